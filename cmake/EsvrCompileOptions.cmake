@@ -1,0 +1,24 @@
+# Warnings and sanitizers for every target of the project, and of no project that contains it.
+if(NOT PROJECT_IS_TOP_LEVEL)
+  return()
+endif()
+
+set(warnings -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  list(APPEND warnings -Wno-restrict) # false alarms on std::string's operator+, GCC bug 105651
+endif()
+add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:${warnings}>")
+# No -Wpedantic for CUDA: nvcc's generated host code is full of line directives in gcc's style.
+list(REMOVE_ITEM warnings -Wpedantic)
+list(JOIN warnings "," forHostCompiler)
+add_compile_options("$<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=${forHostCompiler}>")
+if(ESVR_WERROR)
+  add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:-Werror>"
+                      "$<$<COMPILE_LANGUAGE:CUDA>:-Werror=all-warnings;-Xcompiler=-Werror>")
+endif()
+
+if(ESVR_SANITIZE)
+  set(sanitize -fsanitize=${ESVR_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:${sanitize}>")
+  add_link_options(-fsanitize=${ESVR_SANITIZE})
+endif()

@@ -1,0 +1,43 @@
+# Enables the language CUDA as ESVR_CUDA asks and sets ESVR_WITH_CUDA.
+set(ESVR_WITH_CUDA OFF)
+if(NOT ESVR_CUDA)
+  return()
+endif()
+
+set(ESVR_CUDA_MINIMUM 12.0) # the first nvcc that knows C++20
+
+# nvcc is often installed without being on PATH.
+if(NOT CMAKE_CUDA_COMPILER AND NOT DEFINED ENV{CUDACXX})
+  find_program(ESVR_NVCC nvcc HINTS ENV CUDA_PATH PATHS /usr/local/cuda PATH_SUFFIXES bin)
+  mark_as_advanced(ESVR_NVCC)
+  if(ESVR_NVCC)
+    set(CMAKE_CUDA_COMPILER ${ESVR_NVCC})
+  endif()
+endif()
+
+# The architecture that the project is measured on; `native` and lists are the user's to give.
+if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
+  set(CMAKE_CUDA_ARCHITECTURES 90 CACHE STRING "CUDA architectures")
+endif()
+
+include(CheckLanguage)
+check_language(CUDA)
+if(CMAKE_CUDA_COMPILER)
+  enable_language(CUDA)
+  if(CMAKE_CUDA_COMPILER_VERSION VERSION_GREATER_EQUAL ESVR_CUDA_MINIMUM)
+    find_package(CUDAToolkit REQUIRED)
+    # Not CMAKE_CUDA_STANDARD: before 3.26 CMake does not know nvcc's C++20.
+    # Constexpr functions run on the device too: those of std::array, Coord and voxel offsets.
+    add_compile_options("$<$<COMPILE_LANGUAGE:CUDA>:-std=c++20;--expt-relaxed-constexpr>")
+    set(ESVR_WITH_CUDA ON)
+  endif()
+endif()
+
+if(ESVR_WITH_CUDA)
+  message(STATUS "CUDA: ${CMAKE_CUDA_COMPILER_VERSION} for ${CMAKE_CUDA_ARCHITECTURES}")
+elseif(ESVR_CUDA STREQUAL "AUTO")
+  message(STATUS "CUDA: no nvcc of ${ESVR_CUDA_MINIMUM} or newer, building for the CPU only")
+else()
+  message(FATAL_ERROR "ESVR_CUDA is ${ESVR_CUDA} but there is no working nvcc of "
+                      "${ESVR_CUDA_MINIMUM} or newer")
+endif()

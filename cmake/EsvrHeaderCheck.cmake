@@ -1,0 +1,24 @@
+# Target check_headers: every public header compiles alone, twice in one file; those with code for
+# the device (ESVR_HD) under nvcc too.
+file(GLOB_RECURSE publicHeaders CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/libesvr/include
+     libesvr/include/esvr/*.h)
+
+function(esvr_alone header extension outSources)
+  string(MAKE_C_IDENTIFIER ${header} name)
+  set(source ${PROJECT_BINARY_DIR}/check_headers/${name}.${extension})
+  file(CONFIGURE OUTPUT ${source} CONTENT "#include \"@header@\"\n#include \"@header@\"\n" @ONLY)
+  set(${outSources} ${${outSources}} ${source} PARENT_SCOPE)
+endfunction()
+
+set(sources "")
+foreach(header ${publicHeaders})
+  esvr_alone(${header} cpp sources)
+  file(STRINGS libesvr/include/${header} deviceCode REGEX "ESVR_HD ")
+  if(ESVR_WITH_CUDA AND deviceCode)
+    esvr_alone(${header} cu sources)
+  endif()
+endforeach()
+
+add_library(check_headers OBJECT EXCLUDE_FROM_ALL ${sources})
+target_compile_features(check_headers PRIVATE cxx_std_20)
+target_include_directories(check_headers PRIVATE libesvr/include)

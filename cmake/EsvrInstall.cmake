@@ -1,0 +1,40 @@
+# Installs the library, its headers and the package that find_package(esvr) reads. The component
+# `library` is all that another project needs; programs are in the component `programs`.
+include(CMakePackageConfigHelpers)
+
+set(packageDir ${CMAKE_INSTALL_LIBDIR}/cmake/esvr)
+
+install(
+  TARGETS esvr
+  EXPORT esvrTargets
+  COMPONENT library)
+install(DIRECTORY libesvr/include/esvr TYPE INCLUDE COMPONENT library)
+install(
+  EXPORT esvrTargets
+  NAMESPACE esvr::
+  DESTINATION ${packageDir}
+  COMPONENT library)
+
+get_target_property(libraryType esvr TYPE)
+string(COMPARE EQUAL ${libraryType} STATIC_LIBRARY ESVR_STATIC)
+if(ESVR_WITH_CUDA)
+  set(ESVR_CUDA_IN TRUE)
+else()
+  set(ESVR_CUDA_IN FALSE)
+endif()
+configure_package_config_file(cmake/esvrConfig.cmake.in ${PROJECT_BINARY_DIR}/esvrConfig.cmake
+                              INSTALL_DESTINATION ${packageDir})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/esvrConfigVersion.cmake
+                                 COMPATIBILITY SameMinorVersion)
+file(GLOB findModules CONFIGURE_DEPENDS cmake/Find*.cmake)
+install(
+  FILES ${PROJECT_BINARY_DIR}/esvrConfig.cmake ${PROJECT_BINARY_DIR}/esvrConfigVersion.cmake
+        cmake/EsvrDependencies.cmake ${findModules}
+  DESTINATION ${packageDir}
+  COMPONENT library)
+
+foreach(program vdb2esvr esvr2vdb esvr-sample swc2vdb raw2vdb)
+  if(TARGET ${program})
+    install(TARGETS ${program} COMPONENT programs)
+  endif()
+endforeach()

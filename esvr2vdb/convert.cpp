@@ -1,0 +1,79 @@
+#include <iostream>
+
+#include "cli/interrupts.h"
+#include "cli/output.h"
+#include "esvr/container.h"
+#include "esvr/error.h"
+#include "esvr/grid_names.h"
+#include "esvr2vdb/choose_grids.h"
+#include "esvr2vdb/error_table.h"
+#include "esvr2vdb/jobs.h"
+
+namespace esvr::esvr2vdb {
+namespace {
+
+/// All that can go wrong without work goes wrong before it.
+void checkFiles(const Options& options) {
+  std::vector<std::filesystem::path> files{options.input, options.output};
+  if (options.reference) files.push_back(*options.reference);
+  cli::requireDistinct(files);
+  cli::checkOutput(options.output, {".vdb", ".nvdb"}, options.write.overwrite);
+}
+
+VolumeGrid decoded(const EncodedGrid& grid, const DecodeOptions& options) {
+  VolumeGrid result;
+  result.descriptor = grid.descriptor;
+  result.volume = decodeGrid(grid, options);
+  return result;
+}
+
+void tellEmpty(const VolumeGrid& grid, const cli::Log& log) {
+  if (activeVoxelCount(grid.volume) == 0)
+    log.warning("grid \"" + grid.descriptor.name + "\" comes back without an active voxel");
+}
+
+std::vector<VolumeGrid> decodeAll(const EsvrFile& file, const std::vector<std::size_t>& chosen,
+                                  const Options& options) {
+  const cli::Log log(kProgram, options.verbosity);
+  std::vector<VolumeGrid> grids;
+  for (const std::size_t g : chosen) {
+    grids.push_back(decoded(file.grids[g], options.decode));
+    tellEmpty(grids.back(), log);
+  }
+  return grids;
+}
+
+/// Who is who. The reference is looked through before anything is written.
+std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<std::size_t>& chosen,
+                                       const Options& options) {
+  const auto names = uniqueNames(file);
+  EsvrFile written;
+  for (const std::size_t g : chosen)
+    written.grids.emplace_back().descriptor = file.grids[g].descriptor;
+  const auto writtenNames = uniqueNames(written);
+  std::vector<std::string> referenceNames;
+  for (const auto& grid : inspectVdb(*options.reference).grids) referenceNames.push_back(grid.name);
+  std::vector<ComparedGrid> grids;
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    (void)findGrid(referenceNames, names[chosen[i]], *options.reference);
+    grids.push_back({names[chosen[i]], writtenNames[i]});
+  }
+  return grids;
+}
+
+}  // namespace
+
+void convert(const Options& options) {
+  const cli::Interrupts interrupts;  // a file that is begun is finished
+  checkFiles(options);
+  const EsvrFile file = readEsvr(options.input);
+  const auto chosen = chooseGrids(options.input, file, options.grids);
+  std::vector<ComparedGrid> compared;
+  if (options.reference) compared = counterparts(file, chosen, options);
+  const auto grids = decodeAll(file, chosen, options);
+  if (interrupts.token().cancelled()) throw Cancelled();
+  writeGrids(options.output, file.metadata, grids, options.write);
+  if (options.reference) printErrors(options, compared, std::cout);
+}
+
+}  // namespace esvr::esvr2vdb

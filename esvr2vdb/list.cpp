@@ -1,0 +1,90 @@
+#include <algorithm>
+#include <iostream>
+
+#include "cli/names.h"
+#include "cli/printable.h"
+#include "cli/table.h"
+#include "esvr/container.h"
+#include "esvr2vdb/choose_grids.h"
+#include "esvr2vdb/jobs.h"
+
+namespace esvr::esvr2vdb {
+namespace {
+
+std::string textOf(const Kernel& kernel) {
+  return cli::nameOf(kernel.form) + " " + cli::shortNumber(kernel.kappa);
+}
+
+std::string textOf(const Box& box) {
+  return box.empty() ? "empty" : toString(box.min) + " to " + toString(box.max);
+}
+
+std::string bytesAPrimitive(std::uint64_t bytes, std::size_t primitives) {
+  return primitives == 0 ? "-" : cli::shortNumber(double(bytes) / double(primitives));
+}
+
+struct Listing {
+  EsvrFile file;
+  EsvrSummary summary;
+  std::vector<std::string> names;
+};
+
+void printGrids(const Listing& listing) {
+  cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "kernel, kappa",
+                    "active by", "bytes", "bytes each"});
+  for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
+    const EncodedGrid& grid = listing.file.grids[g];
+    const std::uint64_t bytes = cli::storedBytes(listing.summary, g);
+    const std::size_t primitives = grid.field.primitiveCount();
+    table.add({listing.names[g], cli::nameOf(grid.descriptor.gridClass),
+               cli::nameOf(grid.descriptor.valueType), std::to_string(grid.activeVoxels),
+               std::to_string(primitives), textOf(grid.field.kernel), cli::nameOf(grid.topology),
+               std::to_string(bytes), bytesAPrimitive(bytes, primitives)});
+  }
+  table.print(std::cout);
+}
+
+void printSections(const Listing& listing) {
+  cli::Table table({"section", "of grid", "codec", "bytes", "raw bytes"});
+  for (const auto& s : listing.summary.sections)
+    table.add({s.kind, s.grid < listing.names.size() ? listing.names[s.grid] : "-", s.codec,
+               std::to_string(s.storedBytes), std::to_string(s.rawBytes)});
+  table.print(std::cout);
+}
+
+void printMetadata(const std::string& title, const std::vector<MetaItem>& items) {
+  for (const auto& item : items)
+    std::cout << cli::printable(title + ": " + item.name + " (" + item.type + ")") << '\n';
+}
+
+void printDetails(const Listing& listing) {
+  printMetadata("file metadata", listing.file.metadata);
+  for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
+    const EncodedGrid& grid = listing.file.grids[g];
+    const std::string name = cli::printable(listing.names[g]);
+    std::cout << name << ": " << cli::printable(grid.descriptor.transform.mapType)
+              << ", background " << cli::shortNumber(grid.descriptor.background) << ", values "
+              << cli::shortNumber(grid.valueMin) << " to " << cli::shortNumber(grid.valueMax)
+              << ", threshold " << cli::shortNumber(grid.activeThreshold) << ", active box "
+              << textOf(grid.activeBox) << ", chunks " << grid.field.chunks.size() << '\n';
+    printMetadata(listing.names[g] + " metadata", grid.descriptor.metadata);
+  }
+}
+
+}  // namespace
+
+void list(const Options& options) {
+  Listing listing{readEsvr(options.input), inspectEsvr(options.input), {}};
+  listing.names = uniqueNames(listing.file);
+  std::cout << cli::printable(options.input.string()) << ": .esvr format "
+            << listing.summary.versionMajor << '.' << listing.summary.versionMinor << ", "
+            << listing.summary.fileBytes << " bytes\n\n";
+  printGrids(listing);
+  std::cout << '\n';
+  printSections(listing);
+  if (options.verbosity != cli::Verbosity::kVerbose) return;
+  std::cout << '\n';
+  printDetails(listing);
+}
+
+}  // namespace esvr::esvr2vdb

@@ -1,0 +1,31 @@
+// esvr2vdb: turns an .esvr file back into a VDB, or tells what is in it.
+
+#include "cli/run_main.h"
+#include "cli/thread_limit.h"
+#include "esvr2vdb/jobs.h"
+#include "esvr2vdb/options.h"
+
+namespace {
+
+using namespace esvr::esvr2vdb;
+
+void run(const Options& options) {
+  const esvr::cli::ThreadLimit threads(options.threads);
+  switch (options.job) {
+    case Job::kConvert:
+      return convert(options);
+    case Job::kList:
+      return list(options);
+    case Job::kCheck:
+      return check(options);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return esvr::cli::runMain(kProgram, [&] {
+    if (const auto options = parseOptions(argc, argv)) run(*options);
+    return 0;
+  });
+}

@@ -1,0 +1,116 @@
+#include "esvr2vdb/options.h"
+
+#include <limits>
+
+#include "cli/box_option.h"
+#include "cli/choice.h"
+#include "cli/command_line.h"
+
+namespace esvr::esvr2vdb {
+namespace {
+
+using cli::Arguments;
+using cli::po::bool_switch;
+using cli::po::value;
+
+cli::ProgramText programText() {
+  return {.name = kProgram,
+          .purpose =
+              "Turns the ellipsoids of an .esvr file back into the VDB that they were fitted to:\n"
+              "names, transforms, metadata and background exactly, voxels as close as fitted.\n"
+              "With --list or --check it tells what is in a file.",
+          .usage =
+              "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
+              "  esvr2vdb --list IN.esvr\n"
+              "  esvr2vdb --check IN.esvr",
+          .notes =
+              "OUT may end in .nvdb: it is then a NanoVDB file.\n"
+              "\n"
+              "Active are the voxels that differ from the background by more than a threshold\n"
+              "that was chosen when the file was made; in a level set, those of the narrow band.\n"
+              "\n"
+              "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
+              "be used, 5 memory.",
+          .examples =
+              "  esvr2vdb smoke.esvr smoke.vdb\n"
+              "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   with a table of errors\n"
+              "  esvr2vdb smoke.esvr density.nvdb -g density --half on\n"
+              "  esvr2vdb --list smoke.esvr"};
+}
+
+cli::CommandLine commandLine() {
+  cli::CommandLine line(programText());
+  line.argument("input", "IN.esvr");
+  line.optionalArgument("output", "OUT.vdb");
+  // clang-format off
+  line.options().add_options()
+    ("list", bool_switch(), "print the grids and sections of IN.esvr")
+    ("check", bool_switch(), "read all of IN.esvr and say whether it is whole")
+    ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
+     "write this grid only; may be repeated; 'density[1]' is the second of that name")
+    ("threshold", value<float>()->value_name("T"),
+     "active where the value differs from the background by more (default: as stored)")
+    ("half", value<std::string>()->value_name("W")->default_value("auto"),
+     "save as half: on, off, or auto (as the source was)")
+    ("no-tiles", bool_switch(), "keep leaves whose voxels are all equal")
+    ("reference", value<std::string>()->value_name("REF.vdb"),
+     "print how far the written grids are from this file's")
+    ("box", value<std::string>()->value_name("BOX"),
+     "x0,y0,z0,x1,y1,z1 of the PSNR (default: the reference's active bounding box)")
+    ("force,f", bool_switch(), "replace OUT.vdb if it exists");
+  // clang-format on
+  return line;
+}
+
+Job jobOf(const Arguments& a) {
+  const bool list = a.get<bool>("list"), check = a.get<bool>("check");
+  if (list && check) throw UsageError("--list and --check are two jobs; ask for one");
+  if (!list && !check) return Job::kConvert;
+  for (const char* option : {"output", "grid", "threshold", "reference", "box"})
+    if (a.has(option))
+      throw UsageError(std::string(list ? "--list" : "--check") + " takes IN.esvr only, no " +
+                       option);
+  return list ? Job::kList : Job::kCheck;
+}
+
+std::filesystem::path outputOf(const Arguments& a) {
+  if (!a.has("output")) throw UsageError("missing argument OUT.vdb");
+  return a.get<std::string>("output");
+}
+
+HalfMode halfOf(const Arguments& a) {
+  return cli::choose<HalfMode>(
+      "half", a.get<std::string>("half"),
+      {{"auto", HalfMode::kAuto}, {"on", HalfMode::kOn}, {"off", HalfMode::kOff}});
+}
+
+void readConversion(const Arguments& a, Options& options) {
+  options.output = outputOf(a);
+  options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
+  options.decode.threshold = a.find<float>("threshold");
+  if (options.decode.threshold)
+    cli::requireRange("threshold", *options.decode.threshold, 0.0f,
+                      std::numeric_limits<float>::max());
+  options.write.half = halfOf(a);
+  options.write.constantTiles = !a.get<bool>("no-tiles");
+  options.write.overwrite = a.get<bool>("force");
+  options.reference = a.find<std::string>("reference");
+  if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
+  if (options.box && !options.reference) throw UsageError("--box says nothing without --reference");
+}
+
+}  // namespace
+
+std::optional<Options> parseOptions(int argc, const char* const* argv) {
+  const auto arguments = commandLine().parse(argc, argv);
+  if (!arguments) return std::nullopt;
+  Options options;
+  options.job = jobOf(*arguments);
+  options.input = arguments->get<std::string>("input");
+  options.threads = arguments->threads;
+  options.verbosity = arguments->verbosity;
+  if (options.job == Job::kConvert) readConversion(*arguments, options);
+  return options;
+}
+
+}  // namespace esvr::esvr2vdb

@@ -1,0 +1,36 @@
+#pragma once
+/// What esvr2vdb is asked to do.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/log.h"
+#include "esvr/coord.h"
+#include "esvr/grid_coding.h"
+#include "esvr/vdb_io.h"
+
+namespace esvr::esvr2vdb {
+
+inline constexpr const char* kProgram = "esvr2vdb";
+
+enum class Job { kConvert, kList, kCheck };
+
+struct Options {
+  Job job = Job::kConvert;
+  std::filesystem::path input, output;
+  std::vector<std::string> grids;  ///< empty: all
+  DecodeOptions decode;
+  WriteOptions write;
+  std::optional<std::filesystem::path> reference;
+  std::optional<Box> box;  ///< of the reference's PSNR
+  int threads = 0;         ///< 0: all
+  cli::Verbosity verbosity = cli::Verbosity::kNormal;
+};
+
+/// \return nothing where --help or --version was printed
+/// \throws UsageError
+[[nodiscard]] std::optional<Options> parseOptions(int argc, const char* const* argv);
+
+}  // namespace esvr::esvr2vdb

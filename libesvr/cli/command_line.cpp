@@ -1,0 +1,116 @@
+#include "cli/command_line.h"
+
+#include <boost/program_options/errors.hpp>
+#include <boost/program_options/parsers.hpp>
+#include <iostream>
+#include <limits>
+#include <sstream>
+
+#include "cli/version_text.h"
+
+namespace esvr::cli {
+namespace {
+
+constexpr unsigned kLineLength = 80;
+constexpr unsigned kMinDescriptionLength = 44;
+constexpr const char* kRest = "unexpected arguments";  // no option can have this name
+
+po::options_description commonOptions() {
+  po::options_description common("Common options", kLineLength, kMinDescriptionLength);
+  // clang-format off
+  common.add_options()
+    ("threads", po::value<int>()->value_name("N"), "threads to use (default: all)")
+    ("quiet,q", po::bool_switch(), "print errors only")
+    ("verbose,v", po::bool_switch(), "say more of what is done")
+    ("help,h", po::bool_switch(), "print this text and exit")
+    ("version", po::bool_switch(), "print the versions of all parts and exit");
+  // clang-format on
+  return common;
+}
+
+Arguments withCommonOptions(po::variables_map values) {
+  Arguments arguments{.values = std::move(values)};
+  if (arguments.get<bool>("verbose")) arguments.verbosity = Verbosity::kVerbose;
+  if (arguments.get<bool>("quiet")) arguments.verbosity = Verbosity::kQuiet;
+  if (const auto threads = arguments.find<int>("threads")) {
+    requireRange("threads", *threads, 1, std::numeric_limits<int>::max());
+    arguments.threads = *threads;
+  }
+  return arguments;
+}
+
+void appendSection(std::ostream& out, const char* title, const std::string& text) {
+  if (!text.empty()) out << title << '\n' << text << "\n\n";
+}
+
+}  // namespace
+
+CommandLine::CommandLine(ProgramText text)
+    : text_(std::move(text)),
+      own_("Options", kLineLength, kMinDescriptionLength),
+      common_(commonOptions()) {}
+
+void CommandLine::argument(const std::string& name, const std::string& shown) {
+  arguments_.push_back({name, shown, true});
+}
+
+void CommandLine::optionalArgument(const std::string& name, const std::string& shown) {
+  arguments_.push_back({name, shown, false});
+}
+
+std::string CommandLine::helpText() const {
+  std::ostringstream out;
+  out << text_.purpose << "\n\n";
+  appendSection(out, "Usage:", text_.usage);
+  if (!own_.options().empty()) out << own_ << '\n';
+  out << common_ << '\n';
+  appendSection(out, "Notes:", text_.notes);
+  appendSection(out, "Examples:", text_.examples);
+  std::string help = out.str();
+  help.pop_back();  // the last section's empty line
+  return help;
+}
+
+po::variables_map CommandLine::parseValues(int argc, const char* const* argv) const {
+  po::options_description all, hidden;
+  po::positional_options_description places;
+  for (const Argument& argument : arguments_) {
+    hidden.add_options()(argument.name.c_str(), po::value<std::string>());
+    places.add(argument.name.c_str(), 1);
+  }
+  hidden.add_options()(kRest, po::value<std::vector<std::string>>());
+  places.add(kRest, -1);
+  all.add(own_).add(common_).add(hidden);
+
+  po::variables_map values;
+  po::store(po::command_line_parser(argc, argv).options(all).positional(places).run(), values);
+  po::notify(values);
+  return values;
+}
+
+void CommandLine::requireArguments(const po::variables_map& values) const {
+  for (const Argument& argument : arguments_)
+    if (argument.required && values.count(argument.name) == 0)
+      throw UsageError("missing argument " + argument.shown);
+  if (values.count(kRest) != 0)
+    throw UsageError("unexpected argument '" +
+                     values[kRest].as<std::vector<std::string>>().front() + "'");
+}
+
+std::optional<Arguments> CommandLine::parse(int argc, const char* const* argv) const try {
+  po::variables_map values = parseValues(argc, argv);
+  if (values["help"].as<bool>()) {
+    std::cout << helpText();
+    return std::nullopt;
+  }
+  if (values["version"].as<bool>()) {
+    std::cout << versionText(text_.name);
+    return std::nullopt;
+  }
+  requireArguments(values);
+  return withCommonOptions(std::move(values));
+} catch (const po::error& error) {
+  throw UsageError(error.what());
+}
+
+}  // namespace esvr::cli

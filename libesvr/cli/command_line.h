@@ -1,0 +1,92 @@
+#pragma once
+/// A program's command line: GNU-style options, arguments, --help and --version.
+///
+///     cli::CommandLine line({.name = "esvr-sample", ...});
+///     line.argument("output", "OUT.vdb");
+///     line.options()("resolution", po::value<int>()->value_name("N")->default_value(128), "...");
+///     const auto parsed = line.parse(argc, argv);
+///     if (!parsed) return 0;  // --help or --version was asked for, and is printed
+
+#include <boost/program_options/options_description.hpp>
+#include <boost/program_options/positional_options.hpp>
+#include <boost/program_options/value_semantic.hpp>
+#include <boost/program_options/variables_map.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/log.h"
+#include "esvr/error.h"
+
+namespace esvr::cli {
+
+namespace po = boost::program_options;
+
+/// What a program says of itself in --help. Texts are printed as they are, lines of 80 at most.
+struct ProgramText {
+  std::string name;      ///< "esvr-sample"
+  std::string purpose;   ///< which job it does
+  std::string usage;     ///< command lines, one a line, each beginning with the name
+  std::string notes;     ///< where data comes from and goes to, exit codes of its own; may be empty
+  std::string examples;  ///< commands with a word on each
+};
+
+/// What was given, with the options that all programs share.
+struct Arguments {
+  po::variables_map values;
+  Verbosity verbosity = Verbosity::kNormal;
+  int threads = 0;  ///< 0: as many as the machine has
+
+  [[nodiscard]] bool has(const std::string& option) const { return values.count(option) != 0; }
+  template <class T>
+  [[nodiscard]] const T& get(const std::string& option) const {
+    return values[option].as<T>();
+  }
+  /// Nothing where the option was not given and has no default.
+  template <class T>
+  [[nodiscard]] std::optional<T> find(const std::string& option) const {
+    return has(option) ? std::optional<T>(get<T>(option)) : std::nullopt;
+  }
+};
+
+class CommandLine {
+ public:
+  explicit CommandLine(ProgramText text);
+
+  /// The program's own options, as they appear in --help.
+  po::options_description& options() { return own_; }
+
+  /// Adds an argument without a dash, in order. Its value is a std::string.
+  /// \param shown  as the usage names it: "OUT.vdb"
+  void argument(const std::string& name, const std::string& shown);
+  /// The same for one that may be left out; those come last.
+  void optionalArgument(const std::string& name, const std::string& shown);
+
+  /// \return nothing where --help or --version was printed to stdout
+  /// \throws UsageError  what was given makes no sense
+  [[nodiscard]] std::optional<Arguments> parse(int argc, const char* const* argv) const;
+
+  [[nodiscard]] std::string helpText() const;
+
+ private:
+  struct Argument {
+    std::string name, shown;
+    bool required;
+  };
+  [[nodiscard]] po::variables_map parseValues(int argc, const char* const* argv) const;
+  void requireArguments(const po::variables_map& values) const;
+
+  ProgramText text_;
+  po::options_description own_, common_;
+  std::vector<Argument> arguments_;
+};
+
+/// \throws UsageError  the option's value lies outside [low, high] or is not a number
+template <class T>
+void requireRange(const std::string& option, T value, T low, T high) {
+  if (value >= low && value <= high) return;
+  throw UsageError("--" + option + " must be from " + std::to_string(low) + " to " +
+                   std::to_string(high) + ", not " + std::to_string(value));
+}
+
+}  // namespace esvr::cli

@@ -1,0 +1,52 @@
+#include "cli/output.h"
+
+#include <algorithm>
+#include <string>
+#include <system_error>
+
+#include "core/atomic_file.h"
+#include "esvr/error.h"
+
+namespace esvr::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool sameFile(const fs::path& a, const fs::path& b) {
+  std::error_code ignored;  // what is not there cannot be compared by its inode
+  return fs::equivalent(a, b, ignored) ||
+         fs::weakly_canonical(a, ignored) == fs::weakly_canonical(b, ignored);
+}
+
+std::string alternatives(std::initializer_list<std::string_view> extensions) {
+  std::string text;
+  for (const auto extension : extensions) {
+    if (!text.empty()) text += " or ";
+    text += extension;
+  }
+  return text;
+}
+
+}  // namespace
+
+void checkOutput(const fs::path& path, std::initializer_list<std::string_view> extensions,
+                 bool overwrite) {
+  const std::string given = path.extension().string();
+  if (std::find(extensions.begin(), extensions.end(), given) == extensions.end())
+    throw UsageError("cannot write " + path.string() + ": its name must end in " +
+                     alternatives(extensions));
+  std::error_code unreadable;  // AtomicFile says what is wrong
+  if (!overwrite && fs::exists(path, unreadable))
+    throw RuntimeFailure("cannot write " + path.string() +
+                         ": it exists already (--force replaces it)");
+  AtomicFile probe(path, overwrite);
+}
+
+void requireDistinct(const std::vector<fs::path>& files) {
+  for (std::size_t i = 0; i < files.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (sameFile(files[i], files[j]))
+        throw UsageError(files[j].string() + " and " + files[i].string() + " are one file");
+}
+
+}  // namespace esvr::cli

@@ -1,0 +1,44 @@
+#include "cli/run_main.h"
+
+#include <csignal>
+#include <exception>
+#include <iostream>
+#include <new>
+
+#include "cli/printable.h"
+#include "esvr/error.h"
+
+namespace esvr::cli {
+namespace {
+
+int runAndFlush(const std::function<int()>& body) {
+  const int code = body();
+  std::cout.flush();
+  if (!std::cout) throw RuntimeFailure("cannot write to standard output");
+  return code;
+}
+
+}  // namespace
+
+int runMain(const std::string& program, const std::function<int()>& body) {
+  const auto complain = [&](const std::string& text) {
+    std::cerr << program << ": " << printable(text) << '\n';
+  };
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes is then an error that can be told
+  try {
+    return runAndFlush(body);
+  } catch (const Error& error) {
+    complain(error.what());
+    if (error.kind() == ErrorKind::kUsage)
+      std::cerr << "Try '" << program << " --help' for more information.\n";
+    return error.exitCode();
+  } catch (const std::bad_alloc&) {
+    complain("out of memory");
+    return int(ErrorKind::kDevice);
+  } catch (const std::exception& error) {
+    complain(error.what());
+    return int(ErrorKind::kRuntime);
+  }
+}
+
+}  // namespace esvr::cli

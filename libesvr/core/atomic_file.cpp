@@ -1,0 +1,106 @@
+#include "core/atomic_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <random>
+#include <string>
+#include <system_error>
+
+#include "esvr/error.h"
+
+namespace esvr {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr mode_t kNewFileMode = 0666;  // narrowed by the process's umask
+constexpr mode_t kPermissionBits = 07777;
+
+/// The file that a name stands for: a link's target, so that the link itself survives.
+fs::path followLinks(const fs::path& target) {
+  std::error_code ignored;  // a path that cannot be resolved fails at open, with its own reason
+  const fs::path resolved = fs::weakly_canonical(target, ignored);
+  return resolved.empty() ? target : resolved;
+}
+
+std::string randomSuffix() {
+  std::random_device device;
+  char text[9];
+  std::snprintf(text, sizeof text, "%08x", unsigned(device()));
+  return text;
+}
+
+/// Makes the new name survive a power cut. Not every file system can, and the file is complete
+/// either way, so errors are not failures.
+void flushDirectory(const fs::path& directory) {
+  const int fd = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return;
+  ::fsync(fd);
+  ::close(fd);
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(const fs::path& target, bool overwrite)
+    : target_(followLinks(target)), overwrite_(overwrite) {
+  struct stat status {};
+  const bool exists = ::lstat(target_.c_str(), &status) == 0;
+  if (exists && !S_ISREG(status.st_mode))
+    throw RuntimeFailure("cannot write " + target_.string() + ": it is not a regular file");
+  if (exists && !overwrite)
+    throw RuntimeFailure("cannot write " + target_.string() + ": it exists already");
+  createTemporary(exists ? status.st_mode & kPermissionBits : kNewFileMode);
+}
+
+AtomicFile::~AtomicFile() {
+  if (fd_ >= 0) ::close(fd_);
+  if (!committed_) ::unlink(temporary_.c_str());
+}
+
+void AtomicFile::createTemporary(mode_t mode) {
+  const fs::path directory = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
+  do {
+    temporary_ = directory / (".esvr-" + randomSuffix() + ".tmp");
+    fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+  } while (fd_ < 0 && errno == EEXIST);
+  if (fd_ < 0) fail("cannot write ", errno);
+}
+
+void AtomicFile::write(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd_, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) fail("cannot write ", errno);
+    bytes = bytes.subspan(std::size_t(n));
+  }
+}
+
+void AtomicFile::commit() {
+  if (::fsync(fd_) != 0) fail("cannot flush ", errno);
+  const int closed = ::close(fd_);
+  fd_ = -1;
+  if (closed != 0) fail("cannot flush ", errno);
+  rename();
+  committed_ = true;
+  flushDirectory(temporary_.parent_path());
+}
+
+void AtomicFile::rename() {
+  const unsigned flags = overwrite_ ? 0u : unsigned(RENAME_NOREPLACE);
+  if (::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(), flags) == 0) return;
+  // A file system without RENAME_NOREPLACE: a hard link refuses an existing name as well.
+  const bool unsupported = errno == EINVAL || errno == ENOSYS;
+  if (overwrite_ || !unsupported) fail("cannot name ", errno);
+  if (::link(temporary_.c_str(), target_.c_str()) != 0) fail("cannot name ", errno);
+  ::unlink(temporary_.c_str());
+}
+
+void AtomicFile::fail(const char* what, int error) const {
+  throw RuntimeFailure(what + target_.string() + ": " + std::system_category().message(error));
+}
+
+}  // namespace esvr

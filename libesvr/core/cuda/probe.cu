@@ -1,0 +1,85 @@
+#include <cuda_runtime_api.h>
+
+#include <fstream>
+#include <regex>
+#include <string>
+
+#include "core/cuda/check.h"
+#include "core/cuda_probe.h"
+#include "esvr/device.h"
+
+namespace esvr {
+namespace {
+
+// Architectures that this build has code for, increasing: 900 is sm_90.
+constexpr int kArchitectures[] = {__CUDA_ARCH_LIST__};
+
+std::string version(int packed) {
+  return std::to_string(packed / 1000) + "." + std::to_string(packed % 1000 / 10);
+}
+
+int attribute(cudaDeviceAttr which, int index) {
+  int value = 0;
+  return cudaDeviceGetAttribute(&value, which, index) == cudaSuccess ? value : 0;
+}
+
+/// Devices older than all our code are refused here; whether a newer one takes it is known when a
+/// kernel starts, and says so there.
+std::string whyNotUsable(int index) {
+  const int major = attribute(cudaDevAttrComputeCapabilityMajor, index);
+  const int minor = attribute(cudaDevAttrComputeCapabilityMinor, index);
+  if (major * 100 + minor * 10 < kArchitectures[0])
+    return "compute capability " + std::to_string(major) + "." + std::to_string(minor) +
+           ", this build begins at " + std::to_string(kArchitectures[0] / 100) + "." +
+           std::to_string(kArchitectures[0] / 10 % 10);
+  if (attribute(cudaDevAttrComputeMode, index) == cudaComputeModeProhibited)
+    return "its compute mode is 'prohibited'";
+  return {};
+}
+
+CudaDevice describe(int index) {
+  cudaDeviceProp properties{};
+  const auto status = cudaGetDeviceProperties(&properties, index);
+  if (status != cudaSuccess) return {index, "unknown", cuda::errorText(status)};
+  return {index, properties.name, whyNotUsable(index)};
+}
+
+/// The kernel module's version, as people report it; the runtime only knows the CUDA version that
+/// the driver is made for.
+std::string driverVersion() {
+  int cudaOfDriver = 0;
+  if (cudaDriverGetVersion(&cudaOfDriver) != cudaSuccess || cudaOfDriver == 0) return "no driver";
+  std::ifstream file("/proc/driver/nvidia/version");
+  std::string line;
+  std::smatch match;
+  if (std::getline(file, line) &&
+      std::regex_search(line, match, std::regex(R"(\s(\d+\.\d+(\.\d+)?)\s)")))
+    return "driver " + match[1].str();
+  return "driver for CUDA " + version(cudaOfDriver);
+}
+
+std::string versions() {
+  int runtime = 0;
+  cudaRuntimeGetVersion(&runtime);
+  return "CUDA " + version(runtime) + ", " + driverVersion();
+}
+
+}  // namespace
+
+bool builtWithCuda() noexcept { return true; }
+
+CudaProbe probeCuda() {
+  CudaProbe probe{.versions = versions(), .devices = {}, .whyNoDevices = {}};
+  int count = 0;
+  const auto status = cudaGetDeviceCount(&count);
+  if (status != cudaSuccess) {
+    cudaGetLastError();  // having no GPU is no error of the calls that follow
+    probe.whyNoDevices = cuda::errorText(status);
+  } else if (count == 0) {
+    probe.whyNoDevices = "the driver shows none";
+  }
+  for (int i = 0; i < count; ++i) probe.devices.push_back(describe(i));
+  return probe;
+}
+
+}  // namespace esvr

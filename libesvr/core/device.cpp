@@ -1,0 +1,79 @@
+#include "esvr/device.h"
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <string_view>
+
+#include "core/device_choice.h"
+#include "esvr/error.h"
+
+namespace esvr {
+namespace {
+
+constexpr std::string_view kCudaPrefix = "cuda:";
+
+/// The N of "cuda:N"; nothing where the text is another.
+std::optional<int> cudaIndex(std::string_view text) {
+  if (!text.starts_with(kCudaPrefix)) return std::nullopt;
+  text.remove_prefix(kCudaPrefix.size());
+  if (text.starts_with('-')) return std::nullopt;
+  int index = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), index);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return index;
+}
+
+const CudaDevice* firstUsable(const CudaProbe& probe) {
+  const auto it = std::find_if(probe.devices.begin(), probe.devices.end(),
+                               [](const CudaDevice& d) { return d.whyNotUsable.empty(); });
+  return it == probe.devices.end() ? nullptr : &*it;
+}
+
+Device requireUsable(const CudaProbe& probe) {
+  if (const auto* device = firstUsable(probe)) return {DeviceKind::kCuda, device->index};
+  std::string text = "no CUDA device";
+  if (!probe.whyNoDevices.empty()) text += ": " + probe.whyNoDevices;
+  for (const auto& d : probe.devices)
+    text += "; cuda:" + std::to_string(d.index) + " (" + d.name + "): " + d.whyNotUsable;
+  throw DeviceError(text);
+}
+
+Device requireIndex(const CudaProbe& probe, int index) {
+  const std::string name = std::string(kCudaPrefix) + std::to_string(index);
+  if (!probe.whyNoDevices.empty()) throw DeviceError("no " + name + ": " + probe.whyNoDevices);
+  for (const auto& device : probe.devices) {
+    if (device.index != index) continue;
+    if (!device.whyNotUsable.empty())
+      throw DeviceError(name + " (" + device.name + "): " + device.whyNotUsable);
+    return {DeviceKind::kCuda, index};
+  }
+  throw DeviceError("no " + name + ": there are " + std::to_string(probe.devices.size()) +
+                    " CUDA devices, counted from 0");
+}
+
+}  // namespace
+
+Device chooseDevice(const std::string& text, const CudaProbe& probe) {
+  if (text == "cpu") return {};
+  if (text == "cuda") return requireUsable(probe);
+  if (text == "auto") return firstUsable(probe) ? requireUsable(probe) : Device{};
+  if (const auto index = cudaIndex(text)) return requireIndex(probe, *index);
+  throw UsageError("device '" + text + "' is none of auto, cpu, cuda, cuda:N");
+}
+
+Device selectDevice(const std::string& text) {
+  // "cpu" never wakes the driver.
+  return chooseDevice(text, text == "cpu" ? CudaProbe{} : probeCuda());
+}
+
+std::vector<std::string> cudaDevices() {
+  std::vector<std::string> names;
+  for (const auto& device : probeCuda().devices)
+    if (device.whyNotUsable.empty()) names.push_back(device.name);
+  return names;
+}
+
+std::string cudaVersions() { return probeCuda().versions; }
+
+}  // namespace esvr

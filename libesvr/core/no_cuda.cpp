@@ -1,0 +1,12 @@
+#include "core/cuda_probe.h"
+#include "esvr/device.h"
+
+namespace esvr {
+
+bool builtWithCuda() noexcept { return false; }
+
+CudaProbe probeCuda() {
+  return {.versions = "no CUDA", .devices = {}, .whyNoDevices = "this build has no CUDA"};
+}
+
+}  // namespace esvr

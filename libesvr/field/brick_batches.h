@@ -1,0 +1,18 @@
+#pragma once
+/// Evaluates a field over any number of bricks with a bounded buffer.
+
+#include <functional>
+#include <span>
+
+#include "esvr/coord.h"
+#include "esvr/ellipsoids.h"
+
+namespace esvr {
+
+/// Takes a brick's index corner and its kBrickVoxels values, which it may change.
+using BrickVisitor = std::function<void(Coord, std::span<float>)>;
+
+/// Calls `visit` for every brick, in order, from the calling thread.
+void forEachBrick(const Field& field, std::span<const Coord> corners, const BrickVisitor& visit);
+
+}  // namespace esvr

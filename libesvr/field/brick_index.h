@@ -1,0 +1,47 @@
+#pragma once
+/// Finds a brick by its coordinates: a hash table, so that its size follows the bricks.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "esvr/coord.h"
+
+namespace esvr {
+
+class BrickIndex {
+ public:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  explicit BrickIndex(std::span<const Coord> bricks);
+
+  /// Position of a brick, kNone where there is none.
+  [[nodiscard]] std::uint32_t find(Coord brick) const {
+    for (std::size_t slot = hash(brick) & mask_;; slot = (slot + 1) & mask_) {
+      if (slots_[slot] == kNone) return kNone;
+      if (bricks_[slots_[slot]] == brick) return slots_[slot];
+    }
+  }
+  /// Appends bricks that are not there yet.
+  void append(std::span<const Coord> bricks);
+
+  [[nodiscard]] const std::vector<Coord>& bricks() const { return bricks_; }
+  [[nodiscard]] std::size_t size() const { return bricks_.size(); }
+
+ private:
+  static std::size_t hash(Coord c) {
+    std::uint64_t h = std::uint32_t(c.x) * 0x9e3779b97f4a7c15ull;
+    h = (h ^ (h >> 29)) + std::uint32_t(c.y) * 0xbf58476d1ce4e5b9ull;
+    h = (h ^ (h >> 32)) + std::uint32_t(c.z) * 0x94d049bb133111ebull;
+    return std::size_t(h ^ (h >> 31));
+  }
+  void insert(std::uint32_t position);
+  void rehash();
+
+  std::vector<Coord> bricks_;
+  std::vector<std::uint32_t> slots_;
+  std::size_t mask_ = 0;
+};
+
+}  // namespace esvr

@@ -1,0 +1,254 @@
+// Body of brick_kernels_*.cpp: the same source under other instruction sets. No inline library
+// function may be called here: a copy compiled for AVX-512 could be the one the linker keeps for
+// all.
+//
+// Wants ESVR_KERNEL_NAMESPACE, ESVR_KERNEL_LANES = 8 (a row) or 16 (two rows), and
+// ESVR_KERNEL_NATIVE, the floats in a register: as many, or half of them.
+
+#include "field/brick_kernels.h"
+#include "field/line_math.h"
+
+namespace esvr::ESVR_KERNEL_NAMESPACE {
+namespace {
+
+constexpr int kLanes = ESVR_KERNEL_LANES;    // a row of the brick, or two
+constexpr int kNative = ESVR_KERNEL_NATIVE;  // floats in a register
+constexpr int kRows = kLanes / 8;
+
+typedef float Native __attribute__((vector_size(4 * kNative)));
+typedef int NativeInt __attribute__((vector_size(4 * kNative)));
+
+#if ESVR_KERNEL_NATIVE == ESVR_KERNEL_LANES
+using Vec = Native;
+#else
+/// Two registers that act as one: left to the compiler, wide vectors become scalars.
+struct Vec {
+  Native low, high;
+};
+inline Vec operator+(Vec a, Vec b) { return {a.low + b.low, a.high + b.high}; }
+inline Vec operator-(Vec a, Vec b) { return {a.low - b.low, a.high - b.high}; }
+inline Vec operator*(Vec a, Vec b) { return {a.low * b.low, a.high * b.high}; }
+inline Vec operator+(Vec a, float b) { return {a.low + b, a.high + b}; }
+inline Vec operator-(Vec a, float b) { return {a.low - b, a.high - b}; }
+inline Vec operator*(Vec a, float b) { return {a.low * b, a.high * b}; }
+inline Vec operator*(float a, Vec b) { return b * a; }
+inline Vec& operator+=(Vec& a, Vec b) { return a = a + b; }
+inline Vec& operator+=(Vec& a, float b) { return a = a + b; }
+#endif
+
+/// Applies an operation on registers to one that may be two.
+template <class Operation>
+inline Native each(Operation operation, Native a) {
+  return operation(a);
+}
+template <class Operation>
+inline Native each(Operation operation, Native a, Native b) {
+  return operation(a, b);
+}
+#if ESVR_KERNEL_NATIVE != ESVR_KERNEL_LANES
+template <class Operation>
+inline Vec each(Operation operation, Vec a) {
+  return {operation(a.low), operation(a.high)};
+}
+template <class Operation>
+inline Vec each(Operation operation, Vec a, Vec b) {
+  return {operation(a.low, b.low), operation(a.high, b.high)};
+}
+#endif
+
+inline Vec load(const float* p) {
+  Vec v;
+  __builtin_memcpy(&v, __builtin_assume_aligned(p, 16), sizeof v);
+  return v;
+}
+inline void store(float* p, Vec v) {
+  __builtin_memcpy(__builtin_assume_aligned(p, 16), &v, sizeof v);
+}
+
+alignas(64) constexpr float kLaneZ[16] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
+alignas(64) constexpr float kLaneY[16] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
+
+/// In an order of its own for each instruction set, and the same one always.
+inline float sumLanes(Vec v) {
+  float s[kLanes];
+  __builtin_memcpy(s, &v, sizeof s);
+  float total = 0.0f;
+  for (int i = 0; i < 8; ++i) {
+    float lane = s[i];
+    if constexpr (kRows == 2) lane += s[i + 8];
+    total += lane;
+  }
+  return total;
+}
+
+/// e^x for x in [-87, 88]; below, e^-87. Within 1.5 ulp: x = n ln 2 + r, |r| <= ln 2 / 2, and a
+/// polynomial of degree 6 whose coefficients were fitted at Chebyshev nodes.
+inline Native expApprox(Native x) {
+  constexpr float kLog2e = 1.44269504f, kLn2High = 0.693359375f, kLn2Low = -2.12194440e-4f;
+  constexpr float kRound =
+      12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer in the low bits
+  constexpr Native kLowest = Native{} - 87.0f;
+  x = x > kLowest ? x : kLowest;
+  const Native shifted = x * kLog2e + kRound;
+  const Native n = shifted - kRound;
+  const Native r = (x - n * kLn2High) - n * kLn2Low;
+  Native p = r * 1.39263e-3f + 8.35726e-3f;
+  p = p * r + 4.166655e-2f;
+  p = p * r + 1.6666631e-1f;
+  p = p * r + 0.5f;
+  p = p * r + 1.0f;
+  p = p * r + 1.0f;
+  return (Native)((NativeInt)p + ((NativeInt)shifted << 23));
+}
+
+struct Rows {
+  int begin, end;
+};
+
+inline int clampRow(float y) { return y < 0.0f ? 0 : (y > 8.0f ? 8 : int(y)); }
+
+/// Rows of slice dx that the support can touch. The half width is padded by a voxel's hundredth
+/// against rounding; rows beyond the support contribute exactly zero.
+inline Rows rowsOfSlice(const LineForm& f, float dx, float cy) {
+  const float q = dx / f.halfX;
+  const float left = 1.0f - q * q;
+  const float half = f.halfYx * __builtin_sqrtf(left > 0.0f ? left : 0.0f) + 0.01f;
+  const float mid = cy + f.slopeYx * dx;
+  const int begin = clampRow(mid - half + 1.0f);
+  const int end = clampRow(mid + half + 1.0f);
+  return {begin & ~(kRows - 1), (end + kRows - 1) & ~(kRows - 1)};
+}
+
+inline Rows slices(const LineForm& f, float cx) {
+  return {clampRow(cx - f.halfX - 0.01f + 1.0f), clampRow(cx + f.halfX + 0.01f + 1.0f)};
+}
+
+/// One ellipsoid in the frame of a brick.
+struct Local {
+  float cx, cy;
+  Vec dz;
+  Vec pz[3];  // pz * dz
+};
+
+inline Local localise(const LineForm& f, const float corner[3]) {
+  Local l;
+  l.cx = f.center[0] - corner[0];
+  l.cy = f.center[1] - corner[1];
+  l.dz = load(kLaneZ) - (f.center[2] - corner[2]);
+  for (int j = 0; j < 3; ++j) l.pz[j] = l.dz * f.pz[j];
+  return l;
+}
+
+/// t of row y = 0.
+inline Vec firstDistance(const LineForm& f, const Local& l, float dx) {
+  return distanceAlong(f, load(kLaneY), l.cy, dx, l.dz);
+}
+
+inline Vec phiOf(const KernelConstants<float>& k, Vec m) {
+  return each(
+      [&k](Native v) {
+        const auto inside = v < k.cutoff;
+        const Native clamped = inside ? v : Native{} + k.cutoff;
+        const Native phi = k.numerator / (k.plateau + expApprox(clamped - k.shift)) - k.base;
+        return inside ? phi : Native{};
+      },
+      m);
+}
+
+/// phi' from phi, times the residual: zero where phi is, which is outside the support.
+inline Vec weightOf(const KernelConstants<float>& k, Vec phi, Vec residual) {
+  return each(
+      [&k](Native p, Native r) {
+        const Native quotient = p + k.base;
+        return p > 0.0f ? r * (quotient * (quotient * k.slope - 1.0f)) : Native{};
+      },
+      phi, residual);
+}
+
+template <bool kTape>
+inline void run(const LineForm& f, const float corner[3], const KernelConstants<float>& k,
+                float* sum, PairTape* tape) {
+  const Local l = localise(f, corner);
+  const Rows xs = slices(f, l.cx);
+  float* out = kTape ? tape->phi : nullptr;
+  for (int x = xs.begin; x < xs.end; ++x) {
+    const float dx = float(x) - l.cx;
+    const Rows ys = rowsOfSlice(f, dx, l.cy);
+    const Vec mMin = closestSquared(f, dx, l.pz);
+    Vec t = firstDistance(f, l, dx) + float(ys.begin);
+    float* row = sum + x * 64 + ys.begin * 8;
+    for (int y = ys.begin; y < ys.end; y += kRows, row += kLanes, t += float(kRows)) {
+      const Vec phi = phiOf(k, squaredAt(f, mMin, t));
+      store(row, load(row) + f.intensity * phi);
+      if constexpr (kTape) {
+        store(out, phi);
+        out += kLanes;
+      }
+    }
+    if constexpr (kTape) {
+      tape->yBegin[x] = (signed char)ys.begin;
+      tape->yEnd[x] = (signed char)ys.end;
+    }
+  }
+  if constexpr (kTape) {
+    tape->xBegin = xs.begin;
+    tape->xEnd = xs.end;
+    tape->floats = int(out - tape->phi);
+  }
+}
+
+void add(const LineForm& f, const float corner[3], const KernelConstants<float>& k, float* sum) {
+  run<false>(f, corner, k, sum, nullptr);
+}
+
+void forward(const LineForm& f, const float corner[3], const KernelConstants<float>& k, float* sum,
+             PairTape& tape) {
+  run<true>(f, corner, k, sum, &tape);
+}
+
+void backward(const LineForm& f, const float corner[3], const KernelConstants<float>& k,
+              const float* r, const PairTape& tape, PairMoments& moments) {
+  const Local l = localise(f, corner);
+  Vec s0{}, s0x{}, s0xx{}, s1{}, s1x{}, s2{}, rPhi{}, phi2{};
+  const float* in = tape.phi;
+  for (int x = tape.xBegin; x < tape.xEnd; ++x) {
+    const float dx = float(x) - l.cx;
+    const int begin = tape.yBegin[x], end = tape.yEnd[x];
+    Vec t = firstDistance(f, l, dx) + float(begin);
+    const float* row = r + x * 64 + begin * 8;
+    Vec w0{}, w1{};
+    for (int y = begin; y < end; y += kRows, row += kLanes, in += kLanes, t += float(kRows)) {
+      const Vec phi = load(in), g = load(row);
+      const Vec w = weightOf(k, phi, g);
+      const Vec wt = w * t;
+      w0 += w;
+      w1 += wt;
+      s2 += wt * t;
+      rPhi += g * phi;
+      phi2 += phi * phi;
+    }
+    s0 += w0;
+    s0x += w0 * dx;
+    s0xx += w0 * (dx * dx);
+    s1 += w1;
+    s1x += w1 * dx;
+  }
+  moments = {sumLanes(s0x),
+             sumLanes(s0 * l.dz),
+             sumLanes(s0xx),
+             sumLanes(s0x * l.dz),
+             sumLanes(s0 * l.dz * l.dz),
+             sumLanes(s1),
+             sumLanes(s1x),
+             sumLanes(s1 * l.dz),
+             sumLanes(s2),
+             sumLanes(rPhi),
+             sumLanes(phi2)};
+}
+
+}  // namespace
+
+extern const BrickKernels kKernels;
+const BrickKernels kKernels{ESVR_KERNEL_NAME, add, forward, backward};
+
+}  // namespace esvr::ESVR_KERNEL_NAMESPACE

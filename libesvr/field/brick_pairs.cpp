@@ -1,0 +1,87 @@
+#include "field/brick_pairs.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace esvr {
+namespace {
+
+using Range = tbb::blocked_range<std::size_t>;
+
+void exclusiveSum(std::vector<std::uint32_t>& counts) {
+  std::exclusive_scan(counts.begin(), counts.end(), counts.begin(), 0u);
+}
+
+/// Calls visit(ellipsoid, its n-th pair, brick position) for every pair, ellipsoids in parallel.
+template <class Visit>
+void visitPairs(const BrickIndex& index, std::size_t ellipsoids, const SupportOf& supportOf,
+                Visit&& visit) {
+  tbb::parallel_for(Range(0, ellipsoids, 64), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      std::uint32_t n = 0;
+      forEachReachedBrick(supportOf(i), [&](Coord brick) {
+        if (const auto b = index.find(brick); b != BrickIndex::kNone) visit(i, n++, b);
+      });
+    }
+  });
+}
+
+/// Bricks of each ellipsoid, one list after the other.
+std::vector<std::uint32_t> bricksByEllipsoid(const BrickIndex& index, std::size_t ellipsoids,
+                                             const SupportOf& supportOf,
+                                             std::vector<std::uint32_t>& begin) {
+  begin.assign(ellipsoids + 1, 0);
+  visitPairs(index, ellipsoids, supportOf,
+             [&](std::size_t i, std::uint32_t n, std::uint32_t) { begin[i] = n + 1; });
+  exclusiveSum(begin);
+  std::vector<std::uint32_t> bricks(begin.back());
+  visitPairs(index, ellipsoids, supportOf,
+             [&](std::size_t i, std::uint32_t n, std::uint32_t b) { bricks[begin[i] + n] = b; });
+  return bricks;
+}
+
+}  // namespace
+
+BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
+                       const SupportOf& supportOf) {
+  BrickPairs pairs;
+  const auto bricks = bricksByEllipsoid(index, ellipsoids, supportOf, pairs.ellipsoidBegin);
+  pairs.brickBegin.assign(index.size() + 1, 0);
+  for (const auto b : bricks) ++pairs.brickBegin[b];
+  exclusiveSum(pairs.brickBegin);
+
+  pairs.ellipsoid.resize(bricks.size());
+  pairs.pairOf.resize(bricks.size());
+  auto next = pairs.brickBegin;
+  for (std::size_t i = 0; i < ellipsoids; ++i)
+    for (auto k = pairs.ellipsoidBegin[i]; k != pairs.ellipsoidBegin[i + 1]; ++k) {
+      const auto pair = next[bricks[k]]++;
+      pairs.ellipsoid[pair] = std::uint32_t(i);
+      pairs.pairOf[k] = pair;
+    }
+  return pairs;
+}
+
+std::vector<Coord> missingBricks(const BrickIndex& index, std::size_t ellipsoids,
+                                 const SupportOf& supportOf) {
+  tbb::enumerable_thread_specific<std::vector<Coord>> found;
+  tbb::parallel_for(Range(0, ellipsoids, 64), [&](const Range& range) {
+    auto& mine = found.local();
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      forEachReachedBrick(supportOf(i), [&](Coord brick) {
+        if (index.find(brick) == BrickIndex::kNone) mine.push_back(brick);
+      });
+  });
+  std::vector<Coord> all;
+  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
+  tbb::parallel_sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  return all;
+}
+
+}  // namespace esvr

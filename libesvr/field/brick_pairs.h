@@ -1,0 +1,35 @@
+#pragma once
+/// Which ellipsoids reach which bricks, listed both ways.
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "field/brick_index.h"
+#include "field/support.h"
+
+namespace esvr {
+
+/// Pairs in brick order; within a brick in the ellipsoids' order, so that sums have one order.
+struct BrickPairs {
+  std::vector<std::uint32_t> brickBegin;      ///< bricks + 1: range of a brick's pairs
+  std::vector<std::uint32_t> ellipsoid;       ///< a pair's ellipsoid
+  std::vector<std::uint32_t> ellipsoidBegin;  ///< ellipsoids + 1: range in pairOf
+  std::vector<std::uint32_t> pairOf;          ///< an ellipsoid's pairs, in brick order
+
+  [[nodiscard]] std::size_t pairCount() const { return ellipsoid.size(); }
+};
+
+/// Support of ellipsoid i; called from several threads.
+using SupportOf = std::function<Support(std::size_t)>;
+
+/// Pairs over the bricks of an index. Bricks not in the index are left out.
+[[nodiscard]] BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
+                                     const SupportOf& supportOf);
+
+/// Bricks that some support reaches and the index lacks, in increasing order.
+[[nodiscard]] std::vector<Coord> missingBricks(const BrickIndex& index, std::size_t ellipsoids,
+                                               const SupportOf& supportOf);
+
+}  // namespace esvr

@@ -1,0 +1,31 @@
+#pragma once
+/// A field's ellipsoids as one list, prepared for evaluation.
+
+#include <vector>
+
+#include "esvr/ellipsoids.h"
+#include "field/support.h"
+
+namespace esvr {
+
+struct GatheredField {
+  std::vector<LineForm> forms;                  ///< centers relative to their chunk's origin
+  std::vector<KernelConstants<float>> kernels;  ///< one, or one an ellipsoid
+  std::vector<Coord> origins;                   ///< of the chunks
+  std::vector<std::uint32_t> chunkOf;           ///< of an ellipsoid
+
+  [[nodiscard]] const KernelConstants<float>& kernel(std::size_t i) const {
+    return kernels[kernels.size() == 1 ? 0 : i];
+  }
+  [[nodiscard]] Coord origin(std::size_t i) const { return origins[chunkOf[i]]; }
+};
+
+[[nodiscard]] GatheredField gather(const Field& field);
+
+/// Supports in index coordinates, padded by kRoundingSlack.
+[[nodiscard]] std::vector<Support> supports(const Field& field);
+
+/// Voxels by which supports are padded: float32 centers and forms are off by far less.
+inline constexpr double kRoundingSlack = 0.02;
+
+}  // namespace esvr

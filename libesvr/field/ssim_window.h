@@ -1,0 +1,76 @@
+#pragma once
+/// The Gaussian window of SSIM (Wang et al. 2004) and its sums over the voxels around a brick.
+
+#include <array>
+#include <cstdint>
+
+#include "esvr/coord.h"
+#include "esvr/sparse_volume.h"
+#include "field/window_kernels.h"
+
+namespace esvr {
+
+inline constexpr int kSsimRadius = 5;
+inline constexpr int kSsimTaps = 2 * kSsimRadius + 1;
+inline constexpr double kSsimSigma = 1.5;
+
+/// What SSIM adds to its quotients' terms: (K1 L)^2 and (K2 L)^2 for values of the range L.
+struct SsimConstants {
+  double c1, c2;
+};
+[[nodiscard]] SsimConstants ssimConstants(double peak);
+
+/// A brick with the voxels that its windows reach, z fastest.
+inline constexpr int kHaloSide = kBrickSide + 2 * kSsimRadius;
+inline constexpr int kHaloVoxels = kHaloSide * kHaloSide * kHaloSide;
+inline constexpr Box kWholeHalo{{0, 0, 0}, {kHaloSide - 1, kHaloSide - 1, kHaloSide - 1}};
+inline constexpr Box kWholeBrick{{0, 0, 0}, {kBrickSide - 1, kBrickSide - 1, kBrickSide - 1}};
+using HaloValues = std::array<double, kHaloVoxels>;
+using BrickSums = std::array<double, kBrickVoxels>;
+
+constexpr int haloOffset(int x, int y, int z) { return (x * kHaloSide + y) * kHaloSide + z; }
+
+/// Weights along one axis; they sum to 1.
+[[nodiscard]] std::array<double, kSsimTaps> ssimWeights();
+
+/// The brick's voxels whose windows meet a box of halo coordinates; empty where the box is.
+[[nodiscard]] Box windowsThatSee(const Box& halo);
+/// The halo coordinates that the windows around a box of the brick's voxels meet.
+[[nodiscard]] Box seenByWindows(const Box& voxels);
+
+/// Weighted sums of the windows around a brick's voxels, axis by axis.
+class SsimWindow {
+ public:
+  SsimWindow() : weights_(ssimWeights()) {}
+
+  /// What there is to sum, so that the rest costs nothing.
+  struct Extent {
+    Box support;  ///< halo coordinates outside which every value is zero
+    Box voxels;   ///< of the brick: those whose sums are wanted; rows along z are summed whole
+
+    /// The values that are read, in whole rows along z: all of them must be given.
+    [[nodiscard]] Box read() const;
+  };
+  /// The same bits for every support that holds the values.
+  /// \param out  in voxelOffset order; meaningless outside extent.voxels
+  void sum(const HaloValues& values, const Extent& extent, BrickSums& out);
+  /// Sums of the values' products.
+  void sumProducts(const HaloValues& a, const HaloValues& b, const Extent& extent, BrickSums& out);
+
+  /// Sum along one axis of the weights that lie in [low, high], for a window around `at`: what a
+  /// window clipped at a box's border is divided by.
+  [[nodiscard]] double weightWithin(std::int64_t at, std::int64_t low, std::int64_t high) const;
+
+ private:
+  void alongX(const HaloValues& values, const Extent& extent);
+  void alongY(const Box& voxels);
+  void alongZ(const Box& voxels, BrickSums& out) const;
+
+  const WindowKernels& kernels_ = windowKernels();
+  std::array<double, kSsimTaps> weights_;
+  HaloValues products_{};
+  std::array<double, kBrickSide * kHaloSide * kHaloSide> sumsX_{};
+  std::array<double, kBrickSide * kBrickSide * kHaloSide> sumsXy_{};
+};
+
+}  // namespace esvr

@@ -1,0 +1,45 @@
+#pragma once
+/// Adam (Kingma and Ba 2015) on primitives, in each one's own frame.
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "fit/engine.h"
+#include "fit/primitive.h"
+
+namespace esvr {
+
+/// Largest step a parameter takes in one iteration.
+struct StepSizes {
+  double position = 0.06;   ///< of the semi-axis's scale
+  double shape = 0.06;      ///< relative change of a scale; the same for shears
+  double intensity = 0.06;  ///< of the intensity, at least of kIntensityFloor
+  [[nodiscard]] StepSizes scaled(double f) const {
+    return {position * f, shape * f, intensity * f};
+  }
+};
+
+struct AdamOptions {
+  double beta1 = 0.9;
+  double beta2 = 0.95;  ///< short: the loss has no noise to average out
+};
+
+/// First and second moments of one primitive's gradient.
+struct AdamState {
+  std::array<float, kParameters> m{}, v{};
+  std::uint32_t steps = 0;  ///< since the primitive was placed
+};
+
+/// What a step may lead to.
+struct PrimitiveLimits {
+  double smallestScale, largestScale;        ///< voxels
+  double lowestIntensity, highestIntensity;  ///< in units of the target
+};
+
+/// One step of every primitive.
+void adamStep(std::span<Primitive> primitives, std::span<AdamState> states,
+              std::span<const PrimitiveGradient> gradients, const StepSizes& sizes,
+              const AdamOptions& options, const PrimitiveLimits& limits);
+
+}  // namespace esvr

@@ -1,0 +1,69 @@
+#include "fit/draw_voxels.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+namespace esvr {
+namespace {
+
+/// A uniform number in [0, 1) for draw `n` of a seed.
+double uniform(std::uint64_t seed, std::uint64_t n) {
+  std::uint64_t z =
+      seed * 0x9e3779b97f4a7c15ull + n * 0xbf58476d1ce4e5b9ull + 0x94d049bb133111ebull;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+  return double((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+double energyOf(float r, SignsAllowed signs) {
+  return signs.mends(r) ? double(r) * double(r) : 0.0;
+}
+
+double energy(std::span<const float> values, SignsAllowed signs) {
+  double sum = 0.0;
+  for (const float r : values) sum += energyOf(r, signs);
+  return sum;
+}
+
+/// Running sum of r^2 over bricks; brick b covers [sums[b], sums[b + 1]).
+std::vector<double> energySums(const ResidualField& residual, const DrawOptions& options) {
+  std::vector<double> sums(options.targetBricks + 1, 0.0);
+  tbb::parallel_for(std::size_t(0), options.targetBricks,
+                    [&](std::size_t b) { sums[b + 1] = energy(residual.brick(b), options.signs); });
+  for (std::size_t b = 0; b < options.targetBricks; ++b) sums[b + 1] += sums[b];
+  return sums;
+}
+
+/// The voxel at which the running energy passes `target`; the last with energy where rounding hides
+/// it.
+int voxelAt(std::span<const float> values, SignsAllowed signs, double target) {
+  double sum = 0.0;
+  int last = 0;
+  for (int v = 0; v < kBrickVoxels && sum <= target; ++v) {
+    const double e = energyOf(values[v], signs);
+    if (e > 0.0) last = v;
+    sum += e;
+  }
+  return last;
+}
+
+}  // namespace
+
+std::vector<Coord> drawVoxels(const ResidualField& residual, const DrawOptions& options) {
+  const auto sums = energySums(residual, options);
+  std::vector<Coord> voxels;
+  if (!(sums.back() > 0.0)) return voxels;
+  const double share = sums.back() / double(options.count);
+  for (std::size_t n = 0; n < options.count; ++n) {
+    const double at = (double(n) + uniform(options.seed, n)) * share;
+    const auto after = std::upper_bound(sums.begin(), sums.end() - 1, at);
+    const std::size_t b = std::min(std::size_t(after - sums.begin()), options.targetBricks) - 1;
+    const int v = voxelAt(residual.brick(b), options.signs, at - sums[b]);
+    if (options.signs.mends(residual.brick(b)[v]) && residual.brick(b)[v] != 0.0f)
+      voxels.push_back(residual.index.bricks()[b] * kBrickSide + voxelLocal(v));
+  }
+  return voxels;
+}
+
+}  // namespace esvr

@@ -1,0 +1,202 @@
+#include "fit/engine.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <new>
+
+#include "fit/frame.h"
+#include "fit/parameter_gradient.h"
+
+namespace esvr {
+namespace {
+
+using Range = tbb::blocked_range<std::size_t>;
+constexpr std::size_t kBrickGrain = 4, kPrimitiveGrain = 64;
+
+template <class Constants>
+KernelConstants<float> narrowed(const Constants& k) {
+  return {float(k.shift), float(k.numerator), float(k.plateau), float(k.base),
+          float(k.slope), float(k.cutoff),    float(k.expNegS)};
+}
+
+double sumOfSquares(const float* r) {
+  // Eight partial sums in float32 over 64 terms each, then float64: enough for any loss, and SIMD.
+  float part[8] = {};
+  for (int v = 0; v < kBrickVoxels; v += 8)
+    for (int l = 0; l < 8; ++l) part[l] += r[v + l] * r[v + l];
+  double sum = 0.0;
+  for (const float p : part) sum += double(p);
+  return sum;
+}
+
+struct AlignedDelete {
+  void operator()(float* p) const { ::operator delete[](p, std::align_val_t(64)); }
+};
+
+}  // namespace
+
+/// A thread's tapes of the pairs of one brick.
+struct FitEngine::Scratch {
+  std::vector<PairTape> tapes;
+  std::unique_ptr<float[], AlignedDelete> phi;
+  std::size_t capacity = 0;
+
+  void reserve(std::size_t pairs) {
+    tapes.resize(pairs);
+    if (pairs * kBrickVoxels <= capacity) return;
+    capacity = 2 * pairs * kBrickVoxels;
+    phi.reset(
+        static_cast<float*>(::operator new[](capacity * sizeof(float), std::align_val_t(64))));
+  }
+};
+
+FitEngine::FitEngine(const FitTarget& target, const KernelConstants<double>& kernel)
+    : target_(target),
+      kernel_(kernel),
+      kernelFloat_(narrowed(kernel)),
+      radius_(supportRadius(kernel)),
+      index_(target.bricks) {}
+
+void FitEngine::rebuild(std::span<const Primitive> primitives, double slack) {
+  std::vector<Support> reach(primitives.size());
+  tbb::parallel_for(Range(0, primitives.size(), kPrimitiveGrain), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      reach[i] = makeSupport(primitives[i].center, primitives[i].L, radius_, slack);
+  });
+  const auto supportOf = [&](std::size_t i) -> const Support& { return reach[i]; };
+  index_ = BrickIndex(target_.bricks);
+  if (!target_.narrowBand) index_.append(missingBricks(index_, primitives.size(), supportOf));
+  pairs_ = pairsWithin(index_, primitives.size(), supportOf);
+  moments_.resize(pairs_.pairCount());
+  brickLoss_.resize(index_.size());
+}
+
+void FitEngine::prepare(std::span<const Primitive> primitives) {
+  forms_.resize(primitives.size());
+  frames_.resize(primitives.size());
+  tbb::parallel_for(Range(0, primitives.size(), kPrimitiveGrain), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const Primitive& p = primitives[i];
+      frames_[i] = frameOf(p.center);
+      forms_[i] = makeLineForm(inFrame(p.center, frames_[i]), p.L, radius_, p.intensity);
+    }
+  });
+}
+
+void FitEngine::startFromTarget(std::size_t brick, float* r) const {
+  if (brick >= target_.bricks.size()) {
+    std::fill_n(r, kBrickVoxels, 0.0f);
+    return;
+  }
+  const float* t = target_.values.data() + brick * kBrickVoxels;
+  for (int v = 0; v < kBrickVoxels; ++v) r[v] = -t[v];
+}
+
+/// r = clamp(V, lowest, highest) - target: a narrow band's ends stand for all that is beyond.
+void FitEngine::saturate(std::size_t brick, float* r) const {
+  const float* t = target_.values.data() + brick * kBrickVoxels;
+  const auto low = float(target_.lowest), high = float(target_.highest);
+  for (int v = 0; v < kBrickVoxels; ++v) r[v] = std::clamp(r[v], low - t[v], high - t[v]);
+}
+
+void FitEngine::forwardBrick(std::size_t brick, Scratch& scratch, float* r) const {
+  const auto begin = pairs_.brickBegin[brick], end = pairs_.brickBegin[brick + 1];
+  const Coord corner = index_.bricks()[brick] * kBrickSide;
+  const BrickKernels& kernels = brickKernels();
+  scratch.reserve(end - begin);
+  float* phi = scratch.phi.get();
+  for (auto pair = begin; pair != end; ++pair) {
+    const auto i = pairs_.ellipsoid[pair];
+    PairTape& tape = scratch.tapes[pair - begin];
+    tape.phi = phi;
+    const auto at = cornerIn(frames_[i], corner);
+    kernels.forward(forms_[i], at.data(), kernelFloat_, r, tape);
+    phi += tape.floats;
+  }
+}
+
+void FitEngine::backwardBrick(std::size_t brick, const Scratch& scratch, const float* r) {
+  const auto begin = pairs_.brickBegin[brick], end = pairs_.brickBegin[brick + 1];
+  const Coord corner = index_.bricks()[brick] * kBrickSide;
+  const BrickKernels& kernels = brickKernels();
+  for (auto pair = begin; pair != end; ++pair) {
+    const auto i = pairs_.ellipsoid[pair];
+    const auto at = cornerIn(frames_[i], corner);
+    kernels.backward(forms_[i], at.data(), kernelFloat_, r, scratch.tapes[pair - begin],
+                     moments_[pair]);
+  }
+}
+
+void FitEngine::reduce(std::span<const Primitive> primitives,
+                       std::span<PrimitiveGradient> out) const {
+  tbb::parallel_for(Range(0, primitives.size(), kPrimitiveGrain), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      PairSums sums{};
+      for (auto k = pairs_.ellipsoidBegin[i]; k != pairs_.ellipsoidBegin[i + 1]; ++k)
+        sums.add(moments_[pairs_.pairOf[k]]);
+      out[i] = {parameterGradient(forms_[i], sums), sums.phi2};
+    }
+  });
+}
+
+double FitEngine::gradients(std::span<const Primitive> primitives,
+                            std::span<PrimitiveGradient> out) {
+  prepare(primitives);
+  tbb::enumerable_thread_specific<Scratch> scratches;
+  tbb::parallel_for(Range(0, brickCount(), kBrickGrain), [&](const Range& range) {
+    Scratch& scratch = scratches.local();
+    alignas(64) float r[kBrickVoxels];
+    for (std::size_t b = range.begin(); b != range.end(); ++b) {
+      startFromTarget(b, r);
+      forwardBrick(b, scratch, r);
+      if (target_.narrowBand) saturate(b, r);
+      brickLoss_[b] = sumOfSquares(r);
+      backwardBrick(b, scratch, r);
+    }
+  });
+  reduce(primitives, out);
+  double loss = 0.0;
+  for (const double l : brickLoss_) loss += l;
+  return loss;
+}
+
+void FitEngine::gradientsOf(std::span<const Primitive> primitives,
+                            std::span<const float> lossByValue, std::span<PrimitiveGradient> out) {
+  prepare(primitives);
+  tbb::enumerable_thread_specific<Scratch> scratches;
+  tbb::parallel_for(Range(0, brickCount(), kBrickGrain), [&](const Range& range) {
+    Scratch& scratch = scratches.local();
+    alignas(64) float sum[kBrickVoxels];
+    for (std::size_t b = range.begin(); b != range.end(); ++b) {
+      forwardBrick(b, scratch, sum);
+      backwardBrick(b, scratch, lossByValue.data() + b * kBrickVoxels);
+    }
+  });
+  reduce(primitives, out);
+}
+
+void FitEngine::residuals(std::span<const Primitive> primitives, std::vector<float>& out) {
+  prepare(primitives);
+  out.resize(brickCount() * kBrickVoxels);
+  tbb::parallel_for(Range(0, brickCount(), kBrickGrain), [&](const Range& range) {
+    const BrickKernels& kernels = brickKernels();
+    alignas(64) float r[kBrickVoxels];
+    for (std::size_t b = range.begin(); b != range.end(); ++b) {
+      startFromTarget(b, r);
+      const Coord corner = index_.bricks()[b] * kBrickSide;
+      for (auto pair = pairs_.brickBegin[b]; pair != pairs_.brickBegin[b + 1]; ++pair) {
+        const auto i = pairs_.ellipsoid[pair];
+        kernels.add(forms_[i], cornerIn(frames_[i], corner).data(), kernelFloat_, r);
+      }
+      if (target_.narrowBand) saturate(b, r);
+      std::copy_n(r, kBrickVoxels, out.data() + b * kBrickVoxels);
+    }
+  });
+}
+
+}  // namespace esvr

@@ -1,0 +1,68 @@
+#pragma once
+/// One pass of a fit: from primitives to residuals, loss and gradients, brick by brick.
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "field/brick_kernels.h"
+#include "field/brick_pairs.h"
+#include "fit/primitive.h"
+#include "fit/target.h"
+
+namespace esvr {
+
+/// What a pass tells of one primitive.
+struct PrimitiveGradient {
+  ParameterVector byParameter;  ///< of half the sum of squared residuals, or of the given loss
+  double phi2;                  ///< sum over voxels of phi^2: the curvature by intensity
+};
+
+/// Keeps the pair lists and the prepared forms. Lists hold while no support has moved by more than
+/// the slack they were built with; the caller says when to rebuild.
+class FitEngine {
+ public:
+  FitEngine(const FitTarget& target, const KernelConstants<double>& kernel);
+
+  /// Builds the lists anew, with supports widened by `slack` voxels.
+  void rebuild(std::span<const Primitive> primitives, double slack);
+
+  /// Squared-error pass: gradients of 1/2 sum r^2, r = V - target, over all bricks of the lists.
+  /// \return sum of r^2
+  double gradients(std::span<const Primitive> primitives, std::span<PrimitiveGradient> out);
+
+  /// Writes r for every brick (targetBricks() first, then those only supports reach).
+  void residuals(std::span<const Primitive> primitives, std::vector<float>& out);
+
+  /// Gradients for a loss whose derivative by V is given, kBrickVoxels a brick in residuals' order.
+  void gradientsOf(std::span<const Primitive> primitives, std::span<const float> lossByValue,
+                   std::span<PrimitiveGradient> out);
+
+  [[nodiscard]] const BrickIndex& index() const { return index_; }
+  [[nodiscard]] std::size_t targetBricks() const { return target_.bricks.size(); }
+  [[nodiscard]] std::size_t brickCount() const { return index_.size(); }
+  [[nodiscard]] const BrickPairs& pairs() const { return pairs_; }
+  [[nodiscard]] const KernelConstants<double>& kernel() const { return kernel_; }
+
+ private:
+  struct Scratch;
+  void prepare(std::span<const Primitive> primitives);
+  void startFromTarget(std::size_t brick, float* r) const;
+  void saturate(std::size_t brick, float* r) const;
+  void forwardBrick(std::size_t brick, Scratch& scratch, float* r) const;
+  void backwardBrick(std::size_t brick, const Scratch& scratch, const float* r);
+  void reduce(std::span<const Primitive> primitives, std::span<PrimitiveGradient> out) const;
+
+  const FitTarget& target_;
+  KernelConstants<double> kernel_;
+  KernelConstants<float> kernelFloat_;
+  double radius_;
+  BrickIndex index_;
+  BrickPairs pairs_;
+  std::vector<LineForm> forms_;
+  std::vector<Coord> frames_;  ///< origin of a form's center: near it, so that float32 holds
+  std::vector<PairMoments> moments_;
+  std::vector<double> brickLoss_;
+};
+
+}  // namespace esvr

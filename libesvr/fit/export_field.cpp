@@ -1,0 +1,38 @@
+#include "fit/export_field.h"
+
+#include <cmath>
+#include <map>
+
+#include "fit/frame.h"
+
+namespace esvr {
+namespace {
+
+void append(Ellipsoids& e, const Primitive& p, Coord frame, double scale) {
+  const auto center = inFrame(p.center, frame);
+  const PrincipalAxes axes = principalAxes(p.L);
+  for (std::size_t a = 0; a < 3; ++a) {
+    e.center[a].push_back(float(center[a]));
+    e.logScale[a].push_back(float(std::log(axes.scale[a])));
+  }
+  for (std::size_t a = 0; a < 4; ++a) e.rotation[a].push_back(float(axes.rotation[a]));
+  e.intensity.push_back(float(p.intensity / scale));
+}
+
+}  // namespace
+
+Field exportField(std::span<const Primitive> primitives, const ExportFrame& frame) {
+  std::map<Coord, Ellipsoids> byChunk;
+  for (const Primitive& p : primitives) {
+    const Coord chunk = frameOf(p.center);
+    append(byChunk[chunk], p, chunk, frame.scale);
+  }
+  Field field;
+  field.background = frame.background;
+  field.kernel = frame.kernel;
+  for (auto& [chunk, ellipsoids] : byChunk)
+    field.chunks.push_back({frame.origin + chunk, std::move(ellipsoids)});
+  return field;
+}
+
+}  // namespace esvr

@@ -1,0 +1,21 @@
+#pragma once
+/// From the fit's own form to what files store.
+
+#include <span>
+
+#include "esvr/ellipsoids.h"
+#include "fit/primitive.h"
+
+namespace esvr {
+
+struct ExportFrame {
+  Coord origin;        ///< of the volume, index coordinates
+  double scale = 1.0;  ///< FitTarget::scale
+  float background = 0.0f;
+  Kernel kernel;
+};
+
+/// Principal axes, log scales and intensities in the grid's units; chunks of kChunkExtent.
+[[nodiscard]] Field exportField(std::span<const Primitive> primitives, const ExportFrame& frame);
+
+}  // namespace esvr

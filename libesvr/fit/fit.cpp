@@ -1,0 +1,123 @@
+#include "esvr/fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "esvr/error.h"
+#include "fit/export_field.h"
+#include "fit/pilot.h"
+#include "fit/run.h"
+
+namespace esvr {
+namespace {
+
+/// What a preset stands for.
+struct PresetValues {
+  double voxelsPerPrimitive;  ///< active voxels
+  std::uint32_t iterations;
+};
+PresetValues valuesOf(Preset preset) {
+  switch (preset) {
+    case Preset::kDraft:
+      return {100.0, 400};
+    case Preset::kHigh:
+      return {12.0, 5000};
+    case Preset::kStandard:
+      break;
+  }
+  return {35.0, 1500};
+}
+
+constexpr std::uint32_t kStretchIterations = 400;  // of a --psnr run between two sizes
+constexpr double kFirstGuess = 4.0;  // a --psnr run starts at the preset's count over this
+
+void check(const FitOptions& options) {
+  if (options.count && *options.count == 0) throw UsageError("count must be at least 1");
+  if (options.iterations && *options.iterations == 0)
+    throw UsageError("iterations must be at least 1");
+  if (options.seconds && !(*options.seconds > 0.0)) throw UsageError("seconds must be positive");
+  if (options.psnr && !std::isfinite(*options.psnr)) throw UsageError("psnr must be finite");
+  if (options.kappa && !std::isfinite(*options.kappa)) throw UsageError("kappa must be finite");
+  if (!(options.beta >= 0.0 && options.beta <= 1.0))
+    throw UsageError("beta must be within 0 and 1");
+  if (options.loss == Loss::kPaper && options.narrowBand)
+    throw UsageError(
+        "the paper's loss compares windows, which a narrow band does not fill: use squared");
+  if (options.box && options.box->empty()) throw UsageError("the box is empty");
+}
+
+RunPlan planFor(const FitTarget& target, const FitOptions& options) {
+  const PresetValues preset = valuesOf(options.preset);
+  const auto voxels = std::size_t(target.activeVoxels);
+  const auto most = [&](std::size_t n) { return std::clamp<std::size_t>(n, 1, voxels); };
+  const auto byPreset = most(std::size_t(double(voxels) / preset.voxelsPerPrimitive));
+  RunPlan plan;
+  plan.psnr = options.psnr;
+  plan.seconds = options.seconds;
+  plan.largestCount = most(options.count.value_or(voxels));
+  plan.count = options.psnr ? most(std::size_t(double(byPreset) / kFirstGuess))
+                            : most(options.count.value_or(byPreset));
+  plan.count = std::min(plan.count, plan.largestCount);
+  plan.iterations =
+      options.iterations.value_or(options.psnr ? kStretchIterations : preset.iterations);
+  return plan;
+}
+
+bool anyNegative(const Field& field) {
+  return std::any_of(field.chunks.begin(), field.chunks.end(), [](const Chunk& chunk) {
+    const auto& i = chunk.ellipsoids.intensity;
+    return std::any_of(i.begin(), i.end(), [](float v) { return v < 0.0f; });
+  });
+}
+
+/// Nothing differs from the background: the empty sum is exact.
+FitResult emptyFit(const SparseVolume& volume, const FitOptions& options) {
+  FitResult result;
+  result.field.background = volume.background;
+  result.field.kernel.kappa = options.kappa.value_or(Kernel{}.kappa);
+  CurvePoint point;
+  point.psnrBox = point.psnrActive = kPerfectPsnr;
+  result.curve.push_back(point);
+  return result;
+}
+
+}  // namespace
+
+FitResult fit(const SparseVolume& volume, const FitOptions& options) {
+  check(options);
+  const Tuning tuning;
+  FitTarget target = makeTarget(volume, options.box);
+  target.narrowBand = options.narrowBand;
+  if (target.lowest == 0.0 && target.highest == 0.0) return emptyFit(volume, options);
+
+  Recorder recorder(target, options);
+  const RunPlan plan = planFor(target, options);
+  OptimiserOptions optimiserOptions{{}, options.loss, options.beta, options.seed};
+  FitResult result;
+  if (options.kappa) {
+    optimiserOptions.kernel.kappa = *options.kappa;
+  } else {
+    const auto pilot = chooseKappa(target, plan.count, optimiserOptions, tuning, recorder);
+    optimiserOptions.kernel.kappa = pilot.kappa;
+    result.pilot = pilot.points;
+  }
+  result.secondsPilot = recorder.seconds();
+
+  Optimiser optimiser(target, optimiserOptions, tuning);
+  const RunEnd end = run(optimiser, target, recorder, plan);
+  if (end.end == FitEnd::kCancelled && optimiser.primitives().empty()) throw Cancelled();
+  optimiser.dropUnseen();
+  recorder.record(optimiser, end.iterations);
+
+  result.field = exportField(optimiser.primitives(), {volume.origin, target.scale,
+                                                      volume.background, optimiserOptions.kernel});
+  result.end = end.end;
+  result.curve = recorder.curve();
+  result.pairs = optimiser.pairCount();
+  result.signedIntensities = anyNegative(result.field);
+  result.secondsSeed = optimiser.secondsSeeding();
+  result.secondsOptimise = recorder.seconds() - result.secondsPilot - result.secondsSeed;
+  return result;
+}
+
+}  // namespace esvr

@@ -1,0 +1,40 @@
+#pragma once
+/// From a pair's moments to the gradient by a primitive's parameters: the chain rule, once.
+
+#include "field/brick_kernels.h"
+#include "fit/primitive.h"
+
+namespace esvr {
+
+/// Moments of a primitive's pairs, summed in float64 in the pairs' order.
+struct PairSums {
+  double w0x, w0z, w0xx, w0xz, w0zz, w1, w1x, w1z, w2, rPhi, phi2;
+
+  void add(const PairMoments& m) {
+    w0x += m.w0x, w0z += m.w0z, w0xx += m.w0xx, w0xz += m.w0xz, w0zz += m.w0zz;
+    w1 += m.w1, w1x += m.w1x, w1z += m.w1z, w2 += m.w2, rPhi += m.rPhi, phi2 += m.phi2;
+  }
+};
+
+/// With u = px dx + pz dz + ly t the position in the unit frame,
+///   dL/d delta = -2 I sum r phi' u,   dL/dA_jk = -2 I sum r phi' u_j u_k (twice that off the
+///   diagonal), dL/dI = sum r phi.
+[[nodiscard]] inline ParameterVector parameterGradient(const LineForm& f, const PairSums& s) {
+  const auto first = [&](int j) {
+    return double(f.px[j]) * s.w0x + double(f.pz[j]) * s.w0z + double(f.ly[j]) * s.w1;
+  };
+  const auto second = [&](int j, int k) {
+    const double pxj = f.px[j], pxk = f.px[k], pzj = f.pz[j], pzk = f.pz[k], lyj = f.ly[j],
+                 lyk = f.ly[k];
+    return pxj * pxk * s.w0xx + (pxj * pzk + pzj * pxk) * s.w0xz + pzj * pzk * s.w0zz +
+           (pxj * lyk + lyj * pxk) * s.w1x + (pzj * lyk + lyj * pzk) * s.w1z + lyj * lyk * s.w2;
+  };
+  const double c = -2.0 * f.intensity;
+  return {c * first(0),         c * first(1),
+          c * first(2),         c * second(0, 0),
+          c * second(1, 1),     c * second(2, 2),
+          2 * c * second(0, 1), 2 * c * second(0, 2),
+          2 * c * second(1, 2), s.rPhi};
+}
+
+}  // namespace esvr

@@ -1,0 +1,37 @@
+#include "fit/recorder.h"
+
+#include <cmath>
+
+namespace esvr {
+
+double psnrOf(double squaredSum, double voxels, double peak) {
+  if (squaredSum <= 0.0) return kPerfectPsnr;
+  return std::min(kPerfectPsnr, 10.0 * std::log10(peak * peak * voxels / squaredSum));
+}
+
+double Recorder::seconds() const {
+  return std::chrono::duration<double>(Clock::now() - start_).count();
+}
+
+const CurvePoint& Recorder::record(Optimiser& optimiser, std::uint32_t iteration) {
+  const FitErrors errors = optimiser.measure();
+  CurvePoint point;
+  point.seconds = seconds();
+  point.iteration = iteration;
+  point.primitives = optimiser.primitives().size();
+  point.psnrBox = psnrOf(errors.squaredSumBox, target_.boxVoxels, target_.peak);
+  point.psnrActive = psnrOf(errors.squaredSumActive, double(target_.activeVoxels), target_.peak);
+  point.maxError = errors.largest / target_.scale;
+  curve_.push_back(point);
+  return curve_.back();
+}
+
+void Recorder::report(const CurvePoint& now, double fraction) {
+  constexpr double kInterval = 0.25;  // seconds
+  if (!options_.progress || now.seconds - lastReport_ < kInterval) return;
+  lastReport_ = now.seconds;
+  const double left = fraction > 0.0 ? now.seconds * (1.0 - fraction) / fraction : 0.0;
+  options_.progress({now, fraction, left});
+}
+
+}  // namespace esvr

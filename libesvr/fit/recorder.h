@@ -1,0 +1,42 @@
+#pragma once
+/// A fit's clock, curve and progress reports.
+
+#include <chrono>
+#include <functional>
+#include <vector>
+
+#include "esvr/fit.h"
+#include "fit/optimiser.h"
+
+namespace esvr {
+
+/// 10 log10(peak^2 N / sum of squares); a perfect fit gives kPerfect, so that curves stay finite.
+[[nodiscard]] double psnrOf(double squaredSum, double voxels, double peak);
+inline constexpr double kPerfectPsnr = 999.0;
+
+class Recorder {
+ public:
+  Recorder(const FitTarget& target, const FitOptions& options)
+      : target_(target), options_(options) {}
+
+  [[nodiscard]] double seconds() const;
+  [[nodiscard]] bool cancelled() const { return options_.cancel && options_.cancel->cancelled(); }
+
+  /// Measures exactly and appends a point to the curve.
+  const CurvePoint& record(Optimiser& optimiser, std::uint32_t iteration);
+
+  /// Reports progress if the last report is long enough ago.
+  void report(const CurvePoint& now, double fraction);
+
+  [[nodiscard]] const std::vector<CurvePoint>& curve() const { return curve_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  const FitTarget& target_;
+  const FitOptions& options_;
+  Clock::time_point start_ = Clock::now();
+  double lastReport_ = -1.0;
+  std::vector<CurvePoint> curve_;
+};
+
+}  // namespace esvr

@@ -1,0 +1,29 @@
+#pragma once
+/// Runs an optimiser to what the user asked for.
+
+#include <cstdint>
+#include <optional>
+
+#include "fit/recorder.h"
+#include "fit/schedule.h"
+
+namespace esvr {
+
+/// What a run is to reach, every choice made.
+struct RunPlan {
+  std::size_t count = 0;         ///< with psnr: the first attempt
+  std::size_t largestCount = 0;  ///< with psnr: growth ends here
+  std::uint32_t iterations = 0;
+  std::optional<double> psnr;  ///< dB over the box
+  std::optional<double>
+      seconds;  ///< since the recorder's start; replaces `iterations` as the clock
+};
+
+struct RunEnd {
+  FitEnd end;
+  std::uint32_t iterations;
+};
+
+RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan);
+
+}  // namespace esvr

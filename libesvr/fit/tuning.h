@@ -1,0 +1,32 @@
+#pragma once
+/// The numbers a fit runs on: one place, the same for all data. docs/benchmarks.md says how they
+/// were chosen and what lost.
+
+#include "fit/adam.h"
+
+namespace esvr {
+
+struct Tuning {
+  StepSizes steps;
+  AdamOptions adam;
+  double smallestScale =
+      0.25;  ///< voxels: supports then span a voxel, so that no gaps show between
+  double largestScale = 64.0;
+  double finalStep = 0.2;       ///< step sizes shrink to this fraction over the run
+  double tail = 0.15;           ///< last fraction of the run, over which steps go to zero
+  double firstShare = 0.2;      ///< of the count, seeded at the start
+  double growUntil = 0.3;       ///< fraction of the run by which the rest has been added
+  double relocateUntil = 0.7;   ///< fraction of the run
+  double relocateShare = 0.03;  ///< of the primitives, moved by each event
+  double eventEvery = 0.01;     ///< of the run
+  int eventSpacing = 15;        ///< iterations between events at least: new primitives must settle
+  int graceSteps = 14;          ///< a primitive younger than this is not relocated
+  double seedIntensity = 0.5;   ///< of the residual at a seed: neighbouring seeds overlap
+  double seedWindow = 0.5;      ///< half width over the spacing of seeds
+  double intensityHeadroom = 1.5;  ///< intensities stay within so many times the target's range
+  double listSlack = 0.5;          ///< voxels by which supports are widened in the pair lists
+  int rebuildEvery = 10;           ///< iterations a pair list serves
+  int warmUp = 20;                 ///< iterations over which step sizes rise to their full length
+};
+
+}  // namespace esvr

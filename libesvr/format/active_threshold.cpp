@@ -1,0 +1,91 @@
+#include "format/active_threshold.h"
+
+#include <bit>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "field/brick_batches.h"
+
+namespace esvr::format {
+namespace {
+
+// A bin is a float's exponent and its first 7 bits of mantissa: every scale of values is resolved
+// alike, from 1e-38 to 1e38.
+constexpr int kDroppedBits = 16;
+
+std::size_t binOf(float activity) { return std::bit_cast<std::uint32_t>(activity) >> kDroppedBits; }
+const std::size_t kBins = binOf(std::numeric_limits<float>::max()) + 1;
+
+/// The largest threshold that keeps a bin, and with it all above.
+float thresholdBelow(std::size_t bin) {
+  if (bin == 0) return 0.0f;
+  return std::bit_cast<float>((std::uint32_t(bin) << kDroppedBits) - 1);
+}
+
+struct Tally {
+  std::uint64_t active = 0, inactive = 0;  ///< voxels, by the source's mask
+  double cost = 0.0;  ///< squared error that is added where they are not active
+};
+
+class Histogram {
+ public:
+  void add(const ActivityRule& rule, float value, float wanted, bool active) {
+    const float settled = rule.settled(value);
+    const float activity = rule.activity(settled);
+    if (!(activity > 0.0f)) return;
+    Tally& bin = bins_[binOf(activity)];
+    ++(active ? bin.active : bin.inactive);
+    const double kept = double(wanted) - settled;
+    const double dropped = double(wanted) - rule.inactiveValue(settled);
+    bin.cost += dropped * dropped - kept * kept;
+  }
+
+  [[nodiscard]] ThresholdChoice best(std::uint64_t sourceActive) const {
+    Tally kept = total();
+    double cost = 0.0, bestIou = 0.0;
+    std::size_t first = 0, last = 0;
+    for (std::size_t k = 0; k < bins_.size(); ++k) {
+      const double iou = double(kept.active) / double(sourceActive + kept.inactive);
+      if (cost <= 0.0 && iou > bestIou) {
+        bestIou = iou;
+        first = last = k;
+      } else if (cost <= 0.0 && iou == bestIou && last + 1 == k) {
+        last = k;
+      }
+      kept.active -= bins_[k].active;
+      kept.inactive -= bins_[k].inactive;
+      cost += bins_[k].cost;
+    }
+    return {thresholdBelow((first + last) / 2), bestIou};
+  }
+
+ private:
+  [[nodiscard]] Tally total() const {
+    Tally sum;
+    for (const Tally& bin : bins_) {
+      sum.active += bin.active;
+      sum.inactive += bin.inactive;
+    }
+    return sum;
+  }
+
+  std::vector<Tally> bins_ = std::vector<Tally>(kBins);
+};
+
+}  // namespace
+
+ThresholdChoice chooseThreshold(const SparseVolume& source, const Field& field,
+                                const ActivityRule& rule, std::span<const Coord> bricks) {
+  Histogram histogram;
+  forEachBrick(field, bricks, [&](Coord corner, std::span<float> values) {
+    const auto b = findBrick(source, brickOf(corner - source.origin));
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const float wanted = b ? source.brickValues(*b)[v] : source.background;
+      histogram.add(rule, values[v], wanted, b && source.active[*b].test(v));
+    }
+  });
+  return histogram.best(activeVoxelCount(source));
+}
+
+}  // namespace esvr::format

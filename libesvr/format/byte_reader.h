@@ -1,0 +1,74 @@
+#pragma once
+/// Little-endian bytes taken apart; never reads past their end.
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "esvr/error.h"
+
+namespace esvr::format {
+
+class ByteReader {
+ public:
+  /// \param where  "file: section", begins every error
+  ByteReader(std::span<const std::byte> bytes, std::string where)
+      : bytes_(bytes), where_(std::move(where)) {}
+
+  template <class T>
+  requires std::is_arithmetic_v<T>
+  [[nodiscard]] T get() {
+    T value;
+    std::memcpy(&value, take(sizeof value).data(), sizeof value);
+    return value;
+  }
+
+  /// An enumeration stored in one byte, its values 0 to `last`.
+  template <class Enum>
+  [[nodiscard]] Enum getEnum(Enum last, const char* what) {
+    const auto value = get<std::uint8_t>();
+    if (value > static_cast<std::uint8_t>(last))
+      fail(std::string("unknown ") + what + " " + std::to_string(value));
+    return static_cast<Enum>(value);
+  }
+
+  /// A length in 32 bits, then the bytes.
+  [[nodiscard]] std::span<const std::byte> getSized() { return take(get<std::uint32_t>()); }
+  [[nodiscard]] std::string getString() {
+    const auto bytes = getSized();
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  }
+  [[nodiscard]] std::vector<std::byte> getBlob() {
+    const auto bytes = getSized();
+    return {bytes.begin(), bytes.end()};
+  }
+
+  [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
+
+  /// Refuses bytes that nothing has read.
+  void finish() const {
+    if (left() != 0) fail(std::to_string(left()) + " bytes too many");
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw BadInput(where_ + ": " + what + " (offset " + std::to_string(at_) + " in the content)");
+  }
+
+ private:
+  std::span<const std::byte> take(std::size_t n) {
+    if (n > left()) fail("ends within a value of " + std::to_string(n) + " bytes");
+    const auto taken = bytes_.subspan(at_, n);
+    at_ += n;
+    return taken;
+  }
+
+  std::span<const std::byte> bytes_;
+  std::string where_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace esvr::format

@@ -1,0 +1,47 @@
+#include <string>
+
+#include "esvr/container.h"
+#include "esvr/error.h"
+#include "format/byte_source.h"
+#include "format/section_table.h"
+
+namespace esvr {
+namespace {
+
+using namespace format;
+
+void noteVersion(const SectionTable& table, std::vector<std::string>& notes) {
+  if (table.versionMinor > kVersionMinor)
+    notes.push_back("newer than this reader: " + versions(table.versionMajor, table.versionMinor));
+}
+
+void noteSkipped(const SectionTable& table, std::vector<std::string>& notes) {
+  for (const auto& e : table.entries)
+    if (!known(e.id.kind))
+      notes.push_back("skipped: section " + describe(e.id) + ", " + std::to_string(e.storedBytes) +
+                      " bytes");
+}
+
+void noteGrid(const EncodedGrid& grid, std::vector<std::string>& notes) {
+  const std::string name = "grid '" + grid.descriptor.name + "'";
+  if (grid.field.primitiveCount() == 0) notes.push_back(name + " has no ellipsoids");
+  if (float(grid.descriptor.background) != grid.field.background)
+    notes.push_back(name + " has one background in its descriptor and another in its field");
+}
+
+}  // namespace
+
+std::vector<std::string> checkEsvr(const std::filesystem::path& path) {
+  const auto table = readTable(FileSource(path));
+  const EsvrFile file = readEsvr(path);
+  if (encodeEsvr(file) != encodeEsvr(readEsvr(path)))
+    throw BadInput(path.string() + ": decoding it twice gives two contents");
+
+  std::vector<std::string> notes;
+  noteVersion(table, notes);
+  noteSkipped(table, notes);
+  for (const auto& grid : file.grids) noteGrid(grid, notes);
+  return notes;
+}
+
+}  // namespace esvr

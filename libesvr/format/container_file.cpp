@@ -1,0 +1,31 @@
+#include "core/atomic_file.h"
+#include "esvr/container.h"
+#include "format/byte_source.h"
+#include "format/decode.h"
+#include "format/section_table.h"
+
+namespace esvr {
+
+std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
+                        const ContainerWriteOptions& options) {
+  AtomicFile out(path, options.overwrite);  // refuses before anything is encoded
+  const auto bytes = encodeEsvr(file);
+  out.write(bytes);
+  out.commit();
+  return bytes.size();
+}
+
+EsvrFile readEsvr(const std::filesystem::path& path) {
+  return format::decode(format::FileSource(path));
+}
+
+EsvrSummary inspectEsvr(const std::filesystem::path& path) {
+  const auto table = format::readTable(format::FileSource(path));
+  EsvrSummary summary{table.versionMajor, table.versionMinor, table.fileBytes, {}};
+  for (const auto& e : table.entries)
+    summary.sections.push_back(
+        {format::nameOf(e.id.kind), format::nameOf(e.codec), e.id.grid, e.storedBytes, e.rawBytes});
+  return summary;
+}
+
+}  // namespace esvr

@@ -1,0 +1,12 @@
+#pragma once
+/// A container's bytes, wherever they come from, as grids.
+
+#include "esvr/container.h"
+#include "format/byte_source.h"
+
+namespace esvr::format {
+
+/// \throws BadInput
+[[nodiscard]] EsvrFile decode(const ByteSource& source);
+
+}  // namespace esvr::format

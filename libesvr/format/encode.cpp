@@ -1,0 +1,157 @@
+#include <utility>
+
+#include "esvr/container.h"
+#include "format/byte_writer.h"
+#include "format/checksum.h"
+#include "format/chunk_box.h"
+#include "format/codec.h"
+#include "format/curve_stream.h"
+#include "format/grid_record.h"
+#include "format/leaves_stream.h"
+#include "format/morton_order.h"
+#include "format/planes.h"
+#include "format/section_table.h"
+#include "format/validity.h"
+
+namespace esvr {
+namespace {
+
+using namespace format;
+
+/// Sections on their way into a file, in the order in which they will lie there.
+class Sections {
+ public:
+  /// `typeSize`: bytes of the numbers that the content is made of.
+  void add(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content,
+           std::size_t typeSize) {
+    SectionEntry entry{id, Codec::kRaw, flags, 0, 0, 0, 0};
+    Packed packed = pack(std::move(content), typeSize);
+    entry.codec = packed.codec;
+    entry.rawBytes = packed.rawBytes;
+    entry.storedBytes = packed.bytes.size();
+    entry.checksum = checksum(packed.bytes);
+    table_.entries.push_back(entry);
+    contents_.push_back(std::move(packed.bytes));
+  }
+
+  [[nodiscard]] std::vector<std::byte> assemble() {
+    std::uint64_t end = kHeaderBytes + table_.entries.size() * kEntryBytes;
+    for (auto& entry : table_.entries) {
+      entry.offset = alignUp(end);
+      end = entry.offset + entry.storedBytes;
+    }
+    table_.fileBytes = end;
+
+    ByteWriter file;
+    file.putAll(encodeTable(table_));
+    for (std::size_t i = 0; i < contents_.size(); ++i) {
+      file.padTo(table_.entries[i].offset);
+      file.putAll(contents_[i]);
+    }
+    return file.take();
+  }
+
+ private:
+  SectionTable table_;
+  std::vector<std::vector<std::byte>> contents_;
+};
+
+constexpr std::uint16_t kOptional = 0;
+constexpr std::size_t kByteSize = 1, kFloatSize = sizeof(float), kDoubleSize = sizeof(double);
+
+/// A grid as it is written: its chunks in file order, with their records.
+struct SortedGrid {
+  const EncodedGrid& grid;
+  std::vector<Chunk> chunks;
+  std::vector<ChunkRecord> records;
+};
+
+[[noreturn]] void refuse(const EncodedGrid& grid, const std::string& what) {
+  throw RuntimeFailure("cannot store grid '" + grid.descriptor.name + "': " + what);
+}
+
+void checkGrid(const EncodedGrid& grid) {
+  if (const auto fault = faultOf(grid)) refuse(grid, fault->text);
+  if (grid.topology != TopologyKind::kLeaves && !grid.leaves.empty())
+    refuse(grid, "it has leaves, but a topology without");
+  for (std::size_t c = 0; c < grid.field.chunks.size(); ++c) {
+    const auto& ellipsoids = grid.field.chunks[c].ellipsoids;
+    checkInvariants(ellipsoids);
+    if (const auto fault = faultOf(ellipsoids))
+      refuse(grid, fault->text + " (chunk " + std::to_string(c) + ")");
+  }
+}
+
+SortedGrid sorted(const EncodedGrid& grid) {
+  SortedGrid result{grid, {}, {}};
+  for (const auto& chunk : grid.field.chunks) {
+    result.chunks.push_back({chunk.origin, inMortonOrder(chunk.ellipsoids)});
+    result.records.push_back(
+        {chunk.origin, supportBox(chunk, grid.field.kernel), chunk.ellipsoids.size()});
+  }
+  return result;
+}
+
+void addFileMetadata(Sections& out, const EsvrFile& file) {
+  if (file.metadata.empty()) return;
+  ByteWriter content;
+  putMetadata(content, file.metadata);
+  out.add({SectionKind::kFileMetadata}, kRequired, content.take(), kByteSize);
+}
+
+void addGrid(Sections& out, std::uint32_t g, const SortedGrid& grid) {
+  ByteWriter content;
+  putGrid(content, grid.grid, grid.records);
+  out.add({SectionKind::kGrid, g}, kRequired, content.take(), kByteSize);
+}
+
+/// The grid's own record holds a single chunk's.
+void addChunkTable(Sections& out, std::uint32_t g, const SortedGrid& grid) {
+  if (grid.records.size() < 2) return;
+  ByteWriter content;
+  for (const auto& record : grid.records) putChunk(content, record);
+  out.add({SectionKind::kChunks, g}, kRequired, content.take(), kFloatSize);
+}
+
+void addChunk(Sections& out, std::uint32_t g, std::uint32_t c, const Ellipsoids& e) {
+  const auto add = [&](SectionKind kind, std::span<const Plane> planes) {
+    out.add({kind, g, c}, kRequired, putPlanes(planes), kFloatSize);
+  };
+  if (e.size() == 0) return;
+  add(SectionKind::kCenters, e.center);
+  add(SectionKind::kScales, e.logScale);
+  if (!allIdentity(e.rotation)) add(SectionKind::kRotations, e.rotation);
+  add(SectionKind::kIntensities, {&e.intensity, 1});
+  if (!e.kappa.empty()) add(SectionKind::kKappas, {&e.kappa, 1});
+}
+
+void addExtras(Sections& out, std::uint32_t g, const EncodedGrid& grid) {
+  if (!grid.leaves.empty())
+    out.add({SectionKind::kLeaves, g}, kRequired, putLeaves(grid.leaves), kFloatSize);
+  if (!grid.curve.empty())
+    out.add({SectionKind::kCurve, g}, kOptional, putCurve(grid.curve), kDoubleSize);
+}
+
+}  // namespace
+
+std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
+  std::vector<SortedGrid> grids;
+  for (const auto& grid : file.grids) {
+    checkGrid(grid);
+    grids.push_back(sorted(grid));
+  }
+
+  // What describes comes first: one read at the file's beginning lists it.
+  Sections out;
+  addFileMetadata(out, file);
+  for (std::uint32_t g = 0; g < grids.size(); ++g) addGrid(out, g, grids[g]);
+  for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
+  for (std::uint32_t g = 0; g < grids.size(); ++g) {
+    for (std::uint32_t c = 0; c < grids[g].chunks.size(); ++c)
+      addChunk(out, g, c, grids[g].chunks[c].ellipsoids);
+    addExtras(out, g, grids[g].grid);
+  }
+  return out.assemble();
+}
+
+}  // namespace esvr

@@ -1,0 +1,50 @@
+#include "format/layout.h"
+
+#include <cstdio>
+
+namespace esvr::format {
+namespace {
+
+template <class Id>
+struct Named {
+  Id id;
+  const char* name;
+};
+
+constexpr Named<SectionKind> kKinds[] = {
+    {SectionKind::kFileMetadata, "file metadata"},
+    {SectionKind::kGrid, "grid"},
+    {SectionKind::kChunks, "chunks"},
+    {SectionKind::kLeaves, "leaves"},
+    {SectionKind::kCurve, "curve"},
+    {SectionKind::kCenters, "centers"},
+    {SectionKind::kScales, "scales"},
+    {SectionKind::kRotations, "rotations"},
+    {SectionKind::kIntensities, "intensities"},
+    {SectionKind::kKappas, "kappas"},
+};
+constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
+
+template <class Names, class Id>
+const char* find(const Names& names, Id id) {
+  for (const auto& named : names)
+    if (named.id == id) return named.name;
+  return nullptr;
+}
+
+template <class Names, class Id>
+std::string nameIn(const Names& names, Id id) {
+  if (const char* name = find(names, id)) return name;
+  char text[24];
+  std::snprintf(text, sizeof text, "unknown 0x%x", unsigned(id));
+  return text;
+}
+
+}  // namespace
+
+std::string nameOf(SectionKind kind) { return nameIn(kKinds, kind); }
+std::string nameOf(Codec codec) { return nameIn(kCodecs, codec); }
+bool known(SectionKind kind) { return find(kKinds, kind) != nullptr; }
+bool known(Codec codec) { return find(kCodecs, codec) != nullptr; }
+
+}  // namespace esvr::format

@@ -1,0 +1,63 @@
+#pragma once
+/// The numbers of the .esvr file that docs/format.md specifies: magic, sizes, section kinds,
+/// codecs.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "esvr/container.h"
+
+namespace esvr::format {
+
+/// Not text, and changed by every conversion of line ends: CR LF -> LF, LF -> CR LF, LF -> CR.
+inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
+
+inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
+inline constexpr std::uint16_t kVersionMinor = 0;
+
+inline constexpr std::uint64_t kHeaderBytes = 48;
+inline constexpr std::uint64_t kHeaderChecksumAt = 40;
+inline constexpr std::uint64_t kEntryBytes = 56;
+inline constexpr std::uint64_t kAlignment = 8;  ///< of the table and of every section
+
+/// Grid or chunk of a section that belongs to the whole file or to a whole grid.
+inline constexpr std::uint32_t kNone = 0xffffffff;
+
+enum class SectionKind : std::uint32_t {
+  kFileMetadata = 1,
+  kGrid = 2,
+  kChunks = 3,
+  kLeaves = 4,
+  kCurve = 5,
+  kCenters = 16,
+  kScales = 17,
+  kRotations = 18,
+  kIntensities = 19,
+  kKappas = 20,
+};
+
+enum class Codec : std::uint16_t {
+  kRaw = 0,
+  kBlosc = 1,
+};
+
+/// Flags of a section.
+inline constexpr std::uint16_t kRequired = 1;  ///< a reader that does not know the kind must stop
+
+/// Sizes of records in their sections.
+inline constexpr std::uint64_t kChunkRecordBytes = 44;
+inline constexpr std::uint64_t kCurveRecordBytes = 44;
+
+/// "centers"; "unknown 0x2a".
+[[nodiscard]] std::string nameOf(SectionKind kind);
+[[nodiscard]] std::string nameOf(Codec codec);
+[[nodiscard]] bool known(SectionKind kind);
+[[nodiscard]] bool known(Codec codec);
+
+constexpr std::uint64_t alignUp(std::uint64_t offset) {
+  return (offset + kAlignment - 1) / kAlignment * kAlignment;
+}
+
+}  // namespace esvr::format

@@ -1,0 +1,62 @@
+#include "format/morton_order.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+namespace esvr::format {
+namespace {
+
+constexpr int kBitsPerAxis = 21;  // three of them in a 64-bit key
+constexpr double kCellsPerVoxel = 256.0;
+constexpr double kLastCell = double((1u << kBitsPerAxis) - 1);  // 8192 voxels, two chunk extents
+
+/// Spreads 21 bits so that two zero bits follow each.
+constexpr std::uint64_t spread(std::uint64_t v) {
+  v = (v | v << 32) & 0x1f00000000ffff;
+  v = (v | v << 16) & 0x1f0000ff0000ff;
+  v = (v | v << 8) & 0x100f00f00f00f00f;
+  v = (v | v << 4) & 0x10c30c30c30c30c3;
+  v = (v | v << 2) & 0x1249249249249249;
+  return v;
+}
+
+/// Adds one coordinate to every ellipsoid's key; cells count from the lowest center.
+void addAxis(const std::vector<float>& center, int axis, std::vector<std::uint64_t>& keys) {
+  if (center.empty()) return;
+  const double low = *std::min_element(center.begin(), center.end());
+  for (std::size_t i = 0; i < center.size(); ++i) {
+    const double cell = std::min((center[i] - low) * kCellsPerVoxel, kLastCell);
+    keys[i] |= spread(std::uint64_t(cell)) << axis;
+  }
+}
+
+std::vector<float> picked(const std::vector<float>& values, const std::vector<std::size_t>& order) {
+  std::vector<float> result;
+  if (values.empty()) return result;
+  result.reserve(order.size());
+  for (const auto i : order) result.push_back(values[i]);
+  return result;
+}
+
+}  // namespace
+
+Ellipsoids inMortonOrder(const Ellipsoids& e) {
+  std::vector<std::uint64_t> keys(e.size());
+  for (int axis = 0; axis < 3; ++axis) addAxis(e.center[std::size_t(axis)], axis, keys);
+  std::vector<std::size_t> order(e.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return keys[a] < keys[b]; });
+
+  Ellipsoids sorted;
+  for (std::size_t c = 0; c < 3; ++c) sorted.center[c] = picked(e.center[c], order);
+  for (std::size_t c = 0; c < 3; ++c) sorted.logScale[c] = picked(e.logScale[c], order);
+  for (std::size_t c = 0; c < 4; ++c) sorted.rotation[c] = picked(e.rotation[c], order);
+  sorted.intensity = picked(e.intensity, order);
+  sorted.kappa = picked(e.kappa, order);
+  return sorted;
+}
+
+}  // namespace esvr::format

@@ -1,0 +1,43 @@
+#include "format/section_reader.h"
+
+#include <algorithm>
+
+#include "esvr/error.h"
+#include "format/table_check.h"
+
+namespace esvr::format {
+
+SectionReader::SectionReader(const ByteSource& source)
+    : source_(source), table_(readTable(source)) {
+  for (std::size_t i = 0; i < table_.entries.size(); ++i) unread_[table_.entries[i].id] = i;
+}
+
+std::uint32_t SectionReader::count(SectionKind kind) const {
+  return std::uint32_t(std::count_if(table_.entries.begin(), table_.entries.end(),
+                                     [kind](const auto& e) { return e.id.kind == kind; }));
+}
+
+std::string SectionReader::place(const SectionId& id) const {
+  const auto& entries = table_.entries;
+  const auto it =
+      std::find_if(entries.begin(), entries.end(), [&](const auto& e) { return e.id == id; });
+  if (it == entries.end()) return source_.name() + ": " + describe(id);
+  return placeOf(source_.name(), table_, std::size_t(it - entries.begin()));
+}
+
+std::vector<std::byte> SectionReader::get(const SectionId& id) {
+  const auto node = unread_.extract(id);
+  if (node.empty()) throw BadInput(source_.name() + ": there is no " + describe(id));
+  return readSection(source_, table_, node.mapped());
+}
+
+void SectionReader::finish() {
+  checkGaps(source_, table_);
+  for (const auto& [id, entry] : unread_) {
+    if (known(id.kind))
+      throw BadInput(placeOf(source_.name(), table_, entry) + ": belongs to nothing in the file");
+    (void)readStored(source_, table_, entry);
+  }
+}
+
+}  // namespace esvr::format

@@ -1,0 +1,41 @@
+#pragma once
+/// Hands out a file's sections by what they are of, and knows which were never asked for.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "format/byte_source.h"
+#include "format/section_table.h"
+
+namespace esvr::format {
+
+class SectionReader {
+ public:
+  /// \throws BadInput  header or table damaged
+  explicit SectionReader(const ByteSource& source);
+
+  [[nodiscard]] const SectionTable& table() const { return table_; }
+
+  /// Number of sections of one kind.
+  [[nodiscard]] std::uint32_t count(SectionKind kind) const;
+
+  /// Begins errors about a section, whether it is there or not.
+  [[nodiscard]] std::string place(const SectionId& id) const;
+
+  [[nodiscard]] bool has(const SectionId& id) const { return unread_.contains(id); }
+
+  /// A section's content; each can be had once. \throws BadInput  damaged; there is none
+  [[nodiscard]] std::vector<std::byte> get(const SectionId& id);
+
+  /// Checks what has not been read: bytes between the sections, checksums of unknown sections.
+  /// \throws BadInput  damaged; a known section that belongs to nothing
+  void finish();
+
+ private:
+  const ByteSource& source_;
+  SectionTable table_;
+  std::map<SectionId, std::size_t> unread_;
+};
+
+}  // namespace esvr::format

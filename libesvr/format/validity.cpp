@@ -1,0 +1,62 @@
+#include "format/validity.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <span>
+
+namespace esvr::format {
+namespace {
+
+bool finite(double v) { return std::isfinite(v); }
+
+bool allFinite(std::initializer_list<double> values) {
+  return std::all_of(values.begin(), values.end(), finite);
+}
+
+bool validKernel(const Kernel& kernel) {
+  return finite(kernel.kappa) && kernel.epsilon > 0.0f && kernel.epsilon < 1.0f;
+}
+
+bool validAffine(const Transform& transform) {
+  return !transform.affine ||
+         std::all_of(transform.affine->begin(), transform.affine->end(), finite);
+}
+
+std::optional<Fault> nonFinite(SectionKind section, const char* what,
+                               std::span<const std::vector<float>> planes) {
+  for (const auto& plane : planes) {
+    const auto it = std::find_if_not(plane.begin(), plane.end(), finite);
+    if (it != plane.end())
+      return Fault{section, std::string(what) + " of ellipsoid " +
+                                std::to_string(it - plane.begin()) + " is not finite"};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Fault> faultOf(const EncodedGrid& grid) {
+  const auto fault = [](const char* text) { return Fault{SectionKind::kGrid, text}; };
+  if (!allFinite({grid.descriptor.background, grid.field.background}))
+    return fault("the background is not finite");
+  if (!validAffine(grid.descriptor.transform)) return fault("the affine map is not finite");
+  if (!validKernel(grid.field.kernel))
+    return fault("the kernel's kappa is not finite or its epsilon not between 0 and 1");
+  if (!finite(grid.activeThreshold)) return fault("the threshold is not finite");
+  if (!allFinite({grid.valueMin, grid.valueMax}) || grid.valueMin > grid.valueMax)
+    return fault("the range of values is not finite or empty");
+  return std::nullopt;
+}
+
+std::optional<Fault> faultOf(const Ellipsoids& e) {
+  if (auto f = nonFinite(SectionKind::kCenters, "the center", e.center)) return f;
+  if (auto f = nonFinite(SectionKind::kScales, "a scale", e.logScale)) return f;
+  if (auto f = nonFinite(SectionKind::kRotations, "the rotation", e.rotation)) return f;
+  if (auto f = nonFinite(SectionKind::kIntensities, "the intensity", {&e.intensity, 1})) return f;
+  if (auto f = nonFinite(SectionKind::kKappas, "the kappa", {&e.kappa, 1})) return f;
+  if (!wellFormed(e)) return Fault{SectionKind::kRotations, "a quaternion is not of unit length"};
+  return std::nullopt;
+}
+
+}  // namespace esvr::format

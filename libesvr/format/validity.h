@@ -1,0 +1,24 @@
+#pragma once
+/// What a grid must hold to be written and to be believed: the same rules both ways.
+
+#include <optional>
+#include <string>
+
+#include "esvr/container.h"
+#include "format/layout.h"
+
+namespace esvr::format {
+
+/// A broken rule and the section whose content breaks it.
+struct Fault {
+  SectionKind section;
+  std::string text;
+};
+
+/// All but leaves, curve and chunks: finite numbers, a kernel that can be evaluated, ranges.
+[[nodiscard]] std::optional<Fault> faultOf(const EncodedGrid& grid);
+
+/// Finite parameters, quaternions of unit length.
+[[nodiscard]] std::optional<Fault> faultOf(const Ellipsoids& ellipsoids);
+
+}  // namespace esvr::format

@@ -1,0 +1,98 @@
+#pragma once
+/// The .esvr container: reads, writes and inspects files. docs/format.md specifies every byte.
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "esvr/coord.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/fit_record.h"
+#include "esvr/grid_descriptor.h"
+
+namespace esvr {
+
+inline constexpr std::uint16_t kFormatVersion = 1;
+
+/// How active voxels are found again when the grid is revoxelised.
+enum class TopologyKind {
+  kThreshold = 0,  ///< active where |V - background| > activeThreshold
+  /// As kThreshold, within the stored bricks only. In a level set: the narrow band there, active
+  /// where |V| < background - activeThreshold.
+  kLeaves = 1,
+};
+
+/// One grid of a file.
+struct EncodedGrid {
+  GridDescriptor descriptor;
+  Field field;
+  TopologyKind topology = TopologyKind::kThreshold;
+  float activeThreshold = 0.0f;  ///< negative: active everywhere
+  std::vector<Coord>
+      leaves;  ///< kLeaves: index corners of the source's bricks, increasing; else empty
+  bool nonNegative = true;                 ///< the source had no value below 0: none comes back
+  Box activeBox;                           ///< of the source, index coordinates
+  std::uint64_t activeVoxels = 0;          ///< of the source
+  float valueMin = 0.0f, valueMax = 0.0f;  ///< over the source's active voxels
+  std::vector<CurvePoint> curve;
+};
+
+struct EsvrFile {
+  std::vector<MetaItem> metadata;  ///< the source's file-level metadata, verbatim
+  std::vector<EncodedGrid> grids;
+};
+
+struct ContainerWriteOptions {
+  bool overwrite = false;
+};
+
+/// Writes to a temporary file beside `path`, flushes and renames it.
+/// \return the bytes written
+/// \throws RuntimeFailure  exists (without overwrite), not writable, disk full (a limit on the
+///                         file's size too, where the program ignores SIGXFSZ); as encodeEsvr
+std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
+                        const ContainerWriteOptions& options = {});
+
+/// Reads a whole file. Trusts nothing: every size is checked before it is allocated, every section
+/// against its checksum, every parameter for being finite.
+/// \throws BadInput  missing, not an .esvr, a newer major version, truncated or damaged (says
+/// where)
+[[nodiscard]] EsvrFile readEsvr(const std::filesystem::path& path);
+
+/// The same from and to memory. The same content gives the same bytes. A chunk's ellipsoids are
+/// stored in Morton order of their centers: what comes back is that order, bit for bit the same
+/// ellipsoids.
+/// \throws RuntimeFailure  what no reader would accept: a number that is not finite, a quaternion
+/// not
+///                         of unit length, leaves that are no increasing brick corners
+[[nodiscard]] std::vector<std::byte> encodeEsvr(const EsvrFile& file);
+/// \throws BadInput  as readEsvr
+[[nodiscard]] EsvrFile decodeEsvr(std::span<const std::byte> bytes,
+                                  const std::string& nameForErrors);
+
+/// A row of a file's section table, for --list.
+struct SectionSummary {
+  std::string
+      kind;  ///< "grid", "primitives", ...; "unknown 0x...." where this reader does not know it
+  std::string codec;       ///< "raw", "blosc"
+  std::uint32_t grid = 0;  ///< grid it belongs to, or 0xffffffff for the file
+  std::uint64_t storedBytes = 0, rawBytes = 0;
+};
+struct EsvrSummary {
+  std::uint16_t versionMajor = 0, versionMinor = 0;
+  std::uint64_t fileBytes = 0;
+  std::vector<SectionSummary> sections;
+};
+/// Reads header and section table only. \throws BadInput
+[[nodiscard]] EsvrSummary inspectEsvr(const std::filesystem::path& path);
+
+/// All that readEsvr checks, and that decoding twice gives one content.
+/// \return what a user may want to know of a file that is whole, a line each: sections that this
+///         reader skips, a newer minor version, grids without ellipsoids
+/// \throws BadInput  as readEsvr
+[[nodiscard]] std::vector<std::string> checkEsvr(const std::filesystem::path& path);
+
+}  // namespace esvr

@@ -1,0 +1,77 @@
+#pragma once
+/// Fits ellipsoids to a sparse volume.
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "esvr/coord.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/fit_record.h"
+#include "esvr/progress.h"
+#include "esvr/sparse_volume.h"
+
+namespace esvr {
+
+enum class Loss {
+  kSquared,  ///< mean squared error: what PSNR asks for
+  kPaper     ///< beta L1 + (1 - beta) D-SSIM (paper, eq. 7)
+};
+enum class Preset { kDraft, kStandard, kHigh };
+
+/// What a run reports while it goes on, about four times a second.
+struct FitProgress {
+  CurvePoint point;
+  double fraction = 0.0;     ///< of the run, 0..1
+  double secondsLeft = 0.0;  ///< estimate
+};
+
+/// What to reach. Targets combine: the run ends at the first of psnr, seconds and iterations that
+/// is met; all that are not given follow from the preset and the data.
+struct FitOptions {
+  std::optional<std::size_t> count;         ///< ellipsoids; with psnr: at most so many
+  std::optional<double> psnr;               ///< dB over the box; grows until reached
+  std::optional<double> seconds;            ///< best within a time
+  std::optional<std::uint32_t> iterations;  ///< length of the schedule
+  Preset preset = Preset::kStandard;
+  Loss loss = Loss::kSquared;
+  double beta = 0.2;           ///< of Loss::kPaper
+  std::optional<float> kappa;  ///< the scene's edge; default: a short pilot decides
+  std::optional<Box> box;      ///< of 'PSNR over the box'; default: the active bounding box
+  /// A level set: values beyond the volume's range count as its ends (they saturate when the grid
+  /// is revoxelised as a narrow band), and what lies outside its bricks counts for nothing.
+  bool narrowBand = false;
+  std::uint64_t seed = 1;
+  const CancelToken* cancel = nullptr;  ///< a cancelled fit returns the best so far, marked so
+  std::function<void(const FitProgress&)> progress;
+};
+
+enum class FitEnd { kScheduleDone, kPsnrReached, kTimeUp, kCancelled, kPsnrMissed };
+
+/// One candidate of the pilot that chooses kappa.
+struct PilotPoint {
+  float kappa = 0.0f;
+  double psnrBox = 0.0;
+};
+
+struct FitResult {
+  Field field;
+  std::vector<CurvePoint> curve;
+  FitEnd end = FitEnd::kScheduleDone;
+  std::vector<PilotPoint> pilot;  ///< empty where kappa was given
+  /// Wall clock by phase; seeding (at the start, growth, relocation) is not in secondsOptimise.
+  double secondsSeed = 0.0, secondsPilot = 0.0, secondsOptimise = 0.0;
+  std::uint64_t pairs = 0;         ///< (primitive, brick) pairs that the final field evaluates
+  bool signedIntensities = false;  ///< some intensity is negative
+};
+
+/// Deterministic: the same volume, options and seed give the same bits on any number of threads,
+/// unless `seconds` ends the run.
+/// \throws BadInput  no active voxel; UsageError: count 0, options that contradict each other;
+///         Cancelled: before there was anything to return
+[[nodiscard]] FitResult fit(const SparseVolume& volume, const FitOptions& options);
+
+}  // namespace esvr

@@ -1,0 +1,32 @@
+#pragma once
+/// From a fitted field to what a file stores of a grid, and from there back to voxels.
+
+#include <optional>
+
+#include "esvr/container.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/grid_descriptor.h"
+#include "esvr/sparse_volume.h"
+
+namespace esvr {
+
+/// Completes a fitted field with what the file says of its source, and chooses the rule by which
+/// active voxels are found again:
+///  - usually a threshold, the one whose active voxels overlap best with the source's (intersection
+///    over union) among those that leave the squared error as it is or lower it;
+///  - in a level set whose active voxels all lie within its half width, the narrow band in the
+///    source's bricks;
+///  - where no threshold brings a voxel back, since all values equal the background, the source's
+///    bricks, active throughout.
+/// The curve is left empty.
+[[nodiscard]] EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source,
+                                     Field field);
+
+struct DecodeOptions {
+  std::optional<float> threshold;  ///< instead of the grid's own; 0 or above
+};
+
+/// The voxels that a file gives back. \throws UsageError  threshold negative or not finite
+[[nodiscard]] SparseVolume decodeGrid(const EncodedGrid& grid, const DecodeOptions& options = {});
+
+}  // namespace esvr

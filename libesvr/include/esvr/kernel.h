@@ -1,0 +1,107 @@
+#pragma once
+/// The kernel family phi of an ellipsoid, with its derivatives, written once for host and device.
+///
+///     phi(m) = ((1 + E) / (E + e^m) - eps) / (1 - eps)     for m < cutoff = ln((1 + E) / eps - E),
+///     else 0 E = e^kappa,   m = | S^-1 R^T (x - mu) |^2
+///
+/// kappa is the edge. kappa = k is the paper's sigmoid ellipsoid sigma(k (1 - q)) / sigma(k) with
+/// m = k q (paper, eq. 5, section 3.1), that is with our scales sqrt(k) times smaller than the
+/// paper's; kappa -> -inf is the Gaussian e^-m. The shift by eps makes phi continuous where its
+/// support ends; the paper's own kernel jumps there and is kept for reproduction
+/// (KernelForm::kPaper).
+///
+/// Everything is evaluated with e^-s taken out, s = max(kappa, 0), so that no kappa from -1e4 to
+/// 1e4 overflows:  (1 + E) / (E + e^m) = A / (B + e^(m - s)),  A = e^-s + e^(kappa - s),  B =
+/// e^(kappa - s).
+
+#include <cmath>
+
+#if defined(__CUDACC__)
+#define ESVR_HD __host__ __device__
+#else
+#define ESVR_HD
+#endif
+
+namespace esvr {
+
+enum class KernelForm {
+  kContinuous = 0,  ///< shifted by eps, zero at the end of its support
+  kPaper = 1        ///< no shift, support ends at q = 1.42^2 (paper, section 5)
+};
+
+/// A kernel as a file names it.
+struct Kernel {
+  static constexpr float kDefaultEpsilon = 0.006f;  ///< the paper's kernel at its cutoff, rounded
+  static constexpr float kPaperCutoff = 1.42f;      ///< support radius in the paper's scales
+
+  KernelForm form = KernelForm::kContinuous;
+  float kappa = 2.0f;
+  float epsilon = kDefaultEpsilon;
+  friend bool operator==(const Kernel&, const Kernel&) = default;
+};
+
+/// Constants of one kernel, computed in float64 and rounded once.
+template <class Real>
+struct KernelConstants {
+  Real shift;      ///< s
+  Real numerator;  ///< A / (1 - eps)
+  Real plateau;    ///< B
+  Real base;       ///< eps / (1 - eps): subtracted from the quotient
+  Real slope;      ///< (1 - eps) B / A: turns the quotient into B / (B + y)
+  Real cutoff;     ///< m at which the support ends
+  Real expNegS;    ///< e^-s
+};
+
+template <class Real>
+KernelConstants<Real> kernelConstants(const Kernel& kernel, double kappa) {
+  const bool paper = kernel.form == KernelForm::kPaper;
+  const double s = kappa > 0.0 ? kappa : 0.0;
+  const double expNegS = std::exp(-s);
+  const double b = std::exp(kappa - s);
+  const double a = expNegS + b;
+  const double eps = paper ? 0.0 : double(kernel.epsilon);
+  const double norm = 1.0 / (1.0 - eps);
+  const double cutoff = paper ? kappa * double(Kernel::kPaperCutoff) * double(Kernel::kPaperCutoff)
+                              : s + std::log(a / eps - b);
+  return {Real(s),      Real(a * norm), Real(b), Real(eps * norm), Real(b / (a * norm)),
+          Real(cutoff), Real(expNegS)};
+}
+template <class Real>
+KernelConstants<Real> kernelConstants(const Kernel& kernel) {
+  return kernelConstants<Real>(kernel, double(kernel.kappa));
+}
+
+/// phi and its derivatives at one m.
+template <class Real>
+struct KernelValue {
+  Real phi;
+  Real dPhiDm;      ///< by m
+  Real dPhiDkappa;  ///< by kappa, the support's end held fixed
+};
+
+/// phi at m = c.cutoff and beyond is 0; m >= 0.
+template <class Real>
+ESVR_HD inline Real kernelPhi(const KernelConstants<Real>& c, Real m) {
+  if (!(m < c.cutoff)) return Real(0);
+  return c.numerator / (c.plateau + std::exp(m - c.shift)) - c.base;
+}
+
+template <class Real>
+ESVR_HD inline KernelValue<Real> kernelValue(const KernelConstants<Real>& c, Real m) {
+  if (!(m < c.cutoff)) return {Real(0), Real(0), Real(0)};
+  const Real y = std::exp(m - c.shift);
+  const Real inv = Real(1) / (c.plateau + y);
+  const Real quotient = c.numerator * inv;
+  // d/dE ((1 + E) / (E + e^m)) * E, scaled: B (y - e^-s) / (B + y)^2, over (1 - eps) = numerator /
+  // A
+  const Real norm = c.base + Real(1);
+  return {quotient - c.base, -quotient * y * inv, norm * c.plateau * (y - c.expNegS) * inv * inv};
+}
+
+/// Radius of the support in units of the scales: x is inside where |S^-1 R^T (x - mu)| < radius.
+template <class Real>
+ESVR_HD inline Real supportRadius(const KernelConstants<Real>& c) {
+  return std::sqrt(c.cutoff);
+}
+
+}  // namespace esvr

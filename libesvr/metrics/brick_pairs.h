@@ -1,0 +1,60 @@
+#pragma once
+/// The bricks of two volumes side by side: what every metric walks over.
+
+#include <vector>
+
+#include "esvr/coord.h"
+#include "esvr/sparse_volume.h"
+
+namespace esvr::metrics {
+
+/// One place where at least one of two volumes has a brick.
+struct BrickPair {
+  Coord brick;                       ///< in bricks of index space: corner / 8
+  const float* reference = nullptr;  ///< null where only the candidate has a brick here
+  const float* candidate = nullptr;  ///< null where only the reference has one
+  const BrickMask* referenceActive = nullptr;
+  const BrickMask* candidateActive = nullptr;
+};
+
+/// The union of both volumes' bricks, in increasing order of Coord. Points into the volumes.
+[[nodiscard]] std::vector<BrickPair> pairBricks(const SparseVolume& reference,
+                                                const SparseVolume& candidate);
+
+/// The two volumes' values outside their bricks.
+struct Backgrounds {
+  double reference = 0.0, candidate = 0.0;
+};
+
+/// A pair's voxels, with the backgrounds standing in where a side has no brick.
+class PairValues {
+ public:
+  PairValues(const BrickPair& pair, const Backgrounds& backgrounds)
+      : pair_(pair), backgrounds_(backgrounds) {}
+
+  [[nodiscard]] double reference(int offset) const {
+    return pair_.reference ? pair_.reference[offset] : backgrounds_.reference;
+  }
+  [[nodiscard]] double candidate(int offset) const {
+    return pair_.candidate ? pair_.candidate[offset] : backgrounds_.candidate;
+  }
+  [[nodiscard]] double error(int offset) const { return reference(offset) - candidate(offset); }
+  [[nodiscard]] bool referenceActive(int offset) const {
+    return pair_.referenceActive && pair_.referenceActive->test(offset);
+  }
+  [[nodiscard]] bool candidateActive(int offset) const {
+    return pair_.candidateActive && pair_.candidateActive->test(offset);
+  }
+  [[nodiscard]] Coord voxel(int offset) const {
+    return pair_.brick * kBrickSide + voxelLocal(offset);
+  }
+
+ private:
+  const BrickPair& pair_;
+  const Backgrounds& backgrounds_;
+};
+
+/// The voxels of a brick that lie in a box, as local coordinates; empty where there are none.
+[[nodiscard]] Box localBox(Coord brick, const Box& box);
+
+}  // namespace esvr::metrics

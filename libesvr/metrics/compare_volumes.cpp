@@ -1,0 +1,128 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "esvr/error.h"
+#include "esvr/metrics.h"
+#include "metrics/brick_pairs.h"
+#include "metrics/error_sums.h"
+#include "metrics/order_statistic.h"
+
+namespace esvr {
+namespace {
+
+using metrics::Backgrounds;
+using metrics::BrickPair;
+using metrics::ErrorSums;
+
+constexpr std::uint64_t kP999Permille = 999;
+
+double choosePeak(const SparseVolume& reference, const CompareOptions& options) {
+  const double peak = options.peak ? *options.peak : peakOf(reference);
+  if (!(peak > 0.0) || !std::isfinite(peak))
+    throw UsageError("the peak must be positive, not " + std::to_string(peak));
+  return peak;
+}
+
+Box chooseBox(const SparseVolume& reference, const CompareOptions& options) {
+  const Box box = options.box.value_or(activeBox(reference));
+  if (box.empty())
+    throw UsageError("the box from " + toString(box.min) + " to " + toString(box.max) +
+                     " has no voxel");
+  return box;
+}
+
+/// Successor of a brick in the order of Coord among the bricks of a box.
+Coord nextBrick(Coord brick, const Box& bricks) {
+  if (++brick.z <= bricks.max.z) return brick;
+  brick.z = bricks.min.z;
+  if (++brick.y <= bricks.max.y) return brick;
+  brick.y = bricks.min.y;
+  ++brick.x;
+  return brick;
+}
+
+/// First voxel of the box outside all pairs. Takes one step a pair at most, since each step away
+/// from a free place needs a pair in the way.
+Coord firstFreeVoxel(std::span<const BrickPair> pairs, const Box& box) {
+  const Box bricks{brickOf(box.min), brickOf(box.max)};
+  Coord place = bricks.min;
+  for (const BrickPair& pair : pairs) {
+    if (!bricks.contains(pair.brick)) continue;
+    if (pair.brick != place) break;
+    place = nextBrick(place, bricks);
+  }
+  return maxCoord(place * kBrickSide, box.min);
+}
+
+/// Adds the voxels of the box that lie in no brick: each differs by the backgrounds' difference.
+void addEmptySpace(ErrorSums& sums, std::span<const BrickPair> pairs,
+                   const metrics::ErrorDomain& domain) {
+  const double empty = domain.box.volume() - sums.voxels;
+  const double error = std::abs(domain.backgrounds.reference - domain.backgrounds.candidate);
+  if (empty < 1.0) return;
+  sums.squaredError += empty * error * error;
+  if (error <= sums.maxError) return;
+  sums.maxError = error;
+  sums.maxErrorAt = firstFreeVoxel(pairs, domain.box);
+}
+
+void refuseNonFinite(const ErrorSums& sums, const Backgrounds& backgrounds) {
+  if (sums.nonFinite)
+    throw BadInput("the value at " + toString(*sums.nonFinite) + " is not finite");
+  if (!std::isfinite(backgrounds.reference) || !std::isfinite(backgrounds.candidate))
+    throw BadInput("the background is not finite");
+}
+
+VolumeMetrics metricsOf(const ErrorSums& sums, double peak, double boxVoxels) {
+  VolumeMetrics m;
+  m.peak = peak;
+  m.boxVoxels = boxVoxels;
+  m.activeVoxels = sums.activeReference;
+  m.mseBox = sums.squaredError / boxVoxels;
+  m.mseActive = sums.squaredErrorActive / double(sums.activeReference);
+  m.psnrBox = psnr(m.mseBox, peak);
+  m.psnrActive = psnr(m.mseActive, peak);
+  m.maxError = sums.maxError;
+  m.maxErrorAt = sums.maxErrorAt;
+  m.iou = double(sums.activeIntersection) / double(sums.activeUnion);
+  m.massReference = sums.massReference;
+  m.massCandidate = sums.massCandidate;
+  return m;
+}
+
+}  // namespace
+
+double peakOf(const SparseVolume& reference) {
+  const ValueRange range = activeRange(reference);
+  const double peak = range.max > 0.0f ? range.max : -double(range.min);
+  return peak > 0.0 ? peak : 1.0;
+}
+
+double psnr(double mse, double peak) {
+  if (mse == 0.0) return std::numeric_limits<double>::infinity();
+  return 20.0 * std::log10(peak) - 10.0 * std::log10(mse);
+}
+
+VolumeMetrics compareVolumes(const SparseVolume& reference, const SparseVolume& candidate,
+                             const CompareOptions& options) {
+  if (activeVoxelCount(reference) == 0) throw BadInput("the reference has no active voxel");
+  const double peak = choosePeak(reference, options);
+  const metrics::ErrorDomain domain{chooseBox(reference, options),
+                                    {reference.background, candidate.background}};
+
+  const auto pairs = metrics::pairBricks(reference, candidate);
+  ErrorSums sums = metrics::sumErrors(pairs, domain);
+  refuseNonFinite(sums, domain.backgrounds);
+  addEmptySpace(sums, pairs, domain);
+
+  VolumeMetrics m = metricsOf(sums, peak, domain.box.volume());
+  m.p999Error = metrics::errorOfRank(pairs, domain.backgrounds,
+                                     metrics::nearestRank(sums.activeUnion, kP999Permille));
+  if (options.ssim) m.ssim = ssim3d(reference, candidate, domain.box, peak);
+  return m;
+}
+
+}  // namespace esvr

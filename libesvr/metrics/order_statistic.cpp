@@ -1,0 +1,92 @@
+#include "metrics/order_statistic.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
+#include <bit>
+#include <cmath>
+#include <vector>
+
+namespace esvr::metrics {
+namespace {
+
+constexpr int kDigitBits = 16;
+constexpr int kKeyBits = 64;
+constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
+constexpr std::size_t kPairsPerTask = 4096;  // a task's counters are as large as 512 bricks
+
+using Histogram = std::vector<std::uint64_t>;
+
+/// Bits that order as the non-negative value does.
+std::uint64_t keyOf(double value) { return std::bit_cast<std::uint64_t>(value); }
+
+/// Calls visit(|error|) at every voxel that either side has active.
+template <class Visit>
+void visitErrors(const BrickPair& pair, const Backgrounds& backgrounds, Visit visit) {
+  const PairValues values(pair, backgrounds);
+  for (int offset = 0; offset < kBrickVoxels; ++offset)
+    if (values.referenceActive(offset) || values.candidateActive(offset))
+      visit(std::abs(values.error(offset)));
+}
+
+/// The answer's leading bits as far as they are known.
+struct Prefix {
+  std::uint64_t bits = 0;
+  int unknown = kKeyBits;  ///< trailing bits still to be found
+
+  [[nodiscard]] bool matches(std::uint64_t key) const {
+    return unknown == kKeyBits || (key >> unknown) == bits;
+  }
+  [[nodiscard]] std::size_t nextDigit(std::uint64_t key) const {
+    return std::size_t(key >> (unknown - kDigitBits)) & (kDigits - 1);
+  }
+  void append(std::size_t digit) {
+    bits = bits << kDigitBits | digit;
+    unknown -= kDigitBits;
+  }
+};
+
+Histogram added(Histogram a, const Histogram& b) {
+  for (std::size_t i = 0; i < kDigits; ++i) a[i] += b[i];
+  return a;
+}
+
+Histogram countDigits(std::span<const BrickPair> pairs, const Backgrounds& backgrounds,
+                      const Prefix& prefix) {
+  using Range = tbb::blocked_range<std::size_t>;
+  return tbb::parallel_reduce(
+      Range(0, pairs.size(), kPairsPerTask), Histogram(kDigits),
+      [&](const Range& range, Histogram counts) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i)
+          visitErrors(pairs[i], backgrounds, [&](double error) {
+            const std::uint64_t key = keyOf(error);
+            if (prefix.matches(key)) ++counts[prefix.nextDigit(key)];
+          });
+        return counts;
+      },
+      added);
+}
+
+}  // namespace
+
+double errorOfRank(std::span<const BrickPair> pairs, const Backgrounds& backgrounds,
+                   std::uint64_t rank) {
+  Prefix prefix;
+  while (prefix.unknown > 0) {
+    const Histogram counts = countDigits(pairs, backgrounds, prefix);
+    std::size_t digit = 0;
+    while (counts[digit] < rank) rank -= counts[digit++];
+    prefix.append(digit);
+  }
+  return std::bit_cast<double>(prefix.bits);
+}
+
+std::uint64_t nearestRank(std::uint64_t count, std::uint64_t permille) {
+  constexpr std::uint64_t kThousand = 1000;
+  // ceil(count * permille / 1000) without overflow
+  const std::uint64_t whole = count / kThousand * permille;
+  const std::uint64_t rest = count % kThousand * permille;
+  return whole + (rest + kThousand - 1) / kThousand;
+}
+
+}  // namespace esvr::metrics

@@ -1,0 +1,116 @@
+#include "vdb/archive.h"
+
+#include <openvdb/io/Compression.h>
+#include <openvdb/io/io.h>
+
+#include <algorithm>
+
+#include "esvr/error.h"
+#include "vdb/metadata.h"
+#include "vdb/transform.h"
+#include "vdb/versions.h"
+
+namespace esvr::vdb {
+namespace {
+
+constexpr char kNameSeparator = '\x1e';
+constexpr const char* kHalfSuffix = "_HalfFloat";
+constexpr const char* kTreePrefix = "Tree_";
+constexpr std::uint64_t kUuidBytes = 36;
+
+std::string withoutSuffix(const std::string& text, const std::string& suffix) {
+  return text.ends_with(suffix) ? text.substr(0, text.size() - suffix.size()) : text;
+}
+
+/// An entry and where the next one begins.
+struct DirectoryRow {
+  ArchiveEntry entry;
+  std::int64_t next = 0;
+};
+
+DirectoryRow readRow(InputFile& file) {
+  DirectoryRow row;
+  row.entry.storedName = file.readString();
+  const std::string type = file.readString();
+  row.entry.treeType = withoutSuffix(type, kHalfSuffix);
+  row.entry.savedAsHalf = row.entry.treeType != type;
+  row.entry.parent = file.readString();
+  const auto gridAt = file.read<std::int64_t>();
+  file.read<std::int64_t>();  // where the voxels begin: not needed
+  row.next = file.read<std::int64_t>();
+  if (gridAt < std::int64_t(file.position()) || row.next < gridAt)
+    throw BadInput("is damaged: grid \"" + row.entry.name() + "\" has no valid place in the file");
+  row.entry.gridAt = std::uint64_t(gridAt);
+  return row;
+}
+
+}  // namespace
+
+std::string ArchiveEntry::name() const {
+  return storedName.substr(0, storedName.find(kNameSeparator));
+}
+
+std::string ArchiveEntry::valueType() const {
+  if (!treeType.starts_with(kTreePrefix)) return treeType;
+  const auto begin = std::string(kTreePrefix).size();
+  return treeType.substr(begin, treeType.find('_', begin) - begin);
+}
+
+bool beginsAsVdb(InputFile& file) {
+  if (file.size() < sizeof(std::int64_t)) return false;
+  file.seek(0);
+  return file.read<std::int64_t>() == std::int64_t(openvdb::OPENVDB_MAGIC);
+}
+
+Archive::Archive(InputFile& file) : file_(file) {
+  initializeOpenVdb();
+  if (!beginsAsVdb(file_)) throw BadInput("is not a VDB file");
+  readHeader();
+  metadata_ = readMetadata(file_);
+  readDirectory();
+}
+
+void Archive::readHeader() {
+  const auto fileVersion = file_.read<std::uint32_t>();
+  if (fileVersion < kOldestFileVersion)
+    throw BadInput("has VDB format version " + std::to_string(fileVersion) + ", older than " +
+                   std::to_string(kOldestFileVersion) + ": save it anew with a current program");
+  const auto major = file_.read<std::uint32_t>();
+  const auto minor = file_.read<std::uint32_t>();
+  openvdb::io::setVersion(file_.stream(), {major, minor}, fileVersion);
+  if (!file_.read<char>())
+    throw BadInput("was written to a stream and has no table of grids: save it to a file");
+  file_.skip(kUuidBytes);
+}
+
+void Archive::readDirectory() {
+  const auto count = file_.read<std::int32_t>();
+  if (count < 0) throw BadInput("is damaged: a negative number of grids");
+  for (std::int32_t i = 0; i < count; ++i) {
+    DirectoryRow row = readRow(file_);
+    entries_.push_back(std::move(row.entry));
+    file_.seek(std::uint64_t(row.next));
+  }
+}
+
+GridHead Archive::readHead(const ArchiveEntry& entry) {
+  file_.seek(entry.gridAt);
+  GridHead head;
+  head.compression = file_.read<std::uint32_t>();
+  head.metadata = vdb::readMetadata(file_);
+  head.transform = readTransform(file_);
+  head.treeAt = file_.position();
+  return head;
+}
+
+const ArchiveEntry& Archive::treeOwner(const ArchiveEntry& entry) const {
+  if (entry.parent.empty()) return entry;
+  const auto parent =
+      std::find_if(entries_.begin(), entries_.end(), [&](const ArchiveEntry& candidate) {
+        return candidate.storedName == entry.parent && candidate.parent.empty();
+      });
+  if (parent == entries_.end()) throw BadInput("shares the voxels of a grid that is not there");
+  return *parent;
+}
+
+}  // namespace esvr::vdb

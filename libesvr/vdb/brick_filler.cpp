@@ -1,0 +1,72 @@
+#include "vdb/brick_filler.h"
+
+#include <limits>
+#include <string>
+
+#include "esvr/error.h"
+
+namespace esvr::vdb {
+namespace {
+
+constexpr std::uint64_t kBrickBytes =
+    kBrickVoxels * sizeof(float) + sizeof(BrickMask) + sizeof(Coord);
+
+std::string mebibytes(std::uint64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; }
+
+void refuseTooFarApart(Coord low, Coord high) {
+  constexpr std::int64_t kMaxExtent = std::numeric_limits<std::int32_t>::max() - kBrickSide;
+  const std::int64_t extent = std::max(
+      {std::int64_t(high.x) - low.x, std::int64_t(high.y) - low.y, std::int64_t(high.z) - low.z});
+  if (extent > kMaxExtent)
+    throw BadInput("its active voxels reach from " + toString(low) + " to " + toString(high) +
+                   ": 2^31 voxels or more");
+}
+
+}  // namespace
+
+float narrowBackground(double background) {
+  const auto narrow = float(background);
+  if (!std::isfinite(narrow))
+    throw BadInput("its background, " + std::to_string(background) + ", is not a finite float");
+  return narrow;
+}
+
+void refuseTooLarge(std::uint64_t bricks, std::uint64_t treeBytes, const ReadOptions& options) {
+  if (treeBytes > options.maxBytes)
+    throw BadInput("its tree takes " + mebibytes(treeBytes) + ", more than the limit of " +
+                   mebibytes(options.maxBytes));
+  if (bricks > options.maxBytes / kBrickBytes)
+    throw BadInput("its " + std::to_string(bricks) + " bricks of 8^3 voxels, active tiles " +
+                   "included, exceed the limit of " + mebibytes(options.maxBytes));
+}
+
+void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite) {
+  if (tally.count == 0 || nonFinite == NonFinite::kZero) return;
+  throw BadInput(std::to_string(tally.count) + (tally.count == 1 ? " voxel is" : " voxels are") +
+                 " NaN, infinite or too large for float; the first is at " + toString(tally.first));
+}
+
+SparseVolume layOutBricks(const std::vector<Coord>& corners, float background) {
+  if (corners.empty()) throw BadInput("it has no active voxel");
+  Coord low = corners.front(), high = low;
+  for (const Coord corner : corners) {
+    low = minCoord(low, corner);
+    high = maxCoord(high, corner);
+  }
+  refuseTooFarApart(low, high);
+  SparseVolume volume;
+  volume.origin = low;
+  volume.background = background;
+  volume.bricks.reserve(corners.size());
+  for (const Coord corner : corners) {
+    const Coord place = brickOf(corner - low);
+    if (!volume.bricks.empty() && volume.bricks.back() == place)
+      throw BadInput("it has two bricks at " + toString(corner));
+    volume.bricks.push_back(place);
+  }
+  volume.values.assign(corners.size() * kBrickVoxels, background);
+  volume.active.resize(corners.size());
+  return volume;
+}
+
+}  // namespace esvr::vdb

@@ -1,0 +1,56 @@
+#include "vdb/errors.h"
+
+#include <ios>
+#include <new>
+#include <stdexcept>
+
+#include "esvr/error.h"
+
+namespace esvr::vdb {
+namespace {
+
+/// Errors that mean the same in both directions.
+void rethrowCommon(const std::string& where) {
+  try {
+    throw;
+  } catch (const BadInput& e) {
+    throw BadInput(where + e.what());
+  } catch (const UsageError& e) {
+    throw UsageError(where + e.what());
+  } catch (const RuntimeFailure& e) {
+    throw RuntimeFailure(where + e.what());
+  } catch (const Error& e) {
+    throw Error(e.kind(), where + e.what());
+  } catch (const std::bad_alloc&) {
+    throw RuntimeFailure(where + "out of memory");
+  } catch (const std::logic_error&) {
+    throw;  // a fault of ours: not to be dressed up as a fault of the file
+  } catch (...) {
+  }
+}
+
+}  // namespace
+
+void rethrowWhileReading(const std::string& where) {
+  rethrowCommon(where);
+  try {
+    throw;
+  } catch (const std::ios_base::failure&) {
+    throw BadInput(where + "is truncated or cannot be read");
+  } catch (const std::exception& e) {
+    throw BadInput(where + e.what());
+  }
+}
+
+void rethrowWhileWriting(const std::string& where) {
+  rethrowCommon(where);
+  try {
+    throw;
+  } catch (const std::ios_base::failure&) {
+    throw RuntimeFailure(where + "cannot be written: the disk is full or failing");
+  } catch (const std::exception& e) {
+    throw RuntimeFailure(where + e.what());
+  }
+}
+
+}  // namespace esvr::vdb

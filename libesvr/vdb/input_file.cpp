@@ -1,0 +1,83 @@
+#include "vdb/input_file.h"
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include "esvr/error.h"
+
+namespace esvr::vdb {
+namespace {
+
+/// Long enough that the many small skips of a tree walk seldom reach the system.
+constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
+
+std::uint64_t sizeOfRegularFile(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (status.type() == std::filesystem::file_type::not_found) throw BadInput("no such file");
+  if (error) throw BadInput(error.message());
+  if (status.type() == std::filesystem::file_type::directory) throw BadInput("is a directory");
+  if (status.type() != std::filesystem::file_type::regular) throw BadInput("is not a regular file");
+  const std::uint64_t size = std::filesystem::file_size(path, error);
+  if (error) throw BadInput(error.message());
+  if (size == 0) throw BadInput("is empty");
+  return size;
+}
+
+}  // namespace
+
+InputFile::InputFile(const std::filesystem::path& path)
+    : buffer_(kBufferBytes), size_(sizeOfRegularFile(path)) {
+  stream_.rdbuf()->pubsetbuf(buffer_.data(), std::streamsize(buffer_.size()));
+  errno = 0;
+  stream_.open(path, std::ios::in | std::ios::binary);
+  if (!stream_) throw BadInput(std::string("cannot be opened: ") + std::strerror(errno));
+  stream_.exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
+}
+
+void InputFile::need(std::uint64_t bytes) const {
+  if (bytes > remaining())
+    throw BadInput("is truncated or damaged: " + std::to_string(bytes) + " bytes expected at " +
+                   std::to_string(position_) + ", the file has " + std::to_string(size_));
+}
+
+void InputFile::seek(std::uint64_t position) {
+  if (position > size_)
+    throw BadInput("is truncated or damaged: it points to byte " + std::to_string(position) +
+                   ", the file has " + std::to_string(size_));
+  stream_.seekg(std::streamoff(position));
+  position_ = position;
+}
+
+void InputFile::skip(std::uint64_t bytes) {
+  need(bytes);
+  if (bytes > kBufferBytes) return seek(position_ + bytes);
+  stream_.ignore(std::streamsize(bytes));
+  position_ += bytes;
+}
+
+void InputFile::read(void* to, std::size_t bytes) {
+  need(bytes);
+  stream_.read(static_cast<char*>(to), std::streamsize(bytes));
+  position_ += bytes;
+}
+
+std::vector<std::byte> InputFile::readBytes(std::uint64_t bytes) {
+  need(bytes);
+  std::vector<std::byte> result(bytes);
+  read(result.data(), result.size());
+  return result;
+}
+
+std::string InputFile::readString() {
+  const auto length = read<std::uint32_t>();
+  need(length);
+  std::string text(length, '\0');
+  read(text.data(), length);
+  return text;
+}
+
+void InputFile::followStream() { position_ = std::uint64_t(stream_.tellg()); }
+
+}  // namespace esvr::vdb

@@ -1,0 +1,45 @@
+#pragma once
+/// VDB metadata as bytes: read with checked sizes, looked up, and handed back to OpenVDB.
+
+#include <cstring>
+#include <optional>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "esvr/grid_descriptor.h"
+#include "vdb/input_file.h"
+#include "vdb/versions.h"
+
+#include <openvdb/MetaMap.h>
+
+namespace esvr::vdb {
+
+/// Reads a metadata block, sorted by name as OpenVDB keeps it. Items that OpenVDB itself calls
+/// temporary (their type begins "__") are left out. \throws BadInput  damaged
+std::vector<MetaItem> readMetadata(InputFile& file);
+
+const MetaItem* findItem(std::span<const MetaItem> items, const std::string& name);
+/// The text of an item of type "string"; empty where there is none.
+std::string stringValue(std::span<const MetaItem> items, const std::string& name);
+/// The value of a fixed-size item of that type and size.
+template <class T>
+std::optional<T> fixedValue(std::span<const MetaItem> items, const std::string& name,
+                            const std::string& type) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  const MetaItem* item = findItem(items, name);
+  if (!item || item->type != type || item->value.size() != sizeof(T)) return std::nullopt;
+  T value;
+  std::memcpy(&value, item->value.data(), sizeof value);
+  return value;
+}
+
+/// True for the statistics that a writer regenerates for each grid (file_voxel_count, ...).
+bool isFileStatistic(const MetaItem& item);
+std::vector<MetaItem> withoutFileStatistics(std::vector<MetaItem> items);
+
+/// Inserts the items so that OpenVDB writes the same bytes again.
+void insertItems(std::span<const MetaItem> items, openvdb::MetaMap& to);
+
+}  // namespace esvr::vdb

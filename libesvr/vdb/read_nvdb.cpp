@@ -1,0 +1,56 @@
+#include "vdb/read_nvdb.h"
+
+#include "esvr/error.h"
+#include "vdb/errors.h"
+#include "vdb/grid_names.h"
+#include "vdb/nano_file.h"
+#include "vdb/nano_grid.h"
+
+namespace esvr::vdb {
+namespace {
+
+/// NanoVDB numbers the classes it shares with OpenVDB as we do.
+GridClass gridClassOf(std::uint32_t nanoClass) {
+  return nanoClass <= std::uint32_t(GridClass::kStaggered) ? GridClass(nanoClass)
+                                                           : GridClass::kUnknown;
+}
+
+GridSummary summarise(const NanoEntry& entry) {
+  GridSummary grid;
+  grid.name = entry.name;
+  grid.valueType = nanoValueType(entry.gridType);
+  grid.gridClass = gridClassOf(entry.gridClass);
+  grid.activeVoxels = entry.activeVoxels;
+  grid.activeBox = entry.activeBox;
+  grid.skipReason = isScalarFloatNano(entry.gridType) ? "" : notAFloatType(grid.valueType);
+  if (grid.skipReason.empty() && entry.activeVoxels == 0) grid.skipReason = "has no active voxel";
+  return grid;
+}
+
+std::vector<GridSummary> summarise(const std::vector<NanoEntry>& entries) {
+  std::vector<GridSummary> grids;
+  for (const auto& entry : entries) grids.push_back(summarise(entry));
+  assignUniqueNames(grids);
+  return grids;
+}
+
+}  // namespace
+
+VdbSummary inspectNanoVdb(InputFile& file) {
+  return {"NanoVDB", file.size(), {}, summarise(readNanoDirectory(file))};
+}
+
+VolumeGrid readNanoVdbGrid(InputFile& file, const std::string& name, const ReadOptions& options) {
+  const auto entries = readNanoDirectory(file);
+  const auto grids = summarise(entries);
+  const std::size_t i = findGrid(grids, name);
+  return inGrid(grids[i].uniqueName, [&] {
+    if (!grids[i].skipReason.empty()) throw BadInput(grids[i].skipReason);
+    const NanoBuffer buffer = readNanoBuffer(file, entries[i], options.maxBytes);
+    VolumeGrid grid = readNanoVoxels(buffer, entries[i].gridType, grids[i].gridClass, options);
+    grid.descriptor.name = grids[i].name;
+    return grid;
+  });
+}
+
+}  // namespace esvr::vdb

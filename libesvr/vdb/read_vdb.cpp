@@ -1,0 +1,128 @@
+#include "vdb/read_vdb.h"
+
+#include <openvdb/Grid.h>
+
+#include "esvr/error.h"
+#include "vdb/archive.h"
+#include "vdb/errors.h"
+#include "vdb/grid_names.h"
+#include "vdb/metadata.h"
+#include "vdb/tree_reader.h"
+
+namespace esvr::vdb {
+namespace {
+
+using openvdb::GridBase;
+
+/// A file and its list of grids, in the same order.
+struct ListedArchive {
+  Archive archive;
+  std::vector<GridHead> heads;
+  std::vector<GridSummary> grids;
+};
+
+/// "level set" and so on, as OpenVDB names them; kUnknown for any other text.
+GridClass gridClassOf(const std::string& text) {
+  switch (GridBase::stringToGridClass(text)) {
+    case openvdb::GRID_LEVEL_SET:
+      return GridClass::kLevelSet;
+    case openvdb::GRID_FOG_VOLUME:
+      return GridClass::kFogVolume;
+    case openvdb::GRID_STAGGERED:
+      return GridClass::kStaggered;
+    default:
+      return GridClass::kUnknown;
+  }
+}
+
+std::string reasonToSkip(const ArchiveEntry& entry) {
+  if (isScalarFloatTree(entry)) return {};
+  const std::string type = entry.valueType();
+  if (type.starts_with("ptdataidx") || type.starts_with("ptidx"))
+    return "holds points (" + type + "), not a float volume";
+  if (type == "float" || type == "double")
+    return "its tree (" + entry.treeType + ") is not OpenVDB's standard one";
+  return notAFloatType(type);
+}
+
+/// Counts from the file's statistics where its writer left them.
+bool countFromStatistics(const std::vector<MetaItem>& items, GridSummary& grid) {
+  using Corner = std::array<std::int32_t, 3>;
+  const auto count = fixedValue<std::int64_t>(items, GridBase::META_FILE_VOXEL_COUNT, "int64");
+  const auto low = fixedValue<Corner>(items, GridBase::META_FILE_BBOX_MIN, "vec3i");
+  const auto high = fixedValue<Corner>(items, GridBase::META_FILE_BBOX_MAX, "vec3i");
+  if (!count || !low || !high || *count < 0) return false;
+  grid.activeVoxels = std::uint64_t(*count);
+  if (*count > 0)
+    grid.activeBox = {{(*low)[0], (*low)[1], (*low)[2]}, {(*high)[0], (*high)[1], (*high)[2]}};
+  return true;
+}
+
+void countFromTree(Archive& archive, const ArchiveEntry& entry, GridSummary& grid) {
+  if (!isScalarFloatTree(entry)) return;
+  const TreeSurvey survey = surveyTree(archive, entry);
+  grid.activeVoxels = survey.activeVoxels;
+  grid.activeBox = survey.activeBox;
+}
+
+GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHead& head) {
+  GridSummary grid;
+  grid.name = stringValue(head.metadata, GridBase::META_GRID_NAME);
+  grid.valueType = entry.valueType();
+  grid.savedAsHalf = entry.savedAsHalf;
+  grid.gridClass = gridClassOf(stringValue(head.metadata, GridBase::META_GRID_CLASS));
+  if (!countFromStatistics(head.metadata, grid)) countFromTree(archive, entry, grid);
+  grid.skipReason = reasonToSkip(entry);
+  if (grid.skipReason.empty() && grid.activeVoxels == 0) grid.skipReason = "has no active voxel";
+  return grid;
+}
+
+ListedArchive listGrids(InputFile& file) {
+  ListedArchive listed{Archive(file), {}, {}};
+  for (const auto& entry : listed.archive.entries()) {
+    inGrid(entry.name(), [&] {
+      listed.heads.push_back(listed.archive.readHead(entry));
+      listed.grids.push_back(summarise(listed.archive, entry, listed.heads.back()));
+    });
+  }
+  assignUniqueNames(listed.grids);
+  return listed;
+}
+
+ValueType valueTypeOf(const GridSummary& grid) {
+  if (grid.valueType == "double") return ValueType::kDouble;
+  return grid.savedAsHalf ? ValueType::kHalf : ValueType::kFloat;
+}
+
+VolumeGrid readListedGrid(ListedArchive& listed, std::size_t i, const ReadOptions& options) {
+  const GridSummary& summary = listed.grids[i];
+  const ArchiveEntry& entry = listed.archive.entries()[i];
+  // Only the type is held against it here: statistics that call it empty may be stale.
+  if (!isScalarFloatTree(entry)) throw BadInput(summary.skipReason);
+  TreeVoxels voxels = readVoxels(listed.archive, entry, summary.gridClass, options);
+  VolumeGrid grid;
+  grid.descriptor.name = summary.name;
+  grid.descriptor.gridClass = summary.gridClass;
+  grid.descriptor.valueType = valueTypeOf(summary);
+  grid.descriptor.background = voxels.background;
+  grid.descriptor.transform = std::move(listed.heads[i].transform);
+  grid.descriptor.metadata = withoutFileStatistics(std::move(listed.heads[i].metadata));
+  grid.volume = std::move(voxels.volume);
+  grid.nonFiniteReplaced = voxels.nonFiniteReplaced;
+  return grid;
+}
+
+}  // namespace
+
+VdbSummary inspectOpenVdb(InputFile& file) {
+  ListedArchive listed = listGrids(file);
+  return {"OpenVDB", file.size(), listed.archive.metadata(), std::move(listed.grids)};
+}
+
+VolumeGrid readOpenVdbGrid(InputFile& file, const std::string& name, const ReadOptions& options) {
+  ListedArchive listed = listGrids(file);
+  const std::size_t i = findGrid(listed.grids, name);
+  return inGrid(listed.grids[i].uniqueName, [&] { return readListedGrid(listed, i, options); });
+}
+
+}  // namespace esvr::vdb

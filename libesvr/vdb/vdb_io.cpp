@@ -1,0 +1,62 @@
+#include "esvr/vdb_io.h"
+
+#include "core/atomic_file.h"
+#include "esvr/error.h"
+#include "vdb/archive.h"
+#include "vdb/errors.h"
+#include "vdb/nano_file.h"
+#include "vdb/read_nvdb.h"
+#include "vdb/read_vdb.h"
+#include "vdb/write_nvdb.h"
+#include "vdb/write_vdb.h"
+
+namespace esvr {
+namespace {
+
+enum class FileFormat { kOpenVdb, kNanoVdb };
+
+FileFormat formatOf(vdb::InputFile& file) {
+  if (vdb::beginsAsVdb(file)) return FileFormat::kOpenVdb;
+  if (vdb::beginsAsNanoVdb(file)) return FileFormat::kNanoVdb;
+  throw BadInput("is neither an OpenVDB nor a NanoVDB file");
+}
+
+FileFormat formatNamedBy(const std::filesystem::path& path) {
+  if (path.extension() == ".vdb") return FileFormat::kOpenVdb;
+  if (path.extension() == ".nvdb") return FileFormat::kNanoVdb;
+  throw UsageError(path.string() + ": the extension must be .vdb or .nvdb");
+}
+
+}  // namespace
+
+VdbSummary inspectVdb(const std::filesystem::path& path) {
+  return vdb::whileReading(path, [&] {
+    vdb::InputFile file(path);
+    return formatOf(file) == FileFormat::kOpenVdb ? vdb::inspectOpenVdb(file)
+                                                  : vdb::inspectNanoVdb(file);
+  });
+}
+
+VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
+                    const ReadOptions& options) {
+  return vdb::whileReading(path, [&] {
+    vdb::InputFile file(path);
+    return formatOf(file) == FileFormat::kOpenVdb ? vdb::readOpenVdbGrid(file, name, options)
+                                                  : vdb::readNanoVdbGrid(file, name, options);
+  });
+}
+
+void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
+                std::span<const VolumeGrid> grids, const WriteOptions& options) {
+  const FileFormat format = formatNamedBy(path);
+  AtomicFile file(path, options.overwrite);
+  vdb::whileWriting(path, [&] {
+    if (format == FileFormat::kOpenVdb)
+      vdb::writeOpenVdb(file.path(), fileMetadata, grids, options);
+    else
+      vdb::writeNanoVdb(file.path(), grids, options);
+  });
+  file.commit();
+}
+
+}  // namespace esvr

@@ -1,0 +1,96 @@
+#include "generators/plume.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "generators/hash_noise.h"
+#include "generators/voxelise.h"
+
+namespace esvr::samples {
+namespace {
+
+// All lengths in heights of the plume.
+constexpr double kFootRadius = 0.05, kWidening = 0.2;
+constexpr double kSway = 0.05;        // how far the axis strays
+constexpr double kSwaySize = 0.4;     // height over which it does
+constexpr double kBillowSize = 0.12;  // largest eddies
+constexpr double kBillowDepth =
+    1.1;  // smoke reaches this far out, in radii, and eddies cut as deep
+constexpr double kWarpSize = 0.25, kWarp = 0.05;  // eddies drag each other along
+constexpr double kFadeStart = 0.7;                // the top dissolves from this height on
+constexpr double kSmallestEddy = 4.0;             // voxels
+constexpr double kFaintest = 1.0 / 512.0;         // fainter voxels count as empty
+
+/// Bound on how fast (distance to the axis - kBillowDepth * radius of the envelope) changes.
+constexpr double kAxisSlope = kSway * (1.0 + kNoiseSlope / kSwaySize);  // along x, and along z
+constexpr double kEnvelopeSlope = 1.0 + 2.0 * kAxisSlope + kBillowDepth * kWidening;
+
+int octavesFor(int resolution) {
+  int octaves = 1;
+  while (kBillowSize * resolution > kSmallestEddy * double(1 << octaves)) ++octaves;
+  return octaves;
+}
+
+}  // namespace
+
+PlumeShape::PlumeShape(std::uint64_t seed, int resolution)
+    : seed_(seed), resolution_(resolution), octaves_(octavesFor(resolution)) {}
+
+std::optional<PlumeShape> PlumeShape::within(const Ball& ball) const {
+  const Vec3 p = place(ball.center);
+  const double radius = ball.radius / resolution_;
+  if (p.y + radius < 0.0 || p.y - radius > 1.0) return std::nullopt;
+  const double outside = distanceToAxis(p) - kBillowDepth * envelopeRadius(p.y);
+  if (outside > kEnvelopeSlope * radius) return std::nullopt;
+  return *this;
+}
+
+Sample PlumeShape::at(Vec3 voxel) const {
+  const Vec3 p = place(voxel);
+  if (p.y < 0.0 || p.y > 1.0) return {};
+  const double density = densityAt(p);
+  if (density < kFaintest) return {};
+  return {float(density), true};
+}
+
+Vec3 PlumeShape::place(Vec3 voxel) const {
+  return (voxel + Vec3{0.5, 0.5, 0.5}) * (1.0 / resolution_) - Vec3{0.5, 0.0, 0.5};
+}
+
+double PlumeShape::envelopeRadius(double y) const {
+  const double oneVoxel = 1.0 / resolution_;
+  return std::max(kFootRadius + kWidening * std::clamp(y, 0.0, 1.0), oneVoxel);
+}
+
+double PlumeShape::distanceToAxis(Vec3 p) const {
+  const double height = std::clamp(p.y, 0.0, 1.0);
+  const Vec3 along{0.5, height / kSwaySize, 0.5};
+  const double x = p.x - kSway * height * noise(seed_, along);
+  const double z = p.z - kSway * height * noise(seed_ + 1, along);
+  return std::sqrt(x * x + z * z);
+}
+
+Vec3 PlumeShape::warped(Vec3 p) const {
+  const Vec3 q = p * (1.0 / kWarpSize);
+  return p + Vec3{noise(seed_ + 2, q), noise(seed_ + 3, q), noise(seed_ + 4, q)} * kWarp;
+}
+
+double PlumeShape::densityAt(Vec3 p) const {
+  const double depth = kBillowDepth - distanceToAxis(p) / envelopeRadius(p.y);
+  if (depth < kFaintest) return 0.0;
+  const double billows = fractalNoise(seed_ + 5, warped(p) * (1.0 / kBillowSize), octaves_);
+  const double fade = std::min(1.0, (1.0 - p.y) / (1.0 - kFadeStart));
+  return std::clamp(depth - kBillowDepth * std::abs(billows), 0.0, 1.0) * fade;
+}
+
+SparseVolume makePlume(const SampleOptions& options) {
+  const int last = options.resolution - 1;
+  return voxelise(PlumeShape(options.seed, options.resolution),
+                  {.box = {{0, 0, 0}, {last, last, last}},
+                   .background = 0.0f,
+                   .maxBricks = options.limits.maxBricks,
+                   .cancel = options.limits.cancel});
+}
+
+}  // namespace esvr::samples

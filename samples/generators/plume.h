@@ -1,0 +1,36 @@
+#pragma once
+/// A noisy smoke plume.
+
+#include <cstdint>
+#include <optional>
+
+#include "esvr/sparse_volume.h"
+#include "generators/sample_options.h"
+#include "generators/voxelise.h"
+
+namespace esvr::samples {
+
+/// Smoke that rises along y, widens and breaks up, `resolution` voxels high. The noise goes down to
+/// a few voxels: a finer plume has more detail, as smoke has.
+class PlumeShape {
+ public:
+  PlumeShape(std::uint64_t seed, int resolution);
+
+  [[nodiscard]] std::optional<PlumeShape> within(const Ball& ball) const;
+  [[nodiscard]] Sample at(Vec3 voxel) const;
+
+ private:
+  // points p below: height 0 to 1 along y, the axis near x = z = 0
+  [[nodiscard]] Vec3 place(Vec3 voxel) const;
+  [[nodiscard]] double envelopeRadius(double y) const;
+  [[nodiscard]] double distanceToAxis(Vec3 p) const;
+  [[nodiscard]] Vec3 warped(Vec3 p) const;
+  [[nodiscard]] double densityAt(Vec3 p) const;
+
+  std::uint64_t seed_;
+  int resolution_, octaves_;
+};
+
+[[nodiscard]] SparseVolume makePlume(const SampleOptions& options);
+
+}  // namespace esvr::samples

@@ -1,0 +1,23 @@
+#pragma once
+/// What all generators take.
+
+#include <cstdint>
+#include <limits>
+
+#include "esvr/progress.h"
+
+namespace esvr::samples {
+
+/// When to give up.
+struct Limits {
+  std::uint64_t maxBricks = std::numeric_limits<std::uint64_t>::max();  ///< then DeviceError
+  const CancelToken* cancel = nullptr;                                  ///< then Cancelled
+};
+
+struct SampleOptions {
+  int resolution = 128;  ///< voxels along the longest side of what the sample shows
+  std::uint64_t seed = 1;
+  Limits limits{};
+};
+
+}  // namespace esvr::samples

@@ -1,0 +1,186 @@
+#pragma once
+/// Turns a shape into a sparse volume brick by brick: an octree is searched for the bricks that
+/// hold anything, then they are filled. Time and memory follow the active voxels, not the box.
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <atomic>
+#include <concepts>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "esvr/error.h"
+#include "esvr/progress.h"
+#include "esvr/sparse_volume.h"
+#include "generators/vec3.h"
+
+namespace esvr::samples {
+
+struct Sample {
+  float value = 0.0f;
+  bool active = false;
+};
+
+/// A ball in index coordinates.
+struct Ball {
+  Vec3 center;
+  double radius = 0.0;
+};
+
+/// A scalar field over index space that can be narrowed to a part of it.
+/// within(ball): the shape for use in this ball only, or nothing where no point of it is active.
+/// at(p): the sample at index coordinates.
+template <class S>
+concept Shape = requires(const S& shape, const Ball& ball, Vec3 p) {
+  { shape.within(ball) } -> std::same_as<std::optional<S>>;
+  { shape.at(p) } -> std::same_as<Sample>;
+};
+
+struct VoxeliseOptions {
+  Box box;  ///< holds all active voxels
+  float background = 0.0f;
+  std::uint64_t maxBricks = std::numeric_limits<std::uint64_t>::max();
+  const CancelToken* cancel = nullptr;
+};
+
+/// A brick that has active voxels, with the shape narrowed to it.
+template <class S>
+struct ShapedBrick {
+  Coord brick;
+  S shape;
+};
+
+namespace detail {
+
+inline Vec3 toVec(Coord c) { return {double(c.x), double(c.y), double(c.z)}; }
+
+/// A cube of 2^level bricks a side, placed on multiples of its size.
+struct Cell {
+  Coord place;  ///< in units of the cell's side
+  int level = 0;
+
+  [[nodiscard]] Ball ball() const {
+    const double side = double(std::int64_t{kBrickSide} << level);
+    const double half = (side - 1.0) / 2.0;  // from the centre to the outermost voxels' centres
+    return {toVec(place) * side + Vec3{half, half, half}, std::sqrt(3.0) * half};
+  }
+  [[nodiscard]] Cell child(int octant) const {
+    return {place * 2 + Coord{octant >> 2, (octant >> 1) & 1, octant & 1}, level - 1};
+  }
+};
+
+/// The cells, eight at most, that cover a box.
+inline std::vector<Cell> rootCells(const Box& box) {
+  const Coord low = brickOf(box.min), high = brickOf(box.max);
+  const Coord extent = high - low;
+  int level = 0;
+  while ((std::int64_t{1} << level) <= std::max({extent.x, extent.y, extent.z})) ++level;
+  std::vector<Cell> cells;
+  for (int x = low.x >> level; x <= high.x >> level; ++x)
+    for (int y = low.y >> level; y <= high.y >> level; ++y)
+      for (int z = low.z >> level; z <= high.z >> level; ++z) cells.push_back({{x, y, z}, level});
+  return cells;
+}
+
+template <class S>
+Sample sampleAt(const S& shape, Coord brick, int offset) {
+  return shape.at(toVec(brick * kBrickSide + voxelLocal(offset)));
+}
+
+template <class S>
+bool anyActive(const S& shape, Coord brick) {
+  for (int offset = 0; offset < kBrickVoxels; ++offset)
+    if (sampleAt(shape, brick, offset).active) return true;
+  return false;
+}
+
+template <Shape S>
+class BrickSearch {
+ public:
+  explicit BrickSearch(const VoxeliseOptions& options) : options_(options) {}
+
+  /// All bricks with active voxels, in increasing order.
+  std::vector<ShapedBrick<S>> run(const S& shape) {
+    const auto roots = rootCells(options_.box);
+    tbb::parallel_for(std::size_t{0}, roots.size(),
+                      [&](std::size_t i) { descend(roots[i], shape); });
+    std::vector<ShapedBrick<S>> all;
+    all.reserve(found_.load());
+    for (auto& part : parts_) {
+      std::move(part.begin(), part.end(), std::back_inserter(all));
+      part = {};
+    }
+    tbb::parallel_sort(all.begin(), all.end(),
+                       [](const auto& a, const auto& b) { return a.brick < b.brick; });
+    return all;
+  }
+
+ private:
+  void descend(const Cell& cell, const S& shape) {
+    if (options_.cancel && options_.cancel->cancelled()) throw Cancelled();
+    std::optional<S> narrowed = shape.within(cell.ball());
+    if (!narrowed) return;
+    if (cell.level == 0) return keep(cell.place, std::move(*narrowed));
+    tbb::parallel_for(0, 8, [&](int octant) { descend(cell.child(octant), *narrowed); });
+  }
+
+  void keep(Coord brick, S shape) {
+    if (!anyActive(shape, brick)) return;
+    if (found_.fetch_add(1) >= options_.maxBricks)
+      throw DeviceError("the volume has more than " + std::to_string(options_.maxBricks) +
+                        " bricks of 8^3 voxels, which is more than fits into memory");
+    parts_.local().push_back({brick, std::move(shape)});
+  }
+
+  const VoxeliseOptions& options_;
+  tbb::enumerable_thread_specific<std::vector<ShapedBrick<S>>> parts_;
+  std::atomic<std::uint64_t> found_{0};
+};
+
+template <class S>
+void fillBrick(const ShapedBrick<S>& from, std::span<float> values, BrickMask& active) {
+  for (int offset = 0; offset < kBrickVoxels; ++offset) {
+    const Sample sample = sampleAt(from.shape, from.brick, offset);
+    values[std::size_t(offset)] = sample.value;
+    if (sample.active) active.set(offset);
+  }
+}
+
+template <class S>
+Coord smallestBrick(const std::vector<ShapedBrick<S>>& bricks) {
+  Coord low = bricks.front().brick;
+  for (const auto& brick : bricks) low = minCoord(low, brick.brick);
+  return low;
+}
+
+}  // namespace detail
+
+/// The same bits for any number of threads. Holds the volume (2124 bytes a brick) and one narrowed
+/// shape a brick.
+/// \throws Cancelled; DeviceError  more than maxBricks
+template <Shape S>
+SparseVolume voxelise(const S& shape, const VoxeliseOptions& options) {
+  SparseVolume volume;
+  volume.background = options.background;
+  const auto found = detail::BrickSearch<S>(options).run(shape);
+  if (found.empty()) return volume;
+
+  const Coord low = detail::smallestBrick(found);
+  volume.origin = low * kBrickSide;
+  volume.bricks.resize(found.size());
+  volume.active.resize(found.size());
+  volume.values.resize(found.size() * kBrickVoxels);
+  tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t b) {
+    if (options.cancel && options.cancel->cancelled()) throw Cancelled();
+    volume.bricks[b] = found[b].brick - low;
+    detail::fillBrick(found[b], volume.brickValues(b), volume.active[b]);
+  });
+  return volume;
+}
+
+}  // namespace esvr::samples

@@ -1,0 +1,33 @@
+#pragma once
+/// The samples by name: generated volumes as the grids of a file.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "esvr/grid_descriptor.h"
+#include "esvr/vdb_io.h"
+#include "generators/sample_options.h"
+
+namespace esvr::samples {
+
+inline constexpr double kWorldSize = 10.0;  ///< a sample's longest side in world units
+
+struct SampleFile {
+  std::vector<MetaItem> metadata;
+  std::vector<VolumeGrid> grids;
+};
+
+struct SampleKind {
+  const char* name;
+  const char* description;  ///< one line, for --help
+  SampleFile (*make)(const SampleOptions& options);
+};
+
+/// All kinds, in the order of --help.
+[[nodiscard]] std::span<const SampleKind> sampleKinds();
+
+/// \throws UsageError  no such kind (lists those there are)
+[[nodiscard]] const SampleKind& sampleKind(const std::string& name);
+
+}  // namespace esvr::samples

@@ -1,0 +1,44 @@
+// Lesson 4: from ellipsoids back to voxels.
+//
+// The field is defined everywhere. One can ask for its values in any bricks, or have it turned into
+// a volume again.
+
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "check.h"
+#include "esvr/field.h"
+#include "esvr/fit.h"
+#include "ring.h"
+
+int main() {
+  const esvr::SparseVolume ring = makeRing();
+  esvr::FitOptions options;
+  options.count = 40;
+  options.preset = esvr::Preset::kDraft;
+  const esvr::Field field = esvr::fit(ring, options).field;
+
+  // Values in one brick, in the order of voxelOffset.
+  const esvr::Coord corner{16, 0, 0};
+  std::vector<float> values(esvr::kBrickVoxels);
+  esvr::evaluateBricks(field, std::vector{corner}, values);
+  const esvr::Coord onTheCircle{16, 0, 0};
+  const float value = values[std::size_t(esvr::voxelOffset(onTheCircle - corner))];
+  std::printf("at %s: %.3f, the ring has %.3f\n", esvr::toString(onTheCircle).c_str(),
+              double(value), double(esvr::valueAt(ring, onTheCircle)));
+  check(std::abs(value - esvr::valueAt(ring, onTheCircle)) < 0.1f, "close to the ring's value");
+
+  // The same by the definition, in float64: slow, and what the fast one is tested against.
+  const double reference = esvr::evaluateReference(field, onTheCircle);
+  check(std::abs(double(value) - reference) < 1e-4, "and closer still to the definition");
+
+  // The whole volume. What is fainter than the threshold is not active.
+  esvr::RevoxeliseOptions revoxelise;
+  revoxelise.threshold = 0.05f;
+  revoxelise.nonNegative = true;
+  const esvr::SparseVolume back = esvr::revoxelise(field, revoxelise);
+  std::printf("%zu bricks, the ring has %zu\n", back.brickCount(), ring.brickCount());
+  check(esvr::activeVoxelCount(back) > 0, "there are voxels again");
+  check(esvr::valueAt(back, {0, 0, 0}) == 0.0f, "the ring's hole is still empty");
+}

@@ -1,0 +1,32 @@
+#pragma once
+// The volume that the lessons work on: a soft ring, built as lesson 1 explains.
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "esvr/sparse_volume.h"
+
+inline float ringValue(esvr::Coord v) {
+  constexpr float kRadius = 16.0f, kThickness = 4.0f;
+  const float x = float(v.x), y = float(v.y), z = float(v.z);
+  const float fromCircle = std::hypot(x, y) - kRadius;
+  const float distance = std::hypot(fromCircle, z) / kThickness;
+  return std::max(0.0f, 1.0f - distance * distance);
+}
+
+inline esvr::SparseVolume makeRing() {
+  std::vector<esvr::BrickInput> bricks;
+  for (int x = -24; x < 24; x += esvr::kBrickSide)
+    for (int y = -24; y < 24; y += esvr::kBrickSide)
+      for (int z = -8; z < 8; z += esvr::kBrickSide) {
+        esvr::BrickInput brick{.corner = {x, y, z}, .values = {}, .active = {}};
+        for (int i = 0; i < esvr::kBrickVoxels; ++i) {
+          const float value = ringValue(brick.corner + esvr::voxelLocal(i));
+          brick.values[std::size_t(i)] = value;
+          if (value > 0.0f) brick.active.set(i);
+        }
+        bricks.push_back(brick);
+      }
+  return esvr::makeVolume(std::move(bricks), 0.0f);  // drops bricks without an active voxel
+}

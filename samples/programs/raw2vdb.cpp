@@ -1,0 +1,163 @@
+// Brings in dense images: RAW and NRRD.
+
+#include <charconv>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/command_line.h"
+#include "cli/interrupts.h"
+#include "cli/output.h"
+#include "cli/run_main.h"
+#include "cli/thread_limit.h"
+#include "images/image_source.h"
+#include "images/image_volume.h"
+#include "kinds/density_grid.h"
+#include "programs/memory_limit.h"
+#include "programs/write_output.h"
+
+namespace {
+
+using namespace esvr;
+namespace po = cli::po;
+
+constexpr const char* kName = "raw2vdb";
+constexpr const char* kRawOptions[] = {"dims", "type", "endian", "skip", "voxel-size"};
+
+cli::CommandLine commandLine() {
+  cli::CommandLine line(
+      {.name = kName,
+       .purpose = "Turns a dense image, RAW or NRRD, into a sparse VDB grid.",
+       .usage = "  raw2vdb IN.raw OUT.vdb --dims X,Y,Z --type TYPE [options]\n"
+                "  raw2vdb IN.nrrd|IN.nhdr OUT.vdb [options]",
+       .notes =
+           "TYPE is uint8, int8, uint16, int16, uint32, int32, float32 or float64. x is fastest.\n"
+           "The grid has 32-bit floats. A voxel is active where it is not below the threshold,\n"
+           "or, without one, where it differs from the background. An NRRD's space directions,\n"
+           "origin and spacings become the grid's transform.",
+       .examples = "  raw2vdb aneurism_256x256x256_uint8.raw aneurism.vdb --dims 256,256,256 \\\n"
+                   "      --type uint8 --threshold 32 --normalise\n"
+                   "  raw2vdb ct.nhdr ct.vdb --threshold 300"});
+  line.argument("input", "IN");
+  line.argument("output", "OUT.vdb");
+  // clang-format off
+  line.options().add_options()
+    ("dims", po::value<std::string>()->value_name("X,Y,Z"), "RAW: voxels along each axis")
+    ("type", po::value<std::string>()->value_name("TYPE"), "RAW: type of the values")
+    ("endian", po::value<std::string>()->value_name("little|big"), "RAW: byte order (little)")
+    ("skip", po::value<std::int64_t>()->value_name("BYTES"), "RAW: length of a header (0)")
+    ("voxel-size", po::value<double>()->value_name("S"), "RAW: edge of a voxel in world units (1)")
+    ("threshold", po::value<double>()->value_name("T"), "in the image's units: less is empty")
+    ("background", po::value<double>()->value_name("B")->default_value(0.0),
+     "in the image's units: the value of what is empty")
+    ("normalise", po::bool_switch(),
+     "divide by the type's largest value; float images: by their largest")
+    ("nonfinite", po::value<std::string>()->value_name("refuse|zero")->default_value("refuse"),
+     "what to do with NaN and infinite voxels")
+    ("name", po::value<std::string>()->value_name("NAME")->default_value("density"),
+     "of the grid")
+    ("force,f", po::bool_switch(), "replace OUT.vdb if it exists");
+  // clang-format on
+  return line;
+}
+
+/// "256,256,128": three positive numbers.
+Coord parseDims(const std::string& text) {
+  std::int32_t dims[3] = {};
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [next, error] = std::from_chars(at, end, dims[axis]);
+    const bool separated = axis < 2 ? next != end && *next == ',' : next == end;
+    if (error != std::errc() || !separated || dims[axis] < 1)
+      throw UsageError("--dims takes three positive numbers as in 256,256,128, not '" + text + "'");
+    at = next + 1;
+  }
+  return {dims[0], dims[1], dims[2]};
+}
+
+/// True for the second of two words. \throws UsageError  neither
+bool isSecond(const cli::Arguments& arguments, const std::string& option, const char* first,
+              const char* second) {
+  const auto given = arguments.find<std::string>(option).value_or(first);
+  if (given != first && given != second)
+    throw UsageError("--" + option + " is " + first + " or " + second + ", not '" + given + "'");
+  return given == second;
+}
+
+samples::RawLayout layoutFrom(const cli::Arguments& arguments) {
+  if (!arguments.has("dims") || !arguments.has("type"))
+    throw UsageError(
+        "a RAW image needs --dims and --type (a file ending in .nrrd or .nhdr does not)");
+  constexpr double kSmallest = 1e-4, kLargest = 1e30;  // OpenVDB takes cubes of 1e-15 for 0
+  const auto skip = arguments.find<std::int64_t>("skip").value_or(0);
+  cli::requireRange("skip", skip, std::int64_t{0}, std::numeric_limits<std::int64_t>::max());
+  samples::RawLayout layout{.size = parseDims(arguments.get<std::string>("dims")),
+                            .type = arguments.get<std::string>("type"),
+                            .bigEndian = isSecond(arguments, "endian", "little", "big"),
+                            .headerBytes = std::uint64_t(skip),
+                            .voxelSize = arguments.find<double>("voxel-size").value_or(1.0)};
+  cli::requireRange("voxel-size", layout.voxelSize, kSmallest, kLargest);
+  return layout;
+}
+
+std::unique_ptr<samples::ImageSource> openImage(const cli::Arguments& arguments) {
+  const std::filesystem::path path = arguments.get<std::string>("input");
+  if (path.extension() != ".nrrd" && path.extension() != ".nhdr")
+    return samples::openRaw(path, layoutFrom(arguments));
+  for (const char* option : kRawOptions)
+    if (arguments.has(option))
+      throw UsageError("--" + std::string(option) + " is for RAW images: an NRRD says it itself");
+  return samples::openNrrd(path);
+}
+
+samples::ImageOptions imageOptions(const cli::Arguments& arguments) {
+  samples::ImageOptions options{
+      .threshold = arguments.find<double>("threshold"),
+      .background = arguments.get<double>("background"),
+      .normalise = arguments.get<bool>("normalise"),
+      .zeroNonFinite = isSecond(arguments, "nonfinite", "refuse", "zero")};
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  cli::requireRange("background", options.background, -kLargest, kLargest);
+  if (options.threshold) cli::requireRange("threshold", *options.threshold, -kLargest, kLargest);
+  return options;
+}
+
+Transform transformOf(const samples::ImageSource& image, const std::string& input) {
+  try {
+    return affineTransform(image.indexToWorld());
+  } catch (const UsageError& error) {
+    throw BadInput(input + ": its axes do not span space: " + error.what());
+  }
+}
+
+int run(int argc, char** argv) {
+  const auto arguments = commandLine().parse(argc, argv);
+  if (!arguments) return 0;
+  const samples::ImageOptions options = imageOptions(*arguments);
+  const samples::Output output{arguments->get<std::string>("output"),
+                               arguments->get<bool>("force")};
+  cli::checkOutput(output.path, {".vdb", ".nvdb"}, output.overwrite);
+  const auto image = openImage(*arguments);
+  const Transform transform = transformOf(*image, arguments->get<std::string>("input"));
+
+  const cli::Log log(kName, arguments->verbosity);
+  const cli::ThreadLimit threads(arguments->threads);
+  const cli::Interrupts interrupts;
+  samples::ImageVolume made = volumeOf(
+      *image, options, {.maxBricks = samples::bricksThatFit(), .cancel = &interrupts.token()});
+  if (made.nonFiniteReplaced > 0)
+    log.warning(std::to_string(made.nonFiniteReplaced) + " voxels were not finite and are now 0");
+  const std::vector<VolumeGrid> grids{
+      samples::densityGrid(std::move(made.volume), transform, arguments->get<std::string>("name"))};
+  samples::writeOutput(output, std::vector{stringItem("creator", kName)}, grids, log);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return cli::runMain(kName, [&] { return run(argc, argv); });
+}

@@ -1,0 +1,132 @@
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <string_view>
+#include <system_error>
+#include <unordered_map>
+
+#include "esvr/error.h"
+#include "swc/skeleton.h"
+
+namespace esvr::samples {
+namespace {
+
+constexpr std::size_t kColumns = 7;
+constexpr std::int64_t kNoParent = -1;
+
+/// A node as its line has it.
+struct SwcLine {
+  std::size_t number = 0;  ///< of the line, from 1
+  std::int64_t id = 0, parent = 0;
+  SkeletonNode node;
+};
+
+class SwcParser {
+ public:
+  explicit SwcParser(std::string name) : name_(std::move(name)) {}
+
+  Skeleton parse(std::istream& text) {
+    std::string line;
+    for (std::size_t number = 1; std::getline(text, line); ++number) addLine(line, number);
+    if (text.bad()) throw BadInput(name_ + ": cannot be read to its end");
+    if (lines_.empty()) throw BadInput(name_ + ": has no node: not an SWC file?");
+    return link();
+  }
+
+ private:
+  void addLine(std::string_view text, std::size_t number) {
+    const auto columns = split(text.substr(0, text.find('#')), number);
+    if (columns.empty()) return;
+    SwcLine line{.number = number,
+                 .id = integer(columns[0], number),
+                 .parent = integer(columns[6], number),
+                 .node = {}};
+    line.node.position = {real(columns[2], number), real(columns[3], number),
+                          real(columns[4], number)};
+    line.node.radius = real(columns[5], number);
+    if (line.node.radius < 0.0) refuse(number, "the radius is negative");
+    if (line.id < 0) refuse(number, "the node's id is negative");
+    if (!byId_.emplace(line.id, lines_.size()).second)
+      refuse(number, "node " + std::to_string(line.id) + " is there twice");
+    lines_.push_back(line);
+  }
+
+  /// Parents may come after their children: linked when all are known.
+  Skeleton link() const {
+    Skeleton skeleton;
+    skeleton.reserve(lines_.size());
+    for (const SwcLine& line : lines_) {
+      skeleton.push_back(line.node);
+      if (line.parent != kNoParent) skeleton.back().parent = parentOf(line);
+    }
+    return skeleton;
+  }
+
+  std::size_t parentOf(const SwcLine& line) const {
+    if (line.parent == line.id) refuse(line.number, "the node is its own parent");
+    const auto found = byId_.find(line.parent);
+    if (found == byId_.end())
+      refuse(line.number, "its parent " + std::to_string(line.parent) + " is not there");
+    return found->second;
+  }
+
+  std::vector<std::string_view> split(std::string_view text, std::size_t number) const {
+    constexpr std::string_view kBlank = " \t\r\f\v";
+    std::vector<std::string_view> columns;
+    for (auto at = text.find_first_not_of(kBlank); at != text.npos;) {
+      const auto end = std::min(text.find_first_of(kBlank, at), text.size());
+      columns.push_back(text.substr(at, end - at));
+      at = text.find_first_not_of(kBlank, end);
+    }
+    if (!columns.empty() && columns.size() < kColumns)
+      refuse(number, "a node has 7 columns, here are " + std::to_string(columns.size()));
+    return columns;
+  }
+
+  template <class Number>
+  Number number(std::string_view text, std::size_t line) const {
+    if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+    Number value{};
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size())
+      refuse(line, "'" + std::string(text) + "' is not a number of the kind that stands here");
+    return value;
+  }
+  std::int64_t integer(std::string_view text, std::size_t line) const {
+    return number<std::int64_t>(text, line);
+  }
+  double real(std::string_view text, std::size_t line) const {
+    const auto value = number<double>(text, line);
+    if (!std::isfinite(value)) refuse(line, "'" + std::string(text) + "' is not finite");
+    return value;
+  }
+
+  [[noreturn]] void refuse(std::size_t line, const std::string& why) const {
+    throw BadInput(name_ + ", line " + std::to_string(line) + ": " + why);
+  }
+
+  std::string name_;
+  std::vector<SwcLine> lines_;
+  std::unordered_map<std::int64_t, std::size_t> byId_;
+};
+
+}  // namespace
+
+Skeleton parseSwc(std::istream& text, const std::string& name) {
+  return SwcParser(name).parse(text);
+}
+
+Skeleton readSwc(const std::filesystem::path& path) {
+  std::error_code unreadable;
+  if (std::filesystem::is_directory(path, unreadable))
+    throw BadInput("cannot read " + path.string() + ": it is a directory");
+  std::ifstream file(path);
+  if (!file)
+    throw BadInput("cannot read " + path.string() + ": " + std::generic_category().message(errno));
+  return parseSwc(file, path.string());
+}
+
+}  // namespace esvr::samples

@@ -1,0 +1,49 @@
+// Plan: what an output path is refused for, before any work, and that the check leaves no trace.
+
+#include "cli/output.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cli/run_program.h"
+#include "esvr/error.h"
+
+namespace esvr::cli {
+namespace {
+
+using test::TemporaryFolder;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(CheckOutput, acceptsANewFileAndLeavesNothing) {
+  const TemporaryFolder folder;
+  EXPECT_NO_THROW(checkOutput(folder / "new.vdb", {".vdb", ".nvdb"}, false));
+  EXPECT_TRUE(folder.names().empty());
+}
+
+TEST(CheckOutput, namesTheExtensionsThatAreAllowed) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(
+      [&] {
+        checkOutput(folder / "new.txt", {".vdb", ".nvdb"}, false);
+      },
+      ThrowsMessage<UsageError>(HasSubstr(".vdb or .nvdb")));
+}
+
+TEST(CheckOutput, keepsAnExistingFileUnlessForced) {
+  const TemporaryFolder folder;
+  test::writeText(folder / "old.vdb", "precious");
+  EXPECT_THAT([&] { checkOutput(folder / "old.vdb", {".vdb"}, false); },
+              ThrowsMessage<RuntimeFailure>(HasSubstr("--force")));
+  EXPECT_NO_THROW(checkOutput(folder / "old.vdb", {".vdb"}, true));
+  EXPECT_EQ(test::readText(folder / "old.vdb"), "precious");
+}
+
+TEST(CheckOutput, refusesAFolderThatIsNotThere) {
+  const TemporaryFolder folder;
+  EXPECT_THAT([&] { checkOutput(folder / "none/new.vdb", {".vdb"}, false); },
+              ThrowsMessage<RuntimeFailure>(HasSubstr("none/new.vdb")));
+}
+
+}  // namespace
+}  // namespace esvr::cli

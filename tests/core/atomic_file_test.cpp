@@ -1,0 +1,162 @@
+#include "core/atomic_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <string_view>
+
+#include "esvr/error.h"
+
+namespace esvr {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+class AtomicFileTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "esvr-test-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    directory_ = pattern;
+  }
+  void TearDown() override { fs::remove_all(directory_); }
+
+  [[nodiscard]] fs::path target() const { return directory_ / "out.esvr"; }
+  [[nodiscard]] std::size_t entries() const {
+    return std::size_t(std::distance(fs::directory_iterator(directory_), fs::directory_iterator()));
+  }
+  fs::path directory_;
+};
+
+std::span<const std::byte> bytesOf(std::string_view text) {
+  return std::as_bytes(std::span(text.data(), text.size()));
+}
+std::string contentOf(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+void put(const fs::path& path, std::string_view text) { std::ofstream(path) << text; }
+
+/// Lets files grow to `bytes` only, as a full disk would.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit limit{bytes, old_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &old_);
+    std::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  void (*handler_)(int);
+  rlimit old_{};
+};
+
+TEST_F(AtomicFileTest, AppearsOnlyOnCommit) {
+  AtomicFile file(target(), false);
+  file.write(bytesOf("one "));
+  file.write(bytesOf("two"));
+  EXPECT_FALSE(fs::exists(target()));
+  file.commit();
+  EXPECT_EQ(contentOf(target()), "one two");
+  EXPECT_EQ(entries(), 1u);
+}
+
+TEST_F(AtomicFileTest, LeavesNothingWithoutCommit) {
+  {
+    AtomicFile file(target(), false);
+    file.write(bytesOf("half"));
+    EXPECT_EQ(entries(), 1u);
+  }
+  EXPECT_EQ(entries(), 0u);
+}
+
+TEST_F(AtomicFileTest, TakesWhatALibraryWritesByName) {
+  AtomicFile file(target(), false);
+  put(file.path(), "by name");
+  file.commit();
+  EXPECT_EQ(contentOf(target()), "by name");
+}
+
+TEST_F(AtomicFileTest, RefusesAnExistingTargetAndKeepsIt) {
+  put(target(), "old");
+  EXPECT_THAT([&] { AtomicFile(target(), false); },
+              ThrowsMessage<RuntimeFailure>(HasSubstr("exists already")));
+  EXPECT_EQ(contentOf(target()), "old");
+  EXPECT_EQ(entries(), 1u);
+}
+
+TEST_F(AtomicFileTest, RefusesATargetThatAppearedMeanwhile) {
+  AtomicFile file(target(), false);
+  file.write(bytesOf("new"));
+  put(target(), "somebody else's");
+  EXPECT_THROW(file.commit(), RuntimeFailure);
+  EXPECT_EQ(contentOf(target()), "somebody else's");
+}
+
+TEST_F(AtomicFileTest, ReplacesWhenAskedAndKeepsTheFileUntilThen) {
+  put(target(), "old");
+  AtomicFile file(target(), true);
+  file.write(bytesOf("new"));
+  EXPECT_EQ(contentOf(target()), "old");
+  file.commit();
+  EXPECT_EQ(contentOf(target()), "new");
+}
+
+TEST_F(AtomicFileTest, ReplacingDoesNotWidenPermissions) {
+  put(target(), "old");
+  fs::permissions(target(), fs::perms(0600));
+  AtomicFile file(target(), true);
+  file.commit();
+  EXPECT_EQ(fs::status(target()).permissions(), fs::perms(0600));
+}
+
+TEST_F(AtomicFileTest, FollowsASymbolicLink) {
+  put(directory_ / "real", "old");
+  fs::create_symlink("real", target());
+  AtomicFile file(target(), true);
+  file.write(bytesOf("new"));
+  file.commit();
+  EXPECT_TRUE(fs::is_symlink(target()));
+  EXPECT_EQ(contentOf(directory_ / "real"), "new");
+}
+
+TEST_F(AtomicFileTest, RefusesDevicesAndDirectoriesEvenWhenAskedToReplace) {
+  EXPECT_THAT([&] { AtomicFile("/dev/full", true); },
+              ThrowsMessage<RuntimeFailure>(HasSubstr("/dev/full")));
+  EXPECT_THAT([&] { AtomicFile(directory_, true); },
+              ThrowsMessage<RuntimeFailure>(HasSubstr("not a regular file")));
+}
+
+TEST_F(AtomicFileTest, NamesAMissingDirectory) {
+  EXPECT_THAT([&] { AtomicFile(directory_ / "no" / "out.esvr", false); },
+              ThrowsMessage<RuntimeFailure>(HasSubstr("no/out.esvr: No such file")));
+}
+
+TEST_F(AtomicFileTest, AFullDiskIsAFailureAndLeavesTheOldFile) {
+  put(target(), "old");
+  {
+    AtomicFile file(target(), true);
+    const FileSizeLimit limit(1000);
+    const std::string big(5000, 'x');
+    EXPECT_THAT([&] { file.write(bytesOf(big)); },
+                ThrowsMessage<RuntimeFailure>(HasSubstr("out.esvr")));
+  }
+  EXPECT_EQ(contentOf(target()), "old");
+  EXPECT_EQ(entries(), 1u);
+}
+
+}  // namespace
+}  // namespace esvr

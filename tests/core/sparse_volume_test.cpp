@@ -1,0 +1,199 @@
+#include "esvr/sparse_volume.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "esvr/error.h"
+
+namespace esvr {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// A brick at `corner` with one active voxel of value 1; the others hold 9, which no function that
+/// looks at active voxels may see.
+BrickInput brickWith(Coord corner, Coord activeLocal) {
+  BrickInput brick{};
+  brick.corner = corner;
+  brick.values.fill(9.0f);
+  brick.values[std::size_t(voxelOffset(activeLocal))] = 1.0f;
+  brick.active.set(voxelOffset(activeLocal));
+  return brick;
+}
+
+BrickInput emptyBrick(Coord corner) {
+  BrickInput brick{};
+  brick.corner = corner;
+  return brick;
+}
+
+TEST(VoxelOffset, WalksABrickWithZFastest) {
+  int expected = 0;
+  for (int x = 0; x < kBrickSide; ++x)
+    for (int y = 0; y < kBrickSide; ++y)
+      for (int z = 0; z < kBrickSide; ++z, ++expected) {
+        EXPECT_EQ(voxelOffset({x, y, z}), expected);
+        EXPECT_EQ(voxelLocal(expected), (Coord{x, y, z}));
+      }
+}
+
+TEST(BrickOf, RoundsDownForNegativeCoordinates) {
+  for (int v : {-17, -16, -9, -8, -1, 0, 7, 8, 10'000'000, -10'000'000, Box::kMin, Box::kMax}) {
+    const Coord voxel{v, v, v};
+    const Coord local = localOf(voxel);
+    EXPECT_GE(local.x, 0);
+    EXPECT_LT(local.x, kBrickSide);
+    EXPECT_EQ(brickOf(voxel) * kBrickSide + local, voxel) << v;
+  }
+}
+
+TEST(BrickMask, SetsTestsAndCountsEveryBit) {
+  BrickMask mask;
+  for (int offset = 0; offset < kBrickVoxels; ++offset) {
+    EXPECT_FALSE(mask.test(offset));
+    mask.set(offset);
+    EXPECT_TRUE(mask.test(offset));
+    EXPECT_EQ(mask.count(), offset + 1);
+  }
+  BrickMask all;
+  all.setAll();
+  EXPECT_EQ(mask, all);
+}
+
+TEST(MakeVolume, OfNothingIsTheBackgroundEverywhere) {
+  const auto volume = makeVolume({}, 0.5f);
+  EXPECT_EQ(volume.brickCount(), 0u);
+  EXPECT_EQ(activeVoxelCount(volume), 0u);
+  EXPECT_TRUE(activeBox(volume).empty());
+  EXPECT_EQ(valueAt(volume, {-3, 0, 1 << 30}), 0.5f);
+  EXPECT_THROW((void)activeRange(volume), BadInput);
+  checkInvariants(volume);
+}
+
+TEST(MakeVolume, SortsBricksAndPutsTheOriginAtTheSmallestCorner) {
+  const auto volume =
+      makeVolume({brickWith({8, -16, 0}, {1, 2, 3}), brickWith({-8, 0, 24}, {7, 7, 7})}, 0.0f);
+  checkInvariants(volume);
+  EXPECT_EQ(volume.origin, (Coord{-8, -16, 0}));
+  ASSERT_EQ(volume.brickCount(), 2u);
+  EXPECT_EQ(volume.brickCorner(0), (Coord{-8, 0, 24}));
+  EXPECT_EQ(volume.brickCorner(1), (Coord{8, -16, 0}));
+  EXPECT_EQ(valueAt(volume, {9, -14, 3}), 1.0f);
+  EXPECT_EQ(valueAt(volume, {-1, 7, 31}), 1.0f);
+  EXPECT_EQ(valueAt(volume, {-1, 7, 30}), 9.0f);
+  EXPECT_EQ(activeBox(volume), (Box{{-1, -14, 3}, {9, 7, 31}}));
+  EXPECT_EQ(activeVoxelCount(volume), 2u);
+}
+
+TEST(MakeVolume, DropsBricksWithoutAnActiveVoxelAndTheirPlace) {
+  const auto volume = makeVolume({emptyBrick({-800, 0, 0}), brickWith({8, 8, 8}, {})}, 0.25f);
+  EXPECT_EQ(volume.brickCount(), 1u);
+  EXPECT_EQ(volume.origin, (Coord{8, 8, 8}));
+  EXPECT_EQ(valueAt(volume, {-800, 0, 0}), 0.25f);
+}
+
+TEST(MakeVolume, DoesNotDependOnTheOrderOfTheBricks) {
+  const auto a = brickWith({0, 0, 0}, {1, 0, 0});
+  const auto b = brickWith({0, 0, 8}, {0, 1, 0});
+  const auto forward = makeVolume({a, b}, 0.0f);
+  const auto backward = makeVolume({b, a}, 0.0f);
+  EXPECT_EQ(forward.bricks, backward.bricks);
+  EXPECT_EQ(forward.values, backward.values);
+  EXPECT_EQ(forward.active, backward.active);
+}
+
+class FarVolume : public testing::TestWithParam<std::int32_t> {};
+
+TEST_P(FarVolume, DiffersFromTheNearOneOnlyInItsOrigin) {
+  const Coord shift = Coord{1, 1, 1} * (GetParam() & ~(kBrickSide - 1));
+  const auto near = makeVolume({brickWith({}, {1, 2, 3}), brickWith({16, 0, 8}, {7, 0, 5})}, 0.0f);
+  const auto far = makeVolume(
+      {brickWith(shift, {1, 2, 3}), brickWith(shift + Coord{16, 0, 8}, {7, 0, 5})}, 0.0f);
+  EXPECT_EQ(far.origin, shift);
+  EXPECT_EQ(far.bricks, near.bricks);
+  EXPECT_EQ(far.values, near.values);
+  EXPECT_EQ(activeBox(far), (Box{activeBox(near).min + shift, activeBox(near).max + shift}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Shifts, FarVolume,
+                         testing::Values(1 << 20, 10'000'000, -10'000'000, Box::kMin,
+                                         Box::kMax - 64));
+
+TEST(MakeVolume, RefusesTwoBricksOfOneCorner) {
+  EXPECT_THAT(
+      [] {
+        (void)makeVolume({brickWith({8, 0, 0}, {}), brickWith({8, 0, 0}, {})}, 0.0f);
+      },
+      ThrowsMessage<BadInput>(HasSubstr("(8, 0, 0)")));
+}
+
+TEST(MakeVolume, RefusesBricksFurtherApartThanTheLatticeOfAVolume) {
+  const Coord low{-(1 << 30), 0, 0};
+  const auto apart = [&](std::int32_t x) {
+    return makeVolume({brickWith(low, {}), brickWith({x, 0, 0}, {})}, 0.0f);
+  };
+  EXPECT_THAT([&] { (void)apart(1 << 30); }, ThrowsMessage<BadInput>(HasSubstr("2^31")));
+  const auto widest = apart((1 << 30) - 16);
+  checkInvariants(widest);
+  EXPECT_EQ(valueAt(widest, {(1 << 30) - 16, 0, 0}), 1.0f);
+}
+
+TEST(ValueAt, ReachesFromOneEndOfTheLatticeToTheOther) {
+  const Coord low = Coord{1, 1, 1} * Box::kMin;
+  const auto volume = makeVolume({brickWith(low, {0, 0, 0})}, 0.5f);
+  EXPECT_EQ(valueAt(volume, low), 1.0f);
+  EXPECT_EQ(valueAt(volume, Coord{1, 1, 1} * Box::kMax), 0.5f);
+}
+
+TEST(ActiveRange, SeesActiveVoxelsOnly) {
+  auto brick = brickWith({}, {0, 0, 0});
+  brick.values[1] = -2.0f;
+  brick.active.set(1);
+  const auto range = activeRange(makeVolume({brick}, -100.0f));
+  EXPECT_EQ(range.min, -2.0f);
+  EXPECT_EQ(range.max, 1.0f);
+}
+
+TEST(FindBrick, FindsEveryBrickAndNoOther) {
+  const auto volume = makeVolume(
+      {brickWith({0, 0, 0}, {}), brickWith({0, 0, 16}, {}), brickWith({8, 0, 0}, {})}, 0.0f);
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    EXPECT_EQ(findBrick(volume, volume.bricks[b]), b);
+  EXPECT_FALSE(findBrick(volume, {0, 0, 1}));
+  EXPECT_FALSE(findBrick(volume, {-1, 0, 0}));
+  EXPECT_FALSE(findBrick(volume, {2, 0, 0}));
+}
+
+class BrokenVolume : public testing::Test {
+ protected:
+  SparseVolume volume = makeVolume({brickWith({0, 0, 0}, {}), brickWith({0, 0, 8}, {})}, 0.0f);
+  void expectRefused() { EXPECT_THROW(checkInvariants(volume), std::logic_error); }
+};
+
+TEST_F(BrokenVolume, MissingValuesAreFound) {
+  volume.values.pop_back();
+  expectRefused();
+}
+TEST_F(BrokenVolume, MissingMasksAreFound) {
+  volume.active.pop_back();
+  expectRefused();
+}
+TEST_F(BrokenVolume, BricksOutOfOrderAreFound) {
+  std::swap(volume.bricks[0], volume.bricks[1]);
+  expectRefused();
+}
+TEST_F(BrokenVolume, TheSameBrickTwiceIsFound) {
+  volume.bricks[1] = volume.bricks[0];
+  expectRefused();
+}
+TEST_F(BrokenVolume, AnOriginInsideABrickIsFound) {
+  volume.origin.y = 4;
+  expectRefused();
+}
+
+}  // namespace
+}  // namespace esvr

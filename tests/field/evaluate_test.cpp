@@ -1,0 +1,140 @@
+// Plan: evaluateBricks (float32, SIMD, lists) against evaluateReference (float64, every primitive
+// at every voxel) over kernels from the Gaussian limit to a hard edge, over needles and pancakes,
+// far origins and supports that cross bricks; outside reachedBricks the reference must be zero; the
+// result must not depend on the number of threads, on where the field lies, nor on other bricks
+// asked for.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <set>
+
+#include "esvr/field.h"
+#include "field/cube.h"
+#include "field/random_field.h"
+
+namespace esvr {
+namespace {
+
+using test::cube;
+using test::RandomFieldOptions;
+
+std::vector<float> evaluate(const Field& field, const std::vector<Coord>& corners) {
+  std::vector<float> values(corners.size() * kBrickVoxels);
+  evaluateBricks(field, corners, values);
+  return values;
+}
+
+double largestError(const Field& field, const std::vector<Coord>& corners) {
+  const auto values = evaluate(field, corners);
+  double worst = 0.0;
+  for (std::size_t b = 0; b < corners.size(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const double reference = evaluateReference(field, corners[b] + voxelLocal(v));
+      worst = std::max(worst, std::abs(double(values[b * kBrickVoxels + v]) - reference));
+    }
+  return worst;
+}
+
+class EvaluateKappa : public testing::TestWithParam<float> {};
+
+// A float32 ulp of m is at most 2^-23 m; |phi'| m stays below kappa e^0.. so the error of one term
+// is a few ulp of its intensity times the edge's steepness.
+TEST_P(EvaluateKappa, AgreesWithTheFloat64Sum) {
+  const Field field = test::randomField({.count = 30, .extent = 32, .kappa = GetParam()});
+  const double steepness = std::max(1.0, double(GetParam()));
+  EXPECT_LT(largestError(field, cube({-8, -8, -8}, 6)),
+            4e-7 * steepness * test::intensitySum(field));
+}
+INSTANTIATE_TEST_SUITE_P(Kernels, EvaluateKappa,
+                         testing::Values(-30.f, -3.f, 0.f, 2.f, 5.f, 50.f, 5000.f));
+
+class EvaluateAspect : public testing::TestWithParam<std::pair<double, double>> {};
+
+TEST_P(EvaluateAspect, StaysAccurateForNeedlesAndPancakes) {
+  const auto [aspect, tolerance] = GetParam();
+  const Field field = test::randomField(
+      {.count = 30, .extent = 24, .smallest = 0.3, .aspect = aspect, .intensity = 1.0, .seed = 11});
+  EXPECT_LT(largestError(field, cube({0, 0, 0}, 3)), tolerance);
+}
+INSTANTIATE_TEST_SUITE_P(Aspects, EvaluateAspect,
+                         testing::Values(std::pair{10.0, 1e-5}, std::pair{100.0, 3e-5},
+                                         std::pair{1000.0, 3e-4}));
+
+TEST(Evaluate, GivesTheBackgroundWhereNothingReaches) {
+  Field field = test::randomField({.count = 3});
+  field.background = 0.25f;
+  EXPECT_THAT(evaluate(field, {{800, 0, 0}}), testing::Each(0.25f));
+}
+
+TEST(Evaluate, IsTheSameBitsAtTenMillionVoxels) {
+  const RandomFieldOptions near{.count = 20, .extent = 16};
+  RandomFieldOptions far = near;
+  far.origin = {10'000'000, -10'000'000, 10'000'000};
+  const auto there = cube(far.origin, 2);
+  EXPECT_EQ(evaluate(test::randomField(near), cube({}, 2)),
+            evaluate(test::randomField(far), there));
+}
+
+TEST(Evaluate, DoesNotDependOnTheNumberOfThreads) {
+  const Field field = test::randomField({.count = 300, .extent = 64});
+  const auto corners = cube({}, 8);
+  const auto all = evaluate(field, corners);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(evaluate(field, corners), all);
+}
+
+TEST(Evaluate, DoesNotDependOnTheOtherBricks) {
+  const Field field = test::randomField({.count = 50, .extent = 24});
+  const auto many = evaluate(field, cube({}, 3));
+  const auto one = evaluate(field, {{0, 0, 0}});
+  EXPECT_TRUE(std::equal(one.begin(), one.end(), many.begin()));
+}
+
+TEST(Evaluate, UsesEachPrimitivesOwnKappaWhereGiven) {
+  Field field = test::randomField({.count = 20, .extent = 16});
+  auto& e = field.chunks[0].ellipsoids;
+  for (std::size_t i = 0; i < e.size(); ++i) e.kappa.push_back(float(i) - 8.0f);
+  EXPECT_LT(largestError(field, cube({}, 2)), 5e-6 * test::intensitySum(field));
+}
+
+TEST(Evaluate, AddsChunksOfDifferentOrigins) {
+  Field field = test::randomField({.count = 10, .extent = 16});
+  field.chunks.push_back(
+      test::randomField({.count = 10, .extent = 16, .origin = {-5, 3, 9}, .seed = 3}).chunks[0]);
+  EXPECT_LT(largestError(field, cube({-16, -16, -16}, 5)), 1e-6 * test::intensitySum(field));
+}
+
+TEST(ReachedBricks, HoldEveryVoxelThatIsNotBackground) {
+  const Field field =
+      test::randomField({.count = 8, .extent = 40, .smallest = 0.4, .aspect = 30.0});
+  const auto reached = reachedBricks(field);
+  EXPECT_TRUE(std::is_sorted(reached.begin(), reached.end()));
+  const std::set<Coord> set(reached.begin(), reached.end());
+  for (const Coord corner : cube({-80, -80, -80}, 25)) {
+    if (set.contains(corner)) continue;
+    for (int v = 0; v < kBrickVoxels; v += 7)
+      ASSERT_EQ(evaluateReference(field, corner + voxelLocal(v)), 0.0) << toString(corner);
+  }
+}
+
+TEST(ReachedBricks, AreFewForAThinDiagonalNeedle) {
+  Field field = test::randomField({.count = 1});
+  auto& e = field.chunks[0].ellipsoids;
+  e.logScale = {std::vector{std::log(40.0f)}, {std::log(0.4f)}, {std::log(0.4f)}};
+  const float half = std::sqrt(0.5f);
+  e.rotation = {std::vector{half}, {0.0f}, {0.0f}, {half}};  // about z by 90 degrees: along y
+  const double length = 2 * 40.0 * 3.0;
+  EXPECT_LT(reachedBricks(field).size(), 4 * (length / kBrickSide + 2));
+}
+
+TEST(PaperKernel, EndsAtItsCutoffWithAJump) {
+  Field field = test::randomField({.count = 5, .extent = 16, .kappa = 5.0f});
+  field.kernel.form = KernelForm::kPaper;
+  EXPECT_LT(largestError(field, cube({-8, -8, -8}, 4)), 0.0063 * test::intensitySum(field));
+}
+
+}  // namespace
+}  // namespace esvr

@@ -1,0 +1,44 @@
+#pragma once
+/// The paper's loss by its definition: float64 over every voxel of a box, SSIM as the textbook has
+/// it. Independent of the library's bricks and of its way to write SSIM.
+
+#include <vector>
+
+#include "esvr/coord.h"
+
+namespace esvr::test {
+
+/// Values of a box's voxels, zero outside.
+class DenseValues {
+ public:
+  explicit DenseValues(const Box& box) : box_(box), values_(std::size_t(box.volume())) {}
+
+  [[nodiscard]] const Box& box() const { return box_; }
+  [[nodiscard]] double at(Coord v) const { return box_.contains(v) ? values_[offset(v)] : 0.0; }
+  [[nodiscard]] double& operator[](Coord v) { return values_[offset(v)]; }
+
+ private:
+  [[nodiscard]] std::size_t offset(Coord v) const {
+    const Coord side = box_.max - box_.min + Coord{1, 1, 1}, local = v - box_.min;
+    return (std::size_t(local.x) * std::size_t(side.y) + std::size_t(local.y)) *
+               std::size_t(side.z) +
+           std::size_t(local.z);
+  }
+  Box box_;
+  std::vector<double> values_;
+};
+
+struct DenseLossOptions {
+  double voxels, beta, peak;
+};
+
+/// The box must reach at least 5 voxels, a window's radius, beyond all that is not zero.
+double densePaperLoss(const DenseValues& prediction, const DenseValues& target,
+                      const DenseLossOptions& options);
+
+/// Its derivative by the prediction's voxels: the chain rule through the moments m1 = w * p, m2 =
+/// w * p^2 and m12 = w * (p t).
+DenseValues densePaperLossGradient(const DenseValues& prediction, const DenseValues& target,
+                                   const DenseLossOptions& options);
+
+}  // namespace esvr::test

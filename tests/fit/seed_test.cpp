@@ -1,0 +1,74 @@
+// Plan: draws follow the squared residual of the signs allowed and nothing else; a seed takes
+// place, spread and height from the residual around it; the kernel's variance has its closed form
+// in the Gaussian limit.
+
+#include "fit/seed.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+namespace esvr {
+namespace {
+
+struct Bricks {
+  BrickIndex index;
+  std::vector<float> values;
+  explicit Bricks(std::vector<Coord> bricks)
+      : index(bricks), values(bricks.size() * kBrickVoxels) {}
+  [[nodiscard]] ResidualField field() const { return {index, values}; }
+};
+
+TEST(DrawVoxels, FollowsTheEnergyBrickByBrick) {
+  Bricks b({{0, 0, 0}, {1, 0, 0}});
+  for (std::size_t v = 0; v < kBrickVoxels; ++v)
+    b.values[v] = -1.0f, b.values[kBrickVoxels + v] = -2.0f;
+  const auto voxels = drawVoxels(b.field(), {.count = 100, .targetBricks = 2});
+  ASSERT_EQ(voxels.size(), 100u);
+  const auto inSecond =
+      std::count_if(voxels.begin(), voxels.end(), [](Coord v) { return v.x >= 8; });
+  EXPECT_NEAR(double(inSecond), 80.0, 1.0);  // systematic: within one of 4 / (1 + 4)
+}
+
+TEST(DrawVoxels, LeavesAloneWhatItsSignCannotMend) {
+  Bricks b({{0, 0, 0}});
+  b.values[10] = 5.0f;   // V too high
+  b.values[20] = -1.0f;  // V too low
+  for (const Coord v : drawVoxels(b.field(), {.count = 50, .targetBricks = 1}))
+    EXPECT_EQ(v, voxelLocal(20));
+  DrawOptions negative{
+      .count = 50, .targetBricks = 1, .signs = {.positive = false, .negative = true}};
+  for (const Coord v : drawVoxels(b.field(), negative)) EXPECT_EQ(v, voxelLocal(10));
+}
+
+TEST(DrawVoxels, FindsNothingWhereThereIsNoError) {
+  const Bricks b({{0, 0, 0}});
+  EXPECT_TRUE(drawVoxels(b.field(), {.count = 5, .targetBricks = 1}).empty());
+}
+
+TEST(Seed, TakesPlaceAndHeightFromTheResidual) {
+  Bricks b({{0, 0, 0}, {0, 0, 1}});
+  // A bar along z across two bricks: three voxels high, symmetric about (4, 4, 7).
+  for (int z = 6; z <= 8; ++z)
+    b.values[std::size_t((z >> 3) * kBrickVoxels + voxelOffset({4, 4, z & 7}))] = -0.5f;
+  SeedOptions options;
+  options.draw = {.count = 3, .targetBricks = 2};
+  const auto seeds = seedsFromResidual(b.field(), options);
+  ASSERT_EQ(seeds.size(), 3u);
+  EXPECT_NEAR(seeds[1].center[0], 4.0, 1e-9);
+  EXPECT_NEAR(seeds[1].center[2], 7.0, 1e-9);
+  EXPECT_NEAR(seeds[1].intensity, 0.5, 1e-7);
+  const PrincipalAxes axes = principalAxes(seeds[1].L);
+  EXPECT_GT(axes.scale[0], 1.4 * axes.scale[1]);  // longer along the bar
+}
+
+TEST(KernelVariance, IsOneHalfForTheGaussian) {
+  // e^-m has variance 1/2 along each axis; what eps cuts off goes to zero with it.
+  EXPECT_NEAR(kernelVariance(kernelConstants<double>({.kappa = -30.0f, .epsilon = 1e-9f})), 0.5,
+              1e-4);
+  EXPECT_GT(kernelVariance(kernelConstants<double>({.kappa = 5.0f})), 0.8);
+}
+
+}  // namespace
+}  // namespace esvr

@@ -1,0 +1,118 @@
+// Plan: the moves of a run one by one: Adam on a quadratic and under scaled gradients, trust that
+// cuts and recovers, schedules that start and end where they say, relocation that takes the
+// primitive whose removal the loss misses least.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fit/optimiser.h"
+#include "fit/schedule.h"
+#include "volumes.h"
+
+namespace esvr {
+namespace {
+
+TEST(Adam, FirstStepHasTheTunedSizeWhateverTheGradient) {
+  for (const double size : {1e-25, 1.0, 1e25}) {
+    std::vector<Primitive> p{{{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1.0}};
+    std::vector<AdamState> state(1);
+    std::vector<PrimitiveGradient> g(1);
+    g[0].byParameter.fill(0.0);
+    g[0].byParameter[0] = size;
+    adamStep(p, state, g, {0.1, 0.1, 0.1}, {}, {0.25, 64.0, -2.0, 2.0});
+    // float32 moments round g^2; below 1e-19 they would underflow, which the target's scale
+    // excludes
+    if (size > 1e-19 && size < 1e19) {
+      EXPECT_NEAR(p[0].center[0], -0.1, 1e-6);
+    }
+    EXPECT_TRUE(std::isfinite(p[0].center[0]));
+  }
+}
+
+TEST(Adam, KeepsIntensitiesInRange) {
+  std::vector<Primitive> p{{{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 0.001}};
+  std::vector<AdamState> state(1);
+  std::vector<PrimitiveGradient> g(1);
+  g[0].byParameter.fill(0.0);
+  g[0].byParameter[9] = 1.0;
+  for (int i = 0; i < 50; ++i) adamStep(p, state, g, {}, {}, {0.25, 64.0, 0.0, 1.5});
+  EXPECT_EQ(p[0].intensity, 0.0);
+}
+
+TEST(StepTrust, CutsWhenTheLossJumpsAndRecovers) {
+  StepTrust trust(1.0);
+  EXPECT_EQ(trust.update(1.0), 1.0);
+  EXPECT_LT(trust.update(100.0), 0.7);
+  double factor = 0.0;
+  for (int i = 0; i < 200; ++i) factor = trust.update(0.5);
+  EXPECT_EQ(factor, 1.0);
+}
+
+TEST(StepTrust, LeavesNoiseFarBelowTheTargetAlone) {
+  StepTrust trust(1.0);
+  trust.update(1e-12);
+  EXPECT_EQ(trust.update(1e-6), 1.0);
+}
+
+TEST(StepTrust, DoesNotMistakeNewPrimitivesForOvershoot) {
+  StepTrust trust(1.0);
+  trust.update(1.0);
+  trust.forgetLoss();
+  EXPECT_EQ(trust.update(100.0), 1.0);
+}
+
+TEST(Schedule, GoesFromItsFirstCountToItsLast) {
+  const Tuning tuning;
+  const Schedule schedule{100, 1000, 500, tuning};
+  EXPECT_EQ(schedule.countAt(0.0), 100u);
+  EXPECT_EQ(schedule.countAt(tuning.growUntil), 1000u);
+  EXPECT_EQ(schedule.countAt(1.0), 1000u);
+  EXPECT_GT(schedule.stepAt(0.5, 250), tuning.finalStep);
+  EXPECT_EQ(schedule.stepAt(1.0, 499), 0.0);
+  EXPECT_EQ(schedule.relocationsAt(1.0, 1000), 0u);
+}
+
+TEST(Optimiser, GrowsToTheCountAndLowersTheLoss) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  Optimiser optimiser(target, {}, {});
+  optimiser.growTo(50);
+  EXPECT_EQ(optimiser.primitives().size(), 50u);
+  const double first = optimiser.iterate(1.0);
+  for (int i = 0; i < 60; ++i) optimiser.iterate(0.5);
+  EXPECT_LT(optimiser.measure().squaredSum, 0.2 * first);
+}
+
+TEST(Optimiser, RelocatesTheLeastUsefulAndKeepsTheCount) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  Optimiser optimiser(target, {}, {});
+  optimiser.growTo(50);
+  for (int i = 0; i < 30; ++i) optimiser.iterate(0.5);
+  const auto before = optimiser.primitives();
+  optimiser.relocate(5);
+  const auto& after = optimiser.primitives();
+  ASSERT_EQ(after.size(), 50u);
+  int moved = 0;
+  for (std::size_t i = 0; i < 50; ++i) moved += before[i].center != after[i].center;
+  EXPECT_EQ(moved, 5);
+}
+
+TEST(Optimiser, DropsWhatNoVoxelSees) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  Tuning tiny;
+  tiny.smallestScale = 0.01;
+  tiny.largestScale = 0.02;  // supports of a twentieth of a voxel: most see no voxel
+  Optimiser optimiser(target, {}, tiny);
+  optimiser.growTo(50);
+  for (int i = 0; i < 5; ++i) optimiser.iterate(1.0);
+  optimiser.dropUnseen();
+  EXPECT_LT(optimiser.primitives().size(), 50u);
+  const double error = optimiser.measure().squaredSum;
+  EXPECT_TRUE(std::isfinite(error));
+}
+
+}  // namespace
+}  // namespace esvr

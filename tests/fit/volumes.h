@@ -1,0 +1,73 @@
+#pragma once
+/// Small volumes for the tests of the fit.
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "../field/random_field.h"
+#include "esvr/field.h"
+#include "esvr/sparse_volume.h"
+
+namespace esvr::test {
+
+/// Every voxel of a cube of bricks set from a function of its index coordinates; active where the
+/// value differs from the background.
+inline SparseVolume volumeOf(Coord corner, int bricks, float background,
+                             const std::function<float(Coord)>& value) {
+  std::vector<BrickInput> input;
+  for (int x = 0; x < bricks; ++x)
+    for (int y = 0; y < bricks; ++y)
+      for (int z = 0; z < bricks; ++z) {
+        BrickInput brick;
+        brick.corner = corner + Coord{x, y, z} * kBrickSide;
+        for (int v = 0; v < kBrickVoxels; ++v) {
+          brick.values[std::size_t(v)] = value(brick.corner + voxelLocal(v));
+          if (brick.values[std::size_t(v)] != background) brick.active.set(v);
+        }
+        input.push_back(brick);
+      }
+  return makeVolume(std::move(input), background);
+}
+
+/// A field that ellipsoids can represent exactly, as voxels.
+inline SparseVolume ellipsoidVolume(std::size_t count, double lowest, double highest,
+                                    Coord shift = {}, double scale = 1.0) {
+  Field field =
+      randomField({.count = count, .extent = 30.0, .smallest = 1.5, .aspect = 2.0, .seed = 9});
+  Random random(17);
+  for (float& i : field.chunks[0].ellipsoids.intensity) i = float(random(lowest, highest) * scale);
+  field.chunks[0].origin = shift;
+  return revoxelise(field, {.threshold = 0.0f});
+}
+
+/// A bent tube with soft walls: thin, branching data in small.
+inline SparseVolume tubeVolume(Coord shift = {}) {
+  return volumeOf(shift, 5, 0.0f, [&](Coord v) {
+    const Coord c = v - shift;
+    const double axis = 20.0 + 8.0 * std::sin(c.x * 0.2);
+    const double r = std::hypot(c.y - axis, c.z - 18.0);
+    return r < 4.0 ? float(std::min(1.0, 4.0 - r)) : 0.0f;
+  });
+}
+
+/// The narrow band of a ball as a level set: background 3, -3 inside, bricks without a voxel of the
+/// band left out.
+inline SparseVolume levelSetVolume() {
+  SparseVolume volume = volumeOf({}, 6, 3.0f, [](Coord v) {
+    const double distance = std::hypot(v.x - 23.5, v.y - 23.5, v.z - 23.5) - 19.0;
+    return float(std::clamp(distance, -3.0, 3.0));
+  });
+  std::vector<BrickInput> bricks;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    BrickInput brick{volume.brickCorner(b), {}, {}};
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+      brick.values[v] = volume.brickValues(b)[v];
+      if (std::abs(brick.values[v]) < 3.0f) brick.active.set(int(v));
+    }
+    bricks.push_back(brick);
+  }
+  return makeVolume(std::move(bricks), 3.0f);
+}
+
+}  // namespace esvr::test

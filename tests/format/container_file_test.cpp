@@ -1,0 +1,163 @@
+// Files on disk: written whole or not at all, refused for what they are.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+
+#include "esvr/container.h"
+#include "esvr/error.h"
+#include "format/crafted_file.h"
+#include "format/sample_files.h"
+
+namespace esvr {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::ThrowsMessage;
+
+class ContainerFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "esvr-test-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    directory_ = pattern;
+  }
+  void TearDown() override { fs::remove_all(directory_); }
+
+  [[nodiscard]] fs::path path() const { return directory_ / "f.esvr"; }
+  void put(const std::vector<std::byte>& bytes) const {
+    std::ofstream out(path(), std::ios::binary);
+    out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+  }
+  void put(const std::string& text) const { put(test::bytesOf(text)); }
+
+  fs::path directory_;
+};
+
+TEST_F(ContainerFile, ComesBackAndHasTheSizeThatWasSaid) {
+  const EsvrFile file = test::everything(100);
+  const std::uint64_t written = writeEsvr(path(), file);
+  EXPECT_EQ(written, fs::file_size(path()));
+  EXPECT_EQ(test::difference(readEsvr(path()), file), "");
+}
+
+TEST_F(ContainerFile, AnExistingOneIsReplacedOnlyWhenAsked) {
+  put("precious");
+  const EsvrFile file = test::everything(1);
+  EXPECT_THAT([&] { writeEsvr(path(), file); },
+              ThrowsMessage<RuntimeFailure>(HasSubstr("exists already")));
+  EXPECT_EQ(fs::file_size(path()), 8u);
+  writeEsvr(path(), file, {.overwrite = true});
+  EXPECT_EQ(test::difference(readEsvr(path()), file), "");
+}
+
+TEST_F(ContainerFile, AFullDiskLeavesNothing) {
+  rlimit old{};
+  ::getrlimit(RLIMIT_FSIZE, &old);
+  const rlimit limit{1000, old.rlim_max};
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  ::setrlimit(RLIMIT_FSIZE, &limit);
+  EXPECT_THAT([&] { writeEsvr(path(), test::everything(100)); },
+              ThrowsMessage<RuntimeFailure>(HasSubstr("f.esvr")));
+  ::setrlimit(RLIMIT_FSIZE, &old);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_TRUE(fs::is_empty(directory_));
+}
+
+TEST_F(ContainerFile, WhatCannotBeStoredIsNamedAndLeavesNothing) {
+  EncodedGrid grid = test::fogGrid(4);
+  grid.field.chunks[0].ellipsoids.intensity[2] = std::numeric_limits<float>::infinity();
+  EXPECT_THAT([&] { writeEsvr(path(), test::fileOf(grid)); },
+              ThrowsMessage<RuntimeFailure>(
+                  AllOf(HasSubstr("'density'"), HasSubstr("intensity of ellipsoid 2"))));
+  EXPECT_TRUE(fs::is_empty(directory_));
+}
+
+TEST_F(ContainerFile, OtherThingsAreRefusedByName) {
+  EXPECT_THAT([&] { (void)readEsvr(path()); },
+              ThrowsMessage<BadInput>(HasSubstr("f.esvr: No such file")));
+  EXPECT_THAT([&] { (void)readEsvr(directory_); },
+              ThrowsMessage<BadInput>(HasSubstr("not a regular file")));
+  EXPECT_THAT([&] { (void)readEsvr("/dev/zero"); },
+              ThrowsMessage<BadInput>(HasSubstr("not a regular file")));
+  put("");
+  EXPECT_THAT([&] { (void)readEsvr(path()); },
+              ThrowsMessage<BadInput>(HasSubstr("not an .esvr file")));
+  put("a text of more than a few words, but still a text");
+  EXPECT_THAT([&] { (void)inspectEsvr(path()); },
+              ThrowsMessage<BadInput>(HasSubstr("not an .esvr file")));
+}
+
+TEST_F(ContainerFile, APipeIsRefusedWithoutWaiting) {
+  ASSERT_EQ(::mkfifo(path().c_str(), 0600), 0);
+  EXPECT_THROW((void)readEsvr(path()), BadInput);
+}
+
+TEST_F(ContainerFile, InspectionListsTheSections) {
+  writeEsvr(path(), test::fileOf(test::chunkedGrid(50)));
+  const EsvrSummary summary = inspectEsvr(path());
+  EXPECT_EQ(summary.versionMajor, kFormatVersion);
+  EXPECT_EQ(summary.fileBytes, fs::file_size(path()));
+  std::vector<std::string> kinds;
+  for (const auto& s : summary.sections) kinds.push_back(s.kind);
+  // No rotations in the first chunk, nothing at all in the second.
+  EXPECT_THAT(kinds, ElementsAre("grid", "chunks", "centers", "scales", "intensities", "centers",
+                                 "scales", "rotations", "intensities", "kappas"));
+  EXPECT_EQ(summary.sections[2].rawBytes, 50u * 3 * sizeof(float));
+}
+
+TEST_F(ContainerFile, InspectionNamesWhatItDoesNotKnow) {
+  test::CraftedFile crafted(encodeEsvr({}));
+  crafted.add({format::SectionKind(0x2a)}, 0, test::bytesOf("?"));
+  put(crafted.assemble());
+  const EsvrSummary summary = inspectEsvr(path());
+  ASSERT_EQ(summary.sections.size(), 1u);
+  EXPECT_EQ(summary.sections[0].kind, "unknown 0x2a");
+  EXPECT_EQ(summary.sections[0].grid, 0xffffffffu);
+}
+
+TEST_F(ContainerFile, InspectionDoesNotReadTheSections) {
+  test::CraftedFile crafted(encodeEsvr(test::everything(10)));
+  auto bytes = crafted.assemble();
+  bytes.back() ^= std::byte{1};
+  put(bytes);
+  EXPECT_EQ(inspectEsvr(path()).fileBytes, bytes.size());
+  EXPECT_THROW((void)readEsvr(path()), BadInput);
+}
+
+TEST_F(ContainerFile, CheckHasNothingToSayOfAGoodFile) {
+  writeEsvr(path(), test::fileOf(test::fogGrid(100)));
+  EXPECT_THAT(checkEsvr(path()), IsEmpty());
+}
+
+TEST_F(ContainerFile, CheckNotesWhatAReaderPassesOver) {
+  EncodedGrid odd = test::emptyGrid();
+  odd.field.background = 2.0f;
+  test::CraftedFile crafted(encodeEsvr(test::fileOf(odd)));
+  crafted.versionMinor = 7;
+  crafted.add({format::SectionKind(0x2a), 0}, 0, test::bytesOf("?"));
+  put(crafted.assemble());
+  EXPECT_THAT(checkEsvr(path()),
+              ElementsAre(HasSubstr("format 1.7"), HasSubstr("unknown 0x2a of grid 0, 1 bytes"),
+                          HasSubstr("no ellipsoids"), HasSubstr("another in its field")));
+}
+
+TEST_F(ContainerFile, CheckThrowsForADamagedFile) {
+  auto bytes = encodeEsvr(test::fileOf(test::fogGrid(100)));
+  bytes.back() ^= std::byte{1};
+  put(bytes);
+  EXPECT_THAT([&] { (void)checkEsvr(path()); }, ThrowsMessage<BadInput>(HasSubstr("checksum")));
+}
+
+}  // namespace
+}  // namespace esvr

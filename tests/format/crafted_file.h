@@ -1,0 +1,59 @@
+#pragma once
+/// An .esvr file taken apart, so that a test can change a part and put it together again with
+/// checksums that match: damage that only the reader's own checks can find.
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "format/section_table.h"
+
+namespace esvr::test {
+
+struct CraftedSection {
+  format::SectionEntry entry;
+  std::vector<std::byte> stored;
+};
+
+class CraftedFile {
+ public:
+  explicit CraftedFile(const std::vector<std::byte>& bytes);
+
+  /// The section of a kind, of the first grid or chunk that has one.
+  [[nodiscard]] CraftedSection& section(format::SectionKind kind);
+  void erase(format::SectionKind kind);
+
+  /// Adds a section of raw content.
+  CraftedSection& add(const format::SectionId& id, std::uint16_t flags,
+                      std::vector<std::byte> stored);
+
+  /// The content of a section, uncompressed; and another in its place.
+  [[nodiscard]] std::vector<std::byte> content(format::SectionKind kind);
+  void setContent(format::SectionKind kind, std::vector<std::byte> raw);
+
+  /// Overwrites a number in the content of a section.
+  template <class T>
+  void poke(format::SectionKind kind, std::size_t offset, T value) {
+    auto raw = content(kind);
+    const auto bytes = std::as_bytes(std::span(&value, 1));
+    std::copy(bytes.begin(), bytes.end(), raw.begin() + std::ptrdiff_t(offset));
+    setContent(kind, std::move(raw));
+  }
+
+  /// Sections one behind the other, with fresh offsets and checksums.
+  [[nodiscard]] std::vector<std::byte> assemble();
+
+  /// Header and table from `table` as it is, before the sections at their offsets.
+  [[nodiscard]] std::vector<std::byte> assembleAs(const format::SectionTable& table) const;
+
+  /// What assemble() wrote last.
+  [[nodiscard]] const format::SectionTable& table() const { return table_; }
+
+  std::uint16_t versionMajor = format::kVersionMajor, versionMinor = format::kVersionMinor;
+
+ private:
+  format::SectionTable table_;
+  std::vector<CraftedSection> sections_;
+};
+
+}  // namespace esvr::test

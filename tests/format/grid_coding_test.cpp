@@ -1,0 +1,223 @@
+// Plan. Sources are made from fields whose voxels are known, so that what must come back is known:
+// the same field with its own threshold gives the same voxels; a field that is off gives the best
+// overlap that an exhaustive search over all thresholds finds, and no threshold that costs squared
+// error; level sets give their band and their inside; grids without contrast give their bricks.
+
+#include "esvr/grid_coding.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "esvr/error.h"
+#include "esvr/field.h"
+#include "esvr/metrics.h"
+#include "field/random_field.h"
+
+namespace esvr {
+namespace {
+
+GridDescriptor descriptorOf(GridClass gridClass, double background) {
+  GridDescriptor descriptor;
+  descriptor.name = "a grid";
+  descriptor.gridClass = gridClass;
+  descriptor.background = background;
+  return descriptor;
+}
+const GridDescriptor kFog = descriptorOf(GridClass::kFogVolume, 0.0);
+const GridDescriptor kLevelSet = descriptorOf(GridClass::kLevelSet, 3.0);
+
+Field positiveField(std::uint64_t seed, Coord origin = {}) {
+  Field field = test::randomField({.count = 20, .extent = 30.0, .origin = origin, .seed = seed});
+  for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i) + 0.1f;
+  return field;
+}
+
+/// A field whose source was something like it, for an overlap below 1.
+Field perturbed(Field field) {
+  test::Random random(11);
+  for (float& x : field.chunks[0].ellipsoids.center[0]) x += float(random(-1.0, 1.0));
+  return field;
+}
+
+/// One round body, inside negative: V falls from 3 to -3 as a signed distance would.
+Field ball(float background = 3.0f) {
+  Field field;
+  field.background = background;
+  field.kernel.kappa = 2.0f;
+  field.chunks.resize(1);
+  Ellipsoids& e = field.chunks[0].ellipsoids;
+  e.resize(1);
+  for (auto& c : e.center) c[0] = 20.0f;
+  for (auto& s : e.logScale) s[0] = std::log(4.0f);
+  e.rotation[0][0] = 1.0f;
+  e.intensity[0] = -3.0f * background;
+  return field;
+}
+
+SparseVolume oneBrick(float value, const BrickMask& active, float background = 0.0f) {
+  BrickInput brick{{-8, 0, 16}, {}, active};
+  brick.values.fill(background);
+  for (int v = 0; v < kBrickVoxels; ++v)
+    if (active.test(v)) brick.values[v] = value;
+  return makeVolume({brick}, background);
+}
+
+BrickMask firstVoxels(int count) {
+  BrickMask mask;
+  for (int v = 0; v < count; ++v) mask.set(v);
+  return mask;
+}
+
+void expectSame(const SparseVolume& a, const SparseVolume& b) {
+  EXPECT_EQ(a.origin, b.origin);
+  EXPECT_EQ(a.background, b.background);
+  EXPECT_EQ(a.bricks, b.bricks);
+  EXPECT_EQ(a.values, b.values);
+  EXPECT_EQ(a.active, b.active);
+}
+
+VolumeMetrics decodedAt(const EncodedGrid& grid, const SparseVolume& source, float threshold) {
+  return compareVolumes(source, decodeGrid(grid, {.threshold = threshold}));
+}
+
+TEST(GridCoding, FactsOfTheSourceAreStored) {
+  const Field field = positiveField(1, {-100, 8, 64});
+  const SparseVolume source = revoxelise(field, {.threshold = 0.05f});
+  const EncodedGrid grid = encodeGrid(kFog, source, field);
+  const ValueRange range = activeRange(source);
+  EXPECT_EQ(grid.descriptor, kFog);
+  EXPECT_EQ(grid.activeBox, activeBox(source));
+  EXPECT_EQ(grid.activeVoxels, activeVoxelCount(source));
+  EXPECT_EQ(grid.valueMin, range.min);
+  EXPECT_EQ(grid.valueMax, range.max);
+  EXPECT_TRUE(grid.nonNegative);
+  EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
+  EXPECT_TRUE(grid.leaves.empty());
+}
+
+// The thresholds are edges of bins: exactly representable, so that the source's cut can be met.
+TEST(GridCoding, AFieldThatFitsGivesItsSourceBack) {
+  for (const float threshold : {0.0f, 0.0625f, 0.5f}) {
+    const Field field = positiveField(2);
+    const SparseVolume source = revoxelise(field, {.threshold = threshold});
+    expectSame(source, decodeGrid(encodeGrid(kFog, source, field)));
+  }
+}
+
+TEST(GridCoding, TheThresholdOverlapsAsWellAsTheBestOfManyThatCostNoError) {
+  const Field truth = positiveField(3);
+  const SparseVolume source = revoxelise(truth, {.threshold = 0.2f});
+  const EncodedGrid grid = encodeGrid(kFog, source, perturbed(truth));
+  const double mseOfAll = decodedAt(grid, source, 0.0f).mseBox;
+
+  double bestIou = 0.0;
+  for (float t = 0.001f; t < 1.0f; t *= 1.04f) {
+    const VolumeMetrics m = decodedAt(grid, source, t);
+    if (m.mseBox <= mseOfAll) bestIou = std::max(bestIou, m.iou);
+  }
+  const VolumeMetrics chosen = compareVolumes(source, decodeGrid(grid));
+  ASSERT_LT(bestIou, 0.99);
+  // A bin spans up to 1/128 of its threshold, which holds less than 0.01 of these voxels.
+  EXPECT_GE(chosen.iou, bestIou - 0.01);
+  EXPECT_GT(chosen.iou, decodedAt(grid, source, 0.0f).iou);
+  EXPECT_LE(chosen.mseBox, mseOfAll);
+}
+
+TEST(GridCoding, TheThresholdIsTheSameElsewhereAndScalesWithTheValues) {
+  const float scale = 0x1p-40f;
+  const Field here = positiveField(4);
+  Field there = here, faint = here;
+  there.chunks[0].origin = {1 << 20, -(1 << 20), 0};
+  for (float& i : faint.chunks[0].ellipsoids.intensity) i *= scale;
+
+  const auto thresholdOf = [](const Field& field, float cut) {
+    return encodeGrid(kFog, revoxelise(field, {.threshold = cut}), perturbed(field))
+        .activeThreshold;
+  };
+  const float threshold = thresholdOf(here, 0.1f);
+  EXPECT_GT(threshold, 0.0f);
+  EXPECT_EQ(thresholdOf(there, 0.1f), threshold);
+  // One more threshold than bins below each power of two: the edge itself is off by one ulp.
+  EXPECT_FLOAT_EQ(thresholdOf(faint, 0.1f * scale), threshold * scale);
+}
+
+TEST(GridCoding, NegativeValuesComeBackOnlyWhereTheSourceHadThem) {
+  const Field field = test::randomField({.count = 20, .extent = 30.0});
+  const SparseVolume withNegative = revoxelise(field, {});
+  const SparseVolume without = revoxelise(field, {.nonNegative = true});
+  ASSERT_LT(activeRange(withNegative).min, 0.0f);
+  EXPECT_LT(activeRange(decodeGrid(encodeGrid(kFog, withNegative, field))).min, 0.0f);
+  EXPECT_GE(activeRange(decodeGrid(encodeGrid(kFog, without, field))).min, 0.0f);
+}
+
+TEST(GridCoding, ALevelSetGivesItsBandAndItsInsideBack) {
+  const Field field = ball();
+  const SparseVolume source = revoxelise(field, {.threshold = 0.25f, .narrowBand = true});
+  const Coord inside{20, 20, 20};
+  ASSERT_EQ(valueAt(source, {31, 20, 20}), 3.0f);
+  const EncodedGrid grid = encodeGrid(kLevelSet, source, field);
+  EXPECT_EQ(grid.topology, TopologyKind::kLeaves);
+  EXPECT_EQ(grid.leaves.size(), source.brickCount());
+
+  const SparseVolume decoded = decodeGrid(grid);
+  expectSame(source, decoded);
+  EXPECT_EQ(valueAt(decoded, inside), -3.0f);
+}
+
+TEST(GridCoding, ALevelSetStaysWithinTheBricksOfItsSource) {
+  const Field field = ball();
+  SparseVolume source = revoxelise(field, {.narrowBand = true});
+  ASSERT_GT(source.brickCount(), 1u);
+  source.bricks.pop_back();
+  source.active.pop_back();
+  source.values.resize(source.values.size() - kBrickVoxels);
+  EXPECT_EQ(decodeGrid(encodeGrid(kLevelSet, source, field)).bricks, source.bricks);
+}
+
+TEST(GridCoding, ADistanceFieldThatIsActiveBeyondItsBandIsNotCutToIt) {
+  const Field field = ball();
+  const SparseVolume source = revoxelise(field, {});
+  ASSERT_LT(activeRange(source).min, -3.0f);
+  const EncodedGrid grid = encodeGrid(kLevelSet, source, field);
+  EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
+  expectSame(source, decodeGrid(grid));
+}
+
+TEST(GridCoding, ValuesThatEqualTheBackgroundKeepTheirBricks) {
+  for (const float value : {0.0f, 1.0f}) {
+    Field nothing;
+    nothing.background = value;
+    const SparseVolume source = oneBrick(value, firstVoxels(3), value);
+    const EncodedGrid grid = encodeGrid(kFog, source, nothing);
+    const EsvrFile stored = decodeEsvr(encodeEsvr({{}, {grid}}), "memory");
+    const SparseVolume decoded = decodeGrid(stored.grids[0]);
+    EXPECT_EQ(decoded.origin, source.origin);
+    EXPECT_EQ(decoded.values, source.values);
+    EXPECT_EQ(activeVoxelCount(decoded), std::uint64_t(kBrickVoxels));
+  }
+}
+
+TEST(GridCoding, AGivenThresholdReplacesTheStoredOne) {
+  const Field field = positiveField(5);
+  const EncodedGrid grid = encodeGrid(kFog, revoxelise(field, {.threshold = 0.01f}), field);
+  expectSame(decodeGrid(grid, {.threshold = 0.5f}), revoxelise(field, {.threshold = 0.5f}));
+}
+
+TEST(GridCoding, ThresholdsThatMakeNoSenseAreRefused) {
+  const EncodedGrid grid;
+  for (const float t :
+       {-1.0f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()})
+    EXPECT_THROW(static_cast<void>(decodeGrid(grid, {.threshold = t})), UsageError);
+}
+
+TEST(GridCoding, ASourceWithoutActiveVoxelsIsRefused) {
+  EXPECT_THROW(static_cast<void>(encodeGrid(kFog, SparseVolume{}, Field{})), BadInput);
+}
+
+}  // namespace
+}  // namespace esvr

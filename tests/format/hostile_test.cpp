@@ -1,0 +1,302 @@
+// Damage on purpose: files whose checksums match and whose content lies. Every case changes one
+// thing in a good file; the reader must name it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "esvr/container.h"
+#include "esvr/error.h"
+#include "format/allocation_meter.h"
+#include "format/byte_writer.h"
+#include "format/crafted_file.h"
+#include "format/sample_files.h"
+
+namespace esvr {
+namespace {
+
+using format::Codec;
+using format::kNone;
+using format::SectionKind;
+using format::SectionTable;
+using test::CraftedFile;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+constexpr std::uint32_t kUnknownKind = 0x1234;
+constexpr std::size_t kMegabyte = 1 << 20;
+
+/// Offsets in the record of a grid without name, map and metadata (docs/format.md, "grid").
+namespace at {
+constexpr std::size_t kNameLength = 0, kClass = 4, kValueType = 5, kBackground = 6, kAffine = 22,
+                      kItems = 23, kTopology = 27, kNonNegative = 28, kThreshold = 29,
+                      kValueMin = 65, kFieldBackground = 73, kKernel = 77, kKappa = 78,
+                      kEpsilon = 82, kChunkCount = 86, kChunkBox = 102, kCount = 126;
+}  // namespace at
+
+/// One chunk of four ellipsoids with all attributes, leaves, a curve.
+EncodedGrid plainGrid() {
+  EncodedGrid grid = test::emptyGrid();
+  grid.topology = TopologyKind::kLeaves;
+  grid.leaves = {{0, 0, 0}, {0, 0, 8}, {8, 0, 0}};
+  grid.field.chunks = {{{}, test::sampleEllipsoids(4, 1, {.kappas = true})}};
+  grid.curve = {{0.5, 10, 4, 31.25, 20.5, 0.25}};
+  return grid;
+}
+std::vector<std::byte> plainFile() { return encodeEsvr(test::fileOf(plainGrid())); }
+
+void decode(const std::vector<std::byte>& bytes) { (void)decodeEsvr(bytes, "lie.esvr"); }
+
+TEST(HostileFile, AnUnknownOptionalSectionIsSkipped) {
+  CraftedFile file(plainFile());
+  file.add({SectionKind(kUnknownKind), 7, 8, 9, 10}, 0, test::bytesOf("later")).entry.codec =
+      Codec(99);
+  EXPECT_EQ(test::difference(decodeEsvr(file.assemble(), "f"), test::fileOf(plainGrid())), "");
+}
+
+TEST(HostileFile, AnUnknownOptionalSectionIsChecked) {
+  CraftedFile file(plainFile());
+  file.add({SectionKind(kUnknownKind)}, 0, test::bytesOf("later"));
+  auto bytes = file.assemble();
+  bytes.back() ^= std::byte{1};
+  EXPECT_THAT([&] { decode(bytes); }, ThrowsMessage<BadInput>(HasSubstr("checksum")));
+}
+
+TEST(HostileFile, ANewerMinorVersionIsRead) {
+  CraftedFile file(plainFile());
+  file.versionMinor = 42;
+  EXPECT_EQ(test::difference(decodeEsvr(file.assemble(), "f"), test::fileOf(plainGrid())), "");
+}
+
+TEST(HostileFile, ANewerMajorVersionIsRefusedByItsNumber) {
+  CraftedFile file(plainFile());
+  file.versionMajor = format::kVersionMajor + 1;
+  file.versionMinor = 3;
+  EXPECT_THAT([&] { decode(file.assemble()); },
+              ThrowsMessage<BadInput>(AllOf(HasSubstr("format 2.3"), HasSubstr("knows 1.0"))));
+}
+
+TEST(HostileFile, SectionsOfAnyOrderAreRead) {
+  CraftedFile file(plainFile());
+  for (const auto kind : {SectionKind::kGrid, SectionKind::kCenters}) {
+    auto moved = file.section(kind);
+    file.erase(kind);
+    file.add(moved.entry.id, moved.entry.flags, moved.stored).entry = moved.entry;
+  }
+  EXPECT_EQ(test::difference(decodeEsvr(file.assemble(), "f"), test::fileOf(plainGrid())), "");
+}
+
+TEST(HostileFile, LineEndsChangedByATextTransferAreNamed) {
+  auto bytes = plainFile();
+  bytes.erase(bytes.begin() + 5);  // CR LF -> LF
+  EXPECT_THAT([&] { decode(bytes); }, ThrowsMessage<BadInput>(HasSubstr("as text")));
+}
+
+/// A change to the sections, and what the reader says of it.
+struct ContentLie {
+  const char* name;
+  std::function<void(CraftedFile&)> tell;
+  const char* answer;
+};
+void PrintTo(const ContentLie& lie, std::ostream* out) { *out << lie.name; }
+
+class ContentLies : public testing::TestWithParam<ContentLie> {};
+
+TEST_P(ContentLies, AreFoundOut) {
+  CraftedFile file(plainFile());
+  GetParam().tell(file);
+  EXPECT_THAT([&] { decode(file.assemble()); },
+              ThrowsMessage<BadInput>(AllOf(HasSubstr("lie.esvr"), HasSubstr(GetParam().answer))));
+}
+
+template <class T>
+std::function<void(CraftedFile&)> poke(SectionKind kind, std::size_t offset, T value) {
+  return [=](CraftedFile& file) { file.poke(kind, offset, value); };
+}
+template <class T>
+std::function<void(CraftedFile&)> pokeGrid(std::size_t offset, T value) {
+  return poke(SectionKind::kGrid, offset, value);
+}
+std::function<void(CraftedFile&)> without(SectionKind kind) {
+  return [=](CraftedFile& file) { file.erase(kind); };
+}
+std::function<void(CraftedFile&)> resized(SectionKind kind, std::ptrdiff_t by) {
+  return [=](CraftedFile& file) {
+    auto raw = file.content(kind);
+    raw.resize(std::size_t(std::ptrdiff_t(raw.size()) + by));
+    file.setContent(kind, std::move(raw));
+  };
+}
+/// Another section of the kind of one that is there, for another grid or chunk.
+std::function<void(CraftedFile&)> stray(SectionKind kind, std::uint32_t grid, std::uint32_t chunk) {
+  return [=](CraftedFile& file) {
+    file.add({kind, grid, chunk}, format::kRequired, file.content(kind));
+  };
+}
+std::function<void(CraftedFile&)> setEntry(SectionKind kind,
+                                           std::function<void(format::SectionEntry&)> set) {
+  return [=](CraftedFile& file) { set(file.section(kind).entry); };
+}
+
+using K = SectionKind;
+using Entry = format::SectionEntry;
+constexpr std::uint8_t kNoEnumerator = 200;
+
+const ContentLie kContentLies[] = {
+    {"RequiredUnknownKind", [](CraftedFile& f) { f.add({K(kUnknownKind)}, format::kRequired, {}); },
+     "must be understood"},
+    {"UnknownCodec", setEntry(K::kCenters, [](Entry& e) { e.codec = Codec(2); }),
+     "codec 'unknown 0x2' of format 1.0"},
+    {"UnknownFlag", setEntry(K::kCenters, [](Entry& e) { e.flags = 2; }), "flags 2"},
+    {"LaterFrame", setEntry(K::kCenters, [](Entry& e) { e.id.frame = 1; }), "frame 1"},
+    {"LaterLayer", setEntry(K::kCenters, [](Entry& e) { e.id.layer = 1; }), "layer 1"},
+    {"RawSizeTooLarge", setEntry(K::kCenters, [](Entry& e) { e.rawBytes = 1ull << 60; }),
+     "cannot hold"},
+    {"NotBlosc", setEntry(K::kCenters, [](Entry& e) { e.codec = Codec::kBlosc; }),
+     "damaged Blosc buffer"},
+    {"NoGrid", without(K::kGrid), "belongs to nothing"},
+    {"NoCenters", without(K::kCenters), "there is no centers of grid 0, chunk 0"},
+    {"NoScales", without(K::kScales), "there is no scales"},
+    {"NoIntensities", without(K::kIntensities), "there is no intensities"},
+    {"SecondChunkTable",
+     [](CraftedFile& f) {
+       f.add({K::kChunks, 0}, 0, std::vector<std::byte>(2 * format::kChunkRecordBytes));
+     },
+     "belongs to nothing"},
+    {"StrayChunk", stray(K::kCenters, 0, 1), "belongs to nothing"},
+    {"StrayGrid", stray(K::kCurve, 1, kNone), "belongs to nothing"},
+    {"LeavesOfAThresholdGrid", pokeGrid(at::kTopology, std::uint8_t{0}), "belongs to nothing"},
+    {"GridGap", setEntry(K::kGrid, [](Entry& e) { e.id.grid = 1; }), "there is no grid of grid 0"},
+    {"LongName", pokeGrid(at::kNameLength, 0xffffffffu), "ends within a value"},
+    {"UnknownClass", pokeGrid(at::kClass, kNoEnumerator), "unknown grid class 200"},
+    {"UnknownValueType", pokeGrid(at::kValueType, kNoEnumerator), "unknown value type"},
+    {"UnknownTopology", pokeGrid(at::kTopology, kNoEnumerator), "unknown topology"},
+    {"UnknownKernel", pokeGrid(at::kKernel, kNoEnumerator), "unknown kernel"},
+    {"AffineNeitherNor", pokeGrid(at::kAffine, kNoEnumerator), "unknown mark of an affine"},
+    {"NonNegativeNeitherNor", pokeGrid(at::kNonNegative, kNoEnumerator), "unknown mark"},
+    {"ManyItems", pokeGrid(at::kItems, 0xffffffffu), "ends within a value"},
+    {"BackgroundNan", pokeGrid(at::kBackground, double(kNan)), "background"},
+    {"FieldBackgroundNan", pokeGrid(at::kFieldBackground, kNan), "background"},
+    {"ThresholdNan", pokeGrid(at::kThreshold, kNan), "threshold"},
+    {"ThresholdInfinite", pokeGrid(at::kThreshold, -kInf), "threshold"},
+    {"RangeUpsideDown", pokeGrid(at::kValueMin, 5.0f), "range of values"},
+    {"KappaNan", pokeGrid(at::kKappa, kNan), "kernel"},
+    {"EpsilonZero", pokeGrid(at::kEpsilon, 0.0f), "kernel"},
+    {"EpsilonOne", pokeGrid(at::kEpsilon, 1.0f), "kernel"},
+    {"FewerChunks", pokeGrid(at::kChunkCount, 0u), "44 bytes too many"},
+    {"MoreChunks", pokeGrid(at::kChunkCount, 0xffffffffu), "44 bytes too many"},
+    {"GridRecordTooLong", resized(K::kGrid, 1), "1 bytes too many"},
+    {"GridRecordTooShort", resized(K::kGrid, -1), "ends within a value"},
+    {"MoreEllipsoids", pokeGrid(at::kCount, std::uint64_t{5}), "48 bytes of content for 5"},
+    {"EllipsoidsOverflow", pokeGrid(at::kCount, (std::uint64_t{1} << 62) + 4), "bytes of content"},
+    {"NoEllipsoids", pokeGrid(at::kCount, std::uint64_t{0}), "belongs to nothing"},
+    {"BoxWithoutCenters", pokeGrid(at::kChunkBox, 60), "outside the chunk's box"},
+    {"CenterNan", poke(K::kCenters, 0, kNan), "the center of ellipsoid 0 is not finite"},
+    {"ScaleInfinite", poke(K::kScales, 4, HUGE_VALF), "a scale of ellipsoid 1 is not finite"},
+    {"RotationNan", poke(K::kRotations, 8, kNan), "the rotation of ellipsoid 2"},
+    {"RotationLong", poke(K::kRotations, 0, 2.0f), "not of unit length"},
+    {"IntensityNan", poke(K::kIntensities, 12, kNan), "the intensity of ellipsoid 3"},
+    {"PrimitiveKappaNan", poke(K::kKappas, 0, kNan), "the kappa of ellipsoid 0"},
+    {"KappasTooFew", resized(K::kKappas, -4), "12 bytes of content for 4"},
+    {"RotationsTooMany", resized(K::kRotations, 16), "bytes of content for 4"},
+    {"LeavesOutOfOrder", poke(K::kLeaves, 8, 0), "leaf 2 is out of order"},
+    {"LeavesOutOfRange", poke(K::kLeaves, 0, 1 << 30), "outside the index space"},
+    {"LeavesCutOff", resized(K::kLeaves, -1), "whole number of leaves"},
+    {"CurveCutOff", resized(K::kCurve, 4), "whole number of points"},
+    {"CurveNan", poke(K::kCurve, 0, double(kNan)), "curve"},
+};
+
+INSTANTIATE_TEST_SUITE_P(HostileFile, ContentLies, testing::ValuesIn(kContentLies),
+                         [](const auto& lie) { return lie.param.name; });
+
+/// A change to the section table alone.
+struct TableLie {
+  const char* name;
+  std::function<void(SectionTable&)> tell;
+  const char* answer;
+};
+void PrintTo(const TableLie& lie, std::ostream* out) { *out << lie.name; }
+
+class TableLies : public testing::TestWithParam<TableLie> {};
+
+TEST_P(TableLies, AreFoundOut) {
+  CraftedFile file(plainFile());
+  (void)file.assemble();
+  SectionTable table = file.table();
+  GetParam().tell(table);
+  EXPECT_THAT([&] { decode(file.assembleAs(table)); },
+              ThrowsMessage<BadInput>(AllOf(HasSubstr("lie.esvr"), HasSubstr(GetParam().answer))));
+}
+
+const TableLie kTableLies[] = {
+    {"SizeTooLarge", [](SectionTable& t) { t.fileBytes += 1; }, "truncated"},
+    {"SizeTooSmall", [](SectionTable& t) { t.fileBytes -= 1; }, "bytes after its end"},
+    {"TableOutside", [](SectionTable& t) { t.tableOffset = ~std::uint64_t{7}; }, "section table"},
+    {"TableInHeader", [](SectionTable& t) { t.tableOffset = 0; }, "section table"},
+    {"TableUnaligned", [](SectionTable& t) { t.tableOffset += 1; }, "section table"},
+    {"SectionOutside", [](SectionTable& t) { t.entries[1].offset = t.fileBytes + 4096; },
+     "do not lie in the file"},
+    {"SectionOverflows", [](SectionTable& t) { t.entries[1].storedBytes = ~std::uint64_t{0}; },
+     "do not lie in the file"},
+    {"SectionUnaligned", [](SectionTable& t) { t.entries[1].offset += 1; }, "not aligned"},
+    {"SectionInHeader", [](SectionTable& t) { t.entries[1].offset = 0; }, "overlap"},
+    {"SectionInTable", [](SectionTable& t) { t.entries[1].offset = t.tableOffset + 8; }, "overlap"},
+    {"SectionOnAnother", [](SectionTable& t) { t.entries[1].offset = t.entries[2].offset; },
+     "overlap"},
+    {"SectionTwice", [](SectionTable& t) { t.entries[1].id = t.entries[2].id; }, "two sections"},
+    {"WrongChecksum", [](SectionTable& t) { t.entries[1].checksum ^= 1; },
+     "section 1 (centers of grid 0, chunk 0, at byte"},
+};
+
+INSTANTIATE_TEST_SUITE_P(HostileFile, TableLies, testing::ValuesIn(kTableLies),
+                         [](const auto& lie) { return lie.param.name; });
+
+TEST(HostileFile, BytesBetweenTheSectionsMustBeZero) {
+  CraftedFile file(plainFile());
+  auto bytes = file.assemble();
+  const auto& entries = file.table().entries;
+  const std::size_t gap = entries[0].offset + entries[0].storedBytes;
+  ASSERT_LT(gap, entries[1].offset);
+  bytes[gap] = std::byte{1};
+  EXPECT_THAT([&] { decode(bytes); },
+              ThrowsMessage<BadInput>(HasSubstr("byte " + std::to_string(gap) + " belongs to no")));
+}
+
+/// A kilobyte of file that claims, section by section, as much content as the reader believes in.
+TEST(HostileFile, AKilobyteCannotAskForAGigabyte) {
+  CraftedFile file(plainFile());
+  for (const auto kind : {K::kCenters, K::kScales, K::kRotations, K::kIntensities, K::kKappas,
+                          K::kLeaves, K::kCurve, K::kGrid}) {
+    auto& section = file.section(kind);
+    section.entry.codec = Codec::kBlosc;
+    for (std::uint64_t raw = std::uint64_t{1} << 50; raw > 0; raw /= 2) {
+      section.entry.rawBytes = raw;
+      const auto bytes = file.assemble();
+      ASSERT_LT(bytes.size(), 1024u + 512u);
+      const test::AllocationMeter meter;
+      EXPECT_THROW(decode(bytes), BadInput);
+      EXPECT_LT(meter.bytes(), 32 * kMegabyte) << "raw size " << raw;
+    }
+  }
+}
+
+/// Zeros compress best of all: the most that a small file can hold in earnest.
+TEST(HostileFile, TheMostThatAKilobyteCanHoldIsBounded) {
+  EncodedGrid grid = test::emptyGrid();
+  grid.descriptor.metadata = {{"zeros", "string", std::vector<std::byte>(4 * kMegabyte)}};
+  const auto bytes = encodeEsvr(test::fileOf(grid));
+  const test::AllocationMeter meter;
+  EXPECT_EQ(decodeEsvr(bytes, "zeros").grids.size(), 1u);
+  EXPECT_LT(meter.bytes(), 16 * kMegabyte);
+  EXPECT_LT(bytes.size(), 4096u);
+}
+
+}  // namespace
+}  // namespace esvr

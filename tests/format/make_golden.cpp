@@ -1,0 +1,20 @@
+// Writes the golden files: make_golden FOLDER. For a new one; those that are there do not change.
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+
+#include "format/golden_files.h"
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::cerr << "usage: make_golden FOLDER\n";
+    return 2;
+  }
+  for (const auto& golden : esvr::test::goldenFiles()) {
+    const auto bytes = esvr::test::bytesOf(golden);
+    std::ofstream out(std::filesystem::path(argv[1]) / (golden.name + ".esvr"), std::ios::binary);
+    out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+    if (!out.flush()) return 1;
+  }
+}

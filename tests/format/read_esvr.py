@@ -1,0 +1,212 @@
+#!/usr/bin/env python3
+"""Reads .esvr files as docs/format.md specifies them, and nothing else: shares no code with libesvr.
+
+usage: read_esvr.py FOLDER
+
+Reads every golden file in the folder: header, table and checksums of all, the content of sections
+that are stored raw, and compares what is known of them. Exits 1 where the page and a file disagree.
+"""
+
+import struct
+import sys
+from pathlib import Path
+
+MASK = (1 << 64) - 1
+PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 9650029242287828579,
+          2870177450012600261)
+NONE = 0xFFFFFFFF
+KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 5: "curve", 16: "centers",
+         17: "scales", 18: "rotations", 19: "intensities", 20: "kappas"}
+PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
+
+
+def rotate(value, bits):
+    return ((value << bits) | (value >> (64 - bits))) & MASK
+
+
+def mix(lane, word):
+    return rotate((lane + word * PRIMES[1]) & MASK, 31) * PRIMES[0] & MASK
+
+
+def stripes(data):
+    """The four lanes over all whole stripes of 32 bytes, merged."""
+    lanes = [(PRIMES[0] + PRIMES[1]) & MASK, PRIMES[1], 0, -PRIMES[0] & MASK]
+    for at in range(0, len(data) // 32 * 32, 32):
+        words = struct.unpack_from("<4Q", data, at)
+        lanes = [mix(lane, word) for lane, word in zip(lanes, words)]
+    merged = sum(rotate(lane, bits) for lane, bits in zip(lanes, (1, 7, 12, 18))) & MASK
+    for lane in lanes:
+        merged = ((merged ^ mix(0, lane)) * PRIMES[0] + PRIMES[3]) & MASK
+    return merged
+
+
+def tail(value, data):
+    while len(data) >= 8:
+        word = struct.unpack_from("<Q", data)[0]
+        value = (rotate(value ^ mix(0, word), 27) * PRIMES[0] + PRIMES[3]) & MASK
+        data = data[8:]
+    if len(data) >= 4:
+        word = struct.unpack_from("<I", data)[0]
+        value = (rotate(value ^ word * PRIMES[0] & MASK, 23) * PRIMES[1] + PRIMES[2]) & MASK
+        data = data[4:]
+    for byte in data:
+        value = rotate(value ^ byte * PRIMES[4] & MASK, 11) * PRIMES[0] & MASK
+    return value
+
+
+def xxh64(data):
+    value = stripes(data) if len(data) >= 32 else PRIMES[4]
+    value = tail((value + len(data)) & MASK, data[len(data) // 32 * 32:])
+    value = (value ^ value >> 33) * PRIMES[1] & MASK
+    value = (value ^ value >> 29) * PRIMES[2] & MASK
+    return value ^ value >> 32
+
+
+class Record:
+    """Takes a record apart."""
+
+    def __init__(self, data):
+        self.data, self.at = data, 0
+
+    def get(self, form):
+        values = struct.unpack_from("<" + form, self.data, self.at)
+        self.at += struct.calcsize("<" + form)
+        return values[0] if len(values) == 1 else values
+
+    def sized(self):
+        return self.get(f"{self.get('I')}s")
+
+    def metadata(self):
+        return [(self.sized(), self.sized(), self.sized()) for _ in range(self.get("I"))]
+
+    def chunk(self):
+        return {"origin": self.get("3i"), "box": self.get("6i"), "count": self.get("Q")}
+
+    def end(self):
+        assert self.at == len(self.data), "bytes left in a record"
+
+
+def grid(data):
+    r = Record(data)
+    g = {"name": r.sized(), "class": r.get("B"), "values": r.get("B"), "background": r.get("d"),
+         "map type": r.sized(), "map": r.sized()}
+    g["affine"] = r.get("16d") if r.get("B") else None
+    g["metadata"] = r.metadata()
+    for key, form in (("topology", "B"), ("non-negative", "B"), ("threshold", "f"),
+                      ("active box", "6i"), ("active voxels", "Q"), ("range", "2f"),
+                      ("field background", "f"), ("kernel", "B"), ("kappa", "f"),
+                      ("epsilon", "f"), ("chunk count", "I")):
+        g[key] = r.get(form)
+    g["chunks"] = [r.chunk()] if g["chunk count"] == 1 else []
+    r.end()
+    return g
+
+
+def chunks(data):
+    r = Record(data)
+    table = [r.chunk() for _ in range(len(data) // 44)]
+    r.end()
+    return table
+
+
+def leaves(data):
+    n = len(data) // 12
+    values = struct.unpack(f"<{3 * n}i", data)
+    return [tuple(8 * v for v in values[i::n]) for i in range(n)]
+
+
+def content(name, data):
+    if name in PLANES:
+        n = len(data) // 4 // PLANES[name]
+        values = struct.unpack(f"<{n * PLANES[name]}f", data)
+        return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
+    readers = {"grid": grid, "chunks": chunks, "leaves": leaves}
+    return readers[name](data) if name in readers else data
+
+
+def read(path):
+    """{(kind, grid, chunk): content}; None where the content is compressed."""
+    data = path.read_bytes()
+    magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
+        "<8sHHIQQQQ", data)
+    assert magic == bytes.fromhex("89 45 53 56 52 0D 0A 0A"), "magic"
+    assert (major, minor, size) == (1, 0, len(data)), "version or size"
+    assert table % 8 == 0 and header_sum == xxh64(data[:40]), "header checksum"
+    assert table_sum == xxh64(data[table:table + 56 * count]), "table checksum"
+
+    owned = bytearray(len(data))
+    owned[0:48] = b"\1" * 48
+    owned[table:table + 56 * count] = b"\1" * 56 * count
+    sections = {}
+    for i in range(count):
+        kind, codec, flags, g, c, frame, layer, at, stored, raw, hashed = struct.unpack_from(
+            "<IHHIIIIQQQQ", data, table + 56 * i)
+        part = data[at:at + stored]
+        assert at % 8 == 0 and len(part) == stored and not any(owned[at:at + stored]), "place"
+        owned[at:at + stored] = b"\1" * stored
+        assert hashed == xxh64(part), "section checksum"
+        name = KINDS.get(kind)
+        if name is None:
+            assert flags == 0, "an unknown kind is optional here"
+            continue
+        assert flags == (0 if name == "curve" else 1) and frame == layer == 0, "flags"
+        assert codec in (0, 1) and (codec == 1 or raw == stored), "codec"
+        sections[name, g, c] = content(name, part) if codec == 0 else None
+    assert not any(b for b, o in zip(data, owned) if not o), "padding"
+    return sections
+
+
+def check_one_ellipsoid(sections):
+    g = sections["grid", 0, NONE]
+    assert g["name"] == b"density" and g["background"] == 1.0 and g["kernel"] == 0
+    assert g["kappa"] == 2.0 and abs(g["epsilon"] - 0.006) < 1e-9
+    assert g["chunks"][0]["origin"] == (10, -20, 30) and g["chunks"][0]["count"] == 1
+    low, high = g["chunks"][0]["box"][:3], g["chunks"][0]["box"][3:]
+    assert all(a <= b <= c for a, b, c in zip(low, (11.5, -22.25, 1030.0), high))
+    assert sections["centers", 0, 0] == [(1.5,), (-2.25,), (1000.0,)]
+    assert sections["scales", 0, 0] == [(0.0,), (-1.0,), (2.5,)]
+    assert [round(q[0], 6) for q in sections["rotations", 0, 0]] == [0.8, 0.0, -0.6, 0.0]
+    assert sections["intensities", 0, 0] == [(0.75,)]
+    assert len(sections) == 5
+
+
+def check_level_set(sections):
+    g = sections["grid", 0, NONE]
+    assert (g["class"], g["values"], g["topology"], g["non-negative"]) == (1, 2, 1, 0)
+    assert g["background"] == 0.3 and g["map type"] == b"NonlinearFrustumMap"
+    assert g["affine"] is None and g["kernel"] == 1 and g["active voxels"] == 4
+    assert sections["leaves", 0, NONE] == [(-8, -8, 1 << 20), (-8, 0, 0), (0, -16, 8), (0, 0, -8)]
+    assert ("rotations", 0, 0) not in sections
+
+
+def check_kappas_and_chunks(sections):
+    table = sections["chunks", 0, NONE]
+    assert [c["count"] for c in table] == [4, 0, 4]
+    assert table[1]["box"] == (2147483647,) * 3 + (-2147483648,) * 3
+    assert table[2]["origin"] == (0, -4096, 10_000_000)
+    assert not any(chunk == 1 for _, _, chunk in sections)
+    assert ("kappas", 0, 0) not in sections and len(sections["kappas", 0, 2][0]) == 4
+    for x, y, z, w in zip(*sections["rotations", 0, 2]):
+        assert abs(x * x + y * y + z * z + w * w - 1) < 1e-6
+
+
+CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
+          "level_set": check_level_set, "kappas_and_chunks": check_kappas_and_chunks}
+
+
+def main():
+    assert xxh64(b"") == 0xEF46DB3751D8E999 and xxh64(b"abc") == 0x44BC2CF5AD770999
+    files = sorted(Path(sys.argv[1]).glob("*.esvr"))
+    for path in files:
+        try:
+            CHECKS.get(path.stem, lambda sections: None)(read(path))
+        except (AssertionError, struct.error) as error:
+            sys.exit(f"{path}: {error!r}")
+    missing = CHECKS.keys() - {path.stem for path in files}
+    if missing:
+        sys.exit(f"{sys.argv[1]}: no {', '.join(sorted(missing))}")
+    print(f"{len(files)} files read")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,121 @@
+// Plan: (1) plain dense float64 windows, clipped at the box, on random sparse volumes; (2) values
+// that scikit-image computed (make_ssim_fixture.py); (3) closed forms where windows see background
+// only. The window itself: tests/field/ssim_window_test.cpp.
+//
+// Tolerance of (1): a variance is off by a few eps of the squared values (order 1) and is divided
+// by C2 = 9e-4 peak^2, so each SSIM by about 10 * 2.2e-16 / 9e-4 = 2.5e-12.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "esvr/error.h"
+#include "esvr/metrics.h"
+#include "metrics/dense_reference.h"
+#include "metrics/volumes.h"
+
+namespace esvr {
+namespace {
+
+using test::randomVolume;
+using test::volumeOf;
+
+constexpr double kWindowTolerance = 1e-11;
+
+struct DenseCase {
+  std::uint64_t seed;
+  float backgroundA, backgroundB;
+  Box box;
+};
+
+class AgainstDenseWindows : public testing::TestWithParam<DenseCase> {};
+
+TEST_P(AgainstDenseWindows, sparseSsimIsTheMeanOfAllWindows) {
+  const DenseCase c = GetParam();
+  const auto a = randomVolume({.seed = c.seed, .background = c.backgroundA});
+  const auto b = randomVolume({.seed = c.seed + 50, .background = c.backgroundB});
+  EXPECT_NEAR(ssim3d(a, b, c.box, 1.5), test::denseSsim(a, b, c.box, 1.5), kWindowTolerance);
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, AgainstDenseWindows,
+                         testing::Values(DenseCase{1, 0.0f, 0.0f, {{-12, -9, -11}, {7, 10, 3}}},
+                                         DenseCase{2, 0.5f, 0.5f, {{-12, -9, -11}, {7, 10, 3}}},
+                                         DenseCase{3, 0.0f, 0.25f, {{-20, -20, -4}, {-1, 1, 5}}},
+                                         // narrower than the window, and a single voxel
+                                         DenseCase{4, 0.0f, 0.0f, {{-14, -3, 1}, {14, 0, 2}}},
+                                         DenseCase{5, 0.0f, 0.0f, {{-4, -4, -4}, {-4, -4, -4}}}));
+
+/// The block of hashed values that make_ssim_fixture.py describes.
+float fixtureValue(Coord v, std::uint64_t shift) {
+  const auto index = std::uint64_t((v.x * 32 + v.y) * 32 + v.z) + shift;
+  return float(std::uint32_t(index * 2654435761u) >> 8) * 0x1p-24f;
+}
+
+struct FixtureCase {
+  float backgroundA, backgroundB;
+  double peak, ssim;
+};
+
+class AgainstScikitImage : public testing::TestWithParam<FixtureCase> {};
+
+TEST_P(AgainstScikitImage, boxMeanAgrees) {
+  const FixtureCase c = GetParam();
+  const Box block{{10, 10, 10}, {21, 21, 21}};
+  const auto a = volumeOf(
+      block, [](Coord v) { return fixtureValue(v, 0); }, c.backgroundA);
+  const auto mixed = [](Coord v) {
+    return float(0.75 * fixtureValue(v, 0) + 0.25 * fixtureValue(v, 1000003));
+  };
+  const auto b = volumeOf(block, mixed, c.backgroundB);
+  const double got = ssim3d(a, b, Box{{0, 0, 0}, {31, 31, 31}}, c.peak);
+  EXPECT_NEAR(got, c.ssim, 1e-10);  // scikit-image subtracts moments of order 1 as we do
+}
+
+INSTANTIATE_TEST_SUITE_P(Fixture, AgainstScikitImage,
+                         testing::Values(FixtureCase{0.0f, 0.0f, 1.0, 0.9958420323404611},
+                                         FixtureCase{0.0f, 0.0f, 4.0, 0.9969819328965087},
+                                         FixtureCase{0.25f, 0.25f, 1.0, 0.9927726271701163},
+                                         FixtureCase{0.25f, 0.25f, 4.0, 0.9954547156279874},
+                                         FixtureCase{0.0f, 0.125f, 1.0, 0.10972615086068897},
+                                         FixtureCase{0.0f, 0.125f, 4.0, 0.1860523860886215}));
+
+TEST(Ssim3d, emptySpaceOfOneBackgroundCountsAsExactlyOne) {
+  const auto a = volumeOf({{{0, 0, 0}, 1.0f}}, 0.1f);
+  const auto b = volumeOf({{{0, 0, 0}, 0.2f}}, 0.1f);
+  EXPECT_EQ(ssim3d(a, b, Box{{100, 100, 100}, {120, 120, 120}}, 1.0), 1.0);
+}
+
+TEST(Ssim3d, emptySpaceOfTwoBackgroundsFollowsTheLuminanceTerm) {
+  const auto a = volumeOf({{{0, 0, 0}, 1.0f}}, 0.5f);
+  const auto b = volumeOf({{{0, 0, 0}, 1.0f}}, 0.25f);
+  const double c1 = 1e-4;
+  const double want = (2 * 0.5 * 0.25 + c1) / (0.25 + 0.0625 + c1);
+  EXPECT_DOUBLE_EQ(ssim3d(a, b, Box{{100, 100, 100}, {120, 120, 120}}, 1.0), want);
+}
+
+TEST(Ssim3d, voxelsOutsideTheBoxAreNotSeen) {
+  const auto a = volumeOf({{{0, 0, 0}, 1.0f}});
+  const SparseVolume none;
+  EXPECT_EQ(ssim3d(a, none, Box{{0, 0, 1}, {0, 0, 5}}, 1.0), 1.0);
+  EXPECT_LT(ssim3d(a, none, Box{{0, 0, 0}, {0, 0, 5}}, 1.0), 1.0);
+}
+
+TEST(Ssim3d, ofTwoVolumesIsSymmetric) {
+  const auto a = randomVolume({.seed = 31}), b = randomVolume({.seed = 32, .background = 0.5f});
+  const Box box{{-9, -9, -9}, {9, 9, 9}};
+  EXPECT_NEAR(ssim3d(a, b, box, 1.0), ssim3d(b, a, box, 1.0), 1e-15);
+}
+
+TEST(Ssim3d, refusesValuesThatAreNotFinite) {
+  const auto a = volumeOf({{{0, 0, 0}, NAN}}), b = volumeOf({{{0, 0, 0}, 1.0f}});
+  EXPECT_THROW((void)ssim3d(a, b, Box{{0, 0, 0}, {1, 1, 1}}, 1.0), BadInput);
+}
+
+TEST(Ssim3d, refusesAnEmptyBoxAndAPeakThatIsNotPositive) {
+  const auto a = volumeOf({{{0, 0, 0}, 1.0f}});
+  EXPECT_THROW((void)ssim3d(a, a, Box{}, 1.0), UsageError);
+  EXPECT_THROW((void)ssim3d(a, a, Box{{0, 0, 0}, {1, 1, 1}}, 0.0), UsageError);
+}
+
+}  // namespace
+}  // namespace esvr

@@ -1,0 +1,40 @@
+#pragma once
+/// Small volumes for the tests of metrics.
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "esvr/coord.h"
+#include "esvr/sparse_volume.h"
+
+namespace esvr::test {
+
+/// A uniform number of [0, 1) that depends on its arguments only.
+double hashUnit(std::uint64_t seed, std::uint64_t index);
+
+struct Voxel {
+  Coord at;
+  float value = 0.0f;
+};
+
+/// A volume of single active voxels.
+SparseVolume volumeOf(const std::vector<Voxel>& voxels, float background = 0.0f);
+
+/// A volume that holds value(voxel) at every voxel of a box, all active.
+SparseVolume volumeOf(const Box& box, const std::function<float(Coord)>& value,
+                      float background = 0.0f);
+
+struct RandomVolumeOptions {
+  std::uint64_t seed = 0;
+  int brickRange = 2;        ///< brick positions from -brickRange to brickRange - 1
+  double brickShare = 0.1;   ///< of the places that hold a brick
+  double activeShare = 0.5;  ///< of a brick's voxels; the others hold the background or a value
+  float background = 0.0f;
+};
+SparseVolume randomVolume(const RandomVolumeOptions& options);
+
+/// The same voxels elsewhere. \param by  multiples of 8
+SparseVolume movedBy(SparseVolume volume, Coord by);
+
+}  // namespace esvr::test

@@ -1,0 +1,133 @@
+// Plan: esvr-sample as a user runs it: files that read back, refusals with code and words, nothing
+// half-written, the same voxels for any number of threads.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cli/run_program.h"
+#include "esvr/vdb_io.h"
+
+namespace esvr {
+namespace {
+
+using test::runProgram;
+using test::TemporaryFolder;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+test::ProgramRun sample(const std::vector<std::string>& arguments) {
+  return runProgram(ESVR_SAMPLE, arguments);
+}
+
+TEST(EsvrSample, writesAGridThatReadsBack) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "tree.vdb";
+  const auto run = sample({"tree", path, "--resolution", "40"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, IsEmpty()) << "stdout is for data";
+  EXPECT_THAT(run.err, HasSubstr("active voxels"));
+  const VolumeGrid grid = readGrid(path, "density");
+  EXPECT_EQ(grid.descriptor.gridClass, GridClass::kFogVolume);
+  EXPECT_GT(activeVoxelCount(grid.volume), 100u);
+  EXPECT_THAT(folder.names(), ElementsAre("tree.vdb"));
+}
+
+TEST(EsvrSample, writesSeveralGridsWithTheirMetadata) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "two.vdb";
+  ASSERT_EQ(sample({"two-grids", path, "--resolution", "32", "-q"}).exitCode, 0);
+  const VdbSummary summary = inspectVdb(path);
+  ASSERT_EQ(summary.grids.size(), 2u);
+  EXPECT_TRUE(summary.grids[0].savedAsHalf);
+  EXPECT_EQ(summary.grids[1].name, "temperature");
+  const VolumeGrid temperature = readGrid(path, "temperature");
+  EXPECT_EQ(temperature.volume.background, 0.25f);
+}
+
+TEST(EsvrSample, isTheSameForAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  const std::string one = folder / "1.vdb", many = folder / "5.vdb";
+  ASSERT_EQ(sample({"plume", one, "--resolution", "48", "--threads", "1"}).exitCode, 0);
+  ASSERT_EQ(sample({"plume", many, "--resolution", "48", "--threads", "5"}).exitCode, 0);
+  EXPECT_EQ(readGrid(one, "density").volume.values, readGrid(many, "density").volume.values);
+}
+
+TEST(EsvrSample, isQuietWhenAsked) {
+  const TemporaryFolder folder;
+  const auto run = sample({"blobs", folder / "b.vdb", "--resolution", "8", "--quiet"});
+  EXPECT_EQ(run.exitCode, 0);
+  EXPECT_THAT(run.err, IsEmpty());
+}
+
+TEST(EsvrSample, keepsAnExistingFileUnlessForced) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "a.vdb";
+  test::writeText(path, "precious");
+  const auto refused = sample({"blobs", path, "--resolution", "8"});
+  EXPECT_EQ(refused.exitCode, 1);
+  EXPECT_THAT(refused.err, HasSubstr("--force"));
+  EXPECT_EQ(test::readText(path), "precious");
+  EXPECT_EQ(sample({"blobs", path, "--resolution", "8", "-f"}).exitCode, 0);
+  EXPECT_NO_THROW((void)readGrid(path, "density"));
+}
+
+struct Refusal {
+  std::vector<std::string> arguments;
+  int code;
+  const char* text;
+};
+
+class RefusedSample : public testing::TestWithParam<Refusal> {};
+
+TEST_P(RefusedSample, leavesNoFile) {
+  const TemporaryFolder folder;
+  std::vector<std::string> arguments = GetParam().arguments;
+  for (std::string& argument : arguments)
+    if (argument.starts_with("DIR/")) argument = folder / argument.substr(4);
+  const auto run = sample(arguments);
+  EXPECT_EQ(run.exitCode, GetParam().code);
+  EXPECT_THAT(run.err, HasSubstr(GetParam().text));
+  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_THAT(folder.names(), IsEmpty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, RefusedSample,
+    testing::Values(Refusal{{}, 2, "missing argument KIND"},
+                    Refusal{{"tree"}, 2, "missing argument OUT.vdb"},
+                    Refusal{{"oak", "DIR/a.vdb"}, 2, "'oak'"},
+                    Refusal{{"tree", "DIR/a.txt"}, 2, ".vdb or .nvdb"},
+                    Refusal{{"tree", "DIR/a.vdb", "--resolution", "0"}, 2, "--resolution"},
+                    Refusal{{"tree", "DIR/a.vdb", "--resolution", "-5"}, 2, "--resolution"},
+                    Refusal{{"tree", "DIR/a.vdb", "--resolution", "many"}, 2, "many"},
+                    Refusal{{"tree", "DIR/a.vdb", "--seed", "-1"}, 2, "--seed"},
+                    Refusal{{"tree", "DIR/none/a.vdb"}, 1, "No such file"}));
+
+TEST(EsvrSample, helpListsTheKindsAndVersionThePartsOnStdout) {
+  const auto help = sample({"--help"});
+  EXPECT_EQ(help.exitCode, 0);
+  EXPECT_THAT(help.out, HasSubstr("two-grids"));
+  EXPECT_THAT(help.err, IsEmpty());
+  EXPECT_THAT(sample({"--version"}).out, HasSubstr("OpenVDB"));
+}
+
+TEST(EsvrSample, leavesNothingWhenInterrupted) {
+  const TemporaryFolder folder;
+  // minutes of work, stopped after half a second
+  const auto run =
+      runProgram("/usr/bin/timeout", {"--preserve-status", "--signal=INT", "0.5", ESVR_SAMPLE,
+                                      "plume", folder / "a.vdb", "--resolution", "6000"});
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("cancelled"));
+  EXPECT_THAT(folder.names(), IsEmpty());
+}
+
+TEST(EsvrSample, saysSoWhenTheDiskIsFull) {
+  const auto run = runProgram("/bin/sh", {"-c", std::string(ESVR_SAMPLE) + " --help > /dev/full"});
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("standard output"));
+}
+
+}  // namespace
+}  // namespace esvr

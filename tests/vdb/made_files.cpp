@@ -1,0 +1,80 @@
+#include "vdb/made_files.h"
+
+#include <fstream>
+#include <map>
+
+namespace esvr::test {
+
+openvdb::FloatGrid::Ptr smallGrid(float background) {
+  openvdb::initialize();
+  auto grid = openvdb::FloatGrid::create(background);
+  grid->setName("density");
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  auto accessor = grid->getAccessor();
+  accessor.setValue({1, 2, 3}, 0.25f);
+  accessor.setValue({1, 2, 4}, 0.5f);
+  accessor.setValue({7, 0, 0}, 1.0f);
+  return grid;
+}
+
+void save(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
+          const openvdb::MetaMap& metadata) {
+  openvdb::io::File(path.string()).write(grids, metadata);
+}
+
+void saveCompressed(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
+                    std::uint32_t compression) {
+  openvdb::io::File file(path.string());
+  file.setCompression(compression);
+  file.write(grids);
+}
+
+openvdb::GridBase::Ptr load(const std::filesystem::path& path, const std::string& name) {
+  openvdb::initialize();
+  openvdb::io::File file(path.string());
+  file.open(false);
+  return file.readGrid(name);
+}
+
+std::vector<std::byte> bytesOf(const std::filesystem::path& path) {
+  std::vector<std::byte> bytes(std::filesystem::file_size(path));
+  std::ifstream(path, std::ios::binary)
+      .read(reinterpret_cast<char*>(bytes.data()), std::streamsize(bytes.size()));
+  return bytes;
+}
+
+void writeBytes(const std::filesystem::path& path, const std::vector<std::byte>& bytes) {
+  std::filesystem::remove(path);  // a file emptied and rewritten is flushed to the disk by ext4
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+}
+
+SparseVolume volumeOf(const std::vector<VoxelValue>& voxels, float background) {
+  std::map<Coord, BrickInput> bricks;
+  for (const auto& [voxel, value] : voxels) {
+    const Coord corner = brickOf(voxel) * kBrickSide;
+    auto [it, isNew] = bricks.try_emplace(corner);
+    if (isNew) {
+      it->second.corner = corner;
+      it->second.values.fill(background);
+    }
+    const int offset = voxelOffset(localOf(voxel));
+    it->second.values[std::size_t(offset)] = value;
+    it->second.active.set(offset);
+  }
+  std::vector<BrickInput> inputs;
+  for (auto& [corner, brick] : bricks) inputs.push_back(brick);
+  return makeVolume(std::move(inputs), background);
+}
+
+VolumeGrid gridOf(const std::string& name, const std::vector<VoxelValue>& voxels,
+                  float background) {
+  VolumeGrid grid;
+  grid.descriptor.name = name;
+  grid.descriptor.background = background;
+  grid.descriptor.transform = uniformTransform(1.0);
+  grid.volume = volumeOf(voxels, background);
+  return grid;
+}
+
+}  // namespace esvr::test

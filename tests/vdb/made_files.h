@@ -1,0 +1,38 @@
+#pragma once
+/// Files made with OpenVDB itself, so that the reader is tested against what others write.
+
+#include <openvdb/openvdb.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <vector>
+
+#include "esvr/vdb_io.h"
+
+namespace esvr::test {
+
+/// A float grid with one leaf of three active voxels, named "density".
+openvdb::FloatGrid::Ptr smallGrid(float background = 0.0f);
+
+/// Writes with OpenVDB's own writer, under its default compression unless told otherwise.
+void save(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
+          const openvdb::MetaMap& metadata = {});
+void saveCompressed(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
+                    std::uint32_t compression);
+
+/// Reads one grid with OpenVDB's own reader.
+openvdb::GridBase::Ptr load(const std::filesystem::path& path, const std::string& name);
+
+std::vector<std::byte> bytesOf(const std::filesystem::path& path);
+void writeBytes(const std::filesystem::path& path, const std::vector<std::byte>& bytes);
+
+/// A volume from scratch: these active voxels (any order), the rest background.
+struct VoxelValue {
+  Coord voxel;
+  float value;
+};
+SparseVolume volumeOf(const std::vector<VoxelValue>& voxels, float background = 0.0f);
+VolumeGrid gridOf(const std::string& name, const std::vector<VoxelValue>& voxels,
+                  float background = 0.0f);
+
+}  // namespace esvr::test

@@ -1,0 +1,143 @@
+/// Plan: what a user types for a grid finds the right one: empty names, shared names, names that
+/// look like numbered ones; grids that cannot be fitted are listed by name and type.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openvdb/points/PointConversion.h>
+
+#include "esvr/error.h"
+#include "vdb/made_files.h"
+#include "vdb/test_files.h"
+
+namespace esvr {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// Grids of these names, whose voxel (0, 0, 0) holds 1, 2, ... in turn.
+openvdb::GridPtrVec gridsNamed(const std::vector<std::string>& names) {
+  openvdb::GridPtrVec grids;
+  for (const auto& name : names) {
+    auto grid = test::smallGrid();
+    grid->setName(name);
+    grid->tree().setValue({0, 0, 0}, float(grids.size() + 1));
+    grids.push_back(grid);
+  }
+  return grids;
+}
+
+class Names : public testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path path() const { return directory_ / "in.vdb"; }
+  [[nodiscard]] std::vector<std::string> uniqueNames() const {
+    std::vector<std::string> names;
+    for (const auto& grid : inspectVdb(path()).grids) names.push_back(grid.uniqueName);
+    return names;
+  }
+  [[nodiscard]] float mark(const std::string& name) const {
+    return valueAt(readGrid(path(), name).volume, {0, 0, 0});
+  }
+  test::TemporaryDirectory directory_;
+};
+
+TEST_F(Names, StandInFileOrder) {
+  test::save(path(), gridsNamed({"zebra", "ant", "mole"}));
+  EXPECT_THAT(uniqueNames(), ElementsAre("zebra", "ant", "mole"));
+  EXPECT_EQ(mark("ant"), 2.0f);
+}
+
+TEST_F(Names, SharedByGridsAreNumberedFromZero) {
+  test::save(path(), gridsNamed({"a", "b", "a", "a"}));
+  EXPECT_THAT(uniqueNames(), ElementsAre("a[0]", "b", "a[1]", "a[2]"));
+  EXPECT_EQ(mark("a"), 1.0f);
+  EXPECT_EQ(mark("a[0]"), 1.0f);
+  EXPECT_EQ(mark("a[1]"), 3.0f);
+  EXPECT_EQ(mark("a[2]"), 4.0f);
+  EXPECT_EQ(mark("b[0]"), 2.0f);
+}
+
+TEST_F(Names, MayBeEmpty) {
+  test::save(path(), gridsNamed({""}));
+  EXPECT_THAT(uniqueNames(), ElementsAre(""));
+  EXPECT_EQ(mark(""), 1.0f);
+  test::save(path(), gridsNamed({"", "", "x"}));
+  EXPECT_THAT(uniqueNames(), ElementsAre("[0]", "[1]", "x"));
+  EXPECT_EQ(mark("[1]"), 2.0f);
+  EXPECT_EQ(readGrid(path(), "[1]").descriptor.name, "");
+}
+
+TEST_F(Names, MayLookNumbered) {
+  test::save(path(), gridsNamed({"a[1]", "b"}));
+  EXPECT_THAT(uniqueNames(), ElementsAre("a[1]", "b"));
+  EXPECT_EQ(mark("a[1]"), 1.0f);
+}
+
+TEST_F(Names, ThatAreNotThereAreAnsweredWithThoseThatAre) {
+  test::save(path(), gridsNamed({"a", "b", "a"}));
+  for (const char* name : {"c", "a[2]", "b[1]", "", "A"})
+    EXPECT_THAT([&] { (void)readGrid(path(), name); },
+                ThrowsMessage<BadInput>(AllOf(HasSubstr("in.vdb"), HasSubstr(name),
+                                              HasSubstr("\"a[0]\", \"b\", \"a[1]\""))));
+}
+
+TEST_F(Names, OfAFileWithoutGridsAreNone) {
+  test::save(path(), {});
+  EXPECT_TRUE(inspectVdb(path()).grids.empty());
+  EXPECT_THAT([&] { (void)readGrid(path(), "a"); }, ThrowsMessage<BadInput>(HasSubstr("none")));
+}
+
+template <class Grid>
+openvdb::GridBase::Ptr typed(const std::string& name) {
+  auto grid = Grid::create();
+  grid->setName(name);
+  return grid;
+}
+
+TEST_F(Names, OfGridsThatCannotBeFittedComeWithTheirType) {
+  openvdb::initialize();
+  const std::vector<openvdb::Vec3s> positions{{0, 0, 0}, {1, 2, 3}};
+  openvdb::GridPtrVec grids{typed<openvdb::BoolGrid>("b"),
+                            typed<openvdb::MaskGrid>("m"),
+                            typed<openvdb::Int32Grid>("i"),
+                            typed<openvdb::Int64Grid>("l"),
+                            typed<openvdb::Vec3DGrid>("v"),
+                            openvdb::points::createPointDataGrid<openvdb::points::NullCodec,
+                                                                 openvdb::points::PointDataGrid>(
+                                positions, *openvdb::math::Transform::createLinearTransform(1.0))};
+  grids.back()->setName("p");
+  grids.push_back(test::smallGrid());
+  test::save(path(), grids);
+  const auto listed = inspectVdb(path()).grids;
+  ASSERT_EQ(listed.size(), 7u);
+  EXPECT_THAT(listed[0].skipReason, HasSubstr("bool"));
+  EXPECT_THAT(listed[1].skipReason, HasSubstr("mask"));
+  EXPECT_THAT(listed[2].skipReason, HasSubstr("int32"));
+  EXPECT_THAT(listed[3].skipReason, HasSubstr("int64"));
+  EXPECT_THAT(listed[4].skipReason, HasSubstr("vec3d"));
+  EXPECT_THAT(listed[5].skipReason, HasSubstr("points"));
+  EXPECT_EQ(listed[6].skipReason, "");
+  EXPECT_THAT([&] { (void)readGrid(path(), "v"); }, ThrowsMessage<BadInput>(HasSubstr("vec3d")));
+  EXPECT_EQ(activeVoxelCount(readGrid(path(), "density").volume), 3u);
+}
+
+TEST_F(Names, OfTypesThatOpenVdbDoesNotKnowAreListedToo) {
+  // A tree of another shape: the type exists here and is not registered, as in a host's file.
+  using OddTree = openvdb::tree::Tree4<float, 4, 3, 3>::Type;
+  using OddGrid = openvdb::Grid<OddTree>;
+  openvdb::initialize();
+  auto odd = OddGrid::create();
+  odd->setName("odd");
+  odd->tree().setValue({0, 0, 0}, 1.0f);
+  test::save(path(), {odd, test::smallGrid()});
+  const auto listed = inspectVdb(path()).grids;
+  ASSERT_EQ(listed.size(), 2u);
+  EXPECT_EQ(listed[0].valueType, "float");
+  EXPECT_THAT(listed[0].skipReason, HasSubstr("Tree_float_4_3_3"));
+  EXPECT_EQ(activeVoxelCount(readGrid(path(), "density").volume), 3u);
+}
+
+}  // namespace
+}  // namespace esvr

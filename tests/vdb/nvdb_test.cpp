@@ -1,0 +1,274 @@
+/// Plan: files made with NanoVDB's own writer, in every codec and float type, read exactly; files
+/// written here are read by NanoVDB's own reader; then cut, bent and inconsistent ones.
+
+#include "vdb/versions.h"
+
+#define NANOVDB_USE_OPENVDB
+#define NANOVDB_USE_BLOSC
+#define NANOVDB_USE_ZIP
+#include ESVR_NANOVDB_CREATE
+#include ESVR_NANOVDB_IO
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openvdb/tools/LevelSetSphere.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "esvr/error.h"
+#include "vdb/expect_same.h"
+#include "vdb/made_files.h"
+#include "vdb/test_files.h"
+
+namespace esvr {
+namespace {
+
+using nanovdb::io::Codec;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+using Handles = std::vector<nanovdb::GridHandle<nanovdb::HostBuffer>>;
+using Bytes = std::vector<std::byte>;
+
+/// Leaves, tiles of two levels, a background that is not zero.
+openvdb::FloatGrid::Ptr sourceGrid() {
+  auto grid = test::smallGrid(0.5f);
+  for (int i = 0; i < 300; ++i)
+    grid->tree().setValue({i % 20 - 10, i / 20, i % 7}, float(i % 13) / 4.0f);
+  grid->tree().addTile(1, {64, 0, 0}, 0.75f, true);
+  grid->tree().addTile(2, {1024, 0, 0}, 2.0f, true);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
+  return grid;
+}
+
+class Nvdb : public testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path path() const { return directory_ / "in.nvdb"; }
+  void save(const openvdb::GridPtrVec& grids, Codec codec = Codec::NONE) const {
+    Handles handles;
+    for (const auto& grid : grids) handles.push_back(vdb::nanotools::openToNanoVDB(grid));
+    nanovdb::io::writeGrids(path().string(), handles, codec);
+  }
+  bool readable(const Bytes& bytes) const {
+    test::writeBytes(path(), bytes);
+    try {
+      for (const auto& listed : inspectVdb(path()).grids) {
+        if (!listed.skipReason.empty()) continue;
+        const auto grid =
+            readGrid(path(), listed.uniqueName, {.maxBytes = std::uint64_t{32} << 20});
+        checkInvariants(grid.volume);
+        for (const float value : grid.volume.values)
+          if (!std::isfinite(value)) throw std::logic_error("a value that is not finite");
+      }
+    } catch (const BadInput&) {
+      return false;
+    }
+    return true;
+  }
+  test::TemporaryDirectory directory_;
+};
+
+TEST_F(Nvdb, OfEveryCodecReadsAsItsSource) {
+  const auto source = sourceGrid();
+  test::save(directory_ / "in.vdb", {source});
+  const auto expected = readGrid(directory_ / "in.vdb", "density");
+  for (const Codec codec : {Codec::NONE, Codec::ZIP, Codec::BLOSC}) {
+    save({source}, codec);
+    const auto listed = inspectVdb(path());
+    EXPECT_EQ(listed.format, "NanoVDB");
+    ASSERT_EQ(listed.grids.size(), 1u);
+    EXPECT_EQ(listed.grids[0].valueType, "float");
+    EXPECT_EQ(listed.grids[0].activeVoxels, source->activeVoxelCount());
+    EXPECT_EQ(listed.grids[0].activeBox, activeBox(expected.volume));
+    const auto grid = readGrid(path(), "density");
+    test::expectSameBits(grid.volume, expected.volume);
+    EXPECT_EQ(grid.descriptor.name, "density");
+    EXPECT_EQ(grid.descriptor.gridClass, GridClass::kFogVolume);
+    EXPECT_EQ(grid.descriptor.background, 0.5);
+    EXPECT_EQ(grid.descriptor.transform, expected.descriptor.transform);
+  }
+}
+
+TEST_F(Nvdb, OfDoublesReadsAsItsSource) {
+  openvdb::initialize();
+  auto source = openvdb::DoubleGrid::create(0.1);
+  source->setName("density");
+  source->tree().setValue({-1, 2, 3}, 0.3);
+  save({source});
+  const auto grid = readGrid(path(), "density");
+  EXPECT_EQ(grid.descriptor.valueType, ValueType::kDouble);
+  EXPECT_EQ(grid.descriptor.background, 0.1);
+  EXPECT_EQ(valueAt(grid.volume, {-1, 2, 3}), 0.3f);
+}
+
+template <class Build>
+nanovdb::GridHandle<nanovdb::HostBuffer> quantised(openvdb::FloatGrid& grid) {
+#ifdef ESVR_NANOVDB_HAS_CREATE
+  return vdb::nanotools::createNanoGrid<openvdb::FloatGrid, Build>(grid);
+#else
+  return nanovdb::OpenToNanoVDB<float, Build>()(grid);
+#endif
+}
+
+/// Writes under a quantised type and expects each value within `tolerance` of its source.
+template <class Build>
+void expectQuantised(const std::filesystem::path& path, const char* type, float tolerance) {
+  const auto source = sourceGrid();
+  Handles handles;
+  handles.push_back(quantised<Build>(*source));
+  nanovdb::io::writeGrids(path.string(), handles);
+  EXPECT_EQ(inspectVdb(path).grids.front().valueType, type);
+  const auto grid = readGrid(path, "density");
+  EXPECT_EQ(activeVoxelCount(grid.volume), source->activeVoxelCount());
+  for (auto value = source->cbeginValueOn(); value; ++value) {
+    const auto at = value.getCoord();
+    ASSERT_NEAR(valueAt(grid.volume, {at.x(), at.y(), at.z()}), *value, tolerance) << type;
+  }
+}
+
+TEST_F(Nvdb, OfQuantisedFloatsReadsWithinTheirStep) {
+  // A leaf spans at most 3: half a step of 2^-n of that, and float's rounding.
+  expectQuantised<nanovdb::Fp4>(path(), "fp4", 0.5f * 3 / 15 + 1e-6f);
+  expectQuantised<nanovdb::Fp8>(path(), "fp8", 0.5f * 3 / 255 + 1e-6f);
+  expectQuantised<nanovdb::Fp16>(path(), "fp16", 0.5f * 3 / 65535 + 1e-6f);
+  expectQuantised<nanovdb::FpN>(path(), "fpn", 0.01f + 1e-6f);  // its default for fog
+}
+
+TEST_F(Nvdb, OfALevelSetKeepsInsideAndOutsideApart) {
+  openvdb::initialize();
+  auto sphere = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(10.0f, {0, 0, 0}, 1.0f);
+  sphere->setName("surface");
+  test::save(directory_ / "in.vdb", {sphere});
+  save({sphere});
+  test::expectSameBits(readGrid(path(), "surface").volume,
+                       readGrid(directory_ / "in.vdb", "surface").volume);
+}
+
+TEST_F(Nvdb, ListsSeveralGridsAndWhyOneIsSkipped) {
+  auto first = test::smallGrid(), second = test::smallGrid(), third = test::smallGrid();
+  second->tree().setValue({0, 0, 0}, 2.0f);
+  third->clear();
+  third->setName("empty");
+  auto vectors = openvdb::Vec3SGrid::create();
+  vectors->setName("vel");
+  vectors->tree().setValue({0, 0, 0}, {1, 2, 3});
+  save({first, second, third, vectors});
+  const auto grids = inspectVdb(path()).grids;
+  ASSERT_EQ(grids.size(), 4u);
+  EXPECT_EQ(grids[1].uniqueName, "density[1]");
+  EXPECT_THAT(grids[2].skipReason, HasSubstr("no active voxel"));
+  EXPECT_THAT(grids[3].skipReason, HasSubstr("vec3s"));
+  EXPECT_EQ(valueAt(readGrid(path(), "density[1]").volume, {0, 0, 0}), 2.0f);
+  EXPECT_THROW((void)readGrid(path(), "vel"), BadInput);
+}
+
+TEST_F(Nvdb, WithNonFiniteVoxelsIsRefusedOrMended) {
+  auto source = test::smallGrid();
+  source->tree().setValue({0, 0, 5}, std::numeric_limits<float>::quiet_NaN());
+  save({source});
+  EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
+              ThrowsMessage<BadInput>(AllOf(HasSubstr("1 voxel is"), HasSubstr("(0, 0, 5)"))));
+  EXPECT_EQ(readGrid(path(), "density", {.nonFinite = NonFinite::kZero}).nonFiniteReplaced, 1u);
+}
+
+TEST_F(Nvdb, WithAHugeTileIsRefusedBeforeItIsExpanded) {
+  auto source = test::smallGrid();
+  source->tree().addTile(3, {4096, 0, 0}, 1.0f, true);
+  save({source});
+  EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
+              ThrowsMessage<BadInput>(HasSubstr("bricks")));
+}
+
+TEST_F(Nvdb, WrittenIsWhatNanoVdbReads) {
+  test::save(directory_ / "in.vdb", {sourceGrid()});
+  const auto grid = readGrid(directory_ / "in.vdb", "density");
+  writeGrids(directory_ / "out.nvdb", {}, {&grid, 1});
+  const auto handle = nanovdb::io::readGrid((directory_ / "out.nvdb").string());
+  const auto* back = handle.grid<float>();
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->activeVoxelCount(), activeVoxelCount(grid.volume));
+  const auto accessor = back->getAccessor();
+  for (int i = 0; i < 300; ++i) {
+    const Coord at{i % 20 - 10, i / 20, i % 7};
+    EXPECT_EQ(accessor.getValue({at.x, at.y, at.z}), valueAt(grid.volume, at));
+  }
+  EXPECT_EQ(accessor.getValue({64, 0, 0}), 0.75f);
+  EXPECT_EQ(back->tree().background(), 0.5f);
+  EXPECT_EQ(back->voxelSize()[0], 0.1);
+}
+
+TEST_F(Nvdb, CannotHoldHalf) {
+  const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
+  EXPECT_THROW(writeGrids(path(), {}, {&grid, 1}, {.half = HalfMode::kOn}), UsageError);
+  EXPECT_EQ(directory_.fileCount(), 0u);
+}
+
+TEST_F(Nvdb, CutAnywhereIsRefused) {
+  for (const Codec codec : {Codec::NONE, Codec::ZIP, Codec::BLOSC}) {
+    save({sourceGrid()}, codec);
+    const Bytes whole = test::bytesOf(path());
+    ASSERT_TRUE(readable(whole));
+    for (std::size_t size = 0; size < whole.size(); size += 1 + whole.size() / 100)
+      EXPECT_FALSE(readable(Bytes(whole.begin(), whole.begin() + std::ptrdiff_t(size)))) << size;
+  }
+}
+
+TEST_F(Nvdb, AnyByteMayBeWrong) {
+  for (const Codec codec : {Codec::NONE, Codec::ZIP, Codec::BLOSC}) {
+    save({test::smallGrid()}, codec);
+    const Bytes whole = test::bytesOf(path());
+    // Every byte of the headers; of the nodes, which are large and mostly empty, some.
+    for (std::size_t i = 0; i < whole.size(); i += i < 1200 ? 1 : 1 + whole.size() / 400) {
+      Bytes damaged = whole;
+      damaged[i] ^= i % 2 == 0 ? std::byte{0x80} : std::byte{0xff};
+      (void)readable(damaged);
+    }
+  }
+}
+
+TEST_F(Nvdb, OffsetsThatLeadAstrayAreNotFollowed) {
+  save({test::smallGrid()});
+  const Bytes whole = test::bytesOf(path());
+  // The offsets of tree and nodes are the 64-bit words whose change makes a node lie elsewhere:
+  // whichever they are, no word of the file may lead outside of it.
+  const std::int64_t astray[] = {std::int64_t{1} << 40, -(std::int64_t{1} << 40),
+                                 std::numeric_limits<std::int64_t>::max(),
+                                 std::numeric_limits<std::int64_t>::min(), 32};
+  std::size_t refused = 0;
+  for (std::size_t at = 0; at + 8 <= whole.size(); at += at < 2048 ? 8 : 8 * 97)
+    for (const std::int64_t offset : astray) {
+      Bytes damaged = whole;
+      std::memcpy(damaged.data() + at, &offset, sizeof offset);
+      refused += !readable(damaged);
+    }
+  EXPECT_GT(refused, 20u);
+}
+
+TEST_F(Nvdb, OfAnotherMajorVersionIsRefused) {
+  save({test::smallGrid()});
+  Bytes bytes = test::bytesOf(path());
+  const std::uint32_t version = 31u << 21;
+  std::memcpy(bytes.data() + 8, &version, sizeof version);
+  test::writeBytes(path(), bytes);
+  EXPECT_THAT([&] { (void)inspectVdb(path()); },
+              ThrowsMessage<BadInput>(HasSubstr("written by NanoVDB 31")));
+}
+
+TEST_F(Nvdb, WithTheMagicNumberOfNewerFilesIsRead) {
+  save({test::smallGrid()});
+  Bytes bytes = test::bytesOf(path());
+  bytes[7] = std::byte{'2'};
+  test::writeBytes(path(), bytes);
+  EXPECT_EQ(activeVoxelCount(readGrid(path(), "density").volume), 3u);
+  bytes[7] = std::byte{'1'};
+  test::writeBytes(path(), bytes);
+  EXPECT_THAT([&] { (void)inspectVdb(path()); }, ThrowsMessage<BadInput>(HasSubstr("bare")));
+}
+
+TEST(VdbVersions, NamesBothLibraries) {
+  EXPECT_THAT(vdbVersions(), testing::MatchesRegex("OpenVDB [0-9.]+, NanoVDB [0-9.]+"));
+}
+
+}  // namespace
+}  // namespace esvr

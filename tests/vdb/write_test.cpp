@@ -1,0 +1,236 @@
+/// Plan: what is written is read with OpenVDB's own reader: values, states, tiles, types, half.
+/// Then the ways in which writing fails, each of which must leave nothing behind.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openvdb/tools/LevelSetSphere.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "esvr/error.h"
+#include "vdb/expect_same.h"
+#include "vdb/made_files.h"
+#include "vdb/test_files.h"
+
+namespace esvr {
+namespace {
+
+using openvdb::FloatGrid;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+std::vector<test::VoxelValue> fullBrick(Coord corner, float value) {
+  std::vector<test::VoxelValue> voxels;
+  for (int i = 0; i < kBrickVoxels; ++i) voxels.push_back({corner + voxelLocal(i), value});
+  return voxels;
+}
+
+class Write : public testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path path() const { return directory_ / "out.vdb"; }
+  FloatGrid::Ptr writeAndLoad(const VolumeGrid& grid, const WriteOptions& options = {}) {
+    writeGrids(path(), {}, {&grid, 1}, options);
+    return openvdb::gridPtrCast<FloatGrid>(test::load(path(), grid.descriptor.name));
+  }
+  test::TemporaryDirectory directory_;
+};
+
+TEST_F(Write, InactiveVoxelsHoldTheBackground) {
+  auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}, {{-3, 5, 100}, 2.0f}}, 0.5f);
+  grid.volume.values[1] = 99.0f;  // inactive: a fit leaves anything there
+  const auto back = writeAndLoad(grid);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->background(), 0.5f);
+  EXPECT_EQ(back->activeVoxelCount(), 2u);
+  EXPECT_EQ(back->tree().getValue({0, 0, 0}), 1.0f);
+  EXPECT_EQ(back->tree().getValue({0, 0, 1}), 0.5f);
+  EXPECT_EQ(back->tree().getValue({-3, 5, 100}), 2.0f);
+}
+
+TEST_F(Write, ConstantLeavesBecomeTilesUnlessToldOtherwise) {
+  const auto grid = test::gridOf("density", fullBrick({8, 16, -8}, 0.75f));
+  const auto tiled = writeAndLoad(grid);
+  EXPECT_EQ(tiled->tree().leafCount(), 0u);
+  EXPECT_EQ(tiled->activeVoxelCount(), 512u);
+  EXPECT_EQ(tiled->tree().getValue({15, 23, -1}), 0.75f);
+  test::expectSameBits(readGrid(path(), "density").volume, grid.volume);
+  const auto leaves = writeAndLoad(grid, {.overwrite = true, .constantTiles = false});
+  EXPECT_EQ(leaves->tree().leafCount(), 1u);
+}
+
+TEST_F(Write, LeavesWithoutActiveVoxelsAreNotWritten) {
+  auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}, {{100, 0, 0}, 1.0f}});
+  grid.volume.active.back() = {};
+  EXPECT_EQ(writeAndLoad(grid)->tree().leafCount(), 1u);
+}
+
+TEST_F(Write, ALevelSetComesBackWithSignsEverywhere) {
+  openvdb::initialize();
+  auto sphere = openvdb::tools::createLevelSetSphere<FloatGrid>(40.0f, {0, 0, 0}, 1.0f, 3.0f);
+  sphere->setName("surface");
+  test::save(directory_ / "in.vdb", {sphere});
+  const auto back = writeAndLoad(readGrid(directory_ / "in.vdb", "surface"));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->getGridClass(), openvdb::GRID_LEVEL_SET);
+  EXPECT_TRUE(back->tree().hasSameTopology(sphere->tree()));
+  for (int x = -48; x < 48; x += 2)  // leaves, the space inside and outside, tiles included
+    for (int y = -48; y < 48; y += 2)
+      for (int z = -48; z < 48; ++z)
+        ASSERT_EQ(back->tree().getValue({x, y, z}), sphere->tree().getValue({x, y, z}));
+}
+
+TEST_F(Write, ActiveVoxelsOfALevelSetSurviveTheFloodFill) {
+  // As fluid solvers write them: active throughout, whole leaves of one value.
+  auto voxels = fullBrick({0, 0, 0}, -1.25f);
+  for (const auto& voxel : fullBrick({8, 0, 0}, 7.0f)) voxels.push_back(voxel);
+  auto grid = test::gridOf("phi", voxels, 3.0f);
+  grid.descriptor.gridClass = GridClass::kLevelSet;
+  const auto back = writeAndLoad(grid);
+  EXPECT_EQ(back->activeVoxelCount(), 1024u);
+  EXPECT_EQ(back->tree().getValue({3, 3, 3}), -1.25f);
+  EXPECT_EQ(back->tree().getValue({11, 3, 3}), 7.0f);
+}
+
+TEST_F(Write, ALevelSetWithBackgroundZeroIsWrittenWithoutFloodFill) {
+  auto grid = test::gridOf("phi", {{{0, 0, 0}, -1.0f}, {{1, 0, 0}, 1.0f}});
+  grid.descriptor.gridClass = GridClass::kLevelSet;
+  EXPECT_EQ(writeAndLoad(grid)->tree().getValue({0, 0, 1}), 0.0f);
+}
+
+TEST_F(Write, ADoubleSourceComesBackDouble) {
+  auto grid = test::gridOf("density", {{{0, 0, 0}, 0.1f}});
+  grid.descriptor.valueType = ValueType::kDouble;
+  grid.descriptor.background = 0.1;
+  grid.volume.background = 0.1f;
+  writeGrids(path(), {}, {&grid, 1});
+  const auto back = openvdb::gridPtrCast<openvdb::DoubleGrid>(test::load(path(), "density"));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->background(), 0.1);
+  EXPECT_EQ(back->tree().getValue({0, 0, 0}), double(0.1f));
+}
+
+TEST_F(Write, HalfFollowsTheSourceUnlessToldOtherwise) {
+  auto grid = test::gridOf("density", {{{0, 0, 0}, 0.1f}});
+  const auto savedAsHalf = [&](ValueType source, HalfMode mode) {
+    grid.descriptor.valueType = source;
+    const auto back = writeAndLoad(grid, {.half = mode, .overwrite = true});
+    const float expected = back->saveFloatAsHalf() ? float(openvdb::math::half(0.1f)) : 0.1f;
+    EXPECT_EQ(back->tree().getValue({0, 0, 0}), expected);
+    EXPECT_EQ(back->type(), "Tree_float_5_4_3");  // never OpenVDB's native half grid
+    return inspectVdb(path()).grids.front().savedAsHalf;
+  };
+  EXPECT_FALSE(savedAsHalf(ValueType::kFloat, HalfMode::kAuto));
+  EXPECT_TRUE(savedAsHalf(ValueType::kHalf, HalfMode::kAuto));
+  EXPECT_TRUE(savedAsHalf(ValueType::kFloat, HalfMode::kOn));
+  EXPECT_FALSE(savedAsHalf(ValueType::kHalf, HalfMode::kOff));
+}
+
+TEST_F(Write, ValuesBeyondHalfAreRefusedNotMadeInfinite) {
+  auto grid = test::gridOf("density", {{{0, 0, 0}, 65504.0f}});
+  EXPECT_NO_THROW(writeGrids(path(), {}, {&grid, 1}, {.half = HalfMode::kOn}));
+  grid = test::gridOf("heat", {{{0, 0, 0}, -70000.0f}});
+  EXPECT_THAT(
+      [&] {
+        writeGrids(path(), {}, {&grid, 1}, {.half = HalfMode::kOn, .overwrite = true});
+      },
+      ThrowsMessage<UsageError>(AllOf(HasSubstr("heat"), HasSubstr("65504"))));
+  EXPECT_EQ(inspectVdb(path()).grids.front().name, "density");  // the old file stands
+  EXPECT_EQ(directory_.fileCount(), 1u);
+}
+
+TEST_F(Write, SeveralGridsOfOneNameKeepTheirOrder) {
+  const std::vector<VolumeGrid> grids{test::gridOf("a", {{{0, 0, 0}, 1.0f}}),
+                                      test::gridOf("a", {{{0, 0, 0}, 2.0f}}),
+                                      test::gridOf("", {{{0, 0, 0}, 3.0f}})};
+  writeGrids(path(), {}, grids);
+  EXPECT_EQ(valueAt(readGrid(path(), "a[1]").volume, {0, 0, 0}), 2.0f);
+  EXPECT_EQ(valueAt(readGrid(path(), "").volume, {0, 0, 0}), 3.0f);
+}
+
+TEST_F(Write, IsPackedByBloscAndActiveMask) {
+  const auto back = writeAndLoad(test::gridOf("density", {{{0, 0, 0}, 1.0f}}));
+  const auto packing =
+      back->getMetadata<openvdb::StringMetadata>(openvdb::GridBase::META_FILE_COMPRESSION);
+  ASSERT_TRUE(packing);
+  EXPECT_EQ(packing->value(), "blosc + active values");
+}
+
+TEST_F(Write, AnExistingFileStaysUnlessOverwriteIsGiven) {
+  const auto old = test::gridOf("old", {{{0, 0, 0}, 1.0f}});
+  const auto fresh = test::gridOf("new", {{{0, 0, 0}, 1.0f}});
+  writeGrids(path(), {}, {&old, 1});
+  EXPECT_THAT(
+      [&] {
+        writeGrids(path(), {}, {&fresh, 1});
+      },
+      ThrowsMessage<RuntimeFailure>(AllOf(HasSubstr("out.vdb"), HasSubstr("exists"))));
+  EXPECT_EQ(inspectVdb(path()).grids.front().name, "old");
+  writeGrids(path(), {}, {&fresh, 1}, {.overwrite = true});
+  EXPECT_EQ(inspectVdb(path()).grids.front().name, "new");
+  EXPECT_EQ(directory_.fileCount(), 1u);
+}
+
+TEST_F(Write, OtherExtensionsAreRefused) {
+  const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
+  for (const char* name : {"out.esvr", "out", "out.VDB.gz"})
+    EXPECT_THROW(writeGrids(directory_ / name, {}, {&grid, 1}), UsageError) << name;
+  EXPECT_EQ(directory_.fileCount(), 0u);
+}
+
+TEST_F(Write, ADirectoryThatIsNotThereIsNamed) {
+  const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
+  EXPECT_THAT(
+      [&] {
+        writeGrids(directory_ / "nowhere/out.vdb", {}, {&grid, 1});
+      },
+      ThrowsMessage<RuntimeFailure>(HasSubstr("nowhere/out.vdb")));
+}
+
+TEST_F(Write, ADirectoryWithoutPermissionIsAnError) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root may write anywhere";
+  const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
+  std::filesystem::permissions(
+      directory_.path(), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+  EXPECT_THROW(writeGrids(path(), {}, {&grid, 1}), RuntimeFailure);
+  std::filesystem::permissions(directory_.path(), std::filesystem::perms::owner_all);
+}
+
+/// Files of this process may not grow beyond a size: what a full disk looks like to a writer.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : oldHandler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit limited{bytes, old_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limited);
+  }
+  ~FileSizeLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &old_);
+    std::signal(SIGXFSZ, oldHandler_);
+  }
+
+ private:
+  rlimit old_{};
+  void (*oldHandler_)(int);
+};
+
+TEST_F(Write, AFullDiskIsNoticedAndLeavesNothing) {
+  const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}, {{5000, 0, 0}, 1.0f}});
+  for (const char* name : {"out.vdb", "out.nvdb"}) {
+    for (const rlim_t limit : {rlim_t{0}, rlim_t{100}, rlim_t{600}}) {
+      const FileSizeLimit full(limit);
+      EXPECT_THAT(
+          [&] {
+            writeGrids(directory_ / name, {}, {&grid, 1});
+          },
+          ThrowsMessage<RuntimeFailure>(AllOf(HasSubstr(name), HasSubstr("disk is full"))))
+          << limit;
+    }
+    EXPECT_EQ(directory_.fileCount(), 0u);
+  }
+}
+
+}  // namespace
+}  // namespace esvr

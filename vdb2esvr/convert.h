@@ -1,0 +1,37 @@
+#pragma once
+/// One grid's way from voxels to what the file holds.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "esvr/container.h"
+#include "esvr/fit.h"
+#include "esvr/metrics.h"
+#include "vdb2esvr/options.h"
+
+namespace esvr::vdb2esvr {
+
+struct PhaseSeconds {
+  double read = 0.0, seed = 0.0, pilot = 0.0, optimise = 0.0, encode = 0.0, measure = 0.0;
+  [[nodiscard]] double total() const { return read + seed + pilot + optimise + encode + measure; }
+};
+
+struct ConvertedGrid {
+  std::string uniqueName;  ///< in the input
+  EncodedGrid stored;      ///< as a reader of the file will get it
+  VolumeMetrics metrics;   ///< of the voxels that it gives back
+  std::size_t bricks = 0;  ///< of the source
+  std::uint64_t nonFiniteReplaced = 0;
+  FitEnd end = FitEnd::kScheduleDone;
+  std::vector<PilotPoint> pilot;
+  std::uint64_t pairs = 0;
+  bool signedIntensities = false;
+  PhaseSeconds seconds;
+};
+
+/// Reads, fits, encodes and measures a grid. The fit's progress and cancellation are those of
+/// `options.fit`.
+[[nodiscard]] ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName);
+
+}  // namespace esvr::vdb2esvr

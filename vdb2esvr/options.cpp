@@ -1,0 +1,159 @@
+#include "vdb2esvr/options.h"
+
+#include <limits>
+
+#include "cli/box_option.h"
+#include "cli/choice.h"
+#include "cli/command_line.h"
+
+namespace esvr::vdb2esvr {
+namespace {
+
+using cli::Arguments;
+using cli::requireRange;
+using cli::po::bool_switch;
+using cli::po::value;
+
+constexpr std::int64_t kMostPrimitives = std::numeric_limits<std::uint32_t>::max();
+constexpr std::int64_t kMostIterations = 10'000'000;
+constexpr double kHighestPsnr = 300.0;  // dB; float32 ends at about 150
+constexpr double kLongestRun = 1e9;     // seconds
+constexpr float kLargestKappa = 1e4f;   // kernel.h
+
+cli::ProgramText programText() {
+  return {
+      .name = kProgram,
+      .purpose =
+          "Fits ellipsoids to the sparse grids of a VDB file and writes them as .esvr, which\n"
+          "esvr2vdb turns back into the VDB: transforms, names and metadata exactly, voxels\n"
+          "as close as asked.",
+      .usage = "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--count N | --psnr DB | --seconds S]",
+      .notes =
+          "Without -g all float and double grids are fitted, the others are listed and skipped.\n"
+          "Targets combine: a run ends at the first that is met, and --count bounds --psnr.\n"
+          "An ordinary run prints a table on stdout: PSNR and the largest error are those of\n"
+          "the voxels that the written file gives back.\n"
+          "\n"
+          "Ctrl-C ends the fit; what was reached is written or not, as --on-cancel says, and the\n"
+          "exit code is 1. A second Ctrl-C ends the program at once. OUT.esvr is never half a "
+          "file.\n"
+          "\n"
+          "Exit codes: 0 done, 1 failure or interrupted, 2 wrong options, 3 input that cannot be\n"
+          "used, 4 --psnr not reached (the file is written), 5 device or memory.",
+      .examples =
+          "  vdb2esvr smoke.vdb smoke.esvr                       choose everything from the data\n"
+          "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             as few as 45 dB take\n"
+          "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report smoke.json\n"
+          "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255"};
+}
+
+void addFitOptions(cli::po::options_description& options) {
+  // clang-format off
+  options.add_options()
+    ("count", value<std::int64_t>()->value_name("N"), "ellipsoids; with --psnr: at most so many")
+    ("psnr", value<double>()->value_name("DB"), "grow until this PSNR over the box is reached")
+    ("seconds", value<double>()->value_name("S"), "the best within this time, each grid")
+    ("iterations", value<std::int64_t>()->value_name("N"), "length of the fit's schedule")
+    ("preset", value<std::string>()->value_name("P")->default_value("standard"),
+     "draft, standard or high: what is not given otherwise")
+    ("kappa", value<float>()->value_name("K"),
+     "edge of the ellipsoids (default: a short pilot run decides)")
+    ("loss", value<std::string>()->value_name("L")->default_value("squared"),
+     "squared (what PSNR asks for) or paper (L1 + D-SSIM)")
+    ("beta", value<double>()->value_name("B")->default_value(FitOptions{}.beta),
+     "share of L1 in --loss paper, 0 to 1")
+    ("box", value<std::string>()->value_name("BOX"),
+     "x0,y0,z0,x1,y1,z1 of the PSNR (default: the active voxels' bounding box)")
+    ("seed", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(FitOptions{}.seed)),
+     "of the random choices; the same seed gives the same file")
+    ("device", value<std::string>()->value_name("D")->default_value("auto"),
+     "auto, cpu, cuda or cuda:N");
+  // clang-format on
+}
+
+void addFileOptions(cli::po::options_description& options) {
+  // clang-format off
+  options.add_options()
+    ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
+     "fit this grid only; may be repeated; 'density[1]' is the second of that name")
+    ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
+     "refuse grids with NaN or infinite voxels, or take them as zero")
+    ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
+     "keep or discard the best so far when interrupted")
+    ("report", value<std::string>()->value_name("FILE"),
+     "write a JSON report to FILE.json, '-' for stdout")
+    ("force,f", bool_switch(), "replace OUT.esvr and the report if they exist");
+  // clang-format on
+}
+
+cli::CommandLine commandLine() {
+  cli::CommandLine line(programText());
+  line.argument("input", "IN.vdb");
+  line.argument("output", "OUT.esvr");
+  addFileOptions(line.options());
+  addFitOptions(line.options());
+  return line;
+}
+
+/// A number within [low, high], as the type that takes it.
+template <class To, class From>
+std::optional<To> bounded(const Arguments& arguments, const std::string& option, From low,
+                          From high) {
+  const auto given = arguments.find<From>(option);
+  if (!given) return std::nullopt;
+  requireRange(option, *given, low, high);
+  return To(*given);
+}
+
+FitOptions fitOptions(const Arguments& a) {
+  FitOptions fit;
+  fit.count = bounded<std::size_t>(a, "count", std::int64_t{1}, kMostPrimitives);
+  fit.psnr = bounded<double>(a, "psnr", 0.0, kHighestPsnr);
+  fit.seconds = bounded<double>(a, "seconds", 1e-3, kLongestRun);
+  fit.iterations = bounded<std::uint32_t>(a, "iterations", std::int64_t{1}, kMostIterations);
+  fit.preset = cli::choose<Preset>(
+      "preset", a.get<std::string>("preset"),
+      {{"draft", Preset::kDraft}, {"standard", Preset::kStandard}, {"high", Preset::kHigh}});
+  fit.loss = cli::choose<Loss>("loss", a.get<std::string>("loss"),
+                               {{"squared", Loss::kSquared}, {"paper", Loss::kPaper}});
+  fit.beta = *bounded<double>(a, "beta", 0.0, 1.0);
+  fit.kappa = bounded<float>(a, "kappa", -kLargestKappa, kLargestKappa);
+  if (const auto box = a.find<std::string>("box")) fit.box = cli::parseBox(*box);
+  fit.seed =
+      *bounded<std::uint64_t>(a, "seed", std::int64_t{0}, std::numeric_limits<std::int64_t>::max());
+  return fit;
+}
+
+NonFinite nonFinite(const Arguments& a) {
+  return cli::choose<NonFinite>("nonfinite", a.get<std::string>("nonfinite"),
+                                {{"refuse", NonFinite::kRefuse}, {"zero", NonFinite::kZero}});
+}
+
+OnCancel onCancel(const Arguments& a) {
+  return cli::choose<OnCancel>("on-cancel", a.get<std::string>("on-cancel"),
+                               {{"keep", OnCancel::kKeep}, {"discard", OnCancel::kDiscard}});
+}
+
+}  // namespace
+
+std::optional<Options> parseOptions(int argc, const char* const* argv) {
+  const auto arguments = commandLine().parse(argc, argv);
+  if (!arguments) return std::nullopt;
+  const Arguments& a = *arguments;
+  Options options;
+  options.input = a.get<std::string>("input");
+  options.output = a.get<std::string>("output");
+  options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
+  options.fit = fitOptions(a);
+  options.read.nonFinite = nonFinite(a);
+  options.device = a.get<std::string>("device");
+  options.onCancel = onCancel(a);
+  options.report = a.find<std::string>("report").value_or("");
+  options.overwrite = a.get<bool>("force");
+  options.threads = a.threads;
+  options.verbosity = a.verbosity;
+  options.commandLine.assign(argv, argv + argc);
+  return options;
+}
+
+}  // namespace esvr::vdb2esvr

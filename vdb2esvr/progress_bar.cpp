@@ -1,0 +1,65 @@
+#include "vdb2esvr/progress_bar.h"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+
+#include "cli/printable.h"
+
+namespace esvr::vdb2esvr {
+namespace {
+
+constexpr const char* kBackAndClear = "\r\x1b[K";
+constexpr std::size_t kBarCells = 20;
+
+std::size_t terminalWidth() {
+  constexpr std::size_t kUnknown = 80;
+  winsize size{};
+  const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col : kUnknown;
+}
+
+std::string bar(double fraction) {
+  const auto filled = std::size_t(std::lround(fraction * double(kBarCells)));
+  return '[' + std::string(filled, '#') + std::string(kBarCells - filled, '-') + ']';
+}
+
+std::string clock(double seconds) {
+  constexpr long kMinute = 60;
+  const long whole = std::lround(std::max(seconds, 0.0));
+  char text[32];
+  std::snprintf(text, sizeof text, "%ld:%02ld", whole / kMinute, whole % kMinute);
+  return text;
+}
+
+}  // namespace
+
+std::string progressLine(const std::string& grid, const FitProgress& progress, std::size_t width) {
+  const double fraction = std::clamp(progress.fraction, 0.0, 1.0);
+  char numbers[96];
+  std::snprintf(numbers, sizeof numbers, "  %.2f dB  %llu ellipsoids  ", progress.point.psnrBox,
+                static_cast<unsigned long long>(progress.point.primitives));
+  std::string line = cli::printable(grid) + "  " + std::to_string(std::lround(100.0 * fraction)) +
+                     " % " + bar(fraction) + numbers + clock(progress.secondsLeft) + " left";
+  line.resize(std::min(line.size(), width));
+  return line;
+}
+
+ProgressBar::ProgressBar(std::string grid, bool shown)
+    : grid_(std::move(grid)), shown_(shown && isatty(STDERR_FILENO) == 1) {}
+
+ProgressBar::~ProgressBar() {
+  if (shown_) std::cerr << kBackAndClear << std::flush;
+}
+
+void ProgressBar::show(const FitProgress& progress) const {
+  if (!shown_) return;
+  const std::size_t width = terminalWidth() - 1;  // a full line would wrap
+  std::cerr << kBackAndClear << progressLine(grid_, progress, width) << std::flush;
+}
+
+}  // namespace esvr::vdb2esvr

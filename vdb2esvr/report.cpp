@@ -1,0 +1,233 @@
+#include "vdb2esvr/report.h"
+
+#include <nlohmann/json.hpp>
+
+#include "cli/memory.h"
+#include "cli/names.h"
+#include "cli/version_text.h"
+#include "esvr/device.h"
+#include "vdb2esvr/scene_notes.h"
+
+namespace esvr::vdb2esvr {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kSchema = "esvr-report";
+constexpr int kSchemaVersion = 1;  // docs/report.md: when it changes
+
+const char* nameOf(FitEnd end) {
+  switch (end) {
+    case FitEnd::kScheduleDone:
+      return "schedule done";
+    case FitEnd::kPsnrReached:
+      return "psnr reached";
+    case FitEnd::kTimeUp:
+      return "time up";
+    case FitEnd::kCancelled:
+      return "interrupted";
+    case FitEnd::kPsnrMissed:
+      return "psnr missed";
+  }
+  return "";
+}
+
+const char* nameOf(Preset preset) {
+  switch (preset) {
+    case Preset::kDraft:
+      return "draft";
+    case Preset::kHigh:
+      return "high";
+    case Preset::kStandard:
+      break;
+  }
+  return "standard";
+}
+
+Json toJson(const Box& box) {
+  if (box.empty()) return nullptr;
+  return {box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z};
+}
+
+template <class T>
+Json orNull(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json versions() {
+  return {{"esvr", cli::programVersion()},
+          {"format", kFormatVersion},
+          {"vdb", vdbVersions()},
+          {"cuda", cudaVersions()}};
+}
+
+Json asked(const Options& options) {
+  const FitOptions& fit = options.fit;
+  return {{"count", orNull(fit.count)},
+          {"psnr", orNull(fit.psnr)},
+          {"seconds", orNull(fit.seconds)},
+          {"iterations", orNull(fit.iterations)},
+          {"preset", nameOf(fit.preset)},
+          {"loss", fit.loss == Loss::kPaper ? "paper" : "squared"},
+          {"beta", fit.loss == Loss::kPaper ? Json(fit.beta) : Json(nullptr)},
+          {"kappa", orNull(fit.kappa)},
+          {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
+          {"seed", fit.seed},
+          {"threads", options.threads > 0 ? Json(options.threads) : Json(nullptr)},
+          {"device", options.device}};
+}
+
+Json sourceOf(const ConvertedGrid& grid) {
+  const EncodedGrid& stored = grid.stored;
+  return {{"class", cli::nameOf(stored.descriptor.gridClass)},
+          {"value_type", cli::nameOf(stored.descriptor.valueType)},
+          {"background", stored.descriptor.background},
+          {"map", stored.descriptor.transform.mapType},
+          {"active_voxels", stored.activeVoxels},
+          {"active_box", toJson(stored.activeBox)},
+          {"bricks", grid.bricks},
+          {"value_range", {stored.valueMin, stored.valueMax}},
+          {"nonfinite_replaced", grid.nonFiniteReplaced}};
+}
+
+Json kernelOf(const Kernel& kernel) {
+  return {{"form", cli::nameOf(kernel.form)}, {"kappa", kernel.kappa}, {"epsilon", kernel.epsilon}};
+}
+
+Json topologyOf(const EncodedGrid& grid) {
+  return {{"kind", cli::nameOf(grid.topology)},
+          {"threshold", grid.activeThreshold},
+          {"bricks", grid.leaves.size()}};
+}
+
+Json fitOf(const ConvertedGrid& grid) {
+  Json pilot = Json::array();
+  for (const auto& point : grid.pilot)
+    pilot.push_back({{"kappa", point.kappa}, {"psnr_box", point.psnrBox}});
+  return {{"end", nameOf(grid.end)}, {"pilot", pilot}, {"pairs", grid.pairs}};
+}
+
+Json metricsOf(const VolumeMetrics& m) {
+  return {{"peak", m.peak},
+          {"box_voxels", m.boxVoxels},
+          {"psnr_box", m.psnrBox},
+          {"psnr_active", m.psnrActive},
+          {"max_error", m.maxError},
+          {"max_error_at", {m.maxErrorAt.x, m.maxErrorAt.y, m.maxErrorAt.z}},
+          {"p999_error", m.p999Error},
+          {"iou", m.iou},
+          {"mass_reference", m.massReference},
+          {"mass", m.massCandidate}};
+}
+
+Json secondsOf(const PhaseSeconds& s) {
+  return {{"read", s.read},         {"seed", s.seed},     {"pilot", s.pilot},
+          {"optimise", s.optimise}, {"encode", s.encode}, {"measure", s.measure}};
+}
+
+Json sectionsOf(const EsvrSummary& file, std::size_t grid) {
+  Json sections = Json::array();
+  for (const auto& s : file.sections)
+    if (s.grid == grid)
+      sections.push_back({{"kind", s.kind},
+                          {"codec", s.codec},
+                          {"bytes", s.storedBytes},
+                          {"raw_bytes", s.rawBytes}});
+  return sections;
+}
+
+Json leftOutOf(const RunRecord& record, std::size_t grid) {
+  Json notes = Json::array();
+  for (const auto& note : leftOut(record, grid)) {
+    Json entry{{"part", note.part}, {"why", note.why}};
+    if (note.bytesSaved > 0) entry["raw_bytes_saved"] = note.bytesSaved;
+    notes.push_back(entry);
+  }
+  return notes;
+}
+
+Json curveOf(const std::vector<CurvePoint>& curve) {
+  Json points = Json::array();
+  for (const auto& p : curve)
+    points.push_back({{"seconds", p.seconds},
+                      {"iteration", p.iteration},
+                      {"primitives", p.primitives},
+                      {"psnr_box", p.psnrBox},
+                      {"psnr_active", p.psnrActive},
+                      {"max_error", p.maxError}});
+  return points;
+}
+
+Json gridOf(const RunRecord& record, std::size_t g) {
+  const ConvertedGrid& grid = record.grids[g];
+  return {{"name", grid.uniqueName},
+          {"source", sourceOf(grid)},
+          {"primitives", grid.stored.field.primitiveCount()},
+          {"bytes", cli::storedBytes(record.output, g)},
+          {"sections", sectionsOf(record.output, g)},
+          {"kernel", kernelOf(grid.stored.field.kernel)},
+          {"topology", topologyOf(grid.stored)},
+          {"fit", fitOf(grid)},
+          {"metrics", metricsOf(grid.metrics)},
+          {"seconds", secondsOf(grid.seconds)},
+          {"left_out", leftOutOf(record, g)},
+          {"curve", curveOf(grid.stored.curve)}};
+}
+
+Json gridsOf(const RunRecord& record) {
+  Json grids = Json::array();
+  for (std::size_t g = 0; g < record.grids.size(); ++g) grids.push_back(gridOf(record, g));
+  return grids;
+}
+
+Json skippedOf(const RunRecord& record) {
+  Json skipped = Json::array();
+  for (const auto& grid : record.skipped)
+    skipped.push_back(
+        {{"name", grid.uniqueName}, {"value_type", grid.valueType}, {"why", grid.skipReason}});
+  for (const auto& name : record.notFitted)
+    skipped.push_back({{"name", name}, {"value_type", nullptr}, {"why", "interrupted"}});
+  return skipped;
+}
+
+PhaseSeconds sumOf(const std::vector<ConvertedGrid>& grids) {
+  PhaseSeconds sum;
+  for (const auto& grid : grids) {
+    const PhaseSeconds& s = grid.seconds;
+    sum.read += s.read, sum.seed += s.seed, sum.pilot += s.pilot;
+    sum.optimise += s.optimise, sum.encode += s.encode, sum.measure += s.measure;
+  }
+  return sum;
+}
+
+Json totalSeconds(const RunRecord& record) {
+  Json seconds = secondsOf(sumOf(record.grids));
+  seconds["write"] = record.secondsWrite;
+  seconds["total"] = record.secondsTotal;
+  return seconds;
+}
+
+}  // namespace
+
+Json makeReport(const Options& options, const RunRecord& record) {
+  const std::uint64_t bytesIn = record.input.fileBytes, bytesOut = record.output.fileBytes;
+  return {{"schema", kSchema},
+          {"schema_version", kSchemaVersion},
+          {"program", kProgram},
+          {"command_line", options.commandLine},
+          {"versions", versions()},
+          {"asked", asked(options)},
+          {"device", "cpu"},
+          {"input",
+           {{"path", options.input.string()}, {"format", record.input.format}, {"bytes", bytesIn}}},
+          {"output", {{"path", options.output.string()}, {"bytes", bytesOut}}},
+          {"ratio", double(bytesIn) / double(bytesOut)},
+          {"grids", gridsOf(record)},
+          {"skipped", skippedOf(record)},
+          {"seconds", totalSeconds(record)},
+          {"peak_memory_bytes", cli::peakMemory()},
+          {"interrupted", record.interrupted},
+          {"exit_code", exitCodeOf(record, options.fit.psnr)}};
+}
+
+}  // namespace esvr::vdb2esvr

@@ -1,0 +1,148 @@
+#include "vdb2esvr/run.h"
+
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "cli/interrupts.h"
+#include "cli/json_file.h"
+#include "cli/output.h"
+#include "cli/stopwatch.h"
+#include "cli/table.h"
+#include "cli/thread_limit.h"
+#include "esvr/device.h"
+#include "esvr/error.h"
+#include "vdb2esvr/choose_grids.h"
+#include "vdb2esvr/progress_bar.h"
+#include "vdb2esvr/report.h"
+#include "vdb2esvr/run_record.h"
+#include "vdb2esvr/summary.h"
+
+namespace esvr::vdb2esvr {
+namespace {
+
+bool reportIsFile(const Options& options) {
+  return !options.report.empty() && options.report != cli::kStandardOutput;
+}
+
+void checkFiles(const Options& options) {
+  std::vector<std::filesystem::path> files{options.input, options.output};
+  if (reportIsFile(options)) files.emplace_back(options.report);
+  cli::requireDistinct(files);
+  cli::checkOutput(options.output, {".esvr"}, options.overwrite);
+  if (reportIsFile(options)) cli::checkOutput(options.report, {".json"}, options.overwrite);
+}
+
+/// This version fits on the CPU. "auto" takes it without looking for a GPU.
+void checkDevice(const Options& options, const cli::Log& log) {
+  if (options.device != "auto" && selectDevice(options.device).kind == DeviceKind::kCuda)
+    throw DeviceError("--device " + options.device +
+                      ": this version fits on the CPU only; use --device cpu or auto");
+  log.detail("fitting on the CPU, with " +
+             (options.threads > 0 ? std::to_string(options.threads) : "all available") +
+             " threads");
+}
+
+void tellSkipped(const std::vector<GridSummary>& skipped, const cli::Log& log) {
+  for (const auto& grid : skipped)
+    log.info("skipped grid \"" + grid.uniqueName + "\": " + grid.skipReason);
+}
+
+void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
+  if (grid.nonFiniteReplaced > 0)
+    log.warning("grid \"" + grid.uniqueName + "\": " + std::to_string(grid.nonFiniteReplaced) +
+                " NaN or infinite voxels taken as zero");
+  log.detail("grid \"" + grid.uniqueName + "\": kappa " +
+             cli::shortNumber(grid.stored.field.kernel.kappa) + ", threshold " +
+             cli::shortNumber(grid.stored.activeThreshold) + ", overlap of active voxels " +
+             cli::shortNumber(grid.metrics.iou));
+}
+
+/// Fits one grid after the other until all are done or the run is interrupted.
+class Conversion {
+ public:
+  Conversion(const Options& options, const CancelToken& cancel) : options_(options) {
+    options_.fit.cancel = &cancel;
+  }
+
+  void run(const std::vector<GridSummary>& grids, RunRecord& record) {
+    for (const auto& grid : grids) {
+      if (cancelled())
+        record.notFitted.push_back(grid.uniqueName);
+      else
+        record.grids.push_back(convert(grid.uniqueName));
+    }
+    record.interrupted = cancelled();
+    if (record.interrupted && (options_.onCancel == OnCancel::kDiscard || record.grids.empty()))
+      throw RuntimeFailure("interrupted; nothing was written");
+  }
+
+ private:
+  [[nodiscard]] bool cancelled() const { return options_.fit.cancel->cancelled(); }
+
+  ConvertedGrid convert(const std::string& name) {
+    const ProgressBar bar(name, options_.verbosity != cli::Verbosity::kQuiet);
+    options_.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
+    return convertGrid(options_, name);
+  }
+
+  Options options_;
+};
+
+void write(const Options& options, RunRecord& record) {
+  cli::Stopwatch watch;
+  EsvrFile file;
+  file.metadata = record.input.metadata;
+  for (const auto& grid : record.grids) file.grids.push_back(grid.stored);
+  writeEsvr(options.output, file, {.overwrite = options.overwrite});
+  record.output = inspectEsvr(options.output);
+  record.secondsWrite = watch.lap();
+}
+
+void tellResult(const Options& options, const RunRecord& record) {
+  if (!options.report.empty())
+    cli::writeJson({options.report, options.overwrite}, makeReport(options, record));
+  if (options.report != cli::kStandardOutput && options.verbosity != cli::Verbosity::kQuiet)
+    printSummary(options, record, std::cout);
+}
+
+/// What the user must know though the file is written, by way of the exit code.
+void throwWhatIsAmiss(const Options& options, const RunRecord& record) {
+  if (record.interrupted) {
+    std::string text = "interrupted; " + options.output.string() + " holds the best so far";
+    for (const auto& name : record.notFitted) text += ", without grid \"" + name + "\"";
+    throw RuntimeFailure(text);
+  }
+  if (const ConvertedGrid* grid = firstBelow(record, options.fit.psnr))
+    throw TargetMissed("grid \"" + grid->uniqueName + "\" reached " +
+                       cli::decibels(grid->metrics.psnrBox) + " dB of the " +
+                       cli::decibels(*options.fit.psnr) + " dB asked for; " +
+                       options.output.string() + " is written");
+}
+
+}  // namespace
+
+int run(const Options& options) {
+  cli::Stopwatch watch;
+  const cli::Log log(kProgram, options.verbosity);
+  const cli::ThreadLimit threads(options.threads);
+  const cli::Interrupts interrupts;
+  checkFiles(options);
+  checkDevice(options, log);
+
+  RunRecord record;
+  record.input = inspectVdb(options.input);
+  GridChoice choice = chooseGrids(options.input, record.input, options.grids);
+  tellSkipped(choice.skipped, log);
+  record.skipped = std::move(choice.skipped);
+  Conversion(options, interrupts.token()).run(choice.fitted, record);
+  for (const auto& grid : record.grids) tellGrid(grid, log);
+  write(options, record);
+  record.secondsTotal = watch.lap();
+
+  tellResult(options, record);
+  throwWhatIsAmiss(options, record);
+  return 0;
+}
+
+}  // namespace esvr::vdb2esvr

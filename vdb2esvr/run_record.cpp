@@ -1,0 +1,27 @@
+#include "vdb2esvr/run_record.h"
+
+#include <algorithm>
+
+#include "esvr/error.h"
+
+namespace esvr::vdb2esvr {
+
+bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& kind) {
+  return std::any_of(file.sections.begin(), file.sections.end(),
+                     [&](const SectionSummary& s) { return s.grid == grid && s.kind == kind; });
+}
+
+const ConvertedGrid* firstBelow(const RunRecord& record, std::optional<double> psnr) {
+  if (!psnr) return nullptr;
+  const auto below = std::find_if(record.grids.begin(), record.grids.end(), [&](const auto& grid) {
+    return !(grid.metrics.psnrBox >= *psnr);
+  });
+  return below == record.grids.end() ? nullptr : &*below;
+}
+
+int exitCodeOf(const RunRecord& record, std::optional<double> psnr) {
+  if (record.interrupted) return int(ErrorKind::kRuntime);
+  return firstBelow(record, psnr) ? int(ErrorKind::kTargetMissed) : 0;
+}
+
+}  // namespace esvr::vdb2esvr

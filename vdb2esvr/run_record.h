@@ -1,0 +1,34 @@
+#pragma once
+/// All that a run can tell: what the summary and the report are made from.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "esvr/container.h"
+#include "esvr/vdb_io.h"
+#include "vdb2esvr/convert.h"
+
+namespace esvr::vdb2esvr {
+
+struct RunRecord {
+  VdbSummary input;
+  std::vector<GridSummary> skipped;    ///< they cannot be fitted
+  std::vector<std::string> notFitted;  ///< the run was interrupted before
+  std::vector<ConvertedGrid> grids;
+  EsvrSummary output;
+  bool interrupted = false;
+  double secondsWrite = 0.0, secondsTotal = 0.0;
+};
+
+/// True where the file holds a section of this kind for the grid.
+[[nodiscard]] bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& kind);
+
+/// The first grid that stays below the PSNR asked for; nothing where all reach it.
+[[nodiscard]] const ConvertedGrid* firstBelow(const RunRecord& record, std::optional<double> psnr);
+
+/// The exit code that the run ends with.
+[[nodiscard]] int exitCodeOf(const RunRecord& record, std::optional<double> psnr);
+
+}  // namespace esvr::vdb2esvr

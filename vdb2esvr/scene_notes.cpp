@@ -1,0 +1,36 @@
+#include "vdb2esvr/scene_notes.h"
+
+namespace esvr::vdb2esvr {
+namespace {
+
+constexpr std::uint64_t kFloatBytes = sizeof(float);
+constexpr std::uint64_t kRotationBytes = 4 * kFloatBytes;
+constexpr std::uint64_t kMaskBytes = sizeof(BrickMask);
+
+}  // namespace
+
+std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
+  const ConvertedGrid& grid = record.grids[g];
+  const std::uint64_t primitives = grid.stored.field.primitiveCount();
+  const auto lacks = [&](const char* kind) { return !hasSection(record.output, g, kind); };
+
+  std::vector<LeftOut> notes;
+  if (!grid.signedIntensities)
+    notes.push_back({"signs", "no ellipsoid needed an intensity below 0"});
+  if (lacks("rotations"))
+    notes.push_back(
+        {"rotations", "every ellipsoid lies along the axes", primitives * kRotationBytes});
+  if (lacks("kappas"))
+    notes.push_back(
+        {"an edge for each ellipsoid", "one kappa serves the scene", primitives * kFloatBytes});
+  if (lacks("chunks")) notes.push_back({"chunk table", "the grid fits in one chunk"});
+  notes.push_back({"voxel masks",
+                   lacks("leaves") ? "a threshold finds the active voxels"
+                                   : "the rule of activity finds them in the stored bricks",
+                   grid.bricks * kMaskBytes});
+  notes.push_back({"residual", "no bound on the largest error was asked for"});
+  if (grid.pilot.empty()) notes.push_back({"pilot", "kappa was given, or nothing needed a fit"});
+  return notes;
+}
+
+}  // namespace esvr::vdb2esvr
