@@ -52,6 +52,27 @@ void printSections(const Listing& listing) {
   table.print(std::cout);
 }
 
+void addStream(cli::Table& table, const std::string& grid, const char* stream, std::uint64_t bytes,
+               std::size_t primitives) {
+  table.add({grid, stream, std::to_string(bytes), bytesAPrimitive(bytes, primitives)});
+}
+
+/// What the quantised ellipsoids are made of.
+void printStreams(const Listing& listing) {
+  cli::Table table({"grid", "stream", "bytes", "bytes each"});
+  for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
+    const EncodedGrid& grid = listing.file.grids[g];
+    if (grid.quantised.empty()) continue;
+    const StreamBytes bytes = streamBytes(grid);
+    const std::size_t primitives = grid.field.primitiveCount();
+    addStream(table, listing.names[g], "positions", bytes.positions, primitives);
+    addStream(table, listing.names[g], "scales", bytes.scales, primitives);
+    addStream(table, listing.names[g], "rotations", bytes.rotations, primitives);
+    addStream(table, listing.names[g], "intensities", bytes.intensities, primitives);
+  }
+  table.print(std::cout);
+}
+
 void printMetadata(const std::string& title, const std::vector<MetaItem>& items) {
   for (const auto& item : items)
     std::cout << cli::printable(title + ": " + item.name + " (" + item.type + ")") << '\n';
@@ -83,6 +104,8 @@ void list(const Options& options) {
   std::cout << '\n';
   printSections(listing);
   if (options.verbosity != cli::Verbosity::kVerbose) return;
+  std::cout << '\n';
+  printStreams(listing);
   std::cout << '\n';
   printDetails(listing);
 }

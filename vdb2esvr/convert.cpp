@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "cli/stopwatch.h"
+#include "esvr/compact.h"
 #include "esvr/grid_coding.h"
 
 namespace esvr::vdb2esvr {
@@ -26,6 +27,15 @@ void recordFit(const FitResult& fitted, ConvertedGrid& grid) {
   grid.seconds.optimise = fitted.secondsOptimise;
 }
 
+void makeCompact(const Options& options, const SparseVolume& source, EncodedGrid& encoded,
+                 ConvertedGrid& grid) {
+  CompactResult compact =
+      compactGrid(encoded, source,
+                  {.loss = options.storageLoss, .psnr = options.fit.psnr, .box = options.fit.box});
+  grid.compact = {compact.loss, compact.steps, streamBytes(compact.grid)};
+  encoded = std::move(compact.grid);
+}
+
 }  // namespace
 
 ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName) {
@@ -45,6 +55,7 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName)
 
   EncodedGrid encoded = encodeGrid(source.descriptor, source.volume, std::move(fitted.field));
   encoded.curve = std::move(fitted.curve);
+  if (options.storage == Storage::kCompact) makeCompact(options, source.volume, encoded, grid);
   grid.stored = throughTheFormat(std::move(encoded));
   grid.seconds.encode = watch.lap();
 

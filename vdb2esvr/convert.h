@@ -2,12 +2,14 @@
 /// One grid's way from voxels to what the file holds.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "esvr/container.h"
 #include "esvr/fit.h"
 #include "esvr/metrics.h"
+#include "esvr/quantised.h"
 #include "vdb2esvr/options.h"
 
 namespace esvr::vdb2esvr {
@@ -15,6 +17,13 @@ namespace esvr::vdb2esvr {
 struct PhaseSeconds {
   double read = 0.0, seed = 0.0, pilot = 0.0, optimise = 0.0, encode = 0.0, measure = 0.0;
   [[nodiscard]] double total() const { return read + seed + pilot + optimise + encode + measure; }
+};
+
+/// What quantising the ellipsoids did.
+struct CompactRecord {
+  double loss = 0.0;  ///< dB over the box, against float32
+  QuantiserSteps steps;
+  StreamBytes bytes;
 };
 
 struct ConvertedGrid {
@@ -27,6 +36,7 @@ struct ConvertedGrid {
   std::vector<PilotPoint> pilot;
   std::uint64_t pairs = 0;
   bool signedIntensities = false;
+  std::optional<CompactRecord> compact;  ///< nothing where float32 is stored
   PhaseSeconds seconds;
 };
 

@@ -18,6 +18,7 @@ constexpr std::int64_t kMostPrimitives = std::numeric_limits<std::uint32_t>::max
 constexpr std::int64_t kMostIterations = 10'000'000;
 constexpr double kHighestPsnr = 300.0;  // dB; float32 ends at about 150
 constexpr double kLongestRun = 1e9;     // seconds
+constexpr double kMostLoss = 20.0;      // dB
 constexpr float kLargestKappa = 1e4f;   // kernel.h
 
 cli::ProgramText programText() {
@@ -66,6 +67,11 @@ void addFitOptions(cli::po::options_description& options) {
      "x0,y0,z0,x1,y1,z1 of the PSNR (default: the active voxels' bounding box)")
     ("seed", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(FitOptions{}.seed)),
      "of the random choices; the same seed gives the same file")
+    ("storage", value<std::string>()->value_name("S")->default_value("compact"),
+     "compact (quantised, about 9 bytes an ellipsoid) or float32 (about 34)")
+    ("storage-loss",
+     value<double>()->value_name("DB")->default_value(CompactOptions::kDefaultLoss),
+     "PSNR that --storage compact may cost; with --psnr: whatever that leaves")
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
      "auto, cpu, cuda or cuda:N");
   // clang-format on
@@ -124,6 +130,11 @@ FitOptions fitOptions(const Arguments& a) {
   return fit;
 }
 
+Storage storage(const Arguments& a) {
+  return cli::choose<Storage>("storage", a.get<std::string>("storage"),
+                              {{"compact", Storage::kCompact}, {"float32", Storage::kFloat32}});
+}
+
 NonFinite nonFinite(const Arguments& a) {
   return cli::choose<NonFinite>("nonfinite", a.get<std::string>("nonfinite"),
                                 {{"refuse", NonFinite::kRefuse}, {"zero", NonFinite::kZero}});
@@ -145,6 +156,8 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.output = a.get<std::string>("output");
   options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
   options.fit = fitOptions(a);
+  options.storage = storage(a);
+  options.storageLoss = *bounded<double>(a, "storage-loss", 0.0, kMostLoss);
   options.read.nonFinite = nonFinite(a);
   options.device = a.get<std::string>("device");
   options.onCancel = onCancel(a);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/log.h"
+#include "esvr/compact.h"
 #include "esvr/fit.h"
 #include "esvr/vdb_io.h"
 
@@ -17,10 +18,15 @@ inline constexpr const char* kProgram = "vdb2esvr";
 /// What becomes of an interrupted run's best so far.
 enum class OnCancel { kKeep, kDiscard };
 
+/// How the file holds the ellipsoids' attributes.
+enum class Storage { kCompact, kFloat32 };
+
 struct Options {
   std::filesystem::path input, output;
   std::vector<std::string> grids;  ///< empty: all that can be fitted
   FitOptions fit;
+  Storage storage = Storage::kCompact;
+  double storageLoss = CompactOptions::kDefaultLoss;  ///< dB that kCompact may cost
   ReadOptions read;
   std::string device = "auto";
   OnCancel onCancel = OnCancel::kKeep;

@@ -72,6 +72,8 @@ Json asked(const Options& options) {
           {"beta", fit.loss == Loss::kPaper ? Json(fit.beta) : Json(nullptr)},
           {"kappa", orNull(fit.kappa)},
           {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
+          {"storage", options.storage == Storage::kCompact ? "compact" : "float32"},
+          {"storage_loss", options.storageLoss},
           {"seed", fit.seed},
           {"threads", options.threads > 0 ? Json(options.threads) : Json(nullptr)},
           {"device", options.device}};
@@ -105,6 +107,22 @@ Json fitOf(const ConvertedGrid& grid) {
   for (const auto& point : grid.pilot)
     pilot.push_back({{"kappa", point.kappa}, {"psnr_box", point.psnrBox}});
   return {{"end", nameOf(grid.end)}, {"pilot", pilot}, {"pairs", grid.pairs}};
+}
+
+Json compactOf(const ConvertedGrid& grid) {
+  if (!grid.compact) return nullptr;
+  const auto& [loss, steps, bytes] = *grid.compact;
+  return {{"loss_db", loss},
+          {"steps",
+           {{"positions", steps.position},
+            {"scales", steps.scale},
+            {"rotations", steps.rotation},
+            {"intensities", steps.intensity}}},
+          {"bytes",
+           {{"positions", bytes.positions},
+            {"scales", bytes.scales},
+            {"rotations", bytes.rotations},
+            {"intensities", bytes.intensities}}}};
 }
 
 Json metricsOf(const VolumeMetrics& m) {
@@ -168,6 +186,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"kernel", kernelOf(grid.stored.field.kernel)},
           {"topology", topologyOf(grid.stored)},
           {"fit", fitOf(grid)},
+          {"compact", compactOf(grid)},
           {"metrics", metricsOf(grid.metrics)},
           {"seconds", secondsOf(grid.seconds)},
           {"left_out", leftOutOf(record, g)},

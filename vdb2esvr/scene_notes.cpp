@@ -5,6 +5,7 @@ namespace {
 
 constexpr std::uint64_t kFloatBytes = sizeof(float);
 constexpr std::uint64_t kRotationBytes = 4 * kFloatBytes;
+constexpr std::uint64_t kBitsAByte = 8;
 constexpr std::uint64_t kMaskBytes = sizeof(BrickMask);
 
 }  // namespace
@@ -15,9 +16,11 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   const auto lacks = [&](const char* kind) { return !hasSection(record.output, g, kind); };
 
   std::vector<LeftOut> notes;
+  const bool compact = grid.compact.has_value();
   if (!grid.signedIntensities)
-    notes.push_back({"signs", "no ellipsoid needed an intensity below 0"});
-  if (lacks("rotations"))
+    notes.push_back({"signs", "no ellipsoid needed an intensity below 0",
+                     compact ? primitives / kBitsAByte : 0});
+  if (!compact && lacks("rotations"))
     notes.push_back(
         {"rotations", "every ellipsoid lies along the axes", primitives * kRotationBytes});
   if (lacks("kappas"))

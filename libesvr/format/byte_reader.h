@@ -47,11 +47,20 @@ class ByteReader {
     return {bytes.begin(), bytes.end()};
   }
 
+  /// So many bytes, as they lie there.
+  [[nodiscard]] std::span<const std::byte> getBytes(std::size_t n) { return take(n); }
+
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
 
   /// Refuses bytes that nothing has read.
   void finish() const {
     if (left() != 0) fail(std::to_string(left()) + " bytes too many");
+  }
+
+  /// The same, but for zeros, which stand for nothing.
+  void finishZeros() {
+    while (left() != 0)
+      if (get<std::uint8_t>() != 0) fail("has content after its end");
   }
 
   [[noreturn]] void fail(const std::string& what) const {

@@ -1,10 +1,12 @@
 #include "format/decode.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "esvr/error.h"
 #include "format/chunk_box.h"
 #include "format/curve_stream.h"
+#include "format/ellipsoids_section.h"
 #include "format/grid_record.h"
 #include "format/leaves_stream.h"
 #include "format/planes.h"
@@ -29,8 +31,9 @@ class GridDecoder {
     GridRecord record = readRecord();
     EncodedGrid grid = std::move(record.grid);
     if (record.chunkCount > 1) record.chunks = readChunkTable(record.chunkCount);
+    if (anyQuantised(record.chunks.size())) grid.quantised.resize(record.chunks.size());
     for (std::uint32_t c = 0; c < record.chunks.size(); ++c)
-      grid.field.chunks.push_back(readChunk(c, record.chunks[c]));
+      grid.field.chunks.push_back(readChunk(c, record.chunks[c], grid));
     if (grid.topology == TopologyKind::kLeaves) readLeaves(grid);
     readCurve(grid);
     return grid;
@@ -42,7 +45,16 @@ class GridDecoder {
   }
 
   void refuse(const std::optional<Fault>& fault, std::uint32_t chunk = kNone) const {
-    if (fault) throw BadInput(sections_.place(id(fault->section, chunk)) + ": " + fault->text);
+    if (!fault) return;
+    const auto quantised = id(SectionKind::kEllipsoids, chunk);
+    const auto own = id(fault->section, chunk);
+    throw BadInput(sections_.place(wasThere(quantised) ? quantised : own) + ": " + fault->text);
+  }
+
+  [[nodiscard]] bool wasThere(const SectionId& section) const {
+    const auto& entries = sections_.table().entries;
+    return std::any_of(entries.begin(), entries.end(),
+                       [&](const auto& entry) { return entry.id == section; });
   }
 
   GridRecord readRecord() {
@@ -68,9 +80,19 @@ class GridDecoder {
     getPlanes(sections_.get(section), count, planes, sections_.place(section));
   }
 
-  Chunk readChunk(std::uint32_t c, const ChunkRecord& record) {
+  /// All of a grid's chunks that have ellipsoids are quantised, or none.
+  [[nodiscard]] bool anyQuantised(std::size_t chunks) const {
+    for (std::uint32_t c = 0; c < chunks; ++c)
+      if (sections_.has(id(SectionKind::kEllipsoids, c))) return true;
+    return false;
+  }
+
+  Chunk readChunk(std::uint32_t c, const ChunkRecord& record, EncodedGrid& grid) {
     Chunk chunk{record.origin, {}};
-    if (record.count != 0) chunk.ellipsoids = readEllipsoids(c, record.count);
+    if (record.count != 0 && grid.quantised.empty())
+      chunk.ellipsoids = readEllipsoids(c, record.count);
+    else if (record.count != 0)
+      chunk.ellipsoids = readQuantised(c, record.count, grid.quantised[c]);
     refuse(faultOf(chunk.ellipsoids), c);
     if (!encloses(record.box, centerBox(chunk)))
       refuse(Fault{SectionKind::kCenters, "a center lies outside the chunk's box"}, c);
@@ -89,6 +111,12 @@ class GridDecoder {
     if (const auto section = id(SectionKind::kKappas, c); sections_.has(section))
       readPlanes(section, count, {&e.kappa, 1});
     return e;
+  }
+
+  Ellipsoids readQuantised(std::uint32_t c, std::uint64_t count, QuantisedEllipsoids& quantised) {
+    const auto section = id(SectionKind::kEllipsoids, c);
+    quantised = getEllipsoids(sections_.get(section), count, sections_.place(section));
+    return dequantise(quantised);
   }
 
   void readLeaves(EncodedGrid& grid) {

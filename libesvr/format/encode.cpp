@@ -6,6 +6,7 @@
 #include "format/chunk_box.h"
 #include "format/codec.h"
 #include "format/curve_stream.h"
+#include "format/ellipsoids_section.h"
 #include "format/grid_record.h"
 #include "format/leaves_stream.h"
 #include "format/morton_order.h"
@@ -24,14 +25,14 @@ class Sections {
   /// `typeSize`: bytes of the numbers that the content is made of.
   void add(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content,
            std::size_t typeSize) {
-    SectionEntry entry{id, Codec::kRaw, flags, 0, 0, 0, 0};
-    Packed packed = pack(std::move(content), typeSize);
-    entry.codec = packed.codec;
-    entry.rawBytes = packed.rawBytes;
-    entry.storedBytes = packed.bytes.size();
-    entry.checksum = checksum(packed.bytes);
-    table_.entries.push_back(entry);
-    contents_.push_back(std::move(packed.bytes));
+    addPacked(id, flags, pack(std::move(content), typeSize));
+  }
+
+  /// Content that is coded already.
+  void addRaw(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content) {
+    const std::uint64_t bytes = content.size();
+    table_.versionMinor = kQuantisedMinor;
+    addPacked(id, flags, {Codec::kRaw, std::move(content), bytes});
   }
 
   [[nodiscard]] std::vector<std::byte> assemble() {
@@ -52,6 +53,15 @@ class Sections {
   }
 
  private:
+  void addPacked(const SectionId& id, std::uint16_t flags, Packed packed) {
+    SectionEntry entry{id, packed.codec, flags, 0, 0, 0, 0};
+    entry.rawBytes = packed.rawBytes;
+    entry.storedBytes = packed.bytes.size();
+    entry.checksum = checksum(packed.bytes);
+    table_.entries.push_back(entry);
+    contents_.push_back(std::move(packed.bytes));
+  }
+
   SectionTable table_;
   std::vector<std::vector<std::byte>> contents_;
 };
@@ -74,18 +84,23 @@ void checkGrid(const EncodedGrid& grid) {
   if (const auto fault = faultOf(grid)) refuse(grid, fault->text);
   if (grid.topology != TopologyKind::kLeaves && !grid.leaves.empty())
     refuse(grid, "it has leaves, but a topology without");
+  if (!grid.quantised.empty() && grid.quantised.size() != grid.field.chunks.size())
+    refuse(grid, "its quantised chunks are not those of its field");
   for (std::size_t c = 0; c < grid.field.chunks.size(); ++c) {
     const auto& ellipsoids = grid.field.chunks[c].ellipsoids;
     checkInvariants(ellipsoids);
     if (const auto fault = faultOf(ellipsoids))
       refuse(grid, fault->text + " (chunk " + std::to_string(c) + ")");
+    if (!grid.quantised.empty() && !(dequantise(grid.quantised[c]) == ellipsoids))
+      refuse(grid, "its field is not what is quantised (chunk " + std::to_string(c) + ")");
   }
 }
 
 SortedGrid sorted(const EncodedGrid& grid) {
   SortedGrid result{grid, {}, {}};
   for (const auto& chunk : grid.field.chunks) {
-    result.chunks.push_back({chunk.origin, inMortonOrder(chunk.ellipsoids)});
+    result.chunks.push_back({chunk.origin, grid.quantised.empty() ? inMortonOrder(chunk.ellipsoids)
+                                                                  : chunk.ellipsoids});
     result.records.push_back(
         {chunk.origin, supportBox(chunk, grid.field.kernel), chunk.ellipsoids.size()});
   }
@@ -125,6 +140,11 @@ void addChunk(Sections& out, std::uint32_t g, std::uint32_t c, const Ellipsoids&
   if (!e.kappa.empty()) add(SectionKind::kKappas, {&e.kappa, 1});
 }
 
+void addQuantised(Sections& out, std::uint32_t g, std::uint32_t c, const QuantisedEllipsoids& q) {
+  if (q.size() == 0) return;
+  out.addRaw({SectionKind::kEllipsoids, g, c}, kRequired, putEllipsoids(q));
+}
+
 void addExtras(Sections& out, std::uint32_t g, const EncodedGrid& grid) {
   if (!grid.leaves.empty())
     out.add({SectionKind::kLeaves, g}, kRequired, putLeaves(grid.leaves), kFloatSize);
@@ -147,8 +167,12 @@ std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
   for (std::uint32_t g = 0; g < grids.size(); ++g) addGrid(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
+    const auto& quantised = grids[g].grid.quantised;
     for (std::uint32_t c = 0; c < grids[g].chunks.size(); ++c)
-      addChunk(out, g, c, grids[g].chunks[c].ellipsoids);
+      if (quantised.empty())
+        addChunk(out, g, c, grids[g].chunks[c].ellipsoids);
+      else
+        addQuantised(out, g, c, quantised[c]);
     addExtras(out, g, grids[g].grid);
   }
   return out.assemble();

@@ -7,10 +7,12 @@
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "format/active_threshold.h"
+#include "format/grid_rule.h"
 
 namespace esvr {
 namespace {
 
+using format::ruleOf;
 using format::ThresholdChoice;
 
 constexpr float kAlwaysActive = -1.0f;  // below every activity
@@ -30,12 +32,6 @@ std::vector<Coord> brickCorners(const SparseVolume& volume) {
   return corners;
 }
 
-ActivityRule ruleOf(const EncodedGrid& grid) {
-  const float background = grid.field.background;
-  return {background, grid.nonNegative,
-          grid.topology == TopologyKind::kLeaves && isLevelSet(grid.descriptor, background)};
-}
-
 void chooseTopology(const SparseVolume& source, EncodedGrid& grid) {
   const auto fitsBest = [&](std::span<const Coord> bricks) {
     return format::chooseThreshold(source, grid.field, ruleOf(grid), bricks);
@@ -52,6 +48,16 @@ void chooseTopology(const SparseVolume& source, EncodedGrid& grid) {
 }
 
 }  // namespace
+
+namespace format {
+
+ActivityRule ruleOf(const EncodedGrid& grid) {
+  const float background = grid.field.background;
+  return {background, grid.nonNegative,
+          grid.topology == TopologyKind::kLeaves && isLevelSet(grid.descriptor, background)};
+}
+
+}  // namespace format
 
 EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source, Field field) {
   const ValueRange range = activeRange(source);

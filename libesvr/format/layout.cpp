@@ -22,6 +22,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kRotations, "rotations"},
     {SectionKind::kIntensities, "intensities"},
     {SectionKind::kKappas, "kappas"},
+    {SectionKind::kEllipsoids, "ellipsoids"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
 

@@ -5,6 +5,8 @@
 #include <numeric>
 #include <vector>
 
+#include "core/morton.h"
+
 namespace esvr::format {
 namespace {
 
@@ -12,23 +14,13 @@ constexpr int kBitsPerAxis = 21;  // three of them in a 64-bit key
 constexpr double kCellsPerVoxel = 256.0;
 constexpr double kLastCell = double((1u << kBitsPerAxis) - 1);  // 8192 voxels, two chunk extents
 
-/// Spreads 21 bits so that two zero bits follow each.
-constexpr std::uint64_t spread(std::uint64_t v) {
-  v = (v | v << 32) & 0x1f00000000ffff;
-  v = (v | v << 16) & 0x1f0000ff0000ff;
-  v = (v | v << 8) & 0x100f00f00f00f00f;
-  v = (v | v << 4) & 0x10c30c30c30c30c3;
-  v = (v | v << 2) & 0x1249249249249249;
-  return v;
-}
-
 /// Adds one coordinate to every ellipsoid's key; cells count from the lowest center.
 void addAxis(const std::vector<float>& center, int axis, std::vector<std::uint64_t>& keys) {
   if (center.empty()) return;
   const double low = *std::min_element(center.begin(), center.end());
   for (std::size_t i = 0; i < center.size(); ++i) {
     const double cell = std::min((center[i] - low) * kCellsPerVoxel, kLastCell);
-    keys[i] |= spread(std::uint64_t(cell)) << axis;
+    keys[i] |= spreadBits(std::uint64_t(cell)) << axis;
   }
 }
 

@@ -32,6 +32,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"level_set", fileOf(levelSetGrid(2))},
       {"kappas_and_chunks", fileOf(chunkedGrid(4))},
       {"compressed", fileOf(fogGrid(60))},
+      {"quantised", fileOf(quantisedGrid(20))},
       {"unknown_section", fileOf(oneEllipsoid()), true},
   };
 }

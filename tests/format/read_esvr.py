@@ -16,7 +16,7 @@ PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 96500
           2870177450012600261)
 NONE = 0xFFFFFFFF
 KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 5: "curve", 16: "centers",
-         17: "scales", 18: "rotations", 19: "intensities", 20: "kappas"}
+         17: "scales", 18: "rotations", 19: "intensities", 20: "kappas", 32: "ellipsoids"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
 
@@ -115,12 +115,159 @@ def leaves(data):
     return [tuple(8 * v for v in values[i::n]) for i in range(n)]
 
 
+class Decoder:
+    """A stream of the range coder."""
+
+    def __init__(self, data):
+        self.data, self.at, self.code, self.range = data, 0, 0, 0xFFFFFFFF
+        self.models = {}
+        for _ in range(4):
+            self.code = self.code << 8 | self.next()
+
+    def next(self):
+        self.at += 1
+        return self.data[self.at - 1] if self.at <= len(self.data) else 0
+
+    def fill(self):
+        while self.range < 1 << 24:
+            self.range <<= 8
+            self.code = (self.code << 8 | self.next()) & 0xFFFFFFFF
+
+    def decision(self, *model):
+        p, n = self.models.get(model, (1 << 15, 0))
+        bound = (self.range >> 16) * p
+        one = self.code >= bound
+        if one:
+            self.code -= bound
+            self.range -= bound
+        else:
+            self.range = bound
+        share = (1 << 17) // (2 * n + 3)
+        p += -((p - 32) * share >> 16) if one else (65536 - 32 - p) * share >> 16
+        self.models[model] = p, min(n + 1, 159)
+        self.fill()
+        return int(one)
+
+    def raw(self, bits):
+        value = 0
+        for _ in range(bits):
+            self.range >>= 1
+            one = self.code >= self.range
+            self.code -= self.range if one else 0
+            value = value << 1 | one
+            self.fill()
+        return value
+
+    def tree(self, bits, *model):
+        node = 1
+        for _ in range(bits):
+            node = node << 1 | self.decision(*model, node)
+        return node - (1 << bits)
+
+    def number(self, *model):
+        width = self.tree(5, *model, "width")
+        if width < 2:
+            return width
+        value = 1
+        for _ in range(min(3, width - 1)):
+            value = value << 1 | self.decision(*model, width, value)
+        left = max(0, width - 4)
+        return value << left | self.raw(left)
+
+
+def split(n, rank, stream):
+    if n == 1:
+        return stream.decision("one", rank)
+    if n < 16:
+        return stream.tree(4, "few", n)
+    width, half = n.bit_length(), n // 2
+    above = stream.decision("above", width)
+    distance = stream.number("many", width)
+    return half + distance if above else half - distance
+
+
+def keys(n, bits, stream, prefix=0):
+    if n == 0 or bits == 0:
+        return [prefix] * n
+    zeros = split(n, bits, stream)
+    assert 0 <= zeros <= n, "a split"
+    return (keys(zeros, bits - 1, stream, prefix)
+            + keys(n - zeros, bits - 1, stream, prefix | 1 << (bits - 1)))
+
+
+def clamp(value, low, high):
+    return max(low, min(high, value))
+
+
+def mid(code, bits):
+    return (code + 0.5) / 2**bits
+
+
+def block(lattice, n, streams):
+    """Codes of one block's ellipsoids, and the numbers of their bits."""
+    places, scales, turns, heights = (Decoder(data) for data in streams)
+    before, width = (0, 0), 0
+    for key in keys(n, 3 * lattice["cell bits"], places):
+        low = scales.number("low", min(7, before[0]))
+        middle = scales.number("middle", min(7, before[1]))
+        high = scales.number("high", min(7, middle))
+        before = low, middle
+        sign = lattice["signs"] and heights.decision("sign")
+        height = heights.number("height", width)
+        width = height.bit_length()
+        e = heights.tree(4, "precision", width)
+        bs = clamp(e - lattice["scale offset"], 0, 16)
+        bp = clamp((256 * e + lattice["position base"] - lattice["position slope"] * low) >> 8,
+                   0, 22 - lattice["cell bits"])
+        br = clamp(e + lattice["rotation offset"]
+                   + sum(t <= middle + high for t in lattice["thresholds"]), 0, 14)
+        bi = clamp((lattice["intensity base"]
+                    + lattice["intensity slope"] * (3 * low + 2 * middle + high)) >> 8, 0, 24)
+        logs, below = [], lattice["lowest scale"]
+        for axis, coarse in enumerate((low, middle, high)):
+            top = scales.decision("rest", axis, min(7, coarse)) << (bs - 1) if bs else 0
+            below += mid(coarse << bs | top | scales.raw(max(0, bs - 1)), bs)
+            logs.insert(0, below * lattice["scale step"])
+        turn = []
+        for axis in range(3):
+            top = turns.tree(min(2, br), "turn", axis)
+            rest = max(0, br - 2)
+            turn.append((mid(top << rest | turns.raw(rest), br) - 0.5) * 2**0.5)
+        norm2 = turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]
+        w = max(0.0, 1.0 - norm2)**0.5
+        norm = (norm2 + w * w)**0.5
+        cell = [sum((key >> (3 * b + a) & 1) << b for b in range(lattice["cell bits"]))
+                for a in range(3)]
+        center = [(low_ + mid(c << bp | places.raw(bp), bp)) * lattice["cell"]
+                  for low_, c in zip(lattice["lowest cell"], cell)]
+        height = mid(height, bi) * lattice["intensity step"]
+        yield center, logs, [c / norm for c in (w, *turn)], -height if sign else height
+
+
+def ellipsoids(data):
+    r = Record(data)
+    count = r.get("Q")
+    lattice = {key: r.get(form) for key, form in (
+        ("cell", "d"), ("lowest cell", "3i"), ("scale step", "d"), ("lowest scale", "i"),
+        ("intensity step", "d"), ("position base", "i"), ("position slope", "i"),
+        ("scale offset", "i"), ("intensity base", "i"), ("intensity slope", "i"),
+        ("rotation offset", "i"), ("cell bits", "B"), ("signs", "B"))}
+    lattice["thresholds"] = [r.get("B") for _ in range(r.get("B"))]
+    table = [r.get("4I") for _ in range((count + 4095) // 4096)]
+    result = []
+    for b, sizes in enumerate(table):
+        streams = [r.get(f"{size}s") for size in sizes]
+        result += block(lattice, min(4096, count - 4096 * b), streams)
+    assert not any(data[r.at:]), "padding of ellipsoids"
+    return result
+
+
 def content(name, data):
     if name in PLANES:
         n = len(data) // 4 // PLANES[name]
         values = struct.unpack(f"<{n * PLANES[name]}f", data)
         return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
-    readers = {"grid": grid, "chunks": chunks, "leaves": leaves}
+    readers = {"grid": grid, "chunks": chunks, "leaves": leaves, "ellipsoids": ellipsoids}
     return readers[name](data) if name in readers else data
 
 
@@ -130,7 +277,7 @@ def read(path):
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
     assert magic == bytes.fromhex("89 45 53 56 52 0D 0A 0A"), "magic"
-    assert (major, minor, size) == (1, 0, len(data)), "version or size"
+    assert (major, size) == (1, len(data)) and minor in (0, 1), "version or size"
     assert table % 8 == 0 and header_sum == xxh64(data[:40]), "header checksum"
     assert table_sum == xxh64(data[table:table + 56 * count]), "table checksum"
 
@@ -190,8 +337,36 @@ def check_kappas_and_chunks(sections):
         assert abs(x * x + y * y + z * z + w * w - 1) < 1e-6
 
 
+# Ellipsoids of quantised.esvr: center, logarithms of scales, rotation, intensity.
+QUANTISED = (
+    {0: (36.9375, 23.5625, 0.0625, 2.24971008, 1.77249873,
+         1.06804419, 0.901184678, 0.0994368941, 0.298310667, 0.298310667, 0.544600427),
+     7: (37.0625, 62.8125, 4.1875, 2.27243423, 0.545384228,
+         -0.272692114, 0.999954224, 0.00552427163, 0.00552427163, 0.00552427163, 0.176346809),
+     19: (58.4375, 47.0625, 52.8125, 2.63602376, 1.81794751,
+         -0.63628161, 0.70984745, 0.00276213582, 0.00276213582, 0.70434463, 0.197093487)},
+    {0: (25.78125, 13.96875, 13.90625, 2.28232002, 1.85052979,
+         0.843019128, 0.800452471, 0.00276213582, 0.00276213582, -0.599383473, 0.993603051),
+     7: (48.25, 47.25, 24.75, 1.15144074, 0.986949205,
+         -0.164491534, 0.775604606, -0.0883883461, -0.618718445, -0.0883883461, -0.0285928939),
+     19: (60.625, 47.375, 62.875, 2.34400439, 1.72716117,
+         1.19256365, 0.727863431, 0.0220970865, 0.0220970865, -0.685009718, 0.436041623)},
+)
+
+
+def check_quantised(sections):
+    """Against numbers that the library's own decoder printed, as f32."""
+    for chunk, expected in enumerate(QUANTISED):
+        decoded = sections["ellipsoids", 0, chunk]
+        assert len(decoded) == 20
+        for i, numbers in expected.items():
+            center, logs, turn, height = decoded[i]
+            for a, b in zip((*center, *logs, *turn, height), numbers):
+                assert abs(a - b) <= 1e-7 * max(1.0, abs(b)), (chunk, i, a, b)
+
+
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
-          "level_set": check_level_set, "kappas_and_chunks": check_kappas_and_chunks}
+          "level_set": check_level_set, "quantised": check_quantised, "kappas_and_chunks": check_kappas_and_chunks}
 
 
 def main():

@@ -79,6 +79,7 @@ std::string difference(const EncodedGrid& a, const EncodedGrid& b) {
   if (!(a.activeBox == b.activeBox) || a.activeVoxels != b.activeVoxels) return "active voxels";
   if (!sameBits(a.valueMin, b.valueMin) || !sameBits(a.valueMax, b.valueMax)) return "value range";
   if (a.curve != b.curve) return "curve";
+  if (a.quantised != b.quantised) return "quantised";
   return difference(a.field, b.field);
 }
 
@@ -154,6 +155,23 @@ EncodedGrid chunkedGrid(std::size_t ellipsoidsPerChunk) {
   return grid;
 }
 
+EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk) {
+  EncodedGrid grid = emptyGrid();
+  grid.descriptor.name = "compact";
+  const std::vector<double> curvature(ellipsoidsPerChunk, 4.0);
+  for (std::uint32_t c = 0; c < 2; ++c) {
+    Ellipsoids e = sampleEllipsoids(ellipsoidsPerChunk, 5 + c);
+    if (c == 0)
+      for (float& intensity : e.intensity) intensity = std::abs(intensity);
+    const auto choice = chooseLattice(e, curvature, {0.05, 0.05, 0.05, 0.05});
+    std::vector<std::size_t> order;
+    grid.quantised.push_back(quantise(e, choice, order));
+    grid.field.chunks.push_back(
+        {{std::int32_t(c) * kChunkExtent, 0, 0}, dequantise(grid.quantised.back())});
+  }
+  return grid;
+}
+
 EncodedGrid emptyGrid() {
   EncodedGrid grid;
   grid.descriptor.background = grid.field.background = 1.0f;
@@ -162,7 +180,8 @@ EncodedGrid emptyGrid() {
 
 EsvrFile everything(std::size_t ellipsoids) {
   return {{{"creator", "string", bytesOf("Houdini/GEO_VDBTranslator")}},
-          {fogGrid(ellipsoids), levelSetGrid(ellipsoids), chunkedGrid(ellipsoids), emptyGrid()}};
+          {fogGrid(ellipsoids), levelSetGrid(ellipsoids), chunkedGrid(ellipsoids),
+           quantisedGrid(ellipsoids), emptyGrid()}};
 }
 
 EsvrFile fileOf(EncodedGrid grid) { return {{}, {std::move(grid)}}; }

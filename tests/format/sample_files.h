@@ -30,6 +30,9 @@ struct EllipsoidParts {
 /// Three chunks, the middle one empty, the last with a kappa for each ellipsoid.
 [[nodiscard]] EncodedGrid chunkedGrid(std::size_t ellipsoidsPerChunk);
 
+/// A fog volume whose ellipsoids are quantised, in two chunks, the second with signs.
+[[nodiscard]] EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk);
+
 /// A grid with a background and nothing else.
 [[nodiscard]] EncodedGrid emptyGrid();
 

@@ -12,6 +12,7 @@
 #include "esvr/ellipsoids.h"
 #include "esvr/fit_record.h"
 #include "esvr/grid_descriptor.h"
+#include "esvr/quantised.h"
 
 namespace esvr {
 
@@ -38,7 +39,16 @@ struct EncodedGrid {
   std::uint64_t activeVoxels = 0;          ///< of the source
   float valueMin = 0.0f, valueMax = 0.0f;  ///< over the source's active voxels
   std::vector<CurvePoint> curve;
+  /// Empty: the ellipsoids are stored as float32. Else one for every chunk of the field, whose
+  /// ellipsoids are then exactly what it stands for (dequantise).
+  std::vector<QuantisedEllipsoids> quantised;
 };
+
+/// Bytes that a grid's quantised ellipsoids take, by stream.
+struct StreamBytes {
+  std::uint64_t positions = 0, scales = 0, rotations = 0, intensities = 0;
+};
+[[nodiscard]] StreamBytes streamBytes(const EncodedGrid& grid);
 
 struct EsvrFile {
   std::vector<MetaItem> metadata;  ///< the source's file-level metadata, verbatim

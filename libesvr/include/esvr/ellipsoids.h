@@ -23,6 +23,7 @@ struct Ellipsoids {
 
   [[nodiscard]] std::size_t size() const { return intensity.size(); }
   void resize(std::size_t n, bool perPrimitiveKappa = false);
+  friend bool operator==(const Ellipsoids&, const Ellipsoids&) = default;
 };
 
 /// Throws std::logic_error where the arrays differ in length.

@@ -1,0 +1,14 @@
+#pragma once
+/// Which parameter gets how many bits.
+
+#include "compact/trial.h"
+
+namespace esvr {
+
+/// The smallest of the trials that stay within an error: what a bit of each stream costs and brings
+/// is measured and made equal, then all steps are scaled together. Where no trial stays within the
+/// error, the one with the smallest error.
+/// \param allowed  sum of squares over the box
+[[nodiscard]] Trial chooseSteps(const TrialMaker& maker, double allowed);
+
+}  // namespace esvr

@@ -1,0 +1,107 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "core/lattice_bits.h"
+#include "core/morton.h"
+#include "core/sorted_axes.h"
+#include "esvr/error.h"
+#include "esvr/quantised.h"
+
+namespace esvr {
+namespace {
+
+constexpr double kRotationSide = std::numbers::sqrt2;
+
+/// The cell of a value counted in coarse steps, cut into 2^bits. \throws RuntimeFailure
+std::uint32_t codeOf(double steps, int bits, std::uint32_t lastCoarse, const char* what) {
+  const double code = std::floor(std::ldexp(std::max(steps, 0.0), bits));
+  if (!(code < std::ldexp(double(lastCoarse) + 1.0, bits)))
+    throw RuntimeFailure(std::string("cannot quantise: ") + what + " lies outside the lattice");
+  return std::uint32_t(code);
+}
+
+/// Each logarithm is counted from the one below it as a reader will have it: errors do not add up.
+void putScales(const std::array<double, 3>& logScale, std::size_t i, QuantisedEllipsoids& q) {
+  const int bits = scaleBits(q.lattice, q.precision[i]);
+  double below = double(q.lattice.lowestScale);
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double steps = logScale[2 - a] / q.lattice.scaleStep;
+    q.scale[a][i] = codeOf(steps - below, bits, Lattice::kMaxCoarseScale, "a scale");
+    below += std::ldexp(double(q.scale[a][i]) + 0.5, -bits);
+  }
+}
+
+std::array<double, 3> cellsOf(const Ellipsoids& e, std::size_t i, const Lattice& lattice) {
+  const Coord& low = lattice.lowestCell;
+  return {e.center[0][i] / lattice.cell - low.x, e.center[1][i] / lattice.cell - low.y,
+          e.center[2][i] / lattice.cell - low.z};
+}
+
+void putCenter(const std::array<double, 3>& cells, std::size_t i, int bits,
+               QuantisedEllipsoids& q) {
+  for (std::size_t a = 0; a < 3; ++a)
+    q.position[a][i] = codeOf(cells[a], bits, (1u << q.lattice.cellBits) - 1, "a center");
+}
+
+void putRotation(const std::array<double, 4>& r, std::size_t i, int bits, QuantisedEllipsoids& q) {
+  const double last = std::ldexp(1.0, bits) - 1.0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double code = std::floor(std::ldexp(r[a + 1] / kRotationSide + 0.5, bits));
+    q.rotation[a][i] = std::uint16_t(std::clamp(code, 0.0, last));
+  }
+}
+
+void putIntensity(double intensity, std::size_t i, QuantisedEllipsoids& q) {
+  const int shift = intensityShift(q.lattice, coarseScales(q, i));
+  const bool negative = q.lattice.signedIntensity && intensity < 0.0;
+  const double magnitude =
+      (negative || intensity > 0.0 ? std::abs(intensity) : 0.0) / q.lattice.intensityStep;
+  const double code = std::floor(std::ldexp(magnitude, shift));
+  const auto clamped = std::int32_t(std::min(code, double(Lattice::kMaxIntensity)));
+  q.intensity[i] = negative ? -1 - clamped : clamped;
+}
+
+std::vector<std::size_t> fileOrder(const Ellipsoids& e, const Lattice& lattice) {
+  std::vector<std::uint64_t> keys(e.size());
+  for (std::size_t i = 0; i < e.size(); ++i) {
+    const auto cells = cellsOf(e, i, lattice);
+    for (std::size_t a = 0; a < 3; ++a)
+      keys[i] |= spreadBits(codeOf(cells[a], 0, (1u << lattice.cellBits) - 1, "a center")) << a;
+  }
+  std::vector<std::size_t> order(e.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return keys[a] < keys[b]; });
+  return order;
+}
+
+}  // namespace
+
+QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
+                             std::vector<std::size_t>& order) {
+  QuantisedEllipsoids q;
+  q.lattice = choice.lattice;
+  q.resize(e.size());
+  order = fileOrder(e, q.lattice);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const std::size_t from = order[i];
+    q.precision[i] = choice.precision[from];
+    const SortedAxes axes = sortedAxes(e, from);
+    putScales(axes.logScale, i, q);
+    const CoarseScales s = coarseScales(q, i);
+    putCenter(cellsOf(e, from, q.lattice), i, positionBits(q.lattice, q.precision[i], s), q);
+    putRotation(axes.rotation, i, rotationBits(q.lattice, q.precision[i], s), q);
+    putIntensity(e.intensity[from], i, q);
+  }
+  return q;
+}
+
+void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids& q) {
+  for (std::size_t i = 0; i < q.size(); ++i) putIntensity(intensities[i], i, q);
+}
+
+}  // namespace esvr

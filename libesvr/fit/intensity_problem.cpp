@@ -1,0 +1,239 @@
+#include "fit/intensity_problem.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <new>
+
+#include "esvr/field.h"
+
+namespace esvr {
+namespace {
+
+using Range = tbb::blocked_range<std::size_t>;
+constexpr std::size_t kBrickGrain = 4;
+
+struct AlignedDelete {
+  void operator()(float* p) const { ::operator delete[](p, std::align_val_t(64)); }
+};
+
+/// A thread's tapes of the pairs of one brick.
+struct Scratch {
+  std::vector<PairTape> tapes;
+  std::unique_ptr<float[], AlignedDelete> phi;
+  std::size_t capacity = 0;
+
+  void reserve(std::size_t pairs) {
+    tapes.resize(pairs);
+    if (pairs * kBrickVoxels <= capacity) return;
+    capacity = 2 * pairs * kBrickVoxels;
+    phi.reset(
+        static_cast<float*>(::operator new[](capacity * sizeof(float), std::align_val_t(64))));
+  }
+};
+
+std::vector<Coord> cornersOf(const Field& field, const IntensityTarget& target) {
+  std::vector<Coord> corners(target.bricks.begin(), target.bricks.end());
+  if (target.restrictToBricks) return corners;
+  const auto reached = reachedBricks(field);
+  corners.insert(corners.end(), reached.begin(), reached.end());
+  for (std::size_t b = 0; b < target.source.brickCount(); ++b)
+    corners.push_back(target.source.brickCorner(b));
+  std::sort(corners.begin(), corners.end());
+  corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+  return corners;
+}
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+void addScaled(std::vector<double>& a, double scale, const std::vector<double>& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) a[i] += scale * b[i];
+}
+
+}  // namespace
+
+IntensityProblem::IntensityProblem(const Field& field, const IntensityTarget& target)
+    : source_(target.source),
+      stored_(target.stored),
+      box_(target.box),
+      background_(field.background),
+      corners_(cornersOf(field, target)),
+      plan_(planEvaluation(field, corners_)),
+      moments_(plan_.pairs.pairCount()),
+      brickError_(corners_.size()),
+      exact_(corners_.size()) {}
+
+void IntensityProblem::setForms(std::span<const float> intensities) {
+  for (std::size_t i = 0; i < intensities.size(); ++i)
+    plan_.field.forms[i].intensity = intensities[i];
+}
+
+/// Forward over every brick, middle(brick, sum), which makes the sum what is to be projected on
+/// the ellipsoids, and backward.
+template <class Middle>
+void IntensityProblem::pass(std::vector<double>* rPhi, std::vector<double>* phi2,
+                            const Middle& middle) {
+  const BrickKernels& kernels = brickKernels();
+  const auto& [gathered, pairs] = plan_;
+  tbb::enumerable_thread_specific<Scratch> scratches;
+  tbb::parallel_for(Range(0, corners_.size(), kBrickGrain), [&](const Range& range) {
+    Scratch& scratch = scratches.local();
+    for (std::size_t b = range.begin(); b != range.end(); ++b) {
+      const auto begin = pairs.brickBegin[b], end = pairs.brickBegin[b + 1];
+      const auto each = [&](auto&& visit) {
+        for (auto pair = begin; pair != end; ++pair) {
+          const auto i = pairs.ellipsoid[pair];
+          const Coord local = corners_[b] - gathered.origin(i);
+          const float corner[3] = {float(local.x), float(local.y), float(local.z)};
+          visit(pair, gathered.forms[i], corner, gathered.kernel(i));
+        }
+      };
+      alignas(64) float sum[kBrickVoxels] = {};
+      scratch.reserve(end - begin);
+      float* phi = scratch.phi.get();
+      each([&](auto pair, const LineForm& form, const float* corner, const auto& kernel) {
+        PairTape& tape = scratch.tapes[pair - begin];
+        tape.phi = phi;
+        kernels.forward(form, corner, kernel, sum, tape);
+        phi += tape.floats;
+      });
+      middle(b, sum);
+      if (!rPhi && !phi2) continue;
+      each([&](auto pair, const LineForm& form, const float* corner, const auto& kernel) {
+        kernels.backward(form, corner, kernel, sum, scratch.tapes[pair - begin], moments_[pair]);
+      });
+    }
+  });
+  const std::size_t n = gathered.forms.size();
+  const auto reduce = [&](std::vector<double>* out, float PairMoments::*moment) {
+    if (!out) return;
+    out->assign(n, 0.0);
+    for (std::size_t i = 0; i < n; ++i)
+      for (auto k = pairs.ellipsoidBegin[i]; k != pairs.ellipsoidBegin[i + 1]; ++k)
+        (*out)[i] += double(moments_[pairs.pairOf[k]].*moment);
+  };
+  reduce(rPhi, &PairMoments::rPhi);
+  reduce(phi2, &PairMoments::phi2);
+}
+
+double IntensityProblem::residualOf(std::size_t brick, float* sum, BrickMask* exact) const {
+  const auto at = findBrick(source_, brickOf(corners_[brick] - source_.origin));
+  double error = 0.0;
+  for (int v = 0; v < kBrickVoxels; ++v) {
+    const float wanted = at ? source_.brickValues(*at)[std::size_t(v)] : source_.background;
+    const float value = background_ + sum[v];
+    const double missed = double(stored_(value)) - double(wanted);
+    if (missed != 0.0 && box_.contains(corners_[brick] + voxelLocal(v))) error += missed * missed;
+    sum[v] = missed == 0.0 ? 0.0f : value - wanted;
+    if (exact && missed == 0.0) exact->set(v);
+  }
+  return error;
+}
+
+double IntensityProblem::error(std::span<const float> intensities) {
+  setForms(intensities);
+  pass(nullptr, nullptr,
+       [&](std::size_t b, float* sum) { brickError_[b] = residualOf(b, sum, nullptr); });
+  double total = 0.0;
+  for (const double e : brickError_) total += e;
+  return total;
+}
+
+const std::vector<double>& IntensityProblem::curvature() {
+  if (curvature_.empty()) pass(nullptr, &curvature_, [](std::size_t, float*) {});
+  return curvature_;
+}
+
+double IntensityProblem::gradientAt(std::span<const float> intensities,
+                                    std::vector<double>& gradient) {
+  setForms(intensities);
+  pass(&gradient, &curvature_, [&](std::size_t b, float* sum) {
+    exact_[b] = {};
+    brickError_[b] = residualOf(b, sum, &exact_[b]);
+  });
+  double total = 0.0;
+  for (const double e : brickError_) total += e;
+  return total;
+}
+
+void IntensityProblem::applyNormal(std::span<const double> direction, std::vector<double>& out) {
+  for (std::size_t i = 0; i < direction.size(); ++i)
+    plan_.field.forms[i].intensity = float(direction[i]);
+  pass(&out, nullptr, [&](std::size_t b, float* sum) {
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (exact_[b].test(v)) sum[v] = 0.0f;
+  });
+}
+
+/// The step x that lowers |A x + r|^2, from A^T r.
+std::vector<double> IntensityProblem::conjugateGradients(std::vector<double> residual,
+                                                         int iterations) {
+  const std::size_t n = residual.size();
+  std::vector<double> x(n), z(n), p(n), q;
+  for (double& r : residual) r = -r;
+  const auto precondition = [&] {
+    for (std::size_t i = 0; i < n; ++i)
+      z[i] = curvature_[i] > 0.0 ? residual[i] / curvature_[i] : 0.0;
+  };
+  precondition();
+  p = z;
+  double rho = dot(residual, z);
+  const double enough = rho * 1e-10;
+  for (int k = 0; k < iterations && rho > enough; ++k) {
+    applyNormal(p, q);
+    const double alpha = rho / dot(p, q);
+    if (!std::isfinite(alpha)) break;
+    addScaled(x, alpha, p);
+    addScaled(residual, -alpha, q);
+    precondition();
+    const double next = dot(residual, z);
+    const double beta = next / rho;
+    rho = next;
+    for (std::size_t i = 0; i < n; ++i) p[i] = z[i] + beta * p[i];
+  }
+  return x;
+}
+
+double IntensityProblem::solve(std::vector<float>& intensities, int iterations) {
+  std::vector<double> gradient;
+  const double before = gradientAt(intensities, gradient);
+  const auto step = conjugateGradients(std::move(gradient), iterations);
+  std::vector<float> tried(intensities.size());
+  const bool signs = std::any_of(intensities.begin(), intensities.end(),
+                                 [](float intensity) { return intensity < 0.0f; });
+  const double lowest = signs ? -HUGE_VAL : 0.0;
+  for (double share = 1.0; share > 0.1; share *= 0.5) {
+    for (std::size_t i = 0; i < tried.size(); ++i)
+      tried[i] = float(std::max(lowest, intensities[i] + share * step[i]));
+    const double after = error(tried);
+    if (!(after < before)) continue;
+    intensities = tried;
+    return after;
+  }
+  return before;
+}
+
+std::vector<float> intensitiesOf(const Field& field) {
+  std::vector<float> all;
+  for (const auto& chunk : field.chunks)
+    all.insert(all.end(), chunk.ellipsoids.intensity.begin(), chunk.ellipsoids.intensity.end());
+  return all;
+}
+
+void setIntensities(std::span<const float> intensities, Field& field) {
+  for (auto& chunk : field.chunks) {
+    auto& own = chunk.ellipsoids.intensity;
+    std::copy_n(intensities.begin(), own.size(), own.begin());
+    intensities = intensities.subspan(own.size());
+  }
+}
+
+}  // namespace esvr

@@ -1,0 +1,168 @@
+#include "format/ellipsoid_block.h"
+
+#include <algorithm>
+#include <bit>
+#include <type_traits>
+
+#include "core/lattice_bits.h"
+#include "core/morton.h"
+#include "esvr/error.h"
+#include "format/cell_tree.h"
+#include "format/symbol_coder.h"
+
+namespace esvr::format {
+namespace {
+
+/// Values of the ellipsoid before, which the next one's are likely to be near.
+struct Previous {
+  std::uint32_t low = 0, middle = 0, high = 0;
+  int width = 0;
+};
+
+constexpr std::size_t kContexts = 8;
+std::size_t context(std::uint32_t value) { return std::min<std::size_t>(value, kContexts - 1); }
+
+void require(bool holds, const char* what) {
+  if (!holds) throw BadInput(std::string(what) + " lies outside the lattice");
+}
+
+/// Codes a run in either direction, ellipsoid by ellipsoid, positions' cells before all.
+template <class Side>
+class BlockCoder {
+ public:
+  BlockCoder(std::array<Side, kStreams>& sides, QuantisedEllipsoids& q) : sides_(sides), q_(q) {}
+
+  void code(Run run) {
+    auto keys = keysOf(run);
+    CellTree<Side>(sides_[0]).code(keys, 3 * q_.lattice.cellBits);
+    for (std::size_t k = 0; k < run.count; ++k) {
+      const std::size_t i = run.first + k;
+      const CoarseScales s = codeCoarseScales(i);
+      codeIntensity(i);
+      codePrecision(i);
+      codeScaleRests(s, i);
+      codeRotation(rotationBits(q_.lattice, q_.precision[i], s), i);
+      codePlace(positionBits(q_.lattice, q_.precision[i], s), keys[k], i);
+    }
+  }
+
+ private:
+  static constexpr bool kReads = std::is_same_v<Side, Reader>;
+
+  std::vector<std::uint64_t> keysOf(Run run) const {
+    std::vector<std::uint64_t> keys(run.count);
+    if constexpr (!kReads)
+      for (std::size_t k = 0; k < run.count; ++k) keys[k] = keyOf(run.first + k);
+    return keys;
+  }
+
+  [[nodiscard]] std::uint64_t keyOf(std::size_t i) const {
+    const int bits = positionBits(q_.lattice, q_.precision[i], coarseScales(q_, i));
+    std::uint64_t key = 0;
+    for (std::size_t a = 0; a < 3; ++a) key |= spreadBits(q_.position[a][i] >> bits) << a;
+    return key;
+  }
+
+  std::uint32_t codeCoarse(NumberModel& model, std::uint32_t value) {
+    const std::uint32_t coarse = model.code(sides_[1], value);
+    require(coarse <= Lattice::kMaxCoarseScale, "a scale");
+    return coarse;
+  }
+
+  CoarseScales codeCoarseScales(std::size_t i) {
+    CoarseScales s{};
+    if constexpr (!kReads) s = coarseScales(q_, i);
+    s.low = codeCoarse(low_[context(previous_.low)], s.low);
+    s.middle = codeCoarse(middle_[context(previous_.middle)], s.middle);
+    s.high = codeCoarse(high_[context(s.middle)], s.high);
+    previous_.low = s.low, previous_.middle = s.middle, previous_.high = s.high;
+    return s;
+  }
+
+  void codeIntensity(std::size_t i) {
+    std::int32_t& value = q_.intensity[i];
+    bool negative = value < 0;
+    if (q_.lattice.signedIntensity) negative = sides_[3].bit(sign_, negative);
+    const auto written = std::uint32_t(value < 0 ? -1 - value : value);
+    const std::uint32_t magnitude =
+        magnitude_[std::size_t(previous_.width)].code(sides_[3], written);
+    require(magnitude <= Lattice::kMaxIntensity, "an intensity");
+    value = negative ? -1 - std::int32_t(magnitude) : std::int32_t(magnitude);
+    previous_.width = std::bit_width(magnitude);
+  }
+
+  void codePrecision(std::size_t i) {
+    auto& model = precision_[std::size_t(previous_.width)];
+    q_.precision[i] = std::uint8_t(model.code(sides_[3], q_.precision[i]));
+  }
+
+  void codeScaleRests(const CoarseScales& s, std::size_t i) {
+    const int bits = scaleBits(q_.lattice, q_.precision[i]);
+    const std::uint32_t coarse[] = {s.low, s.middle, s.high};
+    for (std::size_t a = 0; a < 3; ++a) {
+      std::uint32_t rest = bits > 0 ? q_.scale[a][i] & ((1u << bits) - 1u) : 0u;
+      rest = codeRest(a, coarse[a], rest, bits);
+      q_.scale[a][i] = coarse[a] << bits | rest;
+    }
+  }
+
+  /// The highest bit has models; those below are as good as random.
+  std::uint32_t codeRest(std::size_t axis, std::uint32_t coarse, std::uint32_t rest, int bits) {
+    if (bits == 0) return 0;
+    const std::uint32_t top =
+        sides_[1].bit(rest_[axis][context(coarse)], (rest >> (bits - 1)) & 1u) ? 1u : 0u;
+    return top << (bits - 1) | sides_[1].raw(rest & ((1u << (bits - 1)) - 1u), bits - 1);
+  }
+
+  void codeRotation(int bits, std::size_t i) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const int modelled = std::min(bits, kRotationModelled);
+      const int raw = bits - modelled;
+      std::uint32_t node = 1;
+      for (int b = modelled - 1; b >= 0; --b)
+        node = node << 1 | std::uint32_t(sides_[2].bit(rotation_[a][node],
+                                                       (q_.rotation[a][i] >> (raw + b)) & 1u));
+      const std::uint32_t rest = sides_[2].raw(q_.rotation[a][i] & ((1u << raw) - 1u), raw);
+      q_.rotation[a][i] = std::uint16_t((node - (1u << modelled)) << raw | rest);
+    }
+  }
+
+  void codePlace(int bits, std::uint64_t key, std::size_t i) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::uint32_t place = q_.position[a][i] & ((1u << bits) - 1u);
+      q_.position[a][i] = gatherBits(key >> a) << bits | sides_[0].raw(place, bits);
+    }
+  }
+
+  static constexpr int kRotationModelled = 2;
+  static constexpr std::size_t kWidths = 32;
+
+  std::array<Side, kStreams>& sides_;
+  QuantisedEllipsoids& q_;
+  Previous previous_;
+  std::array<NumberModel, kContexts> low_, middle_, high_;
+  std::array<std::array<BitModel, kContexts>, 3> rest_;
+  std::array<std::array<BitModel, std::size_t{1} << kRotationModelled>, 3> rotation_;
+  BitModel sign_;
+  std::array<NumberModel, kWidths> magnitude_;
+  std::array<TreeModel<4>, kWidths> precision_;
+};
+
+}  // namespace
+
+BlockStreams encodeBlock(QuantisedEllipsoids& q, Run run) {
+  std::array<Writer, kStreams> writers;
+  BlockCoder<Writer>(writers, q).code(run);
+  BlockStreams streams;
+  for (std::size_t s = 0; s < kStreams; ++s) streams[s] = writers[s].coder.finish();
+  return streams;
+}
+
+void decodeBlock(const BlockBytes& streams, Run run, QuantisedEllipsoids& q) {
+  std::array<Reader, kStreams> readers{
+      Reader{RangeDecoder(streams[0])}, Reader{RangeDecoder(streams[1])},
+      Reader{RangeDecoder(streams[2])}, Reader{RangeDecoder(streams[3])}};
+  BlockCoder<Reader>(readers, q).code(run);
+}
+
+}  // namespace esvr::format

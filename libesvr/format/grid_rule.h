@@ -1,0 +1,11 @@
+#pragma once
+/// How the voxels of a stored grid are found active.
+
+#include "esvr/container.h"
+#include "field/activity.h"
+
+namespace esvr::format {
+
+[[nodiscard]] ActivityRule ruleOf(const EncodedGrid& grid);
+
+}  // namespace esvr::format

@@ -1,0 +1,70 @@
+#pragma once
+/// Numbers as decisions of a range coder. Written once for both directions: a `Writer` takes the
+/// number and gives it back, a `Reader` ignores what it is given and gives what was written.
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "format/range_coder.h"
+
+namespace esvr::format {
+
+struct Writer {
+  RangeEncoder coder;
+  bool bit(BitModel& model, bool value) {
+    coder.bit(model, value);
+    return value;
+  }
+  std::uint32_t raw(std::uint32_t value, int bits) {
+    coder.raw(value, bits);
+    return value;
+  }
+};
+
+struct Reader {
+  RangeDecoder coder;
+  bool bit(BitModel& model, bool) { return coder.bit(model); }
+  std::uint32_t raw(std::uint32_t, int bits) { return coder.raw(bits); }
+};
+
+/// A number of kBits bits, each decision with a model for the bits above it.
+template <int kBits>
+class TreeModel {
+ public:
+  template <class Side>
+  std::uint32_t code(Side& side, std::uint32_t value) {
+    std::uint32_t node = 1;
+    for (int b = kBits - 1; b >= 0; --b)
+      node = node << 1 | std::uint32_t(side.bit(models_[node], (value >> b) & 1u));
+    return node - (1u << kBits);
+  }
+
+ private:
+  std::array<BitModel, std::size_t{1} << kBits> models_;
+};
+
+/// Any number below 2^31: how many bits it has, then those below the leading one, of which the
+/// first kModelled have models.
+class NumberModel {
+ public:
+  template <class Side>
+  std::uint32_t code(Side& side, std::uint32_t value) {
+    const std::uint32_t width = width_.code(side, std::uint32_t(std::bit_width(value)));
+    if (width < 2) return width;
+    int left = int(width) - 1;
+    std::uint32_t result = 1;
+    for (int n = 0; n < kModelled && left > 0; ++n)
+      result = result << 1 | std::uint32_t(side.bit(bits_[width][result], (value >> --left) & 1u));
+    const std::uint32_t rest = side.raw(value & ((1u << left) - 1u), left);
+    return result << left | rest;
+  }
+
+ private:
+  static constexpr int kWidthBits = 5, kModelled = 3;
+  TreeModel<kWidthBits> width_;
+  std::array<std::array<BitModel, std::size_t{1} << kModelled>, std::size_t{1} << kWidthBits> bits_;
+};
+
+}  // namespace esvr::format

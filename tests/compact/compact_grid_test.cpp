@@ -1,0 +1,108 @@
+// Plan: on a small fit, what quantising costs stays within what was allowed, measured on the voxels
+// that come back through the file's bytes; more loss allowed means fewer bytes.
+
+#include "esvr/compact.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+
+#include "../fit/volumes.h"
+#include "esvr/error.h"
+#include "esvr/fit.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr {
+namespace {
+
+struct Example {
+  SparseVolume source;
+  EncodedGrid grid;
+};
+
+Example fitted(const SparseVolume& volume, bool narrowBand = false) {
+  FitOptions options;
+  options.count = 60;
+  options.iterations = 150;
+  options.kappa = 2.0f;
+  options.narrowBand = narrowBand;
+  GridDescriptor descriptor;
+  if (narrowBand) descriptor.gridClass = GridClass::kLevelSet;
+  return {volume, encodeGrid(descriptor, volume, fit(volume, options).field)};
+}
+const Example& tube() {
+  static const Example example = fitted(test::tubeVolume());
+  return example;
+}
+
+std::vector<std::byte> bytesOf(const EncodedGrid& grid) { return encodeEsvr({{}, {grid}}); }
+
+double psnrOf(const Example& example, const EncodedGrid& grid) {
+  const auto back = decodeEsvr(bytesOf(grid), "memory").grids[0];
+  return compareVolumes(example.source, decodeGrid(back)).psnrBox;
+}
+
+TEST(CompactGrid, CostsNoMoreThanWasAllowed) {
+  const double before = psnrOf(tube(), tube().grid);
+  for (const double loss : {0.05, 0.3, 2.0}) {
+    const auto compact = compactGrid(tube().grid, tube().source, {.loss = loss});
+    const double after = psnrOf(tube(), compact.grid);
+    // the search sums in float64 what the metric sums in float64 too: voxels are float32
+    EXPECT_GE(after, before - loss - 1e-4) << loss;
+    EXPECT_NEAR(compact.loss, before - after, 1e-3);
+  }
+}
+
+TEST(CompactGrid, SpendsFewerBytesWhereMoreLossIsAllowed) {
+  const auto size = [](double loss) {
+    return bytesOf(compactGrid(tube().grid, tube().source, {.loss = loss}).grid).size();
+  };
+  const std::size_t fine = size(0.05), usual = size(0.3), coarse = size(2.0);
+  EXPECT_LT(usual, fine);
+  EXPECT_LT(coarse, usual);
+  EXPECT_LT(2 * usual, bytesOf(tube().grid).size());
+}
+
+TEST(CompactGrid, SpendsWhatThePsnrLeaves) {
+  const double before = psnrOf(tube(), tube().grid);
+  const auto compact = compactGrid(tube().grid, tube().source, {.psnr = before - 1.0});
+  const double after = psnrOf(tube(), compact.grid);
+  EXPECT_GE(after, before - 1.0);
+  EXPECT_LT(after, before - 0.5);
+}
+
+TEST(CompactGrid, ComesAsNearAsItCanToAPsnrOutOfReach) {
+  const auto compact = compactGrid(tube().grid, tube().source, {.psnr = 200.0});
+  EXPECT_FALSE(compact.grid.quantised.empty());
+  EXPECT_LT(compact.loss, 0.05);
+}
+
+TEST(CompactGrid, KeepsTheBandOfALevelSet) {
+  const Example ball = fitted(test::levelSetVolume(), true);
+  const auto compact = compactGrid(ball.grid, ball.source);
+  EXPECT_GE(psnrOf(ball, compact.grid), psnrOf(ball, ball.grid) - 0.3 - 1e-4);
+}
+
+TEST(CompactGrid, GivesTheSameBytesOnOneThread) {
+  const auto many = bytesOf(compactGrid(tube().grid, tube().source).grid);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(bytesOf(compactGrid(tube().grid, tube().source).grid), many);
+}
+
+TEST(CompactGrid, OfNoEllipsoidsIsTheSame) {
+  EncodedGrid empty = tube().grid;
+  for (auto& chunk : empty.field.chunks) chunk.ellipsoids = {};
+  EXPECT_TRUE(compactGrid(empty, tube().source).grid.quantised.empty());
+}
+
+TEST(CompactGrid, RefusesKappasOfEachEllipsoid) {
+  EncodedGrid grid = tube().grid;
+  Ellipsoids& e = grid.field.chunks[0].ellipsoids;
+  e.kappa.assign(e.size(), 2.0f);
+  EXPECT_THROW((void)compactGrid(grid, tube().source), RuntimeFailure);
+}
+
+}  // namespace
+}  // namespace esvr
