@@ -48,7 +48,7 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName)
   grid.seconds.read = watch.lap();
 
   FitOptions fitOptions = options.fit;
-  fitOptions.narrowBand = source.descriptor.gridClass == GridClass::kLevelSet;
+  fitOptions.narrowBand = isNarrowBand(source.descriptor, source.volume);
   FitResult fitted = fit(source.volume, fitOptions);
   recordFit(fitted, grid);
   watch.lap();

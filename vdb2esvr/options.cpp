@@ -5,6 +5,7 @@
 #include "cli/box_option.h"
 #include "cli/choice.h"
 #include "cli/command_line.h"
+#include "cli/table.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -49,6 +50,7 @@ cli::ProgramText programText() {
 }
 
 void addFitOptions(cli::po::options_description& options) {
+  const double beta = FitOptions{}.beta;
   // clang-format off
   options.add_options()
     ("count", value<std::int64_t>()->value_name("N"), "ellipsoids; with --psnr: at most so many")
@@ -61,12 +63,12 @@ void addFitOptions(cli::po::options_description& options) {
      "edge of the ellipsoids (default: a short pilot run decides)")
     ("loss", value<std::string>()->value_name("L")->default_value("squared"),
      "squared (what PSNR asks for) or paper (L1 + D-SSIM)")
-    ("beta", value<double>()->value_name("B")->default_value(FitOptions{}.beta),
+    ("beta", value<double>()->value_name("B")->default_value(beta, cli::shortNumber(beta)),
      "share of L1 in --loss paper, 0 to 1")
     ("box", value<std::string>()->value_name("BOX"),
      "x0,y0,z0,x1,y1,z1 of the PSNR (default: the active voxels' bounding box)")
     ("seed", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(FitOptions{}.seed)),
-     "of the random choices; the same seed gives the same file")
+     "of the random choices; the same seed gives the same ellipsoids")
     ("storage", value<std::string>()->value_name("S")->default_value("compact"),
      "compact (quantised, about 9 bytes an ellipsoid) or float32 (about 34)")
     ("storage-loss",

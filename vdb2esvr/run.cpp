@@ -67,10 +67,8 @@ class Conversion {
 
   void run(const std::vector<GridSummary>& grids, RunRecord& record) {
     for (const auto& grid : grids) {
-      if (cancelled())
+      if (cancelled() || !convert(grid.uniqueName, record))
         record.notFitted.push_back(grid.uniqueName);
-      else
-        record.grids.push_back(convert(grid.uniqueName));
     }
     record.interrupted = cancelled();
     if (record.interrupted && (options_.onCancel == OnCancel::kDiscard || record.grids.empty()))
@@ -80,10 +78,14 @@ class Conversion {
  private:
   [[nodiscard]] bool cancelled() const { return options_.fit.cancel->cancelled(); }
 
-  ConvertedGrid convert(const std::string& name) {
+  /// \return false where the run was interrupted before the fit had anything
+  bool convert(const std::string& name, RunRecord& record) try {
     const ProgressBar bar(name, options_.verbosity != cli::Verbosity::kQuiet);
     options_.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
-    return convertGrid(options_, name);
+    record.grids.push_back(convertGrid(options_, name));
+    return true;
+  } catch (const Cancelled&) {
+    return false;
   }
 
   Options options_;

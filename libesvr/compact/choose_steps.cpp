@@ -85,17 +85,19 @@ class Search {
   QuantiserSteps balanced(QuantiserSteps steps) {
     const Trial here = maker_.make(steps, kSearchIterations);
     std::array<double, kStreams.size()> slope{};
-    double sum = 0.0;
+    double sum = 0.0;  // of the logarithms of slopes that have one
+    int counted = 0;
     for (std::size_t k = 0; k < kStreams.size(); ++k) {
       QuantiserSteps coarser = steps;
       coarser.*kStreams[k] *= kProbe;
       const Trial there = maker_.make(coarser, kSearchIterations);
       const double saved = double(here.bytes) - double(there.bytes);
       slope[k] = saved > 0.0 ? std::max(there.error - here.error, 0.0) / saved : HUGE_VAL;
-      sum += std::log(std::max(slope[k], 1e-300)) / double(kStreams.size());
+      if (slope[k] > 0.0 && slope[k] < HUGE_VAL) sum += std::log(slope[k]), ++counted;
     }
+    const double mean = counted > 0 ? std::exp(sum / counted) : 0.0;
     for (std::size_t k = 0; k < kStreams.size(); ++k) {
-      const double change = std::sqrt(std::exp(sum) / std::max(slope[k], 1e-300));
+      const double change = slope[k] > 0.0 ? std::sqrt(mean / slope[k]) : kMostChange;
       steps.*kStreams[k] *= std::clamp(change, 1.0 / kMostChange, kMostChange);
     }
     return steps;

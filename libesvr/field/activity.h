@@ -4,18 +4,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include "esvr/sparse_volume.h"
 
 namespace esvr {
 
 /// A voxel is active where activity(settled(V)) > threshold.
 struct ActivityRule {
   float background = 0.0f;
-  bool nonNegative = false;
-  bool narrowBand = false;  ///< see RevoxeliseOptions
+  std::optional<ValueRange> range{};  ///< see RevoxeliseOptions, as is the next
+  bool narrowBand = false;
 
   /// The value that a voxel takes where it is active.
   [[nodiscard]] float settled(float value) const {
-    return nonNegative ? std::max(value, 0.0f) : value;
+    return range ? std::clamp(value, range->min, range->max) : value;
   }
   [[nodiscard]] float activity(float value) const {
     return narrowBand ? background - std::abs(value) : std::abs(value - background);

@@ -39,7 +39,7 @@ void tightenOrigin(SparseVolume& volume) {
 
 SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
                            const RevoxeliseOptions& options) {
-  const ActivityRule rule{field.background, options.nonNegative, options.narrowBand};
+  const ActivityRule rule{field.background, options.range, options.narrowBand};
   SparseVolume volume;
   volume.background = field.background;
   if (corners.empty()) return volume;

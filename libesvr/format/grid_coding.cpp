@@ -1,5 +1,6 @@
 #include "esvr/grid_coding.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -32,6 +33,12 @@ std::vector<Coord> brickCorners(const SparseVolume& volume) {
   return corners;
 }
 
+/// What no value of the source lies beyond, active or not.
+ValueRange rangeOf(const EncodedGrid& grid) {
+  const float background = grid.field.background;
+  return {std::min(grid.valueMin, background), std::max(grid.valueMax, background)};
+}
+
 void chooseTopology(const SparseVolume& source, EncodedGrid& grid) {
   const auto fitsBest = [&](std::span<const Coord> bricks) {
     return format::chooseThreshold(source, grid.field, ruleOf(grid), bricks);
@@ -53,24 +60,33 @@ namespace format {
 
 ActivityRule ruleOf(const EncodedGrid& grid) {
   const float background = grid.field.background;
-  return {background, grid.nonNegative,
-          grid.topology == TopologyKind::kLeaves && isLevelSet(grid.descriptor, background)};
+  ActivityRule rule{.background = background};
+  if (grid.withinRange) rule.range = rangeOf(grid);
+  rule.narrowBand =
+      grid.topology == TopologyKind::kLeaves && isLevelSet(grid.descriptor, background);
+  return rule;
 }
 
 }  // namespace format
+
+bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) {
+  return isLevelSet(descriptor, source.background) &&
+         withinBand(activeRange(source), source.background);
+}
 
 EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source, Field field) {
   const ValueRange range = activeRange(source);
   EncodedGrid grid;
   grid.descriptor = descriptor;
   grid.field = std::move(field);
-  grid.nonNegative = range.min >= 0.0f && source.background >= 0.0f;
   grid.activeBox = activeBox(source);
   grid.activeVoxels = activeVoxelCount(source);
   grid.valueMin = range.min;
   grid.valueMax = range.max;
-  if (isLevelSet(descriptor, source.background) && withinBand(range, source.background))
+  if (isNarrowBand(descriptor, source)) {
     grid.topology = TopologyKind::kLeaves;
+    grid.withinRange = false;  // the band has its own ends, and what is beyond them tells the side
+  }
   chooseTopology(source, grid);
   return grid;
 }
@@ -80,7 +96,7 @@ SparseVolume decodeGrid(const EncodedGrid& grid, const DecodeOptions& options) {
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
   const ActivityRule rule = ruleOf(grid);
   return revoxelise(grid.field, {.threshold = options.threshold.value_or(grid.activeThreshold),
-                                 .nonNegative = rule.nonNegative,
+                                 .range = rule.range,
                                  .narrowBand = rule.narrowBand,
                                  .bricks = grid.leaves,
                                  .restrictToBricks = grid.topology == TopologyKind::kLeaves});

@@ -70,7 +70,7 @@ GridDescriptor getDescriptor(ByteReader& in) {
 
 void putVoxelFacts(ByteWriter& out, const EncodedGrid& grid) {
   putEnum(out, grid.topology);
-  putEnum(out, grid.nonNegative);
+  putEnum(out, grid.withinRange);
   out.put(grid.activeThreshold);
   putBox(out, grid.activeBox);
   out.put(grid.activeVoxels);
@@ -79,7 +79,7 @@ void putVoxelFacts(ByteWriter& out, const EncodedGrid& grid) {
 }
 void getVoxelFacts(ByteReader& in, EncodedGrid& grid) {
   grid.topology = in.getEnum(TopologyKind::kLeaves, "topology");
-  grid.nonNegative = getBool(in, "mark of non-negative values");
+  grid.withinRange = getBool(in, "mark of a range of values");
   grid.activeThreshold = in.get<float>();
   grid.activeBox = getBox(in);
   grid.activeVoxels = in.get<std::uint64_t>();

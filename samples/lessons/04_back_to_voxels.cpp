@@ -36,7 +36,7 @@ int main() {
   // The whole volume. What is fainter than the threshold is not active.
   esvr::RevoxeliseOptions revoxelise;
   revoxelise.threshold = 0.05f;
-  revoxelise.nonNegative = true;
+  revoxelise.range = esvr::ValueRange{0.0f, 1.0f};  // no voxel of the ring lies beyond
   const esvr::SparseVolume back = esvr::revoxelise(field, revoxelise);
   std::printf("%zu bricks, the ring has %zu\n", back.brickCount(), ring.brickCount());
   check(esvr::activeVoxelCount(back) > 0, "there are voxels again");

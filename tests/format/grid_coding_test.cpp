@@ -95,7 +95,7 @@ TEST(GridCoding, FactsOfTheSourceAreStored) {
   EXPECT_EQ(grid.activeVoxels, activeVoxelCount(source));
   EXPECT_EQ(grid.valueMin, range.min);
   EXPECT_EQ(grid.valueMax, range.max);
-  EXPECT_TRUE(grid.nonNegative);
+  EXPECT_TRUE(grid.withinRange);
   EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
   EXPECT_TRUE(grid.leaves.empty());
 }
@@ -149,10 +149,29 @@ TEST(GridCoding, TheThresholdIsTheSameElsewhereAndScalesWithTheValues) {
 TEST(GridCoding, NegativeValuesComeBackOnlyWhereTheSourceHadThem) {
   const Field field = test::randomField({.count = 20, .extent = 30.0});
   const SparseVolume withNegative = revoxelise(field, {});
-  const SparseVolume without = revoxelise(field, {.nonNegative = true});
+  const SparseVolume without = revoxelise(field, {.range = ValueRange{0.0f, 1e6f}});
   ASSERT_LT(activeRange(withNegative).min, 0.0f);
   EXPECT_LT(activeRange(decodeGrid(encodeGrid(kFog, withNegative, field))).min, 0.0f);
   EXPECT_GE(activeRange(decodeGrid(encodeGrid(kFog, without, field))).min, 0.0f);
+}
+
+TEST(GridCoding, NoValueComesBackBeyondThoseOfTheSource) {
+  const Field field = positiveField(5);
+  const ValueRange half{0.0f, activeRange(revoxelise(field, {})).max / 2.0f};
+  const SparseVolume source = revoxelise(field, {.range = half});
+  const EncodedGrid grid = encodeGrid(kFog, source, field);
+  expectSame(source, decodeGrid(grid));
+  EXPECT_EQ(activeRange(decodeGrid(grid)).max, half.max);
+}
+
+TEST(GridCoding, TheBackgroundIsNeverCutOff) {
+  Field field = positiveField(6);
+  field.background = -5.0f;
+  for (float& i : field.chunks[0].ellipsoids.intensity) i += 5.0f;
+  const SparseVolume source = revoxelise(field, {.threshold = 5.0f});
+  ASSERT_GT(activeRange(source).min, -5.0f);
+  const SparseVolume all = decodeGrid(encodeGrid(kFog, source, field), {.threshold = 0.0f});
+  EXPECT_LT(activeRange(all).min, -4.9f);
 }
 
 TEST(GridCoding, ALevelSetGivesItsBandAndItsInsideBack) {
@@ -160,6 +179,8 @@ TEST(GridCoding, ALevelSetGivesItsBandAndItsInsideBack) {
   const SparseVolume source = revoxelise(field, {.threshold = 0.25f, .narrowBand = true});
   const Coord inside{20, 20, 20};
   ASSERT_EQ(valueAt(source, {31, 20, 20}), 3.0f);
+  EXPECT_TRUE(isNarrowBand(kLevelSet, source));
+  EXPECT_FALSE(isNarrowBand(kFog, source));
   const EncodedGrid grid = encodeGrid(kLevelSet, source, field);
   EXPECT_EQ(grid.topology, TopologyKind::kLeaves);
   EXPECT_EQ(grid.leaves.size(), source.brickCount());
@@ -183,6 +204,7 @@ TEST(GridCoding, ADistanceFieldThatIsActiveBeyondItsBandIsNotCutToIt) {
   const Field field = ball();
   const SparseVolume source = revoxelise(field, {});
   ASSERT_LT(activeRange(source).min, -3.0f);
+  EXPECT_FALSE(isNarrowBand(kLevelSet, source));
   const EncodedGrid grid = encodeGrid(kLevelSet, source, field);
   EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
   expectSame(source, decodeGrid(grid));

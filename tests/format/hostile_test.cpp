@@ -36,7 +36,7 @@ constexpr std::size_t kMegabyte = 1 << 20;
 /// Offsets in the record of a grid without name, map and metadata (docs/format.md, "grid").
 namespace at {
 constexpr std::size_t kNameLength = 0, kClass = 4, kValueType = 5, kBackground = 6, kAffine = 22,
-                      kItems = 23, kTopology = 27, kNonNegative = 28, kThreshold = 29,
+                      kItems = 23, kTopology = 27, kWithinRange = 28, kThreshold = 29,
                       kValueMin = 65, kFieldBackground = 73, kKernel = 77, kKappa = 78,
                       kEpsilon = 82, kChunkCount = 86, kChunkBox = 102, kCount = 126;
 }  // namespace at
@@ -180,7 +180,7 @@ const ContentLie kContentLies[] = {
     {"UnknownTopology", pokeGrid(at::kTopology, kNoEnumerator), "unknown topology"},
     {"UnknownKernel", pokeGrid(at::kKernel, kNoEnumerator), "unknown kernel"},
     {"AffineNeitherNor", pokeGrid(at::kAffine, kNoEnumerator), "unknown mark of an affine"},
-    {"NonNegativeNeitherNor", pokeGrid(at::kNonNegative, kNoEnumerator), "unknown mark"},
+    {"WithinRangeNeitherNor", pokeGrid(at::kWithinRange, kNoEnumerator), "unknown mark"},
     {"ManyItems", pokeGrid(at::kItems, 0xffffffffu), "ends within a value"},
     {"BackgroundNan", pokeGrid(at::kBackground, double(kNan)), "background"},
     {"FieldBackgroundNan", pokeGrid(at::kFieldBackground, kNan), "background"},

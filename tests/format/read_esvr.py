@@ -92,7 +92,7 @@ def grid(data):
          "map type": r.sized(), "map": r.sized()}
     g["affine"] = r.get("16d") if r.get("B") else None
     g["metadata"] = r.metadata()
-    for key, form in (("topology", "B"), ("non-negative", "B"), ("threshold", "f"),
+    for key, form in (("topology", "B"), ("within range", "B"), ("threshold", "f"),
                       ("active box", "6i"), ("active voxels", "Q"), ("range", "2f"),
                       ("field background", "f"), ("kernel", "B"), ("kappa", "f"),
                       ("epsilon", "f"), ("chunk count", "I")):
@@ -319,7 +319,7 @@ def check_one_ellipsoid(sections):
 
 def check_level_set(sections):
     g = sections["grid", 0, NONE]
-    assert (g["class"], g["values"], g["topology"], g["non-negative"]) == (1, 2, 1, 0)
+    assert (g["class"], g["values"], g["topology"], g["within range"]) == (1, 2, 1, 0)
     assert g["background"] == 0.3 and g["map type"] == b"NonlinearFrustumMap"
     assert g["affine"] is None and g["kernel"] == 1 and g["active voxels"] == 4
     assert sections["leaves", 0, NONE] == [(-8, -8, 1 << 20), (-8, 0, 0), (0, -16, 8), (0, 0, -8)]

@@ -75,7 +75,7 @@ std::string difference(const EncodedGrid& a, const EncodedGrid& b) {
   if (!sameBits(a.descriptor.background, b.descriptor.background)) return "background";
   if (a.topology != b.topology || a.leaves != b.leaves) return "topology";
   if (!sameBits(a.activeThreshold, b.activeThreshold)) return "threshold";
-  if (a.nonNegative != b.nonNegative) return "nonNegative";
+  if (a.withinRange != b.withinRange) return "withinRange";
   if (!(a.activeBox == b.activeBox) || a.activeVoxels != b.activeVoxels) return "active voxels";
   if (!sameBits(a.valueMin, b.valueMin) || !sameBits(a.valueMax, b.valueMax)) return "value range";
   if (a.curve != b.curve) return "curve";
@@ -134,7 +134,7 @@ EncodedGrid levelSetGrid(std::size_t ellipsoids) {
   grid.field.chunks = {{{}, sampleEllipsoids(ellipsoids, 2, {.rotations = false})}};
   grid.topology = TopologyKind::kLeaves;
   grid.leaves = {{-8, -8, 1 << 20}, {-8, 0, 0}, {0, -16, 8}, {0, 0, -8}};
-  grid.nonNegative = false;
+  grid.withinRange = false;
   grid.activeBox = {{-8, -16, -8}, {7, 7, (1 << 20) + 7}};
   grid.activeVoxels = 4;
   grid.valueMin = -0.3f;

@@ -115,9 +115,9 @@ TEST(EsvrSample, helpListsTheKindsAndVersionThePartsOnStdout) {
 TEST(EsvrSample, leavesNothingWhenInterrupted) {
   const TemporaryFolder folder;
   // minutes of work, stopped after half a second
-  const auto run =
-      runProgram("/usr/bin/timeout", {"--preserve-status", "--signal=INT", "0.5", ESVR_SAMPLE,
-                                      "plume", folder / "a.vdb", "--resolution", "6000"});
+  const auto run = runProgram(
+      "/usr/bin/timeout", {"--foreground", "--preserve-status", "--signal=INT", "0.5", ESVR_SAMPLE,
+                           "plume", folder / "a.vdb", "--resolution", "6000"});
   EXPECT_EQ(run.exitCode, 1);
   EXPECT_THAT(run.err, HasSubstr("cancelled"));
   EXPECT_THAT(folder.names(), IsEmpty());

@@ -34,7 +34,7 @@ struct EncodedGrid {
   float activeThreshold = 0.0f;  ///< negative: active everywhere
   std::vector<Coord>
       leaves;  ///< kLeaves: index corners of the source's bricks, increasing; else empty
-  bool nonNegative = true;                 ///< the source had no value below 0: none comes back
+  bool withinRange = true;                 ///< values come back within that of the source, below
   Box activeBox;                           ///< of the source, index coordinates
   std::uint64_t activeVoxels = 0;          ///< of the source
   float valueMin = 0.0f, valueMax = 0.0f;  ///< over the source's active voxels

@@ -2,6 +2,7 @@
 /// Evaluates a Field on bricks. Primitives are gathered in their order in the field, brick by
 /// brick, so a result is the same bits for any number of threads (the calling TBB arena's).
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -28,8 +29,8 @@ void evaluateBricks(const Field& field, std::span<const Coord> corners, std::spa
 
 /// How the field becomes voxels again.
 struct RevoxeliseOptions {
-  float threshold = 0.0f;    ///< active where |V - background| > threshold
-  bool nonNegative = false;  ///< clamp V to >= 0
+  float threshold = 0.0f;             ///< active where |V - background| > threshold
+  std::optional<ValueRange> range{};  ///< values beyond it become its ends
   /// A level set, whose background is half the width of its band: active where
   /// |V| < background - threshold; what is not active holds the background with the sign of V.
   bool narrowBand = false;

@@ -14,13 +14,17 @@ namespace esvr {
 /// active voxels are found again:
 ///  - usually a threshold, the one whose active voxels overlap best with the source's (intersection
 ///    over union) among those that leave the squared error as it is or lower it;
-///  - in a level set whose active voxels all lie within its half width, the narrow band in the
-///    source's bricks;
+///  - in a narrow band, the band itself in the source's bricks;
 ///  - where no threshold brings a voxel back, since all values equal the background, the source's
 ///    bricks, active throughout.
 /// The curve is left empty.
 [[nodiscard]] EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source,
                                      Field field);
+
+/// True for a level set with a half width that none of its active voxels exceeds: what encodeGrid
+/// stores as a narrow band, and FitOptions::narrowBand is meant for. A level set that is active
+/// beyond its half width, or has none, is fitted and stored like any other grid.
+[[nodiscard]] bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source);
 
 struct DecodeOptions {
   std::optional<float> threshold;  ///< instead of the grid's own; 0 or above

@@ -78,11 +78,10 @@ struct SparseVolume {
 /// Smallest box around the active voxels, in index coordinates; empty where none is active.
 [[nodiscard]] Box activeBox(const SparseVolume& volume);
 
-/// Smallest and largest value over the active voxels and, as `includeBackground` says, the
-/// background. \throws BadInput  no active voxel
 struct ValueRange {
   float min = 0.0f, max = 0.0f;
 };
+/// Smallest and largest value over the active voxels. \throws BadInput  no active voxel
 [[nodiscard]] ValueRange activeRange(const SparseVolume& volume);
 
 /// Throws std::logic_error where the arrays do not fit each other or the bricks are not in order.

@@ -1,0 +1,85 @@
+// Plan: every file of the data folder's edge cases through both programs, as its row there says.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "cli/converters.h"
+#include "esvr/vdb_io.h"
+
+namespace esvr {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// A real file's fit and what comes back of it.
+class EdgeFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::string(ESVR_DATA_DIR).empty())
+      GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>";
+  }
+  [[nodiscard]] static std::string path(const std::string& name) {
+    return std::string(ESVR_DATA_DIR) + "/edge/" + name;
+  }
+  [[nodiscard]] test::ProgramRun fit(const std::string& name) const {
+    return test::quickFit(path(name), folder_ / "out.esvr");
+  }
+  [[nodiscard]] VdbSummary back() const {
+    const auto run = test::esvr2vdb({folder_ / "out.esvr", folder_ / "back.vdb"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    return inspectVdb(folder_ / "back.vdb");
+  }
+  void expectRefused(const std::string& name, const std::string& type) const {
+    const auto run = fit(name);
+    EXPECT_EQ(run.exitCode, 3);
+    EXPECT_THAT(run.err, AllOf(HasSubstr(name), HasSubstr("nothing to fit"), HasSubstr(type)));
+    EXPECT_THAT(folder_.names(), IsEmpty());
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+std::vector<std::string> namesOf(const VdbSummary& summary) {
+  std::vector<std::string> names;
+  for (const auto& grid : summary.grids) names.push_back(grid.uniqueName);
+  return names;
+}
+
+TEST_F(EdgeFile, RealFileOfBackgroundOneKeepsIt) {
+  ASSERT_EQ(fit("background_one.vdb").exitCode, 0);
+  ASSERT_EQ(back().grids.size(), 1u);
+  EXPECT_EQ(readGrid(folder_ / "back.vdb", "density").volume.background, 1.0f);
+}
+
+TEST_F(EdgeFile, RealFileOfThreeGridsOfOneNameGivesThemBackInOrder) {
+  ASSERT_EQ(fit("three_grids_named_density.vdb").exitCode, 0);
+  EXPECT_THAT(namesOf(back()), ElementsAre("density[0]", "density[1]", "density[2]"));
+}
+
+TEST_F(EdgeFile, RealFileOfDoublesComesBackAsDoubles) {
+  ASSERT_EQ(fit("double_grid.vdb").exitCode, 0);
+  EXPECT_EQ(back().grids.at(0).valueType, "double");
+}
+
+TEST_F(EdgeFile, RealFileOfVectorsHasNothingToFit) { expectRefused("vec3_velocity.vdb", "vec3s"); }
+
+TEST_F(EdgeFile, RealFileOfPointsHasNothingToFit) {
+  expectRefused("points_only.vdb", "ptdataidx32");
+}
+
+TEST_F(EdgeFile, RealFileWithATypeThatOpenVdbCannotReadGivesItsOtherGrids) {
+  const auto run = fit("unregistered_type.vdb");
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  for (const char* skipped : {"velocity", "flags", "velocity_previous", "particles"})
+    EXPECT_THAT(run.err, HasSubstr(std::string("skipped grid \"") + skipped + "\""));
+  EXPECT_THAT(namesOf(back()), ElementsAre("phi_obstacle", "phi_inflow", "phi_out", "phi_particles",
+                                           "phi", "phi_previous"));
+}
+
+}  // namespace
+}  // namespace esvr

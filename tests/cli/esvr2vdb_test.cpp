@@ -1,0 +1,182 @@
+// Plan: esvr2vdb as a user runs it: its jobs, what it refuses, with which code and words, and that
+// nothing is left behind.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "cli/converters.h"
+#include "cli/vdb_inputs.h"
+#include "esvr/vdb_io.h"
+
+namespace esvr {
+namespace {
+
+using test::esvr2vdb;
+using test::softBall;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// A folder with a fit of two grids and its source.
+class Esvr2Vdb : public testing::Test {
+ protected:
+  void SetUp() override {
+    test::writeInput(
+        source(),
+        {{.voxels = softBall({})},
+         {.name = "heat", .voxels = softBall({40, 0, 0}, 2.0f, 1.0f), .background = 1.0f}});
+    ASSERT_EQ(test::quickFit(source(), in()).exitCode, 0);
+  }
+  [[nodiscard]] std::string source() const { return folder_ / "source.vdb"; }
+  [[nodiscard]] std::string in() const { return folder_ / "in.esvr"; }
+  [[nodiscard]] std::string out() const { return folder_ / "out.vdb"; }
+  [[nodiscard]] bool outIsThere() const { return std::filesystem::exists(out()); }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(Esvr2Vdb, writesAllGridsQuietly) {
+  const auto run = esvr2vdb({in(), out()});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, IsEmpty());
+  const auto grids = inspectVdb(out()).grids;
+  ASSERT_EQ(grids.size(), 2u);
+  EXPECT_EQ(grids[0].name, "density");
+  EXPECT_EQ(grids[1].name, "heat");
+}
+
+TEST_F(Esvr2Vdb, writesTheGridsThatAreNamedOnly) {
+  ASSERT_EQ(esvr2vdb({in(), out(), "-g", "heat"}).exitCode, 0);
+  const auto grids = inspectVdb(out()).grids;
+  ASSERT_EQ(grids.size(), 1u);
+  EXPECT_EQ(grids[0].name, "heat");
+}
+
+TEST_F(Esvr2Vdb, writesNanoVdbByTheEnding) {
+  const std::string nano = folder_ / "out.nvdb";
+  ASSERT_EQ(esvr2vdb({in(), nano}).exitCode, 0);
+  EXPECT_EQ(inspectVdb(nano).format, "NanoVDB");
+  ASSERT_EQ(esvr2vdb({in(), out()}).exitCode, 0);
+  EXPECT_EQ(readGrid(nano, "heat").volume.values, readGrid(out(), "heat").volume.values);
+}
+
+TEST_F(Esvr2Vdb, savesAsHalfWhereAsked) {
+  ASSERT_EQ(esvr2vdb({in(), out(), "--half", "on"}).exitCode, 0);
+  EXPECT_TRUE(inspectVdb(out()).grids[0].savedAsHalf);
+  ASSERT_EQ(esvr2vdb({in(), out(), "--force"}).exitCode, 0);
+  EXPECT_FALSE(inspectVdb(out()).grids[0].savedAsHalf) << "the source was not";
+}
+
+TEST_F(Esvr2Vdb, hasFewerActiveVoxelsAtAHigherThreshold) {
+  ASSERT_EQ(esvr2vdb({in(), out(), "--threshold", "0"}).exitCode, 0);
+  const auto many = inspectVdb(out()).grids[0].activeVoxels;
+  ASSERT_EQ(esvr2vdb({in(), out(), "--threshold", "0.5", "--force"}).exitCode, 0);
+  const auto few = inspectVdb(out()).grids[0].activeVoxels;
+  EXPECT_LT(few, many);
+  EXPECT_GT(few, 0u);
+}
+
+TEST_F(Esvr2Vdb, saysSoWhereAThresholdLeavesNothing) {
+  const auto run = esvr2vdb({in(), out(), "-g", "density", "--threshold", "100"});
+  EXPECT_EQ(run.exitCode, 0);
+  EXPECT_THAT(run.err, HasSubstr("comes back without an active voxel"));
+}
+
+TEST_F(Esvr2Vdb, printsTheErrorAgainstAReference) {
+  const auto run = esvr2vdb({in(), out(), "--reference", source()});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  for (const char* word : {"PSNR box", "SSIM", "IoU", "mass ref", "density", "heat"})
+    EXPECT_THAT(run.out, HasSubstr(word));
+}
+
+TEST_F(Esvr2Vdb, wantsEveryGridInTheReferenceBeforeItWrites) {
+  test::writeInput(folder_ / "other.vdb", {{.voxels = softBall({})}});
+  const auto run = esvr2vdb({in(), out(), "--reference", folder_ / "other.vdb"});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("other.vdb"), HasSubstr("heat")));
+  EXPECT_FALSE(outIsThere());
+}
+
+TEST_F(Esvr2Vdb, listsGridsAndSections) {
+  const auto run = esvr2vdb({"--list", in()});
+  EXPECT_EQ(run.exitCode, 0);
+  for (const char* word : {"density", "heat", "fog volume", "threshold", "ellipsoids"})
+    EXPECT_THAT(run.out, HasSubstr(word));
+  EXPECT_THAT(esvr2vdb({"--list", in(), "-v"}).out, HasSubstr("creator"));
+}
+
+TEST_F(Esvr2Vdb, checksAFile) {
+  const auto whole = esvr2vdb({"--check", in()});
+  EXPECT_EQ(whole.exitCode, 0);
+  EXPECT_THAT(whole.out, HasSubstr("whole"));
+  std::string bytes = test::readText(in());
+  bytes[bytes.size() / 2] ^= 1;
+  test::writeText(in(), bytes);
+  const auto damaged = esvr2vdb({"--check", in()});
+  EXPECT_EQ(damaged.exitCode, 3);
+  EXPECT_THAT(damaged.err, HasSubstr("in.esvr"));
+}
+
+struct Refusal {
+  std::vector<std::string> arguments;  ///< IN and OUT stand for the fixture's files
+  int code;
+  const char* words;
+};
+std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
+  return out << testing::PrintToString(refusal.arguments);
+}
+
+class RefusedRun : public Esvr2Vdb, public testing::WithParamInterface<Refusal> {};
+
+TEST_P(RefusedRun, isExplainedAndLeavesNoFile) {
+  std::vector<std::string> arguments = GetParam().arguments;
+  for (std::string& argument : arguments) {
+    if (argument == "IN") argument = in();
+    if (argument == "OUT") argument = out();
+    if (argument.starts_with("DIR/")) argument = folder_ / argument.substr(4);
+  }
+  const auto run = esvr2vdb(arguments);
+  EXPECT_EQ(run.exitCode, GetParam().code);
+  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "source.vdb"));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, RefusedRun,
+    testing::Values(Refusal{{}, 2, "IN.esvr"}, Refusal{{"IN"}, 2, "OUT.vdb"},
+                    Refusal{{"IN", "DIR/out.txt"}, 2, ".vdb or .nvdb"},
+                    Refusal{{"IN", "OUT", "--threshold", "-1"}, 2, "--threshold"},
+                    Refusal{{"IN", "OUT", "--half", "maybe"}, 2, "maybe"},
+                    Refusal{{"IN", "OUT", "--box", "0,0,0,1,1,1"}, 2, "--reference"},
+                    Refusal{{"IN", "OUT", "--list"}, 2, "--list"},
+                    Refusal{{"--list", "--check", "IN"}, 2, "two jobs"},
+                    Refusal{{"DIR/none.esvr", "OUT"}, 3, "none.esvr"},
+                    Refusal{{"DIR/source.vdb", "OUT"}, 3, "source.vdb"},
+                    Refusal{{"IN", "OUT", "-g", "smoke"}, 3, "\"density\""},
+                    Refusal{{"IN", "OUT", "--reference", "DIR/none.vdb"}, 3, "none.vdb"},
+                    Refusal{{"IN", "DIR/none/out.vdb"}, 1, "none/out.vdb"}));
+
+TEST_F(Esvr2Vdb, keepsAnExistingFileUnlessForced) {
+  test::writeText(out(), "precious");
+  const auto refused = esvr2vdb({in(), out()});
+  EXPECT_EQ(refused.exitCode, 1);
+  EXPECT_THAT(refused.err, HasSubstr("--force"));
+  EXPECT_EQ(test::readText(out()), "precious");
+  EXPECT_EQ(esvr2vdb({in(), out(), "-f"}).exitCode, 0);
+}
+
+TEST_F(Esvr2Vdb, leavesNothingOnAFullDisk) {
+  for (const std::string name : {"out.vdb", "out.nvdb"}) {
+    const auto run =
+        test::runOnFullDisk(std::string(ESVR2VDB) + " " + in() + " " + (folder_ / name).string());
+    EXPECT_EQ(run.exitCode, 1) << name;
+    EXPECT_THAT(run.err, HasSubstr(name));
+  }
+  EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "source.vdb"));
+}
+
+}  // namespace
+}  // namespace esvr

@@ -1,0 +1,346 @@
+// Plan: vdb2esvr as a user runs it: what it refuses, with which code and words, leaving nothing
+// behind; what it tells of what it did; what becomes of an interrupted run.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "cli/converters.h"
+#include "cli/vdb_inputs.h"
+#include "esvr/container.h"
+#include "esvr/metrics.h"
+#include "esvr/vdb_io.h"
+
+namespace esvr {
+namespace {
+
+using test::InputGrid;
+using test::InputVoxel;
+using test::quickFit;
+using test::softBall;
+using test::vdb2esvr;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+/// A folder with one good input.
+class Vdb2Esvr : public testing::Test {
+ protected:
+  void SetUp() override { test::writeInput(in(), {{.voxels = softBall({})}}); }
+  [[nodiscard]] std::string in() const { return folder_ / "in.vdb"; }
+  [[nodiscard]] std::string out() const { return folder_ / "out.esvr"; }
+  [[nodiscard]] bool outIsThere() const { return std::filesystem::exists(out()); }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(Vdb2Esvr, printsATableAndWritesTheFile) {
+  const auto run = quickFit(in(), out());
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("PSNR box"), HasSubstr("density"), HasSubstr("bytes, 1 :")));
+  EXPECT_THAT(run.err, IsEmpty());
+  EXPECT_THAT(checkEsvr(out()), IsEmpty());
+  EXPECT_THAT(folder_.names(), ElementsAre("in.vdb", "out.esvr"));
+}
+
+// ---- input
+
+struct BadFile {
+  const char* name;
+  std::function<void(const std::string& path)> make;
+  const char* words;
+};
+std::ostream& operator<<(std::ostream& out, const BadFile& file) { return out << file.name; }
+
+class BadInputFile : public testing::TestWithParam<BadFile> {};
+
+TEST_P(BadInputFile, isRefusedByNameWithCodeThreeAndNothingIsWritten) {
+  const test::TemporaryFolder folder;
+  const std::string in = folder / "in.vdb";
+  GetParam().make(in);
+  const auto run = quickFit(in, folder / "out.esvr");
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("in.vdb"), HasSubstr(GetParam().words)));
+  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_THAT(folder.names(), Not(testing::Contains(HasSubstr("esvr"))));
+}
+
+/// A grid whose first voxel in index order that is not finite is (1, 2, 3).
+InputGrid withNonFinite() {
+  InputGrid grid{.voxels = softBall({})};
+  grid.voxels.push_back({{9, 9, 9}, kInf});
+  grid.voxels.push_back({{1, 2, 3}, kNan});
+  return grid;
+}
+
+void truncated(const std::string& path) {
+  test::writeInput(path, {{.voxels = softBall({})}});
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, BadInputFile,
+    testing::Values(
+        BadFile{"missing", [](const std::string&) {}, "no such file"},
+        BadFile{"directory", [](const auto& path) { std::filesystem::create_directory(path); },
+                "is a directory"},
+        BadFile{"empty", [](const auto& path) { test::writeText(path, ""); }, "is empty"},
+        BadFile{"text", [](const auto& path) { test::writeText(path, "density 1 2 3\n"); },
+                "neither an OpenVDB nor a NanoVDB"},
+        BadFile{"truncated", truncated, "in.vdb"},
+        BadFile{"no grid", [](const auto& path) { test::writeInput(path, {}); }, "nothing to fit"},
+        BadFile{"no active voxel", [](const auto& path) { test::writeInput(path, {InputGrid{}}); },
+                "has no active voxel"},
+        BadFile{"only grids of other types",
+                [](const auto& path) { test::writeMixedInput(path, {}); }, "ptdataidx32"},
+        BadFile{"not finite", [](const auto& path) { test::writeInput(path, {withNonFinite()}); },
+                "2 voxels are NaN, infinite or too large for float; the first is at (1, 2, 3)"}));
+
+TEST_F(Vdb2Esvr, listsTheGridsWhereTheOneAskedForIsNotThere) {
+  test::writeInput(in(), {{.name = "a", .voxels = softBall({})}, {.name = "b"}});
+  const auto run = quickFit(in(), out(), {"-g", "c"});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("no grid \"c\""), HasSubstr("\"a\""), HasSubstr("\"b\"")));
+  EXPECT_FALSE(outIsThere());
+}
+
+TEST_F(Vdb2Esvr, listsGridsOfOtherTypesAsSkippedAndGoesOn) {
+  test::writeMixedInput(in(), {{.voxels = softBall({})}});
+  const auto run = quickFit(in(), out());
+  EXPECT_EQ(run.exitCode, 0);
+  for (const char* type : {"bool", "int32", "vec3s", "ptdataidx32"})
+    EXPECT_THAT(run.err, HasSubstr(type));
+  EXPECT_EQ(readEsvr(out()).grids.size(), 1u);
+}
+
+TEST_F(Vdb2Esvr, refusesAGridOfAnotherTypeThatIsAskedFor) {
+  test::writeMixedInput(in(), {{.voxels = softBall({})}});
+  const auto run = quickFit(in(), out(), {"-g", "vec3s"});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, HasSubstr("vec3s"));
+  EXPECT_FALSE(outIsThere());
+}
+
+TEST_F(Vdb2Esvr, takesNonFiniteVoxelsAsZeroWhereAskedAndSaysHowMany) {
+  test::writeInput(in(), {withNonFinite()});
+  const auto run = quickFit(in(), out(), {"--nonfinite", "zero"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("2 NaN or infinite voxels taken as zero"));
+  EXPECT_TRUE(outIsThere());
+}
+
+TEST_F(Vdb2Esvr, fitsTheGridsThatAreNamedOnly) {
+  test::writeInput(in(), {{.voxels = softBall({})},
+                          {.voxels = softBall({30, 0, 0})},
+                          {.name = "heat", .voxels = softBall({})}});
+  ASSERT_EQ(quickFit(in(), out(), {"-g", "heat", "-g", "density[1]"}).exitCode, 0);
+  const EsvrFile file = readEsvr(out());
+  ASSERT_EQ(file.grids.size(), 2u);
+  EXPECT_EQ(file.grids[0].activeBox.min.x, 26);
+  EXPECT_EQ(file.grids[1].descriptor.name, "heat");
+}
+
+// ---- options
+
+struct Refusal {
+  std::vector<std::string> options;
+  int code;
+  const char* words;
+};
+std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
+  return out << testing::PrintToString(refusal.options);
+}
+
+class RefusedOptions : public Vdb2Esvr, public testing::WithParamInterface<Refusal> {};
+
+TEST_P(RefusedOptions, areNamedAndLeaveNoFile) {
+  std::vector<std::string> arguments{in(), out()};
+  arguments.insert(arguments.end(), GetParam().options.begin(), GetParam().options.end());
+  const auto run = vdb2esvr(arguments);
+  EXPECT_EQ(run.exitCode, GetParam().code);
+  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  EXPECT_FALSE(outIsThere());
+}
+
+INSTANTIATE_TEST_SUITE_P(All, RefusedOptions,
+                         testing::Values(Refusal{{"--count", "0"}, 2, "--count"},
+                                         Refusal{{"--count", "x"}, 2, "x"},
+                                         Refusal{{"--psnr", "-1"}, 2, "--psnr"},
+                                         Refusal{{"--psnr", "nan"}, 2, "psnr"},
+                                         Refusal{{"--seconds", "0"}, 2, "--seconds"},
+                                         Refusal{{"--iterations", "0"}, 2, "--iterations"},
+                                         Refusal{{"--preset", "best"}, 2, "best"},
+                                         Refusal{{"--box", "1,2,3"}, 2, "--box"},
+                                         Refusal{{"--box", "5,5,5,1,1,1"}, 2, "no voxel"},
+                                         Refusal{{"--loss", "paper", "--beta", "2"}, 2, "--beta"},
+                                         Refusal{{"--device", "tpu"}, 2, "tpu"},
+                                         Refusal{{"--device", "cuda:4096"}, 5, "cuda:4096"},
+                                         Refusal{{"--report", "report.txt"}, 2, ".json"},
+                                         Refusal{{"more"}, 2, "unexpected argument"}));
+
+TEST_F(Vdb2Esvr, endsWithCodeFourWhereThePsnrIsMissedAndWritesTheFile) {
+  const auto run = quickFit(in(), out(), {"--psnr", "200"});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("of the 200.00 dB"), HasSubstr("is written")));
+  EXPECT_THAT(checkEsvr(out()), IsEmpty());
+}
+
+TEST_F(Vdb2Esvr, givesTheSameEllipsoidsOnAnyNumberOfThreads) {
+  const std::string other = folder_ / "other.esvr";
+  ASSERT_EQ(quickFit(in(), out(), {"--threads", "1"}).exitCode, 0);
+  ASSERT_EQ(quickFit(in(), other, {"--threads", "3"}).exitCode, 0);
+  const Ellipsoids a = readEsvr(out()).grids[0].field.chunks[0].ellipsoids;
+  const Ellipsoids b = readEsvr(other).grids[0].field.chunks[0].ellipsoids;
+  EXPECT_EQ(a.center, b.center);
+  EXPECT_EQ(a.logScale, b.logScale);
+  EXPECT_EQ(a.rotation, b.rotation);
+  EXPECT_EQ(a.intensity, b.intensity);
+}
+
+// ---- output
+
+TEST_F(Vdb2Esvr, keepsAnExistingFileUnlessForced) {
+  test::writeText(out(), "precious");
+  const auto refused = quickFit(in(), out());
+  EXPECT_EQ(refused.exitCode, 1);
+  EXPECT_THAT(refused.err, HasSubstr("--force"));
+  EXPECT_EQ(test::readText(out()), "precious");
+  EXPECT_EQ(quickFit(in(), out(), {"--force"}).exitCode, 0);
+  EXPECT_THAT(checkEsvr(out()), IsEmpty());
+}
+
+TEST_F(Vdb2Esvr, refusesOutputsThatCannotBeWrittenBeforeAnyWork) {
+  std::filesystem::create_directory(folder_ / "folder.esvr");
+  for (const std::string name : {"none/out.esvr", "folder.esvr"}) {
+    const auto run = quickFit(in(), folder_ / name, {"--force"});
+    EXPECT_EQ(run.exitCode, 1) << name;
+    EXPECT_THAT(run.err, HasSubstr(name));
+  }
+  EXPECT_THAT(quickFit(in(), "/proc/out.esvr").err, HasSubstr("/proc/out.esvr"));
+  const auto wrongEnding = quickFit(in(), folder_ / "out.vdb");
+  EXPECT_EQ(wrongEnding.exitCode, 2);
+  EXPECT_THAT(wrongEnding.err, HasSubstr(".esvr"));
+  EXPECT_THAT(folder_.names(), ElementsAre("folder.esvr", "in.vdb"));
+}
+
+TEST_F(Vdb2Esvr, refusesToWriteOverItsInput) {
+  std::filesystem::create_hard_link(in(), out());
+  const auto run = quickFit(in(), out(), {"--force"});
+  EXPECT_EQ(run.exitCode, 2);
+  EXPECT_THAT(run.err, HasSubstr("one file"));
+}
+
+TEST_F(Vdb2Esvr, leavesNothingOnAFullDisk) {
+  test::writeText(folder_ / "old.esvr", "precious");
+  for (const std::string name : {"out.esvr", "old.esvr"}) {
+    const auto run =
+        test::runOnFullDisk(std::string(VDB2ESVR) + " " + in() + " " + (folder_ / name).string() +
+                            " --force --iterations 10 --kappa 0");
+    EXPECT_EQ(run.exitCode, 1);
+    EXPECT_THAT(run.err, AllOf(HasSubstr(name), HasSubstr("File too large")));
+  }
+  EXPECT_THAT(folder_.names(), ElementsAre("in.vdb", "old.esvr"));
+  EXPECT_EQ(test::readText(folder_ / "old.esvr"), "precious");
+}
+
+TEST_F(Vdb2Esvr, keepsTheFileWhereOnlyTheTableCannotBePrinted) {
+  const auto run =
+      test::runProgram("/bin/sh", {"-c", std::string(VDB2ESVR) + " " + in() + " " + out() +
+                                             " --iterations 10 --kappa 0 > /dev/full"});
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("standard output"));
+  EXPECT_THAT(checkEsvr(out()), IsEmpty());
+}
+
+// ---- report
+
+using Json = nlohmann::json;
+
+std::vector<std::string> keysOf(const Json& object) {
+  std::vector<std::string> keys;
+  for (const auto& item : object.items()) keys.push_back(item.key());
+  return keys;
+}
+
+TEST_F(Vdb2Esvr, reportsWhatDocsReportSaysAndNothingElse) {
+  const auto run = quickFit(in(), out(), {"--report", "-"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const Json report = Json::parse(run.out);
+  EXPECT_THAT(keysOf(report), testing::UnorderedElementsAre(
+                                  "schema", "schema_version", "program", "command_line", "versions",
+                                  "asked", "device", "input", "output", "ratio", "grids", "skipped",
+                                  "seconds", "peak_memory_bytes", "interrupted", "exit_code"));
+  const Json& grid = report["grids"][0];
+  EXPECT_THAT(keysOf(grid),
+              testing::UnorderedElementsAre("name", "source", "primitives", "bytes", "sections",
+                                            "kernel", "topology", "fit", "compact", "metrics",
+                                            "seconds", "left_out", "curve"));
+  EXPECT_EQ(report["schema"], "esvr-report");
+  EXPECT_EQ(report["exit_code"], 0);
+  EXPECT_EQ(report["output"]["bytes"], std::filesystem::file_size(out()));
+  EXPECT_EQ(grid["primitives"], readEsvr(out()).grids[0].field.primitiveCount());
+  EXPECT_EQ(grid["source"]["active_voxels"], softBall({}).size());
+  EXPECT_EQ(grid["curve"].size(), readEsvr(out()).grids[0].curve.size());
+}
+
+TEST_F(Vdb2Esvr, reportsNullForAPsnrWithoutError) {
+  test::writeInput(in(), {{.voxels = softBall({}, 0.0f)}});
+  const std::string report = folder_ / "r.json";
+  ASSERT_EQ(quickFit(in(), out(), {"--report", report}).exitCode, 0);
+  const Json json = Json::parse(test::readText(report));
+  EXPECT_TRUE(json["grids"][0]["metrics"]["psnr_box"].is_null());
+}
+
+TEST_F(Vdb2Esvr, reportsTheErrorOfTheVoxelsThatComeBack) {
+  const auto run = quickFit(in(), out(), {"--report", "-"});
+  const Json metrics = Json::parse(run.out)["grids"][0]["metrics"];
+  const std::string back = folder_ / "back.vdb";
+  ASSERT_EQ(test::esvr2vdb({out(), back}).exitCode, 0);
+  const VolumeMetrics m =
+      compareVolumes(readGrid(in(), "density").volume, readGrid(back, "density").volume);
+  EXPECT_EQ(metrics["psnr_box"].get<double>(), m.psnrBox);
+  EXPECT_EQ(metrics["psnr_active"].get<double>(), m.psnrActive);
+  EXPECT_EQ(metrics["max_error"].get<double>(), m.maxError);
+  EXPECT_EQ(metrics["iou"].get<double>(), m.iou);
+}
+
+// ---- Ctrl-C
+
+/// A fit of a minute that is stopped after a second.
+class Interrupted : public Vdb2Esvr {
+ protected:
+  [[nodiscard]] test::ProgramRun interrupted(const std::string& onCancel) const {
+    test::writeInput(in(), {{.voxels = softBall({})}, {.name = "heat", .voxels = softBall({})}});
+    return test::runProgram(
+        "/usr/bin/timeout",
+        {"--foreground", "--preserve-status", "--signal=INT", "1", VDB2ESVR, in(), out(),
+         "--seconds", "60", "--kappa", "0", "--on-cancel", onCancel});
+  }
+};
+
+TEST_F(Interrupted, writesTheBestSoFarAndEndsWithCodeOne) {
+  const auto run = interrupted("keep");
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("out.esvr holds the best so far, without grid \"heat\""));
+  EXPECT_THAT(checkEsvr(out()), IsEmpty());
+  EXPECT_THAT(folder_.names(), ElementsAre("in.vdb", "out.esvr"));
+}
+
+TEST_F(Interrupted, writesNothingWhereAskedTo) {
+  const auto run = interrupted("discard");
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("nothing was written"));
+  EXPECT_THAT(folder_.names(), ElementsAre("in.vdb"));
+}
+
+}  // namespace
+}  // namespace esvr
