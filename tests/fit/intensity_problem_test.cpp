@@ -105,8 +105,8 @@ TEST(IntensityProblem, AgreesWithDenseNormalEquations) {
 TEST(IntensityProblem, MeasuresTheErrorThatAReaderGets) {
   const Field field = someField();
   const SparseVolume volume = test::tubeVolume();
-  const RevoxeliseOptions rule{.threshold = 0.2f, .nonNegative = true};
-  const StoredValue stored{{0.0f, true, false}, rule.threshold};
+  const RevoxeliseOptions rule{.threshold = 0.2f, .range = ValueRange{0.0f, 0.9f}};
+  const StoredValue stored{{.range = rule.range}, rule.threshold};
   IntensityProblem problem(field, {volume, stored, activeBox(volume)});
   const auto metrics = compareVolumes(volume, revoxelise(field, rule));
   EXPECT_NEAR(problem.error(intensitiesOf(field)), metrics.mseBox * metrics.boxVoxels, 1e-6);
