@@ -5,6 +5,7 @@
 #include "cli/stopwatch.h"
 #include "esvr/compact.h"
 #include "esvr/grid_coding.h"
+#include "esvr/rate_control.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -27,18 +28,37 @@ void recordFit(const FitResult& fitted, ConvertedGrid& grid) {
   grid.seconds.optimise = fitted.secondsOptimise;
 }
 
-void makeCompact(const Options& options, const SparseVolume& source, EncodedGrid& encoded,
-                 ConvertedGrid& grid) {
+void recordCompact(const CompactResult& compact, const EncodedGrid& stored, ConvertedGrid& grid) {
+  grid.compact = {compact.loss, compact.steps, streamBytes(stored)};
+}
+
+/// Count, bits and all else from the size or the PSNR that was asked for.
+EncodedGrid fitRated(const RateInput& input, std::optional<std::uint64_t> bytes,
+                     ConvertedGrid& grid) {
+  RatedGrid rated = bytes ? fitToSize(input, *bytes) : fitToPsnr(input, *input.options.psnr);
+  recordFit(rated.fit, grid);
+  recordCompact(rated.compact, rated.grid, grid);
+  grid.curve = std::move(rated.fit.curve);
+  return std::move(rated.grid);
+}
+
+EncodedGrid fitPlain(const RateInput& input, const Options& options, ConvertedGrid& grid) {
+  FitResult fitted = fit(input.source, input.options);
+  recordFit(fitted, grid);
+  EncodedGrid encoded = encodeGrid(input.descriptor, input.source, std::move(fitted.field));
+  encoded.curve = grid.curve = std::move(fitted.curve);
+  if (options.storage == Storage::kFloat32) return encoded;
   CompactResult compact =
-      compactGrid(encoded, source,
+      compactGrid(encoded, input.source,
                   {.loss = options.storageLoss, .psnr = options.fit.psnr, .box = options.fit.box});
-  grid.compact = {compact.loss, compact.steps, streamBytes(compact.grid)};
-  encoded = std::move(compact.grid);
+  recordCompact(compact, compact.grid, grid);
+  return std::move(compact.grid);
 }
 
 }  // namespace
 
-ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName) {
+ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
+                          std::optional<std::uint64_t> bytes) {
   ConvertedGrid grid;
   grid.uniqueName = uniqueName;
   cli::Stopwatch watch;
@@ -47,17 +67,12 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName)
   grid.nonFiniteReplaced = source.nonFiniteReplaced;
   grid.seconds.read = watch.lap();
 
-  FitOptions fitOptions = options.fit;
-  fitOptions.narrowBand = isNarrowBand(source.descriptor, source.volume);
-  FitResult fitted = fit(source.volume, fitOptions);
-  recordFit(fitted, grid);
-  watch.lap();
-
-  EncodedGrid encoded = encodeGrid(source.descriptor, source.volume, std::move(fitted.field));
-  encoded.curve = std::move(fitted.curve);
-  if (options.storage == Storage::kCompact) makeCompact(options, source.volume, encoded, grid);
+  RateInput input{source.descriptor, source.volume, options.fit};
+  input.options.narrowBand = isNarrowBand(source.descriptor, source.volume);
+  EncodedGrid encoded = bytes || searchesForPsnr(options) ? fitRated(input, bytes, grid)
+                                                          : fitPlain(input, options, grid);
   grid.stored = throughTheFormat(std::move(encoded));
-  grid.seconds.encode = watch.lap();
+  grid.seconds.encode = watch.lap() - grid.seconds.fit();
 
   grid.metrics = compareVolumes(source.volume, decodeGrid(grid.stored), {.box = options.fit.box});
   grid.seconds.measure = watch.lap();

@@ -16,6 +16,7 @@ namespace esvr::vdb2esvr {
 
 struct PhaseSeconds {
   double read = 0.0, seed = 0.0, pilot = 0.0, optimise = 0.0, encode = 0.0, measure = 0.0;
+  [[nodiscard]] double fit() const { return seed + pilot + optimise; }
   [[nodiscard]] double total() const { return read + seed + pilot + optimise + encode + measure; }
 };
 
@@ -36,12 +37,15 @@ struct ConvertedGrid {
   std::vector<PilotPoint> pilot;
   std::uint64_t pairs = 0;
   bool signedIntensities = false;
+  std::vector<CurvePoint> curve;         ///< of the fit, whether the file has it or not
   std::optional<CompactRecord> compact;  ///< nothing where float32 is stored
   PhaseSeconds seconds;
 };
 
 /// Reads, fits, encodes and measures a grid. The fit's progress and cancellation are those of
 /// `options.fit`.
-[[nodiscard]] ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName);
+/// \param bytes  that the grid may add to the file, where a size was asked for
+[[nodiscard]] ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
+                                        std::optional<std::uint64_t> bytes);
 
 }  // namespace esvr::vdb2esvr

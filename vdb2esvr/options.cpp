@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "cli/box_option.h"
+#include "cli/byte_size.h"
 #include "cli/choice.h"
 #include "cli/command_line.h"
 #include "cli/table.h"
@@ -19,8 +20,9 @@ constexpr std::int64_t kMostPrimitives = std::numeric_limits<std::uint32_t>::max
 constexpr std::int64_t kMostIterations = 10'000'000;
 constexpr double kHighestPsnr = 300.0;  // dB; float32 ends at about 150
 constexpr double kLongestRun = 1e9;     // seconds
-constexpr double kMostLoss = 20.0;      // dB
-constexpr float kLargestKappa = 1e4f;   // kernel.h
+constexpr double kLargestRatio = 1e9;
+constexpr double kMostLoss = 20.0;     // dB
+constexpr float kLargestKappa = 1e4f;  // kernel.h
 
 cli::ProgramText programText() {
   return {
@@ -29,10 +31,14 @@ cli::ProgramText programText() {
           "Fits ellipsoids to the sparse grids of a VDB file and writes them as .esvr, which\n"
           "esvr2vdb turns back into the VDB: transforms, names and metadata exactly, voxels\n"
           "as close as asked.",
-      .usage = "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--count N | --psnr DB | --seconds S]",
+      .usage = "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]",
       .notes =
           "Without -g all float and double grids are fitted, the others are listed and skipped.\n"
-          "Targets combine: a run ends at the first that is met, and --count bounds --psnr.\n"
+          "--size and --ratio choose the number of ellipsoids and of bits, for the best file that\n"
+          "is not larger (at most 2 % smaller); --psnr alone looks for the smallest that reaches "
+          "it.\n"
+          "Several grids share the bytes by their active voxels.\n"
+          "--count, --psnr and --seconds combine: the run ends at the first that is met.\n"
           "An ordinary run prints a table on stdout: PSNR and the largest error are those of\n"
           "the voxels that the written file gives back.\n"
           "\n"
@@ -44,7 +50,8 @@ cli::ProgramText programText() {
           "used, 4 --psnr not reached (the file is written), 5 device or memory.",
       .examples =
           "  vdb2esvr smoke.vdb smoke.esvr                       choose everything from the data\n"
-          "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             as few as 45 dB take\n"
+          "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          the best of 100 KB\n"
+          "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             the smallest of 45 dB\n"
           "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report smoke.json\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255"};
 }
@@ -54,7 +61,10 @@ void addFitOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("count", value<std::int64_t>()->value_name("N"), "ellipsoids; with --psnr: at most so many")
-    ("psnr", value<double>()->value_name("DB"), "grow until this PSNR over the box is reached")
+    ("size", value<std::string>()->value_name("BYTES"),
+     "the best file of at most so many bytes: 50000, 50KB, 2.6MB")
+    ("ratio", value<double>()->value_name("R"), "the same, IN's size over R")
+    ("psnr", value<double>()->value_name("DB"), "reach this PSNR over the box, in few bytes")
     ("seconds", value<double>()->value_name("S"), "the best within this time, each grid")
     ("iterations", value<std::int64_t>()->value_name("N"), "length of the fit's schedule")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
@@ -137,6 +147,20 @@ Storage storage(const Arguments& a) {
                               {{"compact", Storage::kCompact}, {"float32", Storage::kFloat32}});
 }
 
+void readSize(const Arguments& a, Options& options) {
+  if (const auto size = a.find<std::string>("size"))
+    options.size = cli::parseByteSize("size", *size);
+  options.ratio = bounded<double>(a, "ratio", 1.0, kLargestRatio);
+  if (!options.size && !options.ratio) return;
+  const std::string given = options.size ? "--size" : "--ratio";
+  if (options.size && options.ratio) throw UsageError("--size and --ratio are two sizes; give one");
+  for (const char* option : {"count", "psnr", "seconds"})
+    if (a.has(option))
+      throw UsageError(given + " chooses the number of ellipsoids itself; it takes no --" + option);
+  if (options.storage != Storage::kCompact)
+    throw UsageError(given + " needs --storage compact, where bits can be chosen");
+}
+
 NonFinite nonFinite(const Arguments& a) {
   return cli::choose<NonFinite>("nonfinite", a.get<std::string>("nonfinite"),
                                 {{"refuse", NonFinite::kRefuse}, {"zero", NonFinite::kZero}});
@@ -149,6 +173,11 @@ OnCancel onCancel(const Arguments& a) {
 
 }  // namespace
 
+bool searchesForPsnr(const Options& options) {
+  return options.fit.psnr && !options.fit.count && !options.fit.seconds &&
+         options.storage == Storage::kCompact;
+}
+
 std::optional<Options> parseOptions(int argc, const char* const* argv) {
   const auto arguments = commandLine().parse(argc, argv);
   if (!arguments) return std::nullopt;
@@ -160,6 +189,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.fit = fitOptions(a);
   options.storage = storage(a);
   options.storageLoss = *bounded<double>(a, "storage-loss", 0.0, kMostLoss);
+  readSize(a, options);
   options.read.nonFinite = nonFinite(a);
   options.device = a.get<std::string>("device");
   options.onCancel = onCancel(a);

@@ -25,6 +25,8 @@ struct Options {
   std::filesystem::path input, output;
   std::vector<std::string> grids;  ///< empty: all that can be fitted
   FitOptions fit;
+  std::optional<std::uint64_t> size;  ///< bytes of the file
+  std::optional<double> ratio;        ///< bytes of the input for each of the file
   Storage storage = Storage::kCompact;
   double storageLoss = CompactOptions::kDefaultLoss;  ///< dB that kCompact may cost
   ReadOptions read;
@@ -36,6 +38,9 @@ struct Options {
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;
 };
+
+/// Whether --psnr looks for the smallest file: not where a number or a time bounds it.
+[[nodiscard]] bool searchesForPsnr(const Options& options);
 
 /// \return nothing where --help or --version was printed
 /// \throws UsageError

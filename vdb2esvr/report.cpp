@@ -65,6 +65,8 @@ Json asked(const Options& options) {
   const FitOptions& fit = options.fit;
   return {{"count", orNull(fit.count)},
           {"psnr", orNull(fit.psnr)},
+          {"size", orNull(options.size)},
+          {"ratio", orNull(options.ratio)},
           {"seconds", orNull(fit.seconds)},
           {"iterations", orNull(fit.iterations)},
           {"preset", nameOf(fit.preset)},
@@ -190,7 +192,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"metrics", metricsOf(grid.metrics)},
           {"seconds", secondsOf(grid.seconds)},
           {"left_out", leftOutOf(record, g)},
-          {"curve", curveOf(grid.stored.curve)}};
+          {"curve", curveOf(grid.curve)}};
 }
 
 Json gridsOf(const RunRecord& record) {

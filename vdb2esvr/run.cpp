@@ -12,6 +12,7 @@
 #include "cli/thread_limit.h"
 #include "esvr/device.h"
 #include "esvr/error.h"
+#include "vdb2esvr/byte_shares.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/progress_bar.h"
 #include "vdb2esvr/report.h"
@@ -66,8 +67,9 @@ class Conversion {
   }
 
   void run(const std::vector<GridSummary>& grids, RunRecord& record) {
+    ByteShares shares(options_, record.input, grids);
     for (const auto& grid : grids) {
-      if (cancelled() || !convert(grid.uniqueName, record))
+      if (cancelled() || !convert(grid, shares, record))
         record.notFitted.push_back(grid.uniqueName);
     }
     record.interrupted = cancelled();
@@ -79,10 +81,11 @@ class Conversion {
   [[nodiscard]] bool cancelled() const { return options_.fit.cancel->cancelled(); }
 
   /// \return false where the run was interrupted before the fit had anything
-  bool convert(const std::string& name, RunRecord& record) try {
-    const ProgressBar bar(name, options_.verbosity != cli::Verbosity::kQuiet);
+  bool convert(const GridSummary& grid, ByteShares& shares, RunRecord& record) try {
+    const ProgressBar bar(grid.uniqueName, options_.verbosity != cli::Verbosity::kQuiet);
     options_.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
-    record.grids.push_back(convertGrid(options_, name));
+    record.grids.push_back(convertGrid(options_, grid.uniqueName, shares.of(grid)));
+    shares.take(grid, record.grids.back().stored);
     return true;
   } catch (const Cancelled&) {
     return false;

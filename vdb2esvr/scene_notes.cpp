@@ -31,6 +31,9 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
                    lacks("leaves") ? "a threshold finds the active voxels"
                                    : "the rule of activity finds them in the stored bricks",
                    grid.bricks * kMaskBytes});
+  if (lacks("curve") && !grid.curve.empty())
+    notes.push_back({"curve", "a size or a PSNR was asked for; the report has it",
+                     grid.curve.size() * sizeof(CurvePoint)});
   notes.push_back({"residual", "no bound on the largest error was asked for"});
   if (grid.pilot.empty()) notes.push_back({"pilot", "kappa was given, or nothing needed a fit"});
   return notes;

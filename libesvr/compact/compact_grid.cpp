@@ -5,24 +5,22 @@
 
 #include "compact/choose_steps.h"
 #include "esvr/error.h"
-#include "esvr/metrics.h"
 
 namespace esvr {
 namespace {
 
-/// Where the fit is exact, or nearly, there is nothing to compare a loss with: an error that no
-/// one sees.
-constexpr double kInvisiblePsnr = 110.0;
+constexpr double kMargin = 1e-4;  // dB: sums of another order must not fall short
 
-double squares(double psnr, double peak, double voxels) {
-  return peak * peak * voxels * std::pow(10.0, -psnr / 10.0);
+double allowedError(const TrialMaker& maker, const SparseVolume& source, const Box& box,
+                    const CompactOptions& options) {
+  if (options.psnr) return squaresOf(*options.psnr + kMargin, source, box);
+  return maker.error() * std::pow(10.0, options.loss / 10.0) + maker.invisibleError();
 }
 
-double allowedError(double fitted, const SparseVolume& source, const Box& box,
-                    const CompactOptions& options) {
-  const double peak = peakOf(source), voxels = box.volume();
-  if (options.psnr) return squares(*options.psnr, peak, voxels);
-  return fitted * std::pow(10.0, options.loss / 10.0) + squares(kInvisiblePsnr, peak, voxels);
+Trial choose(const TrialMaker& maker, const SparseVolume& source, const Box& box,
+             const CompactOptions& options) {
+  if (options.bytes) return chooseStepsFor(maker, *options.bytes);
+  return chooseStepsWithin(maker, allowedError(maker, source, box, options));
 }
 
 void requireOneKappa(const EncodedGrid& grid) {
@@ -37,14 +35,15 @@ void requireOneKappa(const EncodedGrid& grid) {
 CompactResult compactGrid(const EncodedGrid& grid, const SparseVolume& source,
                           const CompactOptions& options) {
   requireOneKappa(grid);
-  CompactResult result{grid, {}, 0.0};
+  CompactResult result{grid, {}, 0.0, 0};
   if (grid.field.primitiveCount() == 0) return result;
   const Box box = options.box.value_or(activeBox(source));
   const TrialMaker maker(grid, source, box);
-  Trial chosen = chooseSteps(maker, allowedError(maker.error(), source, box, options));
+  Trial chosen = choose(maker, source, box, options);
   result.grid.field = std::move(chosen.field);
   result.grid.quantised = std::move(chosen.quantised);
   result.steps = chosen.steps;
+  result.bytes = chosen.bytes;
   result.loss = maker.error() > 0.0 ? 10.0 * std::log10(chosen.error / maker.error()) : 0.0;
   return result;
 }

@@ -1,12 +1,16 @@
 #include "compact/trial.h"
 
+#include <cmath>
 #include <utility>
 
+#include "esvr/metrics.h"
 #include "format/ellipsoids_section.h"
 #include "format/grid_rule.h"
 
 namespace esvr {
 namespace {
+
+constexpr double kInvisiblePsnr = 110.0;
 
 std::vector<std::vector<double>> byChunk(const Field& field, const std::vector<double>& all) {
   std::vector<std::vector<double>> result;
@@ -31,6 +35,11 @@ void storeIntensities(std::span<const float> intensities, Trial& trial) {
 
 }  // namespace
 
+double squaresOf(double psnr, const SparseVolume& source, const Box& box) {
+  const double peak = peakOf(source);
+  return peak * peak * box.volume() * std::pow(10.0, -psnr / 10.0);
+}
+
 TrialMaker::TrialMaker(const EncodedGrid& grid, const SparseVolume& source, const Box& box)
     : field_(grid.field),
       target_{source,
@@ -41,6 +50,7 @@ TrialMaker::TrialMaker(const EncodedGrid& grid, const SparseVolume& source, cons
   IntensityProblem problem(field_, target_);
   error_ = problem.error(intensitiesOf(field_));
   curvature_ = byChunk(field_, problem.curvature());
+  invisible_ = squaresOf(kInvisiblePsnr, source, box);
 }
 
 /// The field then has rounded shapes and its old intensities, in the file's order.

@@ -25,6 +25,10 @@ class TrialMaker {
   /// All must outlive the maker.
   TrialMaker(const EncodedGrid& grid, const SparseVolume& source, const Box& box);
 
+  /// Where the fit is exact, or nearly, there is nothing to compare a loss with: an error that no
+  /// one sees.
+  [[nodiscard]] double invisibleError() const { return invisible_; }
+
   /// Error of the float32 field.
   [[nodiscard]] double error() const { return error_; }
   [[nodiscard]] std::size_t count() const { return field_.primitiveCount(); }
@@ -39,7 +43,10 @@ class TrialMaker {
   const Field& field_;
   IntensityTarget target_;
   std::vector<std::vector<double>> curvature_;  ///< by chunk
-  double error_ = 0.0;
+  double error_ = 0.0, invisible_ = 0.0;
 };
+
+/// Sum of squares over a box of a PSNR.
+[[nodiscard]] double squaresOf(double psnr, const SparseVolume& source, const Box& box);
 
 }  // namespace esvr

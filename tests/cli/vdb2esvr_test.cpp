@@ -171,21 +171,22 @@ TEST_P(RefusedOptions, areNamedAndLeaveNoFile) {
   EXPECT_FALSE(outIsThere());
 }
 
-INSTANTIATE_TEST_SUITE_P(All, RefusedOptions,
-                         testing::Values(Refusal{{"--count", "0"}, 2, "--count"},
-                                         Refusal{{"--count", "x"}, 2, "x"},
-                                         Refusal{{"--psnr", "-1"}, 2, "--psnr"},
-                                         Refusal{{"--psnr", "nan"}, 2, "psnr"},
-                                         Refusal{{"--seconds", "0"}, 2, "--seconds"},
-                                         Refusal{{"--iterations", "0"}, 2, "--iterations"},
-                                         Refusal{{"--preset", "best"}, 2, "best"},
-                                         Refusal{{"--box", "1,2,3"}, 2, "--box"},
-                                         Refusal{{"--box", "5,5,5,1,1,1"}, 2, "no voxel"},
-                                         Refusal{{"--loss", "paper", "--beta", "2"}, 2, "--beta"},
-                                         Refusal{{"--device", "tpu"}, 2, "tpu"},
-                                         Refusal{{"--device", "cuda:4096"}, 5, "cuda:4096"},
-                                         Refusal{{"--report", "report.txt"}, 2, ".json"},
-                                         Refusal{{"more"}, 2, "unexpected argument"}));
+INSTANTIATE_TEST_SUITE_P(
+    All, RefusedOptions,
+    testing::Values(
+        Refusal{{"--size", "5XB"}, 2, "--size"},
+        Refusal{{"--size", "9KB", "--psnr", "40"}, 2, "--psnr"},
+        Refusal{{"--size", "9KB", "--ratio", "9"}, 2, "--ratio"},
+        Refusal{{"--ratio", "0.5"}, 2, "--ratio"}, Refusal{{"--size", "99"}, 2, "bytes"},
+        Refusal{{"--count", "0"}, 2, "--count"}, Refusal{{"--count", "x"}, 2, "x"},
+        Refusal{{"--psnr", "-1"}, 2, "--psnr"}, Refusal{{"--psnr", "nan"}, 2, "psnr"},
+        Refusal{{"--seconds", "0"}, 2, "--seconds"},
+        Refusal{{"--iterations", "0"}, 2, "--iterations"}, Refusal{{"--preset", "best"}, 2, "best"},
+        Refusal{{"--box", "1,2,3"}, 2, "--box"}, Refusal{{"--box", "5,5,5,1,1,1"}, 2, "no voxel"},
+        Refusal{{"--loss", "paper", "--beta", "2"}, 2, "--beta"},
+        Refusal{{"--device", "tpu"}, 2, "tpu"}, Refusal{{"--device", "cuda:4096"}, 5, "cuda:4096"},
+        Refusal{{"--report", "report.txt"}, 2, ".json"},
+        Refusal{{"more"}, 2, "unexpected argument"}));
 
 TEST_F(Vdb2Esvr, endsWithCodeFourWhereThePsnrIsMissedAndWritesTheFile) {
   const auto run = quickFit(in(), out(), {"--psnr", "200"});

@@ -79,6 +79,24 @@ TEST(CompactGrid, ComesAsNearAsItCanToAPsnrOutOfReach) {
   EXPECT_LT(compact.loss, 0.05);
 }
 
+TEST(CompactGrid, FillsTheBytesThatItMayHave) {
+  for (const std::uint64_t bytes : {400u, 600u, 900u}) {
+    const auto compact = compactGrid(tube().grid, tube().source, {.bytes = bytes});
+    EXPECT_LE(compact.bytes, bytes);
+    // 60 ellipsoids: a step that is a bit too fine for one more bit of all costs 75 bytes, and
+    // steps are tried to half a per cent
+    EXPECT_GE(compact.bytes, bytes - 20);
+  }
+}
+
+TEST(CompactGrid, IsBetterTheMoreBytesItMayHave) {
+  const auto lossAt = [](std::uint64_t bytes) {
+    return compactGrid(tube().grid, tube().source, {.bytes = bytes}).loss;
+  };
+  EXPECT_GT(lossAt(400), lossAt(600));
+  EXPECT_GT(lossAt(600), lossAt(900));
+}
+
 TEST(CompactGrid, KeepsTheBandOfALevelSet) {
   const Example ball = fitted(test::levelSetVolume(), true);
   const auto compact = compactGrid(ball.grid, ball.source);

@@ -1,0 +1,33 @@
+// Plan: what people write for a size, and what is not one.
+
+#include "cli/byte_size.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "esvr/error.h"
+
+namespace esvr::cli {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(ByteSize, knowsUnits) {
+  EXPECT_EQ(parseByteSize("size", "50000"), 50'000u);
+  EXPECT_EQ(parseByteSize("size", "50KB"), 50'000u);
+  EXPECT_EQ(parseByteSize("size", "2.6MB"), 2'600'000u);
+  EXPECT_EQ(parseByteSize("size", "48kib"), 49'152u);
+  EXPECT_EQ(parseByteSize("size", "1GiB"), std::uint64_t{1} << 30);
+  EXPECT_EQ(parseByteSize("size", "7b"), 7u);
+}
+
+TEST(ByteSize, refusesWhatIsNone) {
+  for (const char* text : {"", "KB", "-5KB", "0", "0.4", "5 KB", "5XB", "1e300", "nan", "inf"})
+    EXPECT_THAT([&] { (void)parseByteSize("size", text); },
+                ThrowsMessage<UsageError>(HasSubstr("--size must be a size")))
+        << text;
+}
+
+}  // namespace
+}  // namespace esvr::cli
