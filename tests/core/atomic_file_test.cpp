@@ -2,17 +2,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <string>
 #include <string_view>
 
 #include "esvr/error.h"
+#include "support/file_size_limit.h"
 
 namespace esvr {
 namespace {
@@ -45,24 +44,6 @@ std::string contentOf(const fs::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 void put(const fs::path& path, std::string_view text) { std::ofstream(path) << text; }
-
-/// Lets files grow to `bytes` only, as a full disk would.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &old_);
-    const rlimit limit{bytes, old_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &old_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  void (*handler_)(int);
-  rlimit old_{};
-};
 
 TEST_F(AtomicFileTest, AppearsOnlyOnCommit) {
   AtomicFile file(target(), false);
@@ -149,7 +130,7 @@ TEST_F(AtomicFileTest, AFullDiskIsAFailureAndLeavesTheOldFile) {
   put(target(), "old");
   {
     AtomicFile file(target(), true);
-    const FileSizeLimit limit(1000);
+    const test::FileSizeLimit limit(1000);
     const std::string big(5000, 'x');
     EXPECT_THAT([&] { file.write(bytesOf(big)); },
                 ThrowsMessage<RuntimeFailure>(HasSubstr("out.esvr")));

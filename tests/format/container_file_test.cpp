@@ -2,17 +2,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <fstream>
 
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "format/crafted_file.h"
 #include "format/sample_files.h"
+#include "support/file_size_limit.h"
 
 namespace esvr {
 namespace {
@@ -62,15 +61,11 @@ TEST_F(ContainerFile, AnExistingOneIsReplacedOnlyWhenAsked) {
 }
 
 TEST_F(ContainerFile, AFullDiskLeavesNothing) {
-  rlimit old{};
-  ::getrlimit(RLIMIT_FSIZE, &old);
-  const rlimit limit{1000, old.rlim_max};
-  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
-  ::setrlimit(RLIMIT_FSIZE, &limit);
-  EXPECT_THAT([&] { writeEsvr(path(), test::everything(100)); },
-              ThrowsMessage<RuntimeFailure>(HasSubstr("f.esvr")));
-  ::setrlimit(RLIMIT_FSIZE, &old);
-  std::signal(SIGXFSZ, handler);
+  {
+    const test::FileSizeLimit limit(1000);
+    EXPECT_THAT([&] { writeEsvr(path(), test::everything(100)); },
+                ThrowsMessage<RuntimeFailure>(HasSubstr("f.esvr")));
+  }
   EXPECT_TRUE(fs::is_empty(directory_));
 }
 

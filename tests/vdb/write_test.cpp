@@ -4,12 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetSphere.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
-#include <csignal>
-
 #include "esvr/error.h"
+#include "support/file_size_limit.h"
 #include "vdb/expect_same.h"
 #include "vdb/made_files.h"
 #include "vdb/test_files.h"
@@ -198,29 +196,11 @@ TEST_F(Write, ADirectoryWithoutPermissionIsAnError) {
   std::filesystem::permissions(directory_.path(), std::filesystem::perms::owner_all);
 }
 
-/// Files of this process may not grow beyond a size: what a full disk looks like to a writer.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : oldHandler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &old_);
-    const rlimit limited{bytes, old_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limited);
-  }
-  ~FileSizeLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &old_);
-    std::signal(SIGXFSZ, oldHandler_);
-  }
-
- private:
-  rlimit old_{};
-  void (*oldHandler_)(int);
-};
-
 TEST_F(Write, AFullDiskIsNoticedAndLeavesNothing) {
   const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}, {{5000, 0, 0}, 1.0f}});
   for (const char* name : {"out.vdb", "out.nvdb"}) {
     for (const rlim_t limit : {rlim_t{0}, rlim_t{100}, rlim_t{600}}) {
-      const FileSizeLimit full(limit);
+      const test::FileSizeLimit full(limit);
       EXPECT_THAT(
           [&] {
             writeGrids(directory_ / name, {}, {&grid, 1});
