@@ -14,10 +14,10 @@ struct ThresholdChoice {
   double iou = 0.0;  ///< intersection over union of active voxels, source and result
 };
 
-/// The best overlap that costs no squared error, to 1/128 of the threshold: one evaluation of the
-/// field and a histogram. Where several thresholds do as well, one amid them, so that rounding on
-/// another machine changes nothing.
-/// \param bricks  where the field will be evaluated: increasing index corners
+/// The best overlap that costs no squared error worth telling (0.004 dB), to 1/128 of the
+/// threshold: one evaluation of the field and a histogram. Where several thresholds do as well, one
+/// amid them, so that rounding on another machine changes nothing. \param bricks  where the field
+/// will be evaluated: increasing index corners
 [[nodiscard]] ThresholdChoice chooseThreshold(const SparseVolume& source, const Field& field,
                                               const ActivityRule& rule,
                                               std::span<const Coord> bricks);
