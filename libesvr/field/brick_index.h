@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "esvr/coord.h"
+#include "field/brick_hash.h"
 
 namespace esvr {
 
@@ -30,12 +31,7 @@ class BrickIndex {
   [[nodiscard]] std::size_t size() const { return bricks_.size(); }
 
  private:
-  static std::size_t hash(Coord c) {
-    std::uint64_t h = std::uint32_t(c.x) * 0x9e3779b97f4a7c15ull;
-    h = (h ^ (h >> 29)) + std::uint32_t(c.y) * 0xbf58476d1ce4e5b9ull;
-    h = (h ^ (h >> 32)) + std::uint32_t(c.z) * 0x94d049bb133111ebull;
-    return std::size_t(h ^ (h >> 31));
-  }
+  static std::size_t hash(Coord c) { return std::size_t(hashOf(c)); }
   void insert(std::uint32_t position);
   void rehash();
 

@@ -19,12 +19,17 @@ struct Support {
   std::array<double, 3> half;  ///< half widths of the bounding box, slack included
 };
 
-[[nodiscard]] Support makeSupport(const std::array<double, 3>& center, const Matrix3& L,
-                                  double radius, double slack);
+[[nodiscard]] ESVR_HD inline Support makeSupport(const std::array<double, 3>& center,
+                                                 const Matrix3& L, double radius, double slack) {
+  Support s{center, L, radius, slack, {}};
+  const Matrix3 F = inverse(L);
+  for (int a = 0; a < 3; ++a) s.half[a] = radius * std::sqrt(sigma(F, a, a)) + slack;
+  return s;
+}
 
 /// False only where the brick's voxels certainly lie outside: tests the planes that bound the
 /// support perpendicular to the rows of L, which are its principal axes when L = S^-1 R^T.
-[[nodiscard]] inline bool mayTouch(const Support& s, Coord brick) {
+[[nodiscard]] ESVR_HD inline bool mayTouch(const Support& s, Coord brick) {
   constexpr double kHalf = (kBrickSide - 1) / 2.0;  // voxels are points: a brick spans 7, not 8
   const double d[3] = {double(brick.x) * kBrickSide + kHalf - s.center[0],
                        double(brick.y) * kBrickSide + kHalf - s.center[1],
@@ -41,7 +46,7 @@ struct Support {
 }
 
 /// Bricks that overlap the bounding box, as a box of brick coordinates.
-[[nodiscard]] inline Box brickRange(const Support& s) {
+[[nodiscard]] ESVR_HD inline Box brickRange(const Support& s) {
   const auto low = [&](int a) {
     return std::int32_t(std::ceil(s.center[a] - s.half[a])) >> kBrickLog2;
   };

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "fit/engine.h"
+#include "esvr/kernel.h"
 #include "fit/primitive.h"
 
 namespace esvr {
@@ -15,7 +15,7 @@ struct StepSizes {
   double position = 0.06;   ///< of the semi-axis's scale
   double shape = 0.06;      ///< relative change of a scale; the same for shears
   double intensity = 0.06;  ///< of the intensity, at least of kIntensityFloor
-  [[nodiscard]] StepSizes scaled(double f) const {
+  [[nodiscard]] ESVR_HD StepSizes scaled(double f) const {
     return {position * f, shape * f, intensity * f};
   }
 };
@@ -35,6 +35,12 @@ struct AdamState {
 struct PrimitiveLimits {
   double smallestScale, largestScale;        ///< voxels
   double lowestIntensity, highestIntensity;  ///< in units of the target
+};
+
+/// What a pass tells of one primitive.
+struct PrimitiveGradient {
+  ParameterVector byParameter;  ///< of half the sum of squared residuals, or of the given loss
+  double phi2;                  ///< sum over voxels of phi^2: the curvature by intensity
 };
 
 /// One step of every primitive.

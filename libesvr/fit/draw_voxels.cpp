@@ -7,22 +7,9 @@
 namespace esvr {
 namespace {
 
-/// A uniform number in [0, 1) for draw `n` of a seed.
-double uniform(std::uint64_t seed, std::uint64_t n) {
-  std::uint64_t z =
-      seed * 0x9e3779b97f4a7c15ull + n * 0xbf58476d1ce4e5b9ull + 0x94d049bb133111ebull;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-  return double((z ^ (z >> 31)) >> 11) * 0x1p-53;
-}
-
-double energyOf(float r, SignsAllowed signs) {
-  return signs.mends(r) ? double(r) * double(r) : 0.0;
-}
-
 double energy(std::span<const float> values, SignsAllowed signs) {
   double sum = 0.0;
-  for (const float r : values) sum += energyOf(r, signs);
+  for (const float r : values) sum += drawEnergy(r, signs);
   return sum;
 }
 
@@ -41,7 +28,7 @@ int voxelAt(std::span<const float> values, SignsAllowed signs, double target) {
   double sum = 0.0;
   int last = 0;
   for (int v = 0; v < kBrickVoxels && sum <= target; ++v) {
-    const double e = energyOf(values[v], signs);
+    const double e = drawEnergy(values[v], signs);
     if (e > 0.0) last = v;
     sum += e;
   }
@@ -56,7 +43,7 @@ std::vector<Coord> drawVoxels(const ResidualField& residual, const DrawOptions& 
   if (!(sums.back() > 0.0)) return voxels;
   const double share = sums.back() / double(options.count);
   for (std::size_t n = 0; n < options.count; ++n) {
-    const double at = (double(n) + uniform(options.seed, n)) * share;
+    const double at = (double(n) + drawUniform(options.seed, n)) * share;
     const auto after = std::upper_bound(sums.begin(), sums.end() - 1, at);
     const std::size_t b = std::min(std::size_t(after - sums.begin()), options.targetBricks) - 1;
     const int v = voxelAt(residual.brick(b), options.signs, at - sums[b]);

@@ -7,16 +7,11 @@
 
 #include "field/brick_kernels.h"
 #include "field/brick_pairs.h"
+#include "fit/adam.h"
 #include "fit/primitive.h"
 #include "fit/target.h"
 
 namespace esvr {
-
-/// What a pass tells of one primitive.
-struct PrimitiveGradient {
-  ParameterVector byParameter;  ///< of half the sum of squared residuals, or of the given loss
-  double phi2;                  ///< sum over voxels of phi^2: the curvature by intensity
-};
 
 /// Keeps the pair lists and the prepared forms. Lists hold while no support has moved by more than
 /// the slack they were built with; the caller says when to rebuild.

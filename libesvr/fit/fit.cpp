@@ -92,7 +92,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
 
   Recorder recorder(target, options);
   const RunPlan plan = planFor(target, options);
-  OptimiserOptions optimiserOptions{{}, options.loss, options.beta, options.seed};
+  OptimiserOptions optimiserOptions{{}, options.loss, options.beta, options.seed, options.device};
   FitResult result;
   if (options.kappa) {
     optimiserOptions.kernel.kappa = *options.kappa;
@@ -103,19 +103,19 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   }
   result.secondsPilot = recorder.seconds();
 
-  Optimiser optimiser(target, optimiserOptions, tuning);
-  const RunEnd end = run(optimiser, target, recorder, plan);
-  if (end.end == FitEnd::kCancelled && optimiser.primitives().empty()) throw Cancelled();
-  optimiser.dropUnseen();
-  recorder.record(optimiser, end.iterations);
+  const auto optimiser = makeOptimiser(target, optimiserOptions, tuning);
+  const RunEnd end = run(*optimiser, target, recorder, plan, tuning);
+  if (end.end == FitEnd::kCancelled && optimiser->primitiveCount() == 0) throw Cancelled();
+  optimiser->dropUnseen();
+  recorder.record(*optimiser, end.iterations);
 
-  result.field = exportField(optimiser.primitives(), {volume.origin, target.scale,
+  result.field = exportField(optimiser->primitives(), {volume.origin, target.scale,
                                                       volume.background, optimiserOptions.kernel});
   result.end = end.end;
   result.curve = recorder.curve();
-  result.pairs = optimiser.pairCount();
+  result.pairs = optimiser->pairCount();
   result.signedIntensities = anyNegative(result.field);
-  result.secondsSeed = optimiser.secondsSeeding();
+  result.secondsSeed = optimiser->secondsSeeding();
   result.secondsOptimise = recorder.seconds() - result.secondsPilot - result.secondsSeed;
   return result;
 }

@@ -1,16 +1,16 @@
 #pragma once
-/// The state of a fit and the moves it is made of; run.h decides which comes when.
+/// The state of a fit and the moves it is made of, wherever it is computed; run.h decides which
+/// comes when.
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "esvr/device.h"
 #include "esvr/fit.h"
-#include "fit/adam.h"
-#include "fit/engine.h"
-#include "fit/paper_loss.h"
-#include "fit/seed.h"
-#include "fit/step_trust.h"
+#include "fit/primitive.h"
+#include "fit/target.h"
 #include "fit/tuning.h"
 
 namespace esvr {
@@ -20,6 +20,7 @@ struct OptimiserOptions {
   Loss loss = Loss::kSquared;
   double beta = 0.2;
   std::uint64_t seed = 1;
+  Device device;
 };
 
 /// Errors of a fit as its curve reports them, in units of the target.
@@ -32,54 +33,39 @@ struct FitErrors {
 
 class Optimiser {
  public:
-  /// The target must outlive the optimiser.
-  Optimiser(const FitTarget& target, const OptimiserOptions& options, const Tuning& tuning);
+  virtual ~Optimiser() = default;
 
   /// Adds primitives where the error is, until there are `count`, or no error is left to mend.
-  void growTo(std::size_t count);
+  virtual void growTo(std::size_t count) = 0;
 
   /// Moves `count` primitives whose removal costs least to where the error is.
-  void relocate(std::size_t count);
+  virtual void relocate(std::size_t count) = 0;
 
-  /// Gradients, and one step of `scale` times the tuned sizes. \return sum of r^2 before the step
+  /// Gradients and a step of factor times the tuned sizes, for each of the factors.
+  /// \return sum of r^2 before the last step
   /// \throws RuntimeFailure  the loss is not finite
-  double iterate(double scale);
+  virtual double iterate(std::span<const double> factors) = 0;
 
-  [[nodiscard]] FitErrors measure();
+  /// How many iterations a call of iterate() should be given, where nothing else comes between.
+  [[nodiscard]] virtual std::uint32_t batchSize() const = 0;
+
+  [[nodiscard]] virtual FitErrors measure() = 0;
 
   /// Drops primitives that no voxel sees. They cost bytes and change nothing.
-  void dropUnseen();
+  virtual void dropUnseen() = 0;
 
-  [[nodiscard]] const std::vector<Primitive>& primitives() const { return primitives_; }
+  [[nodiscard]] virtual std::size_t primitiveCount() const = 0;
+  [[nodiscard]] virtual std::vector<Primitive> primitives() const = 0;
+  /// Of the lists last built.
+  [[nodiscard]] virtual std::uint64_t pairCount() const = 0;
   /// Spent so far on finding where primitives are missing and shaping them.
-  [[nodiscard]] double secondsSeeding() const { return secondsSeeding_; }
-  [[nodiscard]] std::uint64_t pairCount() const { return engine_.pairs().pairCount(); }
-  [[nodiscard]] const Tuning& tuning() const { return tuning_; }
-
- private:
-  [[nodiscard]] std::vector<Primitive> newSeeds(std::size_t count);
-  [[nodiscard]] std::vector<std::size_t> leastUseful(std::size_t count) const;
-  void rebuildLists();
-  void refreshResiduals();
-  double takeGradients();
-  double takePaperGradients();
-
-  const FitTarget& target_;
-  OptimiserOptions options_;
-  Tuning tuning_;
-  FitEngine engine_;
-  PaperLoss paperLoss_;
-  StepTrust trust_;
-  double unitVariance_;
-  PrimitiveLimits limits_;
-  std::vector<Primitive> primitives_;
-  std::vector<AdamState> states_;
-  std::vector<PrimitiveGradient> gradients_;
-  std::vector<float> residuals_;
-  std::vector<float> lossByValue_;
-  double secondsSeeding_ = 0.0;
-  std::uint64_t draws_ = 0;          ///< events so far: each draws from its own random stream
-  int iterationsSinceRebuild_ = -1;  ///< -1: lists are stale
+  [[nodiscard]] virtual double secondsSeeding() const = 0;
 };
+
+/// An optimiser on the device of the options. The target must outlive it.
+/// \throws DeviceError  that device cannot be used
+[[nodiscard]] std::unique_ptr<Optimiser> makeOptimiser(const FitTarget& target,
+                                                       const OptimiserOptions& options,
+                                                       const Tuning& tuning);
 
 }  // namespace esvr

@@ -10,7 +10,7 @@ namespace esvr {
 struct PairSums {
   double w0x, w0z, w0xx, w0xz, w0zz, w1, w1x, w1z, w2, rPhi, phi2;
 
-  void add(const PairMoments& m) {
+  ESVR_HD void add(const PairMoments& m) {
     w0x += m.w0x, w0z += m.w0z, w0xx += m.w0xx, w0xz += m.w0xz, w0zz += m.w0zz;
     w1 += m.w1, w1x += m.w1x, w1z += m.w1z, w2 += m.w2, rPhi += m.rPhi, phi2 += m.phi2;
   }
@@ -19,7 +19,8 @@ struct PairSums {
 /// With u = px dx + pz dz + ly t the position in the unit frame,
 ///   dL/d delta = -2 I sum r phi' u,   dL/dA_jk = -2 I sum r phi' u_j u_k (twice that off the
 ///   diagonal), dL/dI = sum r phi.
-[[nodiscard]] inline ParameterVector parameterGradient(const LineForm& f, const PairSums& s) {
+[[nodiscard]] ESVR_HD inline ParameterVector parameterGradient(const LineForm& f,
+                                                               const PairSums& s) {
   const auto first = [&](int j) {
     return double(f.px[j]) * s.w0x + double(f.pz[j]) * s.w0z + double(f.ly[j]) * s.w1;
   };
@@ -35,6 +36,12 @@ struct PairSums {
           c * second(1, 1),     c * second(2, 2),
           2 * c * second(0, 1), 2 * c * second(0, 2),
           2 * c * second(1, 2), s.rPhi};
+}
+
+/// How much the sum of squares would grow if the primitive vanished:
+/// sum (r - I phi)^2 - r^2 = I^2 sum phi^2 - 2 I sum r phi.
+[[nodiscard]] ESVR_HD inline double removalError(double intensity, double phi2, double rPhi) {
+  return intensity * (intensity * phi2 - 2.0 * rPhi);
 }
 
 }  // namespace esvr

@@ -45,14 +45,14 @@ Part partOf(const FitTarget& whole) {
 double psnrAt(float kappa, const FitTarget& target, std::size_t count, OptimiserOptions options,
               const Tuning& tuning) {
   options.kernel.kappa = kappa;
-  Optimiser optimiser(target, options, tuning);
+  const auto optimiser = makeOptimiser(target, options, tuning);
   const FitOptions quiet;
   Recorder recorder(target, quiet);
   RunPlan plan;
   plan.count = count;
   plan.iterations = kPilotIterations;
-  run(optimiser, target, recorder, plan);
-  return psnrOf(optimiser.measure().squaredSum, target.boxVoxels, target.peak);
+  run(*optimiser, target, recorder, plan, tuning);
+  return psnrOf(optimiser->measure().squaredSum, target.boxVoxels, target.peak);
 }
 
 }  // namespace

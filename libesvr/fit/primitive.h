@@ -25,12 +25,6 @@ struct Primitive {
 inline constexpr int kParameters = 10;
 using ParameterVector = std::array<double, kParameters>;
 
-/// Moves a primitive by a step.
-void applyStep(Primitive& p, const ParameterVector& step);
-
-/// Keeps every semi-axis's scale within [smallest, largest] voxels; the frame is kept.
-void clampScales(Primitive& p, double smallest, double largest);
-
 /// Principal axes of L: scales and a rotation with L = Q S^-1 R^T, as Ellipsoids store them.
 struct PrincipalAxes {
   std::array<double, 3> scale;     ///< decreasing

@@ -18,7 +18,7 @@ const CurvePoint& Recorder::record(Optimiser& optimiser, std::uint32_t iteration
   CurvePoint point;
   point.seconds = seconds();
   point.iteration = iteration;
-  point.primitives = optimiser.primitives().size();
+  point.primitives = optimiser.primitiveCount();
   point.psnrBox = psnrOf(errors.squaredSumBox, target_.boxVoxels, target_.peak);
   point.psnrActive = psnrOf(errors.squaredSumActive, double(target_.activeVoxels), target_.peak);
   point.maxError = errors.largest / target_.scale;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace esvr {
 namespace {
@@ -20,15 +21,13 @@ class Stretch {
   /// \return why it ended; kScheduleDone when it ran to its end
   FitEnd run(const Schedule& schedule, std::uint32_t firstIteration) {
     started_ = recorder_.seconds();
-    for (done_ = 0; !finished(schedule); ++done_) {
+    while (!finished(schedule)) {
       if (recorder_.cancelled()) return FitEnd::kCancelled;
-      const double fraction = fractionDone(schedule);
-      if (done_ % schedule.eventInterval() == 0) events(schedule, fraction);
+      if (done_ % schedule.eventInterval() == 0) events(schedule, fractionDone(schedule));
       if (done_ % recordInterval(schedule) == 0)
         recorder_.record(optimiser_, firstIteration + done_);
-      const double loss = optimiser_.iterate(schedule.stepAt(fraction, done_));
-      const double psnr = psnrOf(loss, target_.boxVoxels, target_.peak);
-      report(psnr, firstIteration, fraction);
+      const double psnr = psnrOf(iterate(schedule), target_.boxVoxels, target_.peak);
+      report(psnr, firstIteration, fractionDone(schedule));
       if (plan_.psnr && psnr > *plan_.psnr && reachedExactly(firstIteration))
         return FitEnd::kPsnrReached;
     }
@@ -37,9 +36,8 @@ class Stretch {
   [[nodiscard]] std::uint32_t iterations() const { return done_; }
 
  private:
-  [[nodiscard]] double fractionDone(const Schedule& schedule) const {
-    const double byCount = double(done_) / schedule.iterations;
-    if (!plan_.seconds) return byCount;
+  [[nodiscard]] double fractionDone(const Schedule& schedule, std::uint32_t ahead = 0) const {
+    if (!plan_.seconds) return double(done_ + ahead) / schedule.iterations;
     const double left = *plan_.seconds - started_;
     return left > 0.0 ? std::min(1.0, (recorder_.seconds() - started_) / left) : 1.0;
   }
@@ -50,9 +48,22 @@ class Stretch {
     return std::max(schedule.eventInterval(), schedule.iterations / kCurvePoints);
   }
 
+  /// Iterates until something else is due. \return sum of r^2 before the last step
+  double iterate(const Schedule& schedule) {
+    const auto until = [&](std::uint32_t interval) { return interval - done_ % interval; };
+    std::uint32_t count = std::min({optimiser_.batchSize(), until(schedule.eventInterval()),
+                                    until(recordInterval(schedule))});
+    if (!plan_.seconds) count = std::min(count, schedule.iterations - done_);
+    std::vector<double> factors;
+    for (std::uint32_t k = 0; k < count; ++k)
+      factors.push_back(schedule.stepAt(fractionDone(schedule, k), done_ + k));
+    done_ += count;
+    return optimiser_.iterate(factors);
+  }
+
   void events(const Schedule& schedule, double fraction) {
     if (done_ > 0)
-      optimiser_.relocate(schedule.relocationsAt(fraction, optimiser_.primitives().size()));
+      optimiser_.relocate(schedule.relocationsAt(fraction, optimiser_.primitiveCount()));
     optimiser_.growTo(schedule.countAt(fraction));
   }
 
@@ -60,7 +71,7 @@ class Stretch {
     CurvePoint now;
     now.seconds = recorder_.seconds();
     now.iteration = firstIteration + done_;
-    now.primitives = optimiser_.primitives().size();
+    now.primitives = optimiser_.primitiveCount();
     now.psnrBox = psnr;
     recorder_.report(now, fraction);
   }
@@ -92,8 +103,8 @@ std::size_t nextCount(std::size_t now, double missing, std::size_t largest) {
 
 }  // namespace
 
-RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan) {
-  const Tuning& tuning = optimiser.tuning();
+RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,
+           const Tuning& tuning) {
   Schedule schedule{firstCount(plan, tuning), plan.count, plan.iterations, tuning};
   RunEnd result{FitEnd::kScheduleDone, 0};
   for (;;) {
@@ -106,7 +117,7 @@ RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, co
       result.end = FitEnd::kPsnrMissed;
       return result;
     }
-    schedule.from = optimiser.primitives().size();
+    schedule.from = optimiser.primitiveCount();
     schedule.to =
         std::max(schedule.from, nextCount(schedule.to, *plan.psnr - reached, plan.largestCount));
   }

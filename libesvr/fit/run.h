@@ -24,6 +24,7 @@ struct RunEnd {
   std::uint32_t iterations;
 };
 
-RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan);
+RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,
+           const Tuning& tuning);
 
 }  // namespace esvr

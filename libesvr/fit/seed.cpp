@@ -2,54 +2,29 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Dense>
-#include <algorithm>
 #include <cmath>
+
+#include "fit/seed_math.h"
 
 namespace esvr {
 namespace {
 
-constexpr double kSmallestVariance = 0.25;  // voxels^2: a seed of one voxel still has a shape
-
-/// Moments of the residual of one sign in a window.
-struct Moments {
-  double mass = 0.0;
-  Eigen::Vector3d first = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
-};
-
-Moments momentsAround(const ResidualField& residual, Coord voxel, double sign, int w) {
-  Moments m;
+SeedMoments momentsAround(const ResidualField& residual, Coord voxel, double sign, int w) {
+  SeedMoments m;
   for (int x = -w; x <= w; ++x)
     for (int y = -w; y <= w; ++y)
       for (int z = -w; z <= w; ++z) {
-        if (x * x + y * y + z * z > w * w + 1) continue;
+        if (!inSeedWindow({x, y, z}, w)) continue;
         const double r = sign * residual.at(voxel + Coord{x, y, z});
-        if (r <= 0.0) continue;
-        const Eigen::Vector3d d(x, y, z);
-        m.mass += r;
-        m.first += r * d;
-        m.second += r * d * d.transpose();
+        if (r > 0.0) m.add({x, y, z}, r);
       }
   return m;
 }
 
 Primitive seedAt(const ResidualField& residual, Coord voxel, const SeedOptions& options) {
   const double r = residual.at(voxel);
-  const Moments m = momentsAround(residual, voxel, r < 0.0 ? -1.0 : 1.0, options.window);
-  const Eigen::Vector3d mean = m.first / m.mass;
-  Eigen::Matrix3d covariance = m.second / m.mass - mean * mean.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
-  const Eigen::Vector3d scale =
-      (axes.eigenvalues().cwiseMax(kSmallestVariance) / options.unitVariance).cwiseSqrt();
-  const Eigen::Matrix3d L = scale.cwiseInverse().asDiagonal() * axes.eigenvectors().transpose();
-
-  Primitive p;
-  p.center = {voxel.x + mean[0], voxel.y + mean[1], voxel.z + mean[2]};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) p.L[3 * i + j] = L(i, j);
-  p.intensity = -r * options.intensity;
-  return p;
+  const auto moments = momentsAround(residual, voxel, r < 0.0 ? -1.0 : 1.0, options.window);
+  return seedFromMoments(voxel, moments, {options.unitVariance, -r * options.intensity});
 }
 
 }  // namespace

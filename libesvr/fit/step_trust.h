@@ -3,28 +3,31 @@
 /// residual and move alike; where many do, their sum overshoots although each step is small.
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+
+#include "esvr/kernel.h"
 
 namespace esvr {
 
 class StepTrust {
  public:
   /// \param energy  sum of squares of the target: losses far below it may jump without harm
-  explicit StepTrust(double energy) : noise_(kNoise * energy) {}
+  ESVR_HD explicit StepTrust(double energy = 0.0) : noise_(kNoise * energy) {}
 
   /// \param loss  of the iteration just evaluated \return the factor for its step
-  double update(double loss) {
+  ESVR_HD double update(double loss) {
     const bool rising = loss > previous_;
     previous_ = loss;
     if (rising && loss > kBadly * std::max(best_, noise_))
-      factor_ = std::max(kLeast, factor_ * kCut);
+      factor_ = std::fmax(kLeast, factor_ * kCut);
     else
       factor_ = std::min(1.0, factor_ * kRecover);
     best_ = std::min(loss, best_ * kForget);
     return factor_;
   }
   /// After primitives were added or moved, which may raise the loss.
-  void forgetLoss() { best_ = previous_ = std::numeric_limits<double>::max(); }
+  ESVR_HD void forgetLoss() { best_ = previous_ = std::numeric_limits<double>::max(); }
 
  private:
   static constexpr double kBadly =

@@ -24,17 +24,6 @@ FitOptions quick(std::size_t count = 60) {
   return options;
 }
 
-bool sameBits(const Field& a, const Field& b) {
-  if (a.chunks.size() != b.chunks.size()) return false;
-  for (std::size_t c = 0; c < a.chunks.size(); ++c) {
-    const Ellipsoids &x = a.chunks[c].ellipsoids, &y = b.chunks[c].ellipsoids;
-    if (x.center != y.center || x.logScale != y.logScale || x.rotation != y.rotation ||
-        x.intensity != y.intensity || x.kappa != y.kappa)
-      return false;
-  }
-  return true;
-}
-
 double psnrOfFit(const SparseVolume& volume, const FitResult& result, double peak) {
   RevoxeliseOptions all;
   CompareOptions compare;
@@ -65,21 +54,21 @@ TEST(Fit, CurveAgreesWithTheMetricsOfItsField) {
 
 TEST(Fit, GivesTheSameBitsAgain) {
   const SparseVolume volume = test::tubeVolume();
-  EXPECT_TRUE(sameBits(fit(volume, quick()).field, fit(volume, quick()).field));
+  EXPECT_TRUE(test::sameBits(fit(volume, quick()).field, fit(volume, quick()).field));
 }
 
 TEST(Fit, GivesTheSameBitsOnOneThread) {
   const SparseVolume volume = test::tubeVolume();
   const Field many = fit(volume, quick()).field;
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  EXPECT_TRUE(sameBits(fit(volume, quick()).field, many));
+  EXPECT_TRUE(test::sameBits(fit(volume, quick()).field, many));
 }
 
 TEST(Fit, DependsOnTheSeed) {
   const SparseVolume volume = test::tubeVolume();
   FitOptions other = quick();
   other.seed = 2;
-  EXPECT_FALSE(sameBits(fit(volume, quick()).field, fit(volume, other).field));
+  EXPECT_FALSE(test::sameBits(fit(volume, quick()).field, fit(volume, other).field));
 }
 
 TEST(Fit, GivesTheSameBitsWhereverTheVolumeLies) {
@@ -87,7 +76,7 @@ TEST(Fit, GivesTheSameBitsWhereverTheVolumeLies) {
        {Coord{1 << 20, -(1 << 20), 1 << 20}, Coord{10'000'000, -10'000'000, 8}}) {
     const FitResult here = fit(test::tubeVolume(), quick());
     const FitResult there = fit(test::tubeVolume(shift), quick());
-    EXPECT_TRUE(sameBits(here.field, there.field));
+    EXPECT_TRUE(test::sameBits(here.field, there.field));
     EXPECT_EQ(there.field.chunks[0].origin, here.field.chunks[0].origin + shift);
   }
 }
@@ -102,7 +91,7 @@ TEST(Fit, GivesTheSameBitsWithEmptySpaceAround) {
   }
   bricks.push_back({{-8000, -80, -800}, {}, {}});
   bricks.push_back({{4000, 80, 800}, {}, {}});
-  EXPECT_TRUE(sameBits(fit(makeVolume(bricks, 0.0f), quick()).field, fit(volume, quick()).field));
+  EXPECT_TRUE(test::sameBits(fit(makeVolume(bricks, 0.0f), quick()).field, fit(volume, quick()).field));
 }
 
 class FitScale : public testing::TestWithParam<double> {};

@@ -7,37 +7,16 @@
 
 #include <cmath>
 
-#include "../field/random_field.h"
 #include "fit/engine.h"
+#include "fit/primitive_math.h"
+#include "random_primitives.h"
 
 namespace esvr {
 namespace {
 
-constexpr int kSide = 32;
-
-SparseVolume denseVolume() {
-  std::vector<BrickInput> bricks;
-  test::Random random(5);
-  for (int b = 0; b < 64; ++b) {
-    BrickInput brick;
-    brick.corner = Coord{b / 16, b / 4 % 4, b % 4} * kBrickSide;
-    for (float& v : brick.values) v = float(random(0.0, 1.0));
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), 0.0f);
-}
-
-std::vector<Primitive> randomPrimitives(std::size_t n, double smallest, double aspect) {
-  const Field field = test::randomField(
-      {.count = n, .extent = kSide, .smallest = smallest, .aspect = aspect, .seed = 21});
-  const Ellipsoids& e = field.chunks[0].ellipsoids;
-  std::vector<Primitive> primitives;
-  for (std::size_t i = 0; i < n; ++i)
-    primitives.push_back(
-        {{e.center[0][i], e.center[1][i], e.center[2][i]}, unitFrame(e, i), e.intensity[i]});
-  return primitives;
-}
+using test::denseVolume;
+using test::kSide;
+using test::randomPrimitives;
 
 double valueAt(const std::vector<Primitive>& primitives, const KernelConstants<double>& k,
                Coord v) {

@@ -2,7 +2,7 @@
 // principal axes give the shape back for needles and pancakes too, and export loses nothing but
 // float32.
 
-#include "fit/primitive.h"
+#include "fit/primitive_math.h"
 
 #include <gtest/gtest.h>
 

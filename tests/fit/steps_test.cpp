@@ -4,9 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
-#include "fit/optimiser.h"
+#include "fit/cpu_optimiser.h"
 #include "fit/schedule.h"
 #include "volumes.h"
 
@@ -76,23 +77,23 @@ TEST(Schedule, GoesFromItsFirstCountToItsLast) {
 TEST(Optimiser, GrowsToTheCountAndLowersTheLoss) {
   const SparseVolume volume = test::tubeVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
-  Optimiser optimiser(target, {}, {});
+  CpuOptimiser optimiser(target, {}, {});
   optimiser.growTo(50);
-  EXPECT_EQ(optimiser.primitives().size(), 50u);
-  const double first = optimiser.iterate(1.0);
-  for (int i = 0; i < 60; ++i) optimiser.iterate(0.5);
+  EXPECT_EQ(optimiser.primitiveCount(), 50u);
+  const double first = optimiser.iterate(std::array{1.0});
+  for (int i = 0; i < 60; ++i) optimiser.iterate(std::array{0.5});
   EXPECT_LT(optimiser.measure().squaredSum, 0.2 * first);
 }
 
 TEST(Optimiser, RelocatesTheLeastUsefulAndKeepsTheCount) {
   const SparseVolume volume = test::tubeVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
-  Optimiser optimiser(target, {}, {});
+  CpuOptimiser optimiser(target, {}, {});
   optimiser.growTo(50);
-  for (int i = 0; i < 30; ++i) optimiser.iterate(0.5);
+  for (int i = 0; i < 30; ++i) optimiser.iterate(std::array{0.5});
   const auto before = optimiser.primitives();
   optimiser.relocate(5);
-  const auto& after = optimiser.primitives();
+  const auto after = optimiser.primitives();
   ASSERT_EQ(after.size(), 50u);
   int moved = 0;
   for (std::size_t i = 0; i < 50; ++i) moved += before[i].center != after[i].center;
@@ -105,11 +106,11 @@ TEST(Optimiser, DropsWhatNoVoxelSees) {
   Tuning tiny;
   tiny.smallestScale = 0.01;
   tiny.largestScale = 0.02;  // supports of a twentieth of a voxel: most see no voxel
-  Optimiser optimiser(target, {}, tiny);
+  CpuOptimiser optimiser(target, {}, tiny);
   optimiser.growTo(50);
-  for (int i = 0; i < 5; ++i) optimiser.iterate(1.0);
+  for (int i = 0; i < 5; ++i) optimiser.iterate(std::array{1.0});
   optimiser.dropUnseen();
-  EXPECT_LT(optimiser.primitives().size(), 50u);
+  EXPECT_LT(optimiser.primitiveCount(), 50u);
   const double error = optimiser.measure().squaredSum;
   EXPECT_TRUE(std::isfinite(error));
 }

@@ -70,4 +70,15 @@ inline SparseVolume levelSetVolume() {
   return makeVolume(std::move(bricks), 3.0f);
 }
 
+inline bool sameBits(const Field& a, const Field& b) {
+  if (a.chunks.size() != b.chunks.size()) return false;
+  for (std::size_t c = 0; c < a.chunks.size(); ++c) {
+    const Ellipsoids &x = a.chunks[c].ellipsoids, &y = b.chunks[c].ellipsoids;
+    if (x.center != y.center || x.logScale != y.logScale || x.rotation != y.rotation ||
+        x.intensity != y.intensity || x.kappa != y.kappa)
+      return false;
+  }
+  return true;
+}
+
 }  // namespace esvr::test

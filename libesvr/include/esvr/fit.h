@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "esvr/coord.h"
+#include "esvr/device.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/fit_record.h"
 #include "esvr/progress.h"
@@ -45,6 +46,7 @@ struct FitOptions {
   /// is revoxelised as a narrow band), and what lies outside its bricks counts for nothing.
   bool narrowBand = false;
   std::uint64_t seed = 1;
+  Device device;                        ///< the CPU, or a GPU (selectDevice)
   const CancelToken* cancel = nullptr;  ///< a cancelled fit returns the best so far, marked so
   std::function<void(const FitProgress&)> progress;
 };
@@ -68,10 +70,12 @@ struct FitResult {
   bool signedIntensities = false;  ///< some intensity is negative
 };
 
-/// Deterministic: the same volume, options and seed give the same bits on any number of threads,
-/// unless `seconds` ends the run.
+/// Deterministic: the same volume, options and seed give the same bits on any number of threads and
+/// in every run on a GPU of one kind, unless `seconds` ends the run. CPU and GPU follow the same
+/// method and the same math, but round differently, so that their fits differ in detail.
 /// \throws BadInput  no active voxel; UsageError: count 0, options that contradict each other;
-///         Cancelled: before there was anything to return
+///         Cancelled: before there was anything to return; DeviceError: the GPU cannot be used or
+///         has too little memory; RuntimeFailure: the fit diverged
 [[nodiscard]] FitResult fit(const SparseVolume& volume, const FitOptions& options);
 
 }  // namespace esvr

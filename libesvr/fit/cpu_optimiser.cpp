@@ -1,95 +1,58 @@
-#include "fit/optimiser.h"
+#include "fit/cpu_optimiser.h"
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 
+#include "core/add_seconds.h"
 #include "esvr/error.h"
 #include "field/gather.h"
+#include "fit/parameter_gradient.h"
+#include "fit/scene.h"
 
 namespace esvr {
 namespace {
 
 constexpr int kListsStale = -1;
-constexpr int kSmallestWindow = 2, kLargestWindow = 6;  // voxels
-
-/// Voxels between neighbours if the primitives were spread evenly over the active voxels.
-double spacing(const FitTarget& target, std::size_t primitives) {
-  return std::cbrt(double(target.activeVoxels) / double(std::max<std::size_t>(primitives, 1)));
-}
-
-/// How much the sum of squares would grow if the primitive vanished:
-/// sum (r - I phi)^2 - r^2 = I^2 sum phi^2 - 2 I sum r phi.
-double removalError(const Primitive& p, const PrimitiveGradient& g) {
-  return p.intensity * (p.intensity * g.phi2 - 2.0 * g.byParameter[kParameters - 1]);
-}
-
-/// Adds the seconds of its life to a sum.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& sum) : sum_(sum) {}
-  ~Stopwatch() { sum_ += std::chrono::duration<double>(Clock::now() - start_).count(); }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  using Clock = std::chrono::steady_clock;
-  double& sum_;
-  Clock::time_point start_ = Clock::now();
-};
-
-double energyOf(const FitTarget& target) {
-  double sum = 0.0;
-  for (const float v : target.values) sum += double(v) * double(v);
-  return sum;
-}
-
-SignsAllowed signsOf(const FitTarget& target) {
-  return {.positive = target.highest > 0.0, .negative = target.lowest < 0.0};
-}
 
 }  // namespace
 
-Optimiser::Optimiser(const FitTarget& target, const OptimiserOptions& options, const Tuning& tuning)
+CpuOptimiser::CpuOptimiser(const FitTarget& target, const OptimiserOptions& options, const Tuning& tuning)
     : target_(target),
       options_(options),
       tuning_(tuning),
       engine_(target, kernelConstants<double>(options.kernel)),
       trust_(energyOf(target)),
       unitVariance_(kernelVariance(engine_.kernel())),
-      limits_{tuning.smallestScale, tuning.largestScale, tuning.intensityHeadroom * target.lowest,
-              tuning.intensityHeadroom * target.highest} {}
+      limits_(limitsOf(target, tuning)) {}
 
-void Optimiser::rebuildLists() {
+void CpuOptimiser::rebuildLists() {
   engine_.rebuild(primitives_, tuning_.listSlack);
   iterationsSinceRebuild_ = 0;
 }
 
-void Optimiser::refreshResiduals() {
+void CpuOptimiser::refreshResiduals() {
   engine_.rebuild(primitives_, kRoundingSlack);
   engine_.residuals(primitives_, residuals_);
   iterationsSinceRebuild_ = kListsStale;
 }
 
-std::vector<Primitive> Optimiser::newSeeds(std::size_t count) {
-  const Stopwatch watch(secondsSeeding_);
+std::vector<Primitive> CpuOptimiser::newSeeds(std::size_t count) {
+  const AddSeconds timer(secondsSeeding_);
   refreshResiduals();
   trust_.forgetLoss();
   SeedOptions options;
   options.draw = {count, engine_.targetBricks(), signsOf(target_),
                   options_.seed ^ (++draws_ << 32)};
-  const double distance = spacing(target_, std::max(count, primitives_.size()));
-  options.window =
-      std::clamp(int(std::lround(tuning_.seedWindow * distance)), kSmallestWindow, kLargestWindow);
+  options.window = seedWindow(target_, std::max(count, primitives_.size()), tuning_);
   options.unitVariance = unitVariance_;
   options.intensity = tuning_.seedIntensity;
   return seedsFromResidual({engine_.index(), residuals_}, options);
 }
 
-void Optimiser::growTo(std::size_t count) {
+void CpuOptimiser::growTo(std::size_t count) {
   if (count <= primitives_.size()) return;
   const auto seeds = newSeeds(count - primitives_.size());
   primitives_.insert(primitives_.end(), seeds.begin(), seeds.end());
@@ -97,11 +60,11 @@ void Optimiser::growTo(std::size_t count) {
   gradients_.resize(primitives_.size());
 }
 
-std::vector<std::size_t> Optimiser::leastUseful(std::size_t count) const {
+std::vector<std::size_t> CpuOptimiser::leastUseful(std::size_t count) const {
   std::vector<std::pair<double, std::size_t>> settled;
   for (std::size_t i = 0; i < primitives_.size(); ++i)
     if (states_[i].steps >= std::uint32_t(tuning_.graceSteps))
-      settled.emplace_back(removalError(primitives_[i], gradients_[i]), i);
+      settled.emplace_back(removalError(primitives_[i].intensity, gradients_[i].phi2, gradients_[i].byParameter[kParameters - 1]), i);
   count = std::min(count, settled.size());
   std::nth_element(settled.begin(), settled.begin() + std::ptrdiff_t(count), settled.end());
   std::vector<std::size_t> chosen;
@@ -110,7 +73,7 @@ std::vector<std::size_t> Optimiser::leastUseful(std::size_t count) const {
   return chosen;
 }
 
-void Optimiser::relocate(std::size_t count) {
+void CpuOptimiser::relocate(std::size_t count) {
   // What a removal costs is counted in squares, whatever loss is descended.
   if (options_.loss == Loss::kPaper) engine_.gradients(primitives_, gradients_);
   const auto chosen = leastUseful(count);
@@ -122,7 +85,7 @@ void Optimiser::relocate(std::size_t count) {
   }
 }
 
-double Optimiser::takePaperGradients() {
+double CpuOptimiser::takePaperGradients() {
   engine_.residuals(primitives_, residuals_);
   const PaperLossInput input{engine_.index(),   residuals_,    target_.values,
                              target_.boxVoxels, options_.beta, target_.highest - target_.lowest};
@@ -133,23 +96,29 @@ double Optimiser::takePaperGradients() {
   return squares;
 }
 
-double Optimiser::takeGradients() {
+double CpuOptimiser::takeGradients() {
   if (options_.loss == Loss::kPaper) return takePaperGradients();
   return engine_.gradients(primitives_, gradients_);
 }
 
-double Optimiser::iterate(double scale) {
+double CpuOptimiser::iterateOnce(double factor) {
   if (iterationsSinceRebuild_ < 0 || iterationsSinceRebuild_ >= tuning_.rebuildEvery)
     rebuildLists();
   ++iterationsSinceRebuild_;
   const double loss = takeGradients();
   if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
-  adamStep(primitives_, states_, gradients_, tuning_.steps.scaled(scale * trust_.update(loss)),
+  adamStep(primitives_, states_, gradients_, tuning_.steps.scaled(factor * trust_.update(loss)),
            tuning_.adam, limits_);
   return loss;
 }
 
-FitErrors Optimiser::measure() {
+double CpuOptimiser::iterate(std::span<const double> factors) {
+  double loss = 0.0;
+  for (const double factor : factors) loss = iterateOnce(factor);
+  return loss;
+}
+
+FitErrors CpuOptimiser::measure() {
   refreshResiduals();
   FitErrors errors;
   for (std::size_t b = 0; b < engine_.brickCount(); ++b) {
@@ -167,7 +136,7 @@ FitErrors Optimiser::measure() {
   return errors;
 }
 
-void Optimiser::dropUnseen() {
+void CpuOptimiser::dropUnseen() {
   if (primitives_.empty()) return;
   rebuildLists();
   engine_.gradients(primitives_, gradients_);

@@ -1,0 +1,49 @@
+#pragma once
+/// Adam's step of one primitive, for host and device.
+
+#include <algorithm>
+#include <cmath>
+
+#include "fit/adam.h"
+#include "fit/primitive_math.h"
+
+namespace esvr {
+
+/// What every parameter's direction, which is about 1 at most, is multiplied by.
+ESVR_HD inline ParameterVector largestStep(const Primitive& p, const StepSizes& s) {
+  // Intensities near zero still move: in units of the target, whose largest magnitude is 1.
+  constexpr double kIntensityFloor = 0.01;
+  const double magnitude = std::abs(p.intensity);
+  const double i = s.intensity * (magnitude > kIntensityFloor ? magnitude : kIntensityFloor);
+  return {s.position, s.position, s.position, s.shape, s.shape,
+          s.shape,    s.shape,    s.shape,    s.shape, i};
+}
+
+/// Updates the moments and returns the step, `largest` times Adam's direction.
+ESVR_HD inline ParameterVector adamDirection(AdamState& state, const ParameterVector& gradient,
+                                             const AdamOptions& o, const ParameterVector& largest) {
+  // Gradients are of any size, but the squares of those below it vanish in float32: without it a
+  // quotient of nothing by less would move a primitive out of sight.
+  constexpr double kEpsilon = 1e-18;
+  ++state.steps;
+  const double c1 = 1.0 / (1.0 - std::pow(o.beta1, double(state.steps)));
+  const double c2 = 1.0 / (1.0 - std::pow(o.beta2, double(state.steps)));
+  ParameterVector d;
+  for (int k = 0; k < kParameters; ++k) {
+    const double g = gradient[k];
+    state.m[k] = float(o.beta1 * state.m[k] + (1.0 - o.beta1) * g);
+    state.v[k] = float(o.beta2 * state.v[k] + (1.0 - o.beta2) * g * g);
+    d[k] = -largest[k] * c1 * state.m[k] / (std::sqrt(c2 * state.v[k]) + kEpsilon);
+  }
+  return d;
+}
+
+/// Takes a step and keeps to the limits.
+ESVR_HD inline void moveWithin(Primitive& p, const ParameterVector& step,
+                               const PrimitiveLimits& limits) {
+  applyStep(p, step);
+  p.intensity = std::clamp(p.intensity, limits.lowestIntensity, limits.highestIntensity);
+  clampScales(p, limits.smallestScale, limits.largestScale);
+}
+
+}  // namespace esvr

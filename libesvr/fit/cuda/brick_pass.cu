@@ -1,0 +1,185 @@
+#include "core/cuda/check.h"
+#include "fit/cuda/brick_pass.h"
+#include "fit/cuda/launch.h"
+#include "fit/cuda/pair_lines.cuh"
+
+namespace esvr::cuda {
+namespace {
+
+constexpr int kGroups = kBlock / kGroup;  // of a block, which does one brick
+constexpr int kWarps = kBlock / kWarp;
+constexpr unsigned kAllLanes = 0xffffffffu;
+constexpr int kMomentSlots = 16;  // kMoments, made a power of two
+static_assert(kMomentSlots == kGroup, "each lane ends with one of the moments");
+
+enum class Pass { kGradients, kResiduals, kLossGradients };
+
+/// The same on every thread, summed in one order.
+template <class Real>
+__device__ Real blockSum(Real value) {
+  __shared__ Real parts[kWarps];
+  for (int d = kWarp / 2; d > 0; d /= 2) value += __shfl_xor_sync(kAllLanes, value, d);
+  if (threadIdx.x % kWarp == 0) parts[threadIdx.x / kWarp] = value;
+  __syncthreads();
+  Real sum = 0;
+  for (const Real part : parts) sum += part;
+  __syncthreads();
+  return sum;
+}
+
+struct BrickEntries {
+  std::uint32_t begin, end;
+};
+
+/// Values are summed as integers, whose sum has no order, in units of 2^-exponent: as fine as the
+/// sum of the brick's intensities, which bounds every value, allows 31 bits to be.
+__device__ int sumExponent(const BrickPassArguments& a, BrickEntries entries) {
+  constexpr int kBits = 29, kFarthest = 100;
+  float bound = 0.0f;
+  for (std::uint32_t k = entries.begin + threadIdx.x; k < entries.end; k += kBlock)
+    bound += fabsf(a.forms[a.lists.primitive[k]].form.intensity);
+  bound = blockSum(bound);
+  return bound > 0.0f ? max(-kFarthest, min(kBits - ilogbf(bound), kFarthest)) : 0;
+}
+
+__device__ void addPair(const BrickPassArguments& a, std::uint32_t entry, Coord corner, float unit,
+                        int* sums) {
+  const PairForm p = a.forms[a.lists.primitive[entry]];
+  const float height = p.form.intensity * unit;
+  visitLines(p, corner, a.kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
+    float t = line.t;
+    for (int y = line.yBegin; y < line.yEnd; ++y, t += 1.0f) {
+      const float phi = fastPhi(a.kernel, squaredAt(p.form, line.closest, t));
+      atomicAdd(&sums[line.offset + y * kBrickSide], __float2int_rn(height * phi));
+    }
+  });
+}
+
+/// r = V - target of voxel v, from the integer sum.
+__device__ float residualOf(const BrickPassArguments& a, int v, float sum) {
+  if (blockIdx.x >= a.targetCount) return sum;
+  const float t = a.target[std::size_t(blockIdx.x) * kBrickVoxels + v];
+  const float r = sum - t;
+  return a.narrowBand ? fminf(fmaxf(r, a.lowest - t), a.highest - t) : r;
+}
+
+/// Leaves r in the shared memory that held the sums. \return a thread's part of sum r^2
+__device__ float toResiduals(const BrickPassArguments& a, int exponent, int* sums) {
+  const float unit = ldexpf(1.0f, -exponent);
+  float loss = 0.0f;
+  for (int v = int(threadIdx.x); v < kBrickVoxels; v += kBlock) {
+    const int at = paddedOffset(v);
+    const float r = residualOf(a, v, float(sums[at]) * unit);
+    sums[at] = __float_as_int(r);
+    loss += r * r;
+    if (a.residual != nullptr) a.residual[std::size_t(blockIdx.x) * kBrickVoxels + v] = r;
+  }
+  return loss;
+}
+
+__device__ void loadLossGradients(const BrickPassArguments& a, int* r) {
+  for (int v = int(threadIdx.x); v < kBrickVoxels; v += kBlock)
+    r[paddedOffset(v)] =
+        __float_as_int(a.residual[std::size_t(blockIdx.x) * kBrickVoxels + v]);
+}
+
+/// A lane's moments of a pair, in the order of PairMoments.
+__device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
+                           const int* r, float (&s)[kMomentSlots]) {
+  visitLines(p, corner, kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
+    float w0 = 0.0f, w1 = 0.0f, t = line.t;
+    for (int y = line.yBegin; y < line.yEnd; ++y, t += 1.0f) {
+      const float phi = fastPhi(kernel, squaredAt(p.form, line.closest, t));
+      const float g = __int_as_float(r[line.offset + y * kBrickSide]);
+      const float w = g * fastSlope(kernel, phi);
+      const float wt = w * t;
+      w0 += w;
+      w1 += wt;
+      s[8] += wt * t;
+      s[9] += g * phi;
+      s[10] += phi * phi;
+    }
+    const float w0x = w0 * line.dx, w0z = w0 * line.dz;
+    s[0] += w0x;
+    s[1] += w0z;
+    s[2] += w0x * line.dx;
+    s[3] += w0x * line.dz;
+    s[4] += w0z * line.dz;
+    s[5] += w1;
+    s[6] += w1 * line.dx;
+    s[7] += w1 * line.dz;
+  });
+}
+
+/// Sums over a group's lanes; lane n gets value n. Each exchange halves what a lane keeps.
+__device__ float transposeSum(float (&s)[kMomentSlots]) {
+  const unsigned group = 0xffffu << (threadIdx.x % kWarp / kGroup * kGroup);
+  const unsigned lane = threadIdx.x % kGroup;
+#pragma unroll
+  for (int w = kGroup / 2; w > 0; w /= 2) {
+    const bool upper = (lane & unsigned(w)) != 0;
+#pragma unroll
+    for (int k = 0; k < w; ++k) {
+      const float sent = upper ? s[k] : s[k + w];
+      const float kept = upper ? s[k + w] : s[k];
+      s[k] = kept + __shfl_xor_sync(group, sent, w);
+    }
+  }
+  return s[0];
+}
+
+__device__ void writeMoments(const BrickPassArguments& a, std::uint32_t entry, Coord corner,
+                             const int* r) {
+  const PairForm p = a.forms[a.lists.primitive[entry]];
+  float s[kMomentSlots] = {};
+  sumMoments(p, a.kernel, corner, r, s);
+  const float value = transposeSum(s);
+  const auto lane = threadIdx.x % kGroup;
+  if (lane < kMomentStride)
+    a.moments[std::size_t(a.lists.pair[entry]) * kMomentStride + lane] = value;
+}
+
+/// One block a brick, one group of lanes a pair.
+template <Pass kPass>
+__global__ void __launch_bounds__(kBlock) brickPass(const BrickPassArguments a) {
+  __shared__ int sums[kPaddedVoxels];
+  const Coord corner = a.bricks[blockIdx.x] * kBrickSide;
+  const BrickEntries entries{a.lists.brickBegin[blockIdx.x], a.lists.brickBegin[blockIdx.x + 1]};
+  const std::uint32_t first = entries.begin + threadIdx.x / kGroup;
+
+  if constexpr (kPass == Pass::kLossGradients) {
+    loadLossGradients(a, sums);
+  } else {
+    for (int v = int(threadIdx.x); v < kPaddedVoxels; v += kBlock) sums[v] = 0;
+    const int exponent = sumExponent(a, entries);  // its barriers come after the zeros
+    for (std::uint32_t k = first; k < entries.end; k += kGroups)
+      addPair(a, k, corner, ldexpf(1.0f, exponent), sums);
+    __syncthreads();
+    const double loss = blockSum(double(toResiduals(a, exponent, sums)));
+    if (threadIdx.x == 0) a.brickLoss[blockIdx.x] = loss;
+  }
+  __syncthreads();
+  if constexpr (kPass != Pass::kResiduals)
+    for (std::uint32_t k = first; k < entries.end; k += kGroups) writeMoments(a, k, corner, sums);
+}
+
+template <Pass kPass>
+void launch(const BrickPassArguments& arguments, cudaStream_t stream) {
+  if (arguments.brickCount == 0) return;
+  brickPass<kPass><<<arguments.brickCount, kBlock, 0, stream>>>(arguments);
+  check(cudaGetLastError(), "starting a pass over the bricks");
+}
+
+}  // namespace
+
+void launchGradients(const BrickPassArguments& arguments, cudaStream_t stream) {
+  launch<Pass::kGradients>(arguments, stream);
+}
+void launchResiduals(const BrickPassArguments& arguments, cudaStream_t stream) {
+  launch<Pass::kResiduals>(arguments, stream);
+}
+void launchLossGradients(const BrickPassArguments& arguments, cudaStream_t stream) {
+  launch<Pass::kLossGradients>(arguments, stream);
+}
+
+}  // namespace esvr::cuda

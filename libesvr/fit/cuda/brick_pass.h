@@ -1,0 +1,37 @@
+#pragma once
+/// One pass over the bricks: residuals, loss, and the moments of pairs.
+
+#include <cuda_runtime_api.h>
+
+#include "fit/cuda/brick_table_view.h"
+#include "fit/cuda/pair_form.h"
+#include "fit/cuda/pair_lists.h"
+
+namespace esvr::cuda {
+
+/// Pointers are to device memory, borrowed.
+struct BrickPassArguments {
+  const Coord* bricks;
+  std::uint32_t brickCount, targetCount;
+  PairListsView lists;
+  const PairForm* forms;         ///< a primitive's
+  KernelConstants<float> kernel;
+  const float* target;           ///< kBrickVoxels a target brick
+  bool narrowBand;               ///< residuals saturate at the target's range
+  float lowest, highest;         ///< that range
+  double* brickLoss;             ///< out, a brick's: sum of r^2
+  float* moments;                ///< out, kMomentStride a pair; not written for residuals alone
+  float* residual;               ///< kBrickVoxels a brick; in for lossGradients, else out or null
+};
+
+/// Values of a pair in `moments`: PairMoments, in its order, and room to 48 bytes.
+inline constexpr int kMoments = 11, kMomentStride = 12;
+
+/// Loss and moments for gradients of 1/2 sum r^2.
+void launchGradients(const BrickPassArguments& arguments, cudaStream_t stream);
+/// Loss and residuals.
+void launchResiduals(const BrickPassArguments& arguments, cudaStream_t stream);
+/// Moments for gradients of a loss whose derivative by every value is in `residual`.
+void launchLossGradients(const BrickPassArguments& arguments, cudaStream_t stream);
+
+}  // namespace esvr::cuda

@@ -1,0 +1,253 @@
+#include "fit/cuda/cuda_optimiser.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/add_seconds.h"
+#include "core/cuda/use_device.h"
+#include "esvr/error.h"
+#include "field/gather.h"
+#include "fit/cuda/copy.h"
+#include "fit/cuda/make_cuda_optimiser.h"
+#include "fit/cuda/memory_pool.h"
+#include "fit/cuda/place_seeds.h"
+#include "fit/scene.h"
+#include "fit/seed.h"
+
+namespace esvr {
+namespace cuda {
+namespace {
+
+KernelConstants<float> narrowed(const KernelConstants<double>& k) {
+  return {float(k.shift), float(k.numerator), float(k.plateau), float(k.base),
+          float(k.slope), float(k.cutoff),    float(k.expNegS)};
+}
+
+}  // namespace
+
+CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& options,
+                             const Tuning& tuning)
+    : target_(target),
+      options_(options),
+      tuning_(tuning),
+      kernel_(kernelConstants<double>(options.kernel)),
+      radius_(supportRadius(kernel_)),
+      unitVariance_(kernelVariance(kernel_)),
+      bricks_(target.bricks, stream_.get()),
+      lists_(stream_.get()),
+      targetValues_(target.values, stream_.get()),
+      active_(*target.active, stream_.get()),
+      primitives_(stream_.get()),
+      adam_(stream_.get()),
+      forms_(stream_.get()),
+      usefulness_(stream_.get()),
+      moments_(stream_.get()),
+      residual_(stream_.get()),
+      brickLoss_(stream_.get()),
+      chunkSums_(stream_.get()),
+      loss_(stream_.get()),
+      states_(2, stream_.get()),
+      diverged_(1, stream_.get()),
+      draw_(stream_.get()),
+      ranking_(stream_.get()),
+      errorSums_(stream_.get()) {
+  loss_.reserve(1);
+  diverged_.setZero();
+  setState({StepTrust(energyOf(target)), 0.0});
+}
+
+IterationState CudaOptimiser::state() const {
+  return downloadValue(states_.data() + current_, stream_.get());
+}
+
+void CudaOptimiser::setState(const IterationState& state) {
+  uploadTo(states_.data() + current_, std::span<const IterationState>(&state, 1), stream_.get());
+}
+
+BrickPassArguments CudaOptimiser::passArguments() {
+  return {.bricks = bricks_.view().bricks,
+          .brickCount = std::uint32_t(bricks_.size()),
+          .targetCount = std::uint32_t(bricks_.targetCount()),
+          .lists = lists_.view(),
+          .forms = forms_.data(),
+          .kernel = narrowed(kernel_),
+          .target = targetValues_.data(),
+          .narrowBand = target_.narrowBand,
+          .lowest = float(target_.lowest),
+          .highest = float(target_.highest),
+          .brickLoss = brickLoss_.data(),
+          .moments = moments_.data(),
+          .residual = nullptr};
+}
+
+StepArguments CudaOptimiser::stepArguments(double factor) {
+  return {.primitiveCount = std::uint32_t(count_),
+          .chunkCount = std::uint32_t(lists_.chunkCount()),
+          .brickCount = std::uint32_t(bricks_.size()),
+          .lists = lists_.view(),
+          .moments = moments_.data(),
+          .brickLoss = brickLoss_.data(),
+          .chunkSums = chunkSums_.data(),
+          .loss = loss_.data(),
+          .before = states_.data() + current_,
+          .after = states_.data() + 1 - current_,
+          .primitives = primitives_.data(),
+          .states = adam_.data(),
+          .forms = forms_.data(),
+          .usefulness = usefulness_.data(),
+          .diverged = diverged_.data(),
+          .radius = radius_,
+          .factor = factor,
+          .sizes = tuning_.steps,
+          .adam = tuning_.adam,
+          .limits = limitsOf(target_, tuning_)};
+}
+
+void CudaOptimiser::rebuildLists(double slack) {
+  const SupportSource supports{primitives_.data(), count_, radius_, slack};
+  if (!target_.narrowBand) bricks_.findReached(supports);
+  lists_.rebuild(supports, bricks_);
+  moments_.reserve(lists_.pairCount() * kMomentStride);
+  chunkSums_.reserve(lists_.chunkCount() * kMomentStride);
+  brickLoss_.reserve(bricks_.size());
+  iterationsSinceRebuild_ = 0;
+}
+
+void CudaOptimiser::refreshResiduals() {
+  rebuildLists(kRoundingSlack);
+  BrickPassArguments pass = passArguments();
+  pass.residual = residual_.reserve(bricks_.size() * kBrickVoxels);
+  launchResiduals(pass, stream_.get());
+  iterationsSinceRebuild_ = kListsStale;
+}
+
+void CudaOptimiser::reserve(std::size_t primitives) {
+  primitives_.extend(primitives, count_);
+  adam_.extend(primitives, count_);
+  forms_.extend(primitives, count_);
+  usefulness_.extend(primitives, count_);
+}
+
+std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t primitives,
+                                      const std::uint32_t* into) {
+  refreshResiduals();
+  launchSums(stepArguments(0.0), stream_.get());
+  const double loss = downloadValue(loss_.data(), stream_.get());
+  const Coord* const voxels = draw_.draw(
+      residual_.data(), loss, bricks_.view().bricks,
+      {count, bricks_.targetCount(), signsOf(target_), options_.seed ^ (++draws_ << 32)});
+  IterationState now = state();
+  now.trust.forgetLoss();
+  setState(now);
+  if (voxels == nullptr) return 0;
+  launchPlaceSeeds({.voxels = voxels,
+                    .count = std::uint32_t(count),
+                    .bricks = bricks_.view(),
+                    .residual = residual_.data(),
+                    .window = seedWindow(target_, primitives, tuning_),
+                    .unitVariance = unitVariance_,
+                    .intensity = tuning_.seedIntensity,
+                    .into = into,
+                    .firstPlace = std::uint32_t(count_),
+                    .primitives = primitives_.data(),
+                    .states = adam_.data()},
+                   stream_.get());
+  return count;
+}
+
+void CudaOptimiser::growTo(std::size_t count) {
+  if (count <= count_) return;
+  const AddSeconds timer(secondsSeeding_);
+  reserve(count);
+  count_ += placeSeeds(count - count_, std::max(count - count_, count_), nullptr);
+  launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+}
+
+void CudaOptimiser::relocate(std::size_t count) {
+  const AddSeconds timer(secondsSeeding_);
+  const auto chosen = ranking_.leastUseful(stepArguments(0.0), count, tuning_.graceSteps);
+  if (chosen.count == 0) return;
+  placeSeeds(chosen.count, count_, chosen.places);
+  launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+}
+
+void CudaOptimiser::step(double factor) {
+  if (iterationsSinceRebuild_ < 0 || iterationsSinceRebuild_ >= tuning_.rebuildEvery)
+    rebuildLists(tuning_.listSlack);
+  ++iterationsSinceRebuild_;
+  launchGradients(passArguments(), stream_.get());
+  const StepArguments arguments = stepArguments(factor);
+  launchSums(arguments, stream_.get());
+  launchStep(arguments, stream_.get());
+  current_ = 1 - current_;
+}
+
+double CudaOptimiser::iterate(std::span<const double> factors) {
+  for (const double factor : factors) step(factor);
+  const double loss = state().loss;
+  if (!std::isfinite(loss) || downloadValue(diverged_.data(), stream_.get()) != 0)
+    throw RuntimeFailure("the fit diverged: an ellipsoid is not finite");
+  return loss;
+}
+
+FitErrors CudaOptimiser::measure() {
+  refreshResiduals();
+  return errorSums_.sum({.residual = residual_.data(),
+                         .bricks = bricks_.view().bricks,
+                         .active = active_.data(),
+                         .brickCount = std::uint32_t(bricks_.size()),
+                         .targetCount = std::uint32_t(bricks_.targetCount()),
+                         .box = target_.box});
+}
+
+std::vector<Primitive> CudaOptimiser::primitives() const {
+  std::vector<Primitive> host(count_);
+  downloadTo(std::span<Primitive>(host), primitives_.data(), stream_.get());
+  return host;
+}
+
+void CudaOptimiser::setPrimitives(std::span<const Primitive> primitives) {
+  count_ = 0;
+  reserve(primitives.size());
+  count_ = primitives.size();
+  uploadTo(primitives_.data(), primitives, stream_.get());
+  const std::vector<AdamState> fresh(count_);
+  uploadTo(adam_.data(), std::span<const AdamState>(fresh), stream_.get());
+  launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+  iterationsSinceRebuild_ = kListsStale;
+}
+
+std::vector<PrimitiveGradient> CudaOptimiser::gradients() {
+  rebuildLists(tuning_.listSlack);
+  launchGradients(passArguments(), stream_.get());
+  launchSums(stepArguments(0.0), stream_.get());
+  DeviceBuffer<PrimitiveGradient> out(count_, stream_.get());
+  launchReadGradients(stepArguments(0.0), out.data(), stream_.get());
+  std::vector<PrimitiveGradient> host(count_);
+  out.download(host);
+  return host;
+}
+
+void CudaOptimiser::dropUnseen() {
+  if (count_ == 0) return;
+  const auto all = primitives();
+  const auto seen = gradients();
+  std::vector<Primitive> kept;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (seen[i].phi2 > 0.0 && all[i].intensity != 0.0) kept.push_back(all[i]);
+  setPrimitives(kept);
+}
+
+}  // namespace cuda
+
+std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget& target,
+                                             const OptimiserOptions& options,
+                                             const Tuning& tuning) {
+  if (options.loss == Loss::kPaper)
+    throw UsageError("the paper's loss is computed on the CPU only: use --device cpu");
+  cuda::useDevice(options.device);
+  cuda::keepFreedMemory();
+  return std::make_unique<cuda::CudaOptimiser>(target, options, tuning);
+}
+
+}  // namespace esvr

@@ -1,0 +1,84 @@
+#pragma once
+/// A fit on a GPU. What runs over bricks, pairs and primitives is in the kernels beside this file;
+/// here is their order.
+
+#include "core/cuda/stream.h"
+#include "fit/cuda/brick_pass.h"
+#include "fit/cuda/brick_table.h"
+#include "fit/cuda/draw.h"
+#include "fit/cuda/error_sums.h"
+#include "fit/cuda/pair_lists.h"
+#include "fit/cuda/rank_primitives.h"
+#include "fit/cuda/step.h"
+#include "fit/optimiser.h"
+
+namespace esvr::cuda {
+
+class CudaOptimiser final : public Optimiser {
+ public:
+  /// The device of the options must be the current one.
+  CudaOptimiser(const FitTarget& target, const OptimiserOptions& options, const Tuning& tuning);
+
+  void growTo(std::size_t count) override;
+  void relocate(std::size_t count) override;
+  double iterate(std::span<const double> factors) override;
+  [[nodiscard]] std::uint32_t batchSize() const override { return kBatch; }
+  [[nodiscard]] FitErrors measure() override;
+  void dropUnseen() override;
+
+  [[nodiscard]] std::size_t primitiveCount() const override { return count_; }
+  [[nodiscard]] std::vector<Primitive> primitives() const override;
+  [[nodiscard]] std::uint64_t pairCount() const override { return lists_.pairCount(); }
+  [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
+
+  /// Gradients of 1/2 sum r^2 where the primitives are, for tests.
+  [[nodiscard]] std::vector<PrimitiveGradient> gradients();
+  /// Takes over primitives, for tests.
+  void setPrimitives(std::span<const Primitive> primitives);
+
+ private:
+  /// Iterations without hearing from the device; events come more often in all but long runs.
+  static constexpr std::uint32_t kBatch = 64;
+  static constexpr int kListsStale = -1;
+
+  void rebuildLists(double slack);
+  void refreshResiduals();
+  void step(double factor);
+  void reserve(std::size_t primitives);
+  /// \return how many seeds there are: `count`, or none where no error is left
+  std::size_t placeSeeds(std::size_t count, std::size_t primitives, const std::uint32_t* into);
+  [[nodiscard]] BrickPassArguments passArguments();
+  [[nodiscard]] StepArguments stepArguments(double factor);
+  [[nodiscard]] IterationState state() const;
+  void setState(const IterationState& state);
+
+  const FitTarget& target_;
+  OptimiserOptions options_;
+  Tuning tuning_;
+  KernelConstants<double> kernel_;
+  double radius_;
+  double unitVariance_;
+  Stream stream_;
+  BrickTable bricks_;
+  PairLists lists_;
+  DeviceBuffer<float> targetValues_;
+  DeviceBuffer<BrickMask> active_;
+  GrowingBuffer<Primitive> primitives_;
+  GrowingBuffer<AdamState> adam_;
+  GrowingBuffer<PairForm> forms_;
+  GrowingBuffer<Usefulness> usefulness_;
+  GrowingBuffer<float> moments_, residual_;
+  GrowingBuffer<double> brickLoss_, chunkSums_, loss_;
+  DeviceBuffer<IterationState> states_;  ///< read and written in turn
+  DeviceBuffer<int> diverged_;
+  VoxelDraw draw_;
+  PrimitiveRanking ranking_;
+  ErrorSums errorSums_;
+  std::size_t count_ = 0;
+  int current_ = 0;  ///< which of states_ is the last
+  double secondsSeeding_ = 0.0;
+  std::uint64_t draws_ = 0;          ///< events so far: each draws from its own random stream
+  int iterationsSinceRebuild_ = kListsStale;
+};
+
+}  // namespace esvr::cuda

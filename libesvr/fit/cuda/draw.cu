@@ -1,0 +1,129 @@
+#include <cmath>
+#include <cub/device/device_scan.cuh>
+
+#include "esvr/sparse_volume.h"
+#include "fit/cuda/copy.h"
+#include "fit/cuda/draw.h"
+#include "fit/cuda/launch.h"
+#include "fit/cuda/temporary.h"
+
+namespace esvr::cuda {
+namespace {
+
+constexpr unsigned kAllLanes = 0xffffffffu;
+constexpr int kVoxelsPerLane = kBrickVoxels / kWarp;
+
+/// Energies as integers, whose running sums have no order and no rounding.
+struct EnergyUnits {
+  double scale;  ///< a power of two
+  __device__ std::uint64_t operator()(float residual, SignsAllowed signs) const {
+    return std::uint64_t(drawEnergy(residual, signs) * scale);
+  }
+};
+
+/// Of all voxels together at most 2^61.
+EnergyUnits unitsFor(double loss) { return {std::ldexp(1.0, 60 - std::ilogb(loss))}; }
+
+struct DrawArguments {
+  const float* residual;
+  const Coord* bricks;
+  SignsAllowed signs;
+  EnergyUnits units;
+  std::uint32_t targetBricks;
+  std::uint64_t seed;
+};
+
+__device__ std::uint64_t warpSum(std::uint64_t value) {
+  for (int d = kWarp / 2; d > 0; d /= 2) value += __shfl_xor_sync(kAllLanes, value, d);
+  return value;
+}
+
+/// A warp a brick.
+__global__ void brickEnergies(const DrawArguments a, std::uint64_t* energy) {
+  const std::size_t b = (std::size_t(blockIdx.x) * kBlock + threadIdx.x) / kWarp;
+  if (b >= a.targetBricks) return;
+  std::uint64_t sum = 0;
+  for (int v = int(threadIdx.x % kWarp); v < kBrickVoxels; v += kWarp)
+    sum += a.units(a.residual[b * kBrickVoxels + v], a.signs);
+  sum = warpSum(sum);
+  if (threadIdx.x % kWarp == 0) energy[b] = sum;
+}
+
+/// First brick whose running sum exceeds `at`.
+__device__ std::uint32_t brickAt(const std::uint64_t* sums, std::uint32_t bricks,
+                                 std::uint64_t at) {
+  std::uint32_t low = 0, high = bricks - 1;
+  while (low < high) {
+    const std::uint32_t middle = low + (high - low) / 2;
+    if (sums[middle] > at)
+      high = middle;
+    else
+      low = middle + 1;
+  }
+  return low;
+}
+
+/// The voxel of a brick at which the running energy exceeds `at`. A warp works on it; a lane has
+/// kVoxelsPerLane in a row.
+__device__ int voxelAt(const DrawArguments& a, std::uint32_t brick, std::uint64_t at) {
+  const int lane = int(threadIdx.x % kWarp);
+  const float* const r =
+      a.residual + std::size_t(brick) * kBrickVoxels + std::size_t(lane) * kVoxelsPerLane;
+  std::uint64_t own = 0;
+  for (int v = 0; v < kVoxelsPerLane; ++v) own += a.units(r[v], a.signs);
+  std::uint64_t before = own;
+  for (int d = 1; d < kWarp; d *= 2) {
+    const std::uint64_t below = __shfl_up_sync(kAllLanes, before, d);
+    if (lane >= d) before += below;
+  }
+  before -= own;
+  int found = kBrickVoxels;
+  if (before <= at && at < before + own)
+    for (int v = 0; v < kVoxelsPerLane && found == kBrickVoxels; ++v) {
+      before += a.units(r[v], a.signs);
+      if (before > at) found = lane * kVoxelsPerLane + v;
+    }
+  return int(__reduce_min_sync(kAllLanes, unsigned(found)));
+}
+
+/// A warp a draw: `count` equal shares of the energy, one voxel from each.
+__global__ void drawVoxelsKernel(const DrawArguments a, const std::uint64_t* sums,
+                                 std::uint32_t count, Coord* out) {
+  const std::uint32_t n = (blockIdx.x * kBlock + threadIdx.x) / kWarp;
+  if (n >= count) return;
+  const std::uint64_t total = sums[a.targetBricks - 1];
+  const double share = double(total) / count;
+  const auto wanted = std::uint64_t((double(n) + drawUniform(a.seed, n)) * share);
+  const std::uint64_t at = wanted < total ? wanted : total - 1;
+  const std::uint32_t brick = brickAt(sums, a.targetBricks, at);
+  const int voxel = voxelAt(a, brick, at - (brick > 0 ? sums[brick - 1] : 0));
+  if (threadIdx.x % kWarp == 0) out[n] = a.bricks[brick] * kBrickSide + voxelLocal(voxel);
+}
+
+}  // namespace
+
+VoxelDraw::VoxelDraw(cudaStream_t stream)
+    : stream_(stream), energy_(stream), sums_(stream), voxels_(stream), temporary_(stream) {}
+
+const Coord* VoxelDraw::draw(const float* residual, double loss, const Coord* bricks,
+                             const DrawOptions& options) {
+  if (!(loss > 0.0) || options.count == 0) return nullptr;
+  const auto targets = std::uint32_t(options.targetBricks);
+  const DrawArguments a{residual, bricks, options.signs, unitsFor(loss), targets, options.seed};
+  std::uint64_t* const energy = energy_.reserve(targets);
+  std::uint64_t* const sums = sums_.reserve(targets);
+  brickEnergies<<<blocksFor(std::size_t(targets) * kWarp, kBlock), kBlock, 0, stream_>>>(a, energy);
+  check(cudaGetLastError(), "summing energies");
+  withTemporary(temporary_, "summing energies", [&](void* memory, std::size_t& bytes) {
+    return cub::DeviceScan::InclusiveSum(memory, bytes, energy, sums, targets, stream_);
+  });
+  if (downloadValue(sums + targets - 1, stream_) == 0) return nullptr;
+  const auto count = std::uint32_t(options.count);
+  Coord* const voxels = voxels_.reserve(count);
+  drawVoxelsKernel<<<blocksFor(options.count * kWarp, kBlock), kBlock, 0, stream_>>>(a, sums, count,
+                                                                                     voxels);
+  check(cudaGetLastError(), "drawing voxels");
+  return voxels;
+}
+
+}  // namespace esvr::cuda

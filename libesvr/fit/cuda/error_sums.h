@@ -1,0 +1,32 @@
+#pragma once
+/// Errors of a fit from its residuals.
+
+#include <cuda_runtime_api.h>
+
+#include "esvr/sparse_volume.h"
+#include "fit/cuda/growing_buffer.h"
+#include "fit/optimiser.h"
+
+namespace esvr::cuda {
+
+/// Pointers are to device memory, borrowed.
+struct ErrorArguments {
+  const float* residual;  ///< kBrickVoxels a brick
+  const Coord* bricks;
+  const BrickMask* active;  ///< of the target bricks
+  std::uint32_t brickCount, targetCount;
+  Box box;
+};
+
+class ErrorSums {
+ public:
+  explicit ErrorSums(cudaStream_t stream);
+  [[nodiscard]] FitErrors sum(const ErrorArguments& arguments);
+
+ private:
+  cudaStream_t stream_;
+  GrowingBuffer<double> columns_, totals_;
+  GrowingBuffer<char> temporary_;
+};
+
+}  // namespace esvr::cuda

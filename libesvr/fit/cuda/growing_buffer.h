@@ -1,0 +1,45 @@
+#pragma once
+/// Device memory that grows and is used again.
+
+#include "core/cuda/device_buffer.h"
+
+namespace esvr::cuda {
+
+/// Room for n elements. Growing leaves some to spare, so that sizes which creep up from call to
+/// call do not allocate each time.
+template <class T>
+class GrowingBuffer {
+ public:
+  explicit GrowingBuffer(cudaStream_t stream) : stream_(stream) {}
+
+  /// Room for at least n; what was there is lost when it has to grow.
+  T* reserve(std::size_t n) {
+    if (n > buffer_.size()) {
+      buffer_ = {};  // first freed, so that both are never held at once
+      buffer_ = DeviceBuffer<T>(withSpare(n), stream_);
+    }
+    return buffer_.data();
+  }
+  /// Room for at least n; the first `kept` elements stay.
+  T* extend(std::size_t n, std::size_t kept) {
+    if (n > buffer_.size()) {
+      DeviceBuffer<T> larger(withSpare(n), stream_);
+      if (kept > 0)
+        check(cudaMemcpyAsync(larger.data(), buffer_.data(), kept * sizeof(T),
+                              cudaMemcpyDeviceToDevice, stream_),
+              "copying on the device");
+      buffer_ = std::move(larger);
+    }
+    return buffer_.data();
+  }
+  [[nodiscard]] T* data() { return buffer_.data(); }
+  [[nodiscard]] const T* data() const { return buffer_.data(); }
+  [[nodiscard]] std::size_t bytes() const { return buffer_.bytes(); }
+
+ private:
+  static std::size_t withSpare(std::size_t n) { return n + n / 4; }
+  DeviceBuffer<T> buffer_;
+  cudaStream_t stream_;
+};
+
+}  // namespace esvr::cuda

@@ -1,0 +1,22 @@
+#pragma once
+/// Grid sizes.
+
+#include <cstddef>
+#include <limits>
+
+#include "core/cuda/check.h"
+
+namespace esvr::cuda {
+
+inline constexpr int kWarp = 32;
+inline constexpr int kBlock = 256;  ///< threads of a block, where nothing else is said
+
+/// Blocks that cover `items`, `perBlock` each. \throws DeviceError  more than a launch can have
+inline unsigned blocksFor(std::size_t items, std::size_t perBlock) {
+  const std::size_t blocks = (items + perBlock - 1) / perBlock;
+  if (blocks > std::size_t(std::numeric_limits<int>::max()))
+    throw DeviceError("CUDA: a launch of " + std::to_string(blocks) + " blocks is too large");
+  return unsigned(blocks);
+}
+
+}  // namespace esvr::cuda

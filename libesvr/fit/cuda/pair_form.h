@@ -1,0 +1,24 @@
+#pragma once
+/// A primitive as the passes over bricks read it.
+
+#include "fit/frame.h"
+#include "fit/primitive.h"
+
+namespace esvr::cuda {
+
+struct alignas(16) PairForm {
+  LineForm form;
+  Coord frame;  ///< origin of the form's center
+  float halfZ;  ///< half width of the support's bounding box along z
+};
+
+#if defined(__CUDACC__)
+__device__ inline PairForm pairForm(const Primitive& p, double radius) {
+  const Coord frame = frameOf(p.center);
+  const Matrix3 F = inverse(p.L);
+  return {makeLineForm(inFrame(p.center, frame), p.L, radius, p.intensity), frame,
+          float(radius * std::sqrt(sigma(F, 2, 2)))};
+}
+#endif
+
+}  // namespace esvr::cuda

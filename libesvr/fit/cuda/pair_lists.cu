@@ -1,0 +1,188 @@
+#include <array>
+#include <bit>
+#include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_reduce.cuh>
+#include <cub/device/device_scan.cuh>
+#include <limits>
+
+#include "fit/cuda/copy.h"
+#include "fit/cuda/launch.h"
+#include "fit/cuda/pair_lists.h"
+#include "fit/cuda/reached_bricks.cuh"
+#include "fit/cuda/temporary.h"
+
+namespace esvr::cuda {
+namespace {
+
+constexpr unsigned kAllLanes = 0xffffffffu;
+
+/// Calls visit(brick's number, position among the primitive's pairs) for each of its pairs.
+/// \return how many there are, on all lanes
+template <class Visit>
+__device__ std::uint32_t visitPairs(const SupportSource& source, const BrickTableView& bricks,
+                                    std::size_t i, Visit&& visit) {
+  std::uint32_t before = 0;
+  visitReachedBricks(source, i, [&](Coord brick, bool reached) {
+    const std::uint32_t number = reached ? bricks.find(brick) : kNoBrick;
+    const unsigned present = __ballot_sync(kAllLanes, number != kNoBrick);
+    const unsigned below = present & ((1u << threadIdx.x % kWarp) - 1u);
+    if (number != kNoBrick) visit(number, before + std::uint32_t(__popc(below)));
+    before += std::uint32_t(__popc(present));
+  });
+  return before;
+}
+
+__global__ void countPairsKernel(SupportSource source, BrickTableView bricks,
+                                 std::uint32_t* counts, std::uint32_t* chunks) {
+  const std::size_t i = warpNumber();
+  if (i >= source.count) return;
+  const std::uint32_t n = visitPairs(source, bricks, i, [](std::uint32_t, std::uint32_t) {});
+  if (threadIdx.x % kWarp != 0) return;
+  counts[i] = n;
+  // Every primitive has a chunk: one that reaches nothing still takes a step, of zero.
+  chunks[i] = n == 0 ? 1 : (n - 1) / PairListsView::kChunk + 1;
+}
+
+__global__ void listPairsKernel(SupportSource source, BrickTableView bricks,
+                                const std::uint32_t* begin, std::uint32_t* brickOf,
+                                std::uint32_t* pair, std::uint32_t* owner) {
+  const std::size_t i = warpNumber();
+  if (i >= source.count) return;
+  visitPairs(source, bricks, i, [&](std::uint32_t number, std::uint32_t n) {
+    const std::uint32_t at = begin[i] + n;
+    brickOf[at] = number;
+    pair[at] = at;
+    owner[at] = std::uint32_t(i);
+  });
+}
+
+__global__ void listChunks(const std::uint32_t* begin, std::uint32_t primitives,
+                           std::uint32_t* owner) {
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= primitives) return;
+  for (std::uint32_t c = begin[i]; c < begin[i + 1]; ++c) owner[c] = i;
+}
+
+/// From the sorted bricks of all entries to where each brick's begin.
+__global__ void findBrickBegins(const std::uint32_t* sorted, std::uint32_t entries,
+                                std::uint32_t bricks, std::uint32_t* begin) {
+  const std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x;
+  if (k > entries) return;
+  const std::uint32_t first = k == 0 ? 0 : sorted[k - 1] + 1;
+  const std::uint32_t last = k == entries ? bricks : sorted[k];
+  for (std::uint32_t b = first; b <= last; ++b) begin[b] = k;
+}
+
+__global__ void gatherOwners(const std::uint32_t* pair, const std::uint32_t* owner,
+                             std::uint32_t entries, std::uint32_t* primitive) {
+  const std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x;
+  if (k < entries) primitive[k] = owner[pair[k]];
+}
+
+}  // namespace
+
+PairLists::PairLists(cudaStream_t stream)
+    : stream_(stream),
+      counts_(stream),
+      chunkCounts_(stream),
+      primitiveBegin_(stream),
+      chunkBegin_(stream),
+      chunkOwner_(stream),
+      brickOf_(stream),
+      brickOfSorted_(stream),
+      pair_(stream),
+      pairSorted_(stream),
+      owner_(stream),
+      primitive_(stream),
+      brickBegin_(stream),
+      total_(stream),
+      temporary_(stream) {}
+
+void PairLists::countPairs(const SupportSource& supports, const BrickTableView& bricks) {
+  const std::size_t n = supports.count;
+  std::uint32_t* const counts = counts_.reserve(n + 1);
+  std::uint32_t* const chunks = chunkCounts_.reserve(n + 1);
+  check(cudaMemsetAsync(counts + n, 0, sizeof(*counts), stream_), "clearing a counter");
+  check(cudaMemsetAsync(chunks + n, 0, sizeof(*chunks), stream_), "clearing a counter");
+  if (n > 0)
+    countPairsKernel<<<blocksFor(n * kWarp, kBlock), kBlock, 0, stream_>>>(supports, bricks, counts,
+                                                                           chunks);
+  check(cudaGetLastError(), "counting pairs");
+  const auto sum = [&](std::uint32_t* from, std::uint32_t* to) {
+    withTemporary(temporary_, "summing counts", [&](void* memory, std::size_t& bytes) {
+      return cub::DeviceScan::ExclusiveSum(memory, bytes, from, to, n + 1, stream_);
+    });
+  };
+  sum(counts, primitiveBegin_.reserve(n + 1));
+  sum(chunks, chunkBegin_.reserve(n + 1));
+}
+
+void PairLists::readTotals(std::size_t n) {
+  // 64-bit, so that an overflow of the 32-bit sums is seen.
+  total_.reserve(2);
+  withTemporary(temporary_, "summing counts", [&](void* memory, std::size_t& bytes) {
+    return cub::DeviceReduce::Reduce(memory, bytes, counts_.data(), total_.data(), n + 1,
+                                     ::cuda::std::plus<std::uint64_t>{}, std::uint64_t{0}, stream_);
+  });
+  withTemporary(temporary_, "summing counts", [&](void* memory, std::size_t& bytes) {
+    return cub::DeviceReduce::Reduce(memory, bytes, chunkCounts_.data(), total_.data() + 1, n + 1,
+                                     ::cuda::std::plus<std::uint64_t>{}, std::uint64_t{0}, stream_);
+  });
+  std::array<std::uint64_t, 2> totals{};
+  downloadTo(std::span<std::uint64_t>(totals), total_.data(), stream_);
+  if (totals[0] >= std::numeric_limits<std::uint32_t>::max())
+    throw DeviceError("fitting on the GPU: " + std::to_string(totals[0]) +
+                      " pairs of ellipsoids and bricks are more than the lists can hold");
+  pairCount_ = totals[0];
+  chunkCount_ = totals[1];
+}
+
+void PairLists::listPairs(const SupportSource& supports, const BrickTableView& bricks) {
+  const std::size_t n = supports.count;
+  std::uint32_t* const brickOf = brickOf_.reserve(pairCount_);
+  std::uint32_t* const pair = pair_.reserve(pairCount_);
+  std::uint32_t* const owner = owner_.reserve(pairCount_);
+  std::uint32_t* const chunkOwner = chunkOwner_.reserve(chunkCount_);
+  if (n == 0) return;
+  listPairsKernel<<<blocksFor(n * kWarp, kBlock), kBlock, 0, stream_>>>(
+      supports, bricks, primitiveBegin_.data(), brickOf, pair, owner);
+  check(cudaGetLastError(), "listing pairs");
+  listChunks<<<blocksFor(n, kBlock), kBlock, 0, stream_>>>(chunkBegin_.data(), std::uint32_t(n),
+                                                           chunkOwner);
+  check(cudaGetLastError(), "listing chunks of pairs");
+}
+
+void PairLists::sortByBrick(std::size_t bricks) {
+  const auto entries = std::uint32_t(pairCount_);
+  std::uint32_t* const sorted = brickOfSorted_.reserve(pairCount_);
+  std::uint32_t* const pair = pairSorted_.reserve(pairCount_);
+  if (entries > 0)
+    withTemporary(temporary_, "sorting pairs", [&](void* memory, std::size_t& bytes) {
+      // Stable: within a brick the primitives keep their order.
+      return cub::DeviceRadixSort::SortPairs(memory, bytes, brickOf_.data(), sorted, pair_.data(),
+                                             pair, pairCount_, 0, int(std::bit_width(bricks)),
+                                             stream_);
+    });
+  findBrickBegins<<<blocksFor(pairCount_ + 1, kBlock), kBlock, 0, stream_>>>(
+      sorted, entries, std::uint32_t(bricks), brickBegin_.reserve(bricks + 1));
+  check(cudaGetLastError(), "finding the pairs of bricks");
+  std::uint32_t* const primitive = primitive_.reserve(pairCount_);
+  if (entries > 0)
+    gatherOwners<<<blocksFor(pairCount_, kBlock), kBlock, 0, stream_>>>(pair, owner_.data(),
+                                                                        entries, primitive);
+  check(cudaGetLastError(), "listing the primitives of bricks");
+}
+
+void PairLists::rebuild(const SupportSource& supports, const BrickTable& bricks) {
+  countPairs(supports, bricks.view());
+  readTotals(supports.count);
+  listPairs(supports, bricks.view());
+  sortByBrick(bricks.size());
+}
+
+PairListsView PairLists::view() const {
+  return {brickBegin_.data(),     primitive_.data(),  pairSorted_.data(),
+          primitiveBegin_.data(), chunkBegin_.data(), chunkOwner_.data()};
+}
+
+}  // namespace esvr::cuda

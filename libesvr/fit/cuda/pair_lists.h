@@ -1,0 +1,50 @@
+#pragma once
+/// Which primitives reach which bricks, listed both ways on the device.
+
+#include <cstdint>
+
+#include "fit/cuda/brick_table.h"
+
+namespace esvr::cuda {
+
+/// A primitive's pairs are numbered one after the other, in the bricks' order; moments are kept
+/// under these numbers, so that a primitive's own lie side by side. A primitive's pairs are summed
+/// in chunks, so that one which covers half the volume does not keep its thread for long.
+struct PairListsView {
+  static constexpr std::uint32_t kChunk = 256;  ///< pairs
+
+  const std::uint32_t* brickBegin;      ///< bricks + 1: range of a brick's entries
+  const std::uint32_t* primitive;       ///< an entry's
+  const std::uint32_t* pair;            ///< an entry's number among the primitives' pairs
+  const std::uint32_t* primitiveBegin;  ///< primitives + 1: range of a primitive's pairs
+  const std::uint32_t* chunkBegin;      ///< primitives + 1: range of a primitive's chunks
+  const std::uint32_t* chunkOwner;      ///< a chunk's primitive
+};
+
+class PairLists {
+ public:
+  explicit PairLists(cudaStream_t stream);
+
+  /// \throws DeviceError  2^32 pairs or more
+  void rebuild(const SupportSource& supports, const BrickTable& bricks);
+
+  [[nodiscard]] std::size_t pairCount() const { return pairCount_; }
+  [[nodiscard]] std::size_t chunkCount() const { return chunkCount_; }
+  [[nodiscard]] PairListsView view() const;
+
+ private:
+  void countPairs(const SupportSource& supports, const BrickTableView& bricks);
+  void readTotals(std::size_t primitives);
+  void listPairs(const SupportSource& supports, const BrickTableView& bricks);
+  void sortByBrick(std::size_t bricks);
+
+  cudaStream_t stream_;
+  std::size_t pairCount_ = 0, chunkCount_ = 0;
+  GrowingBuffer<std::uint32_t> counts_, chunkCounts_, primitiveBegin_, chunkBegin_, chunkOwner_;
+  GrowingBuffer<std::uint32_t> brickOf_, brickOfSorted_, pair_, pairSorted_, owner_, primitive_;
+  GrowingBuffer<std::uint32_t> brickBegin_;
+  GrowingBuffer<std::uint64_t> total_;
+  GrowingBuffer<char> temporary_;
+};
+
+}  // namespace esvr::cuda

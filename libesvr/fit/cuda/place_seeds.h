@@ -1,0 +1,28 @@
+#pragma once
+/// New primitives at drawn voxels.
+
+#include <cuda_runtime_api.h>
+
+#include "fit/adam.h"
+#include "fit/cuda/brick_table_view.h"
+
+namespace esvr::cuda {
+
+/// Pointers are to device memory, borrowed.
+struct SeedArguments {
+  const Coord* voxels;  ///< drawn
+  std::uint32_t count;
+  BrickTableView bricks;
+  const float* residual;      ///< kBrickVoxels a brick
+  int window;                 ///< half width of the neighbourhood that shapes a seed, voxels
+  double unitVariance;        ///< of the kernel
+  double intensity;           ///< of the residual at the seed
+  const std::uint32_t* into;  ///< places of the new primitives; null: firstPlace and on
+  std::uint32_t firstPlace;
+  Primitive* primitives;
+  AdamState* states;
+};
+
+void launchPlaceSeeds(const SeedArguments& arguments, cudaStream_t stream);
+
+}  // namespace esvr::cuda

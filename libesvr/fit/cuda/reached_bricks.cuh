@@ -1,0 +1,37 @@
+#pragma once
+/// The bricks that a primitive reaches, a warp for each primitive.
+
+#include <cstdint>
+
+#include "field/support.h"
+#include "fit/cuda/launch.h"
+#include "fit/cuda/supports.h"
+
+namespace esvr::cuda {
+
+/// Number of this thread's warp among all.
+__device__ inline std::size_t warpNumber() {
+  return (std::size_t(blockIdx.x) * blockDim.x + threadIdx.x) / kWarp;
+}
+
+/// Calls visit(brick, reached) on all lanes together until every brick near primitive i has been
+/// visited by one lane, lanes and rounds in increasing order of the bricks.
+template <class Visit>
+__device__ void visitReachedBricks(const SupportSource& source, std::size_t i, Visit&& visit) {
+  const Primitive& p = source.primitives[i];
+  const Support support = makeSupport(p.center, p.L, source.radius, source.slack);
+  const Box range = brickRange(support);
+  const auto nx = std::int64_t(range.max.x) - range.min.x + 1;
+  const auto ny = std::int64_t(range.max.y) - range.min.y + 1;
+  const auto nz = std::int64_t(range.max.z) - range.min.z + 1;
+  const std::int64_t count = nx * ny * nz;
+  for (std::int64_t first = 0; first < count; first += kWarp) {
+    const std::int64_t n = first + threadIdx.x % kWarp;
+    const Coord brick{range.min.x + std::int32_t(n / (ny * nz)),
+                      range.min.y + std::int32_t(n / nz % ny),
+                      range.min.z + std::int32_t(n % nz)};
+    visit(brick, n < count && mayTouch(support, brick));
+  }
+}
+
+}  // namespace esvr::cuda

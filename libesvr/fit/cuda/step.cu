@@ -1,0 +1,131 @@
+#include "core/cuda/check.h"
+#include "fit/adam_math.h"
+#include "fit/cuda/launch.h"
+#include "fit/cuda/step.h"
+#include "fit/parameter_gradient.h"
+
+namespace esvr::cuda {
+namespace {
+
+constexpr int kLanes = 16;      // of a chunk: one a moment, and some to spare
+constexpr int kStepBlock = 64;  // small: few primitives are to use many processors
+constexpr int kLossBlock = 1024;
+static_assert(kLanes >= kMomentStride);
+
+/// One lane a moment: the pairs of a chunk lie side by side.
+__global__ void sumChunks(const StepArguments a) {
+  const std::uint32_t thread = blockIdx.x * kBlock + threadIdx.x;
+  const std::uint32_t chunk = thread / kLanes, lane = thread % kLanes;
+  if (chunk >= a.chunkCount || lane >= kMoments) return;
+  const std::uint32_t i = a.lists.chunkOwner[chunk];
+  const std::uint32_t begin =
+      a.lists.primitiveBegin[i] + (chunk - a.lists.chunkBegin[i]) * PairListsView::kChunk;
+  const std::uint32_t end = min(a.lists.primitiveBegin[i + 1], begin + PairListsView::kChunk);
+  double sum = 0.0;
+#pragma unroll 4
+  for (std::uint32_t k = begin; k < end; ++k)
+    sum += double(a.moments[std::size_t(k) * kMomentStride + lane]);
+  a.chunkSums[std::size_t(chunk) * kMomentStride + lane] = sum;
+}
+
+/// In one order, by one block.
+__global__ void __launch_bounds__(kLossBlock) sumLoss(const StepArguments a) {
+  __shared__ double parts[kLossBlock];
+  double sum = 0.0;
+  for (std::uint32_t b = threadIdx.x; b < a.brickCount; b += kLossBlock) sum += a.brickLoss[b];
+  parts[threadIdx.x] = sum;
+  for (int half = kLossBlock / 2; half > 0; half /= 2) {
+    __syncthreads();
+    if (threadIdx.x < half) parts[threadIdx.x] += parts[threadIdx.x + half];
+  }
+  if (threadIdx.x == 0) *a.loss = parts[0];
+}
+
+__device__ PairSums sumsOf(const StepArguments& a, std::uint32_t i) {
+  PairSums s{};
+  for (std::uint32_t c = a.lists.chunkBegin[i]; c < a.lists.chunkBegin[i + 1]; ++c) {
+    const double* const m = a.chunkSums + std::size_t(c) * kMomentStride;
+    s.w0x += m[0], s.w0z += m[1], s.w0xx += m[2], s.w0xz += m[3], s.w0zz += m[4];
+    s.w1 += m[5], s.w1x += m[6], s.w1z += m[7], s.w2 += m[8], s.rPhi += m[9], s.phi2 += m[10];
+  }
+  return s;
+}
+
+__device__ std::uint32_t ownPrimitive() { return blockIdx.x * kStepBlock + threadIdx.x; }
+
+/// A sum over all numbers of it: one that is not finite shows.
+__device__ bool finite(const Primitive& p) {
+  double sum = p.intensity;
+  for (const double c : p.center) sum += c;
+  for (const double l : p.L) sum += l;
+  return isfinite(sum);
+}
+
+__global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
+  const std::uint32_t i = ownPrimitive();
+  // Every thread works out the same trust; one keeps it, where no other reads.
+  IterationState state = *a.before;
+  state.loss = *a.loss;
+  const double factor = a.factor * state.trust.update(state.loss);
+  if (i == 0) *a.after = state;
+  if (i >= a.primitiveCount) return;
+
+  const PairSums sums = sumsOf(a, i);
+  Primitive p = a.primitives[i];
+  AdamState adam = a.states[i];
+  const ParameterVector gradient = parameterGradient(a.forms[i].form, sums);
+  const ParameterVector largest = largestStep(p, a.sizes.scaled(factor));
+  moveWithin(p, adamDirection(adam, gradient, a.adam, largest), a.limits);
+  a.primitives[i] = p;
+  a.states[i] = adam;
+  a.forms[i] = pairForm(p, a.radius);
+  a.usefulness[i] = {float(sums.phi2), float(sums.rPhi)};
+  if (!finite(p)) *a.diverged = 1;  // integer sums would hide it
+}
+
+__global__ void __launch_bounds__(kStepBlock) readGradients(const StepArguments a,
+                                                            PrimitiveGradient* out) {
+  const std::uint32_t i = ownPrimitive();
+  if (i >= a.primitiveCount) return;
+  const PairSums sums = sumsOf(a, i);
+  out[i] = {parameterGradient(a.forms[i].form, sums), sums.phi2};
+}
+
+__global__ void __launch_bounds__(kStepBlock) writeForms(const Primitive* primitives,
+                                                         std::uint32_t count, double radius,
+                                                         PairForm* forms) {
+  const std::uint32_t i = ownPrimitive();
+  if (i < count) forms[i] = pairForm(primitives[i], radius);
+}
+
+}  // namespace
+
+void launchSums(const StepArguments& a, cudaStream_t stream) {
+  if (a.chunkCount > 0)
+    sumChunks<<<blocksFor(std::size_t(a.chunkCount) * kLanes, kBlock), kBlock, 0, stream>>>(a);
+  check(cudaGetLastError(), "starting the sums of moments");
+  sumLoss<<<1, kLossBlock, 0, stream>>>(a);
+  check(cudaGetLastError(), "starting the sum of the loss");
+}
+
+void launchStep(const StepArguments& a, cudaStream_t stream) {
+  // One block at least: it keeps the state.
+  step<<<std::max(1u, blocksFor(a.primitiveCount, kStepBlock)), kStepBlock, 0, stream>>>(a);
+  check(cudaGetLastError(), "starting a step");
+}
+
+void launchReadGradients(const StepArguments& a, PrimitiveGradient* out, cudaStream_t stream) {
+  if (a.primitiveCount == 0) return;
+  readGradients<<<blocksFor(a.primitiveCount, kStepBlock), kStepBlock, 0, stream>>>(a, out);
+  check(cudaGetLastError(), "starting to read gradients");
+}
+
+void launchForms(const Primitive* primitives, std::uint32_t count, double radius, PairForm* forms,
+                 cudaStream_t stream) {
+  if (count == 0) return;
+  writeForms<<<blocksFor(count, kStepBlock), kStepBlock, 0, stream>>>(primitives, count, radius,
+                                                                      forms);
+  check(cudaGetLastError(), "starting to prepare primitives");
+}
+
+}  // namespace esvr::cuda

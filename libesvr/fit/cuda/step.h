@@ -1,0 +1,58 @@
+#pragma once
+/// From moments to gradients to a step, one thread a primitive and so one writer.
+
+#include <cuda_runtime_api.h>
+
+#include "fit/adam.h"
+#include "fit/cuda/brick_pass.h"
+#include "fit/step_trust.h"
+
+namespace esvr::cuda {
+
+/// What the host learns of the last iteration.
+struct IterationState {
+  StepTrust trust;
+  double loss;  ///< sum of r^2 before the step
+};
+
+/// What a primitive is worth, from the last gradients.
+struct Usefulness {
+  float phi2;  ///< sum of phi^2
+  float rPhi;  ///< sum of r phi
+};
+
+/// Pointers are to device memory, borrowed.
+struct StepArguments {
+  std::uint32_t primitiveCount, chunkCount, brickCount;
+  PairListsView lists;
+  const float* moments;     ///< kMomentStride a pair
+  const double* brickLoss;  ///< a brick's
+  double* chunkSums;        ///< kMomentStride a chunk
+  double* loss;             ///< one value
+  const IterationState* before;
+  IterationState* after;
+  Primitive* primitives;
+  AdamState* states;
+  PairForm* forms;
+  Usefulness* usefulness;
+  int* diverged;  ///< set to 1 where a primitive is not finite
+  double radius;  ///< of the support in the unit frame
+  double factor;  ///< of the step sizes
+  StepSizes sizes;
+  AdamOptions adam;
+  PrimitiveLimits limits;
+};
+
+/// Sums the moments of chunks, and the loss.
+void launchSums(const StepArguments& arguments, cudaStream_t stream);
+/// Takes the step; wants launchSums before.
+void launchStep(const StepArguments& arguments, cudaStream_t stream);
+/// Writes the gradients of all primitives, for tests.
+void launchReadGradients(const StepArguments& arguments, PrimitiveGradient* out,
+                         cudaStream_t stream);
+
+/// Writes the forms of `count` primitives.
+void launchForms(const Primitive* primitives, std::uint32_t count, double radius, PairForm* forms,
+                 cudaStream_t stream);
+
+}  // namespace esvr::cuda

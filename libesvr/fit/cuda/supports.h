@@ -1,0 +1,17 @@
+#pragma once
+/// The supports of primitives, as the kernels that build lists need them.
+
+#include <cstddef>
+
+#include "fit/primitive.h"
+
+namespace esvr::cuda {
+
+struct SupportSource {
+  const Primitive* primitives;
+  std::size_t count;
+  double radius;  ///< of the support in the unit frame
+  double slack;   ///< voxels by which supports are widened
+};
+
+}  // namespace esvr::cuda

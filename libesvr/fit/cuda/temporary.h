@@ -1,0 +1,17 @@
+#pragma once
+/// CUB's temporary memory.
+
+#include "fit/cuda/growing_buffer.h"
+
+namespace esvr::cuda {
+
+/// Calls a function of CUB twice, as CUB wants it: for the size, and with memory of that size.
+/// \param call   call(void* temporary, std::size_t& bytes) -> cudaError_t
+template <class Call>
+void withTemporary(GrowingBuffer<char>& memory, const char* doing, Call&& call) {
+  std::size_t bytes = 0;
+  check(call(nullptr, bytes), doing);
+  check(call(memory.reserve(bytes > 0 ? bytes : 1), bytes), doing);
+}
+
+}  // namespace esvr::cuda

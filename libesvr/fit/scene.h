@@ -1,0 +1,40 @@
+#pragma once
+/// What a fit derives from its target, whatever device it runs on.
+
+#include <algorithm>
+#include <cmath>
+
+#include "fit/adam.h"
+#include "fit/draw_options.h"
+#include "fit/target.h"
+#include "fit/tuning.h"
+
+namespace esvr {
+
+/// Sum of squares of the target.
+[[nodiscard]] inline double energyOf(const FitTarget& target) {
+  double sum = 0.0;
+  for (const float v : target.values) sum += double(v) * double(v);
+  return sum;
+}
+
+[[nodiscard]] inline SignsAllowed signsOf(const FitTarget& target) {
+  return {.positive = target.highest > 0.0, .negative = target.lowest < 0.0};
+}
+
+[[nodiscard]] inline PrimitiveLimits limitsOf(const FitTarget& target, const Tuning& tuning) {
+  return {tuning.smallestScale, tuning.largestScale, tuning.intensityHeadroom * target.lowest,
+          tuning.intensityHeadroom * target.highest};
+}
+
+/// Half width of a seed's neighbourhood: half the distance of neighbours if the primitives were
+/// spread evenly over the active voxels.
+[[nodiscard]] inline int seedWindow(const FitTarget& target, std::size_t primitives,
+                                    const Tuning& tuning) {
+  constexpr int kSmallest = 2, kLargest = 6;  // voxels
+  const double distance =
+      std::cbrt(double(target.activeVoxels) / double(std::max<std::size_t>(primitives, 1)));
+  return std::clamp(int(std::lround(tuning.seedWindow * distance)), kSmallest, kLargest);
+}
+
+}  // namespace esvr

@@ -1,0 +1,157 @@
+// Plan: the moves of a run on the GPU: a step is the CPU's step; growth reaches its count and seeds
+// where the error is; relocation moves the least useful and no others; unseen primitives go; a
+// whole fit is the same bits in three runs, in a far place and with empty bricks around, reaches
+// what the CPU reaches, and fails loudly where it cannot go on.
+
+#include <array>
+#include <cmath>
+
+#include "../random_primitives.h"
+#include "../volumes.h"
+#include "fit/cpu_optimiser.h"
+#include "fit/cuda/cuda_optimiser.h"
+#include "gpu_test.h"
+
+namespace esvr {
+namespace {
+
+using cuda::CudaOptimiser;
+using OptimiserOnGpu = test::OnGpu;
+
+FitResult fitOn(const Device& device, const SparseVolume& volume) {
+  FitOptions options;
+  options.count = 60;
+  options.iterations = 200;
+  options.device = device;
+  return fit(volume, options);
+}
+
+TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
+  const SparseVolume volume = test::denseVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  const auto start = test::randomPrimitives(50, 1.0, 3.0);
+  const Tuning tuning;
+  CudaOptimiser onGpu(target, {}, tuning);
+  onGpu.setPrimitives(start);
+  onGpu.iterate(std::array{0.5});
+
+  FitEngine engine(target, kernelConstants<double>(Kernel{}));
+  engine.rebuild(start, tuning.listSlack);
+  std::vector<PrimitiveGradient> gradients(start.size());
+  engine.gradients(start, gradients);
+  auto expected = start;
+  std::vector<AdamState> states(start.size());
+  adamStep(expected, states, gradients, tuning.steps.scaled(0.5), tuning.adam,
+           {tuning.smallestScale, tuning.largestScale, tuning.intensityHeadroom * target.lowest,
+            tuning.intensityHeadroom * target.highest});
+  const auto found = onGpu.primitives();
+  // Adam's first step has the size of the step and the sign of the gradient, so that only where a
+  // gradient is lost in rounding can a component differ, and then by twice the step.
+  int differing = 0;
+  for (std::size_t i = 0; i < found.size(); ++i)
+    for (int a = 0; a < 3; ++a)
+      differing += std::abs(found[i].center[a] - expected[i].center[a]) > 1e-6;
+  EXPECT_LE(differing, 2);
+}
+
+TEST_F(OptimiserOnGpu, GrowsToTheCountAndLowersTheLoss) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  CudaOptimiser optimiser(target, {}, {});
+  optimiser.growTo(50);
+  EXPECT_EQ(optimiser.primitiveCount(), 50u);
+  const double first = optimiser.iterate(std::array{1.0});
+  for (int i = 0; i < 60; ++i) optimiser.iterate(std::array{0.5});
+  EXPECT_LT(optimiser.measure().squaredSum, 0.2 * first);
+}
+
+TEST_F(OptimiserOnGpu, SeedsAsTheCpuDoes) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  CpuOptimiser onCpu(target, {}, {});
+  CudaOptimiser onGpu(target, {}, {});
+  onCpu.growTo(50);
+  onGpu.growTo(50);
+  const auto expected = onCpu.primitives(), found = onGpu.primitives();
+  // The same draws: running energies are integers here and float64 there, so that a draw next to
+  // the border between two voxels may fall on the other side.
+  int differing = 0;
+  for (std::size_t i = 0; i < found.size(); ++i)
+    differing += std::abs(found[i].center[0] - expected[i].center[0]) +
+                     std::abs(found[i].intensity - expected[i].intensity) >
+                 1e-6;
+  EXPECT_LE(differing, 1);
+}
+
+TEST_F(OptimiserOnGpu, RelocatesTheLeastUsefulAndKeepsTheCount) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  CudaOptimiser optimiser(target, {}, {});
+  optimiser.growTo(50);
+  for (int i = 0; i < 30; ++i) optimiser.iterate(std::array{0.5});
+  const auto before = optimiser.primitives();
+  optimiser.relocate(5);
+  const auto after = optimiser.primitives();
+  ASSERT_EQ(after.size(), 50u);
+  int moved = 0;
+  for (std::size_t i = 0; i < 50; ++i) moved += before[i].center != after[i].center;
+  EXPECT_EQ(moved, 5);
+}
+
+TEST_F(OptimiserOnGpu, DropsWhatNoVoxelSees) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  CudaOptimiser optimiser(target, {}, {});
+  auto primitives = test::randomPrimitives(20, 1.0, 2.0);
+  primitives[7].L = {1e3, 0, 0, 0, 1e3, 0, 0, 0, 1e3};  // between voxels
+  for (double& c : primitives[7].center) c = std::floor(c) + 0.5;
+  optimiser.setPrimitives(primitives);
+  optimiser.dropUnseen();
+  EXPECT_EQ(optimiser.primitiveCount(), 19u);
+}
+
+TEST_F(OptimiserOnGpu, NothingToMendSeedsNothing) {
+  const SparseVolume volume = test::tubeVolume();
+  FitTarget target = makeTarget(volume, std::nullopt);
+  std::fill(target.values.begin(), target.values.end(), 0.0f);
+  CudaOptimiser optimiser(target, {}, {});
+  optimiser.growTo(50);
+  EXPECT_EQ(optimiser.primitiveCount(), 0u);
+  EXPECT_EQ(optimiser.iterate(std::array{1.0}), 0.0);
+}
+
+TEST_F(OptimiserOnGpu, ThreeRunsGiveTheSameBits) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitResult first = fitOn(device_, volume);
+  for (int run = 0; run < 2; ++run) {
+    const FitResult again = fitOn(device_, volume);
+    EXPECT_TRUE(test::sameBits(again.field, first.field));
+  }
+}
+
+TEST_F(OptimiserOnGpu, AFarPlaceChangesNoBit) {
+  const FitResult here = fitOn(device_, test::tubeVolume());
+  const FitResult there = fitOn(device_, test::tubeVolume({1 << 20, -(1 << 20), 1 << 20}));
+  EXPECT_TRUE(test::sameBits(here.field, there.field));
+}
+
+TEST_F(OptimiserOnGpu, ReachesWhatTheCpuReaches) {
+  const SparseVolume volume = test::tubeVolume();
+  const double onCpu = fitOn({}, volume).curve.back().psnrBox;
+  const double onGpu = fitOn(device_, volume).curve.back().psnrBox;
+  // The same method; rounding leads to other optima, which lie within a decibel of each other.
+  EXPECT_NEAR(onGpu, onCpu, 1.0);
+}
+
+TEST_F(OptimiserOnGpu, ALossThatIsNotFiniteEndsTheRun) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  CudaOptimiser optimiser(target, {}, {});
+  auto primitives = test::randomPrimitives(5, 1.0, 2.0);
+  primitives[2].intensity = std::nan("");
+  optimiser.setPrimitives(primitives);
+  EXPECT_THROW(optimiser.iterate(std::array{1.0}), RuntimeFailure);
+}
+
+}  // namespace
+}  // namespace esvr
