@@ -24,7 +24,6 @@ CpuOptimiser::CpuOptimiser(const FitTarget& target, const OptimiserOptions& opti
       options_(options),
       tuning_(tuning),
       engine_(target, kernelConstants<double>(options.kernel)),
-      trust_(energyOf(target)),
       unitVariance_(kernelVariance(engine_.kernel())),
       limits_(limitsOf(target, tuning)) {}
 
@@ -42,7 +41,6 @@ void CpuOptimiser::refreshResiduals() {
 std::vector<Primitive> CpuOptimiser::newSeeds(std::size_t count) {
   const AddSeconds timer(secondsSeeding_);
   refreshResiduals();
-  trust_.forgetLoss();
   SeedOptions options;
   options.draw = {count, engine_.targetBricks(), signsOf(target_),
                   options_.seed ^ (++draws_ << 32)};
@@ -107,7 +105,7 @@ double CpuOptimiser::iterateOnce(double factor) {
   ++iterationsSinceRebuild_;
   const double loss = takeGradients();
   if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
-  adamStep(primitives_, states_, gradients_, tuning_.steps.scaled(factor * trust_.update(loss)),
+  adamStep(primitives_, states_, gradients_, tuning_.steps.scaled(factor),
            tuning_.adam, limits_);
   return loss;
 }

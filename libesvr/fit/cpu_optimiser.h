@@ -10,7 +10,6 @@
 #include "fit/optimiser.h"
 #include "fit/paper_loss.h"
 #include "fit/seed.h"
-#include "fit/step_trust.h"
 #include "fit/tuning.h"
 
 namespace esvr {
@@ -46,7 +45,6 @@ class CpuOptimiser final : public Optimiser {
   Tuning tuning_;
   FitEngine engine_;
   PaperLoss paperLoss_;
-  StepTrust trust_;
   double unitVariance_;
   PrimitiveLimits limits_;
   std::vector<Primitive> primitives_;

@@ -37,20 +37,22 @@ int voxelAt(std::span<const float> values, SignsAllowed signs, double target) {
 
 }  // namespace
 
-std::vector<Coord> drawVoxels(const ResidualField& residual, const DrawOptions& options) {
+DrawnVoxels drawVoxels(const ResidualField& residual, const DrawOptions& options) {
   const auto sums = energySums(residual, options);
-  std::vector<Coord> voxels;
-  if (!(sums.back() > 0.0)) return voxels;
-  const double share = sums.back() / double(options.count);
+  DrawnVoxels drawn;
+  if (!(sums.back() > 0.0)) return drawn;
+  drawn.share = sums.back() / double(options.count);
   for (std::size_t n = 0; n < options.count; ++n) {
-    const double at = (double(n) + drawUniform(options.seed, n)) * share;
+    const double at = (double(n) + drawUniform(options.seed, n)) * drawn.share;
     const auto after = std::upper_bound(sums.begin(), sums.end() - 1, at);
     const std::size_t b = std::min(std::size_t(after - sums.begin()), options.targetBricks) - 1;
     const int v = voxelAt(residual.brick(b), options.signs, at - sums[b]);
     if (options.signs.mends(residual.brick(b)[v]) && residual.brick(b)[v] != 0.0f)
-      voxels.push_back(residual.index.bricks()[b] * kBrickSide + voxelLocal(v));
+      drawn.voxels.push_back(residual.index.bricks()[b] * kBrickSide + voxelLocal(v));
   }
-  return voxels;
+  // Draws of one voxel follow each other.
+  drawn.voxels.erase(std::unique(drawn.voxels.begin(), drawn.voxels.end()), drawn.voxels.end());
+  return drawn;
 }
 
 }  // namespace esvr

@@ -9,7 +9,7 @@ namespace esvr {
 namespace {
 
 constexpr std::size_t kPilotBricks = 400;
-constexpr std::uint32_t kPilotIterations = 120;
+constexpr std::uint32_t kPilotIterations = 300;
 constexpr float kCoarse[] = {-2.0f, 1.0f, 4.0f};
 constexpr float kRefine[] = {-1.0f, 1.0f};
 constexpr double kWorthIt = 0.02;  // dB: less is noise, the first found stays

@@ -11,13 +11,6 @@
 
 namespace esvr {
 
-/// Sum of squares of the target.
-[[nodiscard]] inline double energyOf(const FitTarget& target) {
-  double sum = 0.0;
-  for (const float v : target.values) sum += double(v) * double(v);
-  return sum;
-}
-
 [[nodiscard]] inline SignsAllowed signsOf(const FitTarget& target) {
   return {.positive = target.highest > 0.0, .negative = target.lowest < 0.0};
 }
@@ -27,8 +20,8 @@ namespace esvr {
           tuning.intensityHeadroom * target.highest};
 }
 
-/// Half width of a seed's neighbourhood: half the distance of neighbours if the primitives were
-/// spread evenly over the active voxels.
+/// Half width of a seed's neighbourhood: a share of the distance of neighbours if the primitives
+/// were spread evenly over the active voxels.
 [[nodiscard]] inline int seedWindow(const FitTarget& target, std::size_t primitives,
                                     const Tuning& tuning) {
   constexpr int kSmallest = 2, kLargest = 6;  // voxels

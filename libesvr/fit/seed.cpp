@@ -21,20 +21,22 @@ SeedMoments momentsAround(const ResidualField& residual, Coord voxel, double sig
   return m;
 }
 
-Primitive seedAt(const ResidualField& residual, Coord voxel, const SeedOptions& options) {
+Primitive seedAt(const ResidualField& residual, Coord voxel, const SeedOptions& options,
+                 double share) {
   const double r = residual.at(voxel);
   const auto moments = momentsAround(residual, voxel, r < 0.0 ? -1.0 : 1.0, options.window);
-  return seedFromMoments(voxel, moments, {options.unitVariance, -r * options.intensity});
+  return seedFromMoments(voxel, r, moments, {options.unitVariance, options.intensity, share});
 }
 
 }  // namespace
 
 std::vector<Primitive> seedsFromResidual(const ResidualField& residual,
                                          const SeedOptions& options) {
-  const auto voxels = drawVoxels(residual, options.draw);
+  const auto [voxels, share] = drawVoxels(residual, options.draw);
   std::vector<Primitive> seeds(voxels.size());
-  tbb::parallel_for(std::size_t(0), voxels.size(),
-                    [&](std::size_t i) { seeds[i] = seedAt(residual, voxels[i], options); });
+  tbb::parallel_for(std::size_t(0), seeds.size(), [&, &at = voxels, each = share](std::size_t i) {
+    seeds[i] = seedAt(residual, at[i], options, each);
+  });
   return seeds;
 }
 

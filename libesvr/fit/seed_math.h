@@ -12,12 +12,14 @@ namespace esvr {
 /// Moments of the residual of one sign about a voxel.
 struct SeedMoments {
   double mass = 0.0;
+  double energy = 0.0;  ///< sum of squares
   double x = 0.0, y = 0.0, z = 0.0;
   double xx = 0.0, yy = 0.0, zz = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
 
   /// \param d  from the voxel  \param r  magnitude of the residual there
   ESVR_HD void add(Coord d, double r) {
     mass += r;
+    energy += r * r;
     x += r * d.x, y += r * d.y, z += r * d.z;
     xx += r * d.x * d.x, yy += r * d.y * d.y, zz += r * d.z * d.z;
     xy += r * d.x * d.y, xz += r * d.x * d.z, yz += r * d.y * d.z;
@@ -31,11 +33,19 @@ ESVR_HD inline bool inSeedWindow(Coord d, int w) {
 
 struct SeedShape {
   double unitVariance;  ///< SeedOptions::unitVariance
-  double intensity;     ///< of the seed
+  double intensity;     ///< SeedOptions::intensity
+  double share;         ///< energy that each draw stands for
 };
 
-/// An ellipsoid of the moments' place and spread.
-ESVR_HD inline Primitive seedFromMoments(Coord voxel, const SeedMoments& m,
+/// Height of a seed where the residual is r. Where little is left to mend but in a few places, many
+/// draws fall close together, and all of them would fill the same gap: they share it.
+ESVR_HD inline double seedHeight(double r, const SeedMoments& m, const SeedShape& shape) {
+  const double drawsAround = m.energy / shape.share;
+  return -r * shape.intensity / (drawsAround > 1.0 ? drawsAround : 1.0);
+}
+
+/// An ellipsoid of the moments' place and spread. \param r  the residual at the voxel
+ESVR_HD inline Primitive seedFromMoments(Coord voxel, double r, const SeedMoments& m,
                                          const SeedShape& shape) {
   constexpr double kSmallestVariance = 0.25;  // voxels^2: a seed of one voxel still has a shape
   const Eigen::Vector3d mean(m.x / m.mass, m.y / m.mass, m.z / m.mass);
@@ -57,7 +67,7 @@ ESVR_HD inline Primitive seedFromMoments(Coord voxel, const SeedMoments& m,
     const double inverseScale = std::sqrt(shape.unitVariance / kept);
     for (int j = 0; j < 3; ++j) p.L[3 * i + j] = inverseScale * axes.eigenvectors()(j, i);
   }
-  p.intensity = shape.intensity;
+  p.intensity = seedHeight(r, m, shape);
   return p;
 }
 

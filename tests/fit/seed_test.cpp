@@ -24,7 +24,7 @@ TEST(DrawVoxels, FollowsTheEnergyBrickByBrick) {
   Bricks b({{0, 0, 0}, {1, 0, 0}});
   for (std::size_t v = 0; v < kBrickVoxels; ++v)
     b.values[v] = -1.0f, b.values[kBrickVoxels + v] = -2.0f;
-  const auto voxels = drawVoxels(b.field(), {.count = 100, .targetBricks = 2});
+  const auto voxels = drawVoxels(b.field(), {.count = 100, .targetBricks = 2}).voxels;
   ASSERT_EQ(voxels.size(), 100u);
   const auto inSecond =
       std::count_if(voxels.begin(), voxels.end(), [](Coord v) { return v.x >= 8; });
@@ -35,16 +35,25 @@ TEST(DrawVoxels, LeavesAloneWhatItsSignCannotMend) {
   Bricks b({{0, 0, 0}});
   b.values[10] = 5.0f;   // V too high
   b.values[20] = -1.0f;  // V too low
-  for (const Coord v : drawVoxels(b.field(), {.count = 50, .targetBricks = 1}))
+  for (const Coord v : drawVoxels(b.field(), {.count = 50, .targetBricks = 1}).voxels)
     EXPECT_EQ(v, voxelLocal(20));
   DrawOptions negative{
       .count = 50, .targetBricks = 1, .signs = {.positive = false, .negative = true}};
-  for (const Coord v : drawVoxels(b.field(), negative)) EXPECT_EQ(v, voxelLocal(10));
+  for (const Coord v : drawVoxels(b.field(), negative).voxels) EXPECT_EQ(v, voxelLocal(10));
+}
+
+TEST(DrawVoxels, AVoxelOfManySharesIsDrawnOnce) {
+  Bricks b({{0, 0, 0}});
+  b.values[30] = -10.0f;
+  b.values[40] = -0.1f;
+  const auto [voxels, share] = drawVoxels(b.field(), {.count = 1000, .targetBricks = 1});
+  EXPECT_EQ(voxels, (std::vector<Coord>{voxelLocal(30)}));
+  EXPECT_NEAR(share, 100.01 / 1000, 1e-6);
 }
 
 TEST(DrawVoxels, FindsNothingWhereThereIsNoError) {
   const Bricks b({{0, 0, 0}});
-  EXPECT_TRUE(drawVoxels(b.field(), {.count = 5, .targetBricks = 1}).empty());
+  EXPECT_TRUE(drawVoxels(b.field(), {.count = 5, .targetBricks = 1}).voxels.empty());
 }
 
 TEST(Seed, TakesPlaceAndHeightFromTheResidual) {
@@ -58,7 +67,8 @@ TEST(Seed, TakesPlaceAndHeightFromTheResidual) {
   ASSERT_EQ(seeds.size(), 3u);
   EXPECT_NEAR(seeds[1].center[0], 4.0, 1e-9);
   EXPECT_NEAR(seeds[1].center[2], 7.0, 1e-9);
-  EXPECT_NEAR(seeds[1].intensity, 0.5, 1e-7);
+  // All three see the same residual and share it.
+  EXPECT_NEAR(seeds[0].intensity + seeds[1].intensity + seeds[2].intensity, 0.5, 1e-7);
   const PrincipalAxes axes = principalAxes(seeds[1].L);
   EXPECT_GT(axes.scale[0], 1.4 * axes.scale[1]);  // longer along the bar
 }

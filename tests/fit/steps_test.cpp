@@ -1,5 +1,4 @@
-// Plan: the moves of a run one by one: Adam on a quadratic and under scaled gradients, trust that
-// cuts and recovers, schedules that start and end where they say, relocation that takes the
+// Plan: the moves of a run one by one: Adam on a quadratic and under scaled gradients, schedules that start and end where they say, relocation that takes the
 // primitive whose removal the loss misses least.
 
 #include <gtest/gtest.h>
@@ -39,28 +38,6 @@ TEST(Adam, KeepsIntensitiesInRange) {
   g[0].byParameter[9] = 1.0;
   for (int i = 0; i < 50; ++i) adamStep(p, state, g, {}, {}, {0.25, 64.0, 0.0, 1.5});
   EXPECT_EQ(p[0].intensity, 0.0);
-}
-
-TEST(StepTrust, CutsWhenTheLossJumpsAndRecovers) {
-  StepTrust trust(1.0);
-  EXPECT_EQ(trust.update(1.0), 1.0);
-  EXPECT_LT(trust.update(100.0), 0.7);
-  double factor = 0.0;
-  for (int i = 0; i < 200; ++i) factor = trust.update(0.5);
-  EXPECT_EQ(factor, 1.0);
-}
-
-TEST(StepTrust, LeavesNoiseFarBelowTheTargetAlone) {
-  StepTrust trust(1.0);
-  trust.update(1e-12);
-  EXPECT_EQ(trust.update(1e-6), 1.0);
-}
-
-TEST(StepTrust, DoesNotMistakeNewPrimitivesForOvershoot) {
-  StepTrust trust(1.0);
-  trust.update(1.0);
-  trust.forgetLoss();
-  EXPECT_EQ(trust.update(100.0), 1.0);
 }
 
 TEST(Schedule, GoesFromItsFirstCountToItsLast) {

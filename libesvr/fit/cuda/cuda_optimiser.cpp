@@ -46,22 +46,12 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       brickLoss_(stream_.get()),
       chunkSums_(stream_.get()),
       loss_(stream_.get()),
-      states_(2, stream_.get()),
       diverged_(1, stream_.get()),
       draw_(stream_.get()),
       ranking_(stream_.get()),
       errorSums_(stream_.get()) {
   loss_.reserve(1);
   diverged_.setZero();
-  setState({StepTrust(energyOf(target)), 0.0});
-}
-
-IterationState CudaOptimiser::state() const {
-  return downloadValue(states_.data() + current_, stream_.get());
-}
-
-void CudaOptimiser::setState(const IterationState& state) {
-  uploadTo(states_.data() + current_, std::span<const IterationState>(&state, 1), stream_.get());
 }
 
 BrickPassArguments CudaOptimiser::passArguments() {
@@ -89,8 +79,6 @@ StepArguments CudaOptimiser::stepArguments(double factor) {
           .brickLoss = brickLoss_.data(),
           .chunkSums = chunkSums_.data(),
           .loss = loss_.data(),
-          .before = states_.data() + current_,
-          .after = states_.data() + 1 - current_,
           .primitives = primitives_.data(),
           .states = adam_.data(),
           .forms = forms_.data(),
@@ -133,26 +121,23 @@ std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t primitives,
   refreshResiduals();
   launchSums(stepArguments(0.0), stream_.get());
   const double loss = downloadValue(loss_.data(), stream_.get());
-  const Coord* const voxels = draw_.draw(
+  const DeviceDraw drawn = draw_.draw(
       residual_.data(), loss, bricks_.view().bricks,
       {count, bricks_.targetCount(), signsOf(target_), options_.seed ^ (++draws_ << 32)});
-  IterationState now = state();
-  now.trust.forgetLoss();
-  setState(now);
-  if (voxels == nullptr) return 0;
-  launchPlaceSeeds({.voxels = voxels,
-                    .count = std::uint32_t(count),
+  launchPlaceSeeds({.voxels = drawn.voxels,
+                    .count = drawn.count,
                     .bricks = bricks_.view(),
                     .residual = residual_.data(),
                     .window = seedWindow(target_, primitives, tuning_),
                     .unitVariance = unitVariance_,
                     .intensity = tuning_.seedIntensity,
+                    .share = drawn.share,
                     .into = into,
                     .firstPlace = std::uint32_t(count_),
                     .primitives = primitives_.data(),
                     .states = adam_.data()},
                    stream_.get());
-  return count;
+  return drawn.count;
 }
 
 void CudaOptimiser::growTo(std::size_t count) {
@@ -179,12 +164,11 @@ void CudaOptimiser::step(double factor) {
   const StepArguments arguments = stepArguments(factor);
   launchSums(arguments, stream_.get());
   launchStep(arguments, stream_.get());
-  current_ = 1 - current_;
 }
 
 double CudaOptimiser::iterate(std::span<const double> factors) {
   for (const double factor : factors) step(factor);
-  const double loss = state().loss;
+  const double loss = downloadValue(loss_.data(), stream_.get());
   if (!std::isfinite(loss) || downloadValue(diverged_.data(), stream_.get()) != 0)
     throw RuntimeFailure("the fit diverged: an ellipsoid is not finite");
   return loss;

@@ -45,12 +45,10 @@ class CudaOptimiser final : public Optimiser {
   void refreshResiduals();
   void step(double factor);
   void reserve(std::size_t primitives);
-  /// \return how many seeds there are: `count`, or none where no error is left
+  /// \return how many seeds there are: `count`, fewer where errors are few
   std::size_t placeSeeds(std::size_t count, std::size_t primitives, const std::uint32_t* into);
   [[nodiscard]] BrickPassArguments passArguments();
   [[nodiscard]] StepArguments stepArguments(double factor);
-  [[nodiscard]] IterationState state() const;
-  void setState(const IterationState& state);
 
   const FitTarget& target_;
   OptimiserOptions options_;
@@ -69,13 +67,11 @@ class CudaOptimiser final : public Optimiser {
   GrowingBuffer<Usefulness> usefulness_;
   GrowingBuffer<float> moments_, residual_;
   GrowingBuffer<double> brickLoss_, chunkSums_, loss_;
-  DeviceBuffer<IterationState> states_;  ///< read and written in turn
   DeviceBuffer<int> diverged_;
   VoxelDraw draw_;
   PrimitiveRanking ranking_;
   ErrorSums errorSums_;
   std::size_t count_ = 0;
-  int current_ = 0;  ///< which of states_ is the last
   double secondsSeeding_ = 0.0;
   std::uint64_t draws_ = 0;          ///< events so far: each draws from its own random stream
   int iterationsSinceRebuild_ = kListsStale;

@@ -1,17 +1,16 @@
 #include <cmath>
 #include <cub/device/device_scan.cuh>
+#include <cub/device/device_select.cuh>
+#include <thrust/iterator/discard_iterator.h>
 
 #include "esvr/sparse_volume.h"
+#include "field/brick_hash.h"
 #include "fit/cuda/copy.h"
 #include "fit/cuda/draw.h"
 #include "fit/cuda/launch.h"
 #include "fit/cuda/temporary.h"
 
 namespace esvr::cuda {
-namespace {
-
-constexpr unsigned kAllLanes = 0xffffffffu;
-constexpr int kVoxelsPerLane = kBrickVoxels / kWarp;
 
 /// Energies as integers, whose running sums have no order and no rounding.
 struct EnergyUnits {
@@ -21,9 +20,6 @@ struct EnergyUnits {
   }
 };
 
-/// Of all voxels together at most 2^61.
-EnergyUnits unitsFor(double loss) { return {std::ldexp(1.0, 60 - std::ilogb(loss))}; }
-
 struct DrawArguments {
   const float* residual;
   const Coord* bricks;
@@ -32,6 +28,14 @@ struct DrawArguments {
   std::uint32_t targetBricks;
   std::uint64_t seed;
 };
+
+namespace {
+
+constexpr unsigned kAllLanes = 0xffffffffu;
+constexpr int kVoxelsPerLane = kBrickVoxels / kWarp;
+
+/// Of all voxels together at most 2^61.
+EnergyUnits unitsFor(double loss) { return {std::ldexp(1.0, 60 - std::ilogb(loss))}; }
 
 __device__ std::uint64_t warpSum(std::uint64_t value) {
   for (int d = kWarp / 2; d > 0; d /= 2) value += __shfl_xor_sync(kAllLanes, value, d);
@@ -100,30 +104,59 @@ __global__ void drawVoxelsKernel(const DrawArguments a, const std::uint64_t* sum
   if (threadIdx.x % kWarp == 0) out[n] = a.bricks[brick] * kBrickSide + voxelLocal(voxel);
 }
 
+struct SameVoxel {
+  __host__ __device__ bool operator()(const Coord& a, const Coord& b) const {
+    return sameBrick(a, b);
+  }
+};
+
 }  // namespace
 
 VoxelDraw::VoxelDraw(cudaStream_t stream)
-    : stream_(stream), energy_(stream), sums_(stream), voxels_(stream), temporary_(stream) {}
+    : stream_(stream),
+      energy_(stream),
+      sums_(stream),
+      drawn_(stream),
+      voxels_(stream),
+      count_(stream),
+      temporary_(stream) {}
 
-const Coord* VoxelDraw::draw(const float* residual, double loss, const Coord* bricks,
-                             const DrawOptions& options) {
-  if (!(loss > 0.0) || options.count == 0) return nullptr;
+DeviceDraw VoxelDraw::draw(const float* residual, double loss, const Coord* bricks,
+                           const DrawOptions& options) {
+  if (!(loss > 0.0) || options.count == 0) return {};
   const auto targets = std::uint32_t(options.targetBricks);
   const DrawArguments a{residual, bricks, options.signs, unitsFor(loss), targets, options.seed};
-  std::uint64_t* const energy = energy_.reserve(targets);
-  std::uint64_t* const sums = sums_.reserve(targets);
-  brickEnergies<<<blocksFor(std::size_t(targets) * kWarp, kBlock), kBlock, 0, stream_>>>(a, energy);
+  const std::uint64_t total = sumEnergies(a);
+  if (total == 0) return {};
+  const auto count = std::uint32_t(options.count);
+  Coord* const drawn = drawn_.reserve(count);
+  drawVoxelsKernel<<<blocksFor(options.count * kWarp, kBlock), kBlock, 0, stream_>>>(
+      a, sums_.data(), count, drawn);
+  check(cudaGetLastError(), "drawing voxels");
+  return {voxels_.reserve(count), keepEachOnce(count), double(total) / a.units.scale / count};
+}
+
+std::uint64_t VoxelDraw::sumEnergies(const DrawArguments& a) {
+  std::uint64_t* const energy = energy_.reserve(a.targetBricks);
+  std::uint64_t* const sums = sums_.reserve(a.targetBricks);
+  brickEnergies<<<blocksFor(std::size_t(a.targetBricks) * kWarp, kBlock), kBlock, 0, stream_>>>(
+      a, energy);
   check(cudaGetLastError(), "summing energies");
   withTemporary(temporary_, "summing energies", [&](void* memory, std::size_t& bytes) {
-    return cub::DeviceScan::InclusiveSum(memory, bytes, energy, sums, targets, stream_);
+    return cub::DeviceScan::InclusiveSum(memory, bytes, energy, sums, a.targetBricks, stream_);
   });
-  if (downloadValue(sums + targets - 1, stream_) == 0) return nullptr;
-  const auto count = std::uint32_t(options.count);
-  Coord* const voxels = voxels_.reserve(count);
-  drawVoxelsKernel<<<blocksFor(options.count * kWarp, kBlock), kBlock, 0, stream_>>>(a, sums, count,
-                                                                                     voxels);
-  check(cudaGetLastError(), "drawing voxels");
-  return voxels;
+  return downloadValue(sums + a.targetBricks - 1, stream_);
+}
+
+std::uint32_t VoxelDraw::keepEachOnce(std::uint32_t count) {
+  // Draws of one voxel follow each other.
+  const SameVoxel same;
+  withTemporary(temporary_, "listing drawn voxels", [&](void* memory, std::size_t& bytes) {
+    return cub::DeviceSelect::UniqueByKey(memory, bytes, drawn_.data(), drawn_.data(),
+                                          voxels_.data(), thrust::make_discard_iterator(),
+                                          count_.reserve(1), count, same, stream_);
+  });
+  return downloadValue(count_.data(), stream_);
 }
 
 }  // namespace esvr::cuda

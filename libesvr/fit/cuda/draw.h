@@ -9,6 +9,14 @@
 
 namespace esvr::cuda {
 
+struct DrawArguments;
+
+struct DeviceDraw {
+  const Coord* voxels = nullptr;  ///< on the device, each once
+  std::uint32_t count = 0;
+  double share = 0.0;  ///< energy that each draw stood for
+};
+
 class VoxelDraw {
  public:
   explicit VoxelDraw(cudaStream_t stream);
@@ -16,14 +24,18 @@ class VoxelDraw {
   /// \param residual  kBrickVoxels a brick; at least options.targetBricks of them
   /// \param loss      sum of r^2 over all bricks, finite
   /// \param bricks    coordinates of the bricks
-  /// \return options.count voxels on the device; null where there is no error to mend
-  [[nodiscard]] const Coord* draw(const float* residual, double loss, const Coord* bricks,
+  /// \return none where there is no error to mend
+  [[nodiscard]] DeviceDraw draw(const float* residual, double loss, const Coord* bricks,
                                   const DrawOptions& options);
 
  private:
+  [[nodiscard]] std::uint64_t sumEnergies(const DrawArguments& arguments);
+  [[nodiscard]] std::uint32_t keepEachOnce(std::uint32_t count);
+
   cudaStream_t stream_;
   GrowingBuffer<std::uint64_t> energy_, sums_;
-  GrowingBuffer<Coord> voxels_;
+  GrowingBuffer<Coord> drawn_, voxels_;
+  GrowingBuffer<std::uint32_t> count_;
   GrowingBuffer<char> temporary_;
 };
 

@@ -49,7 +49,7 @@ __device__ SeedMoments momentsAround(const Surroundings& around, double sign, in
     if (first + int(threadIdx.x % kWarp) < cube && r > 0.0 && inSeedWindow(d, w)) m.add(d, r);
   }
   for (double* part :
-       {&m.mass, &m.x, &m.y, &m.z, &m.xx, &m.yy, &m.zz, &m.xy, &m.xz, &m.yz})
+       {&m.mass, &m.energy, &m.x, &m.y, &m.z, &m.xx, &m.yy, &m.zz, &m.xy, &m.xz, &m.yz})
     sumOverWarp(*part);
   return m;
 }
@@ -64,7 +64,7 @@ __global__ void placeSeeds(const SeedArguments a) {
   const SeedMoments moments = momentsAround(around, r < 0.0 ? -1.0 : 1.0, a.window);
   if (threadIdx.x % kWarp != 0) return;
   const std::uint32_t place = a.into != nullptr ? a.into[n] : a.firstPlace + n;
-  a.primitives[place] = seedFromMoments(voxel, moments, {a.unitVariance, -r * a.intensity});
+  a.primitives[place] = seedFromMoments(voxel, r, moments, {a.unitVariance, a.intensity, a.share});
   a.states[place] = AdamState{};
 }
 

@@ -17,6 +17,7 @@ struct SeedArguments {
   int window;                 ///< half width of the neighbourhood that shapes a seed, voxels
   double unitVariance;        ///< of the kernel
   double intensity;           ///< of the residual at the seed
+  double share;               ///< energy that each draw stood for
   const std::uint32_t* into;  ///< places of the new primitives; null: firstPlace and on
   std::uint32_t firstPlace;
   Primitive* primitives;

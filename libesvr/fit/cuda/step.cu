@@ -63,18 +63,13 @@ __device__ bool finite(const Primitive& p) {
 
 __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   const std::uint32_t i = ownPrimitive();
-  // Every thread works out the same trust; one keeps it, where no other reads.
-  IterationState state = *a.before;
-  state.loss = *a.loss;
-  const double factor = a.factor * state.trust.update(state.loss);
-  if (i == 0) *a.after = state;
   if (i >= a.primitiveCount) return;
 
   const PairSums sums = sumsOf(a, i);
   Primitive p = a.primitives[i];
   AdamState adam = a.states[i];
   const ParameterVector gradient = parameterGradient(a.forms[i].form, sums);
-  const ParameterVector largest = largestStep(p, a.sizes.scaled(factor));
+  const ParameterVector largest = largestStep(p, a.sizes.scaled(a.factor));
   moveWithin(p, adamDirection(adam, gradient, a.adam, largest), a.limits);
   a.primitives[i] = p;
   a.states[i] = adam;
@@ -109,8 +104,8 @@ void launchSums(const StepArguments& a, cudaStream_t stream) {
 }
 
 void launchStep(const StepArguments& a, cudaStream_t stream) {
-  // One block at least: it keeps the state.
-  step<<<std::max(1u, blocksFor(a.primitiveCount, kStepBlock)), kStepBlock, 0, stream>>>(a);
+  if (a.primitiveCount == 0) return;
+  step<<<blocksFor(a.primitiveCount, kStepBlock), kStepBlock, 0, stream>>>(a);
   check(cudaGetLastError(), "starting a step");
 }
 

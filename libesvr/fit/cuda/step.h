@@ -5,15 +5,8 @@
 
 #include "fit/adam.h"
 #include "fit/cuda/brick_pass.h"
-#include "fit/step_trust.h"
 
 namespace esvr::cuda {
-
-/// What the host learns of the last iteration.
-struct IterationState {
-  StepTrust trust;
-  double loss;  ///< sum of r^2 before the step
-};
 
 /// What a primitive is worth, from the last gradients.
 struct Usefulness {
@@ -28,9 +21,7 @@ struct StepArguments {
   const float* moments;     ///< kMomentStride a pair
   const double* brickLoss;  ///< a brick's
   double* chunkSums;        ///< kMomentStride a chunk
-  double* loss;             ///< one value
-  const IterationState* before;
-  IterationState* after;
+  double* loss;             ///< one value: sum of r^2 before the step
   Primitive* primitives;
   AdamState* states;
   PairForm* forms;
