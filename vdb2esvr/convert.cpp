@@ -22,6 +22,7 @@ void recordFit(const FitResult& fitted, ConvertedGrid& grid) {
   grid.end = fitted.end;
   grid.pilot = fitted.pilot;
   grid.pairs = fitted.pairs;
+  grid.deviceBytes = fitted.deviceBytes;
   grid.signedIntensities = fitted.signedIntensities;
   grid.seconds.seed = fitted.secondsSeed;
   grid.seconds.pilot = fitted.secondsPilot;
@@ -67,6 +68,7 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
   grid.nonFiniteReplaced = source.nonFiniteReplaced;
   grid.seconds.read = watch.lap();
 
+  grid.device = deviceName(options.fit.device);
   RateInput input{source.descriptor, source.volume, options.fit};
   input.options.narrowBand = isNarrowBand(source.descriptor, source.volume);
   EncodedGrid encoded = bytes || searchesForPsnr(options) ? fitRated(input, bytes, grid)

@@ -35,6 +35,8 @@ struct ConvertedGrid {
   std::uint64_t nonFiniteReplaced = 0;
   FitEnd end = FitEnd::kScheduleDone;
   std::vector<PilotPoint> pilot;
+  std::string device;           ///< that fitted it
+  std::size_t deviceBytes = 0;  ///< FitResult::deviceBytes
   std::uint64_t pairs = 0;
   bool signedIntensities = false;
   std::vector<CurvePoint> curve;         ///< of the fit, whether the file has it or not

@@ -22,6 +22,7 @@ constexpr double kHighestPsnr = 300.0;  // dB; float32 ends at about 150
 constexpr double kLongestRun = 1e9;     // seconds
 constexpr double kLargestRatio = 1e9;
 constexpr double kMostLoss = 20.0;     // dB
+constexpr double kLeastVram = 1e-3, kMostVram = 1e6;  // GB
 constexpr float kLargestKappa = 1e4f;  // kernel.h
 
 cli::ProgramText programText() {
@@ -85,7 +86,8 @@ void addFitOptions(cli::po::options_description& options) {
      value<double>()->value_name("DB")->default_value(CompactOptions::kDefaultLoss),
      "PSNR that --storage compact may cost; with --psnr: whatever that leaves")
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
-     "auto, cpu, cuda or cuda:N");
+     "auto (a GPU where there is one), cpu, cuda or cuda:N")
+    ("max-vram", value<double>()->value_name("GB"), "GPU memory to use (default: what is free)");
   // clang-format on
 }
 
@@ -135,6 +137,8 @@ FitOptions fitOptions(const Arguments& a) {
   fit.loss = cli::choose<Loss>("loss", a.get<std::string>("loss"),
                                {{"squared", Loss::kSquared}, {"paper", Loss::kPaper}});
   fit.beta = *bounded<double>(a, "beta", 0.0, 1.0);
+  if (const auto gigabytes = bounded<double>(a, "max-vram", kLeastVram, kMostVram))
+    fit.maxDeviceBytes = std::size_t(*gigabytes * 1e9);
   fit.kappa = bounded<float>(a, "kappa", -kLargestKappa, kLargestKappa);
   if (const auto box = a.find<std::string>("box")) fit.box = cli::parseBox(*box);
   fit.seed =

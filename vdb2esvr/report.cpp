@@ -78,7 +78,8 @@ Json asked(const Options& options) {
           {"storage_loss", options.storageLoss},
           {"seed", fit.seed},
           {"threads", options.threads > 0 ? Json(options.threads) : Json(nullptr)},
-          {"device", options.device}};
+          {"device", options.device},
+          {"max_vram", orNull(options.fit.maxDeviceBytes)}};
 }
 
 Json sourceOf(const ConvertedGrid& grid) {
@@ -108,7 +109,11 @@ Json fitOf(const ConvertedGrid& grid) {
   Json pilot = Json::array();
   for (const auto& point : grid.pilot)
     pilot.push_back({{"kappa", point.kappa}, {"psnr_box", point.psnrBox}});
-  return {{"end", nameOf(grid.end)}, {"pilot", pilot}, {"pairs", grid.pairs}};
+  return {{"end", nameOf(grid.end)},
+          {"device", grid.device},
+          {"device_bytes", grid.deviceBytes},
+          {"pilot", pilot},
+          {"pairs", grid.pairs}};
 }
 
 Json compactOf(const ConvertedGrid& grid) {
@@ -238,7 +243,6 @@ Json makeReport(const Options& options, const RunRecord& record) {
           {"command_line", options.commandLine},
           {"versions", versions()},
           {"asked", asked(options)},
-          {"device", "cpu"},
           {"input",
            {{"path", options.input.string()}, {"format", record.input.format}, {"bytes", bytesIn}}},
           {"output", {{"path", options.output.string()}, {"bytes", bytesOut}}},

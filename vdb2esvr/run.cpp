@@ -34,14 +34,17 @@ void checkFiles(const Options& options) {
   if (reportIsFile(options)) cli::checkOutput(options.report, {".json"}, options.overwrite);
 }
 
-/// This version fits on the CPU. "auto" takes it without looking for a GPU.
-void checkDevice(const Options& options, const cli::Log& log) {
-  if (options.device != "auto" && selectDevice(options.device).kind == DeviceKind::kCuda)
-    throw DeviceError("--device " + options.device +
-                      ": this version fits on the CPU only; use --device cpu or auto");
-  log.detail("fitting on the CPU, with " +
+constexpr const char* kAuto = "auto";
+
+/// The device that "auto" stands for here: what runs on the CPU alone is fitted there.
+Device chooseDevice(const Options& options, const cli::Log& log) {
+  const bool cpuOnly = options.device == kAuto && options.fit.loss == Loss::kPaper;
+  const Device device = selectDevice(cpuOnly ? "cpu" : options.device);
+  if (cpuOnly) log.detail("the paper's loss is computed on the CPU");
+  log.detail("fitting on " + deviceName(device) + ", with " +
              (options.threads > 0 ? std::to_string(options.threads) : "all available") +
              " threads");
+  return device;
 }
 
 void tellSkipped(const std::vector<GridSummary>& skipped, const cli::Log& log) {
@@ -62,8 +65,10 @@ void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
 /// Fits one grid after the other until all are done or the run is interrupted.
 class Conversion {
  public:
-  Conversion(const Options& options, const CancelToken& cancel) : options_(options) {
+  Conversion(const Options& options, const CancelToken& cancel, const cli::Log& log)
+      : options_(options), log_(log) {
     options_.fit.cancel = &cancel;
+    options_.fit.device = chooseDevice(options, log);
   }
 
   void run(const std::vector<GridSummary>& grids, RunRecord& record) {
@@ -84,14 +89,28 @@ class Conversion {
   bool convert(const GridSummary& grid, ByteShares& shares, RunRecord& record) try {
     const ProgressBar bar(grid.uniqueName, options_.verbosity != cli::Verbosity::kQuiet);
     options_.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
-    record.grids.push_back(convertGrid(options_, grid.uniqueName, shares.of(grid)));
+    record.grids.push_back(convertWhereItFits(grid.uniqueName, shares.of(grid)));
     shares.take(grid, record.grids.back().stored);
     return true;
   } catch (const Cancelled&) {
     return false;
   }
 
+  /// A GPU that "auto" took may prove too small: the CPU then does what is left.
+  ConvertedGrid convertWhereItFits(const std::string& name, std::optional<std::uint64_t> bytes) {
+    if (options_.device != kAuto || options_.fit.device.kind == DeviceKind::kCpu)
+      return convertGrid(options_, name, bytes);
+    try {
+      return convertGrid(options_, name, bytes);
+    } catch (const DeviceError& error) {
+      log_.warning(std::string(error.what()) + "; going on with the CPU");
+      options_.fit.device = {};
+      return convertGrid(options_, name, bytes);
+    }
+  }
+
   Options options_;
+  const cli::Log& log_;
 };
 
 void write(const Options& options, RunRecord& record) {
@@ -133,14 +152,13 @@ int run(const Options& options) {
   const cli::ThreadLimit threads(options.threads);
   const cli::Interrupts interrupts;
   checkFiles(options);
-  checkDevice(options, log);
 
   RunRecord record;
   record.input = inspectVdb(options.input);
   GridChoice choice = chooseGrids(options.input, record.input, options.grids);
   tellSkipped(choice.skipped, log);
   record.skipped = std::move(choice.skipped);
-  Conversion(options, interrupts.token()).run(choice.fitted, record);
+  Conversion(options, interrupts.token(), log).run(choice.fitted, record);
   for (const auto& grid : record.grids) tellGrid(grid, log);
   write(options, record);
   record.secondsTotal = watch.lap();

@@ -74,6 +74,14 @@ std::vector<std::string> cudaDevices() {
   return names;
 }
 
+std::string deviceName(const Device& device) {
+  if (device.kind == DeviceKind::kCpu) return "CPU";
+  const std::string place = std::string(kCudaPrefix) + std::to_string(device.index);
+  for (const auto& found : probeCuda().devices)
+    if (found.index == device.index) return found.name + " (" + place + ")";
+  return place;
+}
+
 std::string cudaVersions() { return probeCuda().versions; }
 
 }  // namespace esvr

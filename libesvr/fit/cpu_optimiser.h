@@ -28,6 +28,7 @@ class CpuOptimiser final : public Optimiser {
 
   [[nodiscard]] std::size_t primitiveCount() const override { return primitives_.size(); }
   [[nodiscard]] std::vector<Primitive> primitives() const override { return primitives_; }
+  [[nodiscard]] std::size_t deviceBytes() const override { return 0; }
   [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
   [[nodiscard]] std::uint64_t pairCount() const override { return engine_.pairs().pairCount(); }
 

@@ -92,7 +92,8 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
 
   Recorder recorder(target, options);
   const RunPlan plan = planFor(target, options);
-  OptimiserOptions optimiserOptions{{}, options.loss, options.beta, options.seed, options.device};
+  OptimiserOptions optimiserOptions{{}, options.loss, options.beta, options.seed, options.device,
+                                    options.maxDeviceBytes};
   FitResult result;
   if (options.kappa) {
     optimiserOptions.kernel.kappa = *options.kappa;
@@ -113,6 +114,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
                                                       volume.background, optimiserOptions.kernel});
   result.end = end.end;
   result.curve = recorder.curve();
+  result.deviceBytes = optimiser->deviceBytes();
   result.pairs = optimiser->pairCount();
   result.signedIntensities = anyNegative(result.field);
   result.secondsSeed = optimiser->secondsSeeding();

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,6 +22,7 @@ struct OptimiserOptions {
   double beta = 0.2;
   std::uint64_t seed = 1;
   Device device;
+  std::optional<std::size_t> maxDeviceBytes;  ///< FitOptions::maxDeviceBytes
 };
 
 /// Errors of a fit as its curve reports them, in units of the target.
@@ -58,6 +60,8 @@ class Optimiser {
   [[nodiscard]] virtual std::vector<Primitive> primitives() const = 0;
   /// Of the lists last built.
   [[nodiscard]] virtual std::uint64_t pairCount() const = 0;
+  /// The most that has been held so far; 0 on the CPU.
+  [[nodiscard]] virtual std::size_t deviceBytes() const = 0;
   /// Spent so far on finding where primitives are missing and shaping them.
   [[nodiscard]] virtual double secondsSeeding() const = 0;
 };

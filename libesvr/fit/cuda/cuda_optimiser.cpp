@@ -9,6 +9,7 @@
 #include "field/gather.h"
 #include "fit/cuda/copy.h"
 #include "fit/cuda/make_cuda_optimiser.h"
+#include "fit/cuda/memory_plan.h"
 #include "fit/cuda/memory_pool.h"
 #include "fit/cuda/place_seeds.h"
 #include "fit/scene.h"
@@ -143,6 +144,7 @@ std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t primitives,
 void CudaOptimiser::growTo(std::size_t count) {
   if (count <= count_) return;
   const AddSeconds timer(secondsSeeding_);
+  requireMemory(target_, count, options_.maxDeviceBytes);
   reserve(count);
   count_ += placeSeeds(count - count_, std::max(count - count_, count_), nullptr);
   launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
@@ -183,6 +185,8 @@ FitErrors CudaOptimiser::measure() {
                          .targetCount = std::uint32_t(bricks_.targetCount()),
                          .box = target_.box});
 }
+
+std::size_t CudaOptimiser::deviceBytes() const { return peakMemory(); }
 
 std::vector<Primitive> CudaOptimiser::primitives() const {
   std::vector<Primitive> host(count_);
@@ -231,6 +235,8 @@ std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget& target,
     throw UsageError("the paper's loss is computed on the CPU only: use --device cpu");
   cuda::useDevice(options.device);
   cuda::keepFreedMemory();
+  cuda::forgetPeakMemory();
+  cuda::requireMemory(target, 1, options.maxDeviceBytes);
   return std::make_unique<cuda::CudaOptimiser>(target, options, tuning);
 }
 

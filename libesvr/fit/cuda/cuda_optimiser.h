@@ -29,6 +29,7 @@ class CudaOptimiser final : public Optimiser {
   [[nodiscard]] std::size_t primitiveCount() const override { return count_; }
   [[nodiscard]] std::vector<Primitive> primitives() const override;
   [[nodiscard]] std::uint64_t pairCount() const override { return lists_.pairCount(); }
+  [[nodiscard]] std::size_t deviceBytes() const override;
   [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
 
   /// Gradients of 1/2 sum r^2 where the primitives are, for tests.

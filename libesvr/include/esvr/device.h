@@ -23,6 +23,9 @@ struct Device {
 /// \throws UsageError  another text; DeviceError: CUDA asked for and not there (says why)
 [[nodiscard]] Device selectDevice(const std::string& text);
 
+/// "CPU", or the GPU's name and place: "NVIDIA H200 (cuda:0)".
+[[nodiscard]] std::string deviceName(const Device& device);
+
 /// "CUDA 13.0, driver 580.159" or "no CUDA": for --version.
 [[nodiscard]] std::string cudaVersions();
 

@@ -47,6 +47,7 @@ struct FitOptions {
   bool narrowBand = false;
   std::uint64_t seed = 1;
   Device device;                        ///< the CPU, or a GPU (selectDevice)
+  std::optional<std::size_t> maxDeviceBytes;  ///< GPU memory to use; default: what is free
   const CancelToken* cancel = nullptr;  ///< a cancelled fit returns the best so far, marked so
   std::function<void(const FitProgress&)> progress;
 };
@@ -66,6 +67,7 @@ struct FitResult {
   std::vector<PilotPoint> pilot;  ///< empty where kappa was given
   /// Wall clock by phase; seeding (at the start, growth, relocation) is not in secondsOptimise.
   double secondsSeed = 0.0, secondsPilot = 0.0, secondsOptimise = 0.0;
+  std::size_t deviceBytes = 0;     ///< GPU memory held at most; 0 on the CPU
   std::uint64_t pairs = 0;         ///< (primitive, brick) pairs that the final field evaluates
   bool signedIntensities = false;  ///< some intensity is negative
 };

@@ -3,13 +3,17 @@
 // whole fit is the same bits in three runs, in a far place and with empty bricks around, reaches
 // what the CPU reaches, and fails loudly where it cannot go on.
 
+#include <gmock/gmock.h>
+
 #include <array>
+#include <chrono>
 #include <cmath>
 
 #include "../random_primitives.h"
 #include "../volumes.h"
 #include "fit/cpu_optimiser.h"
 #include "fit/cuda/cuda_optimiser.h"
+#include "fit/cuda/memory_plan.h"
 #include "gpu_test.h"
 
 namespace esvr {
@@ -141,6 +145,58 @@ TEST_F(OptimiserOnGpu, ReachesWhatTheCpuReaches) {
   const double onGpu = fitOn(device_, volume).curve.back().psnrBox;
   // The same method; rounding leads to other optima, which lie within a decibel of each other.
   EXPECT_NEAR(onGpu, onCpu, 1.0);
+}
+
+/// Seconds of an iteration for each of its pairs.
+double secondsPerPair(const FitTarget& target, const std::vector<Primitive>& primitives) {
+  constexpr int kIterations = 50;
+  Tuning tuning;
+  tuning.largestScale = 64.0;
+  CudaOptimiser optimiser(target, {}, tuning);
+  optimiser.setPrimitives(primitives);
+  const std::vector<double> factors(kIterations, 1e-6);  // lists stay as they are
+  optimiser.iterate(factors);
+  const auto start = std::chrono::steady_clock::now();
+  optimiser.iterate(factors);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  return taken.count() / kIterations / double(optimiser.pairCount());
+}
+
+TEST_F(OptimiserOnGpu, APrimitiveThatCoversHalfHoldsNothingUp) {
+  const SparseVolume volume = test::volumeOf({}, 24, 0.0f, [](Coord) { return 0.5f; });
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  test::Random random(3);
+  std::vector<Primitive> primitives(50'000);
+  for (Primitive& p : primitives)
+    p = {{random(0, 192), random(0, 192), random(0, 192)}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 0.1};
+  const double without = secondsPerPair(target, primitives);
+  constexpr double kInverse = 1.0 / 36.0;  // a support of about 94 voxels' radius
+  primitives.push_back(
+      {{96, 96, 96}, {kInverse, 0, 0, 0, kInverse, 0, 0, 0, kInverse}, 0.1});
+  EXPECT_LT(secondsPerPair(target, primitives), 1.3 * without);
+}
+
+TEST_F(OptimiserOnGpu, SaysHowManyEllipsoidsTheMemoryHolds) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  const std::size_t enough = cuda::predictedBytes(target, 100);
+  EXPECT_NO_THROW(cuda::requireMemory(target, 100, enough));
+  EXPECT_THAT([&] { cuda::requireMemory(target, 1000, enough); },
+              testing::ThrowsMessage<DeviceError>(testing::HasSubstr("100 ellipsoids would fit")));
+}
+
+TEST_F(OptimiserOnGpu, HoldsNoMoreThanWasPredicted) {
+  const SparseVolume volume = test::volumeOf({}, 12, 0.0f, [](Coord v) {
+    return float(std::max(0.0, 1.0 - std::hypot(v.x - 48, v.y - 48, v.z - 48) / 40.0));
+  });
+  FitOptions options;
+  options.count = 5000;
+  options.iterations = 60;
+  options.device = device_;
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  const FitResult result = fit(volume, options);
+  EXPECT_GT(result.deviceBytes, target.values.size() * sizeof(float));
+  EXPECT_LT(result.deviceBytes, cuda::predictedBytes(target, 5000));
 }
 
 TEST_F(OptimiserOnGpu, ALossThatIsNotFiniteEndsTheRun) {

@@ -1,0 +1,104 @@
+#include "fit/cuda/memory_plan.h"
+
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#include "core/cuda/check.h"
+#include "esvr/error.h"
+#include "fit/cuda/brick_pass.h"
+#include "fit/cuda/brick_table_view.h"
+#include "fit/cuda/step.h"
+
+namespace esvr::cuda {
+namespace {
+
+constexpr double kSpare = 1.25;         // GrowingBuffer's
+constexpr double kReachedShare = 1.0;   // bricks beyond the target's, to those of the target
+constexpr double kReach = 3.2;          // width of a support over the distance of neighbours
+constexpr double kSlotsPerEntry = 4.0;  // of hash tables, at most
+
+constexpr double kBytesPerBrick = double(kBrickVoxels * sizeof(float) + sizeof(Coord)) +
+                                  sizeof(double) * 5 + sizeof(std::uint64_t) * 2 +
+                                  sizeof(std::uint32_t) * (1 + kSlotsPerEntry);
+constexpr double kBytesPerTarget = double(kBrickVoxels * sizeof(float) + sizeof(BrickMask));
+constexpr double kBytesPerReached = kSlotsPerEntry * sizeof(ReachedSlot);
+constexpr double kBytesPerPair =
+    double(kMomentStride * sizeof(float)) + 8.0 * sizeof(std::uint32_t);  // lists, sorted and not
+constexpr double kBytesPerPrimitive =
+    double(sizeof(Primitive) + sizeof(AdamState) + sizeof(PairForm) + sizeof(Usefulness)) +
+    double(kMomentStride * sizeof(double)) + 9.0 * sizeof(std::uint32_t) + sizeof(Coord) * 2;
+
+double pairsOf(const FitTarget& target, double primitives) {
+  const double distance = std::cbrt(double(target.activeVoxels) / primitives);
+  return primitives * std::pow(1.0 + kReach * distance / kBrickSide, 3.0);
+}
+
+double bytesOf(const FitTarget& target, double primitives) {
+  const auto targets = double(target.bricks.size());
+  const double reached = target.narrowBand ? 0.0 : kReachedShare * targets;
+  return targets * kBytesPerTarget +
+         kSpare * ((targets + reached) * kBytesPerBrick + reached * kBytesPerReached +
+                   primitives * kBytesPerPrimitive + pairsOf(target, primitives) * kBytesPerPair);
+}
+
+/// The most primitives whose fit stays within a bound; 0 where the bricks alone exceed it.
+std::size_t mostPrimitives(const FitTarget& target, double bound) {
+  double low = 0.0, high = double(target.activeVoxels);
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (bytesOf(target, std::max(middle, 1.0)) <= bound ? low : high) = middle;
+  }
+  return std::size_t(low);
+}
+
+std::string megabytes(double bytes) { return std::to_string(std::llround(bytes / 1e6)) + " MB"; }
+
+std::size_t freeBytes() {
+  std::size_t free = 0, total = 0;
+  check(cudaMemGetInfo(&free, &total), "asking for the free memory");
+  return free;
+}
+
+cudaMemPool_t currentPool() {
+  int device = 0;
+  check(cudaGetDevice(&device), "asking for the current device");
+  cudaMemPool_t pool{};
+  check(cudaDeviceGetDefaultMemPool(&pool, device), "asking for the memory pool");
+  return pool;
+}
+
+}  // namespace
+
+std::size_t predictedBytes(const FitTarget& target, std::size_t primitives) {
+  return std::size_t(bytesOf(target, std::max(double(primitives), 1.0)));
+}
+
+void requireMemory(const FitTarget& target, std::size_t primitives,
+                   std::optional<std::size_t> most) {
+  const auto need = double(predictedBytes(target, primitives));
+  const auto have = double(most ? *most : freeBytes());
+  if (need <= have) return;
+  const std::size_t would = mostPrimitives(target, have);
+  throw DeviceError("fitting " + std::to_string(primitives) + " ellipsoids to " +
+                    std::to_string(target.bricks.size()) + " bricks takes about " +
+                    megabytes(need) + " on the GPU, and " + megabytes(have) +
+                    (most ? " are allowed" : " are free") +
+                    (would > 0 ? "; " + std::to_string(would) + " ellipsoids would fit"
+                               : "; the bricks alone do not fit: use --device cpu"));
+}
+
+std::size_t peakMemory() {
+  std::uint64_t peak = 0;
+  check(cudaMemPoolGetAttribute(currentPool(), cudaMemPoolAttrUsedMemHigh, &peak),
+        "asking for the peak memory");
+  return peak;
+}
+
+void forgetPeakMemory() {
+  std::uint64_t zero = 0;
+  check(cudaMemPoolSetAttribute(currentPool(), cudaMemPoolAttrUsedMemHigh, &zero),
+        "resetting the peak memory");
+}
+
+}  // namespace esvr::cuda

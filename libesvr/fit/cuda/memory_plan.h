@@ -1,0 +1,25 @@
+#pragma once
+/// How much device memory a fit takes, before it takes it.
+
+#include <cstddef>
+#include <optional>
+
+#include "fit/target.h"
+
+namespace esvr::cuda {
+
+/// Bytes that a fit of so many primitives comes to at most, by the sizes of its arrays. How many
+/// pairs there will be is an estimate from the distance of neighbouring primitives.
+[[nodiscard]] std::size_t predictedBytes(const FitTarget& target, std::size_t primitives);
+
+/// \param most  bytes the user allows; none: what is free on the current device
+/// \throws DeviceError  a fit of so many primitives would take more; says how many would fit
+void requireMemory(const FitTarget& target, std::size_t primitives,
+                   std::optional<std::size_t> most);
+
+/// The most bytes that the current device's pool has handed out since the last call of
+/// forgetPeakMemory().
+[[nodiscard]] std::size_t peakMemory();
+void forgetPeakMemory();
+
+}  // namespace esvr::cuda
