@@ -6,18 +6,18 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kGroups = kBlock / kGroup;  // of a block, which does one brick
-constexpr int kWarps = kBlock / kWarp;
+/// Threads for one brick: few keep more bricks going at once, many are done sooner with a full one.
+constexpr int kUsualThreads = 256, kThreadsForFullBricks = 512;
 constexpr unsigned kAllLanes = 0xffffffffu;
 constexpr int kMomentSlots = 16;  // kMoments, made a power of two
-static_assert(kMomentSlots == kGroup, "each lane ends with one of the moments");
+static_assert(kMomentSlots % kGroup == 0, "each lane ends with some of the moments");
 
 enum class Pass { kGradients, kResiduals, kLossGradients };
 
 /// The same on every thread, summed in one order.
-template <class Real>
+template <int kThreads, class Real>
 __device__ Real blockSum(Real value) {
-  __shared__ Real parts[kWarps];
+  __shared__ Real parts[kThreads / kWarp];
   for (int d = kWarp / 2; d > 0; d /= 2) value += __shfl_xor_sync(kAllLanes, value, d);
   if (threadIdx.x % kWarp == 0) parts[threadIdx.x / kWarp] = value;
   __syncthreads();
@@ -33,12 +33,13 @@ struct BrickEntries {
 
 /// Values are summed as integers, whose sum has no order, in units of 2^-exponent: as fine as the
 /// sum of the brick's intensities, which bounds every value, allows 31 bits to be.
+template <int kThreads>
 __device__ int sumExponent(const BrickPassArguments& a, BrickEntries entries) {
   constexpr int kBits = 29, kFarthest = 100;
   float bound = 0.0f;
-  for (std::uint32_t k = entries.begin + threadIdx.x; k < entries.end; k += kBlock)
+  for (std::uint32_t k = entries.begin + threadIdx.x; k < entries.end; k += kThreads)
     bound += fabsf(a.forms[a.lists.primitive[k]].form.intensity);
-  bound = blockSum(bound);
+  bound = blockSum<kThreads>(bound);
   return bound > 0.0f ? max(-kFarthest, min(kBits - ilogbf(bound), kFarthest)) : 0;
 }
 
@@ -56,31 +57,33 @@ __device__ void addPair(const BrickPassArguments& a, std::uint32_t entry, Coord 
 }
 
 /// r = V - target of voxel v, from the integer sum.
-__device__ float residualOf(const BrickPassArguments& a, int v, float sum) {
-  if (blockIdx.x >= a.targetCount) return sum;
-  const float t = a.target[std::size_t(blockIdx.x) * kBrickVoxels + v];
+__device__ float residualOf(const BrickPassArguments& a, std::uint32_t brick, int v, float sum) {
+  if (brick >= a.targetCount) return sum;
+  const float t = a.target[std::size_t(brick) * kBrickVoxels + v];
   const float r = sum - t;
   return a.narrowBand ? fminf(fmaxf(r, a.lowest - t), a.highest - t) : r;
 }
 
 /// Leaves r in the shared memory that held the sums. \return a thread's part of sum r^2
-__device__ float toResiduals(const BrickPassArguments& a, int exponent, int* sums) {
+template <int kThreads>
+__device__ float toResiduals(const BrickPassArguments& a, std::uint32_t brick, int exponent,
+                             int* sums) {
   const float unit = ldexpf(1.0f, -exponent);
   float loss = 0.0f;
-  for (int v = int(threadIdx.x); v < kBrickVoxels; v += kBlock) {
+  for (int v = int(threadIdx.x); v < kBrickVoxels; v += kThreads) {
     const int at = paddedOffset(v);
-    const float r = residualOf(a, v, float(sums[at]) * unit);
+    const float r = residualOf(a, brick, v, float(sums[at]) * unit);
     sums[at] = __float_as_int(r);
     loss += r * r;
-    if (a.residual != nullptr) a.residual[std::size_t(blockIdx.x) * kBrickVoxels + v] = r;
+    if (a.residual != nullptr) a.residual[std::size_t(brick) * kBrickVoxels + v] = r;
   }
   return loss;
 }
 
-__device__ void loadLossGradients(const BrickPassArguments& a, int* r) {
-  for (int v = int(threadIdx.x); v < kBrickVoxels; v += kBlock)
-    r[paddedOffset(v)] =
-        __float_as_int(a.residual[std::size_t(blockIdx.x) * kBrickVoxels + v]);
+template <int kThreads>
+__device__ void loadLossGradients(const BrickPassArguments& a, std::uint32_t brick, int* r) {
+  for (int v = int(threadIdx.x); v < kBrickVoxels; v += kThreads)
+    r[paddedOffset(v)] = __float_as_int(a.residual[std::size_t(brick) * kBrickVoxels + v]);
 }
 
 /// A lane's moments of a pair, in the order of PairMoments.
@@ -111,9 +114,11 @@ __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kern
   });
 }
 
-/// Sums over a group's lanes; lane n gets value n. Each exchange halves what a lane keeps.
-__device__ float transposeSum(float (&s)[kMomentSlots]) {
-  const unsigned group = 0xffffu << (threadIdx.x % kWarp / kGroup * kGroup);
+/// Sums of kGroup values over a group's lanes; lane n gets value n. Each exchange halves what a lane
+/// keeps.
+__device__ float transposeSum(float* s) {
+  constexpr unsigned kLanes = kGroup == kWarp ? kAllLanes : (1u << kGroup) - 1u;
+  const unsigned group = kLanes << (threadIdx.x % kWarp / kGroup * kGroup);
   const unsigned lane = threadIdx.x % kGroup;
 #pragma unroll
   for (int w = kGroup / 2; w > 0; w /= 2) {
@@ -133,30 +138,35 @@ __device__ void writeMoments(const BrickPassArguments& a, std::uint32_t entry, C
   const PairForm p = a.forms[a.lists.primitive[entry]];
   float s[kMomentSlots] = {};
   sumMoments(p, a.kernel, corner, r, s);
-  const float value = transposeSum(s);
-  const auto lane = threadIdx.x % kGroup;
-  if (lane < kMomentStride)
-    a.moments[std::size_t(a.lists.pair[entry]) * kMomentStride + lane] = value;
+  float* const out = a.moments + std::size_t(a.lists.pair[entry]) * kMomentStride;
+#pragma unroll
+  for (int first = 0; first < kMomentSlots; first += kGroup) {
+    const float value = transposeSum(s + first);
+    const int moment = first + int(threadIdx.x % kGroup);
+    if (moment < kMomentStride) out[moment] = value;
+  }
 }
 
 /// One block a brick, one group of lanes a pair.
-template <Pass kPass>
-__global__ void __launch_bounds__(kBlock) brickPass(const BrickPassArguments a) {
+template <Pass kPass, int kThreads>
+__global__ void __launch_bounds__(kThreads) brickPass(const BrickPassArguments a) {
+  constexpr int kGroups = kThreads / kGroup;
   __shared__ int sums[kPaddedVoxels];
-  const Coord corner = a.bricks[blockIdx.x] * kBrickSide;
-  const BrickEntries entries{a.lists.brickBegin[blockIdx.x], a.lists.brickBegin[blockIdx.x + 1]};
+  const std::uint32_t brick = a.lists.brickOrder[blockIdx.x];
+  const Coord corner = a.bricks[brick] * kBrickSide;
+  const BrickEntries entries{a.lists.brickBegin[brick], a.lists.brickBegin[brick + 1]};
   const std::uint32_t first = entries.begin + threadIdx.x / kGroup;
 
   if constexpr (kPass == Pass::kLossGradients) {
-    loadLossGradients(a, sums);
+    loadLossGradients<kThreads>(a, brick, sums);
   } else {
-    for (int v = int(threadIdx.x); v < kPaddedVoxels; v += kBlock) sums[v] = 0;
-    const int exponent = sumExponent(a, entries);  // its barriers come after the zeros
+    for (int v = int(threadIdx.x); v < kPaddedVoxels; v += kThreads) sums[v] = 0;
+    const int exponent = sumExponent<kThreads>(a, entries);  // its barriers come after the zeros
     for (std::uint32_t k = first; k < entries.end; k += kGroups)
       addPair(a, k, corner, ldexpf(1.0f, exponent), sums);
     __syncthreads();
-    const double loss = blockSum(double(toResiduals(a, exponent, sums)));
-    if (threadIdx.x == 0) a.brickLoss[blockIdx.x] = loss;
+    const double loss = blockSum<kThreads>(double(toResiduals<kThreads>(a, brick, exponent, sums)));
+    if (threadIdx.x == 0) a.brickLoss[brick] = loss;
   }
   __syncthreads();
   if constexpr (kPass != Pass::kResiduals)
@@ -166,7 +176,11 @@ __global__ void __launch_bounds__(kBlock) brickPass(const BrickPassArguments a) 
 template <Pass kPass>
 void launch(const BrickPassArguments& arguments, cudaStream_t stream) {
   if (arguments.brickCount == 0) return;
-  brickPass<kPass><<<arguments.brickCount, kBlock, 0, stream>>>(arguments);
+  if (arguments.fewFullBricks)
+    brickPass<kPass, kThreadsForFullBricks>
+        <<<arguments.brickCount, kThreadsForFullBricks, 0, stream>>>(arguments);
+  else
+    brickPass<kPass, kUsualThreads><<<arguments.brickCount, kUsualThreads, 0, stream>>>(arguments);
   check(cudaGetLastError(), "starting a pass over the bricks");
 }
 

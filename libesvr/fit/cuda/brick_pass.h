@@ -14,6 +14,7 @@ struct BrickPassArguments {
   const Coord* bricks;
   std::uint32_t brickCount, targetCount;
   PairListsView lists;
+  bool fewFullBricks;            ///< some bricks have so many pairs that they bound a pass's time
   const PairForm* forms;         ///< a primitive's
   KernelConstants<float> kernel;
   const float* target;           ///< kBrickVoxels a target brick

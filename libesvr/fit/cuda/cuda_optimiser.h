@@ -48,6 +48,7 @@ class CudaOptimiser final : public Optimiser {
   void reserve(std::size_t primitives);
   /// \return how many seeds there are: `count`, fewer where errors are few
   std::size_t placeSeeds(std::size_t count, std::size_t primitives, const std::uint32_t* into);
+  [[nodiscard]] bool fewFullBricks() const;
   [[nodiscard]] BrickPassArguments passArguments();
   [[nodiscard]] StepArguments stepArguments(double factor);
 

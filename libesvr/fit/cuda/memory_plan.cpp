@@ -20,7 +20,7 @@ constexpr double kSlotsPerEntry = 4.0;  // of hash tables, at most
 
 constexpr double kBytesPerBrick = double(kBrickVoxels * sizeof(float) + sizeof(Coord)) +
                                   sizeof(double) * 5 + sizeof(std::uint64_t) * 2 +
-                                  sizeof(std::uint32_t) * (1 + kSlotsPerEntry);
+                                  sizeof(std::uint32_t) * (5 + kSlotsPerEntry);
 constexpr double kBytesPerTarget = double(kBrickVoxels * sizeof(float) + sizeof(BrickMask));
 constexpr double kBytesPerReached = kSlotsPerEntry * sizeof(ReachedSlot);
 constexpr double kBytesPerPair =

@@ -8,7 +8,7 @@
 namespace esvr::cuda {
 
 /// Lanes that work on one pair. Supports of a few voxels meet a brick on some ten lines.
-inline constexpr int kGroup = 16;
+inline constexpr int kGroup = 8;
 
 /// Slices of a brick in shared memory lie so far apart that the voxels of neighbouring lines are in
 /// different banks.
@@ -54,8 +54,10 @@ __device__ inline void visitLines(const PairForm& p, Coord corner, float cutoff,
   const Interval xs = voxelsWithin(cx, f.halfX), zs = voxelsWithin(cz, p.halfZ);
   const int depth = zs.end - zs.begin;
   const int count = max(xs.end - xs.begin, 0) * max(depth, 0);
+  const float inverse = 1.0f / float(depth);  // exact enough for n < 64
   for (int n = lane; n < count; n += kGroup) {
-    const int x = xs.begin + n / depth, z = zs.begin + n % depth;
+    const int row = int((float(n) + 0.5f) * inverse);
+    const int x = xs.begin + row, z = zs.begin + n - row * depth;
     const float dx = float(x) - cx, dz = float(z) - cz;
     const float pzDz[3] = {f.pz[0] * dz, f.pz[1] * dz, f.pz[2] * dz};
     const float closest = closestSquared(f, dx, pzDz);

@@ -79,6 +79,14 @@ __global__ void gatherOwners(const std::uint32_t* pair, const std::uint32_t* own
   if (k < entries) primitive[k] = owner[pair[k]];
 }
 
+__global__ void countBrickPairs(const std::uint32_t* begin, std::uint32_t bricks,
+                                std::uint32_t* pairs, std::uint32_t* brick) {
+  const std::uint32_t b = blockIdx.x * blockDim.x + threadIdx.x;
+  if (b >= bricks) return;
+  pairs[b] = begin[b + 1] - begin[b];
+  brick[b] = b;
+}
+
 }  // namespace
 
 PairLists::PairLists(cudaStream_t stream)
@@ -95,6 +103,10 @@ PairLists::PairLists(cudaStream_t stream)
       owner_(stream),
       primitive_(stream),
       brickBegin_(stream),
+      brickPairs_(stream),
+      brickPairsSorted_(stream),
+      bricks_(stream),
+      brickOrder_(stream),
       total_(stream),
       temporary_(stream) {}
 
@@ -173,15 +185,32 @@ void PairLists::sortByBrick(std::size_t bricks) {
   check(cudaGetLastError(), "listing the primitives of bricks");
 }
 
+/// Blocks start in order: the fullest bricks first, so that none is left over for the end.
+void PairLists::orderBricks(std::size_t bricks) {
+  std::uint32_t* const pairs = brickPairs_.reserve(bricks);
+  std::uint32_t* const sorted = brickPairsSorted_.reserve(bricks);
+  std::uint32_t* const brick = bricks_.reserve(bricks);
+  std::uint32_t* const order = brickOrder_.reserve(bricks);
+  countBrickPairs<<<blocksFor(bricks, kBlock), kBlock, 0, stream_>>>(
+      brickBegin_.data(), std::uint32_t(bricks), pairs, brick);
+  check(cudaGetLastError(), "counting the pairs of bricks");
+  withTemporary(temporary_, "ordering bricks", [&](void* memory, std::size_t& bytes) {
+    return cub::DeviceRadixSort::SortPairsDescending(memory, bytes, pairs, sorted, brick, order,
+                                                     bricks, 0, 32, stream_);
+  });
+  mostPairsOfBrick_ = downloadValue(sorted, stream_);
+}
+
 void PairLists::rebuild(const SupportSource& supports, const BrickTable& bricks) {
   countPairs(supports, bricks.view());
   readTotals(supports.count);
   listPairs(supports, bricks.view());
   sortByBrick(bricks.size());
+  orderBricks(bricks.size());
 }
 
 PairListsView PairLists::view() const {
-  return {brickBegin_.data(),     primitive_.data(),  pairSorted_.data(),
+  return {brickOrder_.data(),     brickBegin_.data(), primitive_.data(), pairSorted_.data(),
           primitiveBegin_.data(), chunkBegin_.data(), chunkOwner_.data()};
 }
 

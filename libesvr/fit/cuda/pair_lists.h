@@ -13,6 +13,7 @@ namespace esvr::cuda {
 struct PairListsView {
   static constexpr std::uint32_t kChunk = 256;  ///< pairs
 
+  const std::uint32_t* brickOrder;      ///< bricks, those with the most pairs first
   const std::uint32_t* brickBegin;      ///< bricks + 1: range of a brick's entries
   const std::uint32_t* primitive;       ///< an entry's
   const std::uint32_t* pair;            ///< an entry's number among the primitives' pairs
@@ -29,6 +30,8 @@ class PairLists {
   void rebuild(const SupportSource& supports, const BrickTable& bricks);
 
   [[nodiscard]] std::size_t pairCount() const { return pairCount_; }
+  /// Of the fullest brick.
+  [[nodiscard]] std::size_t mostPairsOfBrick() const { return mostPairsOfBrick_; }
   [[nodiscard]] std::size_t chunkCount() const { return chunkCount_; }
   [[nodiscard]] PairListsView view() const;
 
@@ -37,12 +40,13 @@ class PairLists {
   void readTotals(std::size_t primitives);
   void listPairs(const SupportSource& supports, const BrickTableView& bricks);
   void sortByBrick(std::size_t bricks);
+  void orderBricks(std::size_t bricks);
 
   cudaStream_t stream_;
-  std::size_t pairCount_ = 0, chunkCount_ = 0;
+  std::size_t pairCount_ = 0, chunkCount_ = 0, mostPairsOfBrick_ = 0;
   GrowingBuffer<std::uint32_t> counts_, chunkCounts_, primitiveBegin_, chunkBegin_, chunkOwner_;
   GrowingBuffer<std::uint32_t> brickOf_, brickOfSorted_, pair_, pairSorted_, owner_, primitive_;
-  GrowingBuffer<std::uint32_t> brickBegin_;
+  GrowingBuffer<std::uint32_t> brickBegin_, brickPairs_, brickPairsSorted_, bricks_, brickOrder_;
   GrowingBuffer<std::uint64_t> total_;
   GrowingBuffer<char> temporary_;
 };
