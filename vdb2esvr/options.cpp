@@ -21,9 +21,9 @@ constexpr std::int64_t kMostIterations = 10'000'000;
 constexpr double kHighestPsnr = 300.0;  // dB; float32 ends at about 150
 constexpr double kLongestRun = 1e9;     // seconds
 constexpr double kLargestRatio = 1e9;
-constexpr double kMostLoss = 20.0;     // dB
+constexpr double kMostLoss = 20.0;                    // dB
 constexpr double kLeastVram = 1e-3, kMostVram = 1e6;  // GB
-constexpr float kLargestKappa = 1e4f;  // kernel.h
+constexpr float kLargestKappa = 1e4f;                 // kernel.h
 
 cli::ProgramText programText() {
   return {

@@ -12,7 +12,7 @@ namespace esvr {
 
 /// Largest step a parameter takes in one iteration.
 struct StepSizes {
-  double position = 0.1;    ///< of the semi-axis's scale
+  double position = 0.1;   ///< of the semi-axis's scale
   double shape = 0.1;      ///< relative change of a scale; the same for shears
   double intensity = 0.1;  ///< of the intensity, at least of kIntensityFloor
   [[nodiscard]] ESVR_HD StepSizes scaled(double f) const {

@@ -19,7 +19,8 @@ constexpr int kListsStale = -1;
 
 }  // namespace
 
-CpuOptimiser::CpuOptimiser(const FitTarget& target, const OptimiserOptions& options, const Tuning& tuning)
+CpuOptimiser::CpuOptimiser(const FitTarget& target, const OptimiserOptions& options,
+                           const Tuning& tuning)
     : target_(target),
       options_(options),
       tuning_(tuning),
@@ -62,7 +63,9 @@ std::vector<std::size_t> CpuOptimiser::leastUseful(std::size_t count) const {
   std::vector<std::pair<double, std::size_t>> settled;
   for (std::size_t i = 0; i < primitives_.size(); ++i)
     if (states_[i].steps >= std::uint32_t(tuning_.graceSteps))
-      settled.emplace_back(removalError(primitives_[i].intensity, gradients_[i].phi2, gradients_[i].byParameter[kParameters - 1]), i);
+      settled.emplace_back(removalError(primitives_[i].intensity, gradients_[i].phi2,
+                                        gradients_[i].byParameter[kParameters - 1]),
+                           i);
   count = std::min(count, settled.size());
   std::nth_element(settled.begin(), settled.begin() + std::ptrdiff_t(count), settled.end());
   std::vector<std::size_t> chosen;
@@ -105,8 +108,7 @@ double CpuOptimiser::iterateOnce(double factor) {
   ++iterationsSinceRebuild_;
   const double loss = takeGradients();
   if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
-  adamStep(primitives_, states_, gradients_, tuning_.steps.scaled(factor),
-           tuning_.adam, limits_);
+  adamStep(primitives_, states_, gradients_, tuning_.steps.scaled(factor), tuning_.adam, limits_);
   return loss;
 }
 

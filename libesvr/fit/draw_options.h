@@ -11,7 +11,9 @@ namespace esvr {
 /// Which errors a new primitive can mend: one of positive intensity fills where V is too low.
 struct SignsAllowed {
   bool positive = true, negative = false;
-  [[nodiscard]] ESVR_HD bool mends(float residual) const { return residual < 0.0f ? positive : negative; }
+  [[nodiscard]] ESVR_HD bool mends(float residual) const {
+    return residual < 0.0f ? positive : negative;
+  }
 };
 
 /// Squared residual that new primitives can mend.

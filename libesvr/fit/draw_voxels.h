@@ -16,7 +16,6 @@ struct DrawnVoxels {
 /// Systematic sampling along the bricks' order: `count` equal shares of the total energy, one voxel
 /// from each, so that draws spread evenly. A voxel that holds several shares is drawn once; none is
 /// where no residual can be mended.
-[[nodiscard]] DrawnVoxels drawVoxels(const ResidualField& residual,
-                                            const DrawOptions& options);
+[[nodiscard]] DrawnVoxels drawVoxels(const ResidualField& residual, const DrawOptions& options);
 
 }  // namespace esvr

@@ -8,8 +8,16 @@
 namespace esvr {
 namespace {
 
-constexpr std::size_t kPilotBricks = 400;
-constexpr std::uint32_t kPilotIterations = 300;
+/// How much of the volume a pilot fits, and for how long. On a GPU a part takes as long as the
+/// whole of a volume of moderate size.
+struct PilotSize {
+  std::size_t bricks;
+  std::uint32_t iterations;
+};
+constexpr PilotSize pilotSize(DeviceKind device) {
+  return device == DeviceKind::kCuda ? PilotSize{20'000, 200} : PilotSize{400, 300};
+}
+
 constexpr float kCoarse[] = {-2.0f, 1.0f, 4.0f};
 constexpr float kRefine[] = {-1.0f, 1.0f};
 constexpr double kWorthIt = 0.02;  // dB: less is noise, the first found stays
@@ -20,8 +28,8 @@ struct Part {
   std::vector<BrickMask> active;
 };
 
-Part partOf(const FitTarget& whole) {
-  const std::size_t n = std::min(kPilotBricks, whole.bricks.size());
+Part partOf(const FitTarget& whole, std::size_t bricks) {
+  const std::size_t n = std::min(bricks, whole.bricks.size());
   const std::size_t first = (whole.bricks.size() - n) / 2;
   const auto slice = [&](const auto& v, std::size_t per) {
     return std::vector(v.begin() + std::ptrdiff_t(first * per),
@@ -50,7 +58,7 @@ double psnrAt(float kappa, const FitTarget& target, std::size_t count, Optimiser
   Recorder recorder(target, quiet);
   RunPlan plan;
   plan.count = count;
-  plan.iterations = kPilotIterations;
+  plan.iterations = pilotSize(options.device.kind).iterations;
   run(*optimiser, target, recorder, plan, tuning);
   return psnrOf(optimiser->measure().squaredSum, target.boxVoxels, target.peak);
 }
@@ -59,7 +67,7 @@ double psnrAt(float kappa, const FitTarget& target, std::size_t count, Optimiser
 
 PilotResult chooseKappa(const FitTarget& whole, std::size_t count, const OptimiserOptions& options,
                         const Tuning& tuning, const Recorder& recorder) {
-  const Part part = partOf(whole);
+  const Part part = partOf(whole, pilotSize(options.device.kind).bricks);
   const double share = double(part.target.activeVoxels) / double(whole.activeVoxels);
   const auto partCount = std::max<std::size_t>(1, std::size_t(std::llround(share * double(count))));
   PilotResult result{Kernel{}.kappa, {}};

@@ -51,8 +51,8 @@ class Stretch {
   /// Iterates until something else is due. \return sum of r^2 before the last step
   double iterate(const Schedule& schedule) {
     const auto until = [&](std::uint32_t interval) { return interval - done_ % interval; };
-    std::uint32_t count = std::min({optimiser_.batchSize(), until(schedule.eventInterval()),
-                                    until(recordInterval(schedule))});
+    std::uint32_t count = std::min(
+        {optimiser_.batchSize(), until(schedule.eventInterval()), until(recordInterval(schedule))});
     if (!plan_.seconds) count = std::min(count, schedule.iterations - done_);
     std::vector<double> factors;
     for (std::uint32_t k = 0; k < count; ++k)

@@ -2,11 +2,13 @@
 """Times and errors of conversions, as docs/benchmarks.md shows them.
 
     fit_benchmarks.py figures --bin BUILD --data DIR --out OUT   files of DIR, one conversion each
+    fit_benchmarks.py gpu --bin BUILD --data DIR --out OUT       the same kind on a GPU, by phase
     fit_benchmarks.py scaling --bin BUILD --out OUT              seconds an iteration against leaves
     fit_benchmarks.py draw --out OUT                             pictures from what was measured
 
 BUILD is a build folder (build/release). Results are JSON in OUT; `draw` needs matplotlib and writes
-OUT/error_time.svg and OUT/scaling.svg. Every run is a whole process on two threads.
+OUT/error_time.svg and OUT/scaling.svg. Every run is a whole process; those on the CPU have two
+threads.
 """
 import argparse
 import json
@@ -27,6 +29,21 @@ FIGURES = [
     ("wdas_cloud_sixteenth", ["--count", "12000"], ""),
     ("dragon_with_xform", ["--count", "8000"], ""),
 ]
+WHOLE_ANEURISM = ["--box", "0,0,0,255,255,255"]
+GPU_FIGURES = [
+    ("aneurism", ["--psnr", "51.54", *WHOLE_ANEURISM], "under 1.5 s"),
+    ("aneurism", ["--count", "59000", *WHOLE_ANEURISM], ">= 85 dB, optimisation under 1 s"),
+    ("aneurism", ["--count", "31000", *WHOLE_ANEURISM], ">= 80 dB, under 1 s"),
+    ("aneurism", ["--count", "12000", *WHOLE_ANEURISM], ">= 54 dB, under 1 s"),
+    ("smoke1", ["--count", "12000"], ">= 54 dB, under 2 s"),
+    ("wdas_cloud_sixteenth", ["--count", "12000"], ">= 35 dB, under 2 s"),
+    ("hydrogen_atom", ["--count", "4000", "--box", "0,0,0,127,127,127"], ">= 65 dB, under 2 s"),
+    ("neuron_m207", ["--count", "30000"], ">= 60 dB, under 2 s"),
+    ("neuron_rp140212", ["--count", "20000"], ""),
+    ("dragon_with_xform", ["--count", "8000"], ""),
+    ("cube_levelset", ["--count", "12000"], ""),
+]
+GPU_STORAGES = ["float32", "compact"]
 TREE_RESOLUTIONS = [64, 96, 128, 192, 256, 384, 512, 768]
 VOXELS_PER_PRIMITIVE = 35  # as the standard preset has it
 SCALING_ITERATIONS = 100
@@ -44,11 +61,11 @@ def run(command):
     return seconds, usage.ru_maxrss * 1024
 
 
-def convert(programs, source, out, options):
+def convert(programs, source, out, options, where=("--device", "cpu", "--threads", THREADS)):
     """One conversion. Returns its report with the whole process's seconds and bytes of memory."""
     report = out.with_suffix(".json")
-    command = [programs / "vdb2esvr/vdb2esvr", source, out, "--threads", THREADS, "--quiet",
-               "--force", "--report", report, *options]
+    command = [programs / "vdb2esvr/vdb2esvr", source, out, *where, "--quiet", "--force",
+               "--report", report, *options]
     seconds, memory = run(command)
     result = json.loads(report.read_text())
     result["process"] = {"seconds": seconds, "peak_bytes": memory}
@@ -78,6 +95,31 @@ def markdown_row(row):
             f"{metrics['psnr_active']:.2f} | {row['grid']['kernel']['kappa']:g} | "
             f"{process['seconds']:.1f} | {process['peak_bytes'] / 1e6:.0f} | "
             f"{row['bytes_out'] / 1e3:.0f} | {row['back_seconds']:.2f} | {row['asked']} |")
+
+
+def gpu(arguments):
+    rows = []
+    for storage in GPU_STORAGES:
+        for name, options, asked in GPU_FIGURES:
+            esvr = arguments.out / f"{name}_{options[1]}_{storage}.esvr"
+            report = convert(arguments.bin, arguments.data / f"{name}.vdb", esvr,
+                             [*options, "--storage", storage], ("--device", "cuda"))
+            rows.append({"file": name, "options": options, "asked": asked, "storage": storage,
+                         "grid": report["grids"][0], "process": report["process"],
+                         "bytes_out": report["output"]["bytes"]})
+            print(gpu_row(rows[-1]), flush=True)
+    (arguments.out / "gpu.json").write_text(json.dumps(rows, indent=1))
+
+
+def gpu_row(row):
+    grid = row["grid"]
+    seconds = grid["seconds"]
+    return (f"| {row['file']} | `{' '.join(row['options'][:2])}` | {row['storage']} | "
+            f"{grid['primitives']} | {grid['metrics']['psnr_box']:.2f} | "
+            f"{grid['kernel']['kappa']:g} | {seconds['pilot']:.2f} | "
+            f"{seconds['optimise'] + seconds['seed']:.2f} | {seconds['encode']:.2f} | "
+            f"{row['process']['seconds']:.2f} | {grid['fit']['device_bytes'] / 1e6:.0f} | "
+            f"{row['bytes_out'] / 1e3:.0f} | {row['asked']} |")
 
 
 def scaling(arguments):
@@ -148,15 +190,15 @@ def draw_scaling(pyplot, rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["figures", "scaling", "draw"])
+    parser.add_argument("what", choices=["figures", "gpu", "scaling", "draw"])
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
     parser.add_argument("--data", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
-    if arguments.what == "figures" and not arguments.data:
-        parser.error("figures needs --data")
+    if arguments.what in ("figures", "gpu") and not arguments.data:
+        parser.error(f"{arguments.what} needs --data")
     arguments.out.mkdir(parents=True, exist_ok=True)
-    {"figures": figures, "scaling": scaling, "draw": draw}[arguments.what](arguments)
+    {"figures": figures, "gpu": gpu, "scaling": scaling, "draw": draw}[arguments.what](arguments)
 
 
 if __name__ == "__main__":

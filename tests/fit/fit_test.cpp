@@ -91,7 +91,8 @@ TEST(Fit, GivesTheSameBitsWithEmptySpaceAround) {
   }
   bricks.push_back({{-8000, -80, -800}, {}, {}});
   bricks.push_back({{4000, 80, 800}, {}, {}});
-  EXPECT_TRUE(test::sameBits(fit(makeVolume(bricks, 0.0f), quick()).field, fit(volume, quick()).field));
+  EXPECT_TRUE(
+      test::sameBits(fit(makeVolume(bricks, 0.0f), quick()).field, fit(volume, quick()).field));
 }
 
 class FitScale : public testing::TestWithParam<double> {};

@@ -1,5 +1,6 @@
-// Plan: the moves of a run one by one: Adam on a quadratic and under scaled gradients, schedules that start and end where they say, relocation that takes the
-// primitive whose removal the loss misses least.
+// Plan: the moves of a run one by one: Adam on a quadratic and under scaled gradients, schedules
+// that start and end where they say, relocation that takes the primitive whose removal the loss
+// misses least.
 
 #include <gtest/gtest.h>
 

@@ -114,8 +114,8 @@ __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kern
   });
 }
 
-/// Sums of kGroup values over a group's lanes; lane n gets value n. Each exchange halves what a lane
-/// keeps.
+/// Sums of kGroup values over a group's lanes; lane n gets value n. Each exchange halves what a
+/// lane keeps.
 __device__ float transposeSum(float* s) {
   constexpr unsigned kLanes = kGroup == kWarp ? kAllLanes : (1u << kGroup) - 1u;
   const unsigned group = kLanes << (threadIdx.x % kWarp / kGroup * kGroup);

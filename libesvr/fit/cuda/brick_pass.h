@@ -14,15 +14,15 @@ struct BrickPassArguments {
   const Coord* bricks;
   std::uint32_t brickCount, targetCount;
   PairListsView lists;
-  bool fewFullBricks;            ///< some bricks have so many pairs that they bound a pass's time
-  const PairForm* forms;         ///< a primitive's
+  bool fewFullBricks;     ///< some bricks have so many pairs that they bound a pass's time
+  const PairForm* forms;  ///< a primitive's
   KernelConstants<float> kernel;
-  const float* target;           ///< kBrickVoxels a target brick
-  bool narrowBand;               ///< residuals saturate at the target's range
-  float lowest, highest;         ///< that range
-  double* brickLoss;             ///< out, a brick's: sum of r^2
-  float* moments;                ///< out, kMomentStride a pair; not written for residuals alone
-  float* residual;               ///< kBrickVoxels a brick; in for lossGradients, else out or null
+  const float* target;    ///< kBrickVoxels a target brick
+  bool narrowBand;        ///< residuals saturate at the target's range
+  float lowest, highest;  ///< that range
+  double* brickLoss;      ///< out, a brick's: sum of r^2
+  float* moments;         ///< out, kMomentStride a pair; not written for residuals alone
+  float* residual;        ///< kBrickVoxels a brick; in for lossGradients, else out or null
 };
 
 /// Values of a pair in `moments`: PairMoments, in its order, and room to 48 bytes.

@@ -75,7 +75,7 @@ class CudaOptimiser final : public Optimiser {
   ErrorSums errorSums_;
   std::size_t count_ = 0;
   double secondsSeeding_ = 0.0;
-  std::uint64_t draws_ = 0;          ///< events so far: each draws from its own random stream
+  std::uint64_t draws_ = 0;  ///< events so far: each draws from its own random stream
   int iterationsSinceRebuild_ = kListsStale;
 };
 

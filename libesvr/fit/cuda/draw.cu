@@ -1,7 +1,7 @@
+#include <thrust/iterator/discard_iterator.h>
 #include <cmath>
 #include <cub/device/device_scan.cuh>
 #include <cub/device/device_select.cuh>
-#include <thrust/iterator/discard_iterator.h>
 
 #include "esvr/sparse_volume.h"
 #include "field/brick_hash.h"

@@ -26,7 +26,7 @@ class VoxelDraw {
   /// \param bricks    coordinates of the bricks
   /// \return none where there is no error to mend
   [[nodiscard]] DeviceDraw draw(const float* residual, double loss, const Coord* bricks,
-                                  const DrawOptions& options);
+                                const DrawOptions& options);
 
  private:
   [[nodiscard]] std::uint64_t sumEnergies(const DrawArguments& arguments);

@@ -24,7 +24,7 @@ __device__ inline int paddedOffset(int voxel) {
 
 /// One line: voxels yBegin .. yEnd - 1.
 struct PairLine {
-  int offset;     ///< of voxel y = 0, padded
+  int offset;  ///< of voxel y = 0, padded
   int yBegin, yEnd;
   float dx, dz;   ///< from the primitive's center
   float closest;  ///< m at the closest approach

@@ -32,8 +32,8 @@ __device__ std::uint32_t visitPairs(const SupportSource& source, const BrickTabl
   return before;
 }
 
-__global__ void countPairsKernel(SupportSource source, BrickTableView bricks,
-                                 std::uint32_t* counts, std::uint32_t* chunks) {
+__global__ void countPairsKernel(SupportSource source, BrickTableView bricks, std::uint32_t* counts,
+                                 std::uint32_t* chunks) {
   const std::size_t i = warpNumber();
   if (i >= source.count) return;
   const std::uint32_t n = visitPairs(source, bricks, i, [](std::uint32_t, std::uint32_t) {});

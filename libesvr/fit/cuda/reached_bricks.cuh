@@ -28,8 +28,7 @@ __device__ void visitReachedBricks(const SupportSource& source, std::size_t i, V
   for (std::int64_t first = 0; first < count; first += kWarp) {
     const std::int64_t n = first + threadIdx.x % kWarp;
     const Coord brick{range.min.x + std::int32_t(n / (ny * nz)),
-                      range.min.y + std::int32_t(n / nz % ny),
-                      range.min.z + std::int32_t(n % nz)};
+                      range.min.y + std::int32_t(n / nz % ny), range.min.z + std::int32_t(n % nz)};
     visit(brick, n < count && mayTouch(support, brick));
   }
 }

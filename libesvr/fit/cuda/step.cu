@@ -78,17 +78,16 @@ __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   if (!finite(p)) *a.diverged = 1;  // integer sums would hide it
 }
 
-__global__ void __launch_bounds__(kStepBlock) readGradients(const StepArguments a,
-                                                            PrimitiveGradient* out) {
+__global__ void __launch_bounds__(kStepBlock)
+    readGradients(const StepArguments a, PrimitiveGradient* out) {
   const std::uint32_t i = ownPrimitive();
   if (i >= a.primitiveCount) return;
   const PairSums sums = sumsOf(a, i);
   out[i] = {parameterGradient(a.forms[i].form, sums), sums.phi2};
 }
 
-__global__ void __launch_bounds__(kStepBlock) writeForms(const Primitive* primitives,
-                                                         std::uint32_t count, double radius,
-                                                         PairForm* forms) {
+__global__ void __launch_bounds__(kStepBlock)
+    writeForms(const Primitive* primitives, std::uint32_t count, double radius, PairForm* forms) {
   const std::uint32_t i = ownPrimitive();
   if (i < count) forms[i] = pairForm(primitives[i], radius);
 }

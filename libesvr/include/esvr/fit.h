@@ -46,7 +46,7 @@ struct FitOptions {
   /// is revoxelised as a narrow band), and what lies outside its bricks counts for nothing.
   bool narrowBand = false;
   std::uint64_t seed = 1;
-  Device device;                        ///< the CPU, or a GPU (selectDevice)
+  Device device;                              ///< the CPU, or a GPU (selectDevice)
   std::optional<std::size_t> maxDeviceBytes;  ///< GPU memory to use; default: what is free
   const CancelToken* cancel = nullptr;  ///< a cancelled fit returns the best so far, marked so
   std::function<void(const FitProgress&)> progress;

@@ -38,7 +38,9 @@ struct BrickMask {
   std::array<std::uint64_t, kBrickSide> words{};
 
   friend bool operator==(const BrickMask&, const BrickMask&) = default;
-  [[nodiscard]] constexpr bool test(int offset) const { return (words[offset >> 6] >> (offset & 63)) & 1u; }
+  [[nodiscard]] constexpr bool test(int offset) const {
+    return (words[offset >> 6] >> (offset & 63)) & 1u;
+  }
   void set(int offset) { words[offset >> 6] |= std::uint64_t{1} << (offset & 63); }
   void setAll() { words.fill(~std::uint64_t{0}); }
   [[nodiscard]] int count() const {

@@ -60,8 +60,8 @@ TEST_P(GradientOnGpu, AgreesWithTheCpu) {
   const Case& c = GetParam();
   const SparseVolume volume = test::denseVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
-  expectAgreement(target, {.kappa = c.kappa},
-                  test::randomPrimitives(c.count, c.smallest, c.aspect), 1e-4);
+  expectAgreement(target, {.kappa = c.kappa}, test::randomPrimitives(c.count, c.smallest, c.aspect),
+                  1e-4);
 }
 INSTANTIATE_TEST_SUITE_P(
     Cases, GradientOnGpu,

@@ -179,8 +179,7 @@ TEST_F(OptimiserOnGpu, APrimitiveThatCoversHalfHoldsNothingUp) {
     p = {{random(0, 192), random(0, 192), random(0, 192)}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 0.1};
   const double without = secondsPerPair(target, primitives);
   constexpr double kInverse = 1.0 / 34.0;  // a support of about 91 voxels' radius
-  primitives.push_back(
-      {{96, 96, 96}, {kInverse, 0, 0, 0, kInverse, 0, 0, 0, kInverse}, 0.1});
+  primitives.push_back({{96, 96, 96}, {kInverse, 0, 0, 0, kInverse, 0, 0, 0, kInverse}, 0.1});
   EXPECT_LT(secondsPerPair(target, primitives), 1.3 * without);
 }
 
