@@ -15,7 +15,7 @@ struct PilotSize {
   std::uint32_t iterations;
 };
 constexpr PilotSize pilotSize(DeviceKind device) {
-  return device == DeviceKind::kCuda ? PilotSize{20'000, 200} : PilotSize{400, 300};
+  return device == DeviceKind::kCuda ? PilotSize{20'000, 200} : PilotSize{400, 200};
 }
 
 constexpr float kCoarse[] = {-2.0f, 1.0f, 4.0f};
