@@ -278,7 +278,7 @@ TEST_F(Vdb2Esvr, reportsWhatDocsReportSaysAndNothingElse) {
   const Json report = Json::parse(run.out);
   EXPECT_THAT(keysOf(report), testing::UnorderedElementsAre(
                                   "schema", "schema_version", "program", "command_line", "versions",
-                                  "asked", "device", "input", "output", "ratio", "grids", "skipped",
+                                  "asked", "input", "output", "ratio", "grids", "skipped",
                                   "seconds", "peak_memory_bytes", "interrupted", "exit_code"));
   const Json& grid = report["grids"][0];
   EXPECT_THAT(keysOf(grid),
