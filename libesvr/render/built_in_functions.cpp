@@ -1,0 +1,155 @@
+#include <algorithm>
+#include <cstdint>
+#include <initializer_list>
+#include <span>
+
+#include "esvr/error.h"
+#include "esvr/transfer_function.h"
+
+namespace esvr {
+namespace {
+
+// Every fifth of 256 entries, 0xRRGGBB; straight lines between them are within 2/255 of the others.
+// viridis, magma, inferno, plasma: S. van der Walt, N. Smith and E. Firing, bids.github.io/colormap
+// (CC0). cividis: J. Nunez, C. Anderton and R. Renslow, PLOS ONE 13(7), 2018, by the polynomial,
+// and turbo: A. Mikhailov, "Turbo, an improved rainbow colormap", 2019, by the polynomial that
+// d3-scale-chromatic 3 publishes.
+constexpr std::uint32_t kViridis[] = {
+    0x440154, 0x46085c, 0x471063, 0x481769, 0x481d6f, 0x482475, 0x472a7a, 0x46307e, 0x453781,
+    0x433d84, 0x414287, 0x3f4889, 0x3d4e8a, 0x3a538b, 0x38598c, 0x355e8d, 0x33638d, 0x31688e,
+    0x2e6d8e, 0x2c718e, 0x2a768e, 0x297b8e, 0x27808e, 0x25848e, 0x23898e, 0x218e8d, 0x20928c,
+    0x1f978b, 0x1e9c89, 0x1fa188, 0x21a585, 0x24aa83, 0x28ae80, 0x2eb37c, 0x35b779, 0x3dbc74,
+    0x46c06f, 0x50c46a, 0x5ac864, 0x65cb5e, 0x70cf57, 0x7cd250, 0x89d548, 0x95d840, 0xa2da37,
+    0xb0dd2f, 0xbddf26, 0xcae11f, 0xd8e219, 0xe5e419, 0xf1e51d, 0xfde725};
+constexpr std::uint32_t kMagma[] = {
+    0x000004, 0x02020b, 0x050416, 0x090720, 0x0e0b2b, 0x140e36, 0x1a1042, 0x21114e, 0x29115a,
+    0x311165, 0x390f6e, 0x420f75, 0x4a1079, 0x52137c, 0x5a167e, 0x621980, 0x6a1c81, 0x721f81,
+    0x792282, 0x812581, 0x892881, 0x912b81, 0x992d80, 0xa1307e, 0xaa337d, 0xb2357b, 0xba3878,
+    0xc23b75, 0xca3e72, 0xd2426f, 0xd9466b, 0xe04c67, 0xe75263, 0xec5860, 0xf1605d, 0xf4695c,
+    0xf7725c, 0xf97b5d, 0xfb8560, 0xfc8e64, 0xfd9869, 0xfea16e, 0xfeaa74, 0xfeb47b, 0xfebd82,
+    0xfec68a, 0xfecf92, 0xfed89a, 0xfde2a3, 0xfdebac, 0xfcf4b6, 0xfcfdbf};
+constexpr std::uint32_t kInferno[] = {
+    0x000004, 0x02020c, 0x050417, 0x0a0722, 0x10092d, 0x160b39, 0x1e0c45, 0x260c51, 0x2f0a5b,
+    0x380962, 0x400a67, 0x490b6a, 0x510e6c, 0x59106e, 0x61136e, 0x69166e, 0x71196e, 0x781c6d,
+    0x801f6c, 0x88226a, 0x902568, 0x982766, 0xa02a63, 0xa82e5f, 0xb0315b, 0xb73557, 0xbf3952,
+    0xc63d4d, 0xcc4248, 0xd34743, 0xd94d3d, 0xdf5337, 0xe45a31, 0xe9612b, 0xed6925, 0xf1711f,
+    0xf47918, 0xf78212, 0xf98b0b, 0xfa9407, 0xfb9d07, 0xfca60c, 0xfcb014, 0xfbba1f, 0xfac42a,
+    0xf8cd37, 0xf6d746, 0xf4e156, 0xf2ea69, 0xf2f27d, 0xf5f992, 0xfcffa4};
+constexpr std::uint32_t kPlasma[] = {
+    0x0d0887, 0x1b068d, 0x260591, 0x2f0596, 0x38049a, 0x41049d, 0x4903a0, 0x5102a3, 0x5901a5,
+    0x6100a7, 0x6900a8, 0x7100a8, 0x7801a8, 0x8004a8, 0x8707a6, 0x8e0ca4, 0x9511a1, 0x9c179e,
+    0xa21d9a, 0xa82296, 0xae2892, 0xb42e8d, 0xba3388, 0xbf3984, 0xc43e7f, 0xc9447a, 0xcd4a76,
+    0xd24f71, 0xd6556d, 0xda5b69, 0xde6164, 0xe26660, 0xe66c5c, 0xe97257, 0xed7953, 0xf07f4f,
+    0xf3854b, 0xf58c46, 0xf79342, 0xf99a3e, 0xfba139, 0xfca835, 0xfdaf31, 0xfeb72d, 0xfebe2a,
+    0xfdc627, 0xfcce25, 0xfbd724, 0xf8df25, 0xf6e826, 0xf3f027, 0xf0f921};
+constexpr std::uint32_t kCividis[] = {
+    0x002051, 0x002459, 0x00275f, 0x002b64, 0x052e67, 0x09326a, 0x0f356c, 0x15396d, 0x1c3c6e,
+    0x23406e, 0x29436e, 0x30476e, 0x374a6e, 0x3e4e6e, 0x44526d, 0x4b556d, 0x51596e, 0x575c6e,
+    0x5c606e, 0x62646f, 0x67676f, 0x6c6b70, 0x706f71, 0x757272, 0x797673, 0x7d7a74, 0x817d75,
+    0x858176, 0x898577, 0x8e8978, 0x928d78, 0x969178, 0x9b9578, 0x9f9978, 0xa49d78, 0xa9a177,
+    0xaea575, 0xb4a974, 0xbaae72, 0xbfb26f, 0xc5b66c, 0xccbb69, 0xd2bf66, 0xd8c462, 0xdec85e,
+    0xe4cd5a, 0xead256, 0xf0d652, 0xf4db4e, 0xf8e04b, 0xfbe548, 0xfdea45};
+constexpr std::uint32_t kTurbo[] = {
+    0x23171b, 0x362354, 0x422f83, 0x493ca8, 0x4b49c5, 0x4a56db, 0x4664ea, 0x4172f3, 0x3c80f8,
+    0x368df9, 0x309bf6, 0x2ba7f0, 0x28b4e8, 0x26bfdf, 0x25cad3, 0x26d4c8, 0x29ddbb, 0x2ee5ae,
+    0x35eca1, 0x3ef295, 0x48f788, 0x54fa7d, 0x61fd71, 0x6ffe67, 0x7efd5d, 0x8dfc55, 0x9cf94d,
+    0xacf546, 0xbbf03f, 0xc9e93a, 0xd7e235, 0xe3d931, 0xeed02d, 0xf7c52a, 0xfeb927, 0xffad25,
+    0xffa022, 0xff9320, 0xff851e, 0xff781c, 0xfc6a19, 0xf45c17, 0xea4f14, 0xdf4212, 0xd3360f,
+    0xc62a0b, 0xb92108, 0xac1805, 0xa11202, 0x980e00, 0x920c00, 0x900c00};
+
+ColorMap fromTable(std::span<const std::uint32_t> table) {
+  constexpr double kFull = 255.0;
+  ColorMap map;
+  for (std::size_t i = 0; i < table.size(); ++i)
+    map.points.push_back(
+        {double(i) / double(table.size() - 1),
+         {(table[i] >> 16) / kFull, (table[i] >> 8 & 0xff) / kFull, (table[i] & 0xff) / kFull}});
+  return map;
+}
+
+ColorMap viridis() { return fromTable(kViridis); }
+ColorMap inferno() { return fromTable(kInferno); }
+ColorMap magma() { return fromTable(kMagma); }
+ColorMap plasma() { return fromTable(kPlasma); }
+ColorMap cividis() { return fromTable(kCividis); }
+ColorMap turbo() { return fromTable(kTurbo); }
+
+ColorMap fromPoints(ColorSpace space, std::initializer_list<ColorPoint> points) {
+  ColorMap map;
+  map.space = space;
+  map.points = points;
+  return map;
+}
+
+// The ends are those of K. Moreland, "Diverging color maps for scientific visualization", ISVC
+// 2009.
+ColorMap coolToWarm() {
+  return fromPoints(ColorSpace::kDiverging,
+                    {{0.0, {0.230, 0.299, 0.754}}, {1.0, {0.706, 0.016, 0.150}}});
+}
+ColorMap grayscale() {
+  return fromPoints(ColorSpace::kRgb, {{0.0, {0.0, 0.0, 0.0}}, {1.0, {1.0, 1.0, 1.0}}});
+}
+ColorMap xRay() {
+  return fromPoints(ColorSpace::kRgb, {{0.0, {1.0, 1.0, 1.0}}, {1.0, {0.0, 0.0, 0.0}}});
+}
+// As ParaView's "Black-Body Radiation": black, red, yellow, white.
+ColorMap blackBody() {
+  return fromPoints(ColorSpace::kRgb, {{0.0, {0.0, 0.0, 0.0}},
+                                       {0.4, {0.901961, 0.0, 0.0}},
+                                       {0.8, {0.901961, 0.901961, 0.0}},
+                                       {1.0, {1.0, 1.0, 1.0}}});
+}
+
+OpacityCurve linear() { return {{0.0, 0.0}, {1.0, 1.0}}; }
+OpacityCurve inverse() { return {{0.0, 1.0}, {1.0, 0.0}}; }
+OpacityCurve tent() { return {{0.0, 0.0}, {0.5, 1.0}, {1.0, 0.0}}; }
+OpacityCurve step() { return {{0.0, 0.0, 0.5, 1.0}, {1.0, 1.0}}; }
+
+template <class Result>
+struct BuiltIn {
+  const char* name;
+  Result (*make)();
+};
+constexpr BuiltIn<ColorMap> kColorMaps[] = {
+    {"viridis", viridis},         {"inferno", inferno},     {"magma", magma},
+    {"plasma", plasma},           {"cividis", cividis},     {"turbo", turbo},
+    {"cool-to-warm", coolToWarm}, {"grayscale", grayscale}, {"x-ray", xRay},
+    {"black-body", blackBody}};
+constexpr BuiltIn<OpacityCurve> kOpacities[] = {
+    {"linear", linear}, {"inverse", inverse}, {"tent", tent}, {"step", step}};
+
+template <class Result>
+std::vector<std::string> namesOf(std::span<const BuiltIn<Result>> all) {
+  std::vector<std::string> names;
+  for (const auto& one : all) names.emplace_back(one.name);
+  return names;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+template <class Result>
+Result named(std::span<const BuiltIn<Result>> all, const std::string& name, const char* what) {
+  for (const auto& one : all)
+    if (name == one.name) return one.make();
+  throw UsageError("no " + std::string(what) + " '" + name + "'; there are " +
+                   listed(namesOf(all)));
+}
+
+}  // namespace
+
+std::vector<std::string> builtInColorMaps() { return namesOf<ColorMap>(kColorMaps); }
+ColorMap builtInColorMap(const std::string& name) {
+  return named<ColorMap>(kColorMaps, name, "color map");
+}
+
+std::vector<std::string> builtInOpacities() { return namesOf<OpacityCurve>(kOpacities); }
+OpacityCurve builtInOpacity(const std::string& name) {
+  return named<OpacityCurve>(kOpacities, name, "opacity");
+}
+
+}  // namespace esvr

@@ -1,0 +1,99 @@
+// Plan: a preset as ParaView writes it comes back point by point; what is no preset is refused with
+// its file and reason.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cli/run_program.h"
+#include "esvr/error.h"
+#include "esvr/transfer_function.h"
+
+namespace esvr::test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kTwoPresets = R"([
+  {"ColorSpace": "Diverging", "Name": "first", "NanColor": [0, 1, 0],
+   "RGBPoints": [0, 0.25, 0.5, 0.75, 10, 1, 0, 0],
+   "Points": [10, 0.5, 0.5, 0, 0, 0, 0.25, 0.75]},
+  {"ColorSpace": "Step", "Name": "second", "RGBPoints": [2, 0, 0, 0, -1, 1, 1, 1]}
+])";
+
+class ParaViewPreset : public testing::Test {
+ protected:
+  TransferFunction read(const std::string& text, const std::string& name = {}) {
+    writeText(folder_ / "p.json", text);
+    return readParaViewPreset(folder_ / "p.json", name);
+  }
+  std::string refusal(const std::string& text, const std::string& name = {}) {
+    try {
+      (void)read(text, name);
+    } catch (const BadInput& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(ParaViewPreset, ComesBackPointByPoint) {
+  const auto f = read(kTwoPresets);
+  EXPECT_EQ(f.colors.space, ColorSpace::kDiverging);
+  EXPECT_EQ(f.colors.nan, (Rgb{0, 1, 0}));
+  ASSERT_EQ(f.colors.points.size(), 2u);
+  EXPECT_EQ(f.colors.points[0].color, (Rgb{0.25, 0.5, 0.75}));
+  EXPECT_EQ(f.colors.points[1].x, 10.0);
+  ASSERT_EQ(f.opacity.size(), 2u);
+  EXPECT_EQ(f.opacity[0].midpoint, 0.25);  // the file has them the other way round
+  EXPECT_EQ(f.opacity[0].sharpness, 0.75);
+  EXPECT_EQ(f.opacity[1].opacity, 0.5);
+}
+
+TEST_F(ParaViewPreset, IsFoundByName) {
+  const auto f = read(kTwoPresets, "second");
+  EXPECT_EQ(f.colors.space, ColorSpace::kStep);
+  EXPECT_EQ(f.colors.points[0].x, -1.0);
+}
+
+TEST_F(ParaViewPreset, WithoutOpacitiesIsLinearOverItsColors) {
+  const auto f = read(kTwoPresets, "second");
+  EXPECT_EQ(opacityAt(f.opacity, -1.0), 0.0);
+  EXPECT_DOUBLE_EQ(opacityAt(f.opacity, 0.5), 0.5);
+  EXPECT_EQ(opacityAt(f.opacity, 2.0), 1.0);
+}
+
+TEST_F(ParaViewPreset, MayBeOneObjectWithoutAnArray) {
+  EXPECT_EQ(read(R"({"RGBPoints": [0, 1, 1, 1]})").colors.points.size(), 1u);
+}
+
+TEST_F(ParaViewPreset, WrapsTheHueWhereItSaysSo) {
+  EXPECT_EQ(read(R"({"ColorSpace": "HSV", "RGBPoints": [0, 1, 1, 1]})").colors.space,
+            ColorSpace::kHsv);
+  for (const char* yes : {"true", "1"})
+    EXPECT_EQ(read(std::string(R"({"ColorSpace": "HSV", "HSVWrap": )") + yes +
+                   R"(, "RGBPoints": [0, 1, 1, 1]})")
+                  .colors.space,
+              ColorSpace::kHsvWrap);
+}
+
+TEST_F(ParaViewPreset, AMissingNameListsThoseThereAre) {
+  EXPECT_THAT(refusal(kTwoPresets, "third"), HasSubstr("\"first\", \"second\""));
+}
+
+TEST_F(ParaViewPreset, WhatIsNoPresetIsRefusedWithItsReason) {
+  EXPECT_THAT(refusal("{"), HasSubstr("p.json: not JSON"));
+  EXPECT_THAT(refusal("[]"), HasSubstr("there are none"));
+  EXPECT_THAT(refusal("3"), HasSubstr("there are none"));
+  EXPECT_THAT(refusal(R"({"RGBPoints": []})"), HasSubstr("RGBPoints"));
+  EXPECT_THAT(refusal(R"({"RGBPoints": [0, 1, 1]})"), HasSubstr("4 a point"));
+  EXPECT_THAT(refusal(R"({"RGBPoints": [0, 1, 1, "x"]})"), HasSubstr("numbers"));
+  EXPECT_THAT(refusal(R"({"RGBPoints": [0, 1, 1, 2]})"), HasSubstr("outside 0 to 1"));
+  EXPECT_THAT(refusal(R"({"RGBPoints": [0, 1, 1, 1], "Points": [0, 2, 0.5, 0]})"),
+              HasSubstr("opacity"));
+  EXPECT_THAT(refusal(R"({"RGBPoints": [0, 1, 1, 1], "NanColor": [0, 1]})"), HasSubstr("NanColor"));
+  EXPECT_THAT(refusal(R"({"RGBPoints": [0, 1, 1, 1], "ColorSpace": "CMYK"})"), HasSubstr("CMYK"));
+  EXPECT_THROW((void)readParaViewPreset(folder_ / "none.json"), BadInput);
+}
+
+}  // namespace
+}  // namespace esvr::test
