@@ -4,6 +4,7 @@
 
 #include "cli/stopwatch.h"
 #include "esvr/compact.h"
+#include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/rate_control.h"
 
@@ -56,6 +57,41 @@ EncodedGrid fitPlain(const RateInput& input, const Options& options, ConvertedGr
   return std::move(compact.grid);
 }
 
+/// The largest error that was asked for. \throws UsageError  a lossless file of what was rounded
+double boundOf(const VoxelDemand& demand, const VolumeGrid& source) {
+  if (demand.exact && source.descriptor.valueType == ValueType::kDouble)
+    throw UsageError("grid '" + source.descriptor.name +
+                     "' is of doubles, which are read as float32: --lossless cannot hold them");
+  const ValueRange range = activeRange(source.volume);
+  if (!demand.relative) return demand.bound;
+  return demand.bound * (double(range.max) - double(range.min));
+}
+
+EncodedGrid storeVoxels(const VoxelDemand& demand, const VolumeGrid& source) {
+  const double bound = boundOf(demand, source);
+  VoxelLayer layer = demand.exact || bound == 0.0
+                         ? exactLayer(source.volume)
+                         : boundedLayer(source.volume, bound, demand.activity);
+  return encodeVoxels(source.descriptor, source.volume, std::move(layer));
+}
+
+/// What is promised is checked on what the file holds.
+void checkVoxels(const VoxelDemand& demand, const VolumeGrid& source, const EncodedGrid& stored) {
+  const double error = largestError(source.volume, *stored.voxels);
+  if (error > boundOf(demand, source))
+    throw RuntimeFailure("grid '" + source.descriptor.name + "': an error of " +
+                         std::to_string(error) + " is beyond what was asked for");
+}
+
+EncodedGrid encode(const Options& options, const VolumeGrid& source,
+                   std::optional<std::uint64_t> bytes, ConvertedGrid& grid) {
+  if (options.voxels) return storeVoxels(*options.voxels, source);
+  RateInput input{source.descriptor, source.volume, options.fit};
+  input.options.narrowBand = isNarrowBand(source.descriptor, source.volume);
+  return bytes || searchesForPsnr(options) ? fitRated(input, bytes, grid)
+                                           : fitPlain(input, options, grid);
+}
+
 }  // namespace
 
 ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
@@ -69,11 +105,8 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
   grid.seconds.read = watch.lap();
 
   grid.device = deviceName(options.fit.device);
-  RateInput input{source.descriptor, source.volume, options.fit};
-  input.options.narrowBand = isNarrowBand(source.descriptor, source.volume);
-  EncodedGrid encoded = bytes || searchesForPsnr(options) ? fitRated(input, bytes, grid)
-                                                          : fitPlain(input, options, grid);
-  grid.stored = throughTheFormat(std::move(encoded));
+  grid.stored = throughTheFormat(encode(options, source, bytes, grid));
+  if (options.voxels) checkVoxels(*options.voxels, source, grid.stored);
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
 
   grid.metrics = compareVolumes(source.volume, decodeGrid(grid.stored), {.box = options.fit.box});

@@ -1,5 +1,7 @@
 #include "vdb2esvr/options.h"
 
+#include <cmath>
+#include <cstdlib>
 #include <limits>
 
 #include "cli/box_option.h"
@@ -54,6 +56,7 @@ cli::ProgramText programText() {
           "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          the best of 100 KB\n"
           "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             the smallest of 45 dB\n"
           "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report smoke.json\n"
+          "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            every voxel within the bound\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255"};
 }
 
@@ -66,6 +69,11 @@ void addFitOptions(cli::po::options_description& options) {
      "the best file of at most so many bytes: 50000, 50KB, 2.6MB")
     ("ratio", value<double>()->value_name("R"), "the same, IN's size over R")
     ("psnr", value<double>()->value_name("DB"), "reach this PSNR over the box, in few bytes")
+    ("lossless", bool_switch(), "voxels and active mask bit for bit, no ellipsoids")
+    ("max-error", value<std::string>()->value_name("E"),
+     "every voxel within E of the source, or E% of its range; no ellipsoids")
+    ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
+     "with --max-error: threshold (active by value) or exact (the source's mask)")
     ("seconds", value<double>()->value_name("S"), "the best within this time, each grid")
     ("iterations", value<std::int64_t>()->value_name("N"), "length of the fit's schedule")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
@@ -151,6 +159,35 @@ Storage storage(const Arguments& a) {
                               {{"compact", Storage::kCompact}, {"float32", Storage::kFloat32}});
 }
 
+/// "0.01", or "1%" of the range of values.
+void readBound(const std::string& text, VoxelDemand& demand) {
+  char* end = nullptr;
+  demand.bound = std::strtod(text.c_str(), &end);
+  demand.relative = std::string(end) == "%";
+  if (demand.relative) demand.bound /= 100.0;
+  const bool number = end != text.c_str() && (*end == '\0' || demand.relative);
+  if (!number || !(demand.bound > 0.0 && std::isfinite(demand.bound)))
+    throw UsageError("--max-error must be a number above 0 such as 0.01 or 1%, not '" + text + "'");
+}
+
+void readVoxels(const Arguments& a, Options& options) {
+  const bool exact = a.get<bool>("lossless");
+  const auto bound = a.find<std::string>("max-error");
+  if (!exact && !bound) return;
+  if (exact && bound) throw UsageError("--lossless leaves no error: it takes no --max-error");
+  const std::string given = exact ? "--lossless" : "--max-error";
+  for (const char* option : {"count", "psnr", "seconds", "size", "ratio"})
+    if (a.has(option))
+      throw UsageError(given + " stores voxels, not ellipsoids; it takes no --" + option);
+  VoxelDemand demand;
+  demand.exact = exact;
+  if (bound) readBound(*bound, demand);
+  demand.activity =
+      cli::choose<Activity>("topology", a.get<std::string>("topology"),
+                            {{"threshold", Activity::kByValue}, {"exact", Activity::kExact}});
+  options.voxels = demand;
+}
+
 void readSize(const Arguments& a, Options& options) {
   if (const auto size = a.find<std::string>("size"))
     options.size = cli::parseByteSize("size", *size);
@@ -193,6 +230,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.fit = fitOptions(a);
   options.storage = storage(a);
   options.storageLoss = *bounded<double>(a, "storage-loss", 0.0, kMostLoss);
+  readVoxels(a, options);
   readSize(a, options);
   options.read.nonFinite = nonFinite(a);
   options.device = a.get<std::string>("device");

@@ -21,12 +21,21 @@ enum class OnCancel { kKeep, kDiscard };
 /// How the file holds the ellipsoids' attributes.
 enum class Storage { kCompact, kFloat32 };
 
+/// Voxels that must come back exactly or within a bound.
+struct VoxelDemand {
+  bool exact = false;
+  double bound = 0.0;     ///< in the grid's values, or a share of their range
+  bool relative = false;  ///< `bound` is a share
+  Activity activity = Activity::kByValue;
+};
+
 struct Options {
   std::filesystem::path input, output;
   std::vector<std::string> grids;  ///< empty: all that can be fitted
   FitOptions fit;
   std::optional<std::uint64_t> size;  ///< bytes of the file
   std::optional<double> ratio;        ///< bytes of the input for each of the file
+  std::optional<VoxelDemand> voxels;  ///< instead of ellipsoids
   Storage storage = Storage::kCompact;
   double storageLoss = CompactOptions::kDefaultLoss;  ///< dB that kCompact may cost
   ReadOptions read;

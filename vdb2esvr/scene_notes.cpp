@@ -15,6 +15,10 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   const std::uint64_t primitives = grid.stored.field.primitiveCount();
   const auto lacks = [&](const char* kind) { return !hasSection(record.output, g, kind); };
 
+  if (grid.stored.voxels)
+    return {{"ellipsoids", "every voxel was asked for, exactly or within a bound"},
+            {"pilot", "nothing needed a fit"}};
+
   std::vector<LeftOut> notes;
   const bool compact = grid.compact.has_value();
   if (!grid.signedIntensities)

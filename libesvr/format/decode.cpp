@@ -12,6 +12,7 @@
 #include "format/planes.h"
 #include "format/section_reader.h"
 #include "format/validity.h"
+#include "format/voxel_section.h"
 
 namespace esvr {
 namespace {
@@ -35,6 +36,7 @@ class GridDecoder {
     for (std::uint32_t c = 0; c < record.chunks.size(); ++c)
       grid.field.chunks.push_back(readChunk(c, record.chunks[c], grid));
     if (grid.topology == TopologyKind::kLeaves) readLeaves(grid);
+    readVoxels(grid);
     readCurve(grid);
     return grid;
   }
@@ -123,6 +125,12 @@ class GridDecoder {
     const auto section = id(SectionKind::kLeaves);
     if (sections_.has(section))
       grid.leaves = getLeaves(sections_.get(section), sections_.place(section));
+  }
+
+  void readVoxels(EncodedGrid& grid) {
+    const auto section = id(SectionKind::kVoxels);
+    if (sections_.has(section))
+      grid.voxels = getVoxels(sections_.get(section), sections_.place(section));
   }
 
   void readCurve(EncodedGrid& grid) {

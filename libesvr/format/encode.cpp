@@ -13,6 +13,7 @@
 #include "format/planes.h"
 #include "format/section_table.h"
 #include "format/validity.h"
+#include "format/voxel_section.h"
 
 namespace esvr {
 namespace {
@@ -31,7 +32,7 @@ class Sections {
   /// Content that is coded already.
   void addRaw(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content) {
     const std::uint64_t bytes = content.size();
-    table_.versionMinor = kQuantisedMinor;
+    table_.versionMinor = kCodedMinor;
     addPacked(id, flags, {Codec::kRaw, std::move(content), bytes});
   }
 
@@ -148,6 +149,7 @@ void addQuantised(Sections& out, std::uint32_t g, std::uint32_t c, const Quantis
 void addExtras(Sections& out, std::uint32_t g, const EncodedGrid& grid) {
   if (!grid.leaves.empty())
     out.add({SectionKind::kLeaves, g}, kRequired, putLeaves(grid.leaves), kFloatSize);
+  if (grid.voxels) out.addRaw({SectionKind::kVoxels, g}, kRequired, putVoxels(*grid.voxels));
   if (!grid.curve.empty())
     out.add({SectionKind::kCurve, g}, kOptional, putCurve(grid.curve), kDoubleSize);
 }

@@ -74,15 +74,33 @@ bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) 
          withinBand(activeRange(source), source.background);
 }
 
-EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source, Field field) {
+namespace {
+
+/// All that is known of a grid without its values.
+EncodedGrid describe(const GridDescriptor& descriptor, const SparseVolume& source) {
   const ValueRange range = activeRange(source);
   EncodedGrid grid;
   grid.descriptor = descriptor;
-  grid.field = std::move(field);
   grid.activeBox = activeBox(source);
   grid.activeVoxels = activeVoxelCount(source);
   grid.valueMin = range.min;
   grid.valueMax = range.max;
+  return grid;
+}
+
+}  // namespace
+
+EncodedGrid encodeVoxels(const GridDescriptor& descriptor, const SparseVolume& source,
+                         VoxelLayer layer) {
+  EncodedGrid grid = describe(descriptor, source);
+  grid.field.background = source.background;
+  grid.voxels = std::move(layer);
+  return grid;
+}
+
+EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source, Field field) {
+  EncodedGrid grid = describe(descriptor, source);
+  grid.field = std::move(field);
   if (isNarrowBand(descriptor, source)) {
     grid.topology = TopologyKind::kLeaves;
     grid.withinRange = false;  // the band has its own ends, and what is beyond them tells the side
@@ -94,6 +112,10 @@ EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& sou
 SparseVolume decodeGrid(const EncodedGrid& grid, const DecodeOptions& options) {
   if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
+  if (grid.voxels && options.threshold)
+    throw UsageError("grid '" + grid.descriptor.name +
+                     "' holds its voxels, which are active as they are: it takes no threshold");
+  if (grid.voxels) return volumeOf(*grid.voxels);
   const ActivityRule rule = ruleOf(grid);
   return revoxelise(grid.field, {.threshold = options.threshold.value_or(grid.activeThreshold),
                                  .range = rule.range,

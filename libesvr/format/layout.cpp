@@ -23,6 +23,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kIntensities, "intensities"},
     {SectionKind::kKappas, "kappas"},
     {SectionKind::kEllipsoids, "ellipsoids"},
+    {SectionKind::kVoxels, "voxels"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
 

@@ -15,9 +15,9 @@ namespace esvr::format {
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
 
 inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
-inline constexpr std::uint16_t kVersionMinor = 1;    ///< the highest that is read and written
-inline constexpr std::uint16_t kFirstMinor = 0;      ///< what needs no later one is written as this
-inline constexpr std::uint16_t kQuantisedMinor = 1;  ///< has quantised ellipsoids
+inline constexpr std::uint16_t kVersionMinor = 1;  ///< the highest that is read and written
+inline constexpr std::uint16_t kFirstMinor = 0;    ///< what needs no later one is written as this
+inline constexpr std::uint16_t kCodedMinor = 1;    ///< has quantised ellipsoids or voxels
 
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
@@ -39,6 +39,7 @@ enum class SectionKind : std::uint32_t {
   kIntensities = 19,
   kKappas = 20,
   kEllipsoids = 32,
+  kVoxels = 33,
 };
 
 enum class Codec : std::uint16_t {

@@ -2,6 +2,7 @@
 /// Numbers as decisions of a range coder. Written once for both directions: a `Writer` takes the
 /// number and gives it back, a `Reader` ignores what it is given and gives what was written.
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -45,26 +46,33 @@ class TreeModel {
   std::array<BitModel, std::size_t{1} << kBits> models_;
 };
 
-/// Any number below 2^31: how many bits it has, then those below the leading one, of which the
-/// first kModelled have models.
-class NumberModel {
+/// Any number of fewer than 2^kWidthBits bits: how many it has, then those below the leading one,
+/// of which the first kModelled have models.
+template <int kWidthBits>
+class NumberModelOf {
  public:
-  template <class Side>
-  std::uint32_t code(Side& side, std::uint32_t value) {
+  template <class Side, class Unsigned>
+  Unsigned code(Side& side, Unsigned value) {
     const std::uint32_t width = width_.code(side, std::uint32_t(std::bit_width(value)));
     if (width < 2) return width;
     int left = int(width) - 1;
-    std::uint32_t result = 1;
+    std::uint32_t top = 1;
     for (int n = 0; n < kModelled && left > 0; ++n)
-      result = result << 1 | std::uint32_t(side.bit(bits_[width][result], (value >> --left) & 1u));
-    const std::uint32_t rest = side.raw(value & ((1u << left) - 1u), left);
-    return result << left | rest;
+      top = top << 1 | std::uint32_t(side.bit(bits_[width][top], (value >> --left) & 1u));
+    Unsigned result = top;
+    for (; left > 0; left -= kRawAtOnce) {
+      const int now = std::min(left, kRawAtOnce), below = left - now;
+      result = result << now | side.raw(std::uint32_t(value >> below) & ((1u << now) - 1u), now);
+    }
+    return result;
   }
 
  private:
-  static constexpr int kWidthBits = 5, kModelled = 3;
+  static constexpr int kModelled = 3, kRawAtOnce = 30;
   TreeModel<kWidthBits> width_;
   std::array<std::array<BitModel, std::size_t{1} << kModelled>, std::size_t{1} << kWidthBits> bits_;
 };
+
+using NumberModel = NumberModelOf<5>;  ///< below 2^31
 
 }  // namespace esvr::format

@@ -12,6 +12,7 @@
 #include "cli/converters.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
+#include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
 
@@ -177,7 +178,9 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"--size", "5XB"}, 2, "--size"},
         Refusal{{"--size", "9KB", "--psnr", "40"}, 2, "--psnr"},
         Refusal{{"--size", "9KB", "--ratio", "9"}, 2, "--ratio"},
-        Refusal{{"--ratio", "0.5"}, 2, "--ratio"}, Refusal{{"--size", "99"}, 2, "bytes"},
+        Refusal{{"--ratio", "0.5"}, 2, "--ratio"}, Refusal{{"--max-error", "0"}, 2, "--max-error"},
+        Refusal{{"--max-error", "1x"}, 2, "--max-error"},
+        Refusal{{"--lossless", "--psnr", "40"}, 2, "--psnr"}, Refusal{{"--size", "99"}, 2, "bytes"},
         Refusal{{"--count", "0"}, 2, "--count"}, Refusal{{"--count", "x"}, 2, "x"},
         Refusal{{"--psnr", "-1"}, 2, "--psnr"}, Refusal{{"--psnr", "nan"}, 2, "psnr"},
         Refusal{{"--seconds", "0"}, 2, "--seconds"},
@@ -193,6 +196,32 @@ TEST_F(Vdb2Esvr, endsWithCodeFourWhereThePsnrIsMissedAndWritesTheFile) {
   EXPECT_EQ(run.exitCode, 4);
   EXPECT_THAT(run.err, AllOf(HasSubstr("of the 200.00 dB"), HasSubstr("is written")));
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
+}
+
+TEST_F(Vdb2Esvr, keepsToTheSizeAskedFor) {
+  const auto run = vdb2esvr({in(), out(), "--size", "1.5KB", "--iterations", "60", "--kappa", "0"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_LE(std::filesystem::file_size(out()), 1500u);
+  EXPECT_GE(std::filesystem::file_size(out()), 1470u);
+}
+
+TEST_F(Vdb2Esvr, losslessGivesBackEveryBit) {
+  const auto run = vdb2esvr({in(), out(), "--lossless"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  const SparseVolume source = readGrid(in(), "density", {}).volume;
+  const SparseVolume back = decodeGrid(readEsvr(out()).grids[0]);
+  EXPECT_EQ(back.values, source.values);
+  EXPECT_EQ(back.active, source.active);
+}
+
+TEST_F(Vdb2Esvr, keepsEveryVoxelWithinTheBound) {
+  const auto run = vdb2esvr({in(), out(), "--max-error", "1%", "--topology", "exact"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  const SparseVolume source = readGrid(in(), "density", {}).volume;
+  const ValueRange range = activeRange(source);
+  const SparseVolume back = decodeGrid(readEsvr(out()).grids[0]);
+  EXPECT_LE(compareVolumes(source, back).maxError, 0.01 * (double(range.max) - range.min));
+  EXPECT_EQ(back.active, source.active);
 }
 
 TEST_F(Vdb2Esvr, givesTheSameEllipsoidsOnAnyNumberOfThreads) {

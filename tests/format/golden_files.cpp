@@ -1,5 +1,6 @@
 #include "format/golden_files.h"
 
+#include "esvr/grid_coding.h"
 #include "format/crafted_file.h"
 #include "format/sample_files.h"
 
@@ -22,6 +23,21 @@ EncodedGrid oneEllipsoid() {
   return grid;
 }
 
+/// A ramp of a few values in two bricks, with an inactive voxel that is not the background.
+EncodedGrid fewValues() {
+  std::vector<BrickInput> bricks(2);
+  for (std::size_t b = 0; b < bricks.size(); ++b) {
+    bricks[b].corner = {-8, 16, std::int32_t(b) * kBrickSide};
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Coord at = bricks[b].corner + voxelLocal(v);
+      bricks[b].values[std::size_t(v)] = float((at.x + at.y * at.z / 4) & 15) * 0.125f;
+      if (at.z > 2 || at == Coord{-5, 18, 1}) bricks[b].active.set(v);
+    }
+  }
+  const SparseVolume volume = makeVolume(bricks, 0.125f);
+  return encodeVoxels({}, volume, exactLayer(volume));
+}
+
 }  // namespace
 
 std::vector<GoldenFile> goldenFiles() {
@@ -33,6 +49,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"kappas_and_chunks", fileOf(chunkedGrid(4))},
       {"compressed", fileOf(fogGrid(60))},
       {"quantised", fileOf(quantisedGrid(20))},
+      {"voxels", fileOf(fewValues())},
       {"unknown_section", fileOf(oneEllipsoid()), true},
   };
 }

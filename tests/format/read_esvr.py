@@ -16,7 +16,8 @@ PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 96500
           2870177450012600261)
 NONE = 0xFFFFFFFF
 KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 5: "curve", 16: "centers",
-         17: "scales", 18: "rotations", 19: "intensities", 20: "kappas", 32: "ellipsoids"}
+         17: "scales", 18: "rotations", 19: "intensities", 20: "kappas", 32: "ellipsoids",
+         33: "voxels"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
 
@@ -164,8 +165,8 @@ class Decoder:
             node = node << 1 | self.decision(*model, node)
         return node - (1 << bits)
 
-    def number(self, *model):
-        width = self.tree(5, *model, "width")
+    def number(self, *model, bits=5):
+        width = self.tree(bits, *model, "width")
         if width < 2:
             return width
         value = 1
@@ -262,12 +263,65 @@ def ellipsoids(data):
     return result
 
 
+def toward_zero(value, divisor):
+    return abs(value) // divisor * (1 if value >= 0 else -1)
+
+
+def guesses(a, b, c, ab, ac, bc, abc):
+    lorenzo = a + b + c - ab - ac - bc + abc
+    return (clamp(lorenzo, min(a, b, c), max(a, b, c)), toward_zero(a + b + c, 3),
+            toward_zero(2 * (a + b + c) - ab - ac - bc, 3),
+            c + toward_zero(b - bc + a - ac, 2), lorenzo)
+
+
+def voxels(data):
+    """{voxel: (code, active)} of those that are not vacant, and the header."""
+    r = Record(data)
+    head = {key: r.get(form) for key, form in (
+        ("form", "B"), ("divisor", "d"), ("origin", "3i"), ("background", "f"))}
+    head["palette"] = [r.get("f") for _ in range(r.get("I"))]
+    bricks, bits, vacant = r.get("Q"), r.get("B"), r.get("i")
+    stream = Decoder(data[r.at:])
+    codes, active, held = {}, set(), {}
+    errors, negative = [0] * 5, 0
+    for key in keys(bricks, 3 * bits, stream):
+        corner = [8 * sum((key >> (3 * b + a) & 1) << b for b in range(bits)) for a in range(3)]
+        for offset in range(512):
+            x, y, z = (corner[0] + (offset >> 6), corner[1] + (offset >> 3 & 7),
+                       corner[2] + (offset & 7))
+            before = [(x - 1, y, z), (x, y - 1, z), (x, y, z - 1), (x - 1, y - 1, z),
+                      (x - 1, y, z - 1), (x, y - 1, z - 1), (x - 1, y - 1, z - 1)]
+            around = sum((p in active) << (6 - i) for i, p in enumerate(before))
+            if stream.decision("active", around):
+                active.add((x, y, z))
+            elif stream.decision("vacant"):
+                codes[x, y, z] = vacant
+                continue
+            a, b, c, ab, ac, bc, abc = (codes.get(p, vacant) for p in before)
+            rules = guesses(a, b, c, ab, ac, bc, abc)
+            best = errors.index(min(errors))
+            spread = (abs(a - ab) + abs(b - bc) + abs(c - ac) + abs(a - ac) + abs(b - ab)
+                      + abs(c - bc) + 2 * (errors[best] >> 3))
+            width = spread.bit_length()
+            upper = spread >> (width - 2) & 1 if width > 1 else 0
+            context = min(2 * width + upper, 23)
+            far = stream.number("far", context, bits=6)
+            if far:
+                negative = stream.decision("negative", context, negative)
+            code = rules[best] + (-far if negative else far)
+            errors = [e + min(abs(code - g), 1 << 34) - (e >> 3) for e, g in zip(errors, rules)]
+            codes[x, y, z] = code
+            held[tuple(o + p for o, p in zip(head["origin"], (x, y, z)))] = (
+                code, (x, y, z) in active)
+    return head, held
+
+
 def content(name, data):
     if name in PLANES:
         n = len(data) // 4 // PLANES[name]
         values = struct.unpack(f"<{n * PLANES[name]}f", data)
         return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
-    readers = {"grid": grid, "chunks": chunks, "leaves": leaves, "ellipsoids": ellipsoids}
+    readers = {"grid": grid, "chunks": chunks, "leaves": leaves, "ellipsoids": ellipsoids, "voxels": voxels}
     return readers[name](data) if name in readers else data
 
 
@@ -365,8 +419,26 @@ def check_quantised(sections):
                 assert abs(a - b) <= 1e-7 * max(1.0, abs(b)), (chunk, i, a, b)
 
 
+def check_voxels(sections):
+    head, held = sections["voxels", 0, NONE]
+    assert (head["form"], head["origin"], head["background"]) == (3, (-8, 16, 0), 0.125)
+    values = 0
+    for x in range(-8, 0):
+        for y in range(16, 24):
+            for z in range(16):
+                wanted = (x + y * z // 4 & 15) * 0.125
+                active = z > 2 or (x, y, z) == (-5, 18, 1)
+                if (x, y, z) not in held:
+                    assert wanted == head["background"] and not active, (x, y, z)
+                    continue
+                code, now = held[x, y, z]
+                assert (head["palette"][code], now) == (wanted, active), (x, y, z)
+                values += 1
+    assert values == len(held) > 800
+
+
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
-          "level_set": check_level_set, "quantised": check_quantised, "kappas_and_chunks": check_kappas_and_chunks}
+          "level_set": check_level_set, "quantised": check_quantised, "voxels": check_voxels, "kappas_and_chunks": check_kappas_and_chunks}
 
 
 def main():

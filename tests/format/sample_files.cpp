@@ -79,6 +79,7 @@ std::string difference(const EncodedGrid& a, const EncodedGrid& b) {
   if (!(a.activeBox == b.activeBox) || a.activeVoxels != b.activeVoxels) return "active voxels";
   if (!sameBits(a.valueMin, b.valueMin) || !sameBits(a.valueMax, b.valueMax)) return "value range";
   if (a.curve != b.curve) return "curve";
+  if (a.voxels != b.voxels) return "voxels";
   if (a.quantised != b.quantised) return "quantised";
   return difference(a.field, b.field);
 }

@@ -56,7 +56,7 @@ TEST(NumberModel, GivesBackNumbersOfAnySize) {
   const auto bytes = writer.coder.finish();
   Reader reader{RangeDecoder(bytes)};
   NumberModel learnt;
-  for (const auto n : numbers) EXPECT_EQ(learnt.code(reader, 0), n);
+  for (const auto n : numbers) EXPECT_EQ(learnt.code(reader, 0u), n);
 }
 
 std::vector<std::uint64_t> throughTheTree(std::vector<std::uint64_t> keys, int bits,

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "esvr/fit_record.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/quantised.h"
+#include "esvr/voxel_layer.h"
 
 namespace esvr {
 
@@ -42,6 +44,8 @@ struct EncodedGrid {
   /// Empty: the ellipsoids are stored as float32. Else one for every chunk of the field, whose
   /// ellipsoids are then exactly what it stands for (dequantise).
   std::vector<QuantisedEllipsoids> quantised;
+  /// The voxels themselves, exact or within a bound: what decodeGrid() gives back then.
+  std::optional<VoxelLayer> voxels;
 };
 
 /// Bytes that a grid's quantised ellipsoids take, by stream.

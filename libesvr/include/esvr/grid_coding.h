@@ -26,6 +26,10 @@ namespace esvr {
 /// beyond its half width, or has none, is fitted and stored like any other grid.
 [[nodiscard]] bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source);
 
+/// A grid that holds its voxels and no ellipsoids. \param layer  of `source` (voxel_layer.h)
+[[nodiscard]] EncodedGrid encodeVoxels(const GridDescriptor& descriptor, const SparseVolume& source,
+                                       VoxelLayer layer);
+
 struct DecodeOptions {
   std::optional<float> threshold;  ///< instead of the grid's own; 0 or above
 };

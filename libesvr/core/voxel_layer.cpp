@@ -1,0 +1,204 @@
+#include "esvr/voxel_layer.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "esvr/error.h"
+
+namespace esvr {
+namespace {
+
+using Limits = std::numeric_limits<std::int32_t>;
+
+constexpr std::size_t kLargestPalette = 4096;
+constexpr double kMargin = 1.0 - 1e-6;  // of a bound: for what rounding to float32 adds
+constexpr double kLargestCode = 0x1p30;
+constexpr int kHalfMantissa = 10, kHalfLowest = -14, kHalfHighest = 15;
+constexpr std::int32_t kHalfOne = 1 << kHalfMantissa, kHalfSign = 0x8000, kHalfBits = 0x7fff;
+
+bool sameBits(float a, float b) {
+  return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
+}
+
+/// -0 comes before 0: every bit pattern has a number of its own.
+std::int32_t orderOf(std::int32_t magnitude, bool negative) {
+  return negative ? -1 - magnitude : magnitude;
+}
+
+float floatAt(std::int32_t n) {
+  const auto magnitude = std::uint32_t(n < 0 ? -1 - n : n);
+  return std::bit_cast<float>(n < 0 ? magnitude | 0x80000000u : magnitude);
+}
+std::int32_t orderOfFloat(float v) {
+  return orderOf(std::int32_t(std::bit_cast<std::uint32_t>(v) & 0x7fffffffu), std::signbit(v));
+}
+
+bool inOrder(float a, float b) { return orderOfFloat(a) < orderOfFloat(b); }
+
+float halfAt(std::int32_t n) {
+  const std::int32_t bits = (n < 0 ? -1 - n : n) & kHalfBits;
+  const int exponent = bits >> kHalfMantissa;
+  const int mantissa = bits & (kHalfOne - 1);
+  const double magnitude =
+      exponent == 0 ? std::ldexp(mantissa, kHalfLowest - kHalfMantissa)
+                    : std::ldexp(mantissa + kHalfOne, exponent - kHalfHighest - kHalfMantissa);
+  return std::copysign(float(magnitude), n < 0 ? -1.0f : 1.0f);
+}
+/// Of the nearest half below in magnitude; halfAt() tells whether it is the value.
+std::int32_t orderOfHalf(float v) {
+  const double magnitude = std::abs(double(v));
+  int exponent = magnitude > 0.0 ? std::ilogb(magnitude) : kHalfLowest;
+  exponent = std::clamp(exponent, kHalfLowest, kHalfHighest);
+  const double mantissa = std::floor(std::ldexp(magnitude, kHalfMantissa - exponent));
+  const auto steps = std::int32_t(std::min(mantissa, 2.0 * kHalfOne - 1.0));
+  const bool subnormal = steps < kHalfOne;
+  const std::int32_t bits =
+      subnormal ? steps : ((exponent + kHalfHighest) << kHalfMantissa) + steps - kHalfOne;
+  return orderOf(bits, std::signbit(v));
+}
+
+float valueAt(const VoxelLayer& layer, std::int32_t n) {
+  switch (layer.form) {
+    case VoxelForm::kLattice:
+      return float(double(n) / layer.divisor);
+    case VoxelForm::kHalf:
+      return halfAt(n);
+    case VoxelForm::kPalette:
+      return layer.palette[std::size_t(n)];
+    case VoxelForm::kFloat:
+      break;
+  }
+  return floatAt(n);
+}
+
+std::int32_t codeOf(const VoxelLayer& layer, float v) {
+  switch (layer.form) {
+    case VoxelForm::kLattice:
+      return std::int32_t(
+          std::lround(std::clamp(double(v) * layer.divisor, -kLargestCode, kLargestCode)));
+    case VoxelForm::kHalf:
+      return orderOfHalf(v);
+    case VoxelForm::kPalette:
+      return std::int32_t(std::lower_bound(layer.palette.begin(), layer.palette.end(), v, inOrder) -
+                          layer.palette.begin());
+    case VoxelForm::kFloat:
+      break;
+  }
+  return orderOfFloat(v);
+}
+
+/// The values that there are, in order; nothing where they are too many.
+std::vector<float> paletteOf(const SparseVolume& volume) {
+  std::vector<float> values = volume.values;
+  std::sort(values.begin(), values.end(), inOrder);
+  values.erase(std::unique(values.begin(), values.end(), sameBits), values.end());
+  if (values.size() > kLargestPalette) values.clear();
+  return values;
+}
+
+bool allHalves(const SparseVolume& volume) {
+  return std::all_of(volume.values.begin(), volume.values.end(),
+                     [](float v) { return sameBits(halfAt(orderOfHalf(v)), v); });
+}
+
+void fill(const SparseVolume& volume, VoxelLayer& layer) {
+  layer.origin = volume.origin;
+  layer.background = volume.background;
+  layer.bricks = volume.bricks;
+  layer.active = volume.active;
+  layer.vacant.resize(volume.brickCount());
+  layer.codes.resize(volume.values.size());
+  for (std::size_t i = 0; i < volume.values.size(); ++i) {
+    const std::size_t b = i / kBrickVoxels;
+    const int v = int(i % kBrickVoxels);
+    if (!volume.active[b].test(v) && sameBits(volume.values[i], volume.background))
+      layer.vacant[b].set(v);
+    layer.codes[i] = codeOf(layer, volume.values[i]);
+  }
+}
+
+/// Bricks without an active voxel go.
+void dropInactive(VoxelLayer& layer) {
+  std::size_t kept = 0;
+  for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
+    if (layer.active[b].count() == 0) continue;
+    layer.bricks[kept] = layer.bricks[b];
+    layer.active[kept] = layer.active[b];
+    layer.vacant[kept] = layer.vacant[b];
+    const auto from = layer.codes.begin() + std::ptrdiff_t(b * kBrickVoxels);
+    std::copy_n(from, kBrickVoxels, layer.codes.begin() + std::ptrdiff_t(kept * kBrickVoxels));
+    ++kept;
+  }
+  layer.bricks.resize(kept);
+  layer.active.resize(kept);
+  layer.vacant.resize(kept);
+  layer.codes.resize(kept * kBrickVoxels);
+}
+
+void activateByValue(const SparseVolume& volume, double bound, VoxelLayer& layer) {
+  const std::int32_t background = codeOf(layer, volume.background);
+  for (std::size_t i = 0; i < volume.values.size(); ++i) {
+    const std::size_t b = i / kBrickVoxels;
+    const int v = int(i % kBrickVoxels);
+    layer.active[b].set(v);
+    if (std::abs(double(volume.values[i]) - volume.background) > bound) continue;
+    layer.active[b].words[std::size_t(v) >> 6] &= ~(std::uint64_t{1} << (v & 63));
+    layer.vacant[b].set(v);
+    layer.codes[i] = background;
+  }
+  dropInactive(layer);
+}
+
+}  // namespace
+
+VoxelLayer exactLayer(const SparseVolume& volume) {
+  VoxelLayer layer;
+  layer.palette = paletteOf(volume);
+  layer.form = !layer.palette.empty() ? VoxelForm::kPalette
+               : allHalves(volume)    ? VoxelForm::kHalf
+                                      : VoxelForm::kFloat;
+  fill(volume, layer);
+  return layer;
+}
+
+VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity) {
+  if (!(std::isfinite(bound) && bound > 0.0))
+    throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
+  VoxelLayer layer;
+  layer.form = VoxelForm::kLattice;
+  layer.divisor = 0.5 / (bound * kMargin);
+  fill(volume, layer);
+  if (activity == Activity::kByValue) activateByValue(volume, bound * kMargin, layer);
+  return largestError(volume, layer) <= bound ? layer : exactLayer(volume);
+}
+
+SparseVolume volumeOf(const VoxelLayer& layer) {
+  SparseVolume volume;
+  volume.origin = layer.origin;
+  volume.background = layer.background;
+  volume.bricks = layer.bricks;
+  volume.active = layer.active;
+  volume.values.resize(layer.codes.size());
+  for (std::size_t i = 0; i < layer.codes.size(); ++i)
+    volume.values[i] = layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels))
+                           ? layer.background
+                           : valueAt(layer, layer.codes[i]);
+  return volume;
+}
+
+double largestError(const SparseVolume& volume, const VoxelLayer& layer) {
+  const SparseVolume back = volumeOf(layer);
+  double largest = 0.0;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    const auto at = findBrick(back, volume.bricks[b]);
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+      const float now = at ? back.brickValues(*at)[v] : back.background;
+      largest = std::max(largest, std::abs(double(volume.brickValues(b)[v]) - double(now)));
+    }
+  }
+  return largest;
+}
+
+}  // namespace esvr

@@ -1,0 +1,109 @@
+// Plan: exact layers give back every bit in the smallest form that can, bounded ones keep their
+// bound at any scale of values.
+
+#include "esvr/voxel_layer.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "../fit/volumes.h"
+#include "esvr/error.h"
+
+namespace esvr {
+namespace {
+
+bool sameBits(const std::vector<float>& a, const std::vector<float>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](float x, float y) {
+    return std::bit_cast<std::uint32_t>(x) == std::bit_cast<std::uint32_t>(y);
+  });
+}
+
+void expectExact(const SparseVolume& volume, VoxelForm form) {
+  const VoxelLayer layer = exactLayer(volume);
+  EXPECT_EQ(layer.form, form);
+  const SparseVolume back = volumeOf(layer);
+  EXPECT_TRUE(sameBits(back.values, volume.values));
+  EXPECT_EQ(back.active, volume.active);
+  EXPECT_EQ(back.bricks, volume.bricks);
+  EXPECT_EQ(back.origin, volume.origin);
+  EXPECT_EQ(largestError(volume, layer), 0.0);
+}
+
+/// Values made from a random number in [-1, 1].
+SparseVolume made(const std::function<float(double)>& value) {
+  test::Random random(11);
+  return test::volumeOf({-8, 16, 800}, 3, 0.25f, [&](Coord) { return value(random(-1.0, 1.0)); });
+}
+
+TEST(ExactLayer, NoticesTheFewValuesOfEightBits) {
+  expectExact(made([](double r) { return float(std::floor(r * 100)) * (1.0f / 255.0f); }),
+              VoxelForm::kPalette);
+}
+
+TEST(ExactLayer, HoldsHalvesAsHalves) {
+  // eleven bits of mantissa over thirty octaves, subnormal halves among them
+  expectExact(made([](double r) {
+                return float(std::ldexp(std::floor(r * 1024), int(std::lround(r * 1e6)) % 15 - 9));
+              }),
+              VoxelForm::kHalf);
+}
+
+TEST(ExactLayer, HoldsAnyFloat) {
+  int n = 0;
+  const float extremes[] = {-0.0f, 0.0f, std::numeric_limits<float>::max(),
+                            -std::numeric_limits<float>::max(),
+                            std::numeric_limits<float>::denorm_min()};
+  expectExact(made([&](double r) {
+                return n++ % 3 == 0 ? extremes[std::size_t(n) % std::size(extremes)]
+                                    : float(r * std::pow(10.0, 30.0 * r));
+              }),
+              VoxelForm::kFloat);
+}
+
+TEST(ExactLayer, KeepsActiveBackgroundAndInactiveValues) {
+  SparseVolume volume = test::tubeVolume();
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    volume.active[b] = {};
+    volume.active[b].set(int(b) % kBrickVoxels);
+  }
+  expectExact(volume, VoxelForm::kPalette);
+}
+
+TEST(BoundedLayer, KeepsItsBoundAtAnyScale) {
+  for (const double scale : {1e-30, 1.0, 1e4, 1e30})
+    for (const double share : {0.1, 0.01, 1e-4})
+      for (const Activity activity : {Activity::kExact, Activity::kByValue}) {
+        const SparseVolume volume = made([&](double r) { return float(r * scale); });
+        const VoxelLayer layer = boundedLayer(volume, share * scale, activity);
+        EXPECT_LE(largestError(volume, layer), share * scale);
+        if (activity == Activity::kExact) {
+          EXPECT_TRUE(layer.active == volume.active);
+        }
+      }
+}
+
+TEST(BoundedLayer, ByValueMakesTheBackgroundInactive) {
+  const SparseVolume volume = test::tubeVolume();
+  const VoxelLayer layer = boundedLayer(volume, 0.2, Activity::kByValue);
+  const SparseVolume back = volumeOf(layer);
+  for (std::size_t b = 0; b < back.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      EXPECT_EQ(back.active[b].test(v), back.brickValues(b)[std::size_t(v)] != 0.0f);
+}
+
+TEST(BoundedLayer, IsExactWhereFloat32IsNoFinerThanTheBound) {
+  const SparseVolume volume = made([](double r) { return float(1e8 + std::floor(r * 1e5)); });
+  EXPECT_EQ(largestError(volume, boundedLayer(volume, 1e-3, Activity::kExact)), 0.0);
+}
+
+TEST(BoundedLayer, RefusesABoundThatIsNone) {
+  const SparseVolume volume = test::tubeVolume();
+  for (const double bound : {0.0, -1.0, std::nan(""), HUGE_VAL})
+    EXPECT_THROW((void)boundedLayer(volume, bound, Activity::kExact), UsageError);
+}
+
+}  // namespace
+}  // namespace esvr

@@ -1,0 +1,128 @@
+// Plan: layers of every form come back integer by integer; lies are found out before memory is
+// spent on them; what a smooth volume costs is a bound on the predictor.
+
+#include "format/voxel_section.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "../fit/volumes.h"
+#include "esvr/container.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "format/allocation_meter.h"
+#include "format/crafted_file.h"
+#include "format/sample_files.h"
+
+namespace esvr {
+namespace {
+
+using format::getVoxels;
+using format::putVoxels;
+using format::SectionKind;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+std::vector<VoxelLayer> someLayers() {
+  const SparseVolume tube = test::tubeVolume(), ball = test::levelSetVolume();
+  SparseVolume halves = tube;
+  for (float& v : halves.values) v = std::round(v * 64.0f) / 64.0f;
+  return {exactLayer(tube), exactLayer(ball), exactLayer(halves),
+          boundedLayer(tube, 0.01, Activity::kByValue), boundedLayer(ball, 0.1, Activity::kExact)};
+}
+
+TEST(VoxelSection, ComesBackIntegerByInteger) {
+  for (const VoxelLayer& layer : someLayers()) EXPECT_EQ(getVoxels(putVoxels(layer), "v"), layer);
+}
+
+TEST(VoxelSection, OfNoBrickComesBack) {
+  EXPECT_EQ(getVoxels(putVoxels(VoxelLayer{}), "v"), VoxelLayer{});
+}
+
+TEST(VoxelSection, PredictsWhatIsSmooth) {
+  const SparseVolume smooth = test::volumeOf({}, 8, -1.0f, [](Coord v) {
+    return float(std::sin(v.x * 0.05) + std::sin(v.y * 0.04) * std::cos(v.z * 0.03));
+  });
+  const VoxelLayer layer = boundedLayer(smooth, 0.01, Activity::kExact);
+  // neighbours differ by two steps at most, second differences by a tenth of one
+  EXPECT_LT(double(putVoxels(layer).size()) * 8.0, 1.6 * double(smooth.values.size()));
+}
+
+EsvrFile voxelFile() {
+  const SparseVolume tube = test::tubeVolume({-16, 8, 1 << 20});
+  return test::fileOf(encodeVoxels({}, tube, exactLayer(tube)));
+}
+
+TEST(VoxelFile, GivesBackItsVoxels) {
+  const EsvrFile file = voxelFile();
+  const auto bytes = encodeEsvr(file);
+  const EsvrFile back = decodeEsvr(bytes, "memory");
+  EXPECT_EQ(test::difference(back, file), "");
+  EXPECT_EQ(encodeEsvr(back), bytes);
+  const SparseVolume tube = test::tubeVolume({-16, 8, 1 << 20});
+  const SparseVolume decoded = decodeGrid(back.grids[0]);
+  EXPECT_EQ(decoded.values, tube.values);
+  EXPECT_EQ(decoded.active, tube.active);
+}
+
+TEST(VoxelFile, TakesNoThreshold) {
+  EXPECT_THROW((void)decodeGrid(voxelFile().grids[0], {.threshold = 0.1f}), UsageError);
+}
+
+/// Offsets in the section (docs/format.md, "Voxels").
+namespace at {
+constexpr std::size_t kForm = 0, kDivisor = 1, kOrigin = 9, kBackground = 21, kPalette = 25;
+}  // namespace at
+
+template <class T>
+void expectLie(std::size_t offset, T value, const char* answer) {
+  test::CraftedFile file(encodeEsvr(voxelFile()));
+  file.poke(SectionKind::kVoxels, offset, value);
+  EXPECT_THAT([&] { (void)decodeEsvr(file.assemble(), "lie.esvr"); },
+              ThrowsMessage<BadInput>(HasSubstr(answer)));
+}
+
+TEST(VoxelLies, AreFoundOut) {
+  expectLie(at::kForm, std::uint8_t{4}, "unknown form of voxels");
+  expectLie(at::kDivisor, 0.0, "divisor");
+  expectLie(at::kOrigin, std::int32_t{1}, "not a brick's corner");
+  expectLie(at::kOrigin, std::int32_t{0x7ffffff8}, "outside the index space");
+  expectLie(at::kBackground, HUGE_VALF, "background");
+  expectLie(at::kPalette, 0xffffffffu, "palette");
+}
+
+TEST(VoxelLies, AKilobyteCannotAskForAGigabyte) {
+  auto content = putVoxels(exactLayer(test::levelSetVolume()));
+  content.resize(1024);
+  const auto countAt = at::kPalette + 4;
+  for (std::uint64_t count = std::uint64_t{1} << 62; count > 0; count /= 2) {
+    const auto bytes = std::as_bytes(std::span(&count, 1));
+    std::copy(bytes.begin(), bytes.end(), content.begin() + std::ptrdiff_t(countAt));
+    const test::AllocationMeter meter;
+    try {
+      (void)getVoxels(content, "lie");
+    } catch (const BadInput&) {
+    }
+    EXPECT_LT(meter.bytes(), std::size_t{64} << 20) << count;
+  }
+}
+
+TEST(VoxelLies, AnyBytesAreReadOrRefused) {
+  const auto whole = putVoxels(boundedLayer(test::tubeVolume(), 0.1, Activity::kExact));
+  std::uint32_t state = 5;
+  for (int n = 0; n < 2000; ++n) {
+    auto bytes = whole;
+    for (int k = 0; k < 3; ++k) {
+      state = state * 1664525u + 1013904223u;
+      bytes[(state >> 8) % bytes.size()] = std::byte(state >> 24);
+    }
+    try {
+      const VoxelLayer once = getVoxels(bytes, "any");
+      EXPECT_EQ(getVoxels(putVoxels(once), "again"), once);
+    } catch (const BadInput&) {
+    }
+  }
+}
+
+}  // namespace
+}  // namespace esvr
