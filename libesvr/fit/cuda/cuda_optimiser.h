@@ -32,9 +32,9 @@ class CudaOptimiser final : public Optimiser {
   [[nodiscard]] std::size_t deviceBytes() const override;
   [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
 
-  /// Gradients of 1/2 sum r^2 where the primitives are, for tests.
+  /// Gradients of 1/2 sum r^2 where the primitives are.
   [[nodiscard]] std::vector<PrimitiveGradient> gradients();
-  /// Takes over primitives, for tests.
+  /// Takes over primitives as they are; they have taken no step yet.
   void setPrimitives(std::span<const Primitive> primitives);
 
  private:

@@ -54,18 +54,22 @@ std::size_t mostPrimitives(const FitTarget& target, double bound) {
 
 std::string megabytes(double bytes) { return std::to_string(std::llround(bytes / 1e6)) + " MB"; }
 
-std::size_t freeBytes() {
-  std::size_t free = 0, total = 0;
-  check(cudaMemGetInfo(&free, &total), "asking for the free memory");
-  return free;
-}
-
 cudaMemPool_t currentPool() {
   int device = 0;
   check(cudaGetDevice(&device), "asking for the current device");
   cudaMemPool_t pool{};
   check(cudaDeviceGetDefaultMemPool(&pool, device), "asking for the memory pool");
   return pool;
+}
+
+/// What the device has left and what its pool keeps for us.
+std::size_t freeBytes() {
+  std::size_t free = 0, total = 0;
+  check(cudaMemGetInfo(&free, &total), "asking for the free memory");
+  std::uint64_t kept = 0;
+  check(cudaMemPoolGetAttribute(currentPool(), cudaMemPoolAttrReservedMemCurrent, &kept),
+        "asking for the pool's memory");
+  return free + kept;
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ struct StepArguments {
 void launchSums(const StepArguments& arguments, cudaStream_t stream);
 /// Takes the step; wants launchSums before.
 void launchStep(const StepArguments& arguments, cudaStream_t stream);
-/// Writes the gradients of all primitives, for tests.
+/// Writes the gradients of all primitives; wants launchSums before.
 void launchReadGradients(const StepArguments& arguments, PrimitiveGradient* out,
                          cudaStream_t stream);
 
