@@ -6,23 +6,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
-#include <new>
 
 #include "fit/frame.h"
 #include "fit/parameter_gradient.h"
+#include "fit/scene.h"
 
 namespace esvr {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
 constexpr std::size_t kBrickGrain = 4, kPrimitiveGrain = 64;
-
-template <class Constants>
-KernelConstants<float> narrowed(const Constants& k) {
-  return {float(k.shift), float(k.numerator), float(k.plateau), float(k.base),
-          float(k.slope), float(k.cutoff),    float(k.expNegS)};
-}
 
 double sumOfSquares(const float* r) {
   // Eight partial sums in float32 over 64 terms each, then float64: enough for any loss, and SIMD.
@@ -34,26 +27,7 @@ double sumOfSquares(const float* r) {
   return sum;
 }
 
-struct AlignedDelete {
-  void operator()(float* p) const { ::operator delete[](p, std::align_val_t(64)); }
-};
-
 }  // namespace
-
-/// A thread's tapes of the pairs of one brick.
-struct FitEngine::Scratch {
-  std::vector<PairTape> tapes;
-  std::unique_ptr<float[], AlignedDelete> phi;
-  std::size_t capacity = 0;
-
-  void reserve(std::size_t pairs) {
-    tapes.resize(pairs);
-    if (pairs * kBrickVoxels <= capacity) return;
-    capacity = 2 * pairs * kBrickVoxels;
-    phi.reset(
-        static_cast<float*>(::operator new[](capacity * sizeof(float), std::align_val_t(64))));
-  }
-};
 
 FitEngine::FitEngine(const FitTarget& target, const KernelConstants<double>& kernel)
     : target_(target),
@@ -104,7 +78,7 @@ void FitEngine::saturate(std::size_t brick, float* r) const {
   for (int v = 0; v < kBrickVoxels; ++v) r[v] = std::clamp(r[v], low - t[v], high - t[v]);
 }
 
-void FitEngine::forwardBrick(std::size_t brick, Scratch& scratch, float* r) const {
+void FitEngine::forwardBrick(std::size_t brick, PairTapes& scratch, float* r) const {
   const auto begin = pairs_.brickBegin[brick], end = pairs_.brickBegin[brick + 1];
   const Coord corner = index_.bricks()[brick] * kBrickSide;
   const BrickKernels& kernels = brickKernels();
@@ -120,7 +94,7 @@ void FitEngine::forwardBrick(std::size_t brick, Scratch& scratch, float* r) cons
   }
 }
 
-void FitEngine::backwardBrick(std::size_t brick, const Scratch& scratch, const float* r) {
+void FitEngine::backwardBrick(std::size_t brick, const PairTapes& scratch, const float* r) {
   const auto begin = pairs_.brickBegin[brick], end = pairs_.brickBegin[brick + 1];
   const Coord corner = index_.bricks()[brick] * kBrickSide;
   const BrickKernels& kernels = brickKernels();
@@ -147,9 +121,9 @@ void FitEngine::reduce(std::span<const Primitive> primitives,
 double FitEngine::gradients(std::span<const Primitive> primitives,
                             std::span<PrimitiveGradient> out) {
   prepare(primitives);
-  tbb::enumerable_thread_specific<Scratch> scratches;
+  tbb::enumerable_thread_specific<PairTapes> scratches;
   tbb::parallel_for(Range(0, brickCount(), kBrickGrain), [&](const Range& range) {
-    Scratch& scratch = scratches.local();
+    PairTapes& scratch = scratches.local();
     alignas(64) float r[kBrickVoxels];
     for (std::size_t b = range.begin(); b != range.end(); ++b) {
       startFromTarget(b, r);
@@ -168,9 +142,9 @@ double FitEngine::gradients(std::span<const Primitive> primitives,
 void FitEngine::gradientsOf(std::span<const Primitive> primitives,
                             std::span<const float> lossByValue, std::span<PrimitiveGradient> out) {
   prepare(primitives);
-  tbb::enumerable_thread_specific<Scratch> scratches;
+  tbb::enumerable_thread_specific<PairTapes> scratches;
   tbb::parallel_for(Range(0, brickCount(), kBrickGrain), [&](const Range& range) {
-    Scratch& scratch = scratches.local();
+    PairTapes& scratch = scratches.local();
     alignas(64) float sum[kBrickVoxels];
     for (std::size_t b = range.begin(); b != range.end(); ++b) {
       forwardBrick(b, scratch, sum);

@@ -8,6 +8,7 @@
 #include "field/brick_kernels.h"
 #include "field/brick_pairs.h"
 #include "fit/adam.h"
+#include "fit/pair_tapes.h"
 #include "fit/primitive.h"
 #include "fit/target.h"
 
@@ -40,12 +41,11 @@ class FitEngine {
   [[nodiscard]] const KernelConstants<double>& kernel() const { return kernel_; }
 
  private:
-  struct Scratch;
   void prepare(std::span<const Primitive> primitives);
   void startFromTarget(std::size_t brick, float* r) const;
   void saturate(std::size_t brick, float* r) const;
-  void forwardBrick(std::size_t brick, Scratch& scratch, float* r) const;
-  void backwardBrick(std::size_t brick, const Scratch& scratch, const float* r);
+  void forwardBrick(std::size_t brick, PairTapes& scratch, float* r) const;
+  void backwardBrick(std::size_t brick, const PairTapes& scratch, const float* r);
   void reduce(std::span<const Primitive> primitives, std::span<PrimitiveGradient> out) const;
 
   const FitTarget& target_;

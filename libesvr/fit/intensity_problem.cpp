@@ -6,35 +6,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
-#include <new>
 
 #include "esvr/field.h"
+#include "fit/pair_tapes.h"
 
 namespace esvr {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
 constexpr std::size_t kBrickGrain = 4;
-
-struct AlignedDelete {
-  void operator()(float* p) const { ::operator delete[](p, std::align_val_t(64)); }
-};
-
-/// A thread's tapes of the pairs of one brick.
-struct Scratch {
-  std::vector<PairTape> tapes;
-  std::unique_ptr<float[], AlignedDelete> phi;
-  std::size_t capacity = 0;
-
-  void reserve(std::size_t pairs) {
-    tapes.resize(pairs);
-    if (pairs * kBrickVoxels <= capacity) return;
-    capacity = 2 * pairs * kBrickVoxels;
-    phi.reset(
-        static_cast<float*>(::operator new[](capacity * sizeof(float), std::align_val_t(64))));
-  }
-};
 
 std::vector<Coord> cornersOf(const Field& field, const IntensityTarget& target) {
   std::vector<Coord> corners(target.bricks.begin(), target.bricks.end());
@@ -83,9 +63,9 @@ void IntensityProblem::pass(std::vector<double>* rPhi, std::vector<double>* phi2
                             const Middle& middle) {
   const BrickKernels& kernels = brickKernels();
   const auto& [gathered, pairs] = plan_;
-  tbb::enumerable_thread_specific<Scratch> scratches;
+  tbb::enumerable_thread_specific<PairTapes> scratches;
   tbb::parallel_for(Range(0, corners_.size(), kBrickGrain), [&](const Range& range) {
-    Scratch& scratch = scratches.local();
+    PairTapes& scratch = scratches.local();
     for (std::size_t b = range.begin(); b != range.end(); ++b) {
       const auto begin = pairs.brickBegin[b], end = pairs.brickBegin[b + 1];
       const auto each = [&](auto&& visit) {

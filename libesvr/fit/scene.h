@@ -11,6 +11,12 @@
 
 namespace esvr {
 
+/// The kernel's constants as inner loops use them.
+[[nodiscard]] inline KernelConstants<float> narrowed(const KernelConstants<double>& k) {
+  return {float(k.shift), float(k.numerator), float(k.plateau), float(k.base),
+          float(k.slope), float(k.cutoff),    float(k.expNegS)};
+}
+
 [[nodiscard]] inline SignsAllowed signsOf(const FitTarget& target) {
   return {.positive = target.highest > 0.0, .negative = target.lowest < 0.0};
 }

@@ -17,15 +17,6 @@
 
 namespace esvr {
 namespace cuda {
-namespace {
-
-KernelConstants<float> narrowed(const KernelConstants<double>& k) {
-  return {float(k.shift), float(k.numerator), float(k.plateau), float(k.base),
-          float(k.slope), float(k.cutoff),    float(k.expNegS)};
-}
-
-}  // namespace
-
 CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& options,
                              const Tuning& tuning)
     : target_(target),

@@ -1,7 +1,6 @@
-// Plan: the moves of a run on the GPU: a step is the CPU's step; growth reaches its count and seeds
-// where the error is; relocation moves the least useful and no others; unseen primitives go; a
-// whole fit is the same bits in three runs, in a far place and with empty bricks around, reaches
-// what the CPU reaches, and fails loudly where it cannot go on.
+// Plan: the GPU against the CPU: a step is the CPU's step, seeds are the CPU's seeds, a whole fit
+// reaches what the CPU reaches; no primitive holds up the others; memory is predicted; what is not
+// finite ends a run. What both devices must do alike is in optimiser_test.cpp.
 
 #include <gmock/gmock.h>
 
@@ -58,17 +57,6 @@ TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
   EXPECT_LE(differing, 2);
 }
 
-TEST_F(OptimiserOnGpu, GrowsToTheCountAndLowersTheLoss) {
-  const SparseVolume volume = test::tubeVolume();
-  const FitTarget target = makeTarget(volume, std::nullopt);
-  CudaOptimiser optimiser(target, {}, {});
-  optimiser.growTo(50);
-  EXPECT_EQ(optimiser.primitiveCount(), 50u);
-  const double first = optimiser.iterate(std::array{1.0});
-  for (int i = 0; i < 60; ++i) optimiser.iterate(std::array{0.5});
-  EXPECT_LT(optimiser.measure().squaredSum, 0.2 * first);
-}
-
 TEST_F(OptimiserOnGpu, SeedsAsTheCpuDoes) {
   const SparseVolume volume = test::tubeVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
@@ -85,58 +73,6 @@ TEST_F(OptimiserOnGpu, SeedsAsTheCpuDoes) {
                      std::abs(found[i].intensity - expected[i].intensity) >
                  1e-6;
   EXPECT_LE(differing, 1);
-}
-
-TEST_F(OptimiserOnGpu, RelocatesTheLeastUsefulAndKeepsTheCount) {
-  const SparseVolume volume = test::tubeVolume();
-  const FitTarget target = makeTarget(volume, std::nullopt);
-  CudaOptimiser optimiser(target, {}, {});
-  optimiser.growTo(50);
-  for (int i = 0; i < 30; ++i) optimiser.iterate(std::array{0.5});
-  const auto before = optimiser.primitives();
-  optimiser.relocate(5);
-  const auto after = optimiser.primitives();
-  ASSERT_EQ(after.size(), 50u);
-  int moved = 0;
-  for (std::size_t i = 0; i < 50; ++i) moved += before[i].center != after[i].center;
-  EXPECT_EQ(moved, 5);
-}
-
-TEST_F(OptimiserOnGpu, DropsWhatNoVoxelSees) {
-  const SparseVolume volume = test::tubeVolume();
-  const FitTarget target = makeTarget(volume, std::nullopt);
-  CudaOptimiser optimiser(target, {}, {});
-  auto primitives = test::randomPrimitives(20, 1.0, 2.0);
-  primitives[7].L = {1e3, 0, 0, 0, 1e3, 0, 0, 0, 1e3};  // between voxels
-  for (double& c : primitives[7].center) c = std::floor(c) + 0.5;
-  optimiser.setPrimitives(primitives);
-  optimiser.dropUnseen();
-  EXPECT_EQ(optimiser.primitiveCount(), 19u);
-}
-
-TEST_F(OptimiserOnGpu, NothingToMendSeedsNothing) {
-  const SparseVolume volume = test::tubeVolume();
-  FitTarget target = makeTarget(volume, std::nullopt);
-  std::fill(target.values.begin(), target.values.end(), 0.0f);
-  CudaOptimiser optimiser(target, {}, {});
-  optimiser.growTo(50);
-  EXPECT_EQ(optimiser.primitiveCount(), 0u);
-  EXPECT_EQ(optimiser.iterate(std::array{1.0}), 0.0);
-}
-
-TEST_F(OptimiserOnGpu, ThreeRunsGiveTheSameBits) {
-  const SparseVolume volume = test::tubeVolume();
-  const FitResult first = fitOn(device_, volume);
-  for (int run = 0; run < 2; ++run) {
-    const FitResult again = fitOn(device_, volume);
-    EXPECT_TRUE(test::sameBits(again.field, first.field));
-  }
-}
-
-TEST_F(OptimiserOnGpu, AFarPlaceChangesNoBit) {
-  const FitResult here = fitOn(device_, test::tubeVolume());
-  const FitResult there = fitOn(device_, test::tubeVolume({1 << 20, -(1 << 20), 1 << 20}));
-  EXPECT_TRUE(test::sameBits(here.field, there.field));
 }
 
 TEST_F(OptimiserOnGpu, ReachesWhatTheCpuReaches) {

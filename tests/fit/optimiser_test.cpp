@@ -1,0 +1,108 @@
+// Plan: the moves of a run on every device: growth reaches its count and seeds where the error is;
+// relocation moves the least useful and no others; unseen primitives go; without error nothing is
+// seeded; a whole fit is the same bits in three runs and in a far place. Without a GPU its tests
+// skip.
+
+#include "fit/optimiser.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "esvr/error.h"
+#include "volumes.h"
+
+namespace esvr {
+namespace {
+
+class OptimiserOn : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    try {
+      options_.device = selectDevice(GetParam());
+    } catch (const DeviceError& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+  [[nodiscard]] std::unique_ptr<Optimiser> make(const Tuning& tuning = {}) const {
+    return makeOptimiser(target_, options_, tuning);
+  }
+  [[nodiscard]] Field fitAt(Coord shift) const {
+    FitOptions options;
+    options.count = 60;
+    options.iterations = 120;
+    options.device = options_.device;
+    return fit(test::tubeVolume(shift), options).field;
+  }
+
+  OptimiserOptions options_;
+  SparseVolume volume_ = test::tubeVolume();
+  FitTarget target_ = makeTarget(volume_, std::nullopt);
+};
+
+TEST_P(OptimiserOn, GrowsToTheCountAndLowersTheLoss) {
+  const auto optimiser = make();
+  optimiser->growTo(50);
+  EXPECT_EQ(optimiser->primitiveCount(), 50u);
+  const double first = optimiser->iterate(std::array{1.0});
+  for (int i = 0; i < 60; ++i) optimiser->iterate(std::array{0.5});
+  EXPECT_LT(optimiser->measure().squaredSum, 0.2 * first);
+}
+
+TEST_P(OptimiserOn, ManyIterationsInACallAreThoseOfManyCalls) {
+  const auto inOne = make(), inMany = make();
+  inOne->growTo(30);
+  inMany->growTo(30);
+  inOne->iterate(std::vector<double>(25, 0.5));
+  for (int i = 0; i < 25; ++i) inMany->iterate(std::array{0.5});
+  EXPECT_EQ(inOne->measure().squaredSum, inMany->measure().squaredSum);
+}
+
+TEST_P(OptimiserOn, RelocatesTheLeastUsefulAndKeepsTheCount) {
+  const auto optimiser = make();
+  optimiser->growTo(50);
+  for (int i = 0; i < 30; ++i) optimiser->iterate(std::array{0.5});
+  const auto before = optimiser->primitives();
+  optimiser->relocate(5);
+  const auto after = optimiser->primitives();
+  ASSERT_EQ(after.size(), 50u);
+  int moved = 0;
+  for (std::size_t i = 0; i < 50; ++i) moved += before[i].center != after[i].center;
+  EXPECT_EQ(moved, 5);
+}
+
+TEST_P(OptimiserOn, DropsWhatNoVoxelSees) {
+  Tuning tiny;
+  tiny.smallestScale = 0.01;
+  tiny.largestScale = 0.02;  // supports of a twentieth of a voxel: most see no voxel
+  const auto optimiser = make(tiny);
+  optimiser->growTo(50);
+  for (int i = 0; i < 5; ++i) optimiser->iterate(std::array{1.0});
+  optimiser->dropUnseen();
+  EXPECT_LT(optimiser->primitiveCount(), 50u);
+  EXPECT_TRUE(std::isfinite(optimiser->measure().squaredSum));
+}
+
+TEST_P(OptimiserOn, SeedsNothingWhereThereIsNothingToMend) {
+  std::fill(target_.values.begin(), target_.values.end(), 0.0f);
+  const auto optimiser = make();
+  optimiser->growTo(50);
+  EXPECT_EQ(optimiser->primitiveCount(), 0u);
+  EXPECT_EQ(optimiser->iterate(std::array{1.0}), 0.0);
+}
+
+TEST_P(OptimiserOn, GivesTheSameBitsInThreeRuns) {
+  const Field first = fitAt({});
+  for (int run = 0; run < 2; ++run) EXPECT_TRUE(test::sameBits(fitAt({}), first));
+}
+
+TEST_P(OptimiserOn, AFarPlaceChangesNoBit) {
+  EXPECT_TRUE(test::sameBits(fitAt({}), fitAt({1 << 20, -(1 << 20), 1 << 20})));
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, OptimiserOn, testing::Values("cpu", "cuda"),
+                         [](const auto& device) { return std::string(device.param); });
+
+}  // namespace
+}  // namespace esvr
