@@ -29,6 +29,11 @@ struct PairMoments {
   float phi2;                        ///< sum phi phi
 };
 
+/// The two of them that need no derivative.
+struct PairProjection {
+  float rPhi, phi2;
+};
+
 struct BrickKernels {
   const char* name;
   /// sum[512] += intensity * phi. `corner`: the brick's first voxel in the frame of f.center.
@@ -40,6 +45,9 @@ struct BrickKernels {
   /// \param r  gradient of the loss by V at the brick's voxels
   void (*backward)(const LineForm& f, const float corner[3], const KernelConstants<float>& k,
                    const float* r, const PairTape& tape, PairMoments& moments);
+  /// forward() and backward() from the tape alone, to the bit, while shapes stay as they were.
+  void (*addTape)(const PairTape& tape, float intensity, float* sum);
+  void (*projectTape)(const PairTape& tape, const float* r, PairProjection& projection);
 };
 
 /// The sets this processor runs, the best first.

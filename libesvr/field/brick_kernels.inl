@@ -246,9 +246,33 @@ void backward(const LineForm& f, const float corner[3], const KernelConstants<fl
              sumLanes(phi2)};
 }
 
+/// Calls visit(phi, row of 512 values) for every row of a tape, in its order.
+template <class Value, class Visit>
+inline void visitTape(const PairTape& tape, Value* values, Visit&& visit) {
+  const float* phi = tape.phi;
+  for (int x = tape.xBegin; x < tape.xEnd; ++x) {
+    Value* row = values + x * 64 + tape.yBegin[x] * 8;
+    for (int y = tape.yBegin[x]; y < tape.yEnd[x]; y += kRows, row += kLanes, phi += kLanes)
+      visit(load(phi), row);
+  }
+}
+
+void addTape(const PairTape& tape, float intensity, float* sum) {
+  visitTape(tape, sum, [&](Vec phi, float* row) { store(row, load(row) + intensity * phi); });
+}
+
+void projectTape(const PairTape& tape, const float* r, PairProjection& projection) {
+  Vec rPhi{}, phi2{};
+  visitTape(tape, r, [&](Vec phi, const float* row) {
+    rPhi += load(row) * phi;
+    phi2 += phi * phi;
+  });
+  projection = {sumLanes(rPhi), sumLanes(phi2)};
+}
+
 }  // namespace
 
 extern const BrickKernels kKernels;
-const BrickKernels kKernels{ESVR_KERNEL_NAME, add, forward, backward};
+const BrickKernels kKernels{ESVR_KERNEL_NAME, add, forward, backward, addTape, projectTape};
 
 }  // namespace esvr::ESVR_KERNEL_NAMESPACE

@@ -8,13 +8,14 @@
 #include <cmath>
 
 #include "esvr/field.h"
-#include "fit/pair_tapes.h"
 
 namespace esvr {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
 constexpr std::size_t kBrickGrain = 4;
+/// Pairs whose tapes are kept from pass to pass: some 200 MB. More are worked out anew each time.
+constexpr std::size_t kMostKept = 400'000;
 
 std::vector<Coord> cornersOf(const Field& field, const IntensityTarget& target) {
   std::vector<Coord> corners(target.bricks.begin(), target.bricks.end());
@@ -47,7 +48,8 @@ IntensityProblem::IntensityProblem(const Field& field, const IntensityTarget& ta
       background_(field.background),
       corners_(cornersOf(field, target)),
       plan_(planEvaluation(field, corners_)),
-      moments_(plan_.pairs.pairCount()),
+      projections_(plan_.pairs.pairCount()),
+      kept_(corners_.size()),
       brickError_(corners_.size()),
       exact_(corners_.size()) {}
 
@@ -56,52 +58,62 @@ void IntensityProblem::setForms(std::span<const float> intensities) {
     plan_.field.forms[i].intensity = intensities[i];
 }
 
+/// The sum of a brick's ellipsoids, and their phi on the tapes.
+const std::vector<PairTape>& IntensityProblem::forward(std::size_t brick, PairTapes& scratch,
+                                                       float* sum) {
+  const BrickKernels& kernels = brickKernels();
+  const auto& [gathered, pairs] = plan_;
+  const auto begin = pairs.brickBegin[brick], end = pairs.brickBegin[brick + 1];
+  std::vector<PairTape>& kept = kept_[brick].tapes;
+  if (kept.size() == end - begin) {
+    for (auto pair = begin; pair != end; ++pair)
+      kernels.addTape(kept[pair - begin], gathered.forms[pairs.ellipsoid[pair]].intensity, sum);
+    return kept;
+  }
+  scratch.reserve(end - begin);
+  float* phi = scratch.phi.get();
+  for (auto pair = begin; pair != end; ++pair) {
+    const auto i = pairs.ellipsoid[pair];
+    const Coord local = corners_[brick] - gathered.origin(i);
+    const float corner[3] = {float(local.x), float(local.y), float(local.z)};
+    PairTape& tape = scratch.tapes[pair - begin];
+    tape.phi = phi;
+    kernels.forward(gathered.forms[i], corner, gathered.kernel(i), sum, tape);
+    phi += tape.floats;
+  }
+  if (pairs.pairCount() <= kMostKept) kept_[brick] = KeptTapes(scratch.tapes);
+  return scratch.tapes;
+}
+
 /// Forward over every brick, middle(brick, sum), which makes the sum what is to be projected on
 /// the ellipsoids, and backward.
 template <class Middle>
 void IntensityProblem::pass(std::vector<double>* rPhi, std::vector<double>* phi2,
                             const Middle& middle) {
-  const BrickKernels& kernels = brickKernels();
-  const auto& [gathered, pairs] = plan_;
+  const auto& pairs = plan_.pairs;
   tbb::enumerable_thread_specific<PairTapes> scratches;
   tbb::parallel_for(Range(0, corners_.size(), kBrickGrain), [&](const Range& range) {
     PairTapes& scratch = scratches.local();
     for (std::size_t b = range.begin(); b != range.end(); ++b) {
-      const auto begin = pairs.brickBegin[b], end = pairs.brickBegin[b + 1];
-      const auto each = [&](auto&& visit) {
-        for (auto pair = begin; pair != end; ++pair) {
-          const auto i = pairs.ellipsoid[pair];
-          const Coord local = corners_[b] - gathered.origin(i);
-          const float corner[3] = {float(local.x), float(local.y), float(local.z)};
-          visit(pair, gathered.forms[i], corner, gathered.kernel(i));
-        }
-      };
       alignas(64) float sum[kBrickVoxels] = {};
-      scratch.reserve(end - begin);
-      float* phi = scratch.phi.get();
-      each([&](auto pair, const LineForm& form, const float* corner, const auto& kernel) {
-        PairTape& tape = scratch.tapes[pair - begin];
-        tape.phi = phi;
-        kernels.forward(form, corner, kernel, sum, tape);
-        phi += tape.floats;
-      });
+      const std::vector<PairTape>& tapes = forward(b, scratch, sum);
       middle(b, sum);
       if (!rPhi && !phi2) continue;
-      each([&](auto pair, const LineForm& form, const float* corner, const auto& kernel) {
-        kernels.backward(form, corner, kernel, sum, scratch.tapes[pair - begin], moments_[pair]);
-      });
+      const auto begin = pairs.brickBegin[b];
+      for (std::size_t k = 0; k < tapes.size(); ++k)
+        brickKernels().projectTape(tapes[k], sum, projections_[begin + k]);
     }
   });
-  const std::size_t n = gathered.forms.size();
-  const auto reduce = [&](std::vector<double>* out, float PairMoments::*moment) {
+  const std::size_t n = plan_.field.forms.size();
+  const auto reduce = [&](std::vector<double>* out, float PairProjection::*value) {
     if (!out) return;
     out->assign(n, 0.0);
     for (std::size_t i = 0; i < n; ++i)
       for (auto k = pairs.ellipsoidBegin[i]; k != pairs.ellipsoidBegin[i + 1]; ++k)
-        (*out)[i] += double(moments_[pairs.pairOf[k]].*moment);
+        (*out)[i] += double(projections_[pairs.pairOf[k]].*value);
   };
-  reduce(rPhi, &PairMoments::rPhi);
-  reduce(phi2, &PairMoments::phi2);
+  reduce(rPhi, &PairProjection::rPhi);
+  reduce(phi2, &PairProjection::phi2);
 }
 
 double IntensityProblem::residualOf(std::size_t brick, float* sum, BrickMask* exact) const {

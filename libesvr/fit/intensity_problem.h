@@ -11,6 +11,7 @@
 #include "field/brick_kernels.h"
 #include "field/evaluate_plan.h"
 #include "field/stored_value.h"
+#include "fit/pair_tapes.h"
 
 namespace esvr {
 
@@ -47,6 +48,7 @@ class IntensityProblem {
   double residualOf(std::size_t brick, float* sum, BrickMask* exact) const;
   double gradientAt(std::span<const float> intensities, std::vector<double>& gradient);
   void applyNormal(std::span<const double> direction, std::vector<double>& out);
+  const std::vector<PairTape>& forward(std::size_t brick, PairTapes& scratch, float* sum);
   template <class Middle>
   void pass(std::vector<double>* rPhi, std::vector<double>* phi2, const Middle& middle);
   std::vector<double> conjugateGradients(std::vector<double> residual, int iterations);
@@ -57,7 +59,8 @@ class IntensityProblem {
   float background_;
   std::vector<Coord> corners_;
   EvaluatePlan plan_;
-  std::vector<PairMoments> moments_;
+  std::vector<PairProjection> projections_;
+  std::vector<KeptTapes> kept_;  ///< a brick's, from the first pass on
   std::vector<double> brickError_;
   std::vector<BrickMask> exact_;
   std::vector<double> curvature_;

@@ -1,9 +1,11 @@
 #pragma once
 /// Room for what a forward pass over a brick leaves for the backward one.
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <new>
+#include <span>
 #include <vector>
 
 #include "esvr/sparse_volume.h"
@@ -11,27 +13,55 @@
 
 namespace esvr {
 
-/// A thread's tapes of the pairs of one brick.
-class PairTapes {
+/// Floats aligned for the widest vectors, uninitialised.
+class AlignedFloats {
  public:
-  void reserve(std::size_t pairs) {
-    tapes.resize(pairs);
-    if (pairs * kBrickVoxels <= capacity_) return;
-    capacity_ = 2 * pairs * kBrickVoxels;
-    phi.reset(
-        static_cast<float*>(::operator new[](capacity_ * sizeof(float), std::align_val_t(kAlign))));
+  AlignedFloats() = default;
+  explicit AlignedFloats(std::size_t size)
+      : floats_(
+            static_cast<float*>(::operator new[](size * sizeof(float), std::align_val_t(kAlign)))) {
   }
+  [[nodiscard]] float* get() const { return floats_.get(); }
 
  private:
-  static constexpr std::size_t kAlign = 64;  // of the widest vectors
-  struct AlignedDelete {
+  static constexpr std::size_t kAlign = 64;
+  struct Delete {
     void operator()(float* p) const { ::operator delete[](p, std::align_val_t(kAlign)); }
   };
-  std::size_t capacity_ = 0;
+  std::unique_ptr<float[], Delete> floats_;
+};
 
- public:
+/// A thread's tapes of the pairs of one brick, used again for the next.
+struct PairTapes {
   std::vector<PairTape> tapes;
-  std::unique_ptr<float[], AlignedDelete> phi;  ///< kBrickVoxels a pair at most
+  AlignedFloats phi;  ///< kBrickVoxels a pair at most
+  std::size_t capacity = 0;
+
+  void reserve(std::size_t pairs) {
+    tapes.resize(pairs);
+    if (pairs * kBrickVoxels <= capacity) return;
+    capacity = 2 * pairs * kBrickVoxels;
+    phi = AlignedFloats(capacity);
+  }
+};
+
+/// Tapes of one brick that stay, as short as they are.
+struct KeptTapes {
+  std::vector<PairTape> tapes;
+  AlignedFloats phi;
+
+  KeptTapes() = default;
+  explicit KeptTapes(std::span<const PairTape> from) : tapes(from.begin(), from.end()) {
+    std::size_t floats = 0;
+    for (const PairTape& tape : from) floats += std::size_t(tape.floats);
+    phi = AlignedFloats(floats);
+    float* at = phi.get();
+    for (PairTape& tape : tapes) {
+      std::copy_n(tape.phi, tape.floats, at);
+      tape.phi = at;
+      at += tape.floats;
+    }
+  }
 };
 
 }  // namespace esvr

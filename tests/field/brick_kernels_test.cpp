@@ -77,5 +77,27 @@ TEST(BrickKernels, AddIsForwardWithoutItsTape) {
   }
 }
 
+TEST(BrickKernels, ATapeGivesTheSameBitsWithoutTheShape) {
+  const auto k = kernelConstants<float>(Kernel{});
+  alignas(64) std::array<float, 512> residual, phi;
+  test::Random random(3);
+  for (float& r : residual) r = float(random(-1.0, 1.0));
+  for (const BrickKernels* set : runnableKernels())
+    for (const LineForm& form : forms(Kernel{}.kappa)) {
+      alignas(64) std::array<float, 512> expected{}, sum{};
+      PairTape tape{};
+      tape.phi = phi.data();
+      set->forward(form, kCorner.data(), k, expected.data(), tape);
+      set->addTape(tape, form.intensity, sum.data());
+      EXPECT_EQ(sum, expected) << set->name;
+      PairMoments moments{};
+      PairProjection projection{};
+      set->backward(form, kCorner.data(), k, residual.data(), tape, moments);
+      set->projectTape(tape, residual.data(), projection);
+      EXPECT_EQ(projection.rPhi, moments.rPhi) << set->name;
+      EXPECT_EQ(projection.phi2, moments.phi2) << set->name;
+    }
+}
+
 }  // namespace
 }  // namespace esvr
