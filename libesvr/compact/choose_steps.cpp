@@ -13,6 +13,7 @@ constexpr int kFirstScalings = 3, kMostScalings = 12;
 constexpr double kParameters = 10.0;      // of an ellipsoid
 constexpr double kEnough = 0.93;          // of the budget: the next scaling would gain little
 constexpr double kFullEnough = 0.994;     // of the bytes
+constexpr double kFull = 0.985;           // of the bytes: less was not asked for
 constexpr double kProbe = 1.41421356237;  // half a bit
 constexpr double kMostChange = 2.0;       // of one stream's step against the others
 constexpr double kLeastAdded = 0.02;      // of the budget: below, scale boldly
@@ -79,7 +80,8 @@ class SizeGoal : public Goal {
     return double(trial.bytes) >= kFullEnough * double(bytes_);
   }
   [[nodiscard]] bool better(const Trial& a, const Trial& b) const override {
-    return met(a) ? a.error < b.error : a.bytes < b.bytes;
+    if (!met(a)) return a.bytes < b.bytes;
+    return fills(a) != fills(b) ? fills(a) : a.error < b.error;
   }
   [[nodiscard]] double correction(const Trial& trial, const Trial& before) const override {
     const double aim = 0.5 * (1.0 + kFullEnough) * double(bytes_);
@@ -88,6 +90,10 @@ class SizeGoal : public Goal {
   }
 
  private:
+  [[nodiscard]] bool fills(const Trial& trial) const {
+    return double(trial.bytes) >= kFull * double(bytes_);
+  }
+
   /// Bytes an octave, as far as two trials tell: less where parameters have no bits left to lose.
   [[nodiscard]] double slope(const Trial& a, const Trial& b) const {
     const double octaves = std::log2(a.steps.scale / b.steps.scale);
