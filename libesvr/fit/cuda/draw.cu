@@ -42,6 +42,11 @@ __device__ std::uint64_t warpSum(std::uint64_t value) {
   return value;
 }
 
+__device__ int warpMin(int value) {
+  for (int d = kWarp / 2; d > 0; d /= 2) value = min(value, __shfl_xor_sync(kAllLanes, value, d));
+  return value;
+}
+
 /// A warp a brick.
 __global__ void brickEnergies(const DrawArguments a, std::uint64_t* energy) {
   const std::size_t b = (std::size_t(blockIdx.x) * kBlock + threadIdx.x) / kWarp;
@@ -87,7 +92,7 @@ __device__ int voxelAt(const DrawArguments& a, std::uint32_t brick, std::uint64_
       before += a.units(r[v], a.signs);
       if (before > at) found = lane * kVoxelsPerLane + v;
     }
-  return int(__reduce_min_sync(kAllLanes, unsigned(found)));
+  return warpMin(found);
 }
 
 /// A warp a draw: `count` equal shares of the energy, one voxel from each.
