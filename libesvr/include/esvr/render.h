@@ -1,0 +1,53 @@
+#pragma once
+/// Pictures of a field or of a volume, by one rule. Along the ray of a pixel, values are sampled at
+/// the distances 0, step, 2 step, ... from the eye (orthographic: from the plane of the eye). A
+/// sample's value, and nothing else, says its color and opacity (post-classification); samples are
+/// put over each other from front to back. A sample that is exactly the background is empty space:
+/// transparent, whatever the transfer function has there.
+///
+/// The same input and options give the same bits on any number of threads (the calling TBB
+/// arena's).
+
+#include <vector>
+
+#include "esvr/camera.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/progress.h"
+#include "esvr/sparse_volume.h"
+#include "esvr/transfer_function.h"
+
+namespace esvr {
+
+struct RenderOptions {
+  Camera camera;
+  Resolution resolution;
+  TransferFunction transfer;  ///< taken at 4097 places from its first point to its last
+  double step = 1.0;          ///< voxels between samples
+  /// Voxels that an opacity of the transfer function holds for: a sample's is 1 - (1 - opacity) ^
+  /// (step / opacityLength).
+  double opacityLength = 1.0;
+  /// A ray ends where less than this part of the light behind would come through. At the default
+  /// that costs a 16th of a level of 255.
+  double minTransmittance = 1.0 / 4096;
+  const CancelToken* cancel = nullptr;  ///< looked at before each row of tiles
+};
+
+/// Red, green, blue, alpha a pixel, row after row from the top. Premultiplied: the colors are those
+/// in front of black.
+struct Image {
+  int width = 0, height = 0;
+  std::vector<float> rgba;
+};
+
+/// Draws the sum of ellipsoids without ever making voxels of it (paper, section "Per-primitive ray
+/// sampling", algorithm 2): each ellipsoid adds to those samples of each ray that lie in its
+/// support, found by solving for entry and exit. \throws UsageError  as checkCamera and
+/// checkTransferFunction; step, opacityLength or
+///                     minTransmittance out of range; Cancelled
+[[nodiscard]] Image renderField(const Field& field, const RenderOptions& options);
+
+/// Marches rays through voxels with trilinear interpolation and jumps over bricks that are not
+/// there. \throws  as renderField
+[[nodiscard]] Image renderVolume(const SparseVolume& volume, const RenderOptions& options);
+
+}  // namespace esvr

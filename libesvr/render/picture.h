@@ -1,0 +1,31 @@
+#pragma once
+/// What both renderers share: checked options and the picture on its way.
+
+#include "esvr/render.h"
+#include "render/transfer_table.h"
+#include "render/view.h"
+
+namespace esvr {
+
+/// \throws UsageError  as renderField
+void checkRenderOptions(const RenderOptions& options);
+
+class Picture {
+ public:
+  /// \throws UsageError  as renderField
+  explicit Picture(const RenderOptions& options);
+
+  const View view;
+  const TransferTable table;
+
+  void set(int column, int row, const RayState& ray);
+  [[nodiscard]] Image take() { return std::move(image_); }
+
+ private:
+  Image image_;
+};
+
+/// \throws Cancelled  where that was asked for
+void checkCancelled(const RenderOptions& options);
+
+}  // namespace esvr

@@ -1,0 +1,51 @@
+#include <tbb/parallel_for.h>
+
+#include "esvr/render.h"
+#include "render/picture.h"
+#include "render/tile.h"
+
+namespace esvr {
+namespace {
+
+using Lists = std::vector<std::vector<std::uint32_t>>;
+
+int tilesAlong(int pixels) { return (pixels + kTileSide - 1) / kTileSide; }
+
+/// For each tile of a row of tiles, the primitives whose bounds overlap it, in their order. A row
+/// at a time, so that lists never hold more than a row's.
+Lists primitivesOfTiles(const VisiblePrimitives& primitives, int firstRow, int tiles) {
+  Lists lists(static_cast<std::size_t>(tiles));
+  for (std::uint32_t p = 0; p < primitives.bounds.size(); ++p) {
+    const ScreenBounds& b = primitives.bounds[p];
+    if (b.lastRow < firstRow || b.firstRow >= firstRow + kTileSide) continue;
+    for (int t = b.firstColumn / kTileSide; t <= b.lastColumn / kTileSide; ++t)
+      lists[t].push_back(p);
+  }
+  return lists;
+}
+
+void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
+  const int tiles = tilesAlong(scene.options.resolution.width);
+  const Lists lists = primitivesOfTiles(scene.primitives, firstRow, tiles);
+  tbb::parallel_for(0, tiles, [&](int t) {
+    if (lists[t].empty()) return;
+    Tile tile(scene, {t * kTileSide, firstRow});
+    tile.draw(lists[t]);
+    tile.copyTo(picture);
+  });
+}
+
+}  // namespace
+
+Image renderField(const Field& field, const RenderOptions& options) {
+  Picture picture(options);
+  const auto primitives = visiblePrimitives(field, picture.view, options.resolution);
+  const TileScene scene{options, picture.view, picture.table, primitives, field.background};
+  tbb::parallel_for(0, tilesAlong(options.resolution.height), [&](int row) {
+    checkCancelled(options);
+    drawRow(scene, row * kTileSide, picture);
+  });
+  return picture.take();
+}
+
+}  // namespace esvr

@@ -1,0 +1,103 @@
+#include "render/reference_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "field/line_form.h"
+#include "render/view.h"
+
+namespace esvr::test {
+namespace {
+
+struct Ellipsoid {
+  Vec3 center;
+  Matrix3 L;
+  KernelConstants<double> kernel;
+  double intensity;
+};
+
+Ellipsoid ellipsoidOf(const Field& field, const Chunk& chunk, std::size_t i) {
+  const Ellipsoids& e = chunk.ellipsoids;
+  const double kappa = e.kappa.empty() ? double(field.kernel.kappa) : double(e.kappa[i]);
+  return {{double(chunk.origin.x) + e.center[0][i], double(chunk.origin.y) + e.center[1][i],
+           double(chunk.origin.z) + e.center[2][i]},
+          unitFrame(e, i),
+          kernelConstants<double>(field.kernel, kappa),
+          e.intensity[i]};
+}
+
+double valueOf(const Ellipsoid& e, const Vec3& place) {
+  double m = 0.0;
+  for (int r = 0; r < 3; ++r) {
+    double u = 0.0;
+    for (int c = 0; c < 3; ++c) u += e.L[3 * r + c] * (place[c] - e.center[c]);
+    m += u * u;
+  }
+  return e.intensity * kernelPhi(e.kernel, m);
+}
+
+struct Light {
+  double r = 0.0, g = 0.0, b = 0.0, transmittance = 1.0;
+};
+
+void addSample(Light& light, double value, const RenderOptions& o) {
+  const Rgb color = colorAt(o.transfer.colors, value);
+  const double opacity = opacityAt(o.transfer.opacity, value);
+  const double alpha = 1.0 - std::pow(1.0 - opacity, o.step / o.opacityLength);
+  light.r += light.transmittance * alpha * color.r;
+  light.g += light.transmittance * alpha * color.g;
+  light.b += light.transmittance * alpha * color.b;
+  light.transmittance *= 1.0 - alpha;
+}
+
+Light lightAlong(const Ray& ray, const SampledScene& scene, const RenderOptions& o) {
+  Light light;
+  for (int j = 0; j * o.step <= scene.farthest; ++j) {
+    const double value = scene.value(sum(ray.origin, scaled(ray.direction, j * o.step)));
+    if (value != scene.background) addSample(light, value, o);
+  }
+  return light;
+}
+
+}  // namespace
+
+ValueAtPlace sumOfEllipsoids(const Field& field) {
+  std::vector<Ellipsoid> all;
+  for (const Chunk& chunk : field.chunks)
+    for (std::size_t i = 0; i < chunk.ellipsoids.size(); ++i)
+      all.push_back(ellipsoidOf(field, chunk, i));
+  return [all, background = double(field.background)](const Vec3& place) {
+    double value = background;
+    for (const Ellipsoid& e : all) value += valueOf(e, place);
+    return value;
+  };
+}
+
+Image referencePicture(const SampledScene& scene, const RenderOptions& o) {
+  const View view(o.camera, o.resolution);
+  Image image{o.resolution.width, o.resolution.height, {}};
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column) {
+      const Light l = lightAlong(view.ray(column, row), scene, o);
+      for (const double v : {l.r, l.g, l.b, 1.0 - l.transmittance}) image.rgba.push_back(float(v));
+    }
+  return image;
+}
+
+double imagePsnr(const Image& a, const Image& b) {
+  double squares = 0.0;
+  for (std::size_t i = 0; i < a.rgba.size(); ++i)
+    squares += std::pow(double(a.rgba[i]) - b.rgba.at(i), 2);
+  return squares == 0.0 ? std::numeric_limits<double>::infinity()
+                        : -10.0 * std::log10(squares / double(a.rgba.size()));
+}
+
+double largestDifference(const Image& a, const Image& b) {
+  double most = 0.0;
+  for (std::size_t i = 0; i < a.rgba.size(); ++i)
+    most = std::max(most, std::abs(double(a.rgba[i]) - b.rgba.at(i)));
+  return most;
+}
+
+}  // namespace esvr::test

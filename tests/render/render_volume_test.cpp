@@ -1,0 +1,127 @@
+// Plan: marching over bricks, with its jumps, against float64 trilinear interpolation at every
+// sample of a dense walk (reference_picture.h). The same sources of difference as in
+// render_field_test.cpp; the interpolation itself is float32, 1e-7 of the values. Then the two
+// renderers against each other.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+
+#include "esvr/field.h"
+#include "esvr/render.h"
+#include "field/random_field.h"
+#include "render/reference_picture.h"
+#include "render/vector.h"
+
+namespace esvr::test {
+namespace {
+
+constexpr double kAsked = 70.0;
+
+double trilinear(const SparseVolume& volume, const Vec3& place) {
+  const Coord low{int(std::floor(place[0])), int(std::floor(place[1])), int(std::floor(place[2]))};
+  const double x = place[0] - low.x, y = place[1] - low.y, z = place[2] - low.z;
+  double value = 0.0;
+  for (int c = 0; c < 8; ++c) {
+    const Coord step{c >> 2, (c >> 1) & 1, c & 1};
+    const double weight = (step.x ? x : 1.0 - x) * (step.y ? y : 1.0 - y) * (step.z ? z : 1.0 - z);
+    value += weight * double(valueAt(volume, low + step));
+  }
+  return value;
+}
+
+/// A few bricks far apart, some with neighbours, full of random values.
+SparseVolume scattered(Coord shift = {}) {
+  Random random(3);
+  std::vector<BrickInput> bricks;
+  for (const Coord corner : {Coord{0, 0, 0}, Coord{0, 0, 8}, Coord{8, 8, 8}, Coord{40, 0, 16},
+                             Coord{16, 40, 32}, Coord{0, 32, 0}}) {
+    BrickInput brick{corner + shift, {}, {}};
+    for (float& v : brick.values) v = float(random(0.0, 1.0));
+    brick.active.setAll();
+    bricks.push_back(brick);
+  }
+  return makeVolume(std::move(bricks), 0.0f);
+}
+
+RenderOptions optionsFor(const SparseVolume& volume, const CameraWish& wish = {}) {
+  RenderOptions o;
+  o.resolution = {45, 38};
+  o.camera = fitCamera(activeBox(volume), wish, o.resolution);
+  o.transfer = {builtInColorMap("turbo"), builtInOpacity("linear")};
+  o.opacityLength = 10.0;
+  return o;
+}
+
+double agreement(const SparseVolume& volume, const RenderOptions& o) {
+  const double farthest = length(difference(o.camera.eye, o.camera.center)) + 100.0;
+  const SampledScene scene{[&](const Vec3& place) { return trilinear(volume, place); },
+                           volume.background, farthest};
+  return imagePsnr(referencePicture(scene, o), renderVolume(volume, o));
+}
+
+TEST(RenderVolume, AgreesWithADenseWalk) {
+  const auto volume = scattered();
+  EXPECT_GE(agreement(volume, optionsFor(volume)), kAsked);
+  EXPECT_GE(agreement(volume, optionsFor(volume, {.projection = Projection::kOrthographic})),
+            kAsked);
+}
+
+TEST(RenderVolume, AgreesAlongAxesWhereSamplesLieOnTheFacesOfBricks) {
+  const auto volume = scattered({-16, 8, -24});
+  for (const Vec3& from : {Vec3{100, 0, 0}, Vec3{0, 0, -100}, Vec3{0, 100, 0}}) {
+    RenderOptions o = optionsFor(volume, {.projection = Projection::kOrthographic});
+    o.resolution = {48, 48};
+    o.camera.height = 96.0;  // a pixel is two voxels: rays pass through voxels
+    o.camera.center = {8.0, 20.0, 0.0};
+    o.camera.eye = sum(o.camera.center, from);
+    o.camera.up = from[1] == 0.0 ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
+    EXPECT_GE(agreement(volume, o), kAsked);
+  }
+}
+
+TEST(RenderVolume, AgreesFromInside) {
+  const auto volume = scattered();
+  const CameraWish inside{.eye = Vec3{9, 10, 11}, .center = Vec3{40, 12, 20}, .fov = 90.0};
+  EXPECT_GE(agreement(volume, optionsFor(volume, inside)), kAsked);
+}
+
+TEST(RenderVolume, EmptySpaceIsTransparentWhateverItsOpacity) {
+  auto volume = scattered();
+  volume.background = 0.0f;
+  RenderOptions o = optionsFor(volume);
+  o.transfer.opacity = builtInOpacity("inverse");
+  o.opacityLength = o.step;  // where 1 - (1 - opacity)^0.1 is steep at opacity 1, a table is coarse
+  EXPECT_GE(agreement(volume, o), kAsked);
+  EXPECT_EQ(renderVolume(volume, o).rgba[3], 0.0f) << "a corner that no ray to the volume meets";
+}
+
+TEST(RenderVolume, IsTheSameForAnyNumberOfThreads) {
+  const auto volume = scattered();
+  const auto withThreads = [&](std::size_t n) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, n);
+    return renderVolume(volume, optionsFor(volume)).rgba;
+  };
+  EXPECT_EQ(withThreads(1), withThreads(3));
+}
+
+TEST(RenderVolume, NoVoxelsGiveAnEmptyPicture) {
+  for (const float v : renderVolume(SparseVolume{}, optionsFor(scattered())).rgba)
+    ASSERT_EQ(v, 0.0f);
+}
+
+TEST(Renderers, AgreeOnSmoothFields) {
+  // Trilinear interpolation of a blob with scale s errs by up to 3/8 of its second derivative, some
+  // 2 I / s^2: 0.7 % of the intensity for s = 10, the more the smaller. Bent down by an opacity of
+  // 1/20, and mostly in one direction: 45 dB.
+  Field field = randomField({.count = 25, .smallest = 8.0, .aspect = 1.5, .kappa = 0.0f});
+  for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+  const SparseVolume volume = revoxelise(field, {.threshold = -1.0f});
+  RenderOptions o = optionsFor(volume);
+  o.transfer = rescaled(o.transfer, {0.0f, 5.0f});
+  o.opacityLength = 20.0;
+  EXPECT_GE(imagePsnr(renderField(field, o), renderVolume(volume, o)), 45.0);
+}
+
+}  // namespace
+}  // namespace esvr::test
