@@ -33,7 +33,7 @@ install(
   DESTINATION ${packageDir}
   COMPONENT library)
 
-foreach(program vdb2esvr esvr2vdb esvr-sample swc2vdb raw2vdb)
+foreach(program vdb2esvr esvr2vdb esvr-render esvr-sample swc2vdb raw2vdb)
   if(TARGET ${program})
     install(TARGETS ${program} COMPONENT programs)
   endif()

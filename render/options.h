@@ -1,0 +1,44 @@
+#pragma once
+/// What esvr-render is asked to do.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "cli/log.h"
+#include "esvr/render.h"
+
+namespace esvr::render {
+
+inline constexpr const char* kProgram = "esvr-render";
+
+/// Which values the transfer function is laid over.
+enum class RangeKind {
+  kAuto,  ///< those of the active voxels and the background
+  kData,  ///< those of the active voxels
+  kOwn,   ///< as its points have them
+  kGiven
+};
+
+struct Options {
+  std::filesystem::path input, output;
+  std::optional<std::string> grid;  ///< default: the first that can be drawn
+  TransferFunction transfer;        ///< not yet over its range
+  RangeKind rangeKind = RangeKind::kAuto;
+  ValueRange range;  ///< kGiven
+  CameraWish camera;
+  Resolution resolution;
+  double step = 1.0, opacityLength = 1.0;
+  std::optional<Rgb> background;  ///< none: the picture is transparent
+  int turntable = 0;              ///< pictures of a full turn; 0: one picture
+  bool overwrite = false;
+  int threads = 0;  ///< 0: all
+  cli::Verbosity verbosity = cli::Verbosity::kNormal;
+  std::string commandLine;  ///< for the picture's metadata
+};
+
+/// \return nothing where --help or --version was printed
+/// \throws UsageError; BadInput: a transfer function's file
+[[nodiscard]] std::optional<Options> parseOptions(int argc, const char* const* argv);
+
+}  // namespace esvr::render

@@ -1,0 +1,222 @@
+// Plan: a blob as .esvr and as .vdb, drawn as a user would; pictures are read back with libpng.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "cli/run_program.h"
+#include "esvr/container.h"
+#include "esvr/field.h"
+#include "esvr/grid_coding.h"
+#include "esvr/transfer_function.h"
+#include "esvr/vdb_io.h"
+#include "esvr/voxel_layer.h"
+#include "field/random_field.h"
+
+namespace esvr::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+struct Pixels {
+  png_image header{};
+  std::vector<png_byte> rgba;
+
+  [[nodiscard]] const png_byte* at(int column, int row) const {
+    return &rgba[4 * (std::size_t(row) * header.width + column)];
+  }
+  [[nodiscard]] std::vector<png_byte> corner() const { return {at(0, 0), at(0, 0) + 4}; }
+};
+
+Pixels readPng(const std::filesystem::path& path) {
+  Pixels p;
+  p.header.version = PNG_IMAGE_VERSION;
+  EXPECT_NE(png_image_begin_read_from_file(&p.header, path.c_str()), 0) << p.header.message;
+  EXPECT_EQ(p.header.format, png_uint_32(PNG_FORMAT_RGBA)) << "8 bits, with alpha";
+  p.header.format = PNG_FORMAT_RGBA;
+  p.rgba.resize(PNG_IMAGE_SIZE(p.header));
+  EXPECT_NE(png_image_finish_read(&p.header, nullptr, p.rgba.data(), 0, nullptr), 0);
+  return p;
+}
+
+double psnrOf(const Pixels& a, const Pixels& b) {
+  double squares = 0.0;
+  for (std::size_t i = 0; i < a.rgba.size(); ++i)
+    squares += std::pow((a.rgba[i] - b.rgba.at(i)) / 255.0, 2);
+  return -10.0 * std::log10(squares / double(a.rgba.size()));
+}
+
+GridDescriptor density() {
+  GridDescriptor d;
+  d.name = "density";
+  d.gridClass = GridClass::kFogVolume;
+  d.transform = uniformTransform(0.5);
+  return d;
+}
+
+class EsvrRender : public testing::Test {
+ protected:
+  EsvrRender() {
+    Field field = randomField({.count = 12, .extent = 30.0, .smallest = 4.0, .aspect = 2.0});
+    for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+    const SparseVolume volume = revoxelise(field, {});
+    writeEsvr(folder_ / "in.esvr", {{}, {encodeGrid(density(), volume, field)}});
+    const VolumeGrid grid{density(), volume, 0};
+    writeGrids(folder_ / "in.vdb", {}, std::span(&grid, 1));
+  }
+
+  ProgramRun draw(const std::string& input, const std::string& output,
+                  std::vector<std::string> more = {}) {
+    more.insert(more.begin(), {folder_ / input, folder_ / output});
+    if (std::find(more.begin(), more.end(), "--resolution") == more.end())
+      more.insert(more.end(), {"--resolution", "64x48"});
+    return runProgram(ESVR_RENDER, more);
+  }
+  Pixels picture(const std::string& input, const std::vector<std::string>& more = {}) {
+    auto arguments = more;
+    arguments.emplace_back("-f");
+    const auto run = draw(input, "out.png", arguments);
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    return readPng(folder_ / "out.png");
+  }
+  void expectRefused(const std::vector<std::string>& more, int exitCode, const std::string& why) {
+    const auto run = draw("in.esvr", "refused.png", more);
+    EXPECT_EQ(run.exitCode, exitCode) << run.err;
+    EXPECT_THAT(run.err, HasSubstr(why));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "refused.png"));
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(EsvrRender, WritesAPictureOfTheSizeAskedForAndSaysSo) {
+  const auto run = draw("in.esvr", "out.png");
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_EQ(run.out, "");
+  EXPECT_THAT(run.err, HasSubstr("density, 64 x 48"));
+  const auto pixels = readPng(folder_ / "out.png");
+  EXPECT_EQ(pixels.header.width, 64u);
+  EXPECT_EQ(pixels.header.height, 48u);
+  EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "in.vdb", "out.png"));
+}
+
+TEST_F(EsvrRender, ThePictureHoldsItsCommandLine) {
+  ASSERT_EQ(draw("in.esvr", "out.png", {"--colors", "magma"}).exitCode, 0);
+  const std::string bytes = readText(folder_ / "out.png");
+  EXPECT_THAT(bytes, HasSubstr("out.png --colors magma --resolution 64x48"));
+  EXPECT_THAT(bytes, HasSubstr("esvr-render 0."));
+}
+
+TEST_F(EsvrRender, EllipsoidsLookLikeTheirVoxels) {
+  // Blobs of 4 voxels: trilinear interpolation is off by some percent of a value between voxels.
+  // Before a background, since colors of what is nearly transparent are nearly anything.
+  const std::vector<std::string> black{"--background", "0,0,0"};
+  EXPECT_GE(psnrOf(picture("in.esvr", black), picture("in.vdb", black)), 35.0);
+}
+
+TEST_F(EsvrRender, AFileThatHoldsItsVoxelsIsDrawnFromThem) {
+  const VolumeGrid grid = readGrid(folder_ / "in.vdb", "density");
+  const VoxelLayer layer = exactLayer(grid.volume);
+  writeEsvr(folder_ / "voxels.esvr", {{}, {encodeVoxels(grid.descriptor, grid.volume, layer)}});
+  EXPECT_EQ(picture("voxels.esvr").rgba, picture("in.vdb").rgba);
+}
+
+TEST_F(EsvrRender, IsTransparentAroundTheVolumeUnlessABackgroundIsGiven) {
+  EXPECT_THAT(picture("in.esvr").corner(), ElementsAre(0, 0, 0, 0));
+  EXPECT_THAT(picture("in.esvr", {"--background", "1,0.5,0"}).corner(),
+              ElementsAre(255, 128, 0, 255));
+}
+
+TEST_F(EsvrRender, TheMiddleOfTheVolumeIsInTheMiddleOfThePicture) {
+  for (const char* input : {"in.esvr", "in.vdb"}) {
+    EXPECT_GT(picture(input).at(32, 24)[3], 200) << input;
+    EXPECT_GT(picture(input, {"--orthographic"}).at(32, 24)[3], 200) << input;
+  }
+}
+
+TEST_F(EsvrRender, APresetAndARangeChangeThePicture) {
+  writeText(folder_ / "tf.json", R"([{"Name": "red", "RGBPoints": [0, 1, 0, 0, 1, 1, 0, 0]}])");
+  const auto red = picture("in.esvr", {"--tf", folder_ / "tf.json", "--preset", "red"});
+  EXPECT_EQ(red.at(32, 24)[0], 255);
+  EXPECT_EQ(red.at(32, 24)[1], 0);
+  const auto own = picture("in.esvr", {"--tf", folder_ / "tf.json", "--range", "own"});
+  EXPECT_NE(own.rgba, red.rgba);
+  const auto given = picture("in.esvr", {"--tf", folder_ / "tf.json", "--range", "0,1"});
+  EXPECT_EQ(given.rgba, own.rgba);
+}
+
+TEST_F(EsvrRender, ATurntableWritesAPictureForEveryAngle) {
+  ASSERT_EQ(draw("in.esvr", "turn.png", {"--turntable", "3"}).exitCode, 0);
+  EXPECT_THAT(folder_.names(),
+              ElementsAre("in.esvr", "in.vdb", "turn.0000.png", "turn.0001.png", "turn.0002.png"));
+  const auto first = readPng(folder_ / "turn.0000.png");
+  EXPECT_EQ(first.rgba, picture("in.esvr").rgba);
+  EXPECT_NE(first.rgba, readPng(folder_ / "turn.0001.png").rgba);
+}
+
+TEST_F(EsvrRender, AGivenCameraIsTaken) {
+  const auto away = picture("in.esvr", {"--eye", "15,15,200", "--center", "15,15,400"});
+  for (const png_byte v : away.rgba) ASSERT_EQ(v, 0);
+  const auto seen =
+      picture("in.esvr", {"--eye", "-90,15,15", "--center", "15,15,15", "--up", "0,0,1"});
+  EXPECT_GT(seen.at(32, 24)[3], 0);
+}
+
+TEST_F(EsvrRender, TheNumberOfThreadsChangesNothing) {
+  EXPECT_EQ(picture("in.esvr", {"--threads", "1"}).rgba, picture("in.esvr").rgba);
+}
+
+TEST_F(EsvrRender, KeepsAPictureThatIsThere) {
+  ASSERT_EQ(draw("in.esvr", "out.png").exitCode, 0);
+  const auto before = readText(folder_ / "out.png");
+  const auto again = draw("in.esvr", "out.png", {"--colors", "magma"});
+  EXPECT_EQ(again.exitCode, 1);
+  EXPECT_THAT(again.err, HasSubstr("--force"));
+  EXPECT_EQ(readText(folder_ / "out.png"), before);
+}
+
+TEST_F(EsvrRender, OptionsThatMakeNoSenseAreRefused) {
+  expectRefused({"--resolution", "64"}, 2, "--resolution");
+  expectRefused({"--resolution", "0x4"}, 2, "--resolution");
+  expectRefused({"--resolution", "20000x4"}, 2, "16384");
+  expectRefused({"--step", "0"}, 2, "--step");
+  expectRefused({"--step", "-1"}, 2, "--step");
+  expectRefused({"--step", "nan"}, 2, "--step");
+  expectRefused({"--opacity-length", "0"}, 2, "--opacity-length");
+  expectRefused({"--colors", "jet"}, 2, "viridis");
+  expectRefused({"--opacity", "cubic"}, 2, "tent");
+  expectRefused({"--range", "3,1"}, 2, "rise");
+  expectRefused({"--range", "1"}, 2, "--range");
+  expectRefused({"--eye", "1,2"}, 2, "--eye");
+  expectRefused({"--eye", "1,2,nan"}, 2, "--eye");
+  expectRefused({"--eye", "0,9,0", "--center", "0,0,0", "--up", "0,1,0"}, 2, "up");
+  expectRefused({"--fov", "180"}, 2, "field of view");
+  expectRefused({"--fov", "20", "--orthographic"}, 2, "--fov");
+  expectRefused({"--height", "20"}, 2, "--orthographic");
+  expectRefused({"--background", "1,2,3"}, 2, "--background");
+  expectRefused({"--turntable", "0"}, 2, "--turntable");
+  expectRefused({"--preset", "x"}, 2, "--tf");
+}
+
+TEST_F(EsvrRender, InputThatCannotBeDrawnIsRefused) {
+  expectRefused({"--grid", "none"}, 3, "density");
+  expectRefused({"--tf", folder_ / "missing.json"}, 3, "missing.json");
+  EXPECT_EQ(draw("missing.esvr", "refused.png").exitCode, 3);
+  EXPECT_EQ(draw("missing.vdb", "refused.png").exitCode, 3);
+  writeText(folder_ / "bad.esvr", "nothing of the kind");
+  EXPECT_EQ(draw("bad.esvr", "refused.png").exitCode, 3);
+  EXPECT_EQ(draw("in.esvr", "refused.jpg").exitCode, 2);
+}
+
+TEST_F(EsvrRender, HelpNamesEveryBuiltInFunction) {
+  const auto help = runProgram(ESVR_RENDER, {"--help"});
+  EXPECT_EQ(help.exitCode, 0);
+  for (const auto& name : builtInColorMaps()) EXPECT_THAT(help.out, HasSubstr(name));
+  for (const auto& name : builtInOpacities()) EXPECT_THAT(help.out, HasSubstr(name));
+}
+
+}  // namespace
+}  // namespace esvr::test
