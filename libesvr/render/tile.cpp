@@ -1,6 +1,7 @@
 #include "render/tile.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace esvr {
@@ -9,6 +10,12 @@ namespace {
 /// axes[0] right + axes[1] up + axes[2] forward, in a primitive's unit frame.
 Vec3 combined(const PrimitiveView& p, const Vec3& axes) {
   return sum(scaled(p.right, axes[0]), sum(scaled(p.up, axes[1]), scaled(p.forward, axes[2])));
+}
+
+/// The bits of samples first to last; none where last is before first.
+std::uint32_t samplesFrom(int first, int last) {
+  constexpr std::uint64_t kOne = 1;
+  return last < first ? 0u : std::uint32_t((kOne << (last + 1)) - (kOne << first));
 }
 
 }  // namespace
@@ -20,7 +27,8 @@ Tile::Tile(const TileScene& scene, TilePlace place)
       rows_(std::min(kTileSide, scene.options.resolution.height - place.row)),
       axes_(kPixels),
       rays_(kPixels),
-      sums_(std::size_t(kPixels) * kBinSamples, 0.0f) {
+      sums_(std::size_t(kPixels) * kBinSamples, 0.0f),
+      touched_(kPixels, 0u) {
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column)
       axes_[row * kTileSide + column] = rayAxes(place.column + column, place.row + row);
@@ -109,6 +117,7 @@ void Tile::addToRay(const PrimitiveView& p, int pixel, double firstDistance) {
   const int last = int(std::floor(std::clamp(middle + half, -1.0, kBinSamples - 1.0)));
   float* sums = &sums_[std::size_t(pixel) * kBinSamples];
   const float m0 = float(nearest), a = float(speed * step * step), from = float(middle - first);
+  touched_[pixel] |= samplesFrom(first, last);
   for (int i = first; i <= last; ++i) {
     const float t = float(i - first) - from;
     sums[i] += p.intensity * kernelPhi(p.kernel, m0 + a * t * t);
@@ -118,10 +127,12 @@ void Tile::addToRay(const PrimitiveView& p, int pixel, double firstDistance) {
 void Tile::composite() {
   for (int pixel = 0; pixel < kPixels; ++pixel) {
     float* sums = &sums_[std::size_t(pixel) * kBinSamples];
-    for (int i = 0; i < kBinSamples; ++i)
-      if (sums[i] != 0.0f && alive(pixel))
-        rays_[pixel].add(scene_.table(scene_.background + sums[i]));
-    std::fill_n(sums, kBinSamples, 0.0f);
+    for (std::uint32_t left = touched_[pixel]; left != 0; left &= left - 1) {
+      float& sum = sums[std::countr_zero(left)];
+      if (sum != 0.0f && alive(pixel)) rays_[pixel].add(scene_.table(scene_.background + sum));
+      sum = 0.0f;
+    }
+    touched_[pixel] = 0;
   }
 }
 

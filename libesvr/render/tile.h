@@ -68,6 +68,9 @@ class Tile {
   std::vector<RayAxes> axes_;
   std::vector<RayState> rays_;
   std::vector<float> sums_;  ///< kBinSamples a pixel
+  /// Which of a pixel's sums something was added to: a bit each, the first sample's the lowest.
+  std::vector<std::uint32_t> touched_;
+  static_assert(kBinSamples == 32, "one bit a sample");
 };
 
 }  // namespace esvr
