@@ -93,6 +93,22 @@ bool visible(const ScreenBounds& b) {
   return b.farthest >= 0.0 && b.firstColumn <= b.lastColumn && b.firstRow <= b.lastRow;
 }
 
+/// Perspective rays share their origin, eye, and run along forward + x right + y up; orthographic
+/// ones run along forward from eye + x right + y up.
+PrimitiveView primitiveView(const View& view, const Vec3& fromEye, const Matrix3& L) {
+  const Vec3 eye = scaled(times(L, fromEye), -1.0), forward = times(L, view.forward);
+  const Vec3 right = times(L, view.right), up = times(L, view.up), none{0.0, 0.0, 0.0};
+  PrimitiveView p{};
+  p.along = {forward, view.perspective ? right : none, view.perspective ? up : none};
+  p.beside =
+      view.perspective
+          ? LinearInPlane<Vec3>{cross(eye, forward), cross(eye, right), cross(eye, up)}
+          : LinearInPlane<Vec3>{cross(eye, forward), cross(right, forward), cross(up, forward)};
+  const Vec3& other = view.perspective ? eye : forward;
+  p.ahead = {inner(eye, forward), inner(other, right), inner(other, up)};
+  return p;
+}
+
 void addChunk(const Field& field, const Chunk& chunk, const View& view, Resolution resolution,
               VisiblePrimitives& out) {
   const Ellipsoids& e = chunk.ellipsoids;
@@ -104,10 +120,10 @@ void addChunk(const Field& field, const Chunk& chunk, const View& view, Resoluti
         screenBounds(view, supportIn(view, fromEye, L, supportRadius(kernel)), resolution);
     if (!visible(bounds)) continue;
     out.bounds.push_back(bounds);
-    out.views.push_back({scaled(times(L, fromEye), -1.0), times(L, view.right), times(L, view.up),
-                         times(L, view.forward),
-                         kernelConstants<float>(field.kernel, kappaOf(field, e, i)),
-                         e.intensity[i]});
+    PrimitiveView p = primitiveView(view, fromEye, L);
+    p.kernel = kernelConstants<float>(field.kernel, kappaOf(field, e, i));
+    p.intensity = e.intensity[i];
+    out.views.push_back(p);
   }
 }
 

@@ -9,11 +9,19 @@
 
 namespace esvr {
 
-/// The ellipsoid's unit frame, L = S^-1 R^T, applied once to what every ray is made of. All of it
-/// is float64: a camera may be a million voxels away.
+/// A function of the place (x, y) in the plane of the picture.
+template <class Value>
+struct LinearInPlane {
+  Value atOrigin, perX, perY;
+};
+
+/// In an ellipsoid's unit frame, u = S^-1 R^T (p - center), a ray starts at o and runs along v, and
+/// everything that is asked of it is linear in the place of its pixel. All of it is float64: a
+/// camera may be a million voxels away.
 struct PrimitiveView {
-  Vec3 eye;                 ///< L (eye - center)
-  Vec3 right, up, forward;  ///< L times the view's axes
+  LinearInPlane<Vec3> along;    ///< v
+  LinearInPlane<Vec3> beside;   ///< o x v: its length over that of v is the distance to the center
+  LinearInPlane<double> ahead;  ///< o . v: negative where the center lies ahead
   KernelConstants<float> kernel;
   float intensity;
 };

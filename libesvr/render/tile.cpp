@@ -7,9 +7,13 @@
 namespace esvr {
 namespace {
 
-/// axes[0] right + axes[1] up + axes[2] forward, in a primitive's unit frame.
-Vec3 combined(const PrimitiveView& p, const Vec3& axes) {
-  return sum(scaled(p.right, axes[0]), sum(scaled(p.up, axes[1]), scaled(p.forward, axes[2])));
+Vec3 at(const LinearInPlane<Vec3>& f, double x, double y) {
+  return {f.atOrigin[0] + x * f.perX[0] + y * f.perY[0],
+          f.atOrigin[1] + x * f.perX[1] + y * f.perY[1],
+          f.atOrigin[2] + x * f.perX[2] + y * f.perY[2]};
+}
+double at(const LinearInPlane<double>& f, double x, double y) {
+  return f.atOrigin + x * f.perX + y * f.perY;
 }
 
 /// The bits of samples first to last; none where last is before first.
@@ -25,19 +29,18 @@ Tile::Tile(const TileScene& scene, TilePlace place)
       place_(place),
       columns_(std::min(kTileSide, scene.options.resolution.width - place.column)),
       rows_(std::min(kTileSide, scene.options.resolution.height - place.row)),
-      axes_(kPixels),
+      places_(kPixels),
       rays_(kPixels),
       sums_(std::size_t(kPixels) * kBinSamples, 0.0f),
       touched_(kPixels, 0u) {
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column)
-      axes_[row * kTileSide + column] = rayAxes(place.column + column, place.row + row);
+      places_[row * kTileSide + column] = rayPlace(place.column + column, place.row + row);
 }
 
-Tile::RayAxes Tile::rayAxes(int column, int row) const {
+Tile::RayPlace Tile::rayPlace(int column, int row) const {
   const double x = scene_.view.planeX(column), y = scene_.view.planeY(row);
-  if (!scene_.view.perspective) return {{x, y, 0.0}, {0.0, 0.0, 1.0}};
-  return {{0.0, 0.0, 0.0}, unit({x, y, 1.0})};
+  return {x, y, scene_.view.perspective ? std::hypot(x, y, 1.0) : 1.0};
 }
 
 Tile::Cosines Tile::cosines() const {
@@ -100,16 +103,16 @@ void Tile::addPrimitive(std::int64_t bin, std::uint32_t primitive) {
         addToRay(p, pixel, firstDistance);
 }
 
-/// Along the ray, m(t) = nearest + speed (t - t*)^2 with t* the place of closest approach: both
-/// terms are positive, so nothing cancels, and float32 is enough once t* is taken off.
+/// Along the ray, m(t) = nearest + speed (t - closest)^2: both terms are positive, so nothing
+/// cancels, and float32 is enough once t is counted from the place of closest approach.
 void Tile::addToRay(const PrimitiveView& p, int pixel, double firstDistance) {
-  const RayAxes& ray = axes_[pixel];
-  const Vec3 origin = sum(p.eye, combined(p, ray.start)), along = combined(p, ray.direction);
-  const double speed = inner(along, along), closest = -inner(origin, along) / speed;
-  const Vec3 nearestPlace = sum(origin, scaled(along, closest));
-  const double nearest = inner(nearestPlace, nearestPlace);
-  if (!(nearest < p.kernel.cutoff)) return;
+  const auto [x, y, unitLength] = places_[pixel];
+  const Vec3 along = at(p.along, x, y), beside = at(p.beside, x, y);
+  const double along2 = inner(along, along), beside2 = inner(beside, beside);
+  if (!(beside2 < double(p.kernel.cutoff) * along2)) return;  // passes by
 
+  const double nearest = beside2 / along2, closest = -at(p.ahead, x, y) / along2 * unitLength;
+  const double speed = along2 / (unitLength * unitLength);
   const double step = scene_.options.step;
   const double half = std::sqrt((p.kernel.cutoff - nearest) / speed) / step;
   const double middle = (closest - firstDistance) / step;  // in samples of this bin

@@ -37,9 +37,10 @@ class Tile {
  private:
   static constexpr int kPixels = kTileSide * kTileSide;
 
-  /// A pixel's ray: in units of the view's axes it starts at start and runs along direction.
-  struct RayAxes {
-    Vec3 start, direction;
+  /// Of a pixel in the plane of the picture, and how far one unit along its ray is: perspective,
+  /// the plane is at distance 1 and its corners are farther away than its middle.
+  struct RayPlace {
+    double x, y, unit;
   };
   /// A primitive and the bins that it may touch.
   struct Entry {
@@ -50,7 +51,7 @@ class Tile {
     double least, most;  ///< of the angles between the tile's rays and forward
   };
 
-  [[nodiscard]] RayAxes rayAxes(int column, int row) const;
+  [[nodiscard]] RayPlace rayPlace(int column, int row) const;
   [[nodiscard]] Cosines cosines() const;
   [[nodiscard]] std::vector<Entry> entries(std::span<const std::uint32_t> primitives) const;
   void drawBin(std::int64_t bin, std::span<const Entry> active);
@@ -65,7 +66,7 @@ class Tile {
   const TileScene& scene_;
   TilePlace place_;
   int columns_, rows_;  ///< pixels within the picture
-  std::vector<RayAxes> axes_;
+  std::vector<RayPlace> places_;
   std::vector<RayState> rays_;
   std::vector<float> sums_;  ///< kBinSamples a pixel
   /// Which of a pixel's sums something was added to: a bit each, the first sample's the lowest.
