@@ -29,6 +29,7 @@ constexpr int kMostRepairs = 3;
 constexpr double kMostGrowth = 8.0;
 constexpr std::uint32_t kDraftShare = 4;  // of the iterations
 constexpr std::size_t kMostFits = 3;      // and more until one reaches the PSNR
+constexpr std::uint64_t kNoticed = 100;   // a hundredth of the size is worth another search
 
 struct Attempt {
   FitResult fit;
@@ -46,11 +47,20 @@ class RateControl {
     Attempt last = attempt(double(bytes) / kBytesEach, true);
     Price price = priceOf(last);
     if (price.own >= bytes) refuse(price.own, bytes);
-    const std::uint64_t left = bytes - price.own;
+    std::uint64_t left = bytes - price.own;
     double each = price.each / kDraftCheaper;
     for (int n = 0; !ended(last); ++n) {
       last = attempt(double(left) / each, false);
       RatedGrid now = rated(last, left);
+      // the full fit's grid may store other sections than the short one's
+      const std::uint64_t own = bytesBesides(now.grid, now.compact.bytes);
+      if (own > price.own + paddingOf(now.grid) ||
+          price.own > own + paddingOf(now.grid) + bytes / kNoticed) {
+        if (own >= bytes) refuse(own, bytes);
+        price.own = own;
+        left = bytes - own;
+        now = rated(last, left);
+      }
       const bool fits = now.compact.bytes <= left;
       if (fits && (now.compact.loss <= kTooMuchLoss || n + 1 >= kMostRepairs)) return now;
       if (!fits && last.asked == 1) refuse(price.own + now.compact.bytes, bytes);
@@ -81,7 +91,8 @@ class RateControl {
   [[nodiscard]] Price priceOf(const Attempt& attempt) const {
     const auto compact = compactGrid(attempt.grid, input_.source, compactOptions(kLoss));
     const double count = double(std::max<std::size_t>(countOf(attempt), 1));
-    return {std::max(double(compact.bytes) / count, 1.0), bytesBesides(compact)};
+    return {std::max(double(compact.bytes) / count, 1.0),
+            bytesBesides(compact.grid, compact.bytes)};
   }
 
   [[noreturn]] void refuse(std::uint64_t least, std::uint64_t bytes) const {
@@ -172,12 +183,14 @@ class RateControl {
   }
 
   /// What a grid adds to a file but for its ellipsoids' section.
-  static std::uint64_t bytesBesides(const CompactResult& compact) {
+  static std::uint64_t bytesBesides(const EncodedGrid& grid, std::uint64_t ellipsoids) {
     EsvrFile with, without;
-    with.grids.push_back(compact.grid);
+    with.grids.push_back(grid);
     // sections begin at multiples of 8
-    return encodeEsvr(with).size() - encodeEsvr(without).size() - compact.bytes +
-           compact.grid.field.chunks.size() * (format::kAlignment - 1);
+    return encodeEsvr(with).size() - encodeEsvr(without).size() - ellipsoids + paddingOf(grid);
+  }
+  static std::uint64_t paddingOf(const EncodedGrid& grid) {
+    return grid.field.chunks.size() * (format::kAlignment - 1);
   }
 
   RatedGrid rated(const Attempt& attempt, std::uint64_t bytes) {
