@@ -12,7 +12,7 @@ constexpr unsigned kAllLanes = 0xffffffffu;
 constexpr int kMomentSlots = 16;  // kMoments, made a power of two
 static_assert(kMomentSlots % kGroup == 0, "each lane ends with some of the moments");
 
-enum class Pass { kGradients, kResiduals, kLossGradients };
+enum class Pass { kGradients, kResiduals };
 
 /// The same on every thread, summed in one order.
 template <int kThreads, class Real>
@@ -78,12 +78,6 @@ __device__ float toResiduals(const BrickPassArguments& a, std::uint32_t brick, i
     if (a.residual != nullptr) a.residual[std::size_t(brick) * kBrickVoxels + v] = r;
   }
   return loss;
-}
-
-template <int kThreads>
-__device__ void loadLossGradients(const BrickPassArguments& a, std::uint32_t brick, int* r) {
-  for (int v = int(threadIdx.x); v < kBrickVoxels; v += kThreads)
-    r[paddedOffset(v)] = __float_as_int(a.residual[std::size_t(brick) * kBrickVoxels + v]);
 }
 
 /// A lane's moments of a pair, in the order of PairMoments.
@@ -157,19 +151,15 @@ __global__ void __launch_bounds__(kThreads) brickPass(const BrickPassArguments a
   const BrickEntries entries{a.lists.brickBegin[brick], a.lists.brickBegin[brick + 1]};
   const std::uint32_t first = entries.begin + threadIdx.x / kGroup;
 
-  if constexpr (kPass == Pass::kLossGradients) {
-    loadLossGradients<kThreads>(a, brick, sums);
-  } else {
-    for (int v = int(threadIdx.x); v < kPaddedVoxels; v += kThreads) sums[v] = 0;
-    const int exponent = sumExponent<kThreads>(a, entries);  // its barriers come after the zeros
-    for (std::uint32_t k = first; k < entries.end; k += kGroups)
-      addPair(a, k, corner, ldexpf(1.0f, exponent), sums);
-    __syncthreads();
-    const double loss = blockSum<kThreads>(double(toResiduals<kThreads>(a, brick, exponent, sums)));
-    if (threadIdx.x == 0) a.brickLoss[brick] = loss;
-  }
+  for (int v = int(threadIdx.x); v < kPaddedVoxels; v += kThreads) sums[v] = 0;
+  const int exponent = sumExponent<kThreads>(a, entries);  // its barriers come after the zeros
+  for (std::uint32_t k = first; k < entries.end; k += kGroups)
+    addPair(a, k, corner, ldexpf(1.0f, exponent), sums);
   __syncthreads();
-  if constexpr (kPass != Pass::kResiduals)
+  const double loss = blockSum<kThreads>(double(toResiduals<kThreads>(a, brick, exponent, sums)));
+  if (threadIdx.x == 0) a.brickLoss[brick] = loss;
+  __syncthreads();
+  if constexpr (kPass == Pass::kGradients)
     for (std::uint32_t k = first; k < entries.end; k += kGroups) writeMoments(a, k, corner, sums);
 }
 
@@ -191,9 +181,6 @@ void launchGradients(const BrickPassArguments& arguments, cudaStream_t stream) {
 }
 void launchResiduals(const BrickPassArguments& arguments, cudaStream_t stream) {
   launch<Pass::kResiduals>(arguments, stream);
-}
-void launchLossGradients(const BrickPassArguments& arguments, cudaStream_t stream) {
-  launch<Pass::kLossGradients>(arguments, stream);
 }
 
 }  // namespace esvr::cuda

@@ -22,7 +22,7 @@ struct BrickPassArguments {
   float lowest, highest;  ///< that range
   double* brickLoss;      ///< out, a brick's: sum of r^2
   float* moments;         ///< out, kMomentStride a pair; not written for residuals alone
-  float* residual;        ///< kBrickVoxels a brick; in for lossGradients, else out or null
+  float* residual;        ///< kBrickVoxels a brick; out, or null
 };
 
 /// Values of a pair in `moments`: PairMoments, in its order, and room to 48 bytes.
@@ -32,7 +32,5 @@ inline constexpr int kMoments = 11, kMomentStride = 12;
 void launchGradients(const BrickPassArguments& arguments, cudaStream_t stream);
 /// Loss and residuals.
 void launchResiduals(const BrickPassArguments& arguments, cudaStream_t stream);
-/// Moments for gradients of a loss whose derivative by every value is in `residual`.
-void launchLossGradients(const BrickPassArguments& arguments, cudaStream_t stream);
 
 }  // namespace esvr::cuda
