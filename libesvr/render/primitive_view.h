@@ -5,32 +5,9 @@
 #include <vector>
 
 #include "esvr/ellipsoids.h"
-#include "render/view.h"
+#include "render/primitive_math.h"
 
 namespace esvr {
-
-/// A function of the place (x, y) in the plane of the picture.
-template <class Value>
-struct LinearInPlane {
-  Value atOrigin, perX, perY;
-};
-
-/// In an ellipsoid's unit frame, u = S^-1 R^T (p - center), a ray starts at o and runs along v, and
-/// everything that is asked of it is linear in the place of its pixel. All of it is float64: a
-/// camera may be a million voxels away.
-struct PrimitiveView {
-  LinearInPlane<Vec3> along;    ///< v
-  LinearInPlane<Vec3> beside;   ///< o x v: its length over that of v is the distance to the center
-  LinearInPlane<double> ahead;  ///< o . v: negative where the center lies ahead
-  KernelConstants<float> kernel;
-  float intensity;
-};
-
-/// A support's bounds, errs on the side of inclusion.
-struct ScreenBounds {
-  std::int32_t firstColumn, lastColumn, firstRow, lastRow;  ///< pixels whose rays may meet it
-  double nearest, farthest;                                 ///< along forward, not below 0
-};
 
 /// The ellipsoids that some ray of the picture may meet, in their order in the field.
 struct VisiblePrimitives {
@@ -40,5 +17,12 @@ struct VisiblePrimitives {
 
 [[nodiscard]] VisiblePrimitives visiblePrimitives(const Field& field, const View& view,
                                                   Resolution resolution);
+
+/// What a camera is shown of a field's ellipsoids; `chunk` counts the field's chunks.
+[[nodiscard]] std::vector<PackedEllipsoid> packed(const Field& field);
+/// Where a chunk's centers are relative to.
+[[nodiscard]] std::vector<Vec3> chunkOrigins(const Field& field);
+/// One kernel for all ellipsoids, or one for each, in the order of `packed`.
+[[nodiscard]] std::vector<RayKernel> rayKernels(const Field& field);
 
 }  // namespace esvr

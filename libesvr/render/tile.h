@@ -10,8 +10,6 @@
 namespace esvr {
 
 inline constexpr int kTileSide = 16;  ///< pixels
-inline constexpr int kBinSamples =
-    32;  ///< samples of a ray that are summed before any is composited
 
 struct TilePlace {
   int column, row;  ///< of its first pixel
@@ -37,26 +35,22 @@ class Tile {
  private:
   static constexpr int kPixels = kTileSide * kTileSide;
 
-  /// Of a pixel in the plane of the picture, and how far one unit along its ray is: perspective,
-  /// the plane is at distance 1 and its corners are farther away than its middle.
-  struct RayPlace {
-    double x, y, unit;
-  };
   /// A primitive and the bins that it may touch.
   struct Entry {
-    std::int64_t firstBin, lastBin;
+    BinRange bins;
     std::uint32_t primitive;
   };
-  struct Cosines {
-    double least, most;  ///< of the angles between the tile's rays and forward
-  };
-
-  [[nodiscard]] RayPlace rayPlace(int column, int row) const;
-  [[nodiscard]] Cosines cosines() const;
+  [[nodiscard]] RayScale rayScale(int column, int row) const;
   [[nodiscard]] std::vector<Entry> entries(std::span<const std::uint32_t> primitives) const;
   void drawBin(std::int64_t bin, std::span<const Entry> active);
   void addPrimitive(std::int64_t bin, std::uint32_t primitive);
-  void addToRay(const PrimitiveView& p, int pixel, double firstDistance);
+  /// A primitive and where it lies from the tile's first pixel and a bin's first sample.
+  struct PlacedPrimitive {
+    const PrimitiveView& view;
+    float column, row, middleAhead;
+  };
+  [[nodiscard]] PlacedPrimitive placed(const PrimitiveView& p, std::int64_t bin) const;
+  void addToRay(const PlacedPrimitive& p, int column, int row);
   void composite();
   [[nodiscard]] bool alive(int pixel) const {
     return !(rays_[pixel].transmittance < scene_.options.minTransmittance);
@@ -66,7 +60,8 @@ class Tile {
   const TileScene& scene_;
   TilePlace place_;
   int columns_, rows_;  ///< pixels within the picture
-  std::vector<RayPlace> places_;
+  double middleUnit_;   ///< samples for each unit along forward, on the ray of the tile's middle
+  std::vector<RayScale> scales_;
   std::vector<RayState> rays_;
   std::vector<float> sums_;  ///< kBinSamples a pixel
   /// Which of a pixel's sums something was added to: a bit each, the first sample's the lowest.

@@ -7,25 +7,33 @@
 namespace esvr {
 namespace {
 
+constexpr int kIntervals = TransferTableView::kIntervals;
+
 Classified classified(const TransferFunction& f, double value, double length) {
   const Rgb color = colorAt(f.colors, value);
   const double alpha = 1.0 - std::pow(1.0 - opacityAt(f.opacity, value), length);
   return {float(color.r), float(color.g), float(color.b), float(alpha)};
 }
 
+/// None, too, where float32 cannot hold it.
+float scaleOf(double extent) {
+  const double scale = extent > 0.0 ? kIntervals / extent : 0.0;
+  return scale < std::numeric_limits<float>::max() ? float(scale) : TransferTableView::kNoExtent;
+}
+
 }  // namespace
 
 TransferTable::TransferTable(const TransferFunction& f, double length)
-    : low_(std::min(f.colors.points.front().x, f.opacity.front().x)),
-      scale_(kNoExtent),
-      nan_(classified(f, std::numeric_limits<double>::quiet_NaN(), length)) {
+    : nan_(classified(f, std::numeric_limits<double>::quiet_NaN(), length)) {
+  const double low = std::min(f.colors.points.front().x, f.opacity.front().x);
   const double high = std::max(f.colors.points.back().x, f.opacity.back().x);
-  if (high > low_) scale_ = kIntervals / (high - low_);
+  low_ = float(low), scale_ = scaleOf(high - low);
+  entries_.reserve(kIntervals + 1);
   for (int i = 0; i <= kIntervals; ++i)
-    entries_.push_back(classified(f, low_ + (high - low_) * i / kIntervals, length));
+    entries_.push_back(classified(f, low + (high - low) * i / kIntervals, length));
   // Below all points are the first of those at one place, above them the last.
   entries_.front() =
-      classified(f, std::nextafter(low_, -std::numeric_limits<double>::max()), length);
+      classified(f, std::nextafter(low, -std::numeric_limits<double>::max()), length);
 }
 
 }  // namespace esvr

@@ -1,15 +1,43 @@
 #pragma once
 /// A transfer function sampled, with opacities for the step: what a renderer asks for every sample.
+/// The looking up and the compositing are written once for host and device.
 
 #include <vector>
 
+#include "esvr/kernel.h"
 #include "esvr/render.h"
 
 namespace esvr {
 
 /// Not premultiplied.
-struct Classified {
+struct alignas(16) Classified {
   float r, g, b, alpha;
+};
+
+/// A table wherever it lies.
+struct TransferTableView {
+  static constexpr int kIntervals = 4096;
+  static constexpr float kNoExtent = 0.0f;
+
+  const Classified* entries;  ///< kIntervals + 1
+  float low, scale;           ///< scale: intervals for one unit of value
+  Classified nan;
+
+  [[nodiscard]] ESVR_HD Classified operator()(float value) const {
+    if (!(value == value)) return nan;
+    const float place = scale == kNoExtent ? (value < low ? 0.0f : float(kIntervals))
+                                           : (value - low) * scale;
+    if (!(place > 0.0f)) return entries[0];
+    if (place >= float(kIntervals)) return entries[kIntervals];
+    const int i = int(place);
+    return between(entries[i], entries[i + 1], place - float(i));
+  }
+
+ private:
+  ESVR_HD static Classified between(const Classified& a, const Classified& b, float s) {
+    return {a.r + s * (b.r - a.r), a.g + s * (b.g - a.g), a.b + s * (b.b - a.b),
+            a.alpha + s * (b.alpha - a.alpha)};
+  }
 };
 
 class TransferTable {
@@ -17,25 +45,15 @@ class TransferTable {
   /// \param length  of a step, in units of the length that opacities are given for
   TransferTable(const TransferFunction& function, double length);
 
-  [[nodiscard]] Classified operator()(float value) const {
-    if (!(value == value)) return nan_;
-    const double place =
-        scale_ == kNoExtent ? (value < low_ ? 0.0 : kIntervals) : (double(value) - low_) * scale_;
-    if (place <= 0.0) return entries_.front();
-    if (place >= kIntervals) return entries_.back();
-    const int i = int(place);
-    return between(entries_[i], entries_[i + 1], float(place - i));
+  [[nodiscard]] Classified operator()(float value) const { return on(entries_.data())(value); }
+  [[nodiscard]] const std::vector<Classified>& entries() const { return entries_; }
+  /// With the entries copied elsewhere.
+  [[nodiscard]] TransferTableView on(const Classified* entries) const {
+    return {entries, low_, scale_, nan_};
   }
 
  private:
-  static constexpr int kIntervals = 4096;
-  static constexpr double kNoExtent = 0.0;
-  static Classified between(const Classified& a, const Classified& b, float s) {
-    return {a.r + s * (b.r - a.r), a.g + s * (b.g - a.g), a.b + s * (b.b - a.b),
-            a.alpha + s * (b.alpha - a.alpha)};
-  }
-
-  double low_, scale_;
+  float low_, scale_;
   std::vector<Classified> entries_;
   Classified nan_;
 };
@@ -45,12 +63,19 @@ struct RayState {
   float r = 0.0f, g = 0.0f, b = 0.0f;
   float transmittance = 1.0f;
 
-  void add(const Classified& sample) {
+  ESVR_HD void add(const Classified& sample) {
     const float weight = transmittance * sample.alpha;
     r += weight * sample.r;
     g += weight * sample.g;
     b += weight * sample.b;
     transmittance *= 1.0f - sample.alpha;
+  }
+  /// What lies behind.
+  ESVR_HD void add(const RayState& behind) {
+    r += transmittance * behind.r;
+    g += transmittance * behind.g;
+    b += transmittance * behind.b;
+    transmittance *= behind.transmittance;
   }
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 /// A camera's coordinates, in which rays and bounds are computed: right, up and forward from the
 /// eye. On the plane of the picture a place is (x, y): perspective, at distance 1 before the eye;
-/// orthographic, in voxels.
+/// orthographic, in voxels. Plain numbers, so that it travels to a device as it is.
 
 #include "esvr/camera.h"
 #include "render/vector.h"
@@ -20,18 +20,29 @@ struct View {
   double pixel;      ///< side of a pixel in the plane
   double left, top;  ///< of the picture in the plane
 
-  /// Of the middle of a pixel.
-  [[nodiscard]] double planeX(int column) const { return left + (column + 0.5) * pixel; }
-  [[nodiscard]] double planeY(int row) const { return top - (row + 0.5) * pixel; }
+  /// Of the middle of a pixel; pixel 3.5 is half-way from the third to the fourth.
+  [[nodiscard]] ESVR_HD double planeX(double column) const { return left + (column + 0.5) * pixel; }
+  [[nodiscard]] ESVR_HD double planeY(double row) const { return top - (row + 0.5) * pixel; }
+  /// The pixel whose middle lies at a place in the plane, with its fraction.
+  [[nodiscard]] ESVR_HD double columnAt(double x) const { return (x - left) / pixel - 0.5; }
+  [[nodiscard]] ESVR_HD double rowAt(double y) const { return (top - y) / pixel - 0.5; }
 
   /// Of a direction or of a displacement from the eye.
-  [[nodiscard]] Vec3 coordinates(const Vec3& v) const {
+  [[nodiscard]] ESVR_HD Vec3 coordinates(const Vec3& v) const {
     return {inner(right, v), inner(up, v), inner(forward, v)};
   }
-  [[nodiscard]] Ray ray(int column, int row) const {
-    const Vec3 across = sum(scaled(right, planeX(column)), scaled(up, planeY(row)));
-    if (perspective) return {eye, unit(sum(forward, across))};
-    return {sum(eye, across), forward};
+  /// How far one unit along forward is on the ray of a place.
+  [[nodiscard]] ESVR_HD double unitAlong(double x, double y) const {
+    return perspective ? std::sqrt(1.0 + x * x + y * y) : 1.0;
+  }
+  /// Perspective: its length is unitAlong.
+  [[nodiscard]] ESVR_HD Vec3 directionAt(double x, double y) const {
+    return perspective ? sum(forward, sum(scaled(right, x), scaled(up, y))) : forward;
+  }
+  [[nodiscard]] ESVR_HD Ray ray(double column, double row) const {
+    const double x = planeX(column), y = planeY(row);
+    if (perspective) return {eye, scaled(directionAt(x, y), 1.0 / unitAlong(x, y))};
+    return {sum(eye, sum(scaled(right, x), scaled(up, y))), forward};
   }
 };
 

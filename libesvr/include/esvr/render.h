@@ -8,10 +8,9 @@
 /// The same input and options give the same bits on any number of threads (the calling TBB
 /// arena's).
 
-#include <vector>
-
 #include "esvr/camera.h"
 #include "esvr/ellipsoids.h"
+#include "esvr/image.h"
 #include "esvr/progress.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/transfer_function.h"
@@ -30,13 +29,6 @@ struct RenderOptions {
   /// that costs a 16th of a level of 255.
   double minTransmittance = 1.0 / 4096;
   const CancelToken* cancel = nullptr;  ///< looked at before each row of tiles
-};
-
-/// Red, green, blue, alpha a pixel, row after row from the top. Premultiplied: the colors are those
-/// in front of black.
-struct Image {
-  int width = 0, height = 0;
-  std::vector<float> rgba;
 };
 
 /// Draws the sum of ellipsoids without ever making voxels of it (paper, section "Per-primitive ray

@@ -1,0 +1,180 @@
+#include "esvr/image_metrics.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "esvr/error.h"
+#include "esvr/metrics.h"
+#include "field/ssim_window.h"
+
+namespace esvr {
+namespace {
+
+constexpr int kChannels = 4, kColors = 3;
+constexpr double kPeak = 1.0;
+constexpr int kRowsPerTask = 16;
+
+using Rows = tbb::blocked_range<int>;
+
+std::string sizeOf(const Image& image) {
+  return std::to_string(image.width) + " x " + std::to_string(image.height);
+}
+
+void checkSizes(const Image& reference, const Image& candidate) {
+  if (reference.width < 1 || reference.height < 1)
+    throw UsageError("a picture of " + sizeOf(reference) + " pixels cannot be compared");
+  if (reference.width != candidate.width || reference.height != candidate.height)
+    throw UsageError("pictures of " + sizeOf(reference) + " and " + sizeOf(candidate) +
+                     " pixels cannot be compared");
+}
+
+/// One color channel, as a screen would show it.
+class Plane {
+ public:
+  Plane(const Image& image, int channel)
+      : width(image.width), height(image.height), values_(std::size_t(width) * height) {
+    for (std::size_t i = 0; i < values_.size(); ++i) {
+      const double v = image.rgba[i * kChannels + channel];
+      if (std::isnan(v)) throw BadInput("a picture with a color that is no number");
+      values_[i] = std::clamp(v, 0.0, kPeak);
+    }
+  }
+  const int width, height;
+  [[nodiscard]] const double* row(int y) const { return &values_[std::size_t(y) * width]; }
+  [[nodiscard]] double* row(int y) { return &values_[std::size_t(y) * width]; }
+
+ private:
+  std::vector<double> values_;
+};
+
+/// A window's taps that lie in a picture, and what they weigh together.
+struct Taps {
+  int first, last;
+  double weight;
+};
+
+class Window {
+ public:
+  [[nodiscard]] Taps within(int at, int size) const {
+    Taps taps{std::max(0, kSsimRadius - at), std::min(kSsimTaps - 1, size - 1 - at + kSsimRadius),
+              0.0};
+    for (int t = taps.first; t <= taps.last; ++t) taps.weight += weights_[std::size_t(t)];
+    return taps;
+  }
+  [[nodiscard]] double weight(int tap) const { return weights_[std::size_t(tap)]; }
+
+ private:
+  std::array<double, kSsimTaps> weights_ = ssimWeights();
+};
+
+/// Weighted means over windows: of a, b, a^2, b^2 and a b.
+struct Means {
+  double a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
+
+  void add(double w, const Means& m) {
+    a += w * m.a, b += w * m.b, aa += w * m.aa, bb += w * m.bb, ab += w * m.ab;
+  }
+};
+
+Means productsOf(double a, double b) { return {a, b, a * a, b * b, a * b}; }
+
+/// Down the columns of a row of windows.
+std::vector<Means> columnMeans(const Plane& a, const Plane& b, const Window& window, int y) {
+  std::vector<Means> means(a.width);
+  const Taps taps = window.within(y, a.height);
+  for (int t = taps.first; t <= taps.last; ++t) {
+    const double *rowA = a.row(y + t - kSsimRadius), *rowB = b.row(y + t - kSsimRadius);
+    const double weight = window.weight(t) / taps.weight;
+    for (int x = 0; x < a.width; ++x) means[x].add(weight, productsOf(rowA[x], rowB[x]));
+  }
+  return means;
+}
+
+Means windowMeans(const std::vector<Means>& columns, const Window& window, int x) {
+  const Taps taps = window.within(x, int(columns.size()));
+  Means means;
+  for (int t = taps.first; t <= taps.last; ++t)
+    means.add(window.weight(t) / taps.weight, columns[x + t - kSsimRadius]);
+  return means;
+}
+
+double ssimOf(const Means& m, const SsimConstants& c) {
+  const double squares = m.a * m.a + m.b * m.b;
+  return (2.0 * m.a * m.b + c.c1) / (squares + c.c1) * (2.0 * (m.ab - m.a * m.b) + c.c2) /
+         (m.aa + m.bb - squares + c.c2);
+}
+
+double ssimOfRow(const Plane& a, const Plane& b, const Window& window, int y) {
+  const auto columns = columnMeans(a, b, window, y);
+  const SsimConstants constants = ssimConstants(kPeak);
+  double sum = 0.0;
+  for (int x = 0; x < a.width; ++x) sum += ssimOf(windowMeans(columns, window, x), constants);
+  return sum;
+}
+
+template <class OfRow>
+double sumOverRows(int rows, OfRow&& ofRow) {
+  return tbb::parallel_deterministic_reduce(
+      Rows(0, rows, kRowsPerTask), 0.0,
+      [&](const Rows& range, double sum) {
+        for (int y = range.begin(); y != range.end(); ++y) sum += ofRow(y);
+        return sum;
+      },
+      std::plus<>());
+}
+
+double squaresOfRow(const Plane& a, const Plane& b, int y) {
+  double sum = 0.0;
+  for (int x = 0; x < a.width; ++x) {
+    const double d = a.row(y)[x] - b.row(y)[x];
+    sum += d * d;
+  }
+  return sum;
+}
+
+double largestDifference(const Plane& a, const Plane& b) {
+  double most = 0.0;
+  for (int y = 0; y < a.height; ++y)
+    for (int x = 0; x < a.width; ++x) most = std::max(most, std::abs(a.row(y)[x] - b.row(y)[x]));
+  return most;
+}
+
+}  // namespace
+
+ImageMetrics compareImages(const Image& reference, const Image& candidate) {
+  checkSizes(reference, candidate);
+  const Window window;
+  const double samples = double(reference.width) * reference.height * kColors;
+  double squares = 0.0, ssim = 0.0;
+  ImageMetrics metrics;
+  for (int channel = 0; channel < kColors; ++channel) {
+    const Plane a(reference, channel), b(candidate, channel);
+    squares += sumOverRows(a.height, [&](int y) { return squaresOfRow(a, b, y); });
+    ssim += sumOverRows(a.height, [&](int y) { return ssimOfRow(a, b, window, y); });
+    metrics.maxError = std::max(metrics.maxError, largestDifference(a, b));
+  }
+  metrics.psnr = psnr(squares / samples, kPeak);
+  metrics.ssim = ssim / samples;
+  return metrics;
+}
+
+Image errorMap(const Image& reference, const Image& candidate, double gain) {
+  checkSizes(reference, candidate);
+  Image map{reference.width, reference.height, std::vector<float>(reference.rgba.size(), 1.0f)};
+  for (std::size_t i = 0; i < map.rgba.size(); i += kChannels) {
+    double most = 0.0;
+    for (int c = 0; c < kColors; ++c)
+      most = std::max(most, std::abs(double(reference.rgba[i + c]) - candidate.rgba[i + c]));
+    for (int c = 0; c < kColors; ++c) map.rgba[i + c] = float(std::min(1.0, most * gain));
+  }
+  return map;
+}
+
+}  // namespace esvr

@@ -1,0 +1,119 @@
+// Plan: PSNR and the largest difference by hand; SSIM against windows summed directly in float64
+// (means of products cancel to 1e-16 of squares below 1, over C2 = 9e-4: 1e-12), closed forms for
+// constant pictures, and what must not count: alpha, colors that no screen shows.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "esvr/error.h"
+#include "esvr/image_metrics.h"
+#include "field/random_field.h"
+
+namespace esvr::test {
+namespace {
+
+Image constant(int width, int height, float color) {
+  Image image{width, height, std::vector<float>(std::size_t(4 * width * height), color)};
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4) image.rgba[i] = 1.0f;
+  return image;
+}
+
+Image noise(int width, int height, std::uint64_t seed) {
+  Random random(seed);
+  Image image = constant(width, height, 0.0f);
+  for (float& v : image.rgba) v = float(random(0.0, 1.0));
+  return image;
+}
+
+/// SSIM of one window by the definition, the variances as sums of squared differences.
+double windowSsim(const Image& a, const Image& b, int cx, int cy, int channel) {
+  double weights = 0.0, meanA = 0.0, meanB = 0.0;
+  const auto overWindow = [&](auto&& visit) {
+    for (int y = std::max(0, cy - 5); y <= std::min(a.height - 1, cy + 5); ++y)
+      for (int x = std::max(0, cx - 5); x <= std::min(a.width - 1, cx + 5); ++x) {
+        const int at = (y * a.width + x) * 4 + channel;
+        const double r2 = std::pow(x - cx, 2) + std::pow(y - cy, 2);
+        visit(std::exp(-r2 / (2 * 1.5 * 1.5)), double(a.rgba[at]), double(b.rgba[at]));
+      }
+  };
+  overWindow([&](double w, double u, double v) { weights += w, meanA += w * u, meanB += w * v; });
+  meanA /= weights, meanB /= weights;
+  double varA = 0.0, varB = 0.0, covariance = 0.0;
+  overWindow([&](double w, double u, double v) {
+    varA += w / weights * (u - meanA) * (u - meanA);
+    varB += w / weights * (v - meanB) * (v - meanB);
+    covariance += w / weights * (u - meanA) * (v - meanB);
+  });
+  const double c1 = 1e-4, c2 = 9e-4;
+  return (2 * meanA * meanB + c1) * (2 * covariance + c2) /
+         ((meanA * meanA + meanB * meanB + c1) * (varA + varB + c2));
+}
+
+double directSsim(const Image& a, const Image& b) {
+  double sum = 0.0;
+  for (int y = 0; y < a.height; ++y)
+    for (int x = 0; x < a.width; ++x)
+      for (int c = 0; c < 3; ++c) sum += windowSsim(a, b, x, y, c);
+  return sum / (3.0 * a.width * a.height);
+}
+
+TEST(ImageMetrics, APictureIsItself) {
+  const Image image = noise(20, 15, 1);
+  const ImageMetrics m = compareImages(image, image);
+  EXPECT_EQ(m.psnr, std::numeric_limits<double>::infinity());
+  EXPECT_NEAR(m.ssim, 1.0, 1e-12);
+  EXPECT_EQ(m.maxError, 0.0);
+}
+
+TEST(ImageMetrics, ConstantPicturesHaveAClosedForm) {
+  const ImageMetrics m = compareImages(constant(9, 30, 0.5f), constant(9, 30, 0.25f));
+  EXPECT_NEAR(m.psnr, -20.0 * std::log10(0.25), 1e-12);
+  EXPECT_NEAR(m.ssim, (2 * 0.5 * 0.25 + 1e-4) / (0.25 + 0.0625 + 1e-4), 1e-12);
+  EXPECT_EQ(m.maxError, 0.25);
+}
+
+TEST(ImageMetrics, SsimIsTheMeanOfAllWindows) {
+  for (const auto& [width, height] : {std::pair{23, 17}, {3, 40}, {1, 1}}) {
+    const Image a = noise(width, height, 2), b = noise(width, height, 3);
+    EXPECT_NEAR(compareImages(a, b).ssim, directSsim(a, b), 1e-11) << width;
+  }
+}
+
+TEST(ImageMetrics, AlphaAndWhatNoScreenShowsDoNotCount) {
+  const Image image = constant(12, 12, 1.0f);
+  Image other = constant(12, 12, 1.5f);
+  for (std::size_t i = 3; i < other.rgba.size(); i += 4) other.rgba[i] = 0.0f;
+  EXPECT_EQ(compareImages(image, other).maxError, 0.0);
+}
+
+TEST(ImageMetrics, IsTheSameForAnyNumberOfThreads) {
+  const Image a = noise(90, 130, 4), b = noise(90, 130, 5);
+  const auto withThreads = [&](std::size_t n) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, n);
+    return compareImages(a, b);
+  };
+  EXPECT_EQ(withThreads(1).ssim, withThreads(3).ssim);
+  EXPECT_EQ(withThreads(1).psnr, withThreads(3).psnr);
+}
+
+TEST(ImageMetrics, WhatCannotBeComparedIsRefused) {
+  EXPECT_THROW((void)compareImages(noise(3, 4, 1), noise(4, 3, 1)), UsageError);
+  EXPECT_THROW((void)compareImages({}, {}), UsageError);
+  Image broken = noise(3, 3, 1);
+  broken.rgba[4] = std::nanf("");
+  EXPECT_THROW((void)compareImages(broken, noise(3, 3, 1)), BadInput);
+}
+
+TEST(ErrorMap, ShowsTheLargestDifferenceOfAPixel) {
+  Image a = constant(2, 1, 0.5f), b = a;
+  b.rgba[5] = 0.25f;  // green of the second pixel
+  const Image map = errorMap(a, b, 2.0);
+  EXPECT_EQ(map.rgba, (std::vector<float>{0, 0, 0, 1, 0.5f, 0.5f, 0.5f, 1}));
+  EXPECT_EQ(errorMap(a, b, 100.0).rgba[4], 1.0f);
+}
+
+}  // namespace
+}  // namespace esvr::test
