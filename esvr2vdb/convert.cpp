@@ -1,10 +1,13 @@
+#include <filesystem>
 #include <iostream>
+#include <utility>
 
 #include "cli/interrupts.h"
 #include "cli/output.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_names.h"
+#include "esvr/level_of_detail.h"
 #include "esvr2vdb/choose_grids.h"
 #include "esvr2vdb/error_table.h"
 #include "esvr2vdb/jobs.h"
@@ -20,10 +23,20 @@ void checkFiles(const Options& options) {
   cli::checkOutput(options.output, {".vdb", ".nvdb"}, options.write.overwrite);
 }
 
-VolumeGrid decoded(const EncodedGrid& grid, const DecodeOptions& options) {
+EsvrFile read(const Options& options, const cli::Log& log) {
+  if (readsAll(options)) return readEsvr(options.input);
+  PartOfFile part = readEsvrPart(options.input, options.part);
+  log.info("read " + std::to_string(part.bytesRead) + " of " +
+           std::to_string(std::filesystem::file_size(options.input)) + " bytes");
+  return std::move(part.file);
+}
+
+VolumeGrid decoded(const EncodedGrid& grid, const Options& options) {
   VolumeGrid result;
   result.descriptor = grid.descriptor;
-  result.volume = decodeGrid(grid, options);
+  result.volume = options.maxPrimitives
+                      ? decodeGrid(heaviest(grid, *options.maxPrimitives), options.decode)
+                      : decodeGrid(grid, options.decode);
   return result;
 }
 
@@ -33,11 +46,10 @@ void tellEmpty(const VolumeGrid& grid, const cli::Log& log) {
 }
 
 std::vector<VolumeGrid> decodeAll(const EsvrFile& file, const std::vector<std::size_t>& chosen,
-                                  const Options& options) {
-  const cli::Log log(kProgram, options.verbosity);
+                                  const Options& options, const cli::Log& log) {
   std::vector<VolumeGrid> grids;
   for (const std::size_t g : chosen) {
-    grids.push_back(decoded(file.grids[g], options.decode));
+    grids.push_back(decoded(file.grids[g], options));
     tellEmpty(grids.back(), log);
   }
   return grids;
@@ -65,12 +77,13 @@ std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<s
 
 void convert(const Options& options) {
   const cli::Interrupts interrupts;  // a file that is begun is finished
+  const cli::Log log(kProgram, options.verbosity);
   checkFiles(options);
-  const EsvrFile file = readEsvr(options.input);
+  const EsvrFile file = read(options, log);
   const auto chosen = chooseGrids(options.input, file, options.grids);
   std::vector<ComparedGrid> compared;
   if (options.reference) compared = counterparts(file, chosen, options);
-  const auto grids = decodeAll(file, chosen, options);
+  const auto grids = decodeAll(file, chosen, options, log);
   if (interrupts.token().cancelled()) throw Cancelled();
   writeGrids(options.output, file.metadata, grids, options.write);
   if (options.reference) printErrors(options, compared, std::cout);

@@ -73,6 +73,25 @@ void printStreams(const Listing& listing) {
   table.print(std::cout);
 }
 
+/// What a reader gets of the first layers, and what it takes.
+void printLayers(const Listing& listing) {
+  cli::Table table({"grid", "layers", "ellipsoids", "bytes", "PSNR box", "max error"});
+  for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
+    const auto& errors = listing.file.grids[g].layerErrors;
+    const auto sizes = layerSizes(listing.file.grids[g]);
+    LayerSize sum;
+    for (std::size_t k = 0; k < sizes.size(); ++k) {
+      sum.ellipsoids += sizes[k].ellipsoids;
+      sum.bytes += sizes[k].bytes;
+      const bool known = k < errors.size();
+      table.add({listing.names[g], std::to_string(k + 1), std::to_string(sum.ellipsoids),
+                 std::to_string(sum.bytes), known ? cli::decibels(errors[k].psnrBox) : "-",
+                 known ? cli::shortNumber(errors[k].maxError) : "-"});
+    }
+  }
+  table.print(std::cout);
+}
+
 void printMetadata(const std::string& title, const std::vector<MetaItem>& items) {
   for (const auto& item : items)
     std::cout << cli::printable(title + ": " + item.name + " (" + item.type + ")") << '\n';
@@ -106,6 +125,8 @@ void list(const Options& options) {
   if (options.verbosity != cli::Verbosity::kVerbose) return;
   std::cout << '\n';
   printStreams(listing);
+  std::cout << '\n';
+  printLayers(listing);
   std::cout << '\n';
   printDetails(listing);
 }

@@ -35,6 +35,8 @@ cli::ProgramText programText() {
               "  esvr2vdb smoke.esvr smoke.vdb\n"
               "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   with a table of errors\n"
               "  esvr2vdb smoke.esvr density.nvdb -g density --half on\n"
+              "  esvr2vdb smoke.esvr coarse.vdb --lod 1               a preview\n"
+              "  esvr2vdb smoke.esvr part.vdb --bbox 0,0,0,63,63,63   a part\n"
               "  esvr2vdb --list smoke.esvr"};
 }
 
@@ -50,6 +52,12 @@ cli::CommandLine commandLine() {
      "write this grid only; may be repeated; 'density[1]' is the second of that name")
     ("threshold", value<float>()->value_name("T"),
      "active where the value differs from the background by more (default: as stored)")
+    ("lod", value<std::int64_t>()->value_name("N"),
+     "the N heaviest layers of ellipsoids only (--list -v tells how far off each is)")
+    ("max-primitives", value<std::int64_t>()->value_name("N"),
+     "the N heaviest ellipsoids of each grid only")
+    ("bbox", value<std::string>()->value_name("BOX"),
+     "x0,y0,z0,x1,y1,z1: these voxels only; what cannot reach them is not read")
     ("half", value<std::string>()->value_name("W")->default_value("auto"),
      "save as half: on, off, or auto (as the source was)")
     ("no-tiles", bool_switch(), "keep leaves whose voxels are all equal")
@@ -66,7 +74,8 @@ Job jobOf(const Arguments& a) {
   const bool list = a.get<bool>("list"), check = a.get<bool>("check");
   if (list && check) throw UsageError("--list and --check are two jobs; ask for one");
   if (!list && !check) return Job::kConvert;
-  for (const char* option : {"output", "grid", "threshold", "reference", "box"})
+  for (const char* option :
+       {"output", "grid", "threshold", "lod", "max-primitives", "bbox", "reference", "box"})
     if (a.has(option))
       throw UsageError(std::string(list ? "--list" : "--check") + " takes IN.esvr only, no " +
                        option);
@@ -84,6 +93,20 @@ HalfMode halfOf(const Arguments& a) {
       {{"auto", HalfMode::kAuto}, {"on", HalfMode::kOn}, {"off", HalfMode::kOff}});
 }
 
+std::optional<std::size_t> countOf(const Arguments& a, const char* option) {
+  const auto given = a.find<std::int64_t>(option);
+  if (!given) return std::nullopt;
+  cli::requireRange(option, *given, std::int64_t{1}, std::numeric_limits<std::int64_t>::max());
+  return std::size_t(*given);
+}
+
+void readPart(const Arguments& a, Options& options) {
+  options.part.layers = countOf(a, "lod");
+  options.part.ellipsoids = options.maxPrimitives = countOf(a, "max-primitives");
+  if (const auto box = a.find<std::string>("bbox"))
+    options.part.box = options.decode.box = cli::parseBox(*box, "bbox");
+}
+
 void readConversion(const Arguments& a, Options& options) {
   options.output = outputOf(a);
   options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
@@ -91,6 +114,7 @@ void readConversion(const Arguments& a, Options& options) {
   if (options.decode.threshold)
     cli::requireRange("threshold", *options.decode.threshold, 0.0f,
                       std::numeric_limits<float>::max());
+  readPart(a, options);
   options.write.half = halfOf(a);
   options.write.constantTiles = !a.get<bool>("no-tiles");
   options.write.overwrite = a.get<bool>("force");
@@ -100,6 +124,11 @@ void readConversion(const Arguments& a, Options& options) {
 }
 
 }  // namespace
+
+bool readsAll(const Options& options) {
+  const ReadPart& part = options.part;
+  return !part.box && !part.layers && !part.ellipsoids;
+}
 
 std::optional<Options> parseOptions(int argc, const char* const* argv) {
   const auto arguments = commandLine().parse(argc, argv);

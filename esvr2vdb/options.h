@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/log.h"
+#include "esvr/container.h"
 #include "esvr/coord.h"
 #include "esvr/grid_coding.h"
 #include "esvr/vdb_io.h"
@@ -22,12 +23,17 @@ struct Options {
   std::filesystem::path input, output;
   std::vector<std::string> grids;  ///< empty: all
   DecodeOptions decode;
+  ReadPart part;                             ///< of the file
+  std::optional<std::size_t> maxPrimitives;  ///< of each grid
   WriteOptions write;
   std::optional<std::filesystem::path> reference;
   std::optional<Box> box;  ///< of the reference's PSNR
   int threads = 0;         ///< 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
 };
+
+/// Whether the whole file is wanted.
+[[nodiscard]] bool readsAll(const Options& options);
 
 /// \return nothing where --help or --version was printed
 /// \throws UsageError

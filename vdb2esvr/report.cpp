@@ -136,6 +136,22 @@ Json compactOf(const ConvertedGrid& grid) {
             {"intensities", bytes.intensities}}}};
 }
 
+/// What a reader gets of the first layers.
+Json layersOf(const EncodedGrid& grid) {
+  Json layers = Json::array();
+  const auto sizes = layerSizes(grid);
+  LayerSize sum;
+  for (std::size_t k = 0; k < grid.layerErrors.size(); ++k) {
+    sum.ellipsoids += sizes[k].ellipsoids;
+    sum.bytes += sizes[k].bytes;
+    layers.push_back({{"primitives", sum.ellipsoids},
+                      {"bytes", sum.bytes},
+                      {"psnr_box", grid.layerErrors[k].psnrBox},
+                      {"max_error", grid.layerErrors[k].maxError}});
+  }
+  return layers;
+}
+
 Json metricsOf(const VolumeMetrics& m) {
   return {{"peak", m.peak},
           {"box_voxels", m.boxVoxels},
@@ -198,6 +214,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"topology", topologyOf(grid.stored)},
           {"fit", fitOf(grid)},
           {"compact", compactOf(grid)},
+          {"layers", layersOf(grid.stored)},
           {"metrics", metricsOf(grid.metrics)},
           {"seconds", secondsOf(grid.seconds)},
           {"left_out", leftOutOf(record, g)},

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "esvr/metrics.h"
-#include "format/ellipsoids_section.h"
 #include "format/grid_rule.h"
+#include "format/layered_section.h"
 
 namespace esvr {
 namespace {
@@ -77,7 +77,7 @@ Trial TrialMaker::make(const QuantiserSteps& steps, int iterations) const {
   Trial trial{steps, field_, {}, 0.0, 0};
   quantiseChunks(trial);
   solveIntensities(trial, iterations);
-  for (const auto& chunk : trial.quantised) trial.bytes += format::putEllipsoids(chunk).size();
+  for (const auto& chunk : trial.quantised) trial.bytes += format::storedBytes(chunk);
   return trial;
 }
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -18,6 +19,10 @@ constexpr double kLog2e = std::numbers::log2e;
 constexpr double kFixed = 256.0;  // Lattice counts bits in 1/256
 constexpr std::size_t kMostThresholds = 16;
 constexpr int kLastRatio = 255;
+
+constexpr std::size_t kLeastLayered =
+    2048;                                // ellipsoids: layers of fewer cost more than they bring
+constexpr std::size_t kFirstLayers = 8;  // the first has an eighth at least, then a quarter, half
 
 /// Of the largest weight: float32 does not show finer steps, and coarser ones leave nothing.
 constexpr double kFinestStep = 0x1p-20, kCoarsestStep = 1.0;
@@ -55,6 +60,22 @@ std::vector<std::uint8_t> precisionsOf(const std::vector<double>& weights, doubl
     e[i] = std::uint8_t(std::clamp(octave, 0.0, double(Lattice::kMaxPrecision)));
   }
   return e;
+}
+
+std::vector<std::uint8_t> layersOf(std::span<const std::uint8_t> precision) {
+  std::array<std::size_t, Lattice::kMaxPrecision + 1> counts{};
+  for (const auto e : precision) ++counts[e];
+  std::vector<std::uint8_t> from;
+  if (precision.size() < kLeastLayered) return from;
+  std::size_t above = 0, layers = kFirstLayers;
+  for (std::size_t e = Lattice::kMaxPrecision; e > 0 && layers > 1; --e) {
+    above += counts[e];
+    if (above == precision.size()) break;
+    if (above * layers < precision.size()) continue;
+    from.push_back(std::uint8_t(e));
+    while (above * layers >= precision.size()) layers /= 2;
+  }
+  return from;
 }
 
 class Chooser {
@@ -143,6 +164,7 @@ LatticeChoice chooseLattice(const Ellipsoids& e, std::span<const double> phi2,
   double largest = *std::max_element(weights.begin(), weights.end());
   if (!(largest > 0.0)) largest = 1.0;
   choice.precision = precisionsOf(weights, largest);
+  choice.layerFrom = layersOf(choice.precision);
   const double lightest = std::ldexp(largest, -Lattice::kMaxPrecision - 1) * std::numbers::sqrt2;
   const auto allowed = within(steps, kFinestStep * largest, kCoarsestStep * largest);
   choice.lattice = Chooser(e, allowed, lightest).choose(curvatureOfVolume(e, phi2));

@@ -65,18 +65,39 @@ void putIntensity(double intensity, std::size_t i, QuantisedEllipsoids& q) {
   q.intensity[i] = negative ? -1 - clamped : clamped;
 }
 
-std::vector<std::size_t> fileOrder(const Ellipsoids& e, const Lattice& lattice) {
-  std::vector<std::uint64_t> keys(e.size());
-  for (std::size_t i = 0; i < e.size(); ++i) {
-    const auto cells = cellsOf(e, i, lattice);
-    for (std::size_t a = 0; a < 3; ++a)
-      keys[i] |= spreadBits(codeOf(cells[a], 0, (1u << lattice.cellBits) - 1, "a center")) << a;
-  }
+std::uint64_t keyOf(const Ellipsoids& e, std::size_t i, const Lattice& lattice) {
+  const auto cells = cellsOf(e, i, lattice);
+  std::uint64_t key = 0;
+  for (std::size_t a = 0; a < 3; ++a)
+    key |= spreadBits(codeOf(cells[a], 0, (1u << lattice.cellBits) - 1, "a center")) << a;
+  return key;
+}
+
+/// Layers are counted from the heaviest.
+std::size_t layerOf(const LatticeChoice& choice, std::size_t i) {
+  return std::size_t(std::count_if(choice.layerFrom.begin(), choice.layerFrom.end(),
+                                   [&](auto from) { return choice.precision[i] < from; }));
+}
+
+std::vector<std::size_t> fileOrder(const Ellipsoids& e, const LatticeChoice& choice) {
+  std::vector<std::pair<std::size_t, std::uint64_t>> keys(e.size());
+  for (std::size_t i = 0; i < e.size(); ++i)
+    keys[i] = {layerOf(choice, i), keyOf(e, i, choice.lattice)};
   std::vector<std::size_t> order(e.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return keys[a] < keys[b]; });
   return order;
+}
+
+/// \param order  the ellipsoids', layer by layer
+std::vector<std::size_t> layerEnds(const LatticeChoice& choice,
+                                   const std::vector<std::size_t>& order) {
+  std::vector<std::size_t> ends;
+  for (std::size_t i = 1; i < order.size(); ++i)
+    if (layerOf(choice, order[i]) != layerOf(choice, order[i - 1])) ends.push_back(i);
+  if (!ends.empty()) ends.push_back(order.size());
+  return ends;
 }
 
 }  // namespace
@@ -86,7 +107,8 @@ QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
   QuantisedEllipsoids q;
   q.lattice = choice.lattice;
   q.resize(e.size());
-  order = fileOrder(e, q.lattice);
+  order = fileOrder(e, choice);
+  q.layerEnds = layerEnds(choice, order);
   for (std::size_t i = 0; i < order.size(); ++i) {
     const std::size_t from = order[i];
     q.precision[i] = choice.precision[from];

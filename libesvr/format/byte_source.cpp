@@ -25,11 +25,21 @@ std::vector<std::byte> ByteSource::read(std::uint64_t offset, std::uint64_t n) c
                    std::to_string(offset) + " do not lie in a file of " + std::to_string(size()));
   std::vector<std::byte> bytes(n);
   fill(offset, bytes);
+  bytesRead_ += n;
   return bytes;
 }
 
 void MemorySource::fill(std::uint64_t offset, std::span<std::byte> out) const {
   std::copy_n(bytes_.begin() + std::ptrdiff_t(offset), out.size(), out.begin());
+}
+
+void BufferSource::fill(std::uint64_t offset, std::span<std::byte> out) const {
+  std::copy_n(bytes_.begin() + std::ptrdiff_t(offset), out.size(), out.begin());
+}
+
+void PartSource::fill(std::uint64_t offset, std::span<std::byte> out) const {
+  const auto bytes = whole_.read(offset_ + offset, out.size());
+  std::copy(bytes.begin(), bytes.end(), out.begin());
 }
 
 FileSource::FileSource(const std::filesystem::path& path)

@@ -27,8 +27,7 @@ class ByteWriter {
 
   template <std::ranges::contiguous_range Values>
   void putAll(const Values& values) {
-    const auto bytes = std::as_bytes(std::span(values));
-    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+    append(std::as_bytes(std::span(values)));
   }
 
   /// A length in 32 bits, then the bytes. \throws RuntimeFailure  4 GiB or more
@@ -47,6 +46,8 @@ class ByteWriter {
   [[nodiscard]] std::vector<std::byte> take() { return std::move(bytes_); }
 
  private:
+  void append(std::span<const std::byte> bytes);
+
   std::vector<std::byte> bytes_;
 };
 

@@ -60,11 +60,11 @@ double radiusOf(const Kernel& kernel, double kappa) {
 
 }  // namespace
 
-Box supportBox(const Chunk& chunk, const Kernel& kernel) {
+Box supportBox(const Chunk& chunk, Run run, const Kernel& kernel) {
   const auto& e = chunk.ellipsoids;
   const double sceneRadius = radiusOf(kernel, kernel.kappa);
   Box box;
-  for (std::size_t i = 0; i < e.size(); ++i) {
+  for (std::size_t i = run.first; i < run.first + run.count; ++i) {
     const double radius = e.kappa.empty() ? sceneRadius : radiusOf(kernel, e.kappa[i]);
     Vec3 half = unitHalfWidths(e, i);
     for (double& h : half) h = radius > 0.0 ? h * radius : 0.0;
@@ -73,9 +73,10 @@ Box supportBox(const Chunk& chunk, const Kernel& kernel) {
   return box;
 }
 
-Box centerBox(const Chunk& chunk) {
+Box centerBox(const Chunk& chunk, Run run) {
   Box box;
-  for (std::size_t i = 0; i < chunk.ellipsoids.size(); ++i) expand(box, centerOf(chunk, i), {});
+  for (std::size_t i = run.first; i < run.first + run.count; ++i)
+    expand(box, centerOf(chunk, i), {});
   return box;
 }
 

@@ -6,12 +6,19 @@
 
 namespace esvr::format {
 
-/// Smallest integer box, in index coordinates, around every ellipsoid's support; cut off at the
-/// ends of 32 bits. Empty without ellipsoids.
-[[nodiscard]] Box supportBox(const Chunk& chunk, const Kernel& kernel);
+/// A run of a chunk's ellipsoids.
+struct Run {
+  std::size_t first = 0, count = 0;
+};
+
+[[nodiscard]] inline Run all(const Chunk& chunk) { return {0, chunk.ellipsoids.size()}; }
+
+/// Smallest integer box, in index coordinates, around the support of every ellipsoid of a run; cut
+/// off at the ends of 32 bits. Empty without ellipsoids.
+[[nodiscard]] Box supportBox(const Chunk& chunk, Run run, const Kernel& kernel);
 
 /// Smallest integer box around every center: lies in the support box, and is the same on every
 /// machine, so that it can be checked.
-[[nodiscard]] Box centerBox(const Chunk& chunk);
+[[nodiscard]] Box centerBox(const Chunk& chunk, Run run);
 
 }  // namespace esvr::format

@@ -19,6 +19,14 @@ EsvrFile readEsvr(const std::filesystem::path& path) {
   return format::decode(format::FileSource(path));
 }
 
+PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part) {
+  const format::FileSource source(path);
+  PartOfFile result;
+  result.file = format::decodePart(source, part);
+  result.bytesRead = source.bytesRead();
+  return result;
+}
+
 EsvrSummary inspectEsvr(const std::filesystem::path& path) {
   const auto table = format::readTable(format::FileSource(path));
   EsvrSummary summary{table.versionMajor, table.versionMinor, table.fileBytes, {}};

@@ -1,6 +1,8 @@
 #include "format/decode.h"
 
 #include <algorithm>
+#include <limits>
+#include <memory>
 #include <utility>
 
 #include "esvr/error.h"
@@ -8,6 +10,8 @@
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
 #include "format/grid_record.h"
+#include "format/layer_errors_stream.h"
+#include "format/layered_section.h"
 #include "format/leaves_stream.h"
 #include "format/planes.h"
 #include "format/section_reader.h"
@@ -19,24 +23,35 @@ namespace {
 
 using namespace format;
 
+bool meet(const Box& a, const Box& b) {
+  const Coord low = maxCoord(a.min, b.min), high = minCoord(a.max, b.max);
+  return low.x <= high.x && low.y <= high.y && low.z <= high.z;
+}
+
 bool encloses(const Box& outer, const Box& inner) {
   return inner.empty() || (outer.contains(inner.min) && outer.contains(inner.max));
 }
 
-/// Reads one grid of a file.
+/// A chunk whose ellipsoids lie in layers.
+struct OpenChunk {
+  std::unique_ptr<ByteSource> section;  ///< none: it has no layers, or is not wanted
+  BlockDirectory directory;
+};
+
+/// Reads one grid of a file. \param part  nothing: all of it
 class GridDecoder {
  public:
-  GridDecoder(SectionReader& sections, std::uint32_t grid) : sections_(sections), g_(grid) {}
+  GridDecoder(SectionReader& sections, std::uint32_t grid, const ReadPart* part)
+      : sections_(sections), g_(grid), part_(part) {}
 
   EncodedGrid decode() {
     GridRecord record = readRecord();
     EncodedGrid grid = std::move(record.grid);
     if (record.chunkCount > 1) record.chunks = readChunkTable(record.chunkCount);
-    if (anyQuantised(record.chunks.size())) grid.quantised.resize(record.chunks.size());
-    for (std::uint32_t c = 0; c < record.chunks.size(); ++c)
-      grid.field.chunks.push_back(readChunk(c, record.chunks[c], grid));
+    readChunks(record.chunks, grid);
     if (grid.topology == TopologyKind::kLeaves) readLeaves(grid);
     readVoxels(grid);
+    readLayerErrors(grid);
     readCurve(grid);
     return grid;
   }
@@ -48,9 +63,10 @@ class GridDecoder {
 
   void refuse(const std::optional<Fault>& fault, std::uint32_t chunk = kNone) const {
     if (!fault) return;
-    const auto quantised = id(SectionKind::kEllipsoids, chunk);
-    const auto own = id(fault->section, chunk);
-    throw BadInput(sections_.place(wasThere(quantised) ? quantised : own) + ": " + fault->text);
+    SectionId place = id(fault->section, chunk);
+    for (const auto kind : {SectionKind::kEllipsoids, SectionKind::kLayered})
+      if (wasThere(id(kind, chunk))) place = id(kind, chunk);
+    throw BadInput(sections_.place(place) + ": " + fault->text);
   }
 
   [[nodiscard]] bool wasThere(const SectionId& section) const {
@@ -85,18 +101,89 @@ class GridDecoder {
   /// All of a grid's chunks that have ellipsoids are quantised, or none.
   [[nodiscard]] bool anyQuantised(std::size_t chunks) const {
     for (std::uint32_t c = 0; c < chunks; ++c)
-      if (sections_.has(id(SectionKind::kEllipsoids, c))) return true;
+      for (const auto kind : {SectionKind::kEllipsoids, SectionKind::kLayered})
+        if (sections_.has(id(kind, c))) return true;
     return false;
+  }
+
+  [[nodiscard]] bool wanted(const Box& box) const {
+    return !part_ || !part_->box || meet(box, *part_->box);
+  }
+
+  void readChunks(const std::vector<ChunkRecord>& records, EncodedGrid& grid) {
+    if (anyQuantised(records.size())) grid.quantised.resize(records.size());
+    std::vector<OpenChunk> open;
+    for (std::uint32_t c = 0; c < records.size(); ++c) open.push_back(openChunk(c, records[c]));
+    layers_ = layersWanted(records, open);
+    for (std::uint32_t c = 0; c < records.size(); ++c)
+      grid.field.chunks.push_back(open[c].section ? readLayered(c, records[c], open[c], grid)
+                                                  : readChunk(c, records[c], grid));
+  }
+
+  OpenChunk openChunk(std::uint32_t c, const ChunkRecord& record) {
+    const auto section = id(SectionKind::kLayered, c);
+    layersInFile_ = std::max<std::size_t>(layersInFile_, record.count > 0 ? 1 : 0);
+    if (record.count == 0 || !wanted(record.box) || !sections_.has(section)) return {};
+    OpenChunk open{sections_.open(section, part_ == nullptr), {}};
+    open.directory = getDirectory(*open.section, record);
+    layersInFile_ = std::max(layersInFile_, open.directory.layerEnds.size());
+    if (!part_) checkEnd(*open.section, open.directory);
+    return open;
+  }
+
+  /// How many layers to read of each chunk.
+  [[nodiscard]] std::size_t layersWanted(const std::vector<ChunkRecord>& records,
+                                         const std::vector<OpenChunk>& open) const {
+    const std::size_t most = part_ && part_->layers ? *part_->layers : kAllLayers;
+    if (!part_ || !part_->ellipsoids) return most;
+    std::vector<std::uint64_t> sizes;
+    for (std::size_t c = 0; c < open.size(); ++c) addLayerSizes(records[c], open[c], sizes);
+    std::uint64_t sum = 0;
+    for (std::size_t layer = 0; layer < sizes.size(); ++layer)
+      if ((sum += sizes[layer]) >= *part_->ellipsoids) return std::min(most, layer + 1);
+    return most;
+  }
+
+  void addLayerSizes(const ChunkRecord& record, const OpenChunk& open,
+                     std::vector<std::uint64_t>& sizes) const {
+    std::vector<std::size_t> ends = open.directory.layerEnds;
+    if (ends.empty()) ends.push_back(wanted(record.box) ? record.count : 0);
+    sizes.resize(std::max(sizes.size(), ends.size()));
+    std::size_t first = 0;
+    for (std::size_t k = 0; k < ends.size(); ++k) {
+      sizes[k] += ends[k] - first;
+      first = ends[k];
+    }
+  }
+
+  Chunk readLayered(std::uint32_t c, const ChunkRecord& record, const OpenChunk& open,
+                    EncodedGrid& grid) {
+    const auto& blocks = open.directory.blocks;
+    std::vector<std::size_t> chosen;
+    for (std::size_t b = 0; b < blocks.size(); ++b)
+      if (blocks[b].layer < layers_ && wanted(blocks[b].box)) chosen.push_back(b);
+    grid.quantised[c] = getBlocks(*open.section, open.directory, chosen);
+    Chunk chunk{record.origin, dequantise(grid.quantised[c])};
+    refuse(faultOf(chunk.ellipsoids), c);
+    std::size_t first = 0;
+    for (const std::size_t b : chosen) {
+      const Run run{first, blocks[b].run.count};
+      if (!encloses(blocks[b].box, centerBox(chunk, run)))
+        refuse(Fault{SectionKind::kLayered, "a center lies outside its block's box"}, c);
+      first += run.count;
+    }
+    return chunk;
   }
 
   Chunk readChunk(std::uint32_t c, const ChunkRecord& record, EncodedGrid& grid) {
     Chunk chunk{record.origin, {}};
-    if (record.count != 0 && grid.quantised.empty())
+    if (record.count == 0 || !wanted(record.box)) return chunk;
+    if (grid.quantised.empty())
       chunk.ellipsoids = readEllipsoids(c, record.count);
-    else if (record.count != 0)
+    else
       chunk.ellipsoids = readQuantised(c, record.count, grid.quantised[c]);
     refuse(faultOf(chunk.ellipsoids), c);
-    if (!encloses(record.box, centerBox(chunk)))
+    if (!encloses(record.box, centerBox(chunk, all(chunk))))
       refuse(Fault{SectionKind::kCenters, "a center lies outside the chunk's box"}, c);
     return chunk;
   }
@@ -133,14 +220,28 @@ class GridDecoder {
       grid.voxels = getVoxels(sections_.get(section), sections_.place(section));
   }
 
+  /// Those of the layers that were read; of a box nothing is known.
+  void readLayerErrors(EncodedGrid& grid) {
+    const auto section = id(SectionKind::kLayerErrors);
+    if (!sections_.has(section) || (part_ && part_->box)) return;
+    grid.layerErrors =
+        getLayerErrors(sections_.get(section), layersInFile_, sections_.place(section));
+    grid.layerErrors.resize(layerCount(grid));
+  }
+
   void readCurve(EncodedGrid& grid) {
     const auto section = id(SectionKind::kCurve);
-    if (sections_.has(section))
+    if (sections_.has(section) && !part_)
       grid.curve = getCurve(sections_.get(section), sections_.place(section));
   }
 
+  static constexpr std::size_t kAllLayers = std::numeric_limits<std::size_t>::max();
+
   SectionReader& sections_;
   std::uint32_t g_;
+  const ReadPart* part_;
+  std::size_t layers_ = kAllLayers;  ///< to be read
+  std::size_t layersInFile_ = 0;     ///< of the chunks that were opened
 };
 
 std::vector<MetaItem> readFileMetadata(SectionReader& sections) {
@@ -156,15 +257,29 @@ std::vector<MetaItem> readFileMetadata(SectionReader& sections) {
 }  // namespace
 
 namespace format {
+namespace {
 
-EsvrFile decode(const ByteSource& source) {
-  SectionReader sections(source);
+EsvrFile decodeGrids(SectionReader& sections, const ReadPart* part) {
   EsvrFile file;
   file.metadata = readFileMetadata(sections);
   const std::uint32_t grids = sections.count(SectionKind::kGrid);
-  for (std::uint32_t g = 0; g < grids; ++g) file.grids.push_back(GridDecoder(sections, g).decode());
+  for (std::uint32_t g = 0; g < grids; ++g)
+    file.grids.push_back(GridDecoder(sections, g, part).decode());
+  return file;
+}
+
+}  // namespace
+
+EsvrFile decode(const ByteSource& source) {
+  SectionReader sections(source);
+  EsvrFile file = decodeGrids(sections, nullptr);
   sections.finish();
   return file;
+}
+
+EsvrFile decodePart(const ByteSource& source, const ReadPart& part) {
+  SectionReader sections(source);
+  return decodeGrids(sections, &part);
 }
 
 }  // namespace format

@@ -9,4 +9,7 @@ namespace esvr::format {
 /// \throws BadInput
 [[nodiscard]] EsvrFile decode(const ByteSource& source);
 
+/// \throws BadInput
+[[nodiscard]] EsvrFile decodePart(const ByteSource& source, const ReadPart& part);
+
 }  // namespace esvr::format

@@ -150,12 +150,44 @@ class BlockCoder {
 
 }  // namespace
 
+std::vector<Run> blockRuns(std::size_t count, std::span<const std::size_t> layerEnds) {
+  std::vector<Run> runs;
+  const auto cut = [&](std::size_t first, std::size_t end) {
+    for (; first < end; first += kBlockEllipsoids)
+      runs.push_back({first, std::min(kBlockEllipsoids, end - first)});
+  };
+  std::size_t first = 0;
+  for (const std::size_t end : layerEnds) {
+    cut(first, end);
+    first = end;
+  }
+  cut(first, count);
+  return runs;
+}
+
+void padForEllipsoids(ByteWriter& out, std::size_t count) {
+  out.padTo(std::max(out.size(), (count + kMostEllipsoidsAByte - 1) / kMostEllipsoidsAByte));
+}
+
+void checkCount(const ByteReader& in, std::uint64_t stored, std::uint64_t count,
+                std::uint64_t bytes) {
+  if (stored != count || count / kMostEllipsoidsAByte > bytes)
+    in.fail(std::to_string(bytes) + " bytes of content with " + std::to_string(stored) +
+            " ellipsoids for " + std::to_string(count));
+}
+
 BlockStreams encodeBlock(QuantisedEllipsoids& q, Run run) {
   std::array<Writer, kStreams> writers;
   BlockCoder<Writer>(writers, q).code(run);
   BlockStreams streams;
   for (std::size_t s = 0; s < kStreams; ++s) streams[s] = writers[s].coder.finish();
   return streams;
+}
+
+std::vector<BlockStreams> encodeBlocks(QuantisedEllipsoids q) {
+  std::vector<BlockStreams> blocks;
+  for (const Run run : blockRuns(q)) blocks.push_back(encodeBlock(q, run));
+  return blocks;
 }
 
 void decodeBlock(const BlockBytes& streams, Run run, QuantisedEllipsoids& q) {

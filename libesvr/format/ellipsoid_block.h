@@ -8,6 +8,9 @@
 #include <vector>
 
 #include "esvr/quantised.h"
+#include "format/byte_reader.h"
+#include "format/byte_writer.h"
+#include "format/chunk_box.h"
 
 namespace esvr::format {
 
@@ -18,13 +21,27 @@ inline constexpr std::size_t kStreams = 4;  ///< positions, scales, rotations, i
 using BlockStreams = std::array<std::vector<std::byte>, kStreams>;
 using BlockBytes = std::array<std::span<const std::byte>, kStreams>;
 
-/// A run of ellipsoids.
-struct Run {
-  std::size_t first = 0, count = 0;
-};
+/// The ellipsoids of each block, layer by layer.
+[[nodiscard]] std::vector<Run> blockRuns(std::size_t count, std::span<const std::size_t> layerEnds);
+[[nodiscard]] inline std::vector<Run> blockRuns(const QuantisedEllipsoids& q) {
+  return blockRuns(q.size(), q.layerEnds);
+}
+
+/// Alike ellipsoids cost next to nothing, and a reader must know how many a byte can hold before it
+/// allocates: writers add zeros where there would be more.
+inline constexpr std::uint64_t kMostEllipsoidsAByte = 64;
+void padForEllipsoids(ByteWriter& out, std::size_t count);
+
+/// Refuses a section of `bytes` that says it has `stored` ellipsoids where its chunk has `count`,
+/// or cannot hold them. \throws BadInput
+void checkCount(const ByteReader& in, std::uint64_t stored, std::uint64_t count,
+                std::uint64_t bytes);
 
 /// Leaves `q` as it is.
 [[nodiscard]] BlockStreams encodeBlock(QuantisedEllipsoids& q, Run run);
+
+/// All of them.
+[[nodiscard]] std::vector<BlockStreams> encodeBlocks(QuantisedEllipsoids q);
 
 /// Fills a run of `q`, whose lattice and size are set. \throws BadInput  values outside the lattice
 void decodeBlock(const BlockBytes& streams, Run run, QuantisedEllipsoids& q);

@@ -11,6 +11,7 @@
 
 namespace esvr::format {
 
+/// \param q  of one layer
 [[nodiscard]] std::vector<std::byte> putEllipsoids(const QuantisedEllipsoids& q);
 
 /// \param count  what the chunk's record says; compared with the content before anything is

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "esvr/container.h"
@@ -8,6 +10,8 @@
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
 #include "format/grid_record.h"
+#include "format/layer_errors_stream.h"
+#include "format/layered_section.h"
 #include "format/leaves_stream.h"
 #include "format/morton_order.h"
 #include "format/planes.h"
@@ -32,7 +36,6 @@ class Sections {
   /// Content that is coded already.
   void addRaw(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content) {
     const std::uint64_t bytes = content.size();
-    table_.versionMinor = kCodedMinor;
     addPacked(id, flags, {Codec::kRaw, std::move(content), bytes});
   }
 
@@ -55,6 +58,7 @@ class Sections {
 
  private:
   void addPacked(const SectionId& id, std::uint16_t flags, Packed packed) {
+    table_.versionMinor = std::max(table_.versionMinor, minorOf(id.kind));
     SectionEntry entry{id, packed.codec, flags, 0, 0, 0, 0};
     entry.rawBytes = packed.rawBytes;
     entry.storedBytes = packed.bytes.size();
@@ -81,12 +85,25 @@ struct SortedGrid {
   throw RuntimeFailure("cannot store grid '" + grid.descriptor.name + "': " + what);
 }
 
+void checkLayers(const EncodedGrid& grid) {
+  for (const auto& q : grid.quantised) {
+    const auto& ends = q.layerEnds;
+    if (ends.empty()) continue;
+    if (ends.size() < 2 || ends.front() == 0 || ends.back() != q.size() ||
+        std::adjacent_find(ends.begin(), ends.end(), std::greater_equal<>()) != ends.end())
+      refuse(grid, "its layers do not divide a chunk");
+  }
+  if (!grid.layerErrors.empty() && grid.layerErrors.size() != layerCount(grid))
+    refuse(grid, "it has not one error for each layer");
+}
+
 void checkGrid(const EncodedGrid& grid) {
   if (const auto fault = faultOf(grid)) refuse(grid, fault->text);
   if (grid.topology != TopologyKind::kLeaves && !grid.leaves.empty())
     refuse(grid, "it has leaves, but a topology without");
   if (!grid.quantised.empty() && grid.quantised.size() != grid.field.chunks.size())
     refuse(grid, "its quantised chunks are not those of its field");
+  checkLayers(grid);
   for (std::size_t c = 0; c < grid.field.chunks.size(); ++c) {
     const auto& ellipsoids = grid.field.chunks[c].ellipsoids;
     checkInvariants(ellipsoids);
@@ -103,7 +120,7 @@ SortedGrid sorted(const EncodedGrid& grid) {
     result.chunks.push_back({chunk.origin, grid.quantised.empty() ? inMortonOrder(chunk.ellipsoids)
                                                                   : chunk.ellipsoids});
     result.records.push_back(
-        {chunk.origin, supportBox(chunk, grid.field.kernel), chunk.ellipsoids.size()});
+        {chunk.origin, supportBox(chunk, all(chunk), grid.field.kernel), chunk.ellipsoids.size()});
   }
   return result;
 }
@@ -141,15 +158,30 @@ void addChunk(Sections& out, std::uint32_t g, std::uint32_t c, const Ellipsoids&
   if (!e.kappa.empty()) add(SectionKind::kKappas, {&e.kappa, 1});
 }
 
-void addQuantised(Sections& out, std::uint32_t g, std::uint32_t c, const QuantisedEllipsoids& q) {
+std::vector<Box> blockBoxes(const Chunk& chunk, const QuantisedEllipsoids& q,
+                            const Kernel& kernel) {
+  std::vector<Box> boxes;
+  for (const Run run : blockRuns(q)) boxes.push_back(supportBox(chunk, run, kernel));
+  return boxes;
+}
+
+void addQuantised(Sections& out, std::uint32_t g, std::uint32_t c, const SortedGrid& grid) {
+  const QuantisedEllipsoids& q = grid.grid.quantised[c];
   if (q.size() == 0) return;
-  out.addRaw({SectionKind::kEllipsoids, g, c}, kRequired, putEllipsoids(q));
+  if (q.layerEnds.empty())
+    out.addRaw({SectionKind::kEllipsoids, g, c}, kRequired, putEllipsoids(q));
+  else
+    out.addRaw(
+        {SectionKind::kLayered, g, c}, kRequired,
+        putLayered(q, grid.records[c].box, blockBoxes(grid.chunks[c], q, grid.grid.field.kernel)));
 }
 
 void addExtras(Sections& out, std::uint32_t g, const EncodedGrid& grid) {
   if (!grid.leaves.empty())
     out.add({SectionKind::kLeaves, g}, kRequired, putLeaves(grid.leaves), kFloatSize);
   if (grid.voxels) out.addRaw({SectionKind::kVoxels, g}, kRequired, putVoxels(*grid.voxels));
+  if (!grid.layerErrors.empty())
+    out.addRaw({SectionKind::kLayerErrors, g}, kOptional, putLayerErrors(grid.layerErrors));
   if (!grid.curve.empty())
     out.add({SectionKind::kCurve, g}, kOptional, putCurve(grid.curve), kDoubleSize);
 }
@@ -174,7 +206,7 @@ std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
       if (quantised.empty())
         addChunk(out, g, c, grids[g].chunks[c].ellipsoids);
       else
-        addQuantised(out, g, c, quantised[c]);
+        addQuantised(out, g, c, grids[g]);
     addExtras(out, g, grids[g].grid);
   }
   return out.assemble();

@@ -109,19 +109,64 @@ EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& sou
   return grid;
 }
 
+namespace {
+
+bool meets(const Box& box, Coord corner) {
+  const Coord last = corner + Coord{kBrickSide - 1, kBrickSide - 1, kBrickSide - 1};
+  return corner.x <= box.max.x && corner.y <= box.max.y && corner.z <= box.max.z &&
+         last.x >= box.min.x && last.y >= box.min.y && last.z >= box.min.z;
+}
+
+/// Where the field is to be evaluated; nothing where it is wherever supports reach.
+std::optional<std::vector<Coord>> bricksWanted(const EncodedGrid& grid,
+                                               const DecodeOptions& options) {
+  const bool stored = grid.topology == TopologyKind::kLeaves;
+  if (!stored && !options.box) return std::nullopt;
+  std::vector<Coord> bricks = stored ? grid.leaves : reachedBricks(grid.field);
+  if (options.box)
+    std::erase_if(bricks, [&](Coord corner) { return !meets(*options.box, corner); });
+  return bricks;
+}
+
+SparseVolume evaluated(const EncodedGrid& grid, const DecodeOptions& options) {
+  const ActivityRule rule = ruleOf(grid);
+  const auto bricks = bricksWanted(grid, options);
+  return revoxelise(grid.field,
+                    {.threshold = options.threshold.value_or(grid.activeThreshold),
+                     .range = rule.range,
+                     .narrowBand = rule.narrowBand,
+                     .bricks = bricks ? std::span<const Coord>(*bricks) : std::span<const Coord>{},
+                     .restrictToBricks = bricks.has_value()});
+}
+
+/// Voxels outside a box become inactive, bricks without an active voxel go.
+void clip(const Box& box, const ActivityRule& rule, SparseVolume& volume) {
+  std::vector<BrickInput> kept;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    BrickInput brick{volume.brickCorner(b), {}, {}};
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const bool inside = box.contains(brick.corner + voxelLocal(v));
+      brick.values[std::size_t(v)] = inside ? values[v] : rule.inactiveValue(values[v]);
+      if (inside && volume.active[b].test(v)) brick.active.set(v);
+    }
+    kept.push_back(brick);
+  }
+  volume = makeVolume(std::move(kept), volume.background);
+}
+
+}  // namespace
+
 SparseVolume decodeGrid(const EncodedGrid& grid, const DecodeOptions& options) {
   if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
   if (grid.voxels && options.threshold)
     throw UsageError("grid '" + grid.descriptor.name +
                      "' holds its voxels, which are active as they are: it takes no threshold");
-  if (grid.voxels) return volumeOf(*grid.voxels);
-  const ActivityRule rule = ruleOf(grid);
-  return revoxelise(grid.field, {.threshold = options.threshold.value_or(grid.activeThreshold),
-                                 .range = rule.range,
-                                 .narrowBand = rule.narrowBand,
-                                 .bricks = grid.leaves,
-                                 .restrictToBricks = grid.topology == TopologyKind::kLeaves});
+  if (options.box && options.box->empty()) throw UsageError("the box of voxels is empty");
+  SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
+  if (options.box) clip(*options.box, ruleOf(grid), volume);
+  return volume;
 }
 
 }  // namespace esvr

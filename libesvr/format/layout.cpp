@@ -17,6 +17,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kChunks, "chunks"},
     {SectionKind::kLeaves, "leaves"},
     {SectionKind::kCurve, "curve"},
+    {SectionKind::kLayerErrors, "layer errors"},
     {SectionKind::kCenters, "centers"},
     {SectionKind::kScales, "scales"},
     {SectionKind::kRotations, "rotations"},
@@ -24,6 +25,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kKappas, "kappas"},
     {SectionKind::kEllipsoids, "ellipsoids"},
     {SectionKind::kVoxels, "voxels"},
+    {SectionKind::kLayered, "layered ellipsoids"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
 
@@ -48,5 +50,18 @@ std::string nameOf(SectionKind kind) { return nameIn(kKinds, kind); }
 std::string nameOf(Codec codec) { return nameIn(kCodecs, codec); }
 bool known(SectionKind kind) { return find(kKinds, kind) != nullptr; }
 bool known(Codec codec) { return find(kCodecs, codec) != nullptr; }
+
+std::uint16_t minorOf(SectionKind kind) {
+  switch (kind) {
+    case SectionKind::kEllipsoids:
+    case SectionKind::kVoxels:
+      return 1;
+    case SectionKind::kLayerErrors:
+    case SectionKind::kLayered:
+      return 2;
+    default:
+      return kFirstMinor;
+  }
+}
 
 }  // namespace esvr::format

@@ -15,9 +15,8 @@ namespace esvr::format {
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
 
 inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
-inline constexpr std::uint16_t kVersionMinor = 1;  ///< the highest that is read and written
+inline constexpr std::uint16_t kVersionMinor = 2;  ///< the highest that is read and written
 inline constexpr std::uint16_t kFirstMinor = 0;    ///< what needs no later one is written as this
-inline constexpr std::uint16_t kCodedMinor = 1;    ///< has quantised ellipsoids or voxels
 
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
@@ -33,6 +32,7 @@ enum class SectionKind : std::uint32_t {
   kChunks = 3,
   kLeaves = 4,
   kCurve = 5,
+  kLayerErrors = 6,
   kCenters = 16,
   kScales = 17,
   kRotations = 18,
@@ -40,6 +40,7 @@ enum class SectionKind : std::uint32_t {
   kKappas = 20,
   kEllipsoids = 32,
   kVoxels = 33,
+  kLayered = 34,
 };
 
 enum class Codec : std::uint16_t {
@@ -59,6 +60,9 @@ inline constexpr std::uint64_t kCurveRecordBytes = 44;
 [[nodiscard]] std::string nameOf(Codec codec);
 [[nodiscard]] bool known(SectionKind kind);
 [[nodiscard]] bool known(Codec codec);
+
+/// The minor version that brought a kind: a file is of the highest of its sections'.
+[[nodiscard]] std::uint16_t minorOf(SectionKind kind);
 
 constexpr std::uint64_t alignUp(std::uint64_t offset) {
   return (offset + kAlignment - 1) / kAlignment * kAlignment;

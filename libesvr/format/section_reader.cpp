@@ -25,10 +25,23 @@ std::string SectionReader::place(const SectionId& id) const {
   return placeOf(source_.name(), table_, std::size_t(it - entries.begin()));
 }
 
-std::vector<std::byte> SectionReader::get(const SectionId& id) {
+std::size_t SectionReader::take(const SectionId& id) {
   const auto node = unread_.extract(id);
   if (node.empty()) throw BadInput(source_.name() + ": there is no " + describe(id));
-  return readSection(source_, table_, node.mapped());
+  return node.mapped();
+}
+
+std::vector<std::byte> SectionReader::get(const SectionId& id) {
+  return readSection(source_, table_, take(id));
+}
+
+std::unique_ptr<ByteSource> SectionReader::open(const SectionId& id, bool whole) {
+  const std::size_t taken = take(id);
+  const SectionEntry& entry = table_.entries[taken];
+  const std::string name = placeOf(source_.name(), table_, taken);
+  if (entry.codec != Codec::kRaw) throw BadInput(name + ": must not be compressed");
+  if (whole) return std::make_unique<BufferSource>(readStored(source_, table_, taken), name);
+  return std::make_unique<PartSource>(source_, entry.offset, entry.storedBytes, name);
 }
 
 void SectionReader::finish() {

@@ -2,6 +2,7 @@
 /// Hands out a file's sections by what they are of, and knows which were never asked for.
 
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -28,11 +29,18 @@ class SectionReader {
   /// A section's content; each can be had once. \throws BadInput  damaged; there is none
   [[nodiscard]] std::vector<std::byte> get(const SectionId& id);
 
+  /// A section to be read piece by piece; instead of get(), and like it once.
+  /// \param whole  read and check all of it now; else nothing of it is checked yet
+  /// \throws BadInput  damaged; there is none; it is compressed
+  [[nodiscard]] std::unique_ptr<ByteSource> open(const SectionId& id, bool whole);
+
   /// Checks what has not been read: bytes between the sections, checksums of unknown sections.
   /// \throws BadInput  damaged; a known section that belongs to nothing
   void finish();
 
  private:
+  [[nodiscard]] std::size_t take(const SectionId& id);
+
   const ByteSource& source_;
   SectionTable table_;
   std::map<SectionId, std::size_t> unread_;

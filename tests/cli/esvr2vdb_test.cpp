@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <filesystem>
 
 #include "cli/converters.h"
@@ -68,6 +69,45 @@ TEST_F(Esvr2Vdb, savesAsHalfWhereAsked) {
   EXPECT_TRUE(inspectVdb(out()).grids[0].savedAsHalf);
   ASSERT_EQ(esvr2vdb({in(), out(), "--force"}).exitCode, 0);
   EXPECT_FALSE(inspectVdb(out()).grids[0].savedAsHalf) << "the source was not";
+}
+
+/// As the report on stderr has it: "read N of M bytes".
+struct BytesRead {
+  unsigned long read = 0, whole = 0;
+};
+BytesRead bytesRead(const std::string& err) {
+  BytesRead bytes;
+  const auto at = err.find("read ");
+  if (at != std::string::npos)
+    std::sscanf(err.c_str() + at, "read %lu of %lu bytes", &bytes.read, &bytes.whole);
+  return bytes;
+}
+
+TEST_F(Esvr2Vdb, writesAPartOfTheVoxelsWithoutReadingTheRest) {
+  // "heat" lies 40 voxels beside "density": its ellipsoids cannot reach the box
+  const auto run = esvr2vdb({in(), out(), "--bbox", "-4,-4,-4,3,7,7"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const Box box = inspectVdb(out()).grids[0].activeBox;
+  EXPECT_FALSE(box.empty());
+  EXPECT_TRUE((Box{{-4, -4, -4}, {3, 7, 7}}.contains(box.min)));
+  EXPECT_TRUE((Box{{-4, -4, -4}, {3, 7, 7}}.contains(box.max)));
+  EXPECT_EQ(inspectVdb(out()).grids[1].activeVoxels, 0u);
+  const BytesRead bytes = bytesRead(run.err);
+  EXPECT_EQ(bytes.whole, std::filesystem::file_size(in()));
+  EXPECT_GT(bytes.read, 0u);
+  EXPECT_LT(bytes.read + 100, bytes.whole);
+  const SparseVolume part = readGrid(out(), "density").volume;
+  ASSERT_EQ(esvr2vdb({in(), out(), "--force"}).exitCode, 0);
+  const SparseVolume whole = readGrid(out(), "density").volume;
+  for (int x = -4; x <= 3; ++x) EXPECT_EQ(valueAt(part, {x, 1, 2}), valueAt(whole, {x, 1, 2}));
+}
+
+TEST_F(Esvr2Vdb, writesTheHeaviestEllipsoidsOnly) {
+  const auto run = esvr2vdb({in(), out(), "-g", "density", "--max-primitives", "1"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto few = inspectVdb(out()).grids[0].activeVoxels;
+  ASSERT_EQ(esvr2vdb({in(), out(), "-g", "density", "--lod", "1", "-f"}).exitCode, 0);
+  EXPECT_LT(few, inspectVdb(out()).grids[0].activeVoxels) << "so small a file has one layer";
 }
 
 TEST_F(Esvr2Vdb, hasFewerActiveVoxelsAtAHigherThreshold) {
@@ -152,6 +192,10 @@ INSTANTIATE_TEST_SUITE_P(
                     Refusal{{"IN", "OUT", "--half", "maybe"}, 2, "maybe"},
                     Refusal{{"IN", "OUT", "--box", "0,0,0,1,1,1"}, 2, "--reference"},
                     Refusal{{"IN", "OUT", "--list"}, 2, "--list"},
+                    Refusal{{"IN", "OUT", "--lod", "0"}, 2, "--lod"},
+                    Refusal{{"IN", "OUT", "--max-primitives", "-1"}, 2, "--max-primitives"},
+                    Refusal{{"IN", "OUT", "--bbox", "1,2,3"}, 2, "bbox"},
+                    Refusal{{"--check", "IN", "--lod", "1"}, 2, "--check"},
                     Refusal{{"--list", "--check", "IN"}, 2, "two jobs"},
                     Refusal{{"DIR/none.esvr", "OUT"}, 3, "none.esvr"},
                     Refusal{{"DIR/source.vdb", "OUT"}, 3, "source.vdb"},

@@ -312,8 +312,8 @@ TEST_F(Vdb2Esvr, reportsWhatDocsReportSaysAndNothingElse) {
   const Json& grid = report["grids"][0];
   EXPECT_THAT(keysOf(grid),
               testing::UnorderedElementsAre("name", "source", "primitives", "bytes", "sections",
-                                            "kernel", "topology", "fit", "compact", "metrics",
-                                            "seconds", "left_out", "curve"));
+                                            "kernel", "topology", "fit", "compact", "layers",
+                                            "metrics", "seconds", "left_out", "curve"));
   EXPECT_EQ(report["schema"], "esvr-report");
   EXPECT_EQ(report["exit_code"], 0);
   EXPECT_EQ(report["output"]["bytes"], std::filesystem::file_size(out()));

@@ -49,6 +49,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"kappas_and_chunks", fileOf(chunkedGrid(4))},
       {"compressed", fileOf(fogGrid(60))},
       {"quantised", fileOf(quantisedGrid(20))},
+      {"layered", fileOf(layeredGrid(20))},
       {"voxels", fileOf(fewValues())},
       {"unknown_section", fileOf(oneEllipsoid()), true},
   };

@@ -17,7 +17,7 @@ PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 96500
 NONE = 0xFFFFFFFF
 KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 5: "curve", 16: "centers",
          17: "scales", 18: "rotations", 19: "intensities", 20: "kappas", 32: "ellipsoids",
-         33: "voxels"}
+         33: "voxels", 6: "layer errors", 34: "layered ellipsoids"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
 
@@ -245,15 +245,20 @@ def block(lattice, n, streams):
         yield center, logs, [c / norm for c in (w, *turn)], -height if sign else height
 
 
-def ellipsoids(data):
-    r = Record(data)
-    count = r.get("Q")
+def lattice_of(r):
     lattice = {key: r.get(form) for key, form in (
         ("cell", "d"), ("lowest cell", "3i"), ("scale step", "d"), ("lowest scale", "i"),
         ("intensity step", "d"), ("position base", "i"), ("position slope", "i"),
         ("scale offset", "i"), ("intensity base", "i"), ("intensity slope", "i"),
         ("rotation offset", "i"), ("cell bits", "B"), ("signs", "B"))}
     lattice["thresholds"] = [r.get("B") for _ in range(r.get("B"))]
+    return lattice
+
+
+def ellipsoids(data):
+    r = Record(data)
+    count = r.get("Q")
+    lattice = lattice_of(r)
     table = [r.get("4I") for _ in range((count + 4095) // 4096)]
     result = []
     for b, sizes in enumerate(table):
@@ -261,6 +266,32 @@ def ellipsoids(data):
         result += block(lattice, min(4096, count - 4096 * b), streams)
     assert not any(data[r.at:]), "padding of ellipsoids"
     return result
+
+
+def layered(data):
+    """[(box in parts, ellipsoids)] of each block, and where the layers end."""
+    r = Record(data)
+    size = r.get("I")
+    count = r.get("Q")
+    lattice = lattice_of(r)
+    ends = [r.get("Q") for _ in range(r.get("B"))]
+    assert len(ends) > 1 and ends == sorted(set(ends)) and ends[-1] == count, "layers"
+    counts = []
+    for first, end in zip([0] + ends, ends):
+        counts += [min(4096, end - at) for at in range(first, end, 4096)]
+    entries = [(r.get("6B"), r.get("4I"), r.get("Q")) for _ in counts]
+    assert r.at == size - 8 and r.get("Q") == xxh64(data[:size - 8]), "directory"
+    blocks = []
+    for n, (box, sizes, hashed) in zip(counts, entries):
+        whole = data[r.at:r.at + sum(sizes)]
+        assert hashed == xxh64(whole), "block checksum"
+        blocks.append((box, list(block(lattice, n, [r.get(f"{size}s") for size in sizes]))))
+    assert not any(data[r.at:]), "padding of ellipsoids"
+    return ends, blocks
+
+
+def layer_errors(data):
+    return [struct.unpack_from("<2f", data, at) for at in range(0, len(data), 8)]
 
 
 def toward_zero(value, divisor):
@@ -321,7 +352,8 @@ def content(name, data):
         n = len(data) // 4 // PLANES[name]
         values = struct.unpack(f"<{n * PLANES[name]}f", data)
         return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
-    readers = {"grid": grid, "chunks": chunks, "leaves": leaves, "ellipsoids": ellipsoids, "voxels": voxels}
+    readers = {"grid": grid, "chunks": chunks, "leaves": leaves, "ellipsoids": ellipsoids,
+               "voxels": voxels, "layered ellipsoids": layered, "layer errors": layer_errors}
     return readers[name](data) if name in readers else data
 
 
@@ -331,7 +363,7 @@ def read(path):
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
     assert magic == bytes.fromhex("89 45 53 56 52 0D 0A 0A"), "magic"
-    assert (major, size) == (1, len(data)) and minor in (0, 1), "version or size"
+    assert (major, size) == (1, len(data)) and minor in (0, 1, 2), "version or size"
     assert table % 8 == 0 and header_sum == xxh64(data[:40]), "header checksum"
     assert table_sum == xxh64(data[table:table + 56 * count]), "table checksum"
 
@@ -350,7 +382,7 @@ def read(path):
         if name is None:
             assert flags == 0, "an unknown kind is optional here"
             continue
-        assert flags == (0 if name == "curve" else 1) and frame == layer == 0, "flags"
+        assert flags == (0 if name in ("curve", "layer errors") else 1) and frame == layer == 0, "flags"
         assert codec in (0, 1) and (codec == 1 or raw == stored), "codec"
         sections[name, g, c] = content(name, part) if codec == 0 else None
     assert not any(b for b, o in zip(data, owned) if not o), "padding"
@@ -419,6 +451,29 @@ def check_quantised(sections):
                 assert abs(a - b) <= 1e-7 * max(1.0, abs(b)), (chunk, i, a, b)
 
 
+def check_layered(sections):
+    """The same ellipsoids as quantised.esvr's, whose lattice does not depend on layers."""
+    assert sections["layer errors", 0, NONE] == [(20.0, 1.0), (25.0, 0.5), (30.0, struct.unpack(
+        "<f", struct.pack("<f", 1 / 3))[0]), (35.0, 0.25)]
+    for chunk, expected in enumerate(QUANTISED):
+        ends, blocks = sections["layered ellipsoids", 0, chunk]
+        assert len(ends) == len(blocks) == 4 and ends[-1] == 20
+        decoded = [e for _, block_ in blocks for e in block_]
+        for numbers in expected.values():
+            near = min(decoded, key=lambda e: sum(abs(a - b) for a, b in zip(e[0], numbers)))
+            center, logs, turn, height = near
+            for a, b in zip((*center, *logs, *turn, height), numbers):
+                assert abs(a - b) <= 1e-7 * max(1.0, abs(b)), (chunk, a, b)
+        low, high = (sections["chunks", 0, NONE][chunk]["box"][i:i + 3] for i in (0, 3))
+        for box, ellipsoids_ in blocks:
+            for axis in range(3):
+                side = high[axis] - low[axis] + 1
+                first = low[axis] + box[2 * axis] * side // 256
+                last = low[axis] - (-(box[2 * axis + 1] + 1) * side // 256) - 1
+                origin = sections["chunks", 0, NONE][chunk]["origin"][axis]
+                assert all(first <= origin + e[0][axis] <= last for e in ellipsoids_)
+
+
 def check_voxels(sections):
     head, held = sections["voxels", 0, NONE]
     assert (head["form"], head["origin"], head["background"]) == (3, (-8, 16, 0), 0.125)
@@ -438,7 +493,8 @@ def check_voxels(sections):
 
 
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
-          "level_set": check_level_set, "quantised": check_quantised, "voxels": check_voxels, "kappas_and_chunks": check_kappas_and_chunks}
+          "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
+          "voxels": check_voxels, "kappas_and_chunks": check_kappas_and_chunks}
 
 
 def main():

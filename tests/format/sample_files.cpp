@@ -1,7 +1,9 @@
 #include "format/sample_files.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <random>
 
 #include "format/morton_order.h"
@@ -81,6 +83,7 @@ std::string difference(const EncodedGrid& a, const EncodedGrid& b) {
   if (a.curve != b.curve) return "curve";
   if (a.voxels != b.voxels) return "voxels";
   if (a.quantised != b.quantised) return "quantised";
+  if (a.layerErrors != b.layerErrors) return "errors of layers";
   return difference(a.field, b.field);
 }
 
@@ -156,7 +159,18 @@ EncodedGrid chunkedGrid(std::size_t ellipsoidsPerChunk) {
   return grid;
 }
 
-EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk) {
+namespace {
+
+/// The three highest of the precisions that there are, each a layer of its own.
+std::vector<std::uint8_t> threeHighest(std::vector<std::uint8_t> precision) {
+  std::sort(precision.begin(), precision.end(), std::greater<>());
+  precision.erase(std::unique(precision.begin(), precision.end()), precision.end());
+  if (precision.size() > 1) precision.pop_back();  // the last layer needs no mark
+  if (precision.size() > 3) precision.resize(3);
+  return precision;
+}
+
+EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk, bool layered) {
   EncodedGrid grid = emptyGrid();
   grid.descriptor.name = "compact";
   const std::vector<double> curvature(ellipsoidsPerChunk, 4.0);
@@ -164,12 +178,27 @@ EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk) {
     Ellipsoids e = sampleEllipsoids(ellipsoidsPerChunk, 5 + c);
     if (c == 0)
       for (float& intensity : e.intensity) intensity = std::abs(intensity);
-    const auto choice = chooseLattice(e, curvature, {0.05, 0.05, 0.05, 0.05});
+    auto choice = chooseLattice(e, curvature, {0.05, 0.05, 0.05, 0.05});
+    choice.layerFrom.clear();
+    if (layered) choice.layerFrom = threeHighest(choice.precision);
     std::vector<std::size_t> order;
     grid.quantised.push_back(quantise(e, choice, order));
     grid.field.chunks.push_back(
         {{std::int32_t(c) * kChunkExtent, 0, 0}, dequantise(grid.quantised.back())});
   }
+  return grid;
+}
+
+}  // namespace
+
+EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk) {
+  return quantisedGrid(ellipsoidsPerChunk, false);
+}
+
+EncodedGrid layeredGrid(std::size_t ellipsoidsPerChunk) {
+  EncodedGrid grid = quantisedGrid(ellipsoidsPerChunk, true);
+  for (std::size_t k = 0; layerCount(grid) > 1 && k < layerCount(grid); ++k)
+    grid.layerErrors.push_back({20.0f + 5.0f * float(k), 1.0f / float(1 + k)});
   return grid;
 }
 
@@ -182,7 +211,7 @@ EncodedGrid emptyGrid() {
 EsvrFile everything(std::size_t ellipsoids) {
   return {{{"creator", "string", bytesOf("Houdini/GEO_VDBTranslator")}},
           {fogGrid(ellipsoids), levelSetGrid(ellipsoids), chunkedGrid(ellipsoids),
-           quantisedGrid(ellipsoids), emptyGrid()}};
+           quantisedGrid(ellipsoids), layeredGrid(ellipsoids), emptyGrid()}};
 }
 
 EsvrFile fileOf(EncodedGrid grid) { return {{}, {std::move(grid)}}; }

@@ -33,6 +33,9 @@ struct EllipsoidParts {
 /// A fog volume whose ellipsoids are quantised, in two chunks, the second with signs.
 [[nodiscard]] EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk);
 
+/// The same in importance layers, four a chunk where there are so many precisions.
+[[nodiscard]] EncodedGrid layeredGrid(std::size_t ellipsoidsPerChunk);
+
 /// A grid with a background and nothing else.
 [[nodiscard]] EncodedGrid emptyGrid();
 

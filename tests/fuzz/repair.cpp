@@ -33,9 +33,35 @@ std::span<std::byte> part(std::span<std::byte> file, std::uint64_t offset, std::
   return inside ? file.subspan(offset, size) : std::span<std::byte>{};
 }
 
+/// Offsets in layered ellipsoids, and sizes there.
+constexpr std::size_t kThresholdsAt = 78, kLayersAt = 79, kBlockBytesAt = 6, kBlockSumAt = 22,
+                      kBlockEntryBytes = 30, kSumBytes = 8;
+
+void repairBlock(std::span<std::byte> section, std::span<std::byte> entry, std::size_t& at) {
+  std::size_t size = 0;
+  for (std::size_t s = 0; s < 4; ++s) size += load<std::uint32_t>(entry, kBlockBytesAt + 4 * s);
+  store(entry, kBlockSumAt, checksum(part(section, at, size)));
+  at += size;
+}
+
+/// The directory has a checksum of its own, and every block.
+void repairLayered(std::span<std::byte> section) {
+  if (section.size() <= kLayersAt) return;
+  const std::size_t size = load<std::uint32_t>(section, 0);
+  const auto layers = part(section, kLayersAt + load<std::uint8_t>(section, kThresholdsAt), 1);
+  if (layers.empty() || size > section.size() || size < kLayersAt + kSumBytes) return;
+  std::size_t entry = std::size_t(layers.data() - section.data()) + 1 +
+                      sizeof(std::uint64_t) * load<std::uint8_t>(layers, 0);
+  for (std::size_t at = size; entry + kBlockEntryBytes + kSumBytes <= size;
+       entry += kBlockEntryBytes)
+    repairBlock(section, section.subspan(entry, kBlockEntryBytes), at);
+  store(section, size - kSumBytes, checksum(section.first(size - kSumBytes)));
+}
+
 void repairEntry(std::span<std::byte> file, std::span<std::byte> entry) {
   const auto section = part(file, load<std::uint64_t>(entry, kEntryOffsetAt),
                             load<std::uint64_t>(entry, kEntryStoredAt));
+  if (load<std::uint32_t>(entry, 0) == std::uint32_t(SectionKind::kLayered)) repairLayered(section);
   store(entry, kEntryChecksumAt, checksum(section));
 }
 

@@ -14,6 +14,7 @@
 #include "esvr/fit_record.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/quantised.h"
+#include "esvr/sparse_volume.h"
 #include "esvr/voxel_layer.h"
 
 namespace esvr {
@@ -26,6 +27,14 @@ enum class TopologyKind {
   /// As kThreshold, within the stored bricks only. In a level set: the narrow band there, active
   /// where |V| < background - activeThreshold.
   kLeaves = 1,
+};
+
+/// What the first importance layers of every chunk come to, against the source. A row of a grid's
+/// table, one for each layer.
+struct LayerError {
+  float psnrBox = 0.0f;   ///< dB, over the box of the conversion; infinite where there is no error
+  float maxError = 0.0f;  ///< largest absolute error
+  friend bool operator==(const LayerError&, const LayerError&) = default;
 };
 
 /// One grid of a file.
@@ -44,6 +53,7 @@ struct EncodedGrid {
   /// Empty: the ellipsoids are stored as float32. Else one for every chunk of the field, whose
   /// ellipsoids are then exactly what it stands for (dequantise).
   std::vector<QuantisedEllipsoids> quantised;
+  std::vector<LayerError> layerErrors;  ///< empty, or one for each of the most layers of a chunk
   /// The voxels themselves, exact or within a bound: what decodeGrid() gives back then.
   std::optional<VoxelLayer> voxels;
 };
@@ -53,6 +63,16 @@ struct StreamBytes {
   std::uint64_t positions = 0, scales = 0, rotations = 0, intensities = 0;
 };
 [[nodiscard]] StreamBytes streamBytes(const EncodedGrid& grid);
+
+/// Importance layers of a grid: the most that a chunk of it has, 1 where nothing is layered, 0
+/// without ellipsoids.
+[[nodiscard]] std::size_t layerCount(const EncodedGrid& grid);
+
+/// What each layer adds to a grid whose ellipsoids are quantised; nothing where they are not.
+struct LayerSize {
+  std::uint64_t ellipsoids = 0, bytes = 0;
+};
+[[nodiscard]] std::vector<LayerSize> layerSizes(const EncodedGrid& grid);
 
 struct EsvrFile {
   std::vector<MetaItem> metadata;  ///< the source's file-level metadata, verbatim
@@ -75,6 +95,26 @@ std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
 /// \throws BadInput  missing, not an .esvr, a newer major version, truncated or damaged (says
 /// where)
 [[nodiscard]] EsvrFile readEsvr(const std::filesystem::path& path);
+
+/// Which part of a file is wanted: that it is needed at all is told from the section table, chunk
+/// records and directories of blocks. A grid that is stored as voxels is read whole.
+struct ReadPart {
+  /// Only what can reach these voxels: every ellipsoid whose support meets the box is there, others
+  /// may be.
+  std::optional<Box> box{};
+  std::optional<std::size_t> layers{};  ///< at most so many importance layers, from the heaviest
+  /// Of these, as many as it takes for so many ellipsoids: whole layers, so there may be more.
+  std::optional<std::size_t> ellipsoids{};
+};
+
+struct PartOfFile {
+  EsvrFile file;  ///< a whole file of what was read; layer errors only where no box was given
+  std::uint64_t bytesRead = 0;
+};
+
+/// Reads what is needed and nothing else, which is therefore not checked.
+/// \throws BadInput  as readEsvr
+[[nodiscard]] PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part);
 
 /// The same from and to memory. The same content gives the same bytes. A chunk's ellipsoids are
 /// stored in Morton order of their centers: what comes back is that order, bit for bit the same

@@ -31,7 +31,9 @@ namespace esvr {
                                        VoxelLayer layer);
 
 struct DecodeOptions {
-  std::optional<float> threshold;  ///< instead of the grid's own; 0 or above
+  std::optional<float> threshold{};  ///< instead of the grid's own; 0 or above
+  /// Voxels elsewhere come back inactive; bricks elsewhere are not evaluated.
+  std::optional<Box> box{};
 };
 
 /// The voxels that a file gives back. \throws UsageError  threshold negative or not finite

@@ -47,7 +47,8 @@ struct Lattice {
   friend bool operator==(const Lattice&, const Lattice&) = default;
 };
 
-/// n ellipsoids in the order of the file: by Morton order of their cells.
+/// n ellipsoids in the order of the file: layer by layer, the heaviest first, each by Morton order
+/// of its cells.
 struct QuantisedEllipsoids {
   Lattice lattice;
   std::array<std::vector<std::uint32_t>, 3> position;  ///< (cell << bits) + place in the cell
@@ -57,6 +58,9 @@ struct QuantisedEllipsoids {
   std::array<std::vector<std::uint32_t>, 3> scale;
   std::array<std::vector<std::uint16_t>, 3> rotation;  ///< x, y, z of the quaternion
   std::vector<std::int32_t> intensity;                 ///< magnitude m as m, negative as -1 - m
+  /// Where the importance layers end, increasing, the last of two or more at size(). Empty: one
+  /// layer.
+  std::vector<std::size_t> layerEnds;
 
   [[nodiscard]] std::size_t size() const { return precision.size(); }
   void resize(std::size_t n);
@@ -73,6 +77,10 @@ struct QuantiserSteps {
 struct LatticeChoice {
   Lattice lattice;
   std::vector<std::uint8_t> precision;
+  /// Lowest precision of every layer but the last, decreasing; empty where there are too few
+  /// ellipsoids to tell apart. A layer is made of octaves of the weight: since precisions are
+  /// stored anyway, knowing the layer saves in them what it costs in the positions.
+  std::vector<std::uint8_t> layerFrom{};
 };
 
 /// \param phi2  sum over voxels of phi^2, for each ellipsoid (intensityCurvature)

@@ -1,0 +1,19 @@
+#pragma once
+/// What each importance layer comes to, as bytes of a section.
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "esvr/container.h"
+
+namespace esvr::format {
+
+[[nodiscard]] std::vector<std::byte> putLayerErrors(std::span<const LayerError> errors);
+
+/// \throws BadInput  not one for each of `layers`, no number; begins with `where`
+[[nodiscard]] std::vector<LayerError> getLayerErrors(std::span<const std::byte> content,
+                                                     std::size_t layers, const std::string& where);
+
+}  // namespace esvr::format

@@ -1,0 +1,18 @@
+#pragma once
+/// Coarser forms of a grid: fewer of its ellipsoids, the ones that matter most.
+
+#include <cstddef>
+
+#include "esvr/container.h"
+
+namespace esvr {
+
+/// The grid of its first importance layers; itself where it has no more.
+[[nodiscard]] EncodedGrid firstLayers(EncodedGrid grid, std::size_t layers);
+
+/// The grid of its `count` heaviest ellipsoids, in their order; itself where it has no more. The
+/// weight is |I| sqrt(s1 s2 s3), the root of the sum of squares over voxels up to a factor that all
+/// ellipsoids of a kappa share. Fewer than all are no longer quantised and have no layers.
+[[nodiscard]] EncodedGrid heaviest(EncodedGrid grid, std::size_t count);
+
+}  // namespace esvr

@@ -1,0 +1,254 @@
+// Plan: chunks in importance layers come back integer by integer; a part of a file is what the
+// whole holds of it, and takes fewer bytes to read; lies in the directory are found out, whole or
+// in part, before memory is spent on them.
+
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <string>
+
+#include "esvr/container.h"
+#include "esvr/error.h"
+#include "esvr/field.h"
+#include "esvr/grid_coding.h"
+#include "esvr/level_of_detail.h"
+#include "format/allocation_meter.h"
+#include "format/checksum.h"
+#include "format/crafted_file.h"
+#include "format/sample_files.h"
+
+namespace esvr {
+namespace {
+
+using format::SectionKind;
+using test::CraftedFile;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+EsvrFile layeredFile(std::size_t n) { return test::fileOf(test::layeredGrid(n)); }
+
+TEST(LayeredFile, ComesBackIntegerByInteger) {
+  for (const std::size_t n : {2u, 7u, 4097u, 20000u}) {
+    const EsvrFile file = layeredFile(n);
+    ASSERT_GE(layerCount(file.grids[0]), 2u);
+    EXPECT_EQ(test::difference(decodeEsvr(encodeEsvr(file), "memory"), file), "") << n;
+  }
+}
+
+TEST(LayeredFile, EncodingAgainGivesTheSameBytes) {
+  const auto bytes = encodeEsvr(layeredFile(5000));
+  EXPECT_EQ(encodeEsvr(decodeEsvr(bytes, "memory")), bytes);
+}
+
+TEST(LayeredFile, IsOfVersionOneTwo) {
+  EXPECT_EQ(std::to_integer<int>(encodeEsvr(layeredFile(5))[10]), 2);
+}
+
+TEST(LayeredFile, HasTheHeavierEllipsoidsInTheFirstLayers) {
+  const EncodedGrid grid = test::layeredGrid(500);
+  const QuantisedEllipsoids& q = grid.quantised[1];
+  std::size_t first = 0;
+  int before = Lattice::kMaxPrecision + 1;
+  for (const std::size_t end : q.layerEnds) {
+    const auto [low, high] = std::minmax_element(q.precision.begin() + std::ptrdiff_t(first),
+                                                 q.precision.begin() + std::ptrdiff_t(end));
+    EXPECT_LT(int(*high), before);
+    before = *low;
+    first = end;
+  }
+  EXPECT_EQ(first, q.size());
+}
+
+/// 20000 ellipsoids are the aim of layers; these are spread evenly and all alike, so that what
+/// layers cost is not hidden by what they save.
+TEST(LayeredFile, CostsLittleMoreThanOneWithoutLayers) {
+  EncodedGrid one = test::quantisedGrid(20000), layered = test::layeredGrid(20000);
+  layered.layerErrors.clear();
+  const double without = double(encodeEsvr(test::fileOf(one)).size());
+  EXPECT_LT(double(encodeEsvr(test::fileOf(layered)).size()), 1.01 * without);
+}
+
+TEST(LayeredFile, SaysWhatEachLayerAdds) {
+  const EncodedGrid grid = test::layeredGrid(300);
+  const auto sizes = layerSizes(grid);
+  ASSERT_EQ(sizes.size(), layerCount(grid));
+  std::uint64_t ellipsoids = 0, bytes = 0;
+  for (const LayerSize& size : sizes) ellipsoids += size.ellipsoids, bytes += size.bytes;
+  EXPECT_EQ(ellipsoids, 600u);
+  const StreamBytes streams = streamBytes(grid);
+  EXPECT_EQ(bytes, streams.positions + streams.scales + streams.rotations + streams.intensities);
+}
+
+TEST(LayeredFile, IsRefusedWhereItsLayersDoNotDivideIt) {
+  for (const auto& ends : {std::vector<std::size_t>{5}, {0, 20}, {3, 3, 20}, {3, 19}}) {
+    EsvrFile file = layeredFile(20);
+    file.grids[0].quantised[0].layerEnds = ends;
+    EXPECT_THROW((void)encodeEsvr(file), RuntimeFailure);
+  }
+  EsvrFile file = layeredFile(20);
+  file.grids[0].layerErrors.pop_back();
+  EXPECT_THROW((void)encodeEsvr(file), RuntimeFailure);
+}
+
+/// A file on disk, removed in the end.
+class PartOfAFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = std::filesystem::temp_directory_path() /
+            ("esvr_part_" + std::to_string(::getpid()) + "_" +
+             testing::UnitTest::GetInstance()->current_test_info()->name());
+    writeEsvr(path_, {{}, {grid_}});
+  }
+  void TearDown() override { std::filesystem::remove(path_); }
+
+  [[nodiscard]] std::uint64_t size() const { return std::filesystem::file_size(path_); }
+
+  EncodedGrid grid_ = test::layeredGrid(9000);
+  std::filesystem::path path_;
+};
+
+TEST_F(PartOfAFile, OfAllLayersIsAllOfIt) {
+  const PartOfFile part = readEsvrPart(path_, {});
+  EXPECT_EQ(test::difference(part.file, {{}, {grid_}}), "");
+  EXPECT_LE(part.bytesRead, size());
+}
+
+TEST_F(PartOfAFile, OfTheFirstLayersIsTheGridOfThem) {
+  std::uint64_t before = 0;
+  for (std::size_t layers = 1; layers <= layerCount(grid_); ++layers) {
+    const PartOfFile part = readEsvrPart(path_, {.layers = layers});
+    EXPECT_EQ(test::difference(part.file, {{}, {firstLayers(grid_, layers)}}), "") << layers;
+    EXPECT_GT(part.bytesRead, before);
+    before = part.bytesRead;
+    EXPECT_EQ(encodeEsvr(decodeEsvr(encodeEsvr(part.file), "part")), encodeEsvr(part.file));
+  }
+  EXPECT_LT(readEsvrPart(path_, {.layers = 1}).bytesRead, size() / 2);
+}
+
+TEST_F(PartOfAFile, OfSoManyEllipsoidsHasWholeLayersOfThem) {
+  const auto sizes = layerSizes(grid_);
+  const auto two = sizes[0].ellipsoids + sizes[1].ellipsoids;
+  const auto countOf = [&](std::size_t n) {
+    return readEsvrPart(path_, {.ellipsoids = n}).file.grids[0].field.primitiveCount();
+  };
+  EXPECT_EQ(countOf(1), sizes[0].ellipsoids);
+  EXPECT_EQ(countOf(sizes[0].ellipsoids), sizes[0].ellipsoids);
+  EXPECT_EQ(countOf(sizes[0].ellipsoids + 1), two);
+  EXPECT_EQ(countOf(1u << 30), 18000u);
+}
+
+TEST_F(PartOfAFile, OfABoxGivesTheSameValuesThere) {
+  // the second chunk lies far away, and is of no use here
+  const Box box{{0, 0, 0}, {9, 9, 9}};
+  const PartOfFile part = readEsvrPart(path_, {.box = box});
+  EXPECT_EQ(part.file.grids[0].field.chunks[1].ellipsoids.size(), 0u);
+  EXPECT_LT(part.bytesRead, size() * 6 / 10);
+  const SparseVolume there = decodeGrid(part.file.grids[0], {.box = box});
+  const SparseVolume whole = decodeGrid(grid_, {.box = box});
+  EXPECT_EQ(there.bricks, whole.bricks);
+  EXPECT_EQ(there.values, whole.values);
+  EXPECT_EQ(there.active, whole.active);
+}
+
+TEST_F(PartOfAFile, OfABoxWithoutEllipsoidsHasNone) {
+  const Box box{{100000, 0, 0}, {100009, 9, 9}};
+  const PartOfFile part = readEsvrPart(path_, {.box = box});
+  EXPECT_EQ(part.file.grids[0].field.primitiveCount(), 0u);
+  EXPECT_LT(part.bytesRead, 2048u);
+}
+
+TEST_F(PartOfAFile, DamagedInABlockIsRefusedWhereTheBlockIsRead) {
+  CraftedFile file(encodeEsvr({{}, {grid_}}));
+  file.section(SectionKind::kLayered).stored.back() ^= std::byte{1};
+  const auto bytes = file.assemble();
+  EXPECT_THROW((void)decodeEsvr(bytes, "f"), BadInput);
+}
+
+/// Offsets in the section (docs/format.md, "Layered ellipsoids"), for no rotation thresholds.
+namespace at {
+constexpr std::size_t kSize = 0, kCount = 4, kCell = 12, kThresholds = 78, kLayers = 79;
+constexpr std::size_t kEntry = 30;  // bytes of a block's
+}  // namespace at
+
+/// The content with its directory's checksum made right.
+std::vector<std::byte> repaired(std::vector<std::byte> content) {
+  std::uint32_t size = 0;
+  std::memcpy(&size, content.data(), sizeof size);
+  if (size < 12 || size > content.size()) return content;
+  const std::uint64_t sum = format::checksum(std::span(content).first(size - sizeof sum));
+  std::memcpy(content.data() + size - sizeof sum, &sum, sizeof sum);
+  return content;
+}
+
+template <class T>
+void expectLie(std::size_t offset, T value, const char* answer) {
+  CraftedFile file(encodeEsvr(layeredFile(20)));
+  file.poke(SectionKind::kLayered, offset, value);
+  file.setContent(SectionKind::kLayered, repaired(file.content(SectionKind::kLayered)));
+  EXPECT_THAT([&] { (void)decodeEsvr(file.assemble(), "lie.esvr"); },
+              ThrowsMessage<BadInput>(HasSubstr(answer)));
+}
+
+/// Where the layers are counted: behind as many thresholds as there are.
+std::size_t layersAt() {
+  CraftedFile file(encodeEsvr(layeredFile(20)));
+  return at::kLayers +
+         std::to_integer<std::size_t>(file.content(SectionKind::kLayered)[at::kThresholds]);
+}
+
+TEST(LayeredLies, AreFoundOut) {
+  const std::size_t layers = layersAt(), ends = layers + 1;
+  const std::size_t entries = ends + 4 * sizeof(std::uint64_t);
+  expectLie(at::kSize, std::uint32_t{11}, "a directory of 11 bytes");
+  expectLie(at::kSize, 0xffffffffu, "a directory of");
+  expectLie(at::kCount, std::uint64_t{21}, "with 21 ellipsoids for 20");
+  expectLie(at::kCell, 0.0, "the cell of the lattice");
+  expectLie(layers, std::uint8_t{3}, "lie.esvr");
+  expectLie(layers, std::uint8_t{0}, "not those of the chunk");
+  expectLie(ends, std::uint64_t{0}, "a layer is empty");
+  expectLie(ends, std::uint64_t{1} << 60, "a layer is empty or beyond");
+  expectLie(entries, std::uint8_t{255}, "lie.esvr");
+  expectLie(entries + 6, 0xffffffffu, "do not lie in the section");
+  expectLie(entries + 22, std::uint64_t{1}, "checksum of a block");
+}
+
+TEST(LayeredLies, ADirectoryThatIsDamagedIsNamed) {
+  CraftedFile file(encodeEsvr(layeredFile(20)));
+  file.poke(SectionKind::kLayered, at::kCell, 3.0);
+  EXPECT_THAT([&] { (void)decodeEsvr(file.assemble(), "f"); },
+              ThrowsMessage<BadInput>(HasSubstr("checksum of the directory")));
+}
+
+TEST(LayeredLies, AKilobyteCannotAskForAGigabyte) {
+  for (std::uint64_t count = std::uint64_t{1} << 62; count > 20; count /= 2) {
+    CraftedFile file(encodeEsvr(layeredFile(20)));
+    file.poke(SectionKind::kLayered, at::kCount, count);
+    file.setContent(SectionKind::kLayered, repaired(file.content(SectionKind::kLayered)));
+    file.poke(SectionKind::kChunks, 36, count);
+    const auto bytes = file.assemble();
+    ASSERT_LT(bytes.size(), 4096u);
+    const test::AllocationMeter meter;
+    EXPECT_THROW((void)decodeEsvr(bytes, "lie"), BadInput) << count;
+    EXPECT_LT(meter.bytes(), std::size_t{32} << 20) << count;
+  }
+}
+
+TEST(LayerErrors, AreRefusedWhereTheyAreNoneOfTheLayers) {
+  for (const std::size_t size : {24u, 40u}) {
+    CraftedFile file(encodeEsvr(layeredFile(20)));
+    file.setContent(SectionKind::kLayerErrors, std::vector<std::byte>(size));
+    EXPECT_THAT([&] { (void)decodeEsvr(file.assemble(), "f"); },
+                ThrowsMessage<BadInput>(HasSubstr("a table of 4 layers")));
+  }
+  CraftedFile file(encodeEsvr(layeredFile(20)));
+  file.poke(SectionKind::kLayerErrors, 4, HUGE_VALF);
+  EXPECT_THROW((void)decodeEsvr(file.assemble(), "f"), BadInput);
+}
+
+}  // namespace
+}  // namespace esvr
