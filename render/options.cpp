@@ -2,8 +2,10 @@
 
 #include <charconv>
 
+#include "cli/choice.h"
 #include "cli/command_line.h"
 #include "cli/number_list.h"
+#include "render/camera_file.h"
 
 namespace esvr::render {
 namespace {
@@ -15,6 +17,8 @@ using cli::po::value;
 constexpr int kMaxSide = 16384;    // pixels
 constexpr int kMaxFrames = 9999;   // four digits in a frame's name
 constexpr double kMinStep = 1e-3;  // voxels
+constexpr int kMostBins = 16;
+constexpr double kLeastVram = 0.001, kMostVram = 1e4;  // GB
 
 cli::ProgramText programText() {
   return {.name = kProgram,
@@ -22,8 +26,9 @@ cli::ProgramText programText() {
               "Draws an .esvr file, or for comparison a VDB, through a transfer function. The\n"
               "ellipsoids of an .esvr are sampled along each ray, without voxels in between.",
           .usage =
-              "  esvr-render IN.esvr OUT.png [OPTION]...\n"
-              "  esvr-render IN.vdb OUT.png [OPTION]...",
+              "  esvr-render IN.esvr OUT.png|OUT.exr [OPTION]...\n"
+              "  esvr-render IN.vdb OUT.png|OUT.exr [OPTION]...\n"
+              "  esvr-render IN.esvr --bench [--ref IN.vdb] [--report FILE.json] [OPTION]...",
           .notes =
               "IN may be an .nvdb too. Both kinds are drawn with the same camera, samples,\n"
               "transfer function and compositing. Voxels are interpolated trilinearly, and so\n"
@@ -34,12 +39,23 @@ cli::ProgramText programText() {
               "the background is transparent.\n"
               "\n"
               "Color maps: viridis, inferno, magma, plasma, cividis, turbo, cool-to-warm,\n"
-              "grayscale, x-ray, black-body. Opacities: linear, inverse, tent, step.\n"
+              "grayscale, x-ray, black-body, smoke, ct-bone, ct-soft-tissue. Opacities: linear,\n"
+              "inverse, tent, step; smoke, ct-bone, ct-soft-tissue for the maps of these names.\n"
+              "CAM.json is what the camera options say: {\"eye\": [1, 2, 3], \"center\": [...],\n"
+              "\"up\": [...], \"fov\": 30}, or \"height\" for an orthographic one.\n"
               "\n"
-              "OUT.png has 8 bits a channel and this command line in its metadata. Exit codes:\n"
+              "On a GPU, voxels are marched in a NanoVDB grid. --ref draws its voxels beside\n"
+              "every picture, on the same device, and says how far apart the two are;\n"
+              "OUT.error.png shows where, ten times as bright. --bench draws a full turn, keeps\n"
+              "no picture and reports frames a second and where the time goes; with --ref, of\n"
+              "both.\n"
+              "\n"
+              "A PNG has the colors of a screen, not premultiplied; an EXR has floats in linear\n"
+              "light, premultiplied. Both have this command line in their metadata. Exit codes:\n"
               "0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot be used,\n"
-              "5 memory.",
+              "5 device or memory.",
           .examples =
+              "  esvr-render smoke.esvr --bench --ref smoke.vdb    speed, memory, quality\n"
               "  esvr-render smoke.esvr smoke.png\n"
               "  esvr-render smoke.vdb reference.png              the original, to compare\n"
               "  esvr-render smoke.esvr smoke.png --colors inferno --opacity-length 4\n"
@@ -50,7 +66,7 @@ cli::ProgramText programText() {
 cli::CommandLine commandLine() {
   cli::CommandLine line(programText());
   line.argument("input", "IN");
-  line.argument("output", "OUT.png");
+  line.optionalArgument("output", "OUT.png");
   // clang-format off
   line.options().add_options()
     ("grid,g", value<std::string>()->value_name("NAME"),
@@ -59,19 +75,33 @@ cli::CommandLine commandLine() {
      "color map (default: viridis)")
     ("opacity", value<std::string>()->value_name("CURVE"),
      "opacity over the range (default: linear)")
-    ("tf", value<std::string>()->value_name("FILE.json"),
-     "colors and opacities from a ParaView preset; --opacity replaces the latter")
+    ("tf", value<std::string>()->value_name("FILE"),
+     "colors and opacities from a ParaView preset, JSON or the XML of old; --opacity replaces the "
+     "latter")
     ("preset", value<std::string>()->value_name("NAME"),
-     "which preset of FILE.json (default: the first)")
+     "which preset of FILE (default: the first)")
+    ("tf-save", value<std::string>()->value_name("FILE.json"),
+     "write the transfer function, laid over its range, as a ParaView preset")
     ("range", value<std::string>()->value_name("R")->default_value("auto"),
      "values that the transfer function is laid over: data (the active voxels'), auto (these and "
-     "the background), own (as FILE.json has them), or LO,HI")
+     "the background), own (as FILE has them), or LO,HI")
     ("opacity-length", value<double>()->value_name("L")->default_value(1.0),
      "voxels that an opacity holds for: more makes the volume clearer")
     ("step", value<double>()->value_name("S")->default_value(1.0), "voxels between samples")
     ("resolution", value<std::string>()->value_name("WxH")->default_value("800x800"), "pixels")
     ("background", value<std::string>()->value_name("R,G,B"),
      "0 to 1 each (default: a transparent picture)")
+    ("bits", value<int>()->value_name("B")->default_value(8), "8 or 16 a channel of a PNG")
+    ("mode", value<std::string>()->value_name("M")->default_value("composite"),
+     "composite, or one value of a ray: maximum, average")
+    ("clip", value<std::string>()->value_name("BOX"),
+     "draw only what lies in x0,y0,z0,x1,y1,z1")
+    ("slice", value<std::string>()->value_name("A=P"),
+     "draw only a slab of one voxel: 'z=12.5' lies across z")
+    ("depth", value<std::string>()->value_name("FILE.exr"),
+     "write how far away half of the light is stopped, in voxels")
+    ("camera", value<std::string>()->value_name("CAM.json"),
+     "the camera; options of their own replace what it says")
     ("eye", value<std::string>()->value_name("X,Y,Z"), "where the camera is")
     ("center", value<std::string>()->value_name("X,Y,Z"), "what it looks at")
     ("up", value<std::string>()->value_name("X,Y,Z"), "upwards in the picture (default: y)")
@@ -81,6 +111,21 @@ cli::CommandLine commandLine() {
      "voxels from the lower to the upper edge of an orthographic picture")
     ("turntable", value<int>()->value_name("N"),
      "N pictures of a full turn about the up axis")
+    ("device", value<std::string>()->value_name("D")->default_value("auto"),
+     "auto (a GPU where there is one), cpu, cuda or cuda:N")
+    ("max-vram", value<double>()->value_name("GB"),
+     "GPU memory to use: less draws large pictures in bands (default: what is free)")
+    ("bins", value<int>()->value_name("N"),
+     "parts of the depth, 1 to 16, that a GPU draws at once (default: by the first picture's lists)")
+    ("values", value<std::string>()->value_name("T"),
+     "march voxels in a NanoVDB grid of float, fp4, fp8, fp16 or fpn")
+    ("ref", value<std::string>()->value_name("FILE"), "compare with the voxels of a VDB")
+    ("bench", bool_switch(),
+     "measure: 720 views of a full turn, or as many as --turntable says")
+    ("report", value<std::string>()->value_name("FILE.json"),
+     "what --bench or --ref found; '-' is the standard output")
+    ("frames", value<std::string>()->value_name("A-B"),
+     "of a turntable, only the pictures from number A to B")
     ("force,f", bool_switch(), "replace OUT.png if it exists");
   // clang-format on
   return line;
@@ -111,16 +156,21 @@ Resolution resolutionOf(const std::string& text) {
 }
 
 CameraWish cameraOf(const Arguments& a) {
-  CameraWish wish;
-  wish.eye = findVector(a, "eye");
-  wish.center = findVector(a, "center");
-  wish.up = findVector(a, "up");
-  wish.fov = a.find<double>("fov");
-  wish.height = a.find<double>("height");
+  const auto file = a.find<std::string>("camera");
+  CameraWish wish = file ? readCamera(*file) : CameraWish{};
+  const auto replace = [](auto& wished, auto given) {
+    if (given) wished = given;
+  };
+  replace(wish.eye, findVector(a, "eye"));
+  replace(wish.center, findVector(a, "center"));
+  replace(wish.up, findVector(a, "up"));
+  replace(wish.fov, a.find<double>("fov"));
+  replace(wish.height, a.find<double>("height"));
   if (a.get<bool>("orthographic")) wish.projection = Projection::kOrthographic;
-  if (wish.height && !a.get<bool>("orthographic"))
+  const bool orthographic = wish.projection == Projection::kOrthographic;
+  if (wish.height && !orthographic)
     throw UsageError("--height says nothing without --orthographic");
-  if (wish.fov && a.get<bool>("orthographic"))
+  if (wish.fov && orthographic)
     throw UsageError("--fov says nothing with --orthographic; --height does");
   return wish;
 }
@@ -164,10 +214,99 @@ std::optional<Rgb> backgroundOf(const Arguments& a) {
   return Rgb{(*color)[0], (*color)[1], (*color)[2]};
 }
 
+constexpr double kEverywhere = 1e9;  // voxels; beyond any grid
+
+PlaceBox sliceOf(const std::string& text) {
+  const std::string axes = "xyz";
+  const auto axis = text.size() > 2 && text[1] == '=' ? axes.find(text[0]) : std::string::npos;
+  if (axis == std::string::npos)
+    throw UsageError("--slice must be like z=12.5, not '" + text + "'");
+  const double place = cli::parseNumbers("slice", text.substr(2), 1)[0];
+  PlaceBox box{{-kEverywhere, -kEverywhere, -kEverywhere}, {kEverywhere, kEverywhere, kEverywhere}};
+  box.low[axis] = place - 0.5, box.high[axis] = place + 0.5;
+  return box;
+}
+
+std::optional<PlaceBox> clipOf(const Arguments& a) {
+  const auto clip = a.find<std::string>("clip"), slice = a.find<std::string>("slice");
+  if (clip && slice) throw UsageError("--clip and --slice are two boxes; give one");
+  if (slice) return sliceOf(*slice);
+  if (!clip) return std::nullopt;
+  const auto v = cli::parseNumbers("clip", *clip, 6);
+  return PlaceBox{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+}
+
+void readFrames(const Arguments& a, Options& options) {
+  const auto text = a.find<std::string>("frames");
+  if (!text) return;
+  if (options.turntable == 0) throw UsageError("--frames says nothing without --turntable");
+  const auto dash = text->find('-');
+  if (dash == std::string::npos || dash == 0)
+    throw UsageError("--frames must be like 0-35, not '" + *text + "'");
+  const auto first = cli::parseNumbers("frames", text->substr(0, dash), 1)[0];
+  const auto last = cli::parseNumbers("frames", text->substr(dash + 1), 1)[0];
+  const bool whole = first == double(int(first)) && last == double(int(last));
+  if (!whole || !(first >= 0.0 && first <= last && last < options.turntable))
+    throw UsageError("--frames must be two of the turntable's numbers, from 0 to " +
+                     std::to_string(options.turntable - 1) + ", not '" + *text + "'");
+  options.firstFrame = int(first), options.lastFrame = int(last);
+}
+
+int bitsOf(const Arguments& a) {
+  const int bits = a.get<int>("bits");
+  if (bits != 8 && bits != 16)
+    throw UsageError("--bits must be 8 or 16, not " + std::to_string(bits));
+  return bits;
+}
+
+RenderMode modeOf(const Arguments& a) {
+  return cli::choose<RenderMode>("mode", a.get<std::string>("mode"),
+                                 {{"composite", RenderMode::kComposite},
+                                  {"maximum", RenderMode::kMaximum},
+                                  {"average", RenderMode::kAverage}});
+}
+
 int turntableOf(const Arguments& a) {
   const auto frames = a.find<int>("turntable");
   if (frames) cli::requireRange("turntable", *frames, 1, kMaxFrames);
   return frames.value_or(0);
+}
+
+std::optional<NanoValues> valuesOf(const Arguments& a) {
+  const auto word = a.find<std::string>("values");
+  if (!word) return std::nullopt;
+  return cli::choose<NanoValues>("values", *word,
+                                 {{"float", NanoValues::kFloat},
+                                  {"fp4", NanoValues::kFp4},
+                                  {"fp8", NanoValues::kFp8},
+                                  {"fp16", NanoValues::kFp16},
+                                  {"fpn", NanoValues::kFpN}});
+}
+
+RendererLimits limitsOf(const Arguments& a) {
+  RendererLimits limits;
+  if (const auto bins = a.find<int>("bins")) {
+    cli::requireRange("bins", *bins, 1, kMostBins);
+    limits.depthParts = *bins;
+  }
+  if (const auto gigabytes = a.find<double>("max-vram")) {
+    cli::requireRange("max-vram", *gigabytes, kLeastVram, kMostVram);
+    limits.maxBytes = std::uint64_t(*gigabytes * 1e9);
+  }
+  return limits;
+}
+
+void readMeasuring(const Arguments& a, Options& options) {
+  options.reference = a.find<std::string>("ref").value_or("");
+  options.bench = a.get<bool>("bench");
+  options.report = a.find<std::string>("report").value_or("");
+  if (options.bench && !options.depth.empty())
+    throw UsageError("--bench keeps no picture; leave --depth out");
+  if (options.bench != options.output.empty())
+    throw UsageError(options.bench ? "--bench keeps no picture; leave OUT.png out"
+                                   : "OUT.png is missing");
+  if (!options.report.empty() && !options.bench && options.reference.empty())
+    throw UsageError("--report says what --bench or --ref found; give one of them");
 }
 
 std::string joined(int argc, const char* const* argv) {
@@ -184,7 +323,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   const Arguments& a = *arguments;
   Options options;
   options.input = a.get<std::string>("input");
-  options.output = a.get<std::string>("output");
+  options.output = a.find<std::string>("output").value_or("");
   options.grid = a.find<std::string>("grid");
   options.transfer = transferOf(a);
   readRange(a, options);
@@ -195,7 +334,17 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.opacityLength = a.get<double>("opacity-length");
   cli::requireRange("opacity-length", options.opacityLength, 1e-6, 1e6);
   options.background = backgroundOf(a);
+  options.bits = bitsOf(a);
+  options.mode = modeOf(a);
+  options.clip = clipOf(a);
   options.turntable = turntableOf(a);
+  readFrames(a, options);
+  options.depth = a.find<std::string>("depth").value_or("");
+  options.saveTransfer = a.find<std::string>("tf-save").value_or("");
+  options.device = a.get<std::string>("device");
+  options.limits = limitsOf(a);
+  options.values = valuesOf(a);
+  readMeasuring(a, options);
   options.overwrite = a.get<bool>("force");
   options.threads = a.threads;
   options.verbosity = a.verbosity;

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "cli/log.h"
-#include "esvr/render.h"
+#include "esvr/renderer.h"
 
 namespace esvr::render {
 
@@ -21,7 +21,8 @@ enum class RangeKind {
 };
 
 struct Options {
-  std::filesystem::path input, output;
+  std::filesystem::path input;
+  std::filesystem::path output;     ///< empty: no picture is kept
   std::optional<std::string> grid;  ///< default: the first that can be drawn
   TransferFunction transfer;        ///< not yet over its range
   RangeKind rangeKind = RangeKind::kAuto;
@@ -30,7 +31,20 @@ struct Options {
   Resolution resolution;
   double step = 1.0, opacityLength = 1.0;
   std::optional<Rgb> background;  ///< none: the picture is transparent
-  int turntable = 0;              ///< pictures of a full turn; 0: one picture
+  int bits = 8;                   ///< of a PNG's channel
+  RenderMode mode = RenderMode::kComposite;
+  std::optional<PlaceBox> clip;
+  int turntable = 0;             ///< pictures of a full turn; 0: one picture
+  int firstFrame = 0;            ///< of those, the first and
+  std::optional<int> lastFrame;  ///< the last to draw; none: all
+  std::filesystem::path depth;   ///< where distances go; empty: nowhere
+  std::filesystem::path saveTransfer;
+  std::string device = "auto";
+  RendererLimits limits;
+  std::optional<NanoValues> values;  ///< of the NanoVDB grid that voxels are marched in
+  std::filesystem::path reference;   ///< empty: none
+  bool bench = false;
+  std::string report;  ///< empty: none
   bool overwrite = false;
   int threads = 0;  ///< 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;

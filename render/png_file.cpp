@@ -14,24 +14,31 @@ namespace {
 constexpr int kChannels = 4;
 using Bytes = std::vector<std::byte>;
 
-png_byte byteOf(double v) { return png_byte(std::lround(std::clamp(v, 0.0, 1.0) * 255.0)); }
+/// Most significant byte first, as PNG has it.
+void append(double v, int bits, std::vector<png_byte>& to) {
+  const double most = double((1 << bits) - 1);
+  const auto level = unsigned(std::lround(std::clamp(v, 0.0, 1.0) * most));
+  if (bits > 8) to.push_back(png_byte(level >> 8));
+  to.push_back(png_byte(level & 0xffu));
+}
 
-void fillPixel(const float* from, const std::optional<Rgb>& background, png_byte* to) {
+void appendPixel(const float* from, const PngForm& form, std::vector<png_byte>& to) {
   const double alpha = from[3], behind = 1.0 - alpha;
-  const Rgb ground = background.value_or(Rgb{});
+  const Rgb ground = form.background.value_or(Rgb{});
   const double grounds[] = {ground.r, ground.g, ground.b};
   for (int c = 0; c < 3; ++c) {
     const double color = from[c];
-    to[c] = background ? byteOf(color + behind * grounds[c])
-                       : byteOf(alpha > 0.0 ? color / alpha : 0.0);
+    append(form.background ? color + behind * grounds[c] : (alpha > 0.0 ? color / alpha : 0.0),
+           form.bits, to);
   }
-  to[3] = background ? byteOf(1.0) : byteOf(alpha);
+  append(form.background ? 1.0 : alpha, form.bits, to);
 }
 
-std::vector<png_byte> pixelsOf(const Image& image, const std::optional<Rgb>& background) {
-  std::vector<png_byte> pixels(image.rgba.size());
-  for (std::size_t i = 0; i < pixels.size(); i += kChannels)
-    fillPixel(&image.rgba[i], background, &pixels[i]);
+std::vector<png_byte> pixelsOf(const Image& image, const PngForm& form) {
+  std::vector<png_byte> pixels;
+  pixels.reserve(image.rgba.size() * std::size_t(form.bits / 8));
+  for (std::size_t i = 0; i < image.rgba.size(); i += kChannels)
+    appendPixel(&image.rgba[i], form, pixels);
   return pixels;
 }
 
@@ -79,11 +86,16 @@ png_text textChunk(const char* key, const std::string& text) {
   return chunk;
 }
 
-bool write(const PngStructs& s, Writing& writing, Resolution size, const PngText& text) {
+/// Of the file's header.
+struct PngHeader {
+  int width, height, bits;
+};
+
+bool write(const PngStructs& s, Writing& writing, const PngHeader& header, const PngText& text) {
   png_text chunks[] = {textChunk("Software", text.software), textChunk("Comment", text.comment)};
   if (setjmp(png_jmpbuf(s.png)) != 0) return false;
   png_set_write_fn(s.png, &writing, append, noFlush);
-  png_set_IHDR(s.png, s.info, png_uint_32(size.width), png_uint_32(size.height), 8,
+  png_set_IHDR(s.png, s.info, png_uint_32(header.width), png_uint_32(header.height), header.bits,
                PNG_COLOR_TYPE_RGB_ALPHA, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                PNG_FILTER_TYPE_DEFAULT);
   png_set_sRGB(s.png, s.info, PNG_sRGB_INTENT_PERCEPTUAL);
@@ -95,13 +107,15 @@ bool write(const PngStructs& s, Writing& writing, Resolution size, const PngText
 
 }  // namespace
 
-Bytes encodePng(const Image& image, const std::optional<Rgb>& background, const PngText& text) {
-  Writing writing{pixelsOf(image, background), {}, {}, {}};
+Bytes encodePng(const Image& image, const PngForm& form, const PngText& text) {
+  Writing writing{pixelsOf(image, form), {}, {}, {}};
+  const std::size_t ofRow =
+      std::size_t(image.width) * std::size_t(kChannels) * std::size_t(form.bits / 8);
   for (int row = 0; row < image.height; ++row)
-    writing.rows.push_back(&writing.pixels[std::size_t(row) * image.width * kChannels]);
+    writing.rows.push_back(&writing.pixels[std::size_t(row) * ofRow]);
   const PngStructs structs(writing);
   if (structs.info == nullptr) throw std::bad_alloc();
-  if (!write(structs, writing, {image.width, image.height}, text))
+  if (!write(structs, writing, {image.width, image.height, form.bits}, text))
     throw RuntimeFailure("libpng: " + writing.error);
   return std::move(writing.bytes);
 }

@@ -15,10 +15,13 @@ struct PngText {
   std::string comment;   ///< how; UTF-8
 };
 
-/// 8 bits a channel, sRGB: the picture before a background, or RGBA with colors that are not
-/// premultiplied. \throws RuntimeFailure  libpng's own words
-[[nodiscard]] std::vector<std::byte> encodePng(const Image& image,
-                                               const std::optional<Rgb>& background,
+struct PngForm {
+  std::optional<Rgb> background;  ///< the picture before it, else RGBA
+  int bits = 8;                   ///< a channel: 8 or 16
+};
+
+/// sRGB; colors that are not premultiplied. \throws RuntimeFailure  libpng's own words
+[[nodiscard]] std::vector<std::byte> encodePng(const Image& image, const PngForm& form,
                                                const PngText& text);
 
 }  // namespace esvr::render

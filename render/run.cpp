@@ -1,14 +1,21 @@
 #include "render/run.h"
 
 #include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <span>
 #include <vector>
 
 #include "cli/bytes_file.h"
 #include "cli/interrupts.h"
+#include "cli/json_file.h"
 #include "cli/output.h"
 #include "cli/stopwatch.h"
 #include "cli/table.h"
 #include "cli/version_text.h"
+#include "esvr/image_metrics.h"
+#include "render/bench.h"
+#include "render/exr_file.h"
 #include "render/png_file.h"
 #include "render/scene.h"
 
@@ -26,19 +33,47 @@ fs::path frameName(const fs::path& output, int frame) {
   return name.replace_extension(number + output.extension().string());
 }
 
+std::vector<fs::path> frameNames(const Options& options, const fs::path& output) {
+  std::vector<fs::path> names;
+  const int last = options.lastFrame.value_or(options.turntable - 1);
+  for (int i = options.firstFrame; i <= last; ++i) names.push_back(frameName(output, i));
+  return names;
+}
+
 std::vector<fs::path> outputs(const Options& options) {
   if (options.turntable == 0) return {options.output};
-  std::vector<fs::path> names;
-  for (int i = 0; i < options.turntable; ++i) names.push_back(frameName(options.output, i));
-  return names;
+  return frameNames(options, options.output);
+}
+
+std::vector<fs::path> depthOutputs(const Options& options) {
+  if (options.depth.empty()) return {};
+  if (options.turntable == 0) return {options.depth};
+  return frameNames(options, options.depth);
+}
+
+/// "turn.0007.png": "turn.0007.error.png".
+fs::path errorName(const fs::path& picture) {
+  fs::path name = picture;
+  return name.replace_extension("error" + picture.extension().string());
 }
 
 /// All that can go wrong without work goes wrong before it.
 void checkFiles(const Options& options, const std::vector<fs::path>& files) {
   for (const auto& file : files) {
     cli::requireDistinct({options.input, file});
-    cli::checkOutput(file, {".png"}, options.overwrite);
+    cli::checkOutput(file, {".png", ".exr"}, options.overwrite);
+    if (options.reference.empty()) continue;
+    cli::requireDistinct({options.reference, file, errorName(file)});
+    cli::checkOutput(errorName(file), {".png", ".exr"}, options.overwrite);
   }
+  for (const auto& file : depthOutputs(options)) {
+    cli::requireDistinct({options.input, file});
+    cli::checkOutput(file, {".exr"}, options.overwrite);
+  }
+  if (!options.saveTransfer.empty())
+    cli::checkOutput(options.saveTransfer, {".json"}, options.overwrite);
+  const bool toFile = !options.report.empty() && options.report != cli::kStandardOutput;
+  if (toFile) cli::checkOutput(options.report, {".json"}, options.overwrite);
 }
 
 ValueRange rangeOf(const Options& options, const Scene& scene) {
@@ -56,7 +91,27 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
                    : rescaled(options.transfer, rangeOf(options, scene));
   r.step = options.step;
   r.opacityLength = options.opacityLength;
+  r.mode = options.mode;
+  r.clip = options.clip;
   return r;
+}
+
+/// A file's scene, prepared for drawing.
+struct Drawing {
+  Drawing(const fs::path& file, const std::optional<std::string>& grid,
+          const DrawSettings& settings)
+      : scene(readScene(file, grid)), renderer(scene, settings) {}
+
+  const Scene scene;
+  SceneRenderer renderer;
+};
+
+/// The reference is drawn as it is, whatever the values of the other.
+std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings& settings) {
+  if (options.reference.empty()) return nullptr;
+  DrawSettings own = settings;
+  if (options.input.extension() != ".esvr") own.values.reset();
+  return std::make_unique<Drawing>(options.reference, std::nullopt, own);
 }
 
 std::string summary(const fs::path& file, const Scene& scene, Resolution r, double seconds) {
@@ -64,30 +119,113 @@ std::string summary(const fs::path& file, const Scene& scene, Resolution r, doub
          std::to_string(r.height) + ", " + cli::shortNumber(seconds) + " s";
 }
 
-void drawFrame(const Scene& scene, const RenderOptions& r, const Options& options,
-               const fs::path& file) {
-  cli::Stopwatch watch;
-  const Image image = draw(scene, r);
-  const double seconds = watch.lap();
-  const PngText text{std::string(kProgram) + " " + cli::programVersion(), options.commandLine};
-  cli::writeBytes(file, encodePng(image, options.background, text), options.overwrite);
-  cli::Log(kProgram, options.verbosity).info(summary(file, scene, r.resolution, seconds));
+class Frames {
+ public:
+  Frames(const Options& options, Drawing& drawing, Drawing* reference)
+      : options_(options),
+        log_(kProgram, options.verbosity),
+        drawing_(drawing),
+        reference_(reference) {}
+
+  void draw(const RenderOptions& r, const fs::path& file) {
+    cli::Stopwatch watch;
+    const Image image = drawing_.renderer->draw(r);
+    const double seconds = watch.lap();
+    write(file, image, options_.background);
+    log_.info(summary(file, drawing_.scene, r.resolution, seconds));
+    if (reference_ != nullptr) compare(r, image, file);
+  }
+  void drawDepth(RenderOptions r, const fs::path& file) {
+    r.mode = RenderMode::kDepth;
+    const auto bytes =
+        encodeDepthExr(drawing_.renderer->draw(r), {software(), options_.commandLine});
+    cli::writeBytes(file, bytes, options_.overwrite);
+    log_.info(file.string() + ": distances in voxels");
+  }
+  [[nodiscard]] const nlohmann::ordered_json& comparisons() const { return comparisons_; }
+
+ private:
+  void write(const fs::path& file, const Image& image, const std::optional<Rgb>& background) {
+    const auto bytes =
+        file.extension() == ".exr"
+            ? encodeExr(image, {software(), options_.commandLine})
+            : encodePng(image, {background, options_.bits}, {software(), options_.commandLine});
+    cli::writeBytes(file, bytes, options_.overwrite);
+  }
+
+  static std::string software() { return std::string(kProgram) + " " + cli::programVersion(); }
+
+  void compare(const RenderOptions& r, const Image& image, const fs::path& file) {
+    constexpr double kGain = 10.0;  // as --help has it
+    const Image expected = reference_->renderer->draw(r);
+    const ImageMetrics m = compareImages(expected, image);
+    write(errorName(file), errorMap(expected, image, kGain), std::nullopt);
+    log_.info(errorName(file).string() + ": PSNR " + cli::shortNumber(m.psnr) + " dB, SSIM " +
+              cli::shortNumber(m.ssim) + ", largest error " + cli::shortNumber(m.maxError));
+    comparisons_.push_back({{"picture", file.string()},
+                            {"psnr", jsonNumber(m.psnr)},
+                            {"ssim", m.ssim},
+                            {"max_error", m.maxError}});
+  }
+
+  const Options& options_;
+  const cli::Log log_;
+  Drawing& drawing_;
+  Drawing* reference_;
+  nlohmann::ordered_json comparisons_ = nlohmann::ordered_json::array();
+};
+
+nlohmann::ordered_json reportHead(const Options& options, const Device& device) {
+  return {{"program", std::string(kProgram) + " " + cli::programVersion()},
+          {"command", options.commandLine},
+          {"device", deviceName(device)},
+          {"input", options.input.string()}};
+}
+
+void writeReport(const Options& options, const nlohmann::ordered_json& report) {
+  if (!options.report.empty()) cli::writeJson({options.report, options.overwrite}, report);
+}
+
+void drawFrames(const Options& options, RenderOptions r, Frames& frames) {
+  const auto files = outputs(options), depths = depthOutputs(options);
+  const Camera first = r.camera;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const std::size_t number = std::size_t(options.firstFrame) + i;
+    if (number > 0) r.camera = turned(first, 360.0 * double(number) / options.turntable);
+    frames.draw(r, files[i]);
+    if (!depths.empty()) frames.drawDepth(r, depths[i]);
+  }
+}
+
+void saveTransfer(const Options& options, const TransferFunction& transfer) {
+  if (options.saveTransfer.empty()) return;
+  const std::string text = paraViewPreset(transfer, options.saveTransfer.stem().string());
+  cli::writeBytes(options.saveTransfer, std::as_bytes(std::span(text)), options.overwrite);
 }
 
 }  // namespace
 
 void run(const Options& options) {
   const cli::Interrupts interrupts;
-  const auto files = outputs(options);
+  const auto files = options.bench ? std::vector<fs::path>{} : outputs(options);
   checkFiles(options, files);
-  const Scene scene = readScene(options.input, options.grid);
-  RenderOptions r = renderOptions(options, scene);
+  const DrawSettings settings{selectDevice(options.device), options.limits, options.values};
+  Drawing drawing(options.input, options.grid, settings);
+  const auto reference = referenceOf(options, settings);
+  RenderOptions r = renderOptions(options, drawing.scene);
   r.cancel = &interrupts.token();
-  const Camera first = r.camera;
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    if (i > 0) r.camera = turned(first, 360.0 * double(i) / double(files.size()));
-    drawFrame(scene, r, options, files[i]);
+  saveTransfer(options, r.transfer);
+  auto report = reportHead(options, settings.device);
+  if (options.bench) {
+    const cli::Log log(kProgram, options.verbosity);
+    report.update(bench({*drawing.renderer, reference ? &*reference->renderer : nullptr}, r,
+                        options.turntable, log));
+  } else {
+    Frames frames(options, drawing, reference.get());
+    drawFrames(options, r, frames);
+    report["comparisons"] = frames.comparisons();
   }
+  writeReport(options, report);
 }
 
 }  // namespace esvr::render

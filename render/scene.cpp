@@ -28,7 +28,7 @@ Scene encoded(const std::filesystem::path& path, const std::optional<std::string
   scene.data = {grid.valueMin, grid.valueMax};
   scene.background = float(grid.descriptor.background);
   if (grid.voxels)
-    scene.content = decodeGrid(grid);
+    scene.content = VolumeGrid{grid.descriptor, decodeGrid(grid), 0};
   else
     scene.content = std::move(grid.field);
   return scene;
@@ -47,7 +47,7 @@ Scene voxels(const std::filesystem::path& path, const std::optional<std::string>
   scene.box = activeBox(grid.volume);
   scene.data = activeRange(grid.volume);
   scene.background = grid.volume.background;
-  scene.content = std::move(grid.volume);
+  scene.content = std::move(grid);
   return scene;
 }
 
@@ -59,9 +59,18 @@ Scene readScene(const std::filesystem::path& path, const std::optional<std::stri
   return scene;
 }
 
-Image draw(const Scene& scene, const RenderOptions& options) {
-  if (const auto* field = std::get_if<Field>(&scene.content)) return renderField(*field, options);
-  return renderVolume(std::get<SparseVolume>(scene.content), options);
+SceneRenderer::SceneRenderer(const Scene& scene, const DrawSettings& s) {
+  if (const auto* field = std::get_if<Field>(&scene.content)) {
+    renderer_ = makeFieldRenderer(*field, s.device, s.limits);
+    return;
+  }
+  const auto& grid = std::get<VolumeGrid>(scene.content);
+  if (s.device.kind == DeviceKind::kCpu && !s.values) {
+    renderer_ = makeVolumeRenderer(grid.volume);
+    return;
+  }
+  nano_ = makeNanoVolume(grid, s.values.value_or(NanoValues::kFloat));
+  renderer_ = makeNanoRenderer(nano_, s.device, s.limits);
 }
 
 }  // namespace esvr::render

@@ -101,9 +101,42 @@ ColorMap blackBody() {
                                        {1.0, {1.0, 1.0, 1.0}}});
 }
 
+// Gray that brightens where smoke is thin and lit through.
+ColorMap smoke() {
+  return fromPoints(
+      ColorSpace::kLab,
+      {{0.0, {0.90, 0.90, 0.92}}, {0.3, {0.70, 0.70, 0.73}}, {1.0, {0.22, 0.22, 0.24}}});
+}
+// For values from air (0) over soft tissue (about a third) to dense bone (1), as a linear CT window
+// of -1000 to 2000 HU has them: fat at 0.30, muscle at 0.35, spongy bone from 0.43, compact bone
+// from 0.6.
+ColorMap ctBone() {
+  return fromPoints(ColorSpace::kRgb, {{0.0, {0.0, 0.0, 0.0}},
+                                       {0.38, {0.55, 0.25, 0.15}},
+                                       {0.45, {0.88, 0.60, 0.29}},
+                                       {0.60, {1.0, 0.94, 0.82}},
+                                       {1.0, {1.0, 1.0, 1.0}}});
+}
+ColorMap ctSoftTissue() {
+  return fromPoints(ColorSpace::kRgb, {{0.0, {0.0, 0.0, 0.0}},
+                                       {0.28, {0.95, 0.78, 0.62}},
+                                       {0.33, {0.80, 0.36, 0.28}},
+                                       {0.40, {0.62, 0.16, 0.14}},
+                                       {0.55, {1.0, 0.94, 0.86}},
+                                       {1.0, {1.0, 1.0, 1.0}}});
+}
+
 OpacityCurve linear() { return {{0.0, 0.0}, {1.0, 1.0}}; }
 OpacityCurve inverse() { return {{0.0, 1.0}, {1.0, 0.0}}; }
 OpacityCurve tent() { return {{0.0, 0.0}, {0.5, 1.0}, {1.0, 0.0}}; }
+OpacityCurve smokeOpacity() { return {{0.0, 0.0}, {0.1, 0.08}, {0.5, 0.35}, {1.0, 0.9}}; }
+OpacityCurve ctBoneOpacity() {
+  return {{0.0, 0.0}, {0.40, 0.0}, {0.48, 0.3}, {0.65, 0.85}, {1.0, 0.95}};
+}
+OpacityCurve ctSoftTissueOpacity() {
+  return {{0.0, 0.0},  {0.27, 0.0}, {0.30, 0.08}, {0.36, 0.25},
+          {0.45, 0.3}, {0.65, 0.8}, {1.0, 0.9}};
+}
 OpacityCurve step() { return {{0.0, 0.0, 0.5, 1.0}, {1.0, 1.0}}; }
 
 template <class Result>
@@ -111,13 +144,26 @@ struct BuiltIn {
   const char* name;
   Result (*make)();
 };
-constexpr BuiltIn<ColorMap> kColorMaps[] = {
-    {"viridis", viridis},         {"inferno", inferno},     {"magma", magma},
-    {"plasma", plasma},           {"cividis", cividis},     {"turbo", turbo},
-    {"cool-to-warm", coolToWarm}, {"grayscale", grayscale}, {"x-ray", xRay},
-    {"black-body", blackBody}};
-constexpr BuiltIn<OpacityCurve> kOpacities[] = {
-    {"linear", linear}, {"inverse", inverse}, {"tent", tent}, {"step", step}};
+constexpr BuiltIn<ColorMap> kColorMaps[] = {{"viridis", viridis},
+                                            {"inferno", inferno},
+                                            {"magma", magma},
+                                            {"plasma", plasma},
+                                            {"cividis", cividis},
+                                            {"turbo", turbo},
+                                            {"cool-to-warm", coolToWarm},
+                                            {"grayscale", grayscale},
+                                            {"x-ray", xRay},
+                                            {"black-body", blackBody},
+                                            {"smoke", smoke},
+                                            {"ct-bone", ctBone},
+                                            {"ct-soft-tissue", ctSoftTissue}};
+constexpr BuiltIn<OpacityCurve> kOpacities[] = {{"linear", linear},
+                                                {"inverse", inverse},
+                                                {"tent", tent},
+                                                {"step", step},
+                                                {"smoke", smokeOpacity},
+                                                {"ct-bone", ctBoneOpacity},
+                                                {"ct-soft-tissue", ctSoftTissueOpacity}};
 
 template <class Result>
 std::vector<std::string> namesOf(std::span<const BuiltIn<Result>> all) {

@@ -1,19 +1,27 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <utility>
 
 #include "esvr/error.h"
 #include "esvr/transfer_function.h"
+#include "render/paraview_xml.h"
 
 namespace esvr {
 namespace {
 
 using nlohmann::json;
 
+bool isXml(std::ifstream& file) {
+  file >> std::ws;
+  return file.peek() == '<';
+}
+
 json parsed(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw BadInput("cannot read " + path.string());
+  if (isXml(file)) return presetsOfXml(path);
   json content = json::parse(file, nullptr, false);
   if (content.is_discarded()) throw BadInput(path.string() + ": not JSON");
   return content.is_array() ? content : json::array({std::move(content)});
@@ -114,7 +122,37 @@ TransferFunction functionOf(const json& preset) {
   return f;
 }
 
+const char* nameOf(ColorSpace space) {
+  switch (space) {
+    case ColorSpace::kRgb:
+      return "RGB";
+    case ColorSpace::kHsv:
+    case ColorSpace::kHsvWrap:
+      return "HSV";
+    case ColorSpace::kLab:
+      return "Lab";
+    case ColorSpace::kDiverging:
+      return "Diverging";
+    case ColorSpace::kStep:
+      return "Step";
+  }
+  throw std::logic_error("writeParaViewPreset: no such space");
+}
+
 }  // namespace
+
+std::string paraViewPreset(const TransferFunction& function, const std::string& name) {
+  checkTransferFunction(function);
+  const ColorMap& map = function.colors;
+  nlohmann::ordered_json preset{{"Name", name}, {"ColorSpace", nameOf(map.space)}};
+  if (map.space == ColorSpace::kHsvWrap) preset["HSVWrap"] = true;
+  preset["NanColor"] = {map.nan.r, map.nan.g, map.nan.b};
+  for (const ColorPoint& p : map.points)
+    for (const double v : {p.x, p.color.r, p.color.g, p.color.b}) preset["RGBPoints"].push_back(v);
+  for (const OpacityPoint& p : function.opacity)
+    for (const double v : {p.x, p.opacity, p.midpoint, p.sharpness}) preset["Points"].push_back(v);
+  return nlohmann::ordered_json::array({preset}).dump(2) + "\n";
+}
 
 TransferFunction readParaViewPreset(const std::filesystem::path& path, const std::string& name) {
   const json presets = parsed(path);

@@ -2,7 +2,7 @@
 /// What both renderers share: checked options and the picture on its way.
 
 #include "esvr/render.h"
-#include "render/transfer_table.h"
+#include "render/sample_rule.h"
 #include "render/view.h"
 
 namespace esvr {
@@ -18,7 +18,7 @@ class Picture {
   const View view;
   const TransferTable table;
 
-  void set(int column, int row, const RayState& ray);
+  void set(int column, int row, const PixelColor& color);
   [[nodiscard]] Image take() { return std::move(image_); }
 
  private:

@@ -40,7 +40,8 @@ void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
 Image renderField(const Field& field, const RenderOptions& options) {
   Picture picture(options);
   const auto primitives = visiblePrimitives(field, picture.view, options.resolution);
-  const TileScene scene{options, picture.view, picture.table, primitives, field.background};
+  const TileScene scene{options, picture.view, primitives,
+                        sampleRule(options, picture.table.view(), field.background)};
   tbb::parallel_for(0, tilesAlong(options.resolution.height), [&](int row) {
     checkCancelled(options);
     drawRow(scene, row * kTileSide, picture);

@@ -1,36 +1,16 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <limits>
+#include <algorithm>
+#include <cmath>
 
 #include "esvr/render.h"
 #include "render/picture.h"
+#include "render/ray_box.h"
 #include "render/voxel_sampler.h"
 
 namespace esvr {
 namespace {
-
-struct Interval {
-  double begin, end;
-};
-
-/// Where a ray lies between two planes perpendicular to an axis.
-Interval slab(double origin, double direction, double low, double high) {
-  constexpr double kAll = std::numeric_limits<double>::infinity();
-  if (direction == 0.0)
-    return origin >= low && origin <= high ? Interval{-kAll, kAll} : Interval{kAll, -kAll};
-  const double a = (low - origin) / direction, b = (high - origin) / direction;
-  return {std::min(a, b), std::max(a, b)};
-}
-
-Interval within(const Ray& ray, const Vec3& low, const Vec3& high) {
-  Interval t{0.0, std::numeric_limits<double>::infinity()};
-  for (int a = 0; a < 3; ++a) {
-    const Interval s = slab(ray.origin[a], ray.direction[a], low[a], high[a]);
-    t = {std::max(t.begin, s.begin), std::min(t.end, s.end)};
-  }
-  return t;
-}
 
 /// The first sample behind a brick that has nothing. Rounding must not lose a sample that lies on
 /// the brick's far side: it may be looked at twice instead.
@@ -39,7 +19,7 @@ double behindBrick(const Ray& ray, Coord brick, double sample, double step) {
   const Vec3 low{double(brick.x) * kBrickSide, double(brick.y) * kBrickSide,
                  double(brick.z) * kBrickSide};
   const Vec3 high = sum(low, {kBrickSide, kBrickSide, kBrickSide});
-  return std::max(sample + 1.0, std::ceil(within(ray, low, high).end / step - kRounding));
+  return std::max(sample + 1.0, std::ceil(within(ray, {low, high}).end / step - kRounding));
 }
 
 class RayMarch {
@@ -48,20 +28,19 @@ class RayMarch {
       : options_(options),
         picture_(picture),
         sampler_(volume),
-        background_(volume.background),
+        rule_(sampleRule(options, picture.table.view(), volume.background)),
         origin_{double(volume.origin.x), double(volume.origin.y), double(volume.origin.z)} {}
 
-  [[nodiscard]] RayState operator()(int column, int row) const {
+  [[nodiscard]] PixelColor operator()(int column, int row) const {
     RayState state;
     Ray ray = picture_.view.ray(column, row);
+    const SampleRange clip = samplesIn(ray, clipOf(options_), options_.step);
     ray.origin = difference(ray.origin, origin_);
-    const Interval t = within(ray, sampler_.low(), sampler_.high());
-    if (t.begin > t.end) return state;
-    const double end = std::floor(t.end / options_.step);
-    double sample = std::ceil(t.begin / options_.step);
-    while (sample <= end && !(state.transmittance < options_.minTransmittance))
+    const RayInterval t = within(ray, {sampler_.low(), sampler_.high()});
+    const SampleRange range = samplesIn(t, options_.step).and_(clip);
+    for (double sample = range.first; range.has(sample) && rule_.open(state);)
       sample = advance(ray, sample, state);
-    return state;
+    return rule_.finished(state);
   }
 
  private:
@@ -73,14 +52,14 @@ class RayMarch {
     const VoxelSampler::Corners* corners = sampler_.find(brick);
     if (corners == nullptr) return behindBrick(ray, brick, sample, options_.step);
     const float value = sampler_.interpolate(*corners, cell);
-    if (value != background_) state.add(picture_.table(value));
+    if (value != rule_.background) rule_.add(state, value, float(sample));
     return sample + 1.0;
   }
 
   const RenderOptions& options_;
   const Picture& picture_;
   VoxelSampler sampler_;
-  float background_;
+  SampleRule rule_;
   Vec3 origin_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 namespace esvr {
 namespace {
@@ -30,18 +31,21 @@ Tile::Tile(const TileScene& scene, TilePlace place)
       rows_(std::min(kTileSide, scene.options.resolution.height - place.row)),
       middleUnit_(middleUnit(scene, place)),
       scales_(kPixels),
+      clips_(kPixels),
       rays_(kPixels),
       sums_(std::size_t(kPixels) * kBinSamples, 0.0f),
       touched_(kPixels, 0u) {
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column)
-      scales_[row * kTileSide + column] = rayScale(place.column + column, place.row + row);
+      lookAlong(place.column + column, place.row + row, row * kTileSide + column);
 }
 
-RayScale Tile::rayScale(int column, int row) const {
+void Tile::lookAlong(int column, int row, int pixel) {
   const View& view = scene_.view;
-  const double unit = view.unitAlong(view.planeX(column), view.planeY(row)) / scene_.options.step;
-  return {float(unit), float(unit - middleUnit_)};
+  const double step = scene_.options.step;
+  const double unit = view.unitAlong(view.planeX(column), view.planeY(row)) / step;
+  scales_[pixel] = {float(unit), float(unit - middleUnit_)};
+  clips_[pixel] = samplesIn(view.ray(column, row), clipOf(scene_.options), step);
 }
 
 std::vector<Tile::Entry> Tile::entries(std::span<const std::uint32_t> primitives) const {
@@ -72,7 +76,7 @@ void Tile::draw(std::span<const std::uint32_t> primitives) {
 
 void Tile::drawBin(std::int64_t bin, std::span<const Entry> active) {
   for (const Entry& entry : active) addPrimitive(bin, entry.primitive);
-  composite();
+  composite(bin);
 }
 
 Tile::PlacedPrimitive Tile::placed(const PrimitiveView& p, std::int64_t bin) const {
@@ -100,16 +104,21 @@ void Tile::addToRay(const PlacedPrimitive& p, int column, int row) {
   for (int i = span.first; i <= span.last; ++i) sums[i] += valueAt(form, span, i);
 }
 
-void Tile::composite() {
-  for (int pixel = 0; pixel < kPixels; ++pixel) {
-    float* sums = &sums_[std::size_t(pixel) * kBinSamples];
-    for (std::uint32_t left = touched_[pixel]; left != 0; left &= left - 1) {
-      float& sum = sums[std::countr_zero(left)];
-      if (sum != 0.0f && alive(pixel)) rays_[pixel].add(scene_.table(scene_.background + sum));
-      sum = 0.0f;
-    }
-    touched_[pixel] = 0;
+void Tile::compositeRay(int pixel, double firstSample) {
+  float* sums = &sums_[std::size_t(pixel) * kBinSamples];
+  for (std::uint32_t left = touched_[pixel]; left != 0; left &= left - 1) {
+    const int sample = std::countr_zero(left);
+    const float sum = std::exchange(sums[sample], 0.0f);
+    const double number = firstSample + sample;
+    if (sum != 0.0f && alive(pixel) && clips_[pixel].has(number))
+      scene_.rule.add(rays_[pixel], scene_.rule.background + sum, float(number));
   }
+  touched_[pixel] = 0;
+}
+
+void Tile::composite(std::int64_t bin) {
+  for (int pixel = 0; pixel < kPixels; ++pixel)
+    if (touched_[pixel] != 0) compositeRay(pixel, double(bin) * kBinSamples);
 }
 
 bool Tile::anyAlive() const {
@@ -122,7 +131,8 @@ bool Tile::anyAlive() const {
 void Tile::copyTo(Picture& picture) const {
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column)
-      picture.set(place_.column + column, place_.row + row, rays_[row * kTileSide + column]);
+      picture.set(place_.column + column, place_.row + row,
+                  scene_.rule.finished(rays_[row * kTileSide + column]));
 }
 
 }  // namespace esvr

@@ -6,6 +6,7 @@
 
 #include "render/picture.h"
 #include "render/primitive_view.h"
+#include "render/ray_box.h"
 
 namespace esvr {
 
@@ -19,9 +20,8 @@ struct TilePlace {
 struct TileScene {
   const RenderOptions& options;
   const View& view;
-  const TransferTable& table;
   const VisiblePrimitives& primitives;
-  float background;
+  SampleRule rule;
 };
 
 class Tile {
@@ -40,7 +40,7 @@ class Tile {
     BinRange bins;
     std::uint32_t primitive;
   };
-  [[nodiscard]] RayScale rayScale(int column, int row) const;
+  void lookAlong(int column, int row, int pixel);
   [[nodiscard]] std::vector<Entry> entries(std::span<const std::uint32_t> primitives) const;
   void drawBin(std::int64_t bin, std::span<const Entry> active);
   void addPrimitive(std::int64_t bin, std::uint32_t primitive);
@@ -51,10 +51,9 @@ class Tile {
   };
   [[nodiscard]] PlacedPrimitive placed(const PrimitiveView& p, std::int64_t bin) const;
   void addToRay(const PlacedPrimitive& p, int column, int row);
-  void composite();
-  [[nodiscard]] bool alive(int pixel) const {
-    return !(rays_[pixel].transmittance < scene_.options.minTransmittance);
-  }
+  void composite(std::int64_t bin);
+  void compositeRay(int pixel, double firstSample);
+  [[nodiscard]] bool alive(int pixel) const { return scene_.rule.open(rays_[pixel]); }
   [[nodiscard]] bool anyAlive() const;
 
   const TileScene& scene_;
@@ -62,6 +61,7 @@ class Tile {
   int columns_, rows_;  ///< pixels within the picture
   double middleUnit_;   ///< samples for each unit along forward, on the ray of the tile's middle
   std::vector<RayScale> scales_;
+  std::vector<SampleRange> clips_;
   std::vector<RayState> rays_;
   std::vector<float> sums_;  ///< kBinSamples a pixel
   /// Which of a pixel's sums something was added to: a bit each, the first sample's the lowest.

@@ -1,6 +1,6 @@
 #pragma once
 /// A transfer function sampled, with opacities for the step: what a renderer asks for every sample.
-/// The looking up and the compositing are written once for host and device.
+/// The looking up is written once for host and device.
 
 #include <vector>
 
@@ -25,8 +25,8 @@ struct TransferTableView {
 
   [[nodiscard]] ESVR_HD Classified operator()(float value) const {
     if (!(value == value)) return nan;
-    const float place = scale == kNoExtent ? (value < low ? 0.0f : float(kIntervals))
-                                           : (value - low) * scale;
+    const float place =
+        scale == kNoExtent ? (value < low ? 0.0f : float(kIntervals)) : (value - low) * scale;
     if (!(place > 0.0f)) return entries[0];
     if (place >= float(kIntervals)) return entries[kIntervals];
     const int i = int(place);
@@ -45,7 +45,8 @@ class TransferTable {
   /// \param length  of a step, in units of the length that opacities are given for
   TransferTable(const TransferFunction& function, double length);
 
-  [[nodiscard]] Classified operator()(float value) const { return on(entries_.data())(value); }
+  [[nodiscard]] Classified operator()(float value) const { return view()(value); }
+  [[nodiscard]] TransferTableView view() const { return on(entries_.data()); }
   [[nodiscard]] const std::vector<Classified>& entries() const { return entries_; }
   /// With the entries copied elsewhere.
   [[nodiscard]] TransferTableView on(const Classified* entries) const {
@@ -56,27 +57,6 @@ class TransferTable {
   float low_, scale_;
   std::vector<Classified> entries_;
   Classified nan_;
-};
-
-/// Light that a ray has gathered on its way.
-struct RayState {
-  float r = 0.0f, g = 0.0f, b = 0.0f;
-  float transmittance = 1.0f;
-
-  ESVR_HD void add(const Classified& sample) {
-    const float weight = transmittance * sample.alpha;
-    r += weight * sample.r;
-    g += weight * sample.g;
-    b += weight * sample.b;
-    transmittance *= 1.0f - sample.alpha;
-  }
-  /// What lies behind.
-  ESVR_HD void add(const RayState& behind) {
-    r += transmittance * behind.r;
-    g += transmittance * behind.g;
-    b += transmittance * behind.b;
-    transmittance *= behind.transmittance;
-  }
 };
 
 }  // namespace esvr

@@ -1,10 +1,16 @@
 // Plan: a blob as .esvr and as .vdb, drawn as a user would; pictures are read back with libpng.
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfStandardAttributes.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <png.h>
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "cli/run_program.h"
 #include "esvr/container.h"
@@ -40,6 +46,21 @@ Pixels readPng(const std::filesystem::path& path) {
   p.rgba.resize(PNG_IMAGE_SIZE(p.header));
   EXPECT_NE(png_image_finish_read(&p.header, nullptr, p.rgba.data(), 0, nullptr), 0);
   return p;
+}
+
+/// One channel of an EXR, row after row.
+std::vector<float> readExr(const std::filesystem::path& path, const char* channel) {
+  Imf::InputFile file(path.c_str());
+  const Imath::Box2i window = file.header().dataWindow();
+  const std::size_t width = std::size_t(window.max.x) + 1, height = std::size_t(window.max.y) + 1;
+  EXPECT_NE(file.header().channels().findChannel(channel), nullptr);
+  std::vector<float> values(width * height);
+  Imf::FrameBuffer buffer;
+  buffer.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()),
+                                    sizeof(float), sizeof(float) * width));
+  file.setFrameBuffer(buffer);
+  file.readPixels(0, window.max.y);
+  return values;
 }
 
 double psnrOf(const Pixels& a, const Pixels& b) {
@@ -165,6 +186,99 @@ TEST_F(EsvrRender, AGivenCameraIsTaken) {
   EXPECT_GT(seen.at(32, 24)[3], 0);
 }
 
+TEST_F(EsvrRender, ACameraFileIsReplacedByOptions) {
+  writeText(folder_ / "cam.json", R"({"eye": [-90, 15, 15], "center": [15, 15, 15],
+                                      "up": [0, 0, 1], "fov": 25})");
+  const auto file = picture("in.esvr", {"--camera", folder_ / "cam.json"});
+  const std::vector<std::string> same{"--eye", "-90,15,15", "--center", "15,15,15",
+                                      "--up",  "0,0,1",     "--fov",    "25"};
+  EXPECT_EQ(file.rgba, picture("in.esvr", same).rgba);
+  EXPECT_NE(picture("in.esvr", {"--camera", folder_ / "cam.json", "--fov", "50"}).rgba, file.rgba);
+  writeText(folder_ / "flat.json", R"({"height": 60})");
+  EXPECT_EQ(picture("in.esvr", {"--camera", folder_ / "flat.json"}).rgba,
+            picture("in.esvr", {"--orthographic", "--height", "60"}).rgba);
+}
+
+TEST_F(EsvrRender, APngMayHave16BitsAChannel) {
+  ASSERT_EQ(draw("in.esvr", "out.png", {"--bits", "16"}).exitCode, 0);
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  ASSERT_NE(png_image_begin_read_from_file(&header, (folder_ / "out.png").c_str()), 0);
+  EXPECT_NE(header.format & PNG_FORMAT_FLAG_LINEAR, 0u) << "how libpng says 16 bits";
+  png_image_free(&header);
+}
+
+TEST_F(EsvrRender, AnExrHasTheSamePictureInLinearLight) {
+  ASSERT_EQ(draw("in.esvr", "out.exr", {"--colors", "grayscale"}).exitCode, 0);
+  const auto red = readExr(folder_ / "out.exr", "R"), alpha = readExr(folder_ / "out.exr", "A");
+  const auto png = picture("in.esvr", {"--colors", "grayscale"});
+  ASSERT_EQ(red.size(), 64u * 48u);
+  const std::size_t middle = 24 * 64 + 32;
+  EXPECT_NEAR(alpha[middle], png.at(32, 24)[3] / 255.0, 0.5 / 255 + 1e-6);
+  const double color = png.at(32, 24)[0] / 255.0;
+  // Half a level of 255 is at most 2.4 half levels of linear light.
+  EXPECT_NEAR(red[middle], alpha[middle] * std::pow((color + 0.055) / 1.055, 2.4), 2.4 / 255);
+  EXPECT_EQ(alpha[0], 0.0f);
+  Imf::InputFile file((folder_ / "out.exr").c_str());
+  EXPECT_THAT(Imf::comments(file.header()), HasSubstr("out.exr --colors grayscale"));
+}
+
+TEST_F(EsvrRender, DistancesAreWrittenWhereLightStops) {
+  const std::vector<std::string> more{"--depth", folder_ / "z.exr", "--opacity-length", "0.5"};
+  ASSERT_EQ(draw("in.esvr", "out.png", more).exitCode, 0);
+  const auto depth = readExr(folder_ / "z.exr", "Z");
+  EXPECT_TRUE(std::isinf(depth[0])) << "a corner that shows nothing";
+  EXPECT_GT(depth[24 * 64 + 32], 10.0f);
+  EXPECT_LT(depth[24 * 64 + 32], 300.0f);
+}
+
+TEST_F(EsvrRender, ModesAndBoxesChangeThePicture) {
+  const auto whole = picture("in.esvr");
+  EXPECT_NE(picture("in.esvr", {"--mode", "maximum"}).rgba, whole.rgba);
+  EXPECT_NE(picture("in.esvr", {"--mode", "average"}).rgba, whole.rgba);
+  EXPECT_NE(picture("in.esvr", {"--clip", "0,0,0,15,40,40"}).rgba, whole.rgba);
+  EXPECT_EQ(picture("in.esvr", {"--slice", "y=15"}).rgba,
+            picture("in.esvr", {"--clip", "-99,14.5,-99,99,15.5,99"}).rgba);
+  for (const png_byte v : picture("in.esvr", {"--clip", "500,0,0,501,1,1"}).rgba) ASSERT_EQ(v, 0);
+}
+
+TEST_F(EsvrRender, SomeFramesOfATurntableAreThoseOfTheWhole) {
+  ASSERT_EQ(draw("in.esvr", "all.png", {"--turntable", "3"}).exitCode, 0);
+  ASSERT_EQ(draw("in.esvr", "part.png", {"--turntable", "3", "--frames", "1-1"}).exitCode, 0);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "part.0000.png"));
+  EXPECT_EQ(readPng(folder_ / "part.0001.png").rgba, readPng(folder_ / "all.0001.png").rgba);
+}
+
+TEST_F(EsvrRender, ASavedTransferFunctionDrawsTheSame) {
+  const auto first = picture(
+      "in.esvr", {"--colors", "turbo", "--opacity", "tent", "--tf-save", folder_ / "tf.json"});
+  const auto again = picture("in.esvr", {"--tf", folder_ / "tf.json", "--range", "own"});
+  EXPECT_EQ(again.rgba, first.rgba);
+}
+
+TEST_F(EsvrRender, ComparesWithAReference) {
+  const auto run = draw("in.esvr", "out.png",
+                        {"--ref", folder_ / "in.vdb", "--report", folder_ / "report.json"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out.error.png"));
+  const auto report = nlohmann::json::parse(readText(folder_ / "report.json"));
+  EXPECT_GT(report["comparisons"][0]["psnr"], 30.0);
+  EXPECT_GT(report["comparisons"][0]["ssim"], 0.9);
+}
+
+TEST_F(EsvrRender, MeasuresWithoutKeepingAPicture) {
+  const auto run =
+      runProgram(ESVR_RENDER, {folder_ / "in.esvr", "--bench", "--turntable", "3", "--resolution",
+                               "64x48", "--ref", folder_ / "in.vdb", "--report", "-", "-q"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto report = nlohmann::json::parse(run.out);
+  EXPECT_EQ(report["views"], 3);
+  EXPECT_GT(report["drawn"]["fps_median"], 0.0);
+  EXPECT_GE(report["drawn"]["fps_median"], report["drawn"]["fps_1_percent_low"]);
+  EXPECT_GT(report["reference"]["frame_ms"], 0.0);
+  EXPECT_GT(report["image"]["psnr"]["least"], 30.0);
+}
+
 TEST_F(EsvrRender, TheNumberOfThreadsChangesNothing) {
   EXPECT_EQ(picture("in.esvr", {"--threads", "1"}).rgba, picture("in.esvr").rgba);
 }
@@ -199,11 +313,31 @@ TEST_F(EsvrRender, OptionsThatMakeNoSenseAreRefused) {
   expectRefused({"--background", "1,2,3"}, 2, "--background");
   expectRefused({"--turntable", "0"}, 2, "--turntable");
   expectRefused({"--preset", "x"}, 2, "--tf");
+  expectRefused({"--bits", "12"}, 2, "--bits");
+  expectRefused({"--mode", "minimum"}, 2, "maximum");
+  expectRefused({"--clip", "1,0,0,0,1,1"}, 2, "clip");
+  expectRefused({"--clip", "0,0,0,1,1,1", "--slice", "x=1"}, 2, "--slice");
+  expectRefused({"--slice", "w=1"}, 2, "--slice");
+  expectRefused({"--slice", "z="}, 2, "--slice");
+  expectRefused({"--frames", "0-1"}, 2, "--turntable");
+  expectRefused({"--turntable", "3", "--frames", "2-3"}, 2, "--frames");
+  expectRefused({"--depth", "z.png"}, 2, ".exr");
+  expectRefused({"--bins", "17"}, 2, "--bins");
+  expectRefused({"--values", "fp32"}, 2, "fp16");
+  expectRefused({"--device", "gpu"}, 2, "gpu");
+  expectRefused({"--bench"}, 2, "--bench");
+  expectRefused({"--report", "r.json"}, 2, "--ref");
 }
 
 TEST_F(EsvrRender, InputThatCannotBeDrawnIsRefused) {
   expectRefused({"--grid", "none"}, 3, "density");
   expectRefused({"--tf", folder_ / "missing.json"}, 3, "missing.json");
+  expectRefused({"--ref", folder_ / "missing.vdb"}, 3, "missing.vdb");
+  expectRefused({"--camera", folder_ / "missing.json"}, 3, "missing.json");
+  writeText(folder_ / "cam.json", R"({"eye": [1, 2]})");
+  expectRefused({"--camera", folder_ / "cam.json"}, 3, "three numbers");
+  writeText(folder_ / "cam.json", R"({"eyes": [1, 2, 3]})");
+  expectRefused({"--camera", folder_ / "cam.json"}, 3, "eyes");
   EXPECT_EQ(draw("missing.esvr", "refused.png").exitCode, 3);
   EXPECT_EQ(draw("missing.vdb", "refused.png").exitCode, 3);
   writeText(folder_ / "bad.esvr", "nothing of the kind");

@@ -95,5 +95,45 @@ TEST_F(ParaViewPreset, WhatIsNoPresetIsRefusedWithItsReason) {
   EXPECT_THROW((void)readParaViewPreset(folder_ / "none.json"), BadInput);
 }
 
+constexpr const char* kOldMaps = R"(<?xml version="1.0"?>
+<ColorMaps>
+  <ColorMap name="plain" space="Lab">
+    <Point x="0" o="1" r="0" g="0.5" b="1"/><Point x="4" o="1" r="1" g="1" b="0"/>
+    <NaN r="0.25" g="0" b="0"/>
+  </ColorMap>
+  <ColorMap name="veil" space="Wrapped">
+    <Point x="2" o="0.75" r="1" g="0" b="0"/><Point x="-2" o="0" r="0" g="0" b="1"/>
+  </ColorMap>
+</ColorMaps>)";
+
+TEST_F(ParaViewPreset, OfOldIsRead) {
+  const auto f = read(kOldMaps);
+  EXPECT_EQ(f.colors.space, ColorSpace::kLab);
+  EXPECT_EQ(f.colors.nan, (Rgb{0.25, 0, 0}));
+  ASSERT_EQ(f.colors.points.size(), 2u);
+  EXPECT_EQ(f.colors.points[1], (ColorPoint{4.0, {1, 1, 0}}));
+  EXPECT_EQ(opacityAt(f.opacity, 1.0), 0.25) << "linear: a map of colors only";
+  const auto veil = read(kOldMaps, "veil");
+  EXPECT_EQ(veil.colors.space, ColorSpace::kHsvWrap);
+  EXPECT_EQ(veil.colors.points[0].x, -2.0);
+  EXPECT_EQ(opacityAt(veil.opacity, 0.0), 0.375);
+}
+
+TEST_F(ParaViewPreset, OfOldThatIsBrokenIsRefused) {
+  EXPECT_THAT(refusal("<ColorMap><Point"), HasSubstr("p.json: not XML"));
+  EXPECT_THAT(refusal("<ColorMap><Point x='a' r='0' g='0' b='0'/></ColorMap>"),
+              HasSubstr("not a color map"));
+  EXPECT_THAT(refusal("<ColorMap name='n'/>"), HasSubstr("no preset"));
+}
+
+TEST_F(ParaViewPreset, WrittenComesBackAsItWas) {
+  for (const char* name : {"first", "second"}) {
+    const auto f = read(kTwoPresets, name);
+    EXPECT_EQ(read(paraViewPreset(f, "again"), "again"), f);
+  }
+  const auto wrapped = read(kOldMaps, "veil");
+  EXPECT_EQ(read(paraViewPreset(wrapped, "")), wrapped);
+}
+
 }  // namespace
 }  // namespace esvr::test

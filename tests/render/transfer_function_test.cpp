@@ -67,7 +67,7 @@ TEST(ColorMap, EveryBuiltInMapIsWellFormed) {
   for (const auto& name : builtInColorMaps())
     for (const auto& opacity : builtInOpacities())
       EXPECT_NO_THROW(checkTransferFunction({builtInColorMap(name), builtInOpacity(opacity)}));
-  EXPECT_EQ(builtInColorMaps().size(), 10u);
+  EXPECT_EQ(builtInColorMaps().size(), 13u);
 }
 
 TEST(ColorMap, AnUnknownNameListsThoseThereAre) {

@@ -8,6 +8,8 @@
 /// The same input and options give the same bits on any number of threads (the calling TBB
 /// arena's).
 
+#include <optional>
+
 #include "esvr/camera.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/image.h"
@@ -16,6 +18,21 @@
 #include "esvr/transfer_function.h"
 
 namespace esvr {
+
+/// What becomes of the samples along a ray.
+enum class RenderMode {
+  kComposite,  ///< put over each other from front to back
+  kMaximum,    ///< the largest value, with its color and its opacity as it is
+  kAverage,    ///< the mean value, likewise; empty space does not count
+  /// Red: how far away half of the light is stopped, in voxels (orthographic: from the plane of the
+  /// eye). Alpha: 1, or 0 where more comes through, and red is 0 too.
+  kDepth
+};
+
+/// A box of places. Voxel (i, j, k) reaches half a voxel to each side of (i, j, k).
+struct PlaceBox {
+  Vec3 low, high;
+};
 
 struct RenderOptions {
   Camera camera;
@@ -28,6 +45,8 @@ struct RenderOptions {
   /// A ray ends where less than this part of the light behind would come through. At the default
   /// that costs a 16th of a level of 255.
   double minTransmittance = 1.0 / 4096;
+  RenderMode mode = RenderMode::kComposite;
+  std::optional<PlaceBox> clip{};       ///< samples outside of it count as empty space
   const CancelToken* cancel = nullptr;  ///< looked at before each row of tiles
 };
 
@@ -35,7 +54,7 @@ struct RenderOptions {
 /// sampling", algorithm 2): each ellipsoid adds to those samples of each ray that lie in its
 /// support, found by solving for entry and exit. \throws UsageError  as checkCamera and
 /// checkTransferFunction; step, opacityLength or
-///                     minTransmittance out of range; Cancelled
+///                     minTransmittance out of range; a clip box that is no box; Cancelled
 [[nodiscard]] Image renderField(const Field& field, const RenderOptions& options);
 
 /// Marches rays through voxels with trilinear interpolation and jumps over bricks that are not

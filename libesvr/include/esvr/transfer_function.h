@@ -29,6 +29,7 @@ enum class ColorSpace {
 struct ColorPoint {
   double x = 0.0;
   Rgb color;
+  friend bool operator==(const ColorPoint&, const ColorPoint&) = default;
 };
 
 /// At least one point, x not decreasing; before the first and behind the last, their colors.
@@ -36,6 +37,7 @@ struct ColorMap {
   ColorSpace space = ColorSpace::kRgb;
   std::vector<ColorPoint> points;
   Rgb nan{0.5, 0.0, 0.0};  ///< of values that are no number
+  friend bool operator==(const ColorMap&, const ColorMap&) = default;
 };
 
 /// The curve from a point to the next one is bent by the point's midpoint (where, of the way, it
@@ -46,6 +48,7 @@ struct OpacityPoint {
   double opacity = 0.0;  ///< 0 to 1, over the length that RenderOptions::opacityLength says
   double midpoint = 0.5;
   double sharpness = 0.0;
+  friend bool operator==(const OpacityPoint&, const OpacityPoint&) = default;
 };
 
 /// At least one point, x not decreasing; before the first and behind the last, their opacities.
@@ -54,6 +57,7 @@ using OpacityCurve = std::vector<OpacityPoint>;
 struct TransferFunction {
   ColorMap colors;
   OpacityCurve opacity;
+  friend bool operator==(const TransferFunction&, const TransferFunction&) = default;
 };
 
 /// \throws UsageError  no points, or not in order, or not finite; opacities, midpoints or
@@ -74,17 +78,24 @@ void checkTransferFunction(const TransferFunction& function);
 
 [[nodiscard]] std::vector<std::string> builtInOpacities();
 /// A curve from 0 to 1: "linear" rises, "inverse" falls, "tent" rises to the middle and falls,
-/// "step" is 0 below the middle and 1 above. \throws UsageError  no such curve
+/// "step" is 0 below the middle and 1 above; "smoke", "ct-bone" and "ct-soft-tissue" go with the
+/// color maps of these names. \throws UsageError  no such curve
 [[nodiscard]] OpacityCurve builtInOpacity(const std::string& name);
 
 /// Reads a ParaView preset: a JSON array of objects, or one object, with "RGBPoints" [x r g b ...],
 /// and optionally "Name", "ColorSpace" (RGB, HSV, Lab, CIELAB, Diverging, Step), "HSVWrap",
 /// "Points" [x opacity midpoint sharpness ...] and "NanColor" [r g b]. Points need no order.
-/// Without "Points" the opacity is linear over the range of the colors. \param name  of the preset
-/// in the file; empty for the first that has "RGBPoints" \throws BadInput  missing, not JSON, no
-/// such preset (lists those there are), not a transfer
-///                   function (says why)
+/// Without "Points" the opacity is linear over the range of the colors. Older ParaView's XML, too:
+/// <ColorMap name space> with <Point x o r g b> and <NaN r g b>; opacities o that are all 1 are
+/// those of a map of colors only, and count as none.
+/// \param name  of the preset in the file; empty for the first that has colors
+/// \throws BadInput  missing, not JSON, not XML, no such preset (lists those there are), not a
+///                   transfer function (says why)
 [[nodiscard]] TransferFunction readParaViewPreset(const std::filesystem::path& path,
                                                   const std::string& name = {});
+
+/// The JSON text of a file with one preset, which readParaViewPreset and ParaView read.
+/// \throws UsageError  as checkTransferFunction
+[[nodiscard]] std::string paraViewPreset(const TransferFunction& function, const std::string& name);
 
 }  // namespace esvr

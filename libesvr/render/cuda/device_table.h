@@ -1,0 +1,44 @@
+#pragma once
+/// What renderers on a CUDA device share: memory that grows, and a transfer function's table.
+
+#include <optional>
+
+#include "core/cuda/device_buffer.h"
+#include "render/sample_rule.h"
+
+namespace esvr::cuda {
+
+/// What was there is lost where it has to grow.
+template <class T>
+void atLeast(DeviceBuffer<T>& buffer, std::size_t n, cudaStream_t stream) {
+  if (buffer.size() >= n) return;
+  buffer = {};  // first freed, so that both are never held at once
+  buffer = DeviceBuffer<T>(n, stream);
+}
+
+class DeviceTable {
+ public:
+  /// A table takes longer to make than a picture: views of one transfer function share it.
+  void update(const RenderOptions& options, cudaStream_t stream) {
+    const double length = opacitySteps(options);
+    if (known_ && known_->length == length && known_->transfer == options.transfer) return;
+    known_ = {options.transfer, length, TransferTable(options.transfer, length)};
+    const auto& entries = known_->table.entries();
+    atLeast(entries_, entries.size(), stream);
+    entries_.upload(entries);
+  }
+  /// After an update.
+  [[nodiscard]] TransferTableView view() const { return known_->table.on(entries_.data()); }
+  [[nodiscard]] std::size_t bytes() const { return entries_.bytes(); }
+
+ private:
+  struct Known {
+    TransferFunction transfer;
+    double length;
+    TransferTable table;
+  };
+  std::optional<Known> known_;
+  DeviceBuffer<Classified> entries_;
+};
+
+}  // namespace esvr::cuda

@@ -1,0 +1,87 @@
+#pragma once
+/// Draws a field by per-primitive ray sampling on a CUDA device.
+
+#include <optional>
+#include <vector>
+
+#include "core/cuda/device_buffer.h"
+#include "core/cuda/stream.h"
+#include "esvr/renderer.h"
+#include "render/cuda/device_table.h"
+#include "render/cuda/event.h"
+#include "render/cuda/tile_frame.h"
+#include "render/scene_depth.h"
+
+namespace esvr::cuda {
+
+/// What of the scene lies on the device for good.
+struct SceneMemory {
+  SceneMemory(const Field& field, cudaStream_t stream);
+
+  DeviceBuffer<PackedEllipsoid> ellipsoids;
+  DeviceBuffer<Vec3> origins;
+  DeviceBuffer<RayKernel> kernels;
+  DeviceBuffer<PrimitiveView> views;
+  DeviceBuffer<Footprint> footprints;
+
+  [[nodiscard]] std::size_t bytes() const;
+  [[nodiscard]] DeviceEllipsoids view() const;
+};
+
+/// What a band of a picture takes; grows where a band needs more.
+struct BandMemory {
+  DeviceBuffer<FrameCounters> counters;
+  DeviceBuffer<std::uint32_t> counts, ends, entries, sorted;
+  DeviceBuffer<TilePart> items;
+  DeviceBuffer<std::uint32_t> partsOfTile, partsDone, closedAt, resultOf;
+  DeviceBuffer<RayState> results;
+  DeviceBuffer<float4> pixels;
+
+  [[nodiscard]] std::size_t bytes() const;
+  [[nodiscard]] TileLists lists();
+};
+
+class FieldRenderer final : public Renderer {
+ public:
+  FieldRenderer(const Field& field, const Device& device, const RendererLimits& limits);
+
+  Image draw(const RenderOptions& options) override;
+  void drawOnDevice(const RenderOptions& options) override;
+  FrameStats stats() const override { return stats_; }
+
+ private:
+  /// Rows of tiles.
+  struct Band {
+    int first, count;
+  };
+  struct Scene;  ///< what all bands of a picture share
+
+  void drawFrame(const RenderOptions& options, Image* image);
+  [[nodiscard]] std::size_t fixedBytes() const { return scene_.bytes() + table_.bytes(); }
+  void drawBand(const Scene& scene, Band band, Image* image);
+  [[nodiscard]] TileFrame frameOf(const Scene& scene, Band band) const;
+  [[nodiscard]] std::size_t bandBytes(const TileFrame& frame) const;
+  void reserve(const TileFrame& frame);
+  void list(const TileFrame& frame);
+  [[nodiscard]] int chosenParts(const TileFrame& frame);
+  [[nodiscard]] FrameCounters drawOnce(const Scene& scene, const TileFrame& frame);
+  void grow(const FrameCounters& counters);
+  [[nodiscard]] FrameCounters readCounters();
+  void download(const TileFrame& frame, Image& image);
+  void count(const TileFrame& frame, const FrameCounters& counters);
+
+  RendererLimits limits_;
+  float background_;
+  std::optional<PlaceBox> box_;
+  int multiprocessors_ = 0;
+  Stream stream_;
+  SceneMemory scene_;
+  BandMemory band_;
+  Event begin_, listed_, drawn_;
+  DeviceTable table_;
+  int parts_;  ///< 0: not yet chosen
+  std::uint64_t tiles_ = 0, occupied_ = 0;
+  FrameStats stats_;
+};
+
+}  // namespace esvr::cuda

@@ -1,0 +1,135 @@
+#pragma once
+/// A picture, or a band of it, as the kernels see it: tiles of pixels, and along their rays bins of
+/// kBinSamples samples. Each tile has for each bin a list of the ellipsoids that may reach it.
+
+#include <cuda_runtime_api.h>
+
+#include <cstdint>
+
+#include "render/primitive_math.h"
+#include "render/ray_box.h"
+#include "render/sample_rule.h"
+
+namespace esvr::cuda {
+
+/// The numbers by which drawing on CUDA is tuned; none of them decides on more of a picture than
+/// its rounding.
+struct DrawTuning {
+  static constexpr int kTileSide = 16;  ///< pixels
+  static constexpr int kTilePixels = kTileSide * kTileSide;
+  static constexpr int kWarpColumns = 8, kWarpRows = 4;  ///< pixels of a warp
+  static constexpr int kStage = 32;  ///< ellipsoids in shared memory at once: a lane each
+  static constexpr int kBlocksPerMultiprocessor = 4;
+  static constexpr int kListThreads = 128;
+  /// An ellipsoid in more lists than this is listed by a whole warp.
+  static constexpr int kManyLists = 64;
+  /// Work begins with the tiles of the longest lists; their lengths are told apart by powers of 2.
+  static constexpr int kLengthClasses = 12;
+  static constexpr int kMostParts = 16;  ///< of the depth
+};
+
+/// Where an ellipsoid lies in the picture.
+struct Footprint {
+  double column, row;                                       ///< of its outline's middle
+  float xx, xy, yy;                                         ///< of the outline, slightly widened
+  float nearest, farthest;                                  ///< along forward, slightly widened
+  std::int16_t firstColumn, lastColumn, firstRow, lastRow;  ///< firstRow > lastRow: not seen
+  std::int32_t everywhere;
+};
+
+struct TileFrame {
+  View view;
+  Resolution resolution;
+  double step;
+  int tileColumns, firstTileRow, tileRows;  ///< of the band
+  std::int64_t firstBin;                    ///< counted from the eye
+  int bins;
+  int parts;       ///< of the depth, drawn at once
+  int binsOfPart;  ///< the last part may have less
+
+  [[nodiscard]] ESVR_HD int tiles() const { return tileColumns * tileRows; }
+};
+
+/// A part of a tile.
+struct TilePart {
+  std::uint32_t tile, part;
+};
+
+/// What a frame counts while it is drawn.
+struct FrameCounters {
+  unsigned long long pairs;                         ///< entries of all lists
+  std::uint32_t items[DrawTuning::kLengthClasses];  ///< parts of tiles that have lists
+  std::uint32_t results;                            ///< of parts of tiles that have several
+  std::uint32_t occupiedTiles;
+  std::uint32_t longestTile;  ///< entries of a tile's lists, at most
+  std::uint32_t longestBin;
+  std::uint32_t next;  ///< item to draw
+};
+
+/// Device memory, borrowed.
+struct TileLists {
+  FrameCounters* counters;
+  std::uint32_t* counts;   ///< bins a tile: how long its list is
+  std::uint32_t* ends;     ///< bins a tile: where its list ends, once it is filled
+  std::uint32_t* entries;  ///< numbers of ellipsoids
+  std::uint32_t* sorted;   ///< room to sort long lists
+  std::uint64_t entryCapacity, sortedCapacity;
+  TilePart* items;             ///< tiles * parts for each class of lengths
+  std::uint32_t* partsOfTile;  ///< that have lists
+  std::uint32_t* partsDone;    ///< tiles
+  std::uint32_t* closedAt;     ///< tiles: a part behind which nothing is seen
+  std::uint32_t* resultOf;     ///< parts a tile: place of a result
+  RayState* results;           ///< kTilePixels each
+  std::uint64_t resultCapacity;
+};
+
+inline constexpr std::uint32_t kNoResult = 0xffffffffu;
+
+/// Only lists longer than a block are sorted in memory; there they lie where their entries do.
+ESVR_HD inline bool needSorting(const FrameCounters& c) {
+  return c.longestBin > std::uint32_t(DrawTuning::kTilePixels);
+}
+/// Whether the room is enough for what a frame counted.
+ESVR_HD inline bool listsFit(const FrameCounters& c, const TileLists& lists) {
+  return c.pairs <= lists.entryCapacity && c.results <= lists.resultCapacity &&
+         (!needSorting(c) || c.pairs <= lists.sortedCapacity);
+}
+
+struct DeviceEllipsoids {
+  const PackedEllipsoid* ellipsoids;
+  std::uint32_t count;
+  const Vec3* origins;       ///< of the chunks
+  const RayKernel* kernels;  ///< one, or an ellipsoid's each
+  std::int32_t ownKernels;
+};
+
+/// Ellipsoids seen by a frame.
+struct SeenEllipsoids {
+  PrimitiveView* views;
+  Footprint* footprints;
+};
+
+/// Looks at the ellipsoids and counts the entries of lists. `lists.counts` and the counters are
+/// zero before.
+void launchView(const TileFrame& frame, const DeviceEllipsoids& ellipsoids,
+                const SeenEllipsoids& seen, const TileLists& lists, cudaStream_t stream);
+/// Finds room for each list and orders the work.
+void launchPlan(const TileFrame& frame, const TileLists& lists, cudaStream_t stream);
+/// Does nothing where entries exceed the capacity.
+void launchFill(const TileFrame& frame, std::uint32_t count, const SeenEllipsoids& seen,
+                const TileLists& lists, cudaStream_t stream);
+
+struct DrawArguments {
+  TileFrame frame;
+  const PrimitiveView* views;
+  const Footprint* footprints;
+  TileLists lists;
+  SampleRule rule;
+  ClipBox clip;
+  float4* pixels;  ///< of the band, row after row: red, green, blue, alpha
+};
+
+/// Does nothing where the lists did not fit. \param multiprocessors  of the device
+void launchDraw(const DrawArguments& arguments, int multiprocessors, cudaStream_t stream);
+
+}  // namespace esvr::cuda

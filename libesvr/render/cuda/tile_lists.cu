@@ -1,0 +1,270 @@
+#include "core/cuda/check.h"
+#include "render/cuda/tile_frame.h"
+
+namespace esvr::cuda {
+namespace {
+
+constexpr int kWarp = 32;
+constexpr unsigned kAllLanes = 0xffffffffu;
+constexpr int kSide = DrawTuning::kTileSide;
+
+/// Widened so that rounding to float32 leaves nothing out.
+constexpr double kWider = 1.0 + 1e-6, kNarrower = 1.0 - 1e-6;
+
+unsigned blocksOf(std::size_t items) {
+  return unsigned((items + DrawTuning::kListThreads - 1) / DrawTuning::kListThreads);
+}
+
+__device__ ScreenEllipse outlineIn(const Footprint& p) {
+  return {p.column, p.row, double(p.xx), double(p.xy), double(p.yy), p.everywhere != 0};
+}
+
+__device__ Footprint footprintOf(const ScreenEllipse& o, const ScreenBounds& b) {
+  return {o.column,
+          o.row,
+          float(o.xx * kWider),
+          float(o.xy),
+          float(o.yy * kWider),
+          float(b.nearest * kNarrower),
+          float(b.farthest * kWider),
+          std::int16_t(b.firstColumn),
+          std::int16_t(b.lastColumn),
+          std::int16_t(b.firstRow),
+          std::int16_t(b.lastRow),
+          o.everywhere ? 1 : 0};
+}
+
+/// Threads that share an ellipsoid.
+struct Lanes {
+  int lane, count;
+};
+
+/// The columns of an ellipsoid's pixels in a row of tiles.
+struct Columns {
+  int first, last;
+};
+// Not inlined, as binsIn: counting and filling must come to the same lists, to the bit.
+__device__ __noinline__ Columns columnsIn(const TileFrame& frame, const Footprint& p, int tileRow) {
+  Columns c{p.firstColumn, p.lastColumn};
+  if (p.everywhere) return c;
+  const int lastRow = min(tileRow * kSide + kSide, frame.resolution.height) - 1;
+  const PixelSpan span = columnsBetween(outlineIn(p), tileRow * kSide, lastRow);
+  const int width = frame.resolution.width;
+  if (!(span.low <= span.high)) return {1, 0};
+  return {max(c.first, primitive_math::firstPixel(span.low, width)),
+          min(c.last, primitive_math::lastPixel(span.high, width))};
+}
+
+/// Bins of the frame, counted from its first.
+__device__ __noinline__ Columns binsIn(const TileFrame& frame, const Footprint& p, int tileColumn,
+                                       int tileRow) {
+  const int firstColumn = tileColumn * kSide, firstRow = tileRow * kSide;
+  const UnitRange unit =
+      unitRange(frame.view, firstColumn, min(firstColumn + kSide, frame.resolution.width) - 1,
+                firstRow, min(firstRow + kSide, frame.resolution.height) - 1);
+  ScreenBounds b{};
+  b.nearest = p.nearest, b.farthest = p.farthest;
+  const BinRange bins = binsOf(b, unit, frame.step);
+  const std::int64_t last = frame.firstBin + frame.bins - 1;
+  return {int(max(bins.first, frame.firstBin) - frame.firstBin),
+          int(min(bins.last, last) - frame.firstBin)};
+}
+
+/// Calls visit(number of the tile times bins + bin) for each list that an ellipsoid belongs to.
+template <class Visit>
+__device__ void visitLists(const TileFrame& frame, const Footprint& p, Lanes lanes, Visit&& visit) {
+  const int lastTileRow = min(p.lastRow / kSide, frame.firstTileRow + frame.tileRows - 1);
+  for (int row = max(p.firstRow / kSide, frame.firstTileRow); row <= lastTileRow; ++row) {
+    const Columns columns = columnsIn(frame, p, row);
+    if (columns.first > columns.last) continue;
+    for (int column = columns.first / kSide + lanes.lane; column <= columns.last / kSide;
+         column += lanes.count) {
+      const int tile = (row - frame.firstTileRow) * frame.tileColumns + column;
+      const Columns bins = binsIn(frame, p, column, row);
+      for (int bin = bins.first; bin <= bins.last; ++bin) visit(tile * frame.bins + bin);
+    }
+  }
+}
+
+__device__ bool isSeen(const TileFrame& frame, const Footprint& p) {
+  return p.firstRow <= p.lastRow && p.lastRow / kSide >= frame.firstTileRow &&
+         p.firstRow / kSide < frame.firstTileRow + frame.tileRows;
+}
+
+__device__ bool inManyLists(const TileFrame& frame, const Footprint& p) {
+  const int columns = p.lastColumn / kSide - p.firstColumn / kSide + 1;
+  const int rows = p.lastRow / kSide - p.firstRow / kSide + 1;
+  const float bins = (p.farthest - p.nearest) / float(frame.step * kBinSamples) + 1.0f;
+  return float(columns) * float(rows) * bins > float(DrawTuning::kManyLists);
+}
+
+/// A thread an ellipsoid; those in many lists by the warp together. All lanes call it; `seen` of
+/// other lanes must be in `footprints` before.
+template <class Visit>
+__device__ void visitByWarp(const TileFrame& frame, const Footprint* footprints, std::uint32_t i,
+                            bool seen, Visit&& visit) {
+  Footprint own{};
+  if (seen) own = footprints[i];
+  const bool many = seen && inManyLists(frame, own);
+  if (seen && !many) visitLists(frame, own, {0, 1}, [&](int list) { visit(list, i); });
+  const int lane = int(threadIdx.x) % kWarp;
+  for (unsigned left = __ballot_sync(kAllLanes, many); left != 0; left &= left - 1) {
+    const std::uint32_t other = __shfl_sync(kAllLanes, i, __ffs(int(left)) - 1);
+    visitLists(frame, footprints[other], {lane, kWarp}, [&](int list) { visit(list, other); });
+  }
+}
+
+__device__ bool look(const TileFrame& frame, const DeviceEllipsoids& all, const SeenEllipsoids& out,
+                     std::uint32_t i) {
+  const PackedEllipsoid e = all.ellipsoids[i];
+  const RayKernel kernel = all.kernels[all.ownKernels ? i : 0];
+  const double radius = sqrt(double(kernel.cutoff));
+  const SeenEllipsoid seen =
+      seenBy(frame.view, e, difference(all.origins[e.chunk], frame.view.eye));
+  const ScreenEllipse outline = outlineOf(frame.view, seen, radius);
+  ScreenBounds bounds = boundsOf(outline, seen, radius, frame.resolution);
+  const bool any = visible(bounds);
+  if (!any) bounds.firstRow = 1, bounds.lastRow = 0;
+  const Footprint footprint = footprintOf(outline, bounds);
+  out.footprints[i] = footprint;
+  if (any) out.views[i] = viewOf(frame.view, seen, outline.everywhere, e.intensity, kernel);
+  return any && isSeen(frame, footprint);
+}
+
+__global__ void __launch_bounds__(DrawTuning::kListThreads)
+    viewKernel(const TileFrame frame, const DeviceEllipsoids all, const SeenEllipsoids out,
+               std::uint32_t* counts) {
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  const bool seen = i < all.count && look(frame, all, out, i);
+  __syncwarp();  // lanes read each other's footprints
+  visitByWarp(frame, out.footprints, i, seen,
+              [&](int list, std::uint32_t) { atomicAdd(&counts[list], 1u); });
+}
+
+__global__ void __launch_bounds__(DrawTuning::kListThreads)
+    fillKernel(const TileFrame frame, std::uint32_t count, const Footprint* footprints,
+               const TileLists lists) {
+  if (lists.counters->pairs > lists.entryCapacity) return;
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  const bool seen = i < count && isSeen(frame, footprints[i]);
+  visitByWarp(frame, footprints, i, seen, [&](int list, std::uint32_t ellipsoid) {
+    const std::uint32_t at = atomicAdd(&lists.ends[list], 1u);
+    if (at < lists.entryCapacity) lists.entries[at] = ellipsoid;
+  });
+}
+
+/// The sum over the lanes below; `total` gets that over all.
+__device__ std::uint32_t sumBelow(std::uint32_t value, std::uint32_t& total) {
+  const int lane = int(threadIdx.x) % kWarp;
+  std::uint32_t sum = value;
+  for (int d = 1; d < kWarp; d *= 2) {
+    const std::uint32_t below = __shfl_up_sync(kAllLanes, sum, d);
+    if (lane >= d) sum += below;
+  }
+  total = __shfl_sync(kAllLanes, sum, kWarp - 1);
+  return sum - value;
+}
+
+struct TileTotals {
+  std::uint32_t entries = 0, longestBin = 0, parts = 0;
+};
+
+__device__ std::uint32_t entriesOfPart(const TileFrame& frame, const std::uint32_t* counts,
+                                       int part) {
+  std::uint32_t entries = 0;
+  const int end = min((part + 1) * frame.binsOfPart, frame.bins);
+  for (int bin = part * frame.binsOfPart; bin < end; ++bin) entries += counts[bin];
+  return entries;
+}
+
+__device__ TileTotals totalsOf(const TileFrame& frame, const std::uint32_t* counts) {
+  TileTotals totals;
+  for (int bin = 0; bin < frame.bins; ++bin)
+    totals.longestBin = max(totals.longestBin, counts[bin]);
+  for (int part = 0; part < frame.parts; ++part) {
+    const std::uint32_t entries = entriesOfPart(frame, counts, part);
+    totals.entries += entries;
+    totals.parts += entries > 0 ? 1 : 0;
+  }
+  return totals;
+}
+
+/// 0 for the longest lists.
+__device__ int lengthClass(std::uint32_t entries) {
+  const int log = 31 - __clz(int(entries));
+  return max(0, DrawTuning::kLengthClasses - 1 - log);
+}
+
+__device__ void planTile(const TileFrame& frame, const TileLists& lists, int tile,
+                         const TileTotals& totals) {
+  const std::uint32_t* counts = &lists.counts[std::size_t(tile) * frame.bins];
+  lists.partsOfTile[tile] = totals.parts;
+  lists.partsDone[tile] = 0;
+  lists.closedAt[tile] = kNoResult;
+  for (int part = 0; part < frame.parts; ++part) {
+    std::uint32_t result = kNoResult;
+    if (const std::uint32_t entries = entriesOfPart(frame, counts, part); entries > 0) {
+      const int of = lengthClass(entries);
+      const std::size_t room = std::size_t(frame.tiles()) * frame.parts;
+      const std::uint32_t at = atomicAdd(&lists.counters->items[of], 1u);
+      lists.items[of * room + at] = {std::uint32_t(tile), std::uint32_t(part)};
+      if (totals.parts > 1) result = atomicAdd(&lists.counters->results, 1u);
+    }
+    lists.resultOf[std::size_t(tile) * frame.parts + part] = result;
+  }
+}
+
+/// A thread a tile. Which tile gets which room does not matter, so no scan over all is needed.
+__global__ void __launch_bounds__(DrawTuning::kListThreads)
+    planKernel(const TileFrame frame, const TileLists lists) {
+  const int tile = int(blockIdx.x * blockDim.x + threadIdx.x);
+  const bool any = tile < frame.tiles();
+  TileTotals totals;
+  if (any) totals = totalsOf(frame, &lists.counts[std::size_t(tile) * frame.bins]);
+
+  std::uint32_t ofWarp = 0;
+  const std::uint32_t below = sumBelow(totals.entries, ofWarp);
+  unsigned long long begin = 0;
+  if (threadIdx.x % kWarp == 0 && ofWarp > 0)
+    begin = atomicAdd(&lists.counters->pairs, static_cast<unsigned long long>(ofWarp));
+  begin = __shfl_sync(kAllLanes, begin, 0) + below;
+  if (!any) return;
+
+  planTile(frame, lists, tile, totals);
+  auto end = std::uint32_t(begin);  // where the entries fit, it fits
+  for (int bin = 0; bin < frame.bins; ++bin) {
+    const std::size_t list = std::size_t(tile) * frame.bins + bin;
+    lists.ends[list] = end;
+    end += lists.counts[list];
+  }
+  if (totals.entries == 0) return;
+  atomicAdd(&lists.counters->occupiedTiles, 1u);
+  atomicMax(&lists.counters->longestTile, totals.entries);
+  atomicMax(&lists.counters->longestBin, totals.longestBin);
+}
+
+}  // namespace
+
+void launchView(const TileFrame& frame, const DeviceEllipsoids& ellipsoids,
+                const SeenEllipsoids& seen, const TileLists& lists, cudaStream_t stream) {
+  if (ellipsoids.count == 0) return;
+  viewKernel<<<blocksOf(ellipsoids.count), DrawTuning::kListThreads, 0, stream>>>(
+      frame, ellipsoids, seen, lists.counts);
+  check(cudaGetLastError(), "looking at ellipsoids");
+}
+
+void launchPlan(const TileFrame& frame, const TileLists& lists, cudaStream_t stream) {
+  planKernel<<<blocksOf(std::size_t(frame.tiles())), DrawTuning::kListThreads, 0, stream>>>(frame,
+                                                                                            lists);
+  check(cudaGetLastError(), "planning tiles");
+}
+
+void launchFill(const TileFrame& frame, std::uint32_t count, const SeenEllipsoids& seen,
+                const TileLists& lists, cudaStream_t stream) {
+  if (count == 0) return;
+  fillKernel<<<blocksOf(count), DrawTuning::kListThreads, 0, stream>>>(frame, count,
+                                                                       seen.footprints, lists);
+  check(cudaGetLastError(), "listing ellipsoids");
+}
+
+}  // namespace esvr::cuda

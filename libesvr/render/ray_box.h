@@ -1,0 +1,64 @@
+#pragma once
+/// Where a ray lies in a box; for host and device.
+
+#include <cmath>
+#include <limits>
+
+#include "esvr/render.h"
+#include "render/view.h"
+
+namespace esvr {
+
+/// Distances along a ray; begin > end where there are none.
+struct RayInterval {
+  double begin, end;
+};
+
+/// Where a ray lies between two planes perpendicular to an axis.
+ESVR_HD inline RayInterval slab(double origin, double direction, double low, double high) {
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  if (direction == 0.0)
+    return origin >= low && origin <= high ? RayInterval{-kAll, kAll} : RayInterval{kAll, -kAll};
+  const double a = (low - origin) / direction, b = (high - origin) / direction;
+  return a < b ? RayInterval{a, b} : RayInterval{b, a};
+}
+
+/// Not before the ray's origin.
+ESVR_HD inline RayInterval within(const Ray& ray, const PlaceBox& box) {
+  RayInterval t{0.0, std::numeric_limits<double>::infinity()};
+  for (int a = 0; a < 3; ++a) {
+    const RayInterval s = slab(ray.origin[a], ray.direction[a], box.low[a], box.high[a]);
+    t.begin = s.begin > t.begin ? s.begin : t.begin;
+    t.end = s.end < t.end ? s.end : t.end;
+  }
+  return t;
+}
+
+/// Of a ray's samples, counted from the eye: those from first to last.
+struct SampleRange {
+  double first, last;
+
+  [[nodiscard]] ESVR_HD bool has(double number) const { return number >= first && number <= last; }
+  [[nodiscard]] ESVR_HD SampleRange and_(const SampleRange& other) const {
+    return {other.first > first ? other.first : first, other.last < last ? other.last : last};
+  }
+};
+
+ESVR_HD inline SampleRange samplesIn(const RayInterval& t, double step) {
+  return {std::ceil(t.begin / step), std::floor(t.end / step)};
+}
+
+/// A box that may be none: then all places are in it.
+struct ClipBox {
+  PlaceBox box;
+  bool given;
+};
+[[nodiscard]] inline ClipBox clipOf(const RenderOptions& options) {
+  return {options.clip.value_or(PlaceBox{}), options.clip.has_value()};
+}
+ESVR_HD inline SampleRange samplesIn(const Ray& ray, const ClipBox& clip, double step) {
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  return clip.given ? samplesIn(within(ray, clip.box), step) : SampleRange{0.0, kAll};
+}
+
+}  // namespace esvr

@@ -1,0 +1,52 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <stdexcept>
+
+#include "esvr/renderer.h"
+#include "render/nano_box.h"
+#include "render/nano_march.h"
+#include "render/picture.h"
+
+namespace esvr {
+namespace {
+
+template <class Build>
+void drawAs(const NanoVolume& volume, const RenderOptions& o, Picture& picture) {
+  const auto& grid = *reinterpret_cast<const nanovdb::NanoGrid<Build>*>(volume.data.get());
+  const NanoScene scene{picture.view, sampledBox(volume), o.step, clipOf(o),
+                        sampleRule(o, picture.table.view(), volume.background)};
+  tbb::parallel_for(tbb::blocked_range<int>(0, o.resolution.height), [&](const auto& rows) {
+    for (int row = rows.begin(); row != rows.end(); ++row) {
+      checkCancelled(o);
+      for (int column = 0; column < o.resolution.width; ++column)
+        picture.set(column, row, marchNano(grid, scene, column, row));
+    }
+  });
+}
+
+void drawInto(Picture& picture, const NanoVolume& volume, const RenderOptions& o) {
+  switch (volume.values) {
+    case NanoValues::kFloat:
+      return drawAs<float>(volume, o, picture);
+    case NanoValues::kFp4:
+      return drawAs<nanovdb::Fp4>(volume, o, picture);
+    case NanoValues::kFp8:
+      return drawAs<nanovdb::Fp8>(volume, o, picture);
+    case NanoValues::kFp16:
+      return drawAs<nanovdb::Fp16>(volume, o, picture);
+    case NanoValues::kFpN:
+      return drawAs<nanovdb::FpN>(volume, o, picture);
+  }
+  throw std::logic_error("renderNano: no such values");
+}
+
+}  // namespace
+
+Image renderNano(const NanoVolume& volume, const RenderOptions& options) {
+  Picture picture(options);
+  drawInto(picture, volume, options);
+  return picture.take();
+}
+
+}  // namespace esvr

@@ -1,0 +1,112 @@
+#pragma once
+/// What becomes of a ray's samples, for host and device.
+
+#include "esvr/render.h"
+#include "render/transfer_table.h"
+
+namespace esvr {
+
+/// What a ray has gathered on its way. What the first three are depends on the mode: a color; the
+/// largest value and how many there were; their sum and number; a distance and whether there is
+/// one.
+struct alignas(16) RayState {
+  float r = 0.0f, g = 0.0f, b = 0.0f;
+  float transmittance = 1.0f;
+};
+
+/// Premultiplied, but for RenderMode::kDepth.
+struct PixelColor {
+  float r, g, b, alpha;
+};
+
+/// What all rays of a picture share.
+struct SampleRule {
+  static constexpr float kHalf = 0.5f;  ///< of the light: how deep RenderMode::kDepth looks
+
+  TransferTableView table;
+  RenderMode mode;
+  float background;  ///< of the field
+  float minTransmittance;
+  float step;
+
+  /// False where nothing behind would show.
+  [[nodiscard]] ESVR_HD bool open(const RayState& ray) const {
+    return !(ray.transmittance < minTransmittance) && !(mode == RenderMode::kDepth && ray.g > 0.0f);
+  }
+
+  /// \param number  of the sample, from the eye
+  ESVR_HD void add(RayState& ray, float value, float number) const {
+    switch (mode) {
+      case RenderMode::kComposite:
+        return composite(ray, table(value));
+      case RenderMode::kMaximum:
+        if (ray.g == 0.0f || value > ray.r) ray.r = value;
+        ray.g += 1.0f;
+        return;
+      case RenderMode::kAverage:
+        ray.r += value, ray.g += 1.0f;
+        return;
+      case RenderMode::kDepth:
+        ray.transmittance *= 1.0f - table(value).alpha;
+        if (ray.transmittance < kHalf) ray.r = number * step, ray.g = 1.0f;
+        return;
+    }
+  }
+
+  /// What a ray gathered behind. Not for RenderMode::kDepth, which has no parts.
+  ESVR_HD void join(RayState& ray, const RayState& behind) const {
+    if (mode == RenderMode::kComposite) {
+      ray.r += ray.transmittance * behind.r;
+      ray.g += ray.transmittance * behind.g;
+      ray.b += ray.transmittance * behind.b;
+      ray.transmittance *= behind.transmittance;
+    } else if (mode == RenderMode::kMaximum) {
+      if (behind.g > 0.0f && (ray.g == 0.0f || behind.r > ray.r)) ray.r = behind.r;
+      ray.g += behind.g;
+    } else {
+      ray.r += behind.r, ray.g += behind.g;
+    }
+  }
+
+  [[nodiscard]] ESVR_HD PixelColor finished(const RayState& ray) const {
+    switch (mode) {
+      case RenderMode::kComposite:
+        return {ray.r, ray.g, ray.b, 1.0f - ray.transmittance};
+      case RenderMode::kMaximum:
+        return ray.g > 0.0f ? colored(ray.r) : PixelColor{0.0f, 0.0f, 0.0f, 0.0f};
+      case RenderMode::kAverage:
+        return ray.g > 0.0f ? colored(ray.r / ray.g) : PixelColor{0.0f, 0.0f, 0.0f, 0.0f};
+      case RenderMode::kDepth:
+        return {ray.r, 0.0f, 0.0f, ray.g};
+    }
+    return {0.0f, 0.0f, 0.0f, 0.0f};
+  }
+
+ private:
+  ESVR_HD static void composite(RayState& ray, const Classified& sample) {
+    const float weight = ray.transmittance * sample.alpha;
+    ray.r += weight * sample.r;
+    ray.g += weight * sample.g;
+    ray.b += weight * sample.b;
+    ray.transmittance *= 1.0f - sample.alpha;
+  }
+  [[nodiscard]] ESVR_HD PixelColor colored(float value) const {
+    const Classified c = table(value);
+    return {c.r * c.alpha, c.g * c.alpha, c.b * c.alpha, c.alpha};
+  }
+};
+
+/// Voxels that an opacity is taken for. One number for a whole ray is no step along it: its opacity
+/// is the transfer function's own.
+[[nodiscard]] inline double opacitySteps(const RenderOptions& options) {
+  const bool alongRay =
+      options.mode == RenderMode::kComposite || options.mode == RenderMode::kDepth;
+  return alongRay ? options.step / options.opacityLength : 1.0;
+}
+
+[[nodiscard]] inline SampleRule sampleRule(const RenderOptions& o, const TransferTableView& table,
+                                           float background) {
+  return {table, o.mode, background, float(o.minTransmittance), float(o.step)};
+}
+
+}  // namespace esvr

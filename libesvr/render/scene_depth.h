@@ -1,0 +1,18 @@
+#pragma once
+/// How far away a scene begins and ends.
+
+#include <optional>
+
+#include "esvr/ellipsoids.h"
+#include "render/primitive_math.h"
+#include "render/ray_box.h"
+
+namespace esvr {
+
+/// Around the supports of all ellipsoids; nothing where there are none.
+[[nodiscard]] std::optional<PlaceBox> supportBox(const Field& field);
+
+/// The bins of the rays' samples that may lie in a box; last < first where none does.
+[[nodiscard]] BinRange binsWithin(const PlaceBox& box, const View& view, double step);
+
+}  // namespace esvr

@@ -1,0 +1,136 @@
+#include "render/bench.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <vector>
+
+#include "cli/stopwatch.h"
+#include "cli/table.h"
+#include "esvr/image_metrics.h"
+
+namespace esvr::render {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kDefaultViews = 720;  // the paper's, of 0.5 degrees each
+constexpr int kWarmUp = 5;
+constexpr int kCompared = 36;
+constexpr double kSlowest = 0.01;  // share of frames that "1 % low" is of
+
+/// Of all counted frames.
+struct Times {
+  std::vector<double> frameMs, listMs, drawMs;
+  double pairs = 0.0, occupancy = 0.0;  ///< means
+  FrameStats last;
+};
+
+double median(std::vector<double> v) {
+  const auto middle = v.begin() + std::ptrdiff_t(v.size() / 2);
+  std::nth_element(v.begin(), middle, v.end());
+  return *middle;
+}
+
+/// Mean of the slowest.
+double slowest(std::vector<double> v) {
+  std::sort(v.begin(), v.end(), std::greater<>());
+  const auto n = std::max<std::size_t>(1, std::size_t(std::ceil(double(v.size()) * kSlowest)));
+  return std::accumulate(v.begin(), v.begin() + std::ptrdiff_t(n), 0.0) / double(n);
+}
+
+RenderOptions viewOf(RenderOptions options, int view, int views) {
+  options.camera = turned(options.camera, 360.0 * view / views);
+  return options;
+}
+
+void count(const FrameStats& stats, double seconds, int views, Times& times) {
+  times.frameMs.push_back(seconds * 1e3);
+  times.listMs.push_back(stats.listMs);
+  times.drawMs.push_back(stats.drawMs);
+  times.pairs += double(stats.pairs) / views;
+  times.occupancy += stats.occupancy / views;
+  times.last = stats;
+}
+
+Times timed(Renderer& renderer, const RenderOptions& options, int views) {
+  Times times;
+  for (int i = 0; i < std::min(kWarmUp, views); ++i)
+    renderer.drawOnDevice(viewOf(options, i, views));
+  for (int i = 0; i < views; ++i) {
+    const RenderOptions view = viewOf(options, i, views);
+    cli::Stopwatch watch;
+    renderer.drawOnDevice(view);
+    count(renderer.stats(), watch.lap(), views, times);
+  }
+  return times;
+}
+
+Json figures(const Times& t) {
+  const double drawMs = median(t.drawMs);
+  return {{"fps_median", 1e3 / median(t.frameMs)},
+          {"fps_1_percent_low", 1e3 / slowest(t.frameMs)},
+          {"frame_ms", median(t.frameMs)},
+          {"list_ms", median(t.listMs)},
+          {"draw_ms", drawMs},
+          {"device_bytes", t.last.deviceBytes},
+          {"occupancy", t.occupancy},
+          {"pairs", t.pairs},
+          {"pairs_per_second", drawMs > 0.0 ? t.pairs / drawMs * 1e3 : 0.0},
+          {"bins", t.last.depthParts}};
+}
+
+std::string summary(const std::string& what, const Json& f) {
+  const auto number = [&](const char* key) { return cli::shortNumber(f[key].get<double>()); };
+  return what + ": " + number("fps_median") + " frames a second (1 % low " +
+         number("fps_1_percent_low") + "), lists " + number("list_ms") + " ms, drawing " +
+         number("draw_ms") + " ms, device memory " +
+         cli::shortNumber(f["device_bytes"].get<double>() / 1e6) + " MB";
+}
+
+Json meanAndLeast(const std::vector<double>& v) {
+  return {{"mean", jsonNumber(std::accumulate(v.begin(), v.end(), 0.0) / double(v.size()))},
+          {"least", jsonNumber(*std::min_element(v.begin(), v.end()))}};
+}
+
+Json compared(const Benched& benched, const RenderOptions& options, int views) {
+  std::vector<double> psnrs, ssims;
+  double maxError = 0.0;
+  const int count = std::min(kCompared, views);
+  for (int i = 0; i < count; ++i) {
+    const RenderOptions view = viewOf(options, i, count);
+    const ImageMetrics m =
+        compareImages(benched.reference->draw(view), benched.renderer.draw(view));
+    psnrs.push_back(m.psnr), ssims.push_back(m.ssim);
+    maxError = std::max(maxError, m.maxError);
+  }
+  return {{"views", count},
+          {"psnr", meanAndLeast(psnrs)},
+          {"ssim", meanAndLeast(ssims)},
+          {"max_error", maxError}};
+}
+
+}  // namespace
+
+Json jsonNumber(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json bench(const Benched& benched, const RenderOptions& options, int views, const cli::Log& log) {
+  const int count = views == 0 ? kDefaultViews : views;
+  Json report{{"width", options.resolution.width},
+              {"height", options.resolution.height},
+              {"step", options.step},
+              {"views", count}};
+  report["drawn"] = figures(timed(benched.renderer, options, count));
+  log.info(summary("drawn", report["drawn"]));
+  if (benched.reference == nullptr) return report;
+  report["reference"] = figures(timed(*benched.reference, options, count));
+  log.info(summary("reference", report["reference"]));
+  report["image"] = compared(benched, options, count);
+  const Json& image = report["image"];
+  log.info("PSNR " + image["psnr"].dump() + ", SSIM " + image["ssim"].dump());
+  return report;
+}
+
+}  // namespace esvr::render

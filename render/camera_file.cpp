@@ -1,0 +1,72 @@
+#include "render/camera_file.h"
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "esvr/error.h"
+
+namespace esvr::render {
+namespace {
+
+using nlohmann::json;
+
+Vec3 place(const json& value) {
+  const bool fits =
+      value.is_array() && value.size() == 3 &&
+      std::all_of(value.begin(), value.end(), [](const json& v) { return v.is_number(); });
+  if (!fits) throw BadInput("is no list of three numbers");
+  return {value[0].get<double>(), value[1].get<double>(), value[2].get<double>()};
+}
+
+double number(const json& value) {
+  if (!value.is_number()) throw BadInput("is no number");
+  return value.get<double>();
+}
+
+Projection projection(const json& value) {
+  if (!value.is_boolean()) throw BadInput("is neither true nor false");
+  return value.get<bool>() ? Projection::kOrthographic : Projection::kPerspective;
+}
+
+void set(const std::string& key, const json& value, CameraWish& wish) {
+  if (key == "eye")
+    wish.eye = place(value);
+  else if (key == "center")
+    wish.center = place(value);
+  else if (key == "up")
+    wish.up = place(value);
+  else if (key == "fov")
+    wish.fov = number(value);
+  else if (key == "height")
+    wish.height = number(value);
+  else if (key == "orthographic")
+    wish.projection = projection(value);
+  else
+    throw BadInput("is none of eye, center, up, fov, height, orthographic");
+}
+
+json parsed(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw BadInput("cannot read " + path.string());
+  json content = json::parse(file, nullptr, false);
+  if (!content.is_object()) throw BadInput(path.string() + ": no JSON object");
+  return content;
+}
+
+}  // namespace
+
+CameraWish readCamera(const std::filesystem::path& path) {
+  CameraWish wish;
+  const json content = parsed(path);
+  if (content.contains("height")) wish.projection = Projection::kOrthographic;
+  for (const auto& [key, value] : content.items()) try {
+      set(key, value, wish);
+    } catch (const BadInput& error) {
+      throw BadInput(path.string() + ": \"" + key + "\" " + error.what());
+    }
+  return wish;
+}
+
+}  // namespace esvr::render

@@ -1,0 +1,208 @@
+// Plan: a CUDA device draws what the CPU draws, over cameras, kernels, shapes, transfer functions,
+// steps, sizes, parts of the depth and bands: within 1/255 of a channel (the hardware's exponential
+// and division are good to some 1e-6 of an intensity, and a ray may end a sample earlier or later,
+// 1/4096). More lists than there is room for at first, lists longer than a block, and further runs,
+// which must not change a bit. Without a GPU the call must say why.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "esvr/error.h"
+#include "esvr/renderer.h"
+#include "field/random_field.h"
+
+namespace esvr::test {
+namespace {
+
+constexpr double kAsked = 1.0 / 255.0;
+constexpr Box kBox{{0, 0, 0}, {39, 39, 39}};
+
+RenderOptions optionsFor(const CameraWish& wish = {}, Resolution resolution = {130, 77}) {
+  RenderOptions o;
+  o.resolution = resolution;
+  o.camera = fitCamera(kBox, wish, resolution);
+  o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
+  o.opacityLength = 8.0;
+  return o;
+}
+
+CameraWish orthographic() { return {.projection = Projection::kOrthographic}; }
+CameraWish inside() {
+  return {.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = 80.0};
+}
+
+double largestDifference(const Image& a, const Image& b) {
+  double most = a.rgba.size() == b.rgba.size() ? 0.0 : 1.0;
+  for (std::size_t i = 0; i < std::min(a.rgba.size(), b.rgba.size()); ++i)
+    most = std::max(most, std::abs(double(a.rgba[i]) - double(b.rgba[i])));
+  return most;
+}
+
+TEST(FieldRenderer, SaysWhichDeviceIsNotThere) {
+  const Field field = randomField({});
+  EXPECT_THROW((void)makeFieldRenderer(field, {DeviceKind::kCuda, 12345}), DeviceError);
+}
+
+class FieldOnGpu : public testing::Test {
+ protected:
+  void SetUp() override {
+    try {
+      device_ = selectDevice("cuda");
+    } catch (const DeviceError& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+  [[nodiscard]] Image drawn(const Field& field, const RenderOptions& o,
+                            const RendererLimits& limits = {}) const {
+    return makeFieldRenderer(field, device_, limits)->draw(o);
+  }
+  void expectTheCpusPicture(const Field& field, const RenderOptions& o,
+                            const RendererLimits& limits = {}) const {
+    const Image expected = renderField(field, o);
+    double light = 0.0;
+    for (const float v : expected.rgba) light += v;
+    EXPECT_GT(light, 0.0) << "an empty picture proves nothing";
+    EXPECT_LE(largestDifference(drawn(field, o, limits), expected), kAsked);
+  }
+
+  Device device_;
+};
+
+TEST_F(FieldOnGpu, AgreesFromEveryKindOfCamera) {
+  for (const CameraWish& wish : {CameraWish{}, orthographic(), inside()})
+    expectTheCpusPicture(randomField({.count = 300}), optionsFor(wish));
+  CameraWish flat = inside();
+  flat.projection = Projection::kOrthographic, flat.fov.reset();
+  expectTheCpusPicture(randomField({}), optionsFor(flat));
+}
+
+TEST_F(FieldOnGpu, AgreesFromFarAway) {
+  CameraWish far{.eye = Vec3{1e6, 2e6, 3.3e6}, .center = Vec3{20, 20, 20}};
+  far.fov = 2.0 * std::atan(30.0 / 4e6) * 180.0 / 3.14159265358979;
+  expectTheCpusPicture(randomField({.count = 300}), optionsFor(far));
+}
+
+TEST_F(FieldOnGpu, AgreesForNeedlesPancakesAndEachKernel) {
+  expectTheCpusPicture(randomField({.count = 100, .smallest = 0.1, .aspect = 200.0}), optionsFor());
+  for (const float kappa : {-30.0f, -3.0f, 0.0f, 12.0f, 50.0f})
+    expectTheCpusPicture(randomField({.count = 100, .kappa = kappa}), optionsFor());
+  Field field = randomField({.count = 15, .kappa = 5.0f});
+  field.chunks[0].ellipsoids.kappa.assign(15, 1.0f);
+  field.chunks[0].ellipsoids.kappa[3] = 20.0f;
+  expectTheCpusPicture(field, optionsFor());
+}
+
+TEST_F(FieldOnGpu, AgreesForOneEllipsoidThatCoversEverything) {
+  Field field = randomField({.count = 1, .smallest = 300.0});
+  field.chunks[0].ellipsoids.intensity[0] = 0.3f;
+  expectTheCpusPicture(field, optionsFor());
+}
+
+TEST_F(FieldOnGpu, AgreesWithABackgroundAndSeveralChunks) {
+  Field field = randomField({.count = 20});
+  field.background = 0.25f;
+  field.chunks.push_back(randomField({.count = 20, .extent = 20.0, .seed = 9}).chunks[0]);
+  field.chunks[1].origin = {16, -8, 8};
+  expectTheCpusPicture(field, optionsFor());
+}
+
+TEST_F(FieldOnGpu, AgreesForOtherStepsSizesAndOpacities) {
+  const Field field = randomField({.count = 200});
+  for (const double step : {0.1, 0.7, 5.0}) {
+    RenderOptions o = optionsFor();
+    o.step = step;
+    expectTheCpusPicture(field, o);
+  }
+  expectTheCpusPicture(field, optionsFor({}, {1, 1}));
+  expectTheCpusPicture(field, optionsFor({}, {1031, 3}));
+  for (const double opacity : {0.0, 1.0}) {
+    RenderOptions o = optionsFor();
+    o.transfer.opacity = {{0.0, opacity}};
+    EXPECT_LE(largestDifference(drawn(field, o), renderField(field, o)), kAsked) << opacity;
+  }
+}
+
+TEST_F(FieldOnGpu, DrawsThePartsOfTheDepthAsOne) {
+  const Field field = randomField({.count = 2000, .extent = 200.0, .smallest = 3.0});
+  RenderOptions o = optionsFor();
+  o.camera = fitCamera({{0, 0, 0}, {199, 199, 199}}, {}, o.resolution);
+  for (const double opacityLength : {0.2, 30.0}) {
+    o.opacityLength = opacityLength;
+    for (const int parts : {0, 1, 2, 3, 16}) expectTheCpusPicture(field, o, {.depthParts = parts});
+  }
+}
+
+TEST_F(FieldOnGpu, AgreesInEachModeAndClipped) {
+  const Field field = randomField({.count = 400});
+  for (const auto mode : {RenderMode::kMaximum, RenderMode::kAverage})
+    for (const int parts : {1, 2}) {
+      RenderOptions o = optionsFor();
+      o.mode = mode;
+      const Image expected = renderField(field, o);
+      const Image image = drawn(field, o, {.depthParts = parts});
+      // A sample on the end of a support, of value 0, may count for one and not for the other.
+      int off = 0;
+      for (std::size_t i = 0; i < image.rgba.size(); ++i)
+        off += std::abs(double(image.rgba[i]) - double(expected.rgba[i])) > kAsked;
+      EXPECT_LE(off, int(image.rgba.size() / 50));
+    }
+  RenderOptions o = optionsFor();
+  o.clip = PlaceBox{{5.3, 0.1, -100}, {22.2, 31.7, 100}};
+  expectTheCpusPicture(field, o);
+}
+
+TEST_F(FieldOnGpu, DrawsListsLongerThanABlock) {
+  const Field field = randomField({.count = 3000, .extent = 4.0});
+  RenderOptions o = optionsFor({}, {40, 30});
+  o.transfer = rescaled(o.transfer, {-30.0f, 30.0f});
+  expectTheCpusPicture(field, o);
+}
+
+TEST_F(FieldOnGpu, DrawsInBandsWhereMemoryIsShort) {
+  const Field field = randomField({.count = 300});
+  const RenderOptions o = optionsFor({}, {500, 400});
+  const auto whole = makeFieldRenderer(field, device_);
+  const Image expected = whole->draw(o);
+  const std::uint64_t bound = whole->stats().deviceBytes / 3;
+  const auto banded = makeFieldRenderer(field, device_, {.depthParts = 1, .maxBytes = bound});
+  EXPECT_LE(largestDifference(banded->draw(o), expected), kAsked);
+  EXPECT_LE(banded->stats().deviceBytes, bound);
+  EXPECT_THROW((void)makeFieldRenderer(field, device_, {.maxBytes = 1000})->draw(o), DeviceError);
+}
+
+TEST_F(FieldOnGpu, GivesTheSameBitsInEveryRun) {
+  const Field field = randomField({.count = 5000, .extent = 40.0});
+  const auto renderer = makeFieldRenderer(field, device_, {.depthParts = 3});
+  const Image first = renderer->draw(optionsFor());
+  (void)renderer->draw(optionsFor(orthographic()));
+  EXPECT_EQ(renderer->draw(optionsFor()).rgba, first.rgba);
+  EXPECT_EQ(drawn(field, optionsFor(), {.depthParts = 3}).rgba, first.rgba);
+}
+
+TEST_F(FieldOnGpu, NothingToSeeIsTransparent) {
+  const auto transparent = [](const Image& image) {
+    for (const float v : image.rgba)
+      if (v != 0.0f) return false;
+    return !image.rgba.empty();
+  };
+  EXPECT_TRUE(transparent(drawn(Field{}, optionsFor())));
+  const CameraWish away{.eye = Vec3{20, 20, 200}, .center = Vec3{20, 20, 300}};
+  EXPECT_TRUE(transparent(drawn(randomField({}), optionsFor(away))));
+}
+
+TEST_F(FieldOnGpu, CountsItsWork) {
+  const Field field = randomField({.count = 50});
+  const auto renderer = makeFieldRenderer(field, device_);
+  renderer->drawOnDevice(optionsFor());
+  const FrameStats stats = renderer->stats();
+  EXPECT_GE(stats.pairs, 50u);
+  EXPECT_GT(stats.occupancy, 0.0);
+  EXPECT_LE(stats.occupancy, 1.0);
+  EXPECT_GT(stats.drawMs, 0.0);
+  EXPECT_GT(stats.deviceBytes, 130u * 77u * 16u);
+}
+
+}  // namespace
+}  // namespace esvr::test

@@ -1,0 +1,136 @@
+// Plan: the largest value, the mean and the depth of half the light along each ray, and a clip box,
+// against the same taken in float64 from every sample of a dense walk. Both renderers; voxels by
+// their own interpolation. Differences as in render_field_test.cpp; a depth may be one sample off
+// where the light is just about half, so that few pixels may differ there.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "esvr/error.h"
+#include "esvr/field.h"
+#include "field/random_field.h"
+#include "render/reference_picture.h"
+#include "render/vector.h"
+#include "render/view.h"
+
+namespace esvr::test {
+namespace {
+
+constexpr Box kBox{{0, 0, 0}, {39, 39, 39}};
+
+RenderOptions optionsFor(RenderMode mode, Projection projection = Projection::kPerspective) {
+  RenderOptions o;
+  o.mode = mode;
+  o.resolution = {50, 37};
+  o.camera = fitCamera(kBox, {.projection = projection}, o.resolution);
+  o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
+  o.opacityLength = 8.0;
+  return o;
+}
+
+/// What a mode is by its definition.
+struct Gathered {
+  double largest = -std::numeric_limits<double>::infinity(), sum = 0.0, light = 1.0, depth = 0.0;
+  int count = 0;
+
+  void add(double value, double distance, const RenderOptions& o) {
+    largest = std::max(largest, value), sum += value, ++count;
+    const double opacity = opacityAt(o.transfer.opacity, value);
+    light *= std::pow(1.0 - opacity, o.step / o.opacityLength);
+    if (depth == 0.0 && light < 0.5) depth = distance;
+  }
+};
+
+Gathered gather(const ValueAtPlace& valueAt, const Ray& ray, const RenderOptions& o) {
+  Gathered all;
+  for (int j = 0; j < 400; ++j)
+    if (const double value = valueAt(sum(ray.origin, scaled(ray.direction, j * o.step)));
+        value != 0.0)
+      all.add(value, j * o.step, o);
+  return all;
+}
+
+std::array<double, 4> colored(double value, const TransferFunction& f) {
+  const Rgb c = colorAt(f.colors, value);
+  const double alpha = opacityAt(f.opacity, value);
+  return {c.r * alpha, c.g * alpha, c.b * alpha, alpha};
+}
+
+std::array<double, 4> expected(const Gathered& all, const RenderOptions& o) {
+  if (o.mode == RenderMode::kDepth) return {all.depth, 0.0, 0.0, all.depth > 0.0 ? 1.0 : 0.0};
+  if (all.count == 0) return {};
+  return colored(o.mode == RenderMode::kMaximum ? all.largest : all.sum / all.count, o.transfer);
+}
+
+/// Share of the pixels that are off by more than a tolerance.
+double shareOff(const Field& field, const RenderOptions& o, double tolerance) {
+  const ValueAtPlace value = sumOfEllipsoids(field);
+  const View view(o.camera, o.resolution);
+  const Image drawn = renderField(field, o);
+  int off = 0, lit = 0;
+  for (int row = 0; row < drawn.height; ++row)
+    for (int column = 0; column < drawn.width; ++column) {
+      const auto want = expected(gather(value, view.ray(column, row), o), o);
+      const float* pixel = &drawn.rgba[std::size_t(4 * (row * drawn.width + column))];
+      bool differs = false;
+      for (int c = 0; c < 4; ++c) differs |= !(std::abs(pixel[c] - want[c]) <= tolerance);
+      off += differs, lit += want[3] > 0.0;
+    }
+  EXPECT_GT(lit, 100) << "an empty picture proves nothing";
+  return double(off) / double(drawn.width * drawn.height);
+}
+
+TEST(RenderModes, ShowTheLargestAndTheMeanValue) {
+  const Field field = randomField({.count = 60});
+  for (const auto projection : {Projection::kPerspective, Projection::kOrthographic})
+    for (const auto mode : {RenderMode::kMaximum, RenderMode::kAverage})
+      // A sample on the end of a support counts for one and not for the other: its value is 0.
+      EXPECT_LE(shareOff(field, optionsFor(mode, projection), 1e-3), 0.02);
+}
+
+TEST(RenderModes, ShowHowDeepHalfOfTheLightComes) {
+  const Field field = randomField({.count = 200});
+  EXPECT_LE(shareOff(field, optionsFor(RenderMode::kDepth), 1e-3), 0.005);
+}
+
+TEST(RenderModes, OfVoxelsAreThoseOfTheirField) {
+  Field field = randomField({.count = 25, .smallest = 8.0, .aspect = 1.5, .kappa = 0.0f});
+  for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+  const SparseVolume volume = revoxelise(field, {.threshold = -1.0f});
+  for (const auto mode : {RenderMode::kMaximum, RenderMode::kAverage}) {
+    RenderOptions o = optionsFor(mode);
+    o.transfer = rescaled(o.transfer, {0.0f, 5.0f});
+    EXPECT_GE(imagePsnr(renderField(field, o), renderVolume(volume, o)), 35.0);
+  }
+}
+
+TEST(ClipBox, LeavesWhatIsInIt) {
+  const Field field = randomField({.count = 200});
+  const auto whole = sumOfEllipsoids(field);
+  for (const PlaceBox& box : {PlaceBox{{5.3, 0.1, -100}, {22.2, 31.7, 100}},
+                              PlaceBox{{20.01, -100, -100}, {21.03, 100, 100}}}) {
+    RenderOptions o = optionsFor(RenderMode::kComposite);
+    o.clip = box;
+    const auto clipped = [&](const Vec3& p) {
+      for (int a = 0; a < 3; ++a)
+        if (p[a] < box.low[a] || p[a] > box.high[a]) return 0.0;
+      return whole(p);
+    };
+    EXPECT_GE(imagePsnr(referencePicture({clipped, 0.0, 300.0}, o), renderField(field, o)), 70.0);
+    const SparseVolume volume = revoxelise(field, {.threshold = -1.0f});
+    EXPECT_GE(imagePsnr(renderField(field, o), renderVolume(volume, o)), 25.0) << "roughly";
+  }
+}
+
+TEST(ClipBox, MustNotEndBeforeItBegins) {
+  RenderOptions o = optionsFor(RenderMode::kComposite);
+  o.clip = PlaceBox{{1, 0, 0}, {0, 1, 1}};
+  EXPECT_THROW((void)renderField(Field{}, o), UsageError);
+  o.clip = PlaceBox{{std::nan(""), 0, 0}, {0, 1, 1}};
+  EXPECT_THROW((void)renderVolume(SparseVolume{}, o), UsageError);
+}
+
+}  // namespace
+}  // namespace esvr::test

@@ -1,0 +1,101 @@
+// Plan: the picture of a NanoVDB grid against that of the same voxels marched in float64
+// (renderVolume). Places in float32 are off by 1e-5 voxel, so that a sample now and then falls into
+// the next cell; values by 1e-5 of their range. Quantised values are off by half a step of 4, 8 or
+// 16 bits of a leaf's range, here up to 1. Negative coordinates, empty space, bricks that touch at
+// their corners only, a camera inside.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "esvr/field.h"
+#include "esvr/renderer.h"
+#include "field/random_field.h"
+#include "render/reference_picture.h"
+
+namespace esvr::test {
+namespace {
+
+constexpr Box kBox{{-20, -20, -20}, {59, 59, 59}};
+
+VolumeGrid blobs(Coord origin = {-20, -20, -20}) {
+  VolumeGrid grid;
+  grid.descriptor.transform = uniformTransform(1.0);
+  const Field field = randomField({.count = 30, .extent = 70.0, .smallest = 1.0, .origin = origin});
+  grid.volume = revoxelise(field, {.threshold = 0.05f});
+  return grid;
+}
+
+RenderOptions optionsFor(const CameraWish& wish = {}) {
+  RenderOptions o;
+  o.resolution = {70, 50};
+  o.camera = fitCamera(kBox, wish, o.resolution);
+  o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
+  o.opacityLength = 8.0;
+  return o;
+}
+
+void expectTheVolumesPicture(const VolumeGrid& grid, NanoValues values, const RenderOptions& o,
+                             double tolerance) {
+  const Image expected = renderVolume(grid.volume, o);
+  double light = 0.0;
+  for (const float v : expected.rgba) light += v;
+  EXPECT_GT(light, 0.0) << "an empty picture proves nothing";
+  const NanoVolume nano = makeNanoVolume(grid, values);
+  EXPECT_LE(largestDifference(makeNanoRenderer(nano, {DeviceKind::kCpu})->draw(o), expected),
+            tolerance);
+}
+
+TEST(RenderNano, DrawsTheVolumesPicture) {
+  const CameraWish inside{.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = 80.0};
+  for (const CameraWish& wish :
+       {CameraWish{}, CameraWish{.projection = Projection::kOrthographic}, inside})
+    expectTheVolumesPicture(blobs(), NanoValues::kFloat, optionsFor(wish), 1e-3);
+}
+
+TEST(RenderNano, AgreesForOtherSteps) {
+  for (const double step : {0.3, 2.7}) {
+    RenderOptions o = optionsFor();
+    o.step = step;
+    expectTheVolumesPicture(blobs(), NanoValues::kFloat, o, 1e-3);
+  }
+}
+
+TEST(RenderNano, StepsOverAllOfAFarEmptySpace) {
+  VolumeGrid grid = blobs();
+  const VolumeGrid other = blobs({5000, -20, -20});
+  std::vector<BrickInput> bricks;
+  for (const SparseVolume* from : {&std::as_const(grid.volume), &other.volume})
+    for (std::size_t b = 0; b < from->brickCount(); ++b) {
+      BrickInput brick{from->brickCorner(b), {}, from->active[b]};
+      std::copy_n(from->brickValues(b).begin(), kBrickVoxels, brick.values.begin());
+      bricks.push_back(brick);
+    }
+  grid.volume = makeVolume(std::move(bricks), 0.0f);
+  const RenderOptions o =
+      optionsFor({.eye = Vec3{-200, 20, 20}, .center = Vec3{0, 20, 20}, .fov = 20.0});
+  expectTheVolumesPicture(grid, NanoValues::kFloat, o, 1e-3);
+}
+
+/// Their background is a quantised value too, and no longer exactly empty: opacity begins at it.
+TEST(RenderNano, QuantisedValuesAreCloseBy) {
+  VolumeGrid grid = blobs();
+  for (float& v : grid.volume.values) v = std::abs(v);
+  RenderOptions o = optionsFor();
+  o.transfer = rescaled(o.transfer, {0.0f, 1.0f});
+  expectTheVolumesPicture(grid, NanoValues::kFp16, o, 2e-3);
+  expectTheVolumesPicture(grid, NanoValues::kFp8, o, 0.02);
+  expectTheVolumesPicture(grid, NanoValues::kFpN, o, 0.1);
+  expectTheVolumesPicture(grid, NanoValues::kFp4, o, 0.2);
+}
+
+TEST(RenderNano, NothingIsTransparent) {
+  VolumeGrid grid;
+  grid.descriptor.transform = uniformTransform(1.0);
+  const NanoVolume nano = makeNanoVolume(grid, NanoValues::kFloat);
+  for (const float v : renderNano(nano, optionsFor()).rgba) ASSERT_EQ(v, 0.0f);
+}
+
+}  // namespace
+}  // namespace esvr::test
