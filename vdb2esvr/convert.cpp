@@ -5,6 +5,7 @@
 #include "cli/stopwatch.h"
 #include "esvr/compact.h"
 #include "esvr/error.h"
+#include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "esvr/rate_control.h"
 
@@ -25,6 +26,7 @@ void recordFit(const FitResult& fitted, ConvertedGrid& grid) {
   grid.pairs = fitted.pairs;
   grid.deviceBytes = fitted.deviceBytes;
   grid.signedIntensities = fitted.signedIntensities;
+  grid.paper = fitted.paper;
   grid.seconds.seed = fitted.secondsSeed;
   grid.seconds.pilot = fitted.secondsPilot;
   grid.seconds.optimise = fitted.secondsOptimise;
@@ -107,6 +109,7 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
   grid.device = deviceName(options.fit.device);
   grid.stored = throughTheFormat(encode(options, source, bytes, grid));
   if (options.voxels) checkVoxels(*options.voxels, source, grid.stored);
+  if (options.countHits) grid.hits = averageHits(grid.stored.field);
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
 
   grid.metrics = compareVolumes(source.volume, decodeGrid(grid.stored), {.box = options.fit.box});

@@ -39,6 +39,8 @@ struct ConvertedGrid {
   std::size_t deviceBytes = 0;  ///< FitResult::deviceBytes
   std::uint64_t pairs = 0;
   bool signedIntensities = false;
+  std::optional<double> hits;            ///< averageHits, where it was asked for
+  std::optional<PaperRecord> paper;      ///< FitResult::paper
   std::vector<CurvePoint> curve;         ///< of the fit, whether the file has it or not
   std::optional<CompactRecord> compact;  ///< nothing where float32 is stored
   PhaseSeconds seconds;

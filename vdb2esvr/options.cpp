@@ -9,6 +9,7 @@
 #include "cli/choice.h"
 #include "cli/command_line.h"
 #include "cli/table.h"
+#include "vdb2esvr/paper_options.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -77,13 +78,13 @@ void addFitOptions(cli::po::options_description& options) {
     ("seconds", value<double>()->value_name("S"), "the best within this time, each grid")
     ("iterations", value<std::int64_t>()->value_name("N"), "length of the fit's schedule")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
-     "draft, standard or high: what is not given otherwise")
+     "draft, standard or high: what is not given otherwise; paper: the paper's method")
     ("kappa", value<float>()->value_name("K"),
      "edge of the ellipsoids (default: a short pilot run decides)")
     ("loss", value<std::string>()->value_name("L")->default_value("squared"),
      "squared (what PSNR asks for) or paper (L1 + D-SSIM)")
     ("beta", value<double>()->value_name("B")->default_value(beta, cli::shortNumber(beta)),
-     "share of L1 in --loss paper, 0 to 1")
+     "share of L1 in the paper's loss, 0 to 1")
     ("box", value<std::string>()->value_name("BOX"),
      "x0,y0,z0,x1,y1,z1 of the PSNR (default: the active voxels' bounding box)")
     ("seed", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(FitOptions{}.seed)),
@@ -110,6 +111,7 @@ void addFileOptions(cli::po::options_description& options) {
      "keep or discard the best so far when interrupted")
     ("report", value<std::string>()->value_name("FILE"),
      "write a JSON report to FILE.json, '-' for stdout")
+    ("hits", bool_switch(), "report how many ellipsoids a voxel meets on average")
     ("force,f", bool_switch(), "replace OUT.esvr and the report if they exist");
   // clang-format on
 }
@@ -120,6 +122,7 @@ cli::CommandLine commandLine() {
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
   addFitOptions(line.options());
+  line.options().add(paperOptions());
   return line;
 }
 
@@ -139,9 +142,12 @@ FitOptions fitOptions(const Arguments& a) {
   fit.psnr = bounded<double>(a, "psnr", 0.0, kHighestPsnr);
   fit.seconds = bounded<double>(a, "seconds", 1e-3, kLongestRun);
   fit.iterations = bounded<std::uint32_t>(a, "iterations", std::int64_t{1}, kMostIterations);
-  fit.preset = cli::choose<Preset>(
-      "preset", a.get<std::string>("preset"),
-      {{"draft", Preset::kDraft}, {"standard", Preset::kStandard}, {"high", Preset::kHigh}});
+  fit.paper = paperMethod(a);
+  fit.preset = cli::choose<Preset>("preset", a.get<std::string>("preset"),
+                                   {{"draft", Preset::kDraft},
+                                    {"standard", Preset::kStandard},
+                                    {"high", Preset::kHigh},
+                                    {"paper", Preset::kStandard}});
   fit.loss = cli::choose<Loss>("loss", a.get<std::string>("loss"),
                                {{"squared", Loss::kSquared}, {"paper", Loss::kPaper}});
   fit.beta = *bounded<double>(a, "beta", 0.0, 1.0);
@@ -157,6 +163,15 @@ FitOptions fitOptions(const Arguments& a) {
 Storage storage(const Arguments& a) {
   return cli::choose<Storage>("storage", a.get<std::string>("storage"),
                               {{"compact", Storage::kCompact}, {"float32", Storage::kFloat32}});
+}
+
+/// As the paper stores them, unless asked otherwise. \throws UsageError  k of each and compact
+Storage storageOfPaper(const Arguments& a, const PaperMethod& method) {
+  if (a.values["storage"].defaulted()) return Storage::kFloat32;
+  const Storage asked = storage(a);
+  if (method.learnK && asked == Storage::kCompact)
+    throw UsageError("--sharpness learned needs --storage float32: the compact form has one edge");
+  return asked;
 }
 
 /// "0.01", or "1%" of the range of values.
@@ -194,6 +209,7 @@ void readSize(const Arguments& a, Options& options) {
   options.ratio = bounded<double>(a, "ratio", 1.0, kLargestRatio);
   if (!options.size && !options.ratio) return;
   const std::string given = options.size ? "--size" : "--ratio";
+  if (options.fit.paper) throw UsageError("--preset paper has no " + given + ": use --count");
   if (options.size && options.ratio) throw UsageError("--size and --ratio are two sizes; give one");
   for (const char* option : {"count", "psnr", "seconds"})
     if (a.has(option))
@@ -215,7 +231,7 @@ OnCancel onCancel(const Arguments& a) {
 }  // namespace
 
 bool searchesForPsnr(const Options& options) {
-  return options.fit.psnr && !options.fit.count && !options.fit.seconds &&
+  return options.fit.psnr && !options.fit.count && !options.fit.seconds && !options.fit.paper &&
          options.storage == Storage::kCompact;
 }
 
@@ -228,7 +244,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.output = a.get<std::string>("output");
   options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
   options.fit = fitOptions(a);
-  options.storage = storage(a);
+  options.storage = options.fit.paper ? storageOfPaper(a, *options.fit.paper) : storage(a);
   options.storageLoss = *bounded<double>(a, "storage-loss", 0.0, kMostLoss);
   readVoxels(a, options);
   readSize(a, options);
@@ -236,6 +252,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.device = a.get<std::string>("device");
   options.onCancel = onCancel(a);
   options.report = a.find<std::string>("report").value_or("");
+  options.countHits = a.get<bool>("hits");
   options.overwrite = a.get<bool>("force");
   options.threads = a.threads;
   options.verbosity = a.verbosity;

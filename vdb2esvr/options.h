@@ -41,7 +41,8 @@ struct Options {
   ReadOptions read;
   std::string device = "auto";
   OnCancel onCancel = OnCancel::kKeep;
-  std::string report;  ///< empty: none; cli::kStandardOutput
+  std::string report;      ///< empty: none; cli::kStandardOutput
+  bool countHits = false;  ///< for the report
   bool overwrite = false;
   int threads = 0;  ///< 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;

@@ -6,6 +6,7 @@
 #include "cli/names.h"
 #include "cli/version_text.h"
 #include "esvr/device.h"
+#include "vdb2esvr/paper_report.h"
 #include "vdb2esvr/scene_notes.h"
 
 namespace esvr::vdb2esvr {
@@ -63,6 +64,7 @@ Json versions() {
 
 Json asked(const Options& options) {
   const FitOptions& fit = options.fit;
+  const bool paperLoss = fit.paper || fit.loss == Loss::kPaper;
   return {{"count", orNull(fit.count)},
           {"psnr", orNull(fit.psnr)},
           {"size", orNull(options.size)},
@@ -73,9 +75,9 @@ Json asked(const Options& options) {
           {"max_error_is_share", options.voxels && options.voxels->relative},
           {"seconds", orNull(fit.seconds)},
           {"iterations", orNull(fit.iterations)},
-          {"preset", nameOf(fit.preset)},
-          {"loss", fit.loss == Loss::kPaper ? "paper" : "squared"},
-          {"beta", fit.loss == Loss::kPaper ? Json(fit.beta) : Json(nullptr)},
+          {"preset", fit.paper ? "paper" : nameOf(fit.preset)},
+          {"loss", paperLoss ? "paper" : "squared"},
+          {"beta", paperLoss ? Json(fit.beta) : Json(nullptr)},
           {"kappa", orNull(fit.kappa)},
           {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
           {"storage", options.storage == Storage::kCompact ? "compact" : "float32"},
@@ -113,11 +115,8 @@ Json fitOf(const ConvertedGrid& grid) {
   Json pilot = Json::array();
   for (const auto& point : grid.pilot)
     pilot.push_back({{"kappa", point.kappa}, {"psnr_box", point.psnrBox}});
-  return {{"end", nameOf(grid.end)},
-          {"device", grid.device},
-          {"device_bytes", grid.deviceBytes},
-          {"pilot", pilot},
-          {"pairs", grid.pairs}};
+  return {{"end", nameOf(grid.end)}, {"device", grid.device}, {"device_bytes", grid.deviceBytes},
+          {"pilot", pilot},          {"pairs", grid.pairs},   {"hits", orNull(grid.hits)}};
 }
 
 Json compactOf(const ConvertedGrid& grid) {
@@ -213,6 +212,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"kernel", kernelOf(grid.stored.field.kernel)},
           {"topology", topologyOf(grid.stored)},
           {"fit", fitOf(grid)},
+          {"paper", grid.paper ? paperJson(*grid.paper) : Json(nullptr)},
           {"compact", compactOf(grid)},
           {"layers", layersOf(grid.stored)},
           {"metrics", metricsOf(grid.metrics)},

@@ -36,11 +36,8 @@ void checkFiles(const Options& options) {
 
 constexpr const char* kAuto = "auto";
 
-/// The device that "auto" stands for here: what runs on the CPU alone is fitted there.
 Device chooseDevice(const Options& options, const cli::Log& log) {
-  const bool cpuOnly = options.device == kAuto && options.fit.loss == Loss::kPaper;
-  const Device device = selectDevice(cpuOnly ? "cpu" : options.device);
-  if (cpuOnly) log.detail("the paper's loss is computed on the CPU");
+  const Device device = selectDevice(options.device);
   log.detail("fitting on " + deviceName(device) + ", with " +
              (options.threads > 0 ? std::to_string(options.threads) : "all available") +
              " threads");

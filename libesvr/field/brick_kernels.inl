@@ -243,7 +243,8 @@ void backward(const LineForm& f, const float corner[3], const KernelConstants<fl
              sumLanes(s1 * l.dz),
              sumLanes(s2),
              sumLanes(rPhi),
-             sumLanes(phi2)};
+             sumLanes(phi2),
+             sumLanes(s0)};
 }
 
 /// Calls visit(phi, row of 512 values) for every row of a tape, in its order.

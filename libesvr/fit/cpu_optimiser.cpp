@@ -9,6 +9,7 @@
 #include "core/add_seconds.h"
 #include "esvr/error.h"
 #include "field/gather.h"
+#include "fit/fit_errors.h"
 #include "fit/parameter_gradient.h"
 #include "fit/scene.h"
 
@@ -120,20 +121,7 @@ double CpuOptimiser::iterate(std::span<const double> factors) {
 
 FitErrors CpuOptimiser::measure() {
   refreshResiduals();
-  FitErrors errors;
-  for (std::size_t b = 0; b < engine_.brickCount(); ++b) {
-    const float* r = residuals_.data() + b * kBrickVoxels;
-    const bool inTarget = b < engine_.targetBricks();
-    const Coord corner = engine_.index().bricks()[b] * kBrickSide;
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const double squared = double(r[v]) * double(r[v]);
-      errors.squaredSum += squared;
-      if (target_.box.contains(corner + voxelLocal(v))) errors.squaredSumBox += squared;
-      errors.largest = std::max(errors.largest, std::abs(double(r[v])));
-      if (inTarget && (*target_.active)[b].test(v)) errors.squaredSumActive += squared;
-    }
-  }
-  return errors;
+  return errorsOf(target_, {engine_.index(), residuals_});
 }
 
 void CpuOptimiser::dropUnseen() {

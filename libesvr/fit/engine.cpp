@@ -40,11 +40,16 @@ void FitEngine::rebuild(std::span<const Primitive> primitives, double slack) {
   std::vector<Support> reach(primitives.size());
   tbb::parallel_for(Range(0, primitives.size(), kPrimitiveGrain), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i)
-      reach[i] = makeSupport(primitives[i].center, primitives[i].L, radius_, slack);
+      reach[i] = makeSupport(primitives[i].center, primitives[i].L, radiusOf(i), slack);
   });
   const auto supportOf = [&](std::size_t i) -> const Support& { return reach[i]; };
   index_ = BrickIndex(target_.bricks);
-  if (!target_.narrowBand) index_.append(missingBricks(index_, primitives.size(), supportOf));
+  if (!target_.narrowBand) {
+    auto reached = missingBricks(index_, primitives.size(), supportOf);
+    if (target_.within)
+      std::erase_if(reached, [&](Coord brick) { return !target_.within->contains(brick); });
+    index_.append(reached);
+  }
   pairs_ = pairsWithin(index_, primitives.size(), supportOf);
   moments_.resize(pairs_.pairCount());
   brickLoss_.resize(index_.size());
@@ -57,7 +62,7 @@ void FitEngine::prepare(std::span<const Primitive> primitives) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Primitive& p = primitives[i];
       frames_[i] = frameOf(p.center);
-      forms_[i] = makeLineForm(inFrame(p.center, frames_[i]), p.L, radius_, p.intensity);
+      forms_[i] = makeLineForm(inFrame(p.center, frames_[i]), p.L, radiusOf(i), p.intensity);
     }
   });
 }
@@ -89,7 +94,7 @@ void FitEngine::forwardBrick(std::size_t brick, PairTapes& scratch, float* r) co
     PairTape& tape = scratch.tapes[pair - begin];
     tape.phi = phi;
     const auto at = cornerIn(frames_[i], corner);
-    kernels.forward(forms_[i], at.data(), kernelFloat_, r, tape);
+    kernels.forward(forms_[i], at.data(), kernelOf(i), r, tape);
     phi += tape.floats;
   }
 }
@@ -101,7 +106,7 @@ void FitEngine::backwardBrick(std::size_t brick, const PairTapes& scratch, const
   for (auto pair = begin; pair != end; ++pair) {
     const auto i = pairs_.ellipsoid[pair];
     const auto at = cornerIn(frames_[i], corner);
-    kernels.backward(forms_[i], at.data(), kernelFloat_, r, scratch.tapes[pair - begin],
+    kernels.backward(forms_[i], at.data(), kernelOf(i), r, scratch.tapes[pair - begin],
                      moments_[pair]);
   }
 }
@@ -113,7 +118,7 @@ void FitEngine::reduce(std::span<const Primitive> primitives,
       PairSums sums{};
       for (auto k = pairs_.ellipsoidBegin[i]; k != pairs_.ellipsoidBegin[i + 1]; ++k)
         sums.add(moments_[pairs_.pairOf[k]]);
-      out[i] = {parameterGradient(forms_[i], sums), sums.phi2};
+      out[i] = {parameterGradient(forms_[i], sums), sums.phi2, sums.w0};
     }
   });
 }
@@ -165,7 +170,7 @@ void FitEngine::residuals(std::span<const Primitive> primitives, std::vector<flo
       const Coord corner = index_.bricks()[b] * kBrickSide;
       for (auto pair = pairs_.brickBegin[b]; pair != pairs_.brickBegin[b + 1]; ++pair) {
         const auto i = pairs_.ellipsoid[pair];
-        kernels.add(forms_[i], cornerIn(frames_[i], corner).data(), kernelFloat_, r);
+        kernels.add(forms_[i], cornerIn(frames_[i], corner).data(), kernelOf(i), r);
       }
       if (target_.narrowBand) saturate(b, r);
       std::copy_n(r, kBrickVoxels, out.data() + b * kBrickVoxels);

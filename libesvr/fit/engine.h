@@ -14,11 +14,20 @@
 
 namespace esvr {
 
+/// Kernels where primitives differ in their edge.
+struct OwnKernels {
+  std::vector<KernelConstants<float>> constants;
+  std::vector<double> radii;  ///< of the supports, in the unit frames
+};
+
 /// Keeps the pair lists and the prepared forms. Lists hold while no support has moved by more than
 /// the slack they were built with; the caller says when to rebuild.
 class FitEngine {
  public:
   FitEngine(const FitTarget& target, const KernelConstants<double>& kernel);
+
+  /// Kernels of the primitives, borrowed; null: all have the engine's. Lists must be rebuilt.
+  void useKernels(const OwnKernels* kernels) { ownKernels_ = kernels; }
 
   /// Builds the lists anew, with supports widened by `slack` voxels.
   void rebuild(std::span<const Primitive> primitives, double slack);
@@ -41,6 +50,12 @@ class FitEngine {
   [[nodiscard]] const KernelConstants<double>& kernel() const { return kernel_; }
 
  private:
+  [[nodiscard]] const KernelConstants<float>& kernelOf(std::size_t primitive) const {
+    return ownKernels_ ? ownKernels_->constants[primitive] : kernelFloat_;
+  }
+  [[nodiscard]] double radiusOf(std::size_t primitive) const {
+    return ownKernels_ ? ownKernels_->radii[primitive] : radius_;
+  }
   void prepare(std::span<const Primitive> primitives);
   void startFromTarget(std::size_t brick, float* r) const;
   void saturate(std::size_t brick, float* r) const;
@@ -52,6 +67,7 @@ class FitEngine {
   KernelConstants<double> kernel_;
   KernelConstants<float> kernelFloat_;
   double radius_;
+  const OwnKernels* ownKernels_ = nullptr;
   BrickIndex index_;
   BrickPairs pairs_;
   std::vector<LineForm> forms_;

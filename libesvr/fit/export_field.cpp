@@ -23,9 +23,11 @@ void append(Ellipsoids& e, const Primitive& p, Coord frame, double scale) {
 
 Field exportField(std::span<const Primitive> primitives, const ExportFrame& frame) {
   std::map<Coord, Ellipsoids> byChunk;
-  for (const Primitive& p : primitives) {
-    const Coord chunk = frameOf(p.center);
-    append(byChunk[chunk], p, chunk, frame.scale);
+  for (std::size_t i = 0; i < primitives.size(); ++i) {
+    const Coord chunk = frameOf(primitives[i].center);
+    Ellipsoids& ellipsoids = byChunk[chunk];
+    append(ellipsoids, primitives[i], chunk, frame.scale);
+    if (!frame.kappas.empty()) ellipsoids.kappa.push_back(float(frame.kappas[i]));
   }
   Field field;
   field.background = frame.background;

@@ -13,6 +13,7 @@ struct ExportFrame {
   double scale = 1.0;  ///< FitTarget::scale
   float background = 0.0f;
   Kernel kernel;
+  std::span<const double> kappas{};  ///< of the primitives, where they differ
 };
 
 /// Principal axes, log scales and intensities in the grid's units; chunks of kChunkExtent.

@@ -5,6 +5,7 @@
 
 #include "esvr/error.h"
 #include "fit/export_field.h"
+#include "fit/paper/fit_paper.h"
 #include "fit/pilot.h"
 #include "fit/run.h"
 
@@ -49,6 +50,7 @@ void check(const FitOptions& options) {
     throw UsageError(
         "the paper's loss compares windows, which a narrow band does not fill: use squared");
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
+  if (options.paper) paper::checkPaper(options);
 }
 
 RunPlan planFor(const FitTarget& target, const FitOptions& options) {
@@ -94,6 +96,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   FitTarget target = makeTarget(volume, options.box);
   target.narrowBand = options.narrowBand;
   if (target.lowest == 0.0 && target.highest == 0.0) return emptyFit(volume, options);
+  if (options.paper) return paper::fitPaper(volume, target, options);
 
   Recorder recorder(target, options);
   const RunPlan plan = planFor(target, options);

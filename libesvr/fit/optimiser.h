@@ -31,6 +31,14 @@ struct FitErrors {
   double squaredSumBox = 0.0;     ///< over the target's box
   double squaredSumActive = 0.0;  ///< over the active voxels
   double largest = 0.0;
+
+  /// Of two parts of a volume.
+  void add(const FitErrors& part) {
+    squaredSum += part.squaredSum;
+    squaredSumBox += part.squaredSumBox;
+    squaredSumActive += part.squaredSumActive;
+    largest = largest > part.largest ? largest : part.largest;
+  }
 };
 
 class Optimiser {

@@ -92,11 +92,12 @@ double PaperLoss::absoluteError(const PaperLossInput& in, std::vector<float>& lo
   return scale * sumOfBricks();
 }
 
-void PaperLoss::findWindows(const SsimValues& values) {
+void PaperLoss::findWindows(const SsimValues& values, const std::optional<Box>& within) {
   nonZero_.resize(values.index.size());
   forEachBrick(nonZero_.size(), [&](std::size_t b) { nonZero_[b] = nonZeroBox(values, b); });
 
   std::vector<Coord> bricks = dilated(values.index);
+  if (within) std::erase_if(bricks, [&](Coord b) { return !within->contains(b); });
   std::vector<Box> supports(bricks.size());
   forEachBrick(bricks.size(), [&](std::size_t b) {
     supports[b] = haloSupport(bricksAround(values.index, bricks[b]), nonZero_);
@@ -137,7 +138,7 @@ double PaperLoss::evaluate(const PaperLossInput& in, std::vector<float>& lossByV
   if (in.beta == 1.0) return loss;
   const SsimValues values{in.index, in.residual, in.target, ssimConstants(in.peak)};
   const double scale = (1.0 - in.beta) / in.voxels;
-  findWindows(values);
+  findWindows(values, in.within);
   const double dissimilar = dissimilarities(values);
   addGradient(values, scale, lossByValue);
   return loss + scale * dissimilar;

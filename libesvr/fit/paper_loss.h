@@ -2,6 +2,7 @@
 /// The paper's loss, beta * L1 + (1 - beta) * D-SSIM (eq. recon_loss), and its derivative by every
 /// voxel of the prediction. D-SSIM is 1 - the mean of 3D SSIM, with the window of ssim_window.h.
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,7 +11,8 @@
 
 namespace esvr {
 
-/// Prediction and target are zero outside the bricks, and space is infinite: no window is clipped.
+/// Prediction and target are zero outside the bricks, and no window is clipped: those of the voxels
+/// of all space count, or those of a box.
 struct PaperLossInput {
   const BrickIndex& index;          ///< every brick where prediction or target may be non-zero
   std::span<const float> residual;  ///< prediction - target, kBrickVoxels a brick of the index
@@ -18,6 +20,7 @@ struct PaperLossInput {
   double voxels;                    ///< of the box that the means are taken over
   double beta;                      ///< 0..1
   double peak;                      ///< range L of the values; L1 is taken of values divided by it
+  std::optional<Box> within{};      ///< in bricks: only the windows of its voxels count
 };
 
 /// Costs follow the bricks and those next to them: windows that see no brick count as SSIM 1, which
@@ -33,7 +36,7 @@ class PaperLoss {
 
  private:
   double absoluteError(const PaperLossInput& input, std::vector<float>& lossByValue);
-  void findWindows(const SsimValues& values);
+  void findWindows(const SsimValues& values, const std::optional<Box>& within);
   double dissimilarities(const SsimValues& values);
   void addGradient(const SsimValues& values, double scale, std::vector<float>& lossByValue);
   [[nodiscard]] double sumOfBricks() const;

@@ -14,11 +14,15 @@ double Recorder::seconds() const {
 }
 
 const CurvePoint& Recorder::record(Optimiser& optimiser, std::uint32_t iteration) {
-  const FitErrors errors = optimiser.measure();
+  return record(optimiser.measure(), optimiser.primitiveCount(), iteration);
+}
+
+const CurvePoint& Recorder::record(const FitErrors& errors, std::size_t primitives,
+                                   std::uint32_t iteration) {
   CurvePoint point;
   point.seconds = seconds();
   point.iteration = iteration;
-  point.primitives = optimiser.primitiveCount();
+  point.primitives = primitives;
   point.psnrBox = psnrOf(errors.squaredSumBox, target_.boxVoxels, target_.peak);
   point.psnrActive = psnrOf(errors.squaredSumActive, double(target_.activeVoxels), target_.peak);
   point.maxError = errors.largest / target_.scale;

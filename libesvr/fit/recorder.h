@@ -22,7 +22,10 @@ class Recorder {
   [[nodiscard]] double seconds() const;
   [[nodiscard]] bool cancelled() const { return options_.cancel && options_.cancel->cancelled(); }
 
-  /// Measures exactly and appends a point to the curve.
+  /// Appends a point to the curve.
+  const CurvePoint& record(const FitErrors& errors, std::size_t primitives,
+                           std::uint32_t iteration);
+  /// The same, measured exactly.
   const CurvePoint& record(Optimiser& optimiser, std::uint32_t iteration);
 
   /// Reports progress if the last report is long enough ago.

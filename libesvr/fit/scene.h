@@ -12,7 +12,7 @@
 namespace esvr {
 
 /// The kernel's constants as inner loops use them.
-[[nodiscard]] inline KernelConstants<float> narrowed(const KernelConstants<double>& k) {
+[[nodiscard]] ESVR_HD inline KernelConstants<float> narrowed(const KernelConstants<double>& k) {
   return {float(k.shift), float(k.numerator), float(k.plateau), float(k.base),
           float(k.slope), float(k.cutoff),    float(k.expNegS)};
 }

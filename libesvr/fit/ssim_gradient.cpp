@@ -3,40 +3,10 @@
 #include <algorithm>
 #include <numeric>
 
+#include "fit/ssim_math.h"
+
 namespace esvr {
 namespace {
-
-/// Weighted means over one window: t the target, r = prediction - target.
-struct WindowMoments {
-  double t, tt, r, rr, tr;
-};
-
-/// 1 - SSIM of one window, in [0, 2] and exactly 0 where r is zero, and its WindowGradients.
-struct Dissimilarity {
-  double value, byR;
-  float byRr, byTr;
-};
-
-inline Dissimilarity dissimilarity(const WindowMoments& m, const SsimConstants& constants) {
-  const double meanP = m.t + m.r;
-  const double varianceT = std::max(m.tt - m.t * m.t, 0.0);
-  const double varianceR = std::max(m.rr - m.r * m.r, 0.0);
-  const double covariance = m.tr - m.t * m.r;
-  const double varianceP = std::max(varianceT + 2.0 * covariance + varianceR, 0.0);
-
-  const double byMeans = 1.0 / (meanP * meanP + m.t * m.t + constants.c1);
-  const double byVariances = 1.0 / (varianceP + varianceT + constants.c2);
-  const double l = m.r * m.r * byMeans, c = varianceR * byVariances;
-
-  Dissimilarity d;
-  d.value = l + c - l * c;
-  d.byRr = float((1.0 - l) * (1.0 - c) * byVariances * constants.c2);
-  d.byTr = float(-2.0 * (1.0 - l) * c * byVariances * constants.c2);
-  // With byRr and byTr as rounded, so that what cancels in a flat region's sums still does.
-  d.byR = 2.0 * (1.0 - c) * (m.r - l * meanP) * byMeans -
-          (2.0 * m.r * double(d.byRr) + m.t * double(d.byTr)) * (1.0 / constants.c2);
-  return d;
-}
 
 /// Null for bricks beyond the array's end and where there is none.
 ValuesAround<float> valuesAround(std::span<const float> values, const BricksAround& around) {

@@ -20,6 +20,7 @@ struct FitTarget {
   double lowest = 0.0, highest = 0.0;              ///< range of `values`, zero included
   bool narrowBand = false;                         ///< FitOptions::narrowBand
   const std::vector<BrickMask>* active = nullptr;  ///< of the volume the target was made from
+  std::optional<Box> within{};  ///< bricks: what lies elsewhere counts for nothing; default: all
 };
 
 /// The volume must outlive the target. \throws BadInput  no active voxel

@@ -187,6 +187,15 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"--iterations", "0"}, 2, "--iterations"}, Refusal{{"--preset", "best"}, 2, "best"},
         Refusal{{"--box", "1,2,3"}, 2, "--box"}, Refusal{{"--box", "5,5,5,1,1,1"}, 2, "no voxel"},
         Refusal{{"--loss", "paper", "--beta", "2"}, 2, "--beta"},
+        Refusal{{"--epochs", "5"}, 2, "--preset paper"},
+        Refusal{{"--preset", "paper", "--kappa", "2"}, 2, "kappa"},
+        Refusal{{"--preset", "paper", "--iterations", "9"}, 2, "epochs"},
+        Refusal{{"--preset", "paper", "--size", "9KB"}, 2, "--size"},
+        Refusal{{"--preset", "paper", "--loss", "squared"}, 2, "--beta 1"},
+        Refusal{{"--preset", "paper", "--sharpness", "soft"}, 2, "soft"},
+        Refusal{{"--preset", "paper", "--sharpness", "learned", "--storage", "compact"}, 2, "edge"},
+        Refusal{{"--preset", "paper", "--primitive", "gaussian", "--sharpness", "3"}, 2, "Gauss"},
+        Refusal{{"--preset", "paper", "--prune-passes", "2"}, 2, "--prune-passes"},
         Refusal{{"--device", "tpu"}, 2, "tpu"}, Refusal{{"--device", "cuda:4096"}, 5, "cuda:4096"},
         Refusal{{"--report", "report.txt"}, 2, ".json"},
         Refusal{{"more"}, 2, "unexpected argument"}));
@@ -312,14 +321,34 @@ TEST_F(Vdb2Esvr, reportsWhatDocsReportSaysAndNothingElse) {
   const Json& grid = report["grids"][0];
   EXPECT_THAT(keysOf(grid),
               testing::UnorderedElementsAre("name", "source", "primitives", "bytes", "sections",
-                                            "kernel", "topology", "fit", "compact", "layers",
-                                            "metrics", "seconds", "left_out", "curve"));
+                                            "kernel", "topology", "fit", "paper", "compact",
+                                            "layers", "metrics", "seconds", "left_out", "curve"));
+  EXPECT_TRUE(grid["paper"].is_null());
   EXPECT_EQ(report["schema"], "esvr-report");
   EXPECT_EQ(report["exit_code"], 0);
   EXPECT_EQ(report["output"]["bytes"], std::filesystem::file_size(out()));
   EXPECT_EQ(grid["primitives"], readEsvr(out()).grids[0].field.primitiveCount());
   EXPECT_EQ(grid["source"]["active_voxels"], softBall({}).size());
   EXPECT_EQ(grid["curve"].size(), readEsvr(out()).grids[0].curve.size());
+}
+
+TEST_F(Vdb2Esvr, reportsWhatThePapersMethodUsed) {
+  const auto run = vdb2esvr({in(), out(), "--preset", "paper", "--epochs", "28", "--points", "60",
+                             "--count", "40", "--report", "-", "--prune-score", "no-fa", "--hits",
+                             "--device", "cpu", "--densify-threshold", "0"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const Json report = Json::parse(run.out);
+  EXPECT_EQ(report["asked"]["preset"], "paper");
+  EXPECT_EQ(report["asked"]["loss"], "paper");
+  EXPECT_EQ(report["asked"]["storage"], "float32");
+  const Json& paper = report["grids"][0]["paper"];
+  EXPECT_EQ(paper["k"], 5.0);
+  EXPECT_EQ(paper["points"], 60);
+  EXPECT_EQ(paper["prune_score"], "no-fa");
+  EXPECT_EQ(paper["densify"]["until"], 4);  // of 400 in 2800 epochs
+  EXPECT_EQ(paper["prunes"][0]["epoch"], 12);
+  EXPECT_EQ(paper["prunes"][0]["after"], 40);
+  EXPECT_GT(report["grids"][0]["fit"]["hits"], 1.0);
 }
 
 TEST_F(Vdb2Esvr, reportsNullForAPsnrWithoutError) {

@@ -203,8 +203,18 @@ TEST(PaperKernel, IsThePapersFormulaInThePapersScales) {
     const double q = qEnd * i / 1000.0;
     EXPECT_NEAR(kernelPhi(c, k * q), sigma(k * (1.0 - q)) / sigma(k), kRounding<double>);
   }
-  EXPECT_EQ(kernelPhi(c, k * qEnd), 0.0);
+  EXPECT_EQ(kernelPhi(c, k * qEnd * (1.0 + 1e-14)), 0.0);
   EXPECT_NEAR(supportRadius(c) / std::sqrt(k), 1.42, 1e-7);  // kPaperCutoff is a float
+}
+
+TEST(PaperKernel, EndsAtTheSameValueForEveryK) {
+  const auto end = kernelConstants<double>({.form = KernelForm::kPaper, .kappa = Kernel::kPaperK});
+  const double value = kernelPhi(end, std::nextafter(end.cutoff, 0.0));
+  for (const float k : {-30.0f, 0.5f, 3.0f, 50.0f}) {
+    const auto c = kernelConstants<double>({.form = KernelForm::kPaper, .kappa = k});
+    EXPECT_NEAR(kernelPhi(c, std::nextafter(c.cutoff, 0.0)), value, 1e-12) << k;
+    EXPECT_EQ(kernelPhi(c, std::nextafter(c.cutoff, 1e9)), 0.0) << k;
+  }
 }
 
 TEST(PaperKernel, JumpsWhereItsSupportEnds) {

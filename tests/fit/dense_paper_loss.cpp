@@ -85,7 +85,7 @@ double densePaperLoss(const DenseValues& p, const DenseValues& t, const DenseLos
   double absolute = 0.0, dissimilar = 0.0;
   forEachVoxel(p.box(), [&](Coord v) {
     absolute += std::abs(p.at(v) - t.at(v));
-    dissimilar += 1.0 - ssim.at(v).value();
+    if (options.counts(v)) dissimilar += 1.0 - ssim.at(v).value();
   });
   return (options.beta * absolute / options.peak + (1.0 - options.beta) * dissimilar) /
          options.voxels;
@@ -96,6 +96,7 @@ DenseValues densePaperLossGradient(const DenseValues& p, const DenseValues& t,
   const SsimMap ssim(p, t, options.peak);
   DenseValues byM1(p.box()), byM2(p.box()), byM12(p.box()), gradient(p.box());
   forEachVoxel(p.box(), [&](Coord v) {
+    if (!options.counts(v)) return;
     const Ssim s = ssim.at(v);
     byM1[v] = s.byM1();
     byM2[v] = s.byM2();

@@ -2,6 +2,7 @@
 /// The paper's loss by its definition: float64 over every voxel of a box, SSIM as the textbook has
 /// it. Independent of the library's bricks and of its way to write SSIM.
 
+#include <optional>
 #include <vector>
 
 #include "esvr/coord.h"
@@ -30,6 +31,9 @@ class DenseValues {
 
 struct DenseLossOptions {
   double voxels, beta, peak;
+  std::optional<Box> windows{};  ///< voxels whose windows count; default: all
+
+  [[nodiscard]] bool counts(Coord v) const { return !windows || windows->contains(v); }
 };
 
 /// The box must reach at least 5 voxels, a window's radius, beyond all that is not zero.

@@ -19,132 +19,44 @@
 #include "esvr/error.h"
 #include "esvr/metrics.h"
 #include "field/random_field.h"
-#include "fit/dense_paper_loss.h"
 #include "fit/paper_loss.h"
+#include "fit/paper_loss_scene.h"
 
 namespace esvr {
 namespace {
 
+using test::boxAround;
+using test::cubeOfBricks;
+using test::denseGradient;
+using test::denseLoss;
+using test::denseOf;
+using test::densePrediction;
 using test::DenseValues;
+using test::kMargin;
+using test::LossAndGradient;
+using test::makeScene;
+using test::mixedBricks;
+using test::randomScene;
+using test::relativeDifference;
+using test::residualOf;
+using test::Scene;
 
 constexpr double kLossTolerance = 1e-12, kGradientTolerance = 1e-7;
-constexpr int kMargin = 5;  // voxels beyond the bricks that windows see
-
-struct Scene {
-  std::vector<Coord> bricks;
-  std::size_t targetBricks = 0;
-  std::vector<float> prediction{}, target{};  // of all bricks
-  double voxels = 5000.0, beta = 0.2, peak = 1.0;
-};
-
-/// Bricks that touch by face, edge and corner, one apart, on both sides of zero; the last three
-/// hold a prediction only.
-std::vector<Coord> mixedBricks() {
-  return {{-2, -1, 0}, {-1, -1, 0}, {-1, 0, 1}, {0, 1, 0}, {0, -1, -1}, {-1, -1, 1}, {1, 1, 1}};
-}
-
-using ValueAt = std::function<float(Coord)>;
-
-Scene makeScene(const std::vector<Coord>& bricks, std::size_t targetBricks, const ValueAt& target,
-                const ValueAt& prediction) {
-  Scene scene{.bricks = bricks, .targetBricks = targetBricks};
-  for (std::size_t b = 0; b < bricks.size(); ++b)
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const Coord at = bricks[b] * kBrickSide + voxelLocal(v);
-      scene.target.push_back(b < targetBricks ? target(at) : 0.0f);
-      scene.prediction.push_back(prediction(at));
-    }
-  return scene;
-}
-
-Scene randomScene(std::uint64_t seed, const std::vector<Coord>& bricks = mixedBricks()) {
-  test::Random random(seed);
-  const auto value = [&](Coord) { return float(random(0.0, 1.0)); };
-  return makeScene(bricks, (bricks.size() + 1) / 2, value, value);
-}
-
-/// Prediction less target. Exact for values of one exponent or multiples of one step, which these
-/// tests use where they compare bits.
-std::vector<float> residualOf(const Scene& scene) {
-  std::vector<float> residual(scene.target.size());
-  for (std::size_t v = 0; v < residual.size(); ++v)
-    residual[v] = scene.prediction[v] - scene.target[v];
-  return residual;
-}
-
-struct LossAndGradient {
-  double loss = 0.0;
-  std::vector<float> gradient;
-};
 
 LossAndGradient evaluate(const Scene& scene, PaperLoss& loss) {
   const BrickIndex index(scene.bricks);
   const auto residual = residualOf(scene);
   const std::span target(scene.target.data(), scene.targetBricks * kBrickVoxels);
   LossAndGradient result;
-  result.loss = loss.evaluate({index, residual, target, scene.voxels, scene.beta, scene.peak},
-                              result.gradient);
+  result.loss =
+      loss.evaluate({index, residual, target, scene.voxels, scene.beta, scene.peak, scene.within},
+                    result.gradient);
   return result;
 }
 
 LossAndGradient evaluate(const Scene& scene) {
   PaperLoss loss;
   return evaluate(scene, loss);
-}
-
-Box boxAround(const std::vector<Coord>& bricks, int margin) {
-  Box box;
-  for (const Coord b : bricks) {
-    box.expand(b * kBrickSide - Coord{margin, margin, margin});
-    box.expand((b + Coord{1, 1, 1}) * kBrickSide + Coord{margin - 1, margin - 1, margin - 1});
-  }
-  return box;
-}
-
-DenseValues denseOf(const Scene& scene, const std::vector<float>& values) {
-  DenseValues dense(boxAround(scene.bricks, kMargin));
-  for (std::size_t v = 0; v < values.size(); ++v)
-    dense[scene.bricks[v / kBrickVoxels] * kBrickSide + voxelLocal(int(v % kBrickVoxels))] =
-        values[v];
-  return dense;
-}
-
-/// The prediction as the library sees it: target + residual, the residual in float32.
-DenseValues densePrediction(const Scene& scene) {
-  const auto residual = residualOf(scene);
-  DenseValues dense = denseOf(scene, scene.target);
-  const DenseValues difference = denseOf(scene, residual);
-  for (std::size_t v = 0; v < residual.size(); ++v) {
-    const Coord at =
-        scene.bricks[v / kBrickVoxels] * kBrickSide + voxelLocal(int(v % kBrickVoxels));
-    dense[at] += difference.at(at);
-  }
-  return dense;
-}
-
-double denseLoss(const Scene& scene) {
-  return test::densePaperLoss(densePrediction(scene), denseOf(scene, scene.target),
-                              {scene.voxels, scene.beta, scene.peak});
-}
-
-std::vector<double> denseGradient(const Scene& scene) {
-  const DenseValues dense = test::densePaperLossGradient(
-      densePrediction(scene), denseOf(scene, scene.target), {scene.voxels, scene.beta, scene.peak});
-  std::vector<double> gradient(scene.target.size());
-  for (std::size_t v = 0; v < gradient.size(); ++v)
-    gradient[v] =
-        dense.at(scene.bricks[v / kBrickVoxels] * kBrickSide + voxelLocal(int(v % kBrickVoxels)));
-  return gradient;
-}
-
-template <class A, class B>
-double relativeDifference(const std::vector<A>& values, const std::vector<B>& reference) {
-  double difference = 0.0, norm = 0.0;
-  for (std::size_t i = 0; i < reference.size(); ++i) {
-    difference += std::pow(double(values[i]) - double(reference[i]), 2);
-    norm += std::pow(double(reference[i]), 2);
-  }
-  return std::sqrt(difference / norm);
 }
 
 void expectDenseResult(const Scene& scene) {
@@ -170,6 +82,12 @@ TEST_P(AgainstDense, LossAndGradientAreThoseOfTheTextbook) {
 INSTANTIATE_TEST_SUITE_P(Shares, AgainstDense,
                          testing::Values(Share{1, 0.0, 1.0}, Share{2, 0.2, 1.0}, Share{3, 1.0, 1.0},
                                          Share{4, 0.2, 0.6}, Share{5, 0.5, 37.0}));
+
+TEST(PaperLoss, OfABoxCountsTheWindowsOfItsVoxelsAlone) {
+  Scene scene = randomScene(13);
+  scene.within = Box{{-1, -1, 0}, {0, 1, 1}};
+  expectDenseResult(scene);
+}
 
 // Most voxels are zero, some are predicted exactly: what windows need not see must not be missed.
 TEST(PaperLoss, OfFewVoxelsIsThatOfTheTextbook) {
@@ -316,13 +234,6 @@ TEST(PaperLoss, OfNoBricksIsZero) {
   Scene empty;
   EXPECT_EQ(evaluate(empty).loss, 0.0);
   EXPECT_TRUE(evaluate(empty).gradient.empty());
-}
-
-std::vector<Coord> cubeOfBricks(int side) {
-  std::vector<Coord> bricks;
-  for (int i = 0; i < side * side * side; ++i)
-    bricks.push_back({i / (side * side), i / side % side, i % side});
-  return bricks;
 }
 
 // The variance is 3e-9, a tenth of what rounding 0.5^2 to float32 costs.

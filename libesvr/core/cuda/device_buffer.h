@@ -52,6 +52,7 @@ class DeviceBuffer {
   /// Copies size() elements in; `from` may be reused on return.
   void upload(std::span<const T> from) {
     requireSize(from.size());
+    if (size_ == 0) return;
     check(cudaMemcpyAsync(data_, from.data(), bytes(), cudaMemcpyHostToDevice, stream_),
           "copying to the device");
     // Pinned memory would still be read after the call.

@@ -12,7 +12,7 @@ constexpr unsigned kAllLanes = 0xffffffffu;
 constexpr int kMomentSlots = 16;  // kMoments, made a power of two
 static_assert(kMomentSlots % kGroup == 0, "each lane ends with some of the moments");
 
-enum class Pass { kGradients, kResiduals };
+enum class Pass { kGradients, kResiduals, kGivenGradients };
 
 /// The same on every thread, summed in one order.
 template <int kThreads, class Real>
@@ -43,14 +43,24 @@ __device__ int sumExponent(const BrickPassArguments& a, BrickEntries entries) {
   return bound > 0.0f ? max(-kFarthest, min(kBits - ilogbf(bound), kFarthest)) : 0;
 }
 
+/// kOwnKernels: primitives differ in their edge.
+template <bool kOwnKernels>
+__device__ const KernelConstants<float>& kernelOf(const BrickPassArguments& a,
+                                                  std::uint32_t entry) {
+  if constexpr (kOwnKernels) return a.kernels[a.lists.primitive[entry]];
+  return a.kernel;
+}
+
+template <bool kOwnKernels>
 __device__ void addPair(const BrickPassArguments& a, std::uint32_t entry, Coord corner, float unit,
                         int* sums) {
   const PairForm p = a.forms[a.lists.primitive[entry]];
+  const KernelConstants<float>& kernel = kernelOf<kOwnKernels>(a, entry);
   const float height = p.form.intensity * unit;
-  visitLines(p, corner, a.kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
+  visitLines(p, corner, kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
     float t = line.t;
     for (int y = line.yBegin; y < line.yEnd; ++y, t += 1.0f) {
-      const float phi = fastPhi(a.kernel, squaredAt(p.form, line.closest, t));
+      const float phi = fastPhi(kernel, squaredAt(p.form, line.closest, t));
       atomicAdd(&sums[line.offset + y * kBrickSide], __float2int_rn(height * phi));
     }
   });
@@ -80,6 +90,14 @@ __device__ float toResiduals(const BrickPassArguments& a, std::uint32_t brick, i
   return loss;
 }
 
+/// Puts the given derivatives where residuals would be.
+template <int kThreads>
+__device__ void loadGiven(const BrickPassArguments& a, std::uint32_t brick, int* sums) {
+  for (int v = int(threadIdx.x); v < kBrickVoxels; v += kThreads)
+    sums[paddedOffset(v)] =
+        __float_as_int(a.lossByValue[std::size_t(brick) * kBrickVoxels + std::size_t(v)]);
+}
+
 /// A lane's moments of a pair, in the order of PairMoments.
 __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
                            const int* r, float (&s)[kMomentSlots]) {
@@ -105,6 +123,7 @@ __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kern
     s[5] += w1;
     s[6] += w1 * line.dx;
     s[7] += w1 * line.dz;
+    s[11] += w0;
   });
 }
 
@@ -127,11 +146,12 @@ __device__ float transposeSum(float* s) {
   return s[0];
 }
 
+template <bool kOwnKernels>
 __device__ void writeMoments(const BrickPassArguments& a, std::uint32_t entry, Coord corner,
                              const int* r) {
   const PairForm p = a.forms[a.lists.primitive[entry]];
   float s[kMomentSlots] = {};
-  sumMoments(p, a.kernel, corner, r, s);
+  sumMoments(p, kernelOf<kOwnKernels>(a, entry), corner, r, s);
   float* const out = a.moments + std::size_t(a.lists.pair[entry]) * kMomentStride;
 #pragma unroll
   for (int first = 0; first < kMomentSlots; first += kGroup) {
@@ -141,43 +161,66 @@ __device__ void writeMoments(const BrickPassArguments& a, std::uint32_t entry, C
   }
 }
 
+/// Leaves r of a brick in `sums`, and its loss in the arguments' array.
+template <int kThreads, bool kOwnKernels>
+__device__ void sumBrick(const BrickPassArguments& a, std::uint32_t brick, Coord corner,
+                         BrickEntries entries, int* sums) {
+  for (int v = int(threadIdx.x); v < kPaddedVoxels; v += kThreads) sums[v] = 0;
+  const int exponent = sumExponent<kThreads>(a, entries);  // its barriers come after the zeros
+  for (std::uint32_t k = entries.begin + threadIdx.x / kGroup; k < entries.end;
+       k += kThreads / kGroup)
+    addPair<kOwnKernels>(a, k, corner, ldexpf(1.0f, exponent), sums);
+  __syncthreads();
+  const double loss = blockSum<kThreads>(double(toResiduals<kThreads>(a, brick, exponent, sums)));
+  if (threadIdx.x == 0) a.brickLoss[brick] = loss;
+}
+
 /// One block a brick, one group of lanes a pair.
-template <Pass kPass, int kThreads>
+template <Pass kPass, int kThreads, bool kOwnKernels>
 __global__ void __launch_bounds__(kThreads) brickPass(const BrickPassArguments a) {
-  constexpr int kGroups = kThreads / kGroup;
   __shared__ int sums[kPaddedVoxels];
   const std::uint32_t brick = a.lists.brickOrder[blockIdx.x];
   const Coord corner = a.bricks[brick] * kBrickSide;
   const BrickEntries entries{a.lists.brickBegin[brick], a.lists.brickBegin[brick + 1]};
-  const std::uint32_t first = entries.begin + threadIdx.x / kGroup;
 
-  for (int v = int(threadIdx.x); v < kPaddedVoxels; v += kThreads) sums[v] = 0;
-  const int exponent = sumExponent<kThreads>(a, entries);  // its barriers come after the zeros
-  for (std::uint32_t k = first; k < entries.end; k += kGroups)
-    addPair(a, k, corner, ldexpf(1.0f, exponent), sums);
+  if constexpr (kPass == Pass::kGivenGradients)
+    loadGiven<kThreads>(a, brick, sums);
+  else
+    sumBrick<kThreads, kOwnKernels>(a, brick, corner, entries, sums);
   __syncthreads();
-  const double loss = blockSum<kThreads>(double(toResiduals<kThreads>(a, brick, exponent, sums)));
-  if (threadIdx.x == 0) a.brickLoss[brick] = loss;
-  __syncthreads();
-  if constexpr (kPass == Pass::kGradients)
-    for (std::uint32_t k = first; k < entries.end; k += kGroups) writeMoments(a, k, corner, sums);
+  if constexpr (kPass != Pass::kResiduals)
+    for (std::uint32_t k = entries.begin + threadIdx.x / kGroup; k < entries.end;
+         k += kThreads / kGroup)
+      writeMoments<kOwnKernels>(a, k, corner, sums);
+}
+
+template <Pass kPass, bool kOwnKernels>
+void launchWith(const BrickPassArguments& arguments, cudaStream_t stream) {
+  if (arguments.fewFullBricks)
+    brickPass<kPass, kThreadsForFullBricks, kOwnKernels>
+        <<<arguments.brickCount, kThreadsForFullBricks, 0, stream>>>(arguments);
+  else
+    brickPass<kPass, kUsualThreads, kOwnKernels>
+        <<<arguments.brickCount, kUsualThreads, 0, stream>>>(arguments);
+  check(cudaGetLastError(), "starting a pass over the bricks");
 }
 
 template <Pass kPass>
 void launch(const BrickPassArguments& arguments, cudaStream_t stream) {
   if (arguments.brickCount == 0) return;
-  if (arguments.fewFullBricks)
-    brickPass<kPass, kThreadsForFullBricks>
-        <<<arguments.brickCount, kThreadsForFullBricks, 0, stream>>>(arguments);
+  if (arguments.kernels != nullptr)
+    launchWith<kPass, true>(arguments, stream);
   else
-    brickPass<kPass, kUsualThreads><<<arguments.brickCount, kUsualThreads, 0, stream>>>(arguments);
-  check(cudaGetLastError(), "starting a pass over the bricks");
+    launchWith<kPass, false>(arguments, stream);
 }
 
 }  // namespace
 
 void launchGradients(const BrickPassArguments& arguments, cudaStream_t stream) {
   launch<Pass::kGradients>(arguments, stream);
+}
+void launchGivenGradients(const BrickPassArguments& arguments, cudaStream_t stream) {
+  launch<Pass::kGivenGradients>(arguments, stream);
 }
 void launchResiduals(const BrickPassArguments& arguments, cudaStream_t stream) {
   launch<Pass::kResiduals>(arguments, stream);

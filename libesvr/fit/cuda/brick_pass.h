@@ -23,13 +23,17 @@ struct BrickPassArguments {
   double* brickLoss;      ///< out, a brick's: sum of r^2
   float* moments;         ///< out, kMomentStride a pair; not written for residuals alone
   float* residual;        ///< kBrickVoxels a brick; out, or null
+  const KernelConstants<float>* kernels = nullptr;  ///< a primitive's; null: all have `kernel`
+  const float* lossByValue = nullptr;  ///< kBrickVoxels a brick, for launchGivenGradients
 };
 
-/// Values of a pair in `moments`: PairMoments, in its order, and room to 48 bytes.
-inline constexpr int kMoments = 11, kMomentStride = 12;
+/// Values of a pair in `moments`: PairMoments, in its order.
+inline constexpr int kMoments = 12, kMomentStride = 12;
 
 /// Loss and moments for gradients of 1/2 sum r^2.
 void launchGradients(const BrickPassArguments& arguments, cudaStream_t stream);
+/// Moments for gradients of a loss whose derivative by V is given. Writes no loss.
+void launchGivenGradients(const BrickPassArguments& arguments, cudaStream_t stream);
 /// Loss and residuals.
 void launchResiduals(const BrickPassArguments& arguments, cudaStream_t stream);
 

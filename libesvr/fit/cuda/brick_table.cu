@@ -24,16 +24,20 @@ __global__ void insertTargets(const Coord* bricks, std::uint32_t count, std::uin
   while (atomicCAS(&slots[s], kNoBrick, number) != kNoBrick) s = (s + 1) & mask;
 }
 
-/// Where and how many: the counter goes beyond `most` when the table is too small.
+/// Where, which and how many: the counter goes beyond `most` when the table is too small.
 struct ReachedInsertion {
   ReachedSlot* slots;
   std::uint32_t mask;
   std::uint32_t most;
   std::uint32_t* count;
+  BrickTableView targets;  ///< these bricks and
+  Box within;              ///< those beyond are passed over
 };
 
 /// Claims a slot for a brick, or finds the one it has.
 __device__ void insertReached(const ReachedInsertion& into, Coord brick) {
+  if (!into.within.contains(brick)) return;
+  if (into.targets.findTarget(brick, std::uint32_t(hashOf(brick))) != kNoBrick) return;
   for (std::uint32_t s = std::uint32_t(hashOf(brick)) & into.mask;; s = (s + 1) & into.mask) {
     ReachedSlot& slot = into.slots[s];
     volatile int* const state = &slot.state;
@@ -55,14 +59,22 @@ __device__ void insertReached(const ReachedInsertion& into, Coord brick) {
   }
 }
 
-__global__ void collectReached(SupportSource source, BrickTableView targets,
-                               ReachedInsertion into) {
+__global__ void collectReached(SupportSource source, ReachedInsertion into) {
   const std::size_t i = warpNumber();
   if (i >= source.count) return;
   visitReachedBricks(source, i, [&](Coord brick, bool reached) {
-    if (reached && targets.findTarget(brick, std::uint32_t(hashOf(brick))) == kNoBrick)
-      insertReached(into, brick);
+    if (reached) insertReached(into, brick);
   });
+}
+
+constexpr int kNeighbours = 27;  // a brick itself is one
+
+__global__ void collectAround(const Coord* bricks, std::uint32_t count, ReachedInsertion into) {
+  const std::size_t n = std::size_t(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (n >= std::size_t(count) * kNeighbours) return;
+  const int side = int(n % kNeighbours);
+  insertReached(into,
+                bricks[n / kNeighbours] + Coord{side / 9 - 1, side / 3 % 3 - 1, side % 3 - 1});
 }
 
 /// In any order; they are sorted next.
@@ -108,18 +120,21 @@ void BrickTable::buildTargetTable() {
   slotCount_ = slotsFor(targetCount_);
   std::uint32_t* const slots = slots_.reserve(slotCount_);
   check(cudaMemsetAsync(slots, 0xff, slotCount_ * sizeof(*slots), stream_), "clearing a table");
+  if (targetCount_ == 0) return;
   insertTargets<<<blocksFor(targetCount_, kBlock), kBlock, 0, stream_>>>(
       bricks_.data(), std::uint32_t(targetCount_), slots, std::uint32_t(slotCount_ - 1));
   check(cudaGetLastError(), "filling the table of bricks");
 }
 
-bool BrickTable::collect(const SupportSource& supports) {
+/// \param launch  launch(where to) starts the kernel that inserts
+template <class Launch>
+bool BrickTable::collect(Launch&& launch) {
   ReachedSlot* const slots = reachedSlots_.reserve(reachedSlotCount_);
   check(cudaMemsetAsync(slots, 0, reachedSlotCount_ * sizeof(*slots), stream_), "clearing a table");
   check(cudaMemsetAsync(counter_.data(), 0, sizeof(std::uint32_t), stream_), "clearing a counter");
   const auto most = std::uint32_t(reachedSlotCount_ / 2);
-  collectReached<<<blocksFor(supports.count * kWarp, kBlock), kBlock, 0, stream_>>>(
-      supports, view(), {slots, std::uint32_t(reachedSlotCount_ - 1), most, counter_.data()});
+  launch(ReachedInsertion{slots, std::uint32_t(reachedSlotCount_ - 1), most, counter_.data(),
+                          view(), kAllBricks});
   check(cudaGetLastError(), "finding reached bricks");
   reachedCount_ = downloadValue(counter_.data(), stream_);
   return reachedCount_ <= most;
@@ -143,12 +158,31 @@ void BrickTable::number() {
   check(cudaGetLastError(), "numbering reached bricks");
 }
 
-void BrickTable::findReached(const SupportSource& supports) {
+template <class Launch>
+void BrickTable::find(Launch&& launch) {
+  reachedSlotCount_ = std::max(reachedSlotCount_, kFewestReachedSlots);
+  while (!collect(launch)) reachedSlotCount_ *= 4;
+  number();
+}
+
+void BrickTable::findReached(const SupportSource& supports, const Box& within) {
   reachedCount_ = 0;
   if (supports.count == 0) return;
-  reachedSlotCount_ = std::max(reachedSlotCount_, kFewestReachedSlots);
-  while (!collect(supports)) reachedSlotCount_ *= 4;
-  number();
+  find([&](ReachedInsertion into) {
+    into.within = within;
+    collectReached<<<blocksFor(supports.count * kWarp, kBlock), kBlock, 0, stream_>>>(supports,
+                                                                                      into);
+  });
+}
+
+void BrickTable::findAround(const BrickTable& other, const Box& within) {
+  reachedCount_ = 0;
+  if (other.size() == 0) return;
+  find([&](ReachedInsertion into) {
+    into.within = within;
+    collectAround<<<blocksFor(other.size() * kNeighbours, kBlock), kBlock, 0, stream_>>>(
+        other.bricks_.data(), std::uint32_t(other.size()), into);
+  });
 }
 
 BrickTableView BrickTable::view() const {

@@ -14,12 +14,19 @@
 
 namespace esvr::cuda {
 
+/// Every brick there is.
+inline constexpr Box kAllBricks{{Box::kMin, Box::kMin, Box::kMin},
+                                {Box::kMax, Box::kMax, Box::kMax}};
+
 class BrickTable {
  public:
   BrickTable(std::span<const Coord> targetBricks, cudaStream_t stream);
 
   /// Finds the bricks beyond the target's that supports reach.
-  void findReached(const SupportSource& supports);
+  /// \param within  bricks elsewhere are passed over
+  void findReached(const SupportSource& supports, const Box& within = kAllBricks);
+  /// Finds another table's bricks and their neighbours, in the place of those that supports reach.
+  void findAround(const BrickTable& other, const Box& within = kAllBricks);
 
   [[nodiscard]] std::size_t targetCount() const { return targetCount_; }
   [[nodiscard]] std::size_t size() const { return targetCount_ + reachedCount_; }
@@ -27,7 +34,10 @@ class BrickTable {
 
  private:
   void buildTargetTable();
-  [[nodiscard]] bool collect(const SupportSource& supports);
+  template <class Launch>
+  void find(Launch&& launch);
+  template <class Launch>
+  [[nodiscard]] bool collect(Launch&& launch);
   void number();
 
   cudaStream_t stream_;

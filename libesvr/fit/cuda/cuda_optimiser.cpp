@@ -41,7 +41,8 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       diverged_(1, stream_.get()),
       draw_(stream_.get()),
       ranking_(stream_.get()),
-      errorSums_(stream_.get()) {
+      errorSums_(stream_.get()),
+      paperLoss_(stream_.get()) {
   loss_.reserve(1);
   diverged_.setZero();
 }
@@ -94,6 +95,7 @@ void CudaOptimiser::rebuildLists(double slack) {
   const SupportSource supports{primitives_.data(), count_, radius_, slack};
   if (!target_.narrowBand) bricks_.findReached(supports);
   lists_.rebuild(supports, bricks_);
+  if (options_.loss == Loss::kPaper) paperLoss_.setBricks(bricks_);
   moments_.reserve(lists_.pairCount() * kMomentStride);
   chunkSums_.reserve(lists_.chunkCount() * kMomentStride);
   brickLoss_.reserve(bricks_.size());
@@ -139,10 +141,18 @@ std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t primitives,
   return drawn.count;
 }
 
+void CudaOptimiser::requireMemoryFor(std::size_t primitives) const {
+  constexpr double kWithReached = 2.0;  // bricks that supports reach beyond the target's
+  const double windows = options_.loss == Loss::kPaper
+                             ? PaperLoss::bytesFor(kWithReached * double(target_.bricks.size()))
+                             : 0.0;
+  requireMemory(target_, primitives, options_.maxDeviceBytes, windows);
+}
+
 void CudaOptimiser::growTo(std::size_t count) {
   if (count <= count_) return;
   const AddSeconds timer(secondsSeeding_);
-  requireMemory(target_, count, options_.maxDeviceBytes);
+  requireMemoryFor(count);
   reserve(count);
   count_ += placeSeeds(count - count_, std::max(count - count_, count_), nullptr);
   launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
@@ -150,17 +160,44 @@ void CudaOptimiser::growTo(std::size_t count) {
 
 void CudaOptimiser::relocate(std::size_t count) {
   const AddSeconds timer(secondsSeeding_);
+  if (options_.loss == Loss::kPaper && count_ > 0) refreshUsefulness();
   const auto chosen = ranking_.leastUseful(stepArguments(0.0), count, tuning_.graceSteps);
   if (chosen.count == 0) return;
   placeSeeds(chosen.count, count_, chosen.places);
   launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
 }
 
+void CudaOptimiser::takePaperGradients() {
+  BrickPassArguments pass = passArguments();
+  pass.residual = residual_.reserve(bricks_.size() * kBrickVoxels);
+  launchResiduals(pass, stream_.get());
+  pass.lossByValue = paperLoss_.derivative({.residual = pass.residual,
+                                            .target = targetValues_.data(),
+                                            .targetBricks = bricks_.targetCount(),
+                                            .voxels = target_.boxVoxels,
+                                            .beta = options_.beta,
+                                            .peak = target_.highest - target_.lowest});
+  launchGivenGradients(pass, stream_.get());
+}
+
+void CudaOptimiser::takeGradients() {
+  if (options_.loss == Loss::kPaper) return takePaperGradients();
+  launchGradients(passArguments(), stream_.get());
+}
+
+/// What a removal costs is counted in squares, whatever loss is descended.
+void CudaOptimiser::refreshUsefulness() {
+  rebuildLists(tuning_.listSlack);
+  launchGradients(passArguments(), stream_.get());
+  launchSums(stepArguments(0.0), stream_.get());
+  launchUsefulness(stepArguments(0.0), stream_.get());
+}
+
 void CudaOptimiser::step(double factor) {
   if (iterationsSinceRebuild_ < 0 || iterationsSinceRebuild_ >= tuning_.rebuildEvery)
     rebuildLists(tuning_.listSlack);
   ++iterationsSinceRebuild_;
-  launchGradients(passArguments(), stream_.get());
+  takeGradients();
   const StepArguments arguments = stepArguments(factor);
   launchSums(arguments, stream_.get());
   launchStep(arguments, stream_.get());
@@ -205,7 +242,7 @@ void CudaOptimiser::setPrimitives(std::span<const Primitive> primitives) {
 
 std::vector<PrimitiveGradient> CudaOptimiser::gradients() {
   rebuildLists(tuning_.listSlack);
-  launchGradients(passArguments(), stream_.get());
+  takeGradients();
   launchSums(stepArguments(0.0), stream_.get());
   DeviceBuffer<PrimitiveGradient> out(count_, stream_.get());
   launchReadGradients(stepArguments(0.0), out.data(), stream_.get());
@@ -229,8 +266,6 @@ void CudaOptimiser::dropUnseen() {
 std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget& target,
                                              const OptimiserOptions& options,
                                              const Tuning& tuning) {
-  if (options.loss == Loss::kPaper)
-    throw UsageError("the paper's loss is computed on the CPU only: use --device cpu");
   cuda::useDevice(options.device);
   cuda::keepFreedMemory();
   cuda::forgetPeakMemory();

@@ -8,6 +8,7 @@
 #include "fit/cuda/draw.h"
 #include "fit/cuda/error_sums.h"
 #include "fit/cuda/pair_lists.h"
+#include "fit/cuda/paper_loss.h"
 #include "fit/cuda/rank_primitives.h"
 #include "fit/cuda/step.h"
 #include "fit/optimiser.h"
@@ -32,7 +33,7 @@ class CudaOptimiser final : public Optimiser {
   [[nodiscard]] std::size_t deviceBytes() const override;
   [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
 
-  /// Gradients of 1/2 sum r^2 where the primitives are.
+  /// Gradients of 1/2 sum r^2, or of the paper's loss, where the primitives are.
   [[nodiscard]] std::vector<PrimitiveGradient> gradients();
   /// Takes over primitives as they are; they have taken no step yet.
   void setPrimitives(std::span<const Primitive> primitives);
@@ -45,7 +46,11 @@ class CudaOptimiser final : public Optimiser {
   void rebuildLists(double slack);
   void refreshResiduals();
   void step(double factor);
+  void takeGradients();
+  void takePaperGradients();
+  void refreshUsefulness();
   void reserve(std::size_t primitives);
+  void requireMemoryFor(std::size_t primitives) const;
   /// \return how many seeds there are: `count`, fewer where errors are few
   std::size_t placeSeeds(std::size_t count, std::size_t primitives, const std::uint32_t* into);
   [[nodiscard]] bool fewFullBricks() const;
@@ -73,6 +78,7 @@ class CudaOptimiser final : public Optimiser {
   VoxelDraw draw_;
   PrimitiveRanking ranking_;
   ErrorSums errorSums_;
+  PaperLoss paperLoss_;
   std::size_t count_ = 0;
   double secondsSeeding_ = 0.0;
   std::uint64_t draws_ = 0;  ///< events so far: each draws from its own random stream

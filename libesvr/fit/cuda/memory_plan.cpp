@@ -78,12 +78,12 @@ std::size_t predictedBytes(const FitTarget& target, std::size_t primitives) {
   return std::size_t(bytesOf(target, std::max(double(primitives), 1.0)));
 }
 
-void requireMemory(const FitTarget& target, std::size_t primitives,
-                   std::optional<std::size_t> most) {
-  const auto need = double(predictedBytes(target, primitives));
+void requireMemory(const FitTarget& target, std::size_t primitives, std::optional<std::size_t> most,
+                   double extra) {
+  const double need = double(predictedBytes(target, primitives)) + extra;
   const auto have = double(most ? *most : freeBytes());
   if (need <= have) return;
-  const std::size_t would = mostPrimitives(target, have);
+  const std::size_t would = mostPrimitives(target, have - extra);
   throw DeviceError("fitting " + std::to_string(primitives) + " ellipsoids to " +
                     std::to_string(target.bricks.size()) + " bricks takes about " +
                     megabytes(need) + " on the GPU, and " + megabytes(have) +

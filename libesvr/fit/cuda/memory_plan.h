@@ -12,10 +12,11 @@ namespace esvr::cuda {
 /// pairs there will be is an estimate from the distance of neighbouring primitives.
 [[nodiscard]] std::size_t predictedBytes(const FitTarget& target, std::size_t primitives);
 
-/// \param most  bytes the user allows; none: what is free on the current device
+/// \param most   bytes the user allows; none: what is free on the current device
+/// \param extra  bytes that the fit takes besides what every fit does
 /// \throws DeviceError  a fit of so many primitives would take more; says how many would fit
-void requireMemory(const FitTarget& target, std::size_t primitives,
-                   std::optional<std::size_t> most);
+void requireMemory(const FitTarget& target, std::size_t primitives, std::optional<std::size_t> most,
+                   double extra = 0.0);
 
 /// The most bytes that the current device's pool has handed out since the last call of
 /// forgetPeakMemory().

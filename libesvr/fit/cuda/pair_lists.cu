@@ -187,6 +187,8 @@ void PairLists::sortByBrick(std::size_t bricks) {
 
 /// Blocks start in order: the fullest bricks first, so that none is left over for the end.
 void PairLists::orderBricks(std::size_t bricks) {
+  mostPairsOfBrick_ = 0;
+  if (bricks == 0) return;
   std::uint32_t* const pairs = brickPairs_.reserve(bricks);
   std::uint32_t* const sorted = brickPairsSorted_.reserve(bricks);
   std::uint32_t* const brick = bricks_.reserve(bricks);

@@ -19,7 +19,7 @@ __device__ inline std::size_t warpNumber() {
 template <class Visit>
 __device__ void visitReachedBricks(const SupportSource& source, std::size_t i, Visit&& visit) {
   const Primitive& p = source.primitives[i];
-  const Support support = makeSupport(p.center, p.L, source.radius, source.slack);
+  const Support support = makeSupport(p.center, p.L, source.radiusOf(i), source.slack);
   const Box range = brickRange(support);
   const auto nx = std::int64_t(range.max.x) - range.min.x + 1;
   const auto ny = std::int64_t(range.max.y) - range.min.y + 1;

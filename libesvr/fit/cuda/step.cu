@@ -1,6 +1,7 @@
 #include "core/cuda/check.h"
 #include "fit/adam_math.h"
 #include "fit/cuda/launch.h"
+#include "fit/cuda/pair_sums.cuh"
 #include "fit/cuda/step.h"
 #include "fit/parameter_gradient.h"
 
@@ -41,25 +42,7 @@ __global__ void __launch_bounds__(kLossBlock) sumLoss(const StepArguments a) {
   if (threadIdx.x == 0) *a.loss = parts[0];
 }
 
-__device__ PairSums sumsOf(const StepArguments& a, std::uint32_t i) {
-  PairSums s{};
-  for (std::uint32_t c = a.lists.chunkBegin[i]; c < a.lists.chunkBegin[i + 1]; ++c) {
-    const double* const m = a.chunkSums + std::size_t(c) * kMomentStride;
-    s.w0x += m[0], s.w0z += m[1], s.w0xx += m[2], s.w0xz += m[3], s.w0zz += m[4];
-    s.w1 += m[5], s.w1x += m[6], s.w1z += m[7], s.w2 += m[8], s.rPhi += m[9], s.phi2 += m[10];
-  }
-  return s;
-}
-
 __device__ std::uint32_t ownPrimitive() { return blockIdx.x * kStepBlock + threadIdx.x; }
-
-/// A sum over all numbers of it: one that is not finite shows.
-__device__ bool finite(const Primitive& p) {
-  double sum = p.intensity;
-  for (const double c : p.center) sum += c;
-  for (const double l : p.L) sum += l;
-  return isfinite(sum);
-}
 
 __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   const std::uint32_t i = ownPrimitive();
@@ -78,12 +61,19 @@ __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   if (!finite(p)) *a.diverged = 1;  // integer sums would hide it
 }
 
+__global__ void __launch_bounds__(kStepBlock) writeUsefulness(const StepArguments a) {
+  const std::uint32_t i = ownPrimitive();
+  if (i >= a.primitiveCount) return;
+  const PairSums sums = sumsOf(a, i);
+  a.usefulness[i] = {float(sums.phi2), float(sums.rPhi)};
+}
+
 __global__ void __launch_bounds__(kStepBlock)
     readGradients(const StepArguments a, PrimitiveGradient* out) {
   const std::uint32_t i = ownPrimitive();
   if (i >= a.primitiveCount) return;
   const PairSums sums = sumsOf(a, i);
-  out[i] = {parameterGradient(a.forms[i].form, sums), sums.phi2};
+  out[i] = {parameterGradient(a.forms[i].form, sums), sums.phi2, sums.w0};
 }
 
 __global__ void __launch_bounds__(kStepBlock)
@@ -106,6 +96,12 @@ void launchStep(const StepArguments& a, cudaStream_t stream) {
   if (a.primitiveCount == 0) return;
   step<<<blocksFor(a.primitiveCount, kStepBlock), kStepBlock, 0, stream>>>(a);
   check(cudaGetLastError(), "starting a step");
+}
+
+void launchUsefulness(const StepArguments& a, cudaStream_t stream) {
+  if (a.primitiveCount == 0) return;
+  writeUsefulness<<<blocksFor(a.primitiveCount, kStepBlock), kStepBlock, 0, stream>>>(a);
+  check(cudaGetLastError(), "starting to weigh primitives");
 }
 
 void launchReadGradients(const StepArguments& a, PrimitiveGradient* out, cudaStream_t stream) {

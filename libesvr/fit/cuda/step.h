@@ -38,6 +38,8 @@ struct StepArguments {
 void launchSums(const StepArguments& arguments, cudaStream_t stream);
 /// Takes the step; wants launchSums before.
 void launchStep(const StepArguments& arguments, cudaStream_t stream);
+/// Writes only the usefulness; wants launchSums before.
+void launchUsefulness(const StepArguments& arguments, cudaStream_t stream);
 /// Writes the gradients of all primitives; wants launchSums before.
 void launchReadGradients(const StepArguments& arguments, PrimitiveGradient* out,
                          cudaStream_t stream);

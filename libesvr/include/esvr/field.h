@@ -23,8 +23,12 @@ namespace esvr {
 /// \param out      kBrickVoxels a brick, in voxelOffset order
 void evaluateBricks(const Field& field, std::span<const Coord> corners, std::span<float> out);
 
-/// The same in float64 by the definition: sums every primitive at every voxel. For tests and
-/// checks.
+/// Average number of ellipsoids whose support holds a voxel, over the voxels that any does (the
+/// paper's 'average primitive hits'); 0 where there are none.
+[[nodiscard]] double averageHits(const Field& field);
+
+/// The same as evaluateBricks in float64 by the definition: sums every primitive at every voxel.
+/// For tests and checks.
 [[nodiscard]] double evaluateReference(const Field& field, Coord voxel);
 
 /// How the field becomes voxels again.

@@ -12,6 +12,7 @@
 #include "esvr/device.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/fit_record.h"
+#include "esvr/paper_method.h"
 #include "esvr/progress.h"
 #include "esvr/sparse_volume.h"
 
@@ -39,9 +40,12 @@ struct FitOptions {
   std::optional<std::uint32_t> iterations;  ///< length of the schedule
   Preset preset = Preset::kStandard;
   Loss loss = Loss::kSquared;
-  double beta = 0.2;           ///< of Loss::kPaper
+  double beta = 0.2;           ///< of the paper's loss
   std::optional<float> kappa;  ///< the scene's edge; default: a short pilot decides
   std::optional<Box> box;      ///< of 'PSNR over the box'; default: the active bounding box
+  /// Instead of all else that decides how: the paper's method, with its own loss and kernel. Takes
+  /// no kappa and no iterations; `count` is what its last pruning leaves.
+  std::optional<PaperMethod> paper;
   /// A level set: values beyond the volume's range count as its ends (they saturate when the grid
   /// is revoxelised as a narrow band), and what lies outside its bricks counts for nothing.
   bool narrowBand = false;
@@ -67,9 +71,10 @@ struct FitResult {
   std::vector<PilotPoint> pilot;  ///< empty where kappa was given
   /// Wall clock by phase; seeding (at the start, growth, relocation) is not in secondsOptimise.
   double secondsSeed = 0.0, secondsPilot = 0.0, secondsOptimise = 0.0;
-  std::size_t deviceBytes = 0;     ///< GPU memory held at most; 0 on the CPU
-  std::uint64_t pairs = 0;         ///< (primitive, brick) pairs that the final field evaluates
-  bool signedIntensities = false;  ///< some intensity is negative
+  std::size_t deviceBytes = 0;       ///< GPU memory held at most; 0 on the CPU
+  std::uint64_t pairs = 0;           ///< (primitive, brick) pairs that the final field evaluates
+  bool signedIntensities = false;    ///< some intensity is negative
+  std::optional<PaperRecord> paper;  ///< where FitOptions::paper was given
 };
 
 /// Deterministic: the same volume, options and seed give the same bits on any number of threads and

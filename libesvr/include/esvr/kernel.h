@@ -26,13 +26,16 @@ namespace esvr {
 
 enum class KernelForm {
   kContinuous = 0,  ///< shifted by eps, zero at the end of its support
-  kPaper = 1        ///< no shift, support ends at q = 1.42^2 (paper, section 5)
+  /// No shift. For k = 5 the support ends at q = 1.42^2 (paper, section 5), for others where phi
+  /// has the value that it has there: the paper adjusts the cutoff too, and does not say how.
+  kPaper = 1
 };
 
 /// A kernel as a file names it.
 struct Kernel {
   static constexpr float kDefaultEpsilon = 0.006f;  ///< the paper's kernel at its cutoff, rounded
-  static constexpr float kPaperCutoff = 1.42f;      ///< support radius in the paper's scales
+  static constexpr float kPaperK = 5.0f;            ///< sharpness in the paper
+  static constexpr float kPaperCutoff = 1.42f;      ///< support radius there, in the paper's scales
 
   KernelForm form = KernelForm::kContinuous;
   float kappa = 2.0f;
@@ -52,8 +55,14 @@ struct KernelConstants {
   Real expNegS;    ///< e^-s
 };
 
+/// What phi of the paper's kernel ends at.
+ESVR_HD inline double paperEnd() {
+  const double k = Kernel::kPaperK, q = double(Kernel::kPaperCutoff) * Kernel::kPaperCutoff;
+  return (1.0 + std::exp(-k)) / (1.0 + std::exp(k * (q - 1.0)));
+}
+
 template <class Real>
-KernelConstants<Real> kernelConstants(const Kernel& kernel, double kappa) {
+ESVR_HD KernelConstants<Real> kernelConstants(const Kernel& kernel, double kappa) {
   const bool paper = kernel.form == KernelForm::kPaper;
   const double s = kappa > 0.0 ? kappa : 0.0;
   const double expNegS = std::exp(-s);
@@ -61,13 +70,12 @@ KernelConstants<Real> kernelConstants(const Kernel& kernel, double kappa) {
   const double a = expNegS + b;
   const double eps = paper ? 0.0 : double(kernel.epsilon);
   const double norm = 1.0 / (1.0 - eps);
-  const double cutoff = paper ? kappa * double(Kernel::kPaperCutoff) * double(Kernel::kPaperCutoff)
-                              : s + std::log(a / eps - b);
+  const double cutoff = s + std::log(a / (paper ? paperEnd() : eps) - b);
   return {Real(s),      Real(a * norm), Real(b), Real(eps * norm), Real(b / (a * norm)),
           Real(cutoff), Real(expNegS)};
 }
 template <class Real>
-KernelConstants<Real> kernelConstants(const Kernel& kernel) {
+ESVR_HD KernelConstants<Real> kernelConstants(const Kernel& kernel) {
   return kernelConstants<Real>(kernel, double(kernel.kappa));
 }
 

@@ -1,0 +1,64 @@
+#include <tbb/parallel_for.h>
+
+#include <array>
+
+#include "esvr/field.h"
+#include "field/evaluate_plan.h"
+#include "field/line_math.h"
+
+namespace esvr {
+namespace {
+
+struct Hits {
+  std::uint64_t hits = 0, voxels = 0;
+};
+
+using Counts = std::array<std::uint32_t, kBrickVoxels>;
+
+/// Adds 1 to every voxel of a brick that lies in an ellipsoid's support.
+void addHits(const LineForm& f, const std::array<float, 3>& corner, float cutoff, Counts& counts) {
+  const float cx = f.center[0] - corner[0], cy = f.center[1] - corner[1],
+              cz = f.center[2] - corner[2];
+  for (int x = 0; x < kBrickSide; ++x)
+    for (int z = 0; z < kBrickSide; ++z) {
+      const float dx = float(x) - cx, dz = float(z) - cz;
+      const float pz[3] = {f.pz[0] * dz, f.pz[1] * dz, f.pz[2] * dz};
+      const float closest = closestSquared(f, dx, pz);
+      if (!(closest < cutoff)) continue;
+      for (int y = 0; y < kBrickSide; ++y)
+        if (squaredAt(f, closest, distanceAlong(f, float(y), cy, dx, dz)) < cutoff)
+          ++counts[std::size_t(voxelOffset({x, y, z}))];
+    }
+}
+
+Hits totalOf(const Counts& counts) {
+  Hits total;
+  for (const std::uint32_t count : counts) {
+    total.hits += count;
+    total.voxels += count > 0 ? 1 : 0;
+  }
+  return total;
+}
+
+}  // namespace
+
+double averageHits(const Field& field) {
+  const std::vector<Coord> corners = reachedBricks(field);
+  const EvaluatePlan plan = planEvaluation(field, corners);
+  std::vector<Hits> hits(corners.size());
+  tbb::parallel_for(std::size_t(0), corners.size(), [&](std::size_t b) {
+    Counts counts{};
+    for (auto pair = plan.pairs.brickBegin[b]; pair != plan.pairs.brickBegin[b + 1]; ++pair) {
+      const std::size_t i = plan.pairs.ellipsoid[pair];
+      const Coord corner = corners[b] - plan.field.origin(i);
+      addHits(plan.field.forms[i], {float(corner.x), float(corner.y), float(corner.z)},
+              plan.field.kernel(i).cutoff, counts);
+    }
+    hits[b] = totalOf(counts);
+  });
+  Hits total;
+  for (const Hits& h : hits) total.hits += h.hits, total.voxels += h.voxels;
+  return total.voxels > 0 ? double(total.hits) / double(total.voxels) : 0.0;
+}
+
+}  // namespace esvr

@@ -1,0 +1,210 @@
+#include "fit/cuda/cuda_paper_optimiser.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/cuda/use_device.h"
+#include "esvr/error.h"
+#include "field/gather.h"
+#include "fit/cuda/copy.h"
+#include "fit/cuda/make_cuda_paper_optimiser.h"
+#include "fit/cuda/memory_plan.h"
+#include "fit/cuda/memory_pool.h"
+#include "fit/scene.h"
+
+namespace esvr {
+namespace cuda {
+
+CudaPaperOptimiser::Part::Part(std::unique_ptr<paper::Subvolume> from, cudaStream_t stream)
+    : volume(std::move(from)),
+      values(volume->target.values, stream),
+      active(volume->active, stream),
+      bricks(volume->target.bricks, stream),
+      lists(stream),
+      loss(stream) {}
+
+CudaPaperOptimiser::CudaPaperOptimiser(const FitTarget& target, const paper::PaperOptions& options)
+    : target_(target),
+      options_(options),
+      kernel_(kernelOf(options.kind)),
+      constants_(kernelConstants<double>(kernel_)),
+      primitives_(stream_.get()),
+      states_(stream_.get()),
+      units_(stream_.get()),
+      forms_(stream_.get()),
+      kernels_(stream_.get()),
+      radii_(stream_.get()),
+      moments_(stream_.get()),
+      residual_(stream_.get()),
+      brickLoss_(stream_.get()),
+      chunkSums_(stream_.get()),
+      squares_(stream_.get()),
+      diverged_(1, stream_.get()),
+      errorSums_(stream_.get()) {
+  squares_.reserve(1);
+  diverged_.setZero();
+  for (auto& volume : paper::cutSubvolumes(target, paper::spaceOf(target), options.subvolumeSide))
+    parts_.push_back(std::make_unique<Part>(std::move(volume), stream_.get()));
+}
+
+PaperPrimitives CudaPaperOptimiser::primitives() {
+  const bool own = options_.kind.learnK;
+  return {.count = std::uint32_t(count_),
+          .kind = options_.kind,
+          .kernel = kernel_,
+          .constants = constants_,
+          .primitives = primitives_.data(),
+          .states = states_.data(),
+          .units = units_.data(),
+          .forms = forms_.data(),
+          .kernels = own ? kernels_.data() : nullptr,
+          .radii = own ? radii_.data() : nullptr,
+          .diverged = diverged_.data()};
+}
+
+BrickPassArguments CudaPaperOptimiser::passArguments(const Part& part) {
+  return {.bricks = part.bricks.view().bricks,
+          .brickCount = std::uint32_t(part.bricks.size()),
+          .targetCount = std::uint32_t(part.bricks.targetCount()),
+          .lists = part.lists.view(),
+          .fewFullBricks = false,
+          .forms = forms_.data(),
+          .kernel = narrowed(constants_),
+          .target = part.values.data(),
+          .narrowBand = false,
+          .lowest = float(target_.lowest),
+          .highest = float(target_.highest),
+          .brickLoss = brickLoss_.data(),
+          .moments = moments_.data(),
+          .residual = residual_.data(),
+          .kernels = primitives().kernels};
+}
+
+StepArguments CudaPaperOptimiser::sumArguments(const Part& part) {
+  StepArguments a{};
+  a.primitiveCount = std::uint32_t(count_);
+  a.chunkCount = std::uint32_t(part.lists.chunkCount());
+  a.brickCount = std::uint32_t(part.bricks.size());
+  a.lists = part.lists.view();
+  a.moments = moments_.data();
+  a.brickLoss = brickLoss_.data();
+  a.chunkSums = chunkSums_.data();
+  a.loss = squares_.data();
+  return a;
+}
+
+void CudaPaperOptimiser::rebuildLists(Part& part, double slack) {
+  const SupportSource supports{units_.data(), count_, supportRadius(constants_), slack,
+                               primitives().radii};
+  const Box within = *part.volume->target.within;
+  part.bricks.findReached(supports, within);
+  part.lists.rebuild(supports, part.bricks);
+  part.loss.setBricks(part.bricks, within);
+  part.motionLeft = slack;
+}
+
+/// Room in what all subvolumes use in turn.
+void CudaPaperOptimiser::takeResiduals(Part& part) {
+  moments_.reserve(part.lists.pairCount() * kMomentStride);
+  chunkSums_.reserve(part.lists.chunkCount() * kMomentStride);
+  brickLoss_.reserve(part.bricks.size());
+  residual_.reserve(part.bricks.size() * kBrickVoxels);
+  launchResiduals(passArguments(part), stream_.get());
+}
+
+void CudaPaperOptimiser::takeGradients(Part& part) {
+  takeResiduals(part);
+  BrickPassArguments pass = passArguments(part);
+  pass.lossByValue = part.loss.derivative({.residual = residual_.data(),
+                                           .target = part.values.data(),
+                                           .targetBricks = part.bricks.targetCount(),
+                                           .voxels = part.volume->target.boxVoxels,
+                                           .beta = options_.beta,
+                                           .peak = target_.highest - target_.lowest});
+  launchGivenGradients(pass, stream_.get());
+  launchSums(sumArguments(part), stream_.get());
+}
+
+void CudaPaperOptimiser::iterate(std::size_t subvolume, const paper::PaperStep& step) {
+  Part& part = *parts_[subvolume];
+  if (part.motionLeft < 0.0) rebuildLists(part, paper::kListSlack);
+  takeGradients(part);
+  launchPaperStep(primitives(), sumArguments(part), step, stream_.get());
+  for (auto& each : parts_) each->motionLeft -= paper::motionOf(step);
+}
+
+void CudaPaperOptimiser::requireMemoryFor(std::size_t count) const {
+  constexpr double kWithReached = 2.0;  // bricks that supports reach beyond the target's
+  const double windows = PaperLoss::bytesFor(kWithReached * double(target_.bricks.size()));
+  requireMemory(target_, count, options_.maxDeviceBytes, windows);
+}
+
+void CudaPaperOptimiser::put(const paper::Population& population) {
+  requireMemoryFor(population.size());
+  count_ = population.size();
+  uploadTo(primitives_.reserve(count_), std::span(population.primitives), stream_.get());
+  uploadTo(states_.reserve(count_), std::span(population.states), stream_.get());
+  units_.reserve(count_);
+  forms_.reserve(count_);
+  if (options_.kind.learnK) {
+    kernels_.reserve(count_);
+    radii_.reserve(count_);
+  }
+  launchPaperForms(primitives(), stream_.get());
+  for (auto& part : parts_) part->motionLeft = -1.0;
+}
+
+paper::Population CudaPaperOptimiser::population() const {
+  paper::Population population;
+  population.primitives.resize(count_);
+  population.states.resize(count_);
+  downloadTo(std::span(population.primitives), primitives_.data(), stream_.get());
+  downloadTo(std::span(population.states), states_.data(), stream_.get());
+  return population;
+}
+
+FitErrors CudaPaperOptimiser::measure() {
+  if (downloadValue(diverged_.data(), stream_.get()) != 0)
+    throw RuntimeFailure("the fit diverged: an ellipsoid is not finite");
+  FitErrors errors;
+  pairCount_ = 0;
+  for (auto& part : parts_) {
+    rebuildLists(*part, kRoundingSlack);
+    pairCount_ += part->lists.pairCount();
+    if (part->bricks.size() == 0) continue;
+    takeResiduals(*part);
+    errors.add(errorSums_.sum({.residual = residual_.data(),
+                               .bricks = part->bricks.view().bricks,
+                               .active = part->active.data(),
+                               .brickCount = std::uint32_t(part->bricks.size()),
+                               .targetCount = std::uint32_t(part->bricks.targetCount()),
+                               .box = target_.box}));
+  }
+  return errors;
+}
+
+std::size_t CudaPaperOptimiser::deviceBytes() const { return peakMemory(); }
+
+paper::LossGradients CudaPaperOptimiser::gradients(std::size_t subvolume) {
+  Part& part = *parts_[subvolume];
+  rebuildLists(part, paper::kListSlack);
+  takeGradients(part);
+  DeviceBuffer<paper::PaperVector> out(count_, stream_.get());
+  launchPaperGradients(primitives(), sumArguments(part), out.data(), stream_.get());
+  paper::LossGradients result{part.loss.loss(), std::vector<paper::PaperVector>(count_)};
+  out.download(result.byPrimitive);
+  return result;
+}
+
+}  // namespace cuda
+
+std::unique_ptr<paper::PaperOptimiser> paper::makeCudaPaperOptimiser(const FitTarget& target,
+                                                                     const PaperOptions& options) {
+  cuda::useDevice(options.device);
+  cuda::keepFreedMemory();
+  cuda::forgetPeakMemory();
+  cuda::requireMemory(target, 1, options.maxDeviceBytes);
+  return std::make_unique<cuda::CudaPaperOptimiser>(target, options);
+}
+
+}  // namespace esvr

@@ -1,0 +1,84 @@
+#include "core/cuda/check.h"
+#include "fit/cuda/launch.h"
+#include "fit/cuda/pair_sums.cuh"
+#include "fit/cuda/paper_step.h"
+#include "fit/scene.h"
+
+namespace esvr::cuda {
+namespace {
+
+constexpr int kStepBlock = 64;  // small: few primitives are to use many processors
+
+__device__ std::uint32_t ownPrimitive() { return blockIdx.x * kStepBlock + threadIdx.x; }
+
+/// From the paper's form to those that passes and lists take.
+__device__ void writeForms(const PaperPrimitives& a, std::uint32_t i,
+                           const paper::PaperPrimitive& p) {
+  const Primitive unit = primitiveOf(p, a.kind);
+  double radius = supportRadius(a.constants);
+  if (a.kernels != nullptr) {
+    const auto constants = kernelConstants<double>(a.kernel, p.k);
+    radius = supportRadius(constants);
+    a.kernels[i] = narrowed(constants);
+    a.radii[i] = radius;
+  }
+  a.units[i] = unit;
+  a.forms[i] = pairForm(unit, radius);
+  if (!finite(unit)) *a.diverged = 1;
+}
+
+__device__ paper::PaperVector gradientOf(const PaperPrimitives& a, const StepArguments& s,
+                                         std::uint32_t i, const paper::PaperPrimitive& p) {
+  const PairSums sums = sumsOf(s, i);
+  const PrimitiveGradient own{parameterGradient(a.forms[i].form, sums), sums.phi2, sums.w0};
+  const double slope = a.kernels != nullptr ? double(a.kernels[i].slope) : a.constants.slope;
+  return byPaperParameters(p, a.units[i], own, slope);
+}
+
+__global__ void __launch_bounds__(kStepBlock) formsKernel(const PaperPrimitives a) {
+  const std::uint32_t i = ownPrimitive();
+  if (i < a.count) writeForms(a, i, a.primitives[i]);
+}
+
+__global__ void __launch_bounds__(kStepBlock)
+    stepKernel(const PaperPrimitives a, const StepArguments s, const paper::PaperStep step) {
+  const std::uint32_t i = ownPrimitive();
+  if (i >= a.count) return;
+  paper::PaperPrimitive p = a.primitives[i];
+  paper::PaperState state = a.states[i];
+  const bool reached = s.lists.primitiveBegin[i + 1] > s.lists.primitiveBegin[i];
+  takeStep(p, state, gradientOf(a, s, i, p), reached, step);
+  a.primitives[i] = p;
+  a.states[i] = state;
+  writeForms(a, i, p);
+}
+
+__global__ void __launch_bounds__(kStepBlock)
+    gradientsKernel(const PaperPrimitives a, const StepArguments s, paper::PaperVector* out) {
+  const std::uint32_t i = ownPrimitive();
+  if (i < a.count) out[i] = gradientOf(a, s, i, a.primitives[i]);
+}
+
+}  // namespace
+
+void launchPaperForms(const PaperPrimitives& a, cudaStream_t stream) {
+  if (a.count == 0) return;
+  formsKernel<<<blocksFor(a.count, kStepBlock), kStepBlock, 0, stream>>>(a);
+  check(cudaGetLastError(), "starting to prepare primitives");
+}
+
+void launchPaperStep(const PaperPrimitives& a, const StepArguments& sums,
+                     const paper::PaperStep& step, cudaStream_t stream) {
+  if (a.count == 0) return;
+  stepKernel<<<blocksFor(a.count, kStepBlock), kStepBlock, 0, stream>>>(a, sums, step);
+  check(cudaGetLastError(), "starting a step");
+}
+
+void launchPaperGradients(const PaperPrimitives& a, const StepArguments& sums,
+                          paper::PaperVector* out, cudaStream_t stream) {
+  if (a.count == 0) return;
+  gradientsKernel<<<blocksFor(a.count, kStepBlock), kStepBlock, 0, stream>>>(a, sums, out);
+  check(cudaGetLastError(), "starting to read gradients");
+}
+
+}  // namespace esvr::cuda

@@ -1,0 +1,51 @@
+#pragma once
+/// The paper's method on the CPU.
+
+#include <vector>
+
+#include "fit/engine.h"
+#include "fit/paper/paper_optimiser.h"
+#include "fit/paper_loss.h"
+
+namespace esvr::paper {
+
+class CpuPaperOptimiser final : public PaperOptimiser {
+ public:
+  CpuPaperOptimiser(const FitTarget& target, const PaperOptions& options);
+
+  [[nodiscard]] std::size_t subvolumeCount() const override { return parts_.size(); }
+  void iterate(std::size_t subvolume, const PaperStep& step) override;
+  [[nodiscard]] LossGradients gradients(std::size_t subvolume) override;
+  void put(const Population& population) override;
+  [[nodiscard]] Population population() const override { return population_; }
+  [[nodiscard]] std::size_t primitiveCount() const override { return population_.size(); }
+  [[nodiscard]] FitErrors measure() override;
+  [[nodiscard]] std::uint64_t pairCount() const override { return pairCount_; }
+  [[nodiscard]] std::size_t deviceBytes() const override { return 0; }
+
+ private:
+  struct Part {
+    std::unique_ptr<Subvolume> volume;
+    FitEngine engine;
+    double motionLeft = -1.0;  ///< voxels that supports may still move by; below 0: lists are stale
+  };
+
+  void formPrimitives();
+  void rebuildLists(Part& part, double slack);
+  double takeGradients(Part& part);
+  [[nodiscard]] double slopeOf(std::size_t primitive) const;
+  [[nodiscard]] PaperVector gradientOf(std::size_t primitive) const;
+
+  PaperOptions options_;
+  double slope_;  ///< KernelConstants::slope of the scene's kernel
+  std::vector<Part> parts_;
+  Population population_;
+  std::vector<Primitive> primitives_;  ///< the same in the form that passes take
+  OwnKernels kernels_;
+  std::vector<PrimitiveGradient> gradients_;
+  std::vector<float> residuals_, lossByValue_;
+  PaperLoss loss_;
+  std::uint64_t pairCount_ = 0;
+};
+
+}  // namespace esvr::paper

@@ -1,0 +1,59 @@
+#include "fit/paper/initial_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "fit/draw_options.h"
+
+namespace esvr::paper {
+namespace {
+
+std::uint64_t voxelsToDrawFrom(const FitTarget& target) {
+  return std::uint64_t(target.values.size()) -
+         std::uint64_t(std::count(target.values.begin(), target.values.end(), 0.0f));
+}
+
+/// Integral over the unit frame of phi.
+double massOf(const KernelConstants<double>& kernel) {
+  constexpr int kSteps = 400;
+  const double step = supportRadius(kernel) / kSteps;
+  double mass = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double u = (i + 0.5) * step;
+    mass += 4.0 * std::numbers::pi * u * u * kernelPhi(kernel, u * u) * step;
+  }
+  return mass;
+}
+
+}  // namespace
+
+std::vector<PaperPrimitive> initialPoints(const FitTarget& target, std::size_t points,
+                                          const KernelKind& kind, std::uint64_t seed) {
+  const std::uint64_t voxels = voxelsToDrawFrom(target);
+  const std::uint64_t count = std::min<std::uint64_t>(points, voxels);
+  const double each = double(voxels) / double(std::max<std::uint64_t>(count, 1));
+  const double scale = std::cbrt(each), units = kind.unitsPerScale(kind.k);
+  const double mass = massOf(kernelConstants<double>(kernelOf(kind))) / std::pow(units, 3.0);
+
+  std::vector<PaperPrimitive> drawn;
+  const auto nextAt = [&] {
+    const auto n = double(drawn.size());
+    return std::uint64_t((n + drawUniform(seed, drawn.size())) * each);
+  };
+  std::uint64_t passed = 0, wanted = nextAt();
+  for (std::size_t i = 0; i < target.values.size() && drawn.size() < count; ++i) {
+    if (target.values[i] == 0.0f || passed++ != wanted) continue;
+    const Coord v =
+        target.bricks[i / kBrickVoxels] * kBrickSide + voxelLocal(int(i % kBrickVoxels));
+    PaperPrimitive p{
+        {double(v.x), double(v.y), double(v.z)}, {}, {1.0, 0.0, 0.0, 0.0}, 0.0, kind.k};
+    p.logScale.fill(std::log(scale));
+    p.intensity = double(target.values[i]) / mass;
+    drawn.push_back(p);
+    wanted = std::max(nextAt(), wanted + 1);
+  }
+  return drawn;
+}
+
+}  // namespace esvr::paper

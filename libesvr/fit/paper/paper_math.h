@@ -1,0 +1,128 @@
+#pragma once
+/// One primitive's frame, gradient and step, for host and device.
+
+#include <cmath>
+
+#include "fit/adam.h"
+#include "fit/paper/paper_primitive.h"
+
+namespace esvr::paper {
+
+/// A step of one iteration.
+struct PaperStep {
+  PaperVector rates{};                    ///< by parameter; of the position in voxels
+  double positionUnit = 1.0;              ///< voxels: half the longest axis
+  double correct1 = 1.0, correct2 = 1.0;  ///< 1 / (1 - beta^steps)
+  double smallestLogScale = 0.0, largestLogScale = 0.0;
+};
+
+/// As 3D Gaussian Splatting sets them.
+inline constexpr double kBeta1 = 0.9, kBeta2 = 0.999, kAdamEpsilon = 1e-15;
+/// Learned k stays within: below, an ellipsoid has no edge, beyond, no slope that a voxel sees.
+inline constexpr double kSmallestK = 0.5, kLargestK = 50.0;
+
+ESVR_HD inline double lengthOf(const std::array<double, 4>& q) {
+  return std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+}
+ESVR_HD inline std::array<double, 4> normalised(const std::array<double, 4>& q) {
+  const double s = 1.0 / lengthOf(q);
+  return {q[0] * s, q[1] * s, q[2] * s, q[3] * s};
+}
+
+/// Row-major matrix of a unit quaternion.
+ESVR_HD inline Matrix3 rotationOf(const std::array<double, 4>& q) {
+  const double w = q[0], x = q[1], y = q[2], z = q[3];
+  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+          2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+}
+
+/// L = units S^-1 R^T: the same ellipsoid in the form that passes take.
+ESVR_HD inline Primitive primitiveOf(const PaperPrimitive& p, const KernelKind& kind) {
+  const Matrix3 R = rotationOf(normalised(p.rotation));
+  const double units = kind.unitsPerScale(p.k);
+  Primitive unit{p.center, {}, p.intensity};
+  for (int j = 0; j < 3; ++j) {
+    const double inverse = units * std::exp(-p.logScale[j]);
+    for (int i = 0; i < 3; ++i) unit.L[3 * j + i] = inverse * R[3 * i + j];
+  }
+  return unit;
+}
+
+namespace paper_math {
+
+/// By the angles of a turn about the own axes: with W its generator, A = S^-1 W S changes L as
+/// exp(-A) L, of which the loss sees the symmetric part.
+ESVR_HD inline std::array<double, 3> byTurn(const PaperPrimitive& p, const ParameterVector& g) {
+  const auto skew = [&](int j, int k) {
+    return 0.5 *
+           (std::exp(p.logScale[k] - p.logScale[j]) - std::exp(p.logScale[j] - p.logScale[k]));
+  };
+  return {-g[8] * skew(1, 2), g[7] * skew(0, 2), -g[6] * skew(0, 1)};
+}
+
+/// By a quaternion's components: a turn by t about own axis j adds t/2 (q e_j) to a unit
+/// quaternion.
+ESVR_HD inline std::array<double, 4> byQuaternion(const PaperPrimitive& p,
+                                                  const std::array<double, 3>& turn) {
+  const std::array<double, 4> q = normalised(p.rotation);
+  const double w = q[0], x = q[1], y = q[2], z = q[3];
+  const double scale = 2.0 / lengthOf(p.rotation);
+  const double a = scale * turn[0], b = scale * turn[1], c = scale * turn[2];
+  return {-x * a - y * b - z * c, w * a - z * b + y * c, z * a + w * b - x * c,
+          -y * a + x * b + w * c};
+}
+
+}  // namespace paper_math
+
+/// From the gradient in the primitive's own frame (primitive.h) to that by the paper's parameters.
+/// \param unit  primitiveOf(p)
+/// \param slope KernelConstants::slope of this primitive's kernel, which has no shift
+ESVR_HD inline PaperVector byPaperParameters(const PaperPrimitive& p, const Primitive& unit,
+                                             const PrimitiveGradient& gradient, double slope) {
+  const ParameterVector& g = gradient.byParameter;
+  PaperVector out{};
+  // center = F delta, so that d/d center = L^T d/d delta.
+  for (int i = 0; i < 3; ++i)
+    out[i] = unit.L[i] * g[0] + unit.L[3 + i] * g[1] + unit.L[6 + i] * g[2];
+  for (int j = 0; j < 3; ++j) out[3 + j] = g[3 + j];
+  const auto turn = paper_math::byTurn(p, g);
+  const auto quaternion = paper_math::byQuaternion(p, turn);
+  for (int j = 0; j < 4; ++j) out[6 + j] = quaternion[j];
+  out[10] = g[9];
+  // At fixed q = m / k: d phi / d kappa = slope (phi - phi^2), and sum r phi' = slope sum r phi^2 -
+  // sum r phi; the trace of A's gradient is -2 I sum r phi' m.
+  out[11] =
+      p.intensity * ((slope - 1.0) * g[9] - gradient.slopes) - 0.5 * (g[3] + g[4] + g[5]) / p.k;
+  return out;
+}
+
+/// Remembers the gradient's length and takes Adam's step.
+/// \param reached  the subvolume just visited holds voxels that the primitive reaches
+ESVR_HD inline void takeStep(PaperPrimitive& p, PaperState& state, const PaperVector& gradient,
+                             bool reached, const PaperStep& step) {
+  if (reached) {
+    const double x = gradient[0], y = gradient[1], z = gradient[2];
+    state.gradientSum += step.positionUnit * std::sqrt(x * x + y * y + z * z);
+    ++state.seen;
+  }
+  PaperVector by{};
+  for (int i = 0; i < kPaperParameters; ++i) {
+    state.m[i] = float(kBeta1 * state.m[i] + (1.0 - kBeta1) * gradient[i]);
+    state.v[i] = float(kBeta2 * state.v[i] + (1.0 - kBeta2) * gradient[i] * gradient[i]);
+    by[i] = -step.rates[i] * step.correct1 * state.m[i] /
+            (std::sqrt(step.correct2 * state.v[i]) + kAdamEpsilon);
+  }
+  const auto clamped = [](double v, double low, double high) {
+    return v < low ? low : (v > high ? high : v);
+  };
+  for (int i = 0; i < 3; ++i) {
+    p.center[i] += by[i];
+    p.logScale[i] = clamped(p.logScale[i] + by[3 + i], step.smallestLogScale, step.largestLogScale);
+  }
+  for (int i = 0; i < 4; ++i) p.rotation[i] += by[6 + i];
+  p.intensity += by[10];
+  p.k = clamped(p.k + by[11], kSmallestK, kLargestK);
+}
+
+}  // namespace esvr::paper

@@ -1,0 +1,231 @@
+// Plan: cutting into subvolumes (every brick once, sides by the paper's rule); the points at the
+// start; the schedule's scaling; on every device a run as a whole: it lowers the error, clones and
+// splits, prunes to what was asked, learns k, ends at its time and when it is cancelled, and gives
+// the same bits in three runs and in a far place; what makes no sense is refused.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "../volumes.h"
+#include "esvr/error.h"
+#include "esvr/field.h"
+#include "esvr/fit.h"
+#include "fit/paper/initial_points.h"
+#include "fit/paper/subvolumes.h"
+#include "on_device.h"
+
+namespace esvr::paper {
+namespace {
+
+TEST(Subvolumes, HoldEveryBrickOnceAndKeepToTheirBoxes) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  std::size_t bricks = 0, cubes = 0;
+  std::set<Coord> seen;
+  for (const auto& part : cutSubvolumes(target, spaceOf(target), 16)) {
+    ++cubes;
+    bricks += part->target.bricks.size();
+    EXPECT_EQ(part->target.values.size(), part->target.bricks.size() * kBrickVoxels);
+    EXPECT_EQ(part->active.size(), part->target.bricks.size());
+    for (const Coord brick : part->target.bricks) {
+      EXPECT_TRUE(part->target.within->contains(brick));
+      seen.insert(brick);
+    }
+  }
+  EXPECT_EQ(bricks, target.bricks.size());
+  EXPECT_EQ(seen.size(), target.bricks.size());
+  const Coord sides = spaceOf(target).bricks.max - spaceOf(target).bricks.min;
+  EXPECT_EQ(cubes, std::size_t((sides.x / 2 + 1) * (sides.y / 2 + 1) * (sides.z / 2 + 1)));
+}
+
+TEST(Subvolumes, AreHalfTheLongestAxisOrTheShortest) {
+  const auto sideOf = [](int x, int y, int z, int asked) {
+    const Space space{{{0, 0, 0}, {x / 8 - 1, y / 8 - 1, z / 8 - 1}}};
+    return subvolumeSide(space, asked);
+  };
+  EXPECT_EQ(sideOf(256, 256, 256, 0), 128);    // the paper's for Aneurysm
+  EXPECT_EQ(sideOf(2544, 1296, 136, 0), 136);  // Neuron: the smallest axis, in whole bricks
+  EXPECT_EQ(sideOf(88, 88, 88, 0), 48);        // 44, in whole bricks
+  EXPECT_EQ(sideOf(256, 256, 256, 60), 64);
+  EXPECT_EQ(sideOf(8, 8, 8, 0), 8);
+}
+
+TEST(InitialPoints, LieOnVoxelsThatDifferFromTheBackgroundEachOnce) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  for (const std::size_t points : {std::size_t{50}, std::size_t{100'000}}) {
+    const auto drawn = initialPoints(target, points, {}, 5);
+    const auto voxels = std::size_t(std::count_if(target.values.begin(), target.values.end(),
+                                                  [](float v) { return v != 0.0f; }));
+    EXPECT_EQ(drawn.size(), std::min(points, voxels));
+    std::set<std::array<double, 3>> places;
+    for (const auto& p : drawn) {
+      const Coord at{int(p.center[0]), int(p.center[1]), int(p.center[2])};
+      EXPECT_NE(valueAt(volume, volume.origin + at), 0.0f);
+      places.insert(p.center);
+    }
+    EXPECT_EQ(places.size(), drawn.size());
+  }
+}
+
+TEST(InitialPoints, OfEveryVoxelAddUpToTheVolume) {
+  const SparseVolume volume = test::volumeOf({}, 2, 0.0f, [](Coord) { return 1.0f; });
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  // In the middle of the cube the lattice sum of a kernel as wide as its spacing is its integral to
+  // a few percent.
+  const Coord middle{8, 8, 8};
+  for (const KernelKind kind : {KernelKind{}, KernelKind{.gaussian = true}}) {
+    const auto kernel = kernelConstants<double>(kernelOf(kind));
+    double sum = 0.0;
+    for (const auto& p : initialPoints(target, 1 << 20, kind, 1)) {
+      double q = 0.0;
+      const double at[3] = {double(middle.x), double(middle.y), double(middle.z)};
+      for (std::size_t a = 0; a < 3; ++a) q += (at[a] - p.center[a]) * (at[a] - p.center[a]);
+      sum += p.intensity *
+             kernelPhi(kernel, q * kind.unitsPerScale(kind.k) * kind.unitsPerScale(kind.k));
+    }
+    EXPECT_NEAR(sum, target.values[0], 0.1 * double(target.values[0]));
+  }
+}
+
+TEST(PaperMethod, IsScaledInAllThatIsSaidInEpochs) {
+  const PaperMethod method = scaledTo({}, 280);
+  EXPECT_EQ(method.densifyUntil, 40u);
+  EXPECT_EQ(method.densifyFrom, 2u);   // 1.6
+  EXPECT_EQ(method.densifyEvery, 1u);  // 0.4, and at least 1
+  EXPECT_EQ(method.prunes.front().epoch, 120u);
+  EXPECT_EQ(withThreePasses({}).prunes.size(), 3u);
+}
+
+class PaperRunOn : public test::OnDevice {
+ protected:
+  [[nodiscard]] static PaperMethod shortMethod() {
+    PaperMethod method;
+    method.points = 300;
+    method.epochs = 60;
+    method.densifyFrom = 4;
+    method.densifyUntil = 16;
+    method.gradientThreshold = 0.02;  // a small volume's mean over few voxels
+    method.percentDense = 0.06;       // 1.2 voxels
+    method.prunes = {{24, 0.3}};
+    return method;
+  }
+  [[nodiscard]] FitResult run(const PaperMethod& method, Coord shift = {},
+                              FitOptions options = {}) const {
+    options.paper = method;
+    options.device = device_;
+    return fit(test::tubeVolume(shift), options);
+  }
+};
+
+TEST_P(PaperRunOn, LowersTheErrorAndSaysWhatItDid) {
+  const FitResult result = run(shortMethod());
+  ASSERT_TRUE(result.paper);
+  EXPECT_EQ(result.end, FitEnd::kScheduleDone);
+  EXPECT_EQ(result.paper->points, 300u);
+  EXPECT_EQ(result.paper->iterations, 60u * result.paper->subvolumes);
+  EXPECT_GT(result.paper->cloned + result.paper->split, 0u);
+  EXPECT_GT(result.paper->firstGradient, 0.0);
+  ASSERT_EQ(result.paper->prunes.size(), 1u);
+  const PruneRecord& pass = result.paper->prunes.front();
+  EXPECT_EQ(pass.before, 300 + result.paper->cloned + result.paper->split);
+  EXPECT_NEAR(double(pass.after), 0.7 * double(pass.before), 0.5);
+  EXPECT_LT(pass.psnrBoxAfter, pass.psnrBoxBefore);
+  EXPECT_GT(result.curve.back().psnrBox, pass.psnrBoxAfter + 1.0);
+  EXPECT_LE(result.field.primitiveCount(), pass.after);
+  EXPECT_EQ(result.field.kernel.form, KernelForm::kPaper);
+}
+
+TEST_P(PaperRunOn, LeavesTheCountThatIsAsked) {
+  FitOptions options;
+  options.count = 120;
+  EXPECT_EQ(run(shortMethod(), {}, options).paper->prunes.back().after, 120u);
+}
+
+TEST_P(PaperRunOn, WithoutPruningAddsUpToTheCount) {
+  FitOptions options;
+  options.count = 400;
+  PaperMethod method = shortMethod();
+  method.prunes.clear();
+  method.gradientThreshold = 0.0;
+  EXPECT_EQ(run(method, {}, options).curve.end()[-2].primitives, 400u);
+}
+
+TEST_P(PaperRunOn, WithoutDensifyingOnlyMovesThePoints) {
+  PaperMethod method = shortMethod();
+  method.densify = false;
+  method.prunes.clear();
+  const FitResult result = run(method);
+  EXPECT_EQ(result.curve.end()[-2].primitives, 300u);
+  EXPECT_GT(result.curve.back().psnrBox, result.curve.front().psnrBox);
+}
+
+TEST_P(PaperRunOn, LearnsKOfEachEllipsoid) {
+  PaperMethod method = shortMethod();
+  method.learnK = true;
+  const FitResult result = run(method);
+  std::set<float> values;
+  for (const Chunk& chunk : result.field.chunks) {
+    ASSERT_EQ(chunk.ellipsoids.kappa.size(), chunk.ellipsoids.size());
+    values.insert(chunk.ellipsoids.kappa.begin(), chunk.ellipsoids.kappa.end());
+  }
+  EXPECT_GT(values.size(), 10u);
+}
+
+TEST_P(PaperRunOn, FitsGaussiansWithTheSameMethod) {
+  PaperMethod method = shortMethod();
+  method.gaussian = true;
+  method.countHits = true;
+  const FitResult gaussians = run(method);
+  method.gaussian = false;
+  const FitResult ellipsoids = run(method);
+  EXPECT_GT(gaussians.curve.back().psnrBox, gaussians.paper->prunes.front().psnrBoxAfter);
+  EXPECT_LT(gaussians.field.kernel.kappa, -20.0f);
+  // Supports of 3 sigma against 1.42 scales: more of them meet a voxel.
+  EXPECT_GT(averageHits(gaussians.field), 1.3 * averageHits(ellipsoids.field));
+  EXPECT_GT(ellipsoids.paper->prunes.front().hitsBefore, 1.0);
+}
+
+TEST_P(PaperRunOn, GivesTheSameBitsInThreeRunsAndInAFarPlace) {
+  PaperMethod method = shortMethod();
+  method.epochs = 20;
+  method.prunes = {{18, 0.3}};
+  const Field first = run(method).field;
+  for (int n = 0; n < 2; ++n) EXPECT_TRUE(test::sameBits(run(method).field, first));
+  EXPECT_TRUE(test::sameBits(run(method, {1 << 20, -(1 << 20), 1 << 20}).field, first));
+}
+
+TEST_P(PaperRunOn, EndsWhenItsPsnrIsReachedOrItIsCancelled) {
+  FitOptions options;
+  options.psnr = 5.0;
+  EXPECT_EQ(run(shortMethod(), {}, options).end, FitEnd::kPsnrReached);
+  CancelToken cancel;
+  cancel.cancel();
+  options.psnr = std::nullopt;
+  options.cancel = &cancel;
+  EXPECT_EQ(run(shortMethod(), {}, options).end, FitEnd::kCancelled);
+}
+
+ESVR_ON_DEVICES(PaperRunOn);
+
+TEST(PaperOptionsOfAFit, AreRefusedWhereTheyMakeNoSense) {
+  const auto refused = [](const std::function<void(FitOptions&)>& change) {
+    FitOptions options;
+    options.paper = PaperMethod{};
+    change(options);
+    EXPECT_THROW((void)fit(test::tubeVolume(), options), UsageError);
+  };
+  refused([](FitOptions& o) { o.kappa = 2.0f; });
+  refused([](FitOptions& o) { o.iterations = 10; });
+  refused([](FitOptions& o) { o.narrowBand = true; });
+  refused([](FitOptions& o) { o.paper->k = 0.0; });
+  refused([](FitOptions& o) { o.paper->points = 0; });
+  refused([](FitOptions& o) { o.paper->densifyEvery = 0; });
+  refused([](FitOptions& o) { o.paper->prunes = {{10, 1.0}}; });
+  refused([](FitOptions& o) { o.paper->prunes = {{10, 0.5}, {10, 0.5}}; });
+}
+
+}  // namespace
+}  // namespace esvr::paper

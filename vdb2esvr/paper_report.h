@@ -1,0 +1,12 @@
+#pragma once
+/// What the report says of a run of the paper's method.
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "esvr/paper_method.h"
+
+namespace esvr::vdb2esvr {
+
+[[nodiscard]] nlohmann::ordered_json paperJson(const PaperRecord& record);
+
+}  // namespace esvr::vdb2esvr
