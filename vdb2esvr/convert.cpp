@@ -49,7 +49,8 @@ EncodedGrid fitRated(const RateInput& input, std::optional<std::uint64_t> bytes,
 EncodedGrid fitPlain(const RateInput& input, const Options& options, ConvertedGrid& grid) {
   FitResult fitted = fit(input.source, input.options);
   recordFit(fitted, grid);
-  EncodedGrid encoded = encodeGrid(input.descriptor, input.source, std::move(fitted.field));
+  EncodedGrid encoded =
+      encodeGrid(input.descriptor, input.source, std::move(fitted.field), input.activity);
   encoded.curve = grid.curve = std::move(fitted.curve);
   if (options.storage == Storage::kFloat32) return encoded;
   CompactResult compact =
@@ -69,11 +70,10 @@ double boundOf(const VoxelDemand& demand, const VolumeGrid& source) {
   return demand.bound * (double(range.max) - double(range.min));
 }
 
-EncodedGrid storeVoxels(const VoxelDemand& demand, const VolumeGrid& source) {
+EncodedGrid storeVoxels(const VoxelDemand& demand, Activity activity, const VolumeGrid& source) {
   const double bound = boundOf(demand, source);
-  VoxelLayer layer = demand.exact || bound == 0.0
-                         ? exactLayer(source.volume)
-                         : boundedLayer(source.volume, bound, demand.activity);
+  VoxelLayer layer = demand.exact || bound == 0.0 ? exactLayer(source.volume)
+                                                  : boundedLayer(source.volume, bound, activity);
   return encodeVoxels(source.descriptor, source.volume, std::move(layer));
 }
 
@@ -87,8 +87,8 @@ void checkVoxels(const VoxelDemand& demand, const VolumeGrid& source, const Enco
 
 EncodedGrid encode(const Options& options, const VolumeGrid& source,
                    std::optional<std::uint64_t> bytes, ConvertedGrid& grid) {
-  if (options.voxels) return storeVoxels(*options.voxels, source);
-  RateInput input{source.descriptor, source.volume, options.fit};
+  if (options.voxels) return storeVoxels(*options.voxels, options.activity, source);
+  RateInput input{source.descriptor, source.volume, options.fit, options.activity};
   input.options.narrowBand = isNarrowBand(source.descriptor, source.volume);
   return bytes || searchesForPsnr(options) ? fitRated(input, bytes, grid)
                                            : fitPlain(input, options, grid);

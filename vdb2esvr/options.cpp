@@ -74,7 +74,7 @@ void addFitOptions(cli::po::options_description& options) {
     ("max-error", value<std::string>()->value_name("E"),
      "every voxel within E of the source, or E% of its range; no ellipsoids")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
-     "with --max-error: threshold (active by value) or exact (the source's mask)")
+     "threshold (voxels are active by their values) or exact (the source's mask is stored)")
     ("seconds", value<double>()->value_name("S"), "the best within this time, each grid")
     ("iterations", value<std::int64_t>()->value_name("N"), "length of the fit's schedule")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
@@ -197,10 +197,12 @@ void readVoxels(const Arguments& a, Options& options) {
   VoxelDemand demand;
   demand.exact = exact;
   if (bound) readBound(*bound, demand);
-  demand.activity =
-      cli::choose<Activity>("topology", a.get<std::string>("topology"),
-                            {{"threshold", Activity::kByValue}, {"exact", Activity::kExact}});
   options.voxels = demand;
+}
+
+Activity activity(const Arguments& a) {
+  return cli::choose<Activity>("topology", a.get<std::string>("topology"),
+                               {{"threshold", Activity::kByValue}, {"exact", Activity::kExact}});
 }
 
 void readSize(const Arguments& a, Options& options) {
@@ -246,6 +248,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.fit = fitOptions(a);
   options.storage = options.fit.paper ? storageOfPaper(a, *options.fit.paper) : storage(a);
   options.storageLoss = *bounded<double>(a, "storage-loss", 0.0, kMostLoss);
+  options.activity = activity(a);
   readVoxels(a, options);
   readSize(a, options);
   options.read.nonFinite = nonFinite(a);

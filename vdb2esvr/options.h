@@ -26,7 +26,6 @@ struct VoxelDemand {
   bool exact = false;
   double bound = 0.0;     ///< in the grid's values, or a share of their range
   bool relative = false;  ///< `bound` is a share
-  Activity activity = Activity::kByValue;
 };
 
 struct Options {
@@ -36,6 +35,7 @@ struct Options {
   std::optional<std::uint64_t> size;  ///< bytes of the file
   std::optional<double> ratio;        ///< bytes of the input for each of the file
   std::optional<VoxelDemand> voxels;  ///< instead of ellipsoids
+  Activity activity = Activity::kByValue;
   Storage storage = Storage::kCompact;
   double storageLoss = CompactOptions::kDefaultLoss;  ///< dB that kCompact may cost
   ReadOptions read;

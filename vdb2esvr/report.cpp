@@ -82,6 +82,7 @@ Json asked(const Options& options) {
           {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
           {"storage", options.storage == Storage::kCompact ? "compact" : "float32"},
           {"storage_loss", options.storageLoss},
+          {"topology", options.activity == Activity::kExact ? "exact" : "threshold"},
           {"seed", fit.seed},
           {"threads", options.threads > 0 ? Json(options.threads) : Json(nullptr)},
           {"device", options.device},

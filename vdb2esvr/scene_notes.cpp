@@ -31,10 +31,11 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
     notes.push_back(
         {"an edge for each ellipsoid", "one kappa serves the scene", primitives * kFloatBytes});
   if (lacks("chunks")) notes.push_back({"chunk table", "the grid fits in one chunk"});
-  notes.push_back({"voxel masks",
-                   lacks("leaves") ? "a threshold finds the active voxels"
-                                   : "the rule of activity finds them in the stored bricks",
-                   grid.bricks * kMaskBytes});
+  if (grid.stored.topology != TopologyKind::kMask)
+    notes.push_back({"voxel masks",
+                     lacks("leaves") ? "a threshold finds the active voxels"
+                                     : "the rule of activity finds them in the stored bricks",
+                     grid.bricks * kMaskBytes});
   if (lacks("curve") && !grid.curve.empty())
     notes.push_back({"curve", "a size or a PSNR was asked for; the report has it",
                      grid.curve.size() * sizeof(CurvePoint)});

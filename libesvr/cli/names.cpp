@@ -31,6 +31,7 @@ std::string nameOf(ValueType type) {
 std::string nameOf(KernelForm form) { return form == KernelForm::kPaper ? "paper" : "continuous"; }
 
 std::string nameOf(TopologyKind kind) {
+  if (kind == TopologyKind::kMask) return "mask";
   return kind == TopologyKind::kLeaves ? "bricks" : "threshold";
 }
 

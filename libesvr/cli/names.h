@@ -15,7 +15,7 @@ namespace esvr::cli {
 [[nodiscard]] std::string nameOf(ValueType type);
 /// "continuous", "paper".
 [[nodiscard]] std::string nameOf(KernelForm form);
-/// "threshold", "bricks".
+/// "threshold", "bricks", "mask".
 [[nodiscard]] std::string nameOf(TopologyKind kind);
 
 /// Bytes of a grid's sections.

@@ -175,7 +175,8 @@ class RateControl {
     result.fit = fit(input_.source, options);
     kappa_ = result.fit.field.kernel.kappa;
     if (!result.fit.pilot.empty()) pilot_ = result.fit.pilot;
-    result.grid = encodeGrid(input_.descriptor, input_.source, std::move(result.fit.field));
+    result.grid =
+        encodeGrid(input_.descriptor, input_.source, std::move(result.fit.field), input_.activity);
     result.psnr = compareVolumes(input_.source, decodeGrid(result.grid),
                                  {.box = input_.options.box, .peak = {}, .ssim = false})
                       .psnrBox;

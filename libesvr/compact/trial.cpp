@@ -46,7 +46,7 @@ TrialMaker::TrialMaker(const EncodedGrid& grid, const SparseVolume& source, cons
               {format::ruleOf(grid), grid.activeThreshold},
               box,
               grid.leaves,
-              grid.topology == TopologyKind::kLeaves} {
+              grid.topology != TopologyKind::kThreshold} {
   IntensityProblem problem(field_, target_);
   error_ = problem.error(intensitiesOf(field_));
   curvature_ = byChunk(field_, problem.curvature());

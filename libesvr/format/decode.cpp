@@ -13,6 +13,7 @@
 #include "format/layer_errors_stream.h"
 #include "format/layered_section.h"
 #include "format/leaves_stream.h"
+#include "format/mask_section.h"
 #include "format/planes.h"
 #include "format/section_reader.h"
 #include "format/validity.h"
@@ -50,6 +51,7 @@ class GridDecoder {
     if (record.chunkCount > 1) record.chunks = readChunkTable(record.chunkCount);
     readChunks(record.chunks, grid);
     if (grid.topology == TopologyKind::kLeaves) readLeaves(grid);
+    if (grid.topology == TopologyKind::kMask) readMask(grid);
     readVoxels(grid);
     readLayerErrors(grid);
     readCurve(grid);
@@ -214,10 +216,19 @@ class GridDecoder {
       grid.leaves = getLeaves(sections_.get(section), sections_.place(section));
   }
 
+  void readMask(EncodedGrid& grid) {
+    const auto section = id(SectionKind::kMask);
+    Mask mask = getMask(sections_.get(section), sections_.place(section));
+    grid.leaves = std::move(mask.leaves);
+    grid.mask = std::move(mask.active);
+  }
+
   void readVoxels(EncodedGrid& grid) {
-    const auto section = id(SectionKind::kVoxels);
+    const auto section = id(SectionKind::kVoxels), old = id(SectionKind::kOldVoxels);
     if (sections_.has(section))
       grid.voxels = getVoxels(sections_.get(section), sections_.place(section));
+    else if (sections_.has(old))
+      grid.voxels = getOldVoxels(sections_.get(old), sections_.place(old));
   }
 
   /// Those of the layers that were read; of a box nothing is known.

@@ -13,6 +13,7 @@
 #include "format/layer_errors_stream.h"
 #include "format/layered_section.h"
 #include "format/leaves_stream.h"
+#include "format/mask_section.h"
 #include "format/morton_order.h"
 #include "format/planes.h"
 #include "format/section_table.h"
@@ -99,8 +100,10 @@ void checkLayers(const EncodedGrid& grid) {
 
 void checkGrid(const EncodedGrid& grid) {
   if (const auto fault = faultOf(grid)) refuse(grid, fault->text);
-  if (grid.topology != TopologyKind::kLeaves && !grid.leaves.empty())
+  if (grid.topology == TopologyKind::kThreshold && !grid.leaves.empty())
     refuse(grid, "it has leaves, but a topology without");
+  if (grid.mask.size() != (grid.topology == TopologyKind::kMask ? grid.leaves.size() : 0))
+    refuse(grid, "its mask is not that of its topology");
   if (!grid.quantised.empty() && grid.quantised.size() != grid.field.chunks.size())
     refuse(grid, "its quantised chunks are not those of its field");
   checkLayers(grid);
@@ -177,7 +180,9 @@ void addQuantised(Sections& out, std::uint32_t g, std::uint32_t c, const SortedG
 }
 
 void addExtras(Sections& out, std::uint32_t g, const EncodedGrid& grid) {
-  if (!grid.leaves.empty())
+  if (grid.topology == TopologyKind::kMask)
+    out.addRaw({SectionKind::kMask, g}, kRequired, putMask(grid.leaves, grid.mask));
+  else if (!grid.leaves.empty())
     out.add({SectionKind::kLeaves, g}, kRequired, putLeaves(grid.leaves), kFloatSize);
   if (grid.voxels) out.addRaw({SectionKind::kVoxels, g}, kRequired, putVoxels(*grid.voxels));
   if (!grid.layerErrors.empty())

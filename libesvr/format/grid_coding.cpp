@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -16,7 +17,7 @@ namespace {
 using format::ruleOf;
 using format::ThresholdChoice;
 
-constexpr float kAlwaysActive = -1.0f;  // below every activity
+constexpr float kAlwaysActive = -std::numeric_limits<float>::max();  // below every activity
 
 bool isLevelSet(const GridDescriptor& descriptor, float background) {
   return descriptor.gridClass == GridClass::kLevelSet && background > 0.0f;
@@ -39,6 +40,13 @@ ValueRange rangeOf(const EncodedGrid& grid) {
   return {std::min(grid.valueMin, background), std::max(grid.valueMax, background)};
 }
 
+void storeMask(const SparseVolume& source, EncodedGrid& grid) {
+  grid.topology = TopologyKind::kMask;
+  grid.leaves = brickCorners(source);
+  grid.mask = source.active;
+  grid.activeThreshold = kAlwaysActive;
+}
+
 void chooseTopology(const SparseVolume& source, EncodedGrid& grid) {
   const auto fitsBest = [&](std::span<const Coord> bricks) {
     return format::chooseThreshold(source, grid.field, ruleOf(grid), bricks);
@@ -48,10 +56,7 @@ void chooseTopology(const SparseVolume& source, EncodedGrid& grid) {
                                      ? fitsBest(grid.leaves)
                                      : fitsBest(reachedBricks(grid.field));
   grid.activeThreshold = choice.threshold;
-  if (choice.iou > 0.0) return;
-  grid.topology = TopologyKind::kLeaves;
-  grid.leaves = brickCorners(source);
-  grid.activeThreshold = kAlwaysActive;
+  if (!(choice.iou > 0.0)) storeMask(source, grid);
 }
 
 }  // namespace
@@ -63,7 +68,7 @@ ActivityRule ruleOf(const EncodedGrid& grid) {
   ActivityRule rule{.background = background};
   if (grid.withinRange) rule.range = rangeOf(grid);
   rule.narrowBand =
-      grid.topology == TopologyKind::kLeaves && isLevelSet(grid.descriptor, background);
+      grid.topology != TopologyKind::kThreshold && isLevelSet(grid.descriptor, background);
   return rule;
 }
 
@@ -98,14 +103,18 @@ EncodedGrid encodeVoxels(const GridDescriptor& descriptor, const SparseVolume& s
   return grid;
 }
 
-EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source, Field field) {
+EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source, Field field,
+                       Activity activity) {
   EncodedGrid grid = describe(descriptor, source);
   grid.field = std::move(field);
   if (isNarrowBand(descriptor, source)) {
     grid.topology = TopologyKind::kLeaves;
     grid.withinRange = false;  // the band has its own ends, and what is beyond them tells the side
   }
-  chooseTopology(source, grid);
+  if (activity == Activity::kExact)
+    storeMask(source, grid);
+  else
+    chooseTopology(source, grid);
   return grid;
 }
 
@@ -120,7 +129,7 @@ bool meets(const Box& box, Coord corner) {
 /// Where the field is to be evaluated; nothing where it is wherever supports reach.
 std::optional<std::vector<Coord>> bricksWanted(const EncodedGrid& grid,
                                                const DecodeOptions& options) {
-  const bool stored = grid.topology == TopologyKind::kLeaves;
+  const bool stored = grid.topology != TopologyKind::kThreshold;
   if (!stored && !options.box) return std::nullopt;
   std::vector<Coord> bricks = stored ? grid.leaves : reachedBricks(grid.field);
   if (options.box)
@@ -137,6 +146,19 @@ SparseVolume evaluated(const EncodedGrid& grid, const DecodeOptions& options) {
                      .narrowBand = rule.narrowBand,
                      .bricks = bricks ? std::span<const Coord>(*bricks) : std::span<const Coord>{},
                      .restrictToBricks = bricks.has_value()});
+}
+
+/// Voxels that the mask has not become inactive.
+void applyMask(const EncodedGrid& grid, SparseVolume& volume) {
+  const ActivityRule rule = ruleOf(grid);
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    const auto leaf =
+        std::lower_bound(grid.leaves.begin(), grid.leaves.end(), volume.brickCorner(b));
+    volume.active[b] = grid.mask[std::size_t(leaf - grid.leaves.begin())];
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!volume.active[b].test(v))
+        volume.brickValues(b)[v] = rule.inactiveValue(volume.brickValues(b)[v]);
+  }
 }
 
 /// Voxels outside a box become inactive, bricks without an active voxel go.
@@ -160,11 +182,12 @@ void clip(const Box& box, const ActivityRule& rule, SparseVolume& volume) {
 SparseVolume decodeGrid(const EncodedGrid& grid, const DecodeOptions& options) {
   if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
-  if (grid.voxels && options.threshold)
+  if (options.threshold && (grid.voxels || grid.topology == TopologyKind::kMask))
     throw UsageError("grid '" + grid.descriptor.name +
-                     "' holds its voxels, which are active as they are: it takes no threshold");
+                     "' says itself which voxels are active: it takes no threshold");
   if (options.box && options.box->empty()) throw UsageError("the box of voxels is empty");
   SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
+  if (!grid.voxels && grid.topology == TopologyKind::kMask) applyMask(grid, volume);
   if (options.box) clip(*options.box, ruleOf(grid), volume);
   return volume;
 }

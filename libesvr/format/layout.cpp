@@ -24,8 +24,10 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kIntensities, "intensities"},
     {SectionKind::kKappas, "kappas"},
     {SectionKind::kEllipsoids, "ellipsoids"},
-    {SectionKind::kVoxels, "voxels"},
+    {SectionKind::kOldVoxels, "voxels of 1.1"},
     {SectionKind::kLayered, "layered ellipsoids"},
+    {SectionKind::kMask, "mask"},
+    {SectionKind::kVoxels, "voxels"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
 
@@ -54,10 +56,12 @@ bool known(Codec codec) { return find(kCodecs, codec) != nullptr; }
 std::uint16_t minorOf(SectionKind kind) {
   switch (kind) {
     case SectionKind::kEllipsoids:
-    case SectionKind::kVoxels:
+    case SectionKind::kOldVoxels:
       return 1;
     case SectionKind::kLayerErrors:
     case SectionKind::kLayered:
+    case SectionKind::kMask:
+    case SectionKind::kVoxels:
       return 2;
     default:
       return kFirstMinor;

@@ -39,8 +39,10 @@ enum class SectionKind : std::uint32_t {
   kIntensities = 19,
   kKappas = 20,
   kEllipsoids = 32,
-  kVoxels = 33,
+  kOldVoxels = 33,
   kLayered = 34,
+  kMask = 35,
+  kVoxels = 36,
 };
 
 enum class Codec : std::uint16_t {

@@ -21,11 +21,15 @@ bool validSuccessor(Coord corner, const Coord* previous) {
 
 }  // namespace
 
-std::vector<std::byte> putLeaves(std::span<const Coord> corners) {
+void requireLeaves(std::span<const Coord> corners) {
   for (std::size_t i = 0; i < corners.size(); ++i)
     if (!validSuccessor(corners[i], i == 0 ? nullptr : &corners[i - 1]))
       throw RuntimeFailure("leaf corner " + toString(corners[i]) +
                            " is not a multiple of 8 or not above the one before it");
+}
+
+std::vector<std::byte> putLeaves(std::span<const Coord> corners) {
+  requireLeaves(corners);
   ByteWriter out;
   for (const auto axis : kAxes)
     for (const Coord& corner : corners) out.put(brickOf(corner).*axis);

@@ -11,6 +11,9 @@
 namespace esvr::format {
 
 /// \throws RuntimeFailure  corners that are not multiples of 8 or not increasing
+void requireLeaves(std::span<const Coord> corners);
+
+/// \throws RuntimeFailure  as requireLeaves
 [[nodiscard]] std::vector<std::byte> putLeaves(std::span<const Coord> corners);
 
 /// \throws BadInput  not a list of increasing corners; begins with `where`

@@ -4,13 +4,15 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "core/morton.h"
 #include "esvr/error.h"
 #include "format/byte_reader.h"
 #include "format/byte_writer.h"
 #include "format/cell_tree.h"
-#include "format/voxel_coder.h"
+#include "format/old_voxel_coder.h"
+#include "format/voxel_model.h"
 
 namespace esvr::format {
 namespace {
@@ -47,11 +49,13 @@ int bitsOf(const std::vector<Coord>& bricks) {
   return bits;
 }
 
-/// What the coder takes vacant voxels for. Any would do: a code near the background serves best.
-std::int32_t vacantCodeOf(const VoxelLayer& layer) {
-  for (std::size_t i = 0; i < layer.codes.size(); ++i)
-    if (layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels))) return layer.codes[i];
-  return 0;
+void putHeader(ByteWriter& out, const VoxelLayer& layer) {
+  out.put(std::uint8_t(layer.form));
+  out.put(layer.divisor);
+  for (const auto at : {layer.origin.x, layer.origin.y, layer.origin.z}) out.put(at);
+  out.put(layer.background);
+  out.put(std::uint32_t(layer.palette.size()));
+  out.putAll(layer.palette);
 }
 
 VoxelLayer getHeader(ByteReader& in) {
@@ -93,42 +97,95 @@ void setBricks(std::span<const std::uint64_t> keys, const ByteReader& in, VoxelL
       in.fail("a brick of voxels lies outside the index space");
 }
 
-void decodeStream(ByteReader& in, std::uint64_t bricks, int bits, std::int32_t vacantCode,
-                  VoxelLayer& layer) {
+void putModel(ByteWriter& out, const VoxelModel& model) {
+  out.put(model.vacantCode);
+  for (const auto mirror : model.mirror) out.put(mirror);
+  out.put(std::uint8_t(model.common.size()));
+  out.putAll(model.common);
+}
+
+VoxelModel getModel(ByteReader& in) {
+  VoxelModel model;
+  model.vacantCode = in.get<std::int32_t>();
+  for (auto& mirror : model.mirror) {
+    mirror = in.get<std::int32_t>();
+    if (mirror < VoxelModel::kNoMirror) in.fail("a mirror of voxels");
+  }
+  model.common.resize(in.get<std::uint8_t>());
+  if (model.common.size() > VoxelModel::kMostCommon) in.fail("too many common voxels");
+  for (auto& code : model.common) code = in.get<std::int32_t>();
+  return model;
+}
+
+struct BrickCount {
+  std::uint64_t bricks = 0;
+  int bits = 0;
+};
+
+BrickCount getBrickCount(ByteReader& in, std::uint64_t bytes) {
+  BrickCount count{in.get<std::uint64_t>(), 0};
+  if (count.bricks / kMostBricksAByte > bytes)
+    in.fail(std::to_string(bytes) + " bytes of content for " + std::to_string(count.bricks) +
+            " bricks");
+  count.bits = in.get<std::uint8_t>();
+  if (count.bits > kMaxBrickBits) in.fail("bricks of voxels lie too far apart");
+  return count;
+}
+
+std::vector<std::byte> encodeStream(const VoxelLayer& layer, const VoxelModel& model, int bits) {
+  const auto order = codingOrder(layer.bricks);
+  std::vector<std::uint64_t> keys;
+  for (const auto b : order) keys.push_back(keyOf(layer.bricks[b]));
+  Writer writer;
+  CellTree<Writer>(writer).code(keys, 3 * bits);
+  VoxelLayer written = layer;
+  codeVoxels(writer, order, model, written);
+  return writer.coder.finish();
+}
+
+/// \param codeBricks  takes the stream, the bricks' order and the layer
+template <class CodeBricks>
+void decodeStream(ByteReader& in, const BrickCount& count, VoxelLayer& layer,
+                  const CodeBricks& codeBricks) {
   Reader reader{RangeDecoder(in.getBytes(in.left()))};
-  std::vector<std::uint64_t> keys(bricks);
-  CellTree<Reader>(reader).code(keys, 3 * bits);
-  setBricks(keys, in, layer);
-  layer.codes.resize(bricks * kBrickVoxels);
-  layer.active.resize(bricks);
-  layer.vacant.resize(bricks);
-  codeVoxels(reader, codingOrder(layer.bricks), vacantCode, layer);
+  std::vector<std::uint64_t> keys(count.bricks);
+  try {
+    CellTree<Reader>(reader).code(keys, 3 * count.bits);
+    setBricks(keys, in, layer);
+    layer.codes.resize(count.bricks * kBrickVoxels);
+    layer.active.resize(count.bricks);
+    layer.vacant.resize(count.bricks);
+    codeBricks(reader, codingOrder(layer.bricks), layer);
+  } catch (const BadInput& error) {
+    in.fail(error.what());
+  }
+}
+
+void checkValues(const VoxelLayer& layer, const ByteReader& in) {
+  checkCodes(layer, in);
+  const SparseVolume volume = volumeOf(layer);
+  if (!std::all_of(volume.values.begin(), volume.values.end(),
+                   [](float v) { return std::isfinite(v); }))
+    in.fail("a voxel is not finite");
 }
 
 }  // namespace
 
 std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   const int bits = bitsOf(layer.bricks);
-  const auto order = codingOrder(layer.bricks);
-  const std::int32_t vacantCode = vacantCodeOf(layer);
-  std::vector<std::uint64_t> keys;
-  for (const auto b : order) keys.push_back(keyOf(layer.bricks[b]));
-  Writer writer;
-  CellTree<Writer>(writer).code(keys, 3 * bits);
-  VoxelLayer written = layer;
-  codeVoxels(writer, order, vacantCode, written);
-
+  VoxelModel model = chooseModel(layer);
+  auto stream = encodeStream(layer, model, bits);
+  if (hasMirror(model)) {
+    const VoxelModel plain = withoutMirrors(model);
+    auto other = encodeStream(layer, plain, bits);
+    if (other.size() < stream.size()) stream = std::move(other), model = plain;
+  }
   ByteWriter out;
-  out.put(std::uint8_t(layer.form));
-  out.put(layer.divisor);
-  for (const auto at : {layer.origin.x, layer.origin.y, layer.origin.z}) out.put(at);
-  out.put(layer.background);
-  out.put(std::uint32_t(layer.palette.size()));
-  out.putAll(layer.palette);
+  putHeader(out, layer);
   out.put(std::uint64_t(layer.bricks.size()));
   out.put(std::uint8_t(bits));
-  out.put(vacantCode);
-  out.putAll(writer.coder.finish());
+  putModel(out, model);
+  out.putAll(stream);
   out.padTo(std::max<std::uint64_t>(
       out.size(), (layer.bricks.size() + kMostBricksAByte - 1) / kMostBricksAByte));
   return out.take();
@@ -137,23 +194,24 @@ std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
 VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where) {
   ByteReader in(content, where);
   VoxelLayer layer = getHeader(in);
-  const auto bricks = in.get<std::uint64_t>();
-  if (bricks / kMostBricksAByte > content.size())
-    in.fail(std::to_string(content.size()) + " bytes of content for " + std::to_string(bricks) +
-            " bricks");
-  const int bits = in.get<std::uint8_t>();
-  if (bits > kMaxBrickBits) in.fail("bricks of voxels lie too far apart");
+  const BrickCount count = getBrickCount(in, content.size());
+  const VoxelModel model = getModel(in);
+  decodeStream(in, count, layer, [&](Reader& reader, const auto& order, VoxelLayer& into) {
+    codeVoxels(reader, order, model, into);
+  });
+  checkValues(layer, in);
+  return layer;
+}
+
+VoxelLayer getOldVoxels(std::span<const std::byte> content, const std::string& where) {
+  ByteReader in(content, where);
+  VoxelLayer layer = getHeader(in);
+  const BrickCount count = getBrickCount(in, content.size());
   const auto vacantCode = in.get<std::int32_t>();
-  try {
-    decodeStream(in, bricks, bits, vacantCode, layer);
-  } catch (const BadInput& error) {
-    in.fail(error.what());
-  }
-  checkCodes(layer, in);
-  const SparseVolume volume = volumeOf(layer);
-  if (!std::all_of(volume.values.begin(), volume.values.end(),
-                   [](float v) { return std::isfinite(v); }))
-    in.fail("a voxel is not finite");
+  decodeStream(in, count, layer, [&](Reader& reader, const auto& order, VoxelLayer& into) {
+    readOldVoxels(reader, order, vacantCode, into);
+  });
+  checkValues(layer, in);
   return layer;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
-/// A voxel layer as the content of a section: every voxel predicted from those before it, what is
-/// left coded in contexts of how well that went around it.
+/// A voxel layer as the content of a section: coded by what foretells them (voxel_coder.h).
 
 #include <cstddef>
 #include <span>
@@ -12,6 +11,9 @@
 namespace esvr::format {
 
 [[nodiscard]] std::vector<std::byte> putVoxels(const VoxelLayer& layer);
+
+/// As format 1.1 wrote them. \throws BadInput  as getVoxels
+[[nodiscard]] VoxelLayer getOldVoxels(std::span<const std::byte> content, const std::string& where);
 
 /// \throws BadInput  damaged; begins with `where`
 [[nodiscard]] VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where);

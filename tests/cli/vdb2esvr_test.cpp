@@ -233,6 +233,16 @@ TEST_F(Vdb2Esvr, keepsEveryVoxelWithinTheBound) {
   EXPECT_EQ(back.active, source.active);
 }
 
+TEST_F(Vdb2Esvr, storesTheMaskWhereAsked) {
+  ASSERT_EQ(quickFit(in(), out(), {"--topology", "exact"}).exitCode, 0);
+  const SparseVolume source = readGrid(in(), "density").volume;
+  const EncodedGrid grid = readEsvr(out()).grids[0];
+  EXPECT_GT(grid.field.primitiveCount(), 0u);
+  const SparseVolume back = decodeGrid(grid);
+  EXPECT_EQ(back.bricks, source.bricks);
+  EXPECT_EQ(back.active, source.active);
+}
+
 TEST_F(Vdb2Esvr, givesTheSameEllipsoidsOnAnyNumberOfThreads) {
   const std::string other = folder_ / "other.esvr";
   ASSERT_EQ(quickFit(in(), out(), {"--threads", "1"}).exitCode, 0);

@@ -1,5 +1,8 @@
 #include "format/golden_files.h"
 
+#include <algorithm>
+#include <bit>
+
 #include "esvr/grid_coding.h"
 #include "format/crafted_file.h"
 #include "format/sample_files.h"
@@ -38,6 +41,44 @@ EncodedGrid fewValues() {
   return encodeVoxels({}, volume, exactLayer(volume));
 }
 
+/// A palette of values above 0 as floats, whose order is that of their bits.
+VoxelLayer asFloats(VoxelLayer layer) {
+  layer.form = VoxelForm::kFloat;
+  for (auto& code : layer.codes)
+    code = std::bit_cast<std::int32_t>(layer.palette[std::size_t(code)]);
+  layer.palette.clear();
+  return layer;
+}
+
+/// 16 x 8 x 8 floats that are alike under a mirror along x, many of them 0.5.
+EncodedGrid mirroredValues() {
+  std::vector<BrickInput> bricks(2);
+  for (std::size_t b = 0; b < bricks.size(); ++b) {
+    bricks[b].corner = {std::int32_t(b) * kBrickSide, -8, 8};
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Coord at = bricks[b].corner + voxelLocal(v);
+      const std::int32_t x = std::min(at.x, 15 - at.x);
+      const std::int32_t n = (x * 64 + (at.y + 8) * 8 + at.z - 8) * 37 % 512;
+      bricks[b].values[std::size_t(v)] =
+          at.z % 3 == 0 ? 0.5f : 1.0f + float(n) * float(n) / 65536.0f;
+      if (x > 1 || n % 5 != 0) bricks[b].active.set(v);
+    }
+  }
+  const SparseVolume volume = makeVolume(bricks, 0.0f);
+  return encodeVoxels({}, volume, asFloats(exactLayer(volume)));
+}
+
+/// An ellipsoid with the mask of the voxels above.
+EncodedGrid masked() {
+  EncodedGrid grid = oneEllipsoid();
+  const SparseVolume volume = volumeOf(*fewValues().voxels);
+  grid.topology = TopologyKind::kMask;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    grid.leaves.push_back(volume.brickCorner(b));
+  grid.mask = volume.active;
+  return grid;
+}
+
 }  // namespace
 
 std::vector<GoldenFile> goldenFiles() {
@@ -50,8 +91,10 @@ std::vector<GoldenFile> goldenFiles() {
       {"compressed", fileOf(fogGrid(60))},
       {"quantised", fileOf(quantisedGrid(20))},
       {"layered", fileOf(layeredGrid(20))},
-      {"voxels", fileOf(fewValues())},
-      {"unknown_section", fileOf(oneEllipsoid()), true},
+      {"voxels", fileOf(fewValues()), false},
+      {"mirrored_voxels", fileOf(mirroredValues())},
+      {"mask", fileOf(masked())},
+      {"unknown_section", fileOf(oneEllipsoid()), true, true},
   };
 }
 

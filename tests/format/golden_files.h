@@ -13,6 +13,7 @@ namespace esvr::test {
 struct GoldenFile {
   std::string name;
   EsvrFile content;
+  bool written = true;          ///< else an older version did: it is only read
   bool unknownSection = false;  ///< followed by an optional section of a kind nobody knows
 };
 

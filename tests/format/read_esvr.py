@@ -17,7 +17,7 @@ PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 96500
 NONE = 0xFFFFFFFF
 KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 5: "curve", 16: "centers",
          17: "scales", 18: "rotations", 19: "intensities", 20: "kappas", 32: "ellipsoids",
-         33: "voxels", 6: "layer errors", 34: "layered ellipsoids"}
+         33: "voxels of 1.1", 6: "layer errors", 34: "layered ellipsoids", 35: "mask", 36: "voxels"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
 
@@ -305,46 +305,124 @@ def guesses(a, b, c, ab, ac, bc, abc):
             c + toward_zero(b - bc + a - ac, 2), lorenzo)
 
 
-def voxels(data):
-    """{voxel: (code, active)} of those that are not vacant, and the header."""
-    r = Record(data)
+def header_of_voxels(r):
     head = {key: r.get(form) for key, form in (
         ("form", "B"), ("divisor", "d"), ("origin", "3i"), ("background", "f"))}
     head["palette"] = [r.get("f") for _ in range(r.get("I"))]
-    bricks, bits, vacant = r.get("Q"), r.get("B"), r.get("i")
+    head.update((key, r.get(form)) for key, form in (
+        ("bricks", "Q"), ("bits", "B"), ("vacant", "i")))
+    return head
+
+
+class Voxels:
+    """What has been read of a grid's voxels."""
+
+    def __init__(self, head, stream, mirrors=(-1, -1, -1), common=()):
+        self.head, self.stream, self.mirrors, self.common = head, stream, mirrors, common
+        self.codes, self.active, self.held = {}, set(), {}
+
+    def code(self, p):
+        return self.codes.get(p, self.head["vacant"])
+
+    def image(self, p):
+        """The first that lies before the voxel."""
+        for axis, mirror in enumerate(self.mirrors):
+            if mirror >= 0 and mirror - p[axis] < p[axis]:
+                return tuple(mirror - c if a == axis else c for a, c in enumerate(p))
+        return None
+
+    def each(self):
+        """Every voxel in order, with those before it."""
+        for key in keys(self.head["bricks"], 3 * self.head["bits"], self.stream):
+            corner = [8 * sum((key >> (3 * b + a) & 1) << b for b in range(self.head["bits"]))
+                      for a in range(3)]
+            for offset in range(512):
+                x, y, z = (corner[0] + (offset >> 6), corner[1] + (offset >> 3 & 7),
+                           corner[2] + (offset & 7))
+                yield (x, y, z), [(x - 1, y, z), (x, y - 1, z), (x, y, z - 1), (x - 1, y - 1, z),
+                                  (x - 1, y, z - 1), (x, y - 1, z - 1), (x - 1, y - 1, z - 1)]
+
+    def put(self, p, code):
+        self.codes[p] = code
+        self.held[tuple(o + c for o, c in zip(self.head["origin"], p))] = code, p in self.active
+
+
+def spread_of(a, b, c, ab, ac, bc):
+    return (abs(a - ab) + abs(b - bc) + abs(c - ac) + abs(a - ac) + abs(b - ab) + abs(c - bc))
+
+
+def half_octaves(number, most):
+    width = number.bit_length()
+    return min(2 * width + (number >> (width - 2) & 1 if width > 1 else 0), most)
+
+
+def old_voxels(data):
+    """{voxel: (code, active)} of those that are not vacant, and the header."""
+    r = Record(data)
+    head = header_of_voxels(r)
     stream = Decoder(data[r.at:])
-    codes, active, held = {}, set(), {}
+    v = Voxels(head, stream)
     errors, negative = [0] * 5, 0
-    for key in keys(bricks, 3 * bits, stream):
-        corner = [8 * sum((key >> (3 * b + a) & 1) << b for b in range(bits)) for a in range(3)]
-        for offset in range(512):
-            x, y, z = (corner[0] + (offset >> 6), corner[1] + (offset >> 3 & 7),
-                       corner[2] + (offset & 7))
-            before = [(x - 1, y, z), (x, y - 1, z), (x, y, z - 1), (x - 1, y - 1, z),
-                      (x - 1, y, z - 1), (x, y - 1, z - 1), (x - 1, y - 1, z - 1)]
-            around = sum((p in active) << (6 - i) for i, p in enumerate(before))
-            if stream.decision("active", around):
-                active.add((x, y, z))
-            elif stream.decision("vacant"):
-                codes[x, y, z] = vacant
+    for p, before in v.each():
+        around = sum((q in v.active) << (6 - i) for i, q in enumerate(before))
+        if stream.decision("active", around):
+            v.active.add(p)
+        elif stream.decision("vacant"):
+            v.codes[p] = head["vacant"]
+            continue
+        codes = [v.code(q) for q in before]
+        rules = guesses(*codes)
+        best = errors.index(min(errors))
+        context = half_octaves(spread_of(*codes[:6]) + 2 * (errors[best] >> 3), 23)
+        far = stream.number("far", context, bits=6)
+        if far:
+            negative = stream.decision("negative", context, negative)
+        code = rules[best] + (-far if negative else far)
+        errors = [e + min(abs(code - g), 1 << 34) - (e >> 3) for e, g in zip(errors, rules)]
+        v.put(p, code)
+    return head, v.held
+
+
+def voxels(data):
+    r = Record(data)
+    head = header_of_voxels(r)
+    mirrors = r.get("3i")
+    common = [r.get("i") for _ in range(r.get("B"))]
+    stream = Decoder(data[r.at:])
+    v = Voxels(head, stream, mirrors, common)
+    errors, negative = [0] * 7, 0
+    for p, before in v.each():
+        image = v.image(p)
+        state = 0 if image is None else 2 if image in v.active else 1
+        around = sum((q in v.active) << (6 - i) for i, q in enumerate(before))
+        if stream.decision("active", around, state):
+            v.active.add(p)
+        elif stream.decision("vacant", image and (state, v.code(image) == head["vacant"])):
+            v.codes[p] = head["vacant"]
+            continue
+        codes = [v.code(q) for q in before]
+        if common:
+            classes = [1 + common.index(c) if c in common else 0
+                       for c in ([v.code(image)] if image else codes[:3])]
+            known = stream.tree(4, "class", *classes)
+            if known:
+                v.put(p, common[known - 1])
                 continue
-            a, b, c, ab, ac, bc, abc = (codes.get(p, vacant) for p in before)
-            rules = guesses(a, b, c, ab, ac, bc, abc)
-            best = errors.index(min(errors))
-            spread = (abs(a - ab) + abs(b - bc) + abs(c - ac) + abs(a - ac) + abs(b - ab)
-                      + abs(c - bc) + 2 * (errors[best] >> 3))
-            width = spread.bit_length()
-            upper = spread >> (width - 2) & 1 if width > 1 else 0
-            context = min(2 * width + upper, 23)
-            far = stream.number("far", context, bits=6)
-            if far:
-                negative = stream.decision("negative", context, negative)
-            code = rules[best] + (-far if negative else far)
-            errors = [e + min(abs(code - g), 1 << 34) - (e >> 3) for e, g in zip(errors, rules)]
-            codes[x, y, z] = code
-            held[tuple(o + p for o, p in zip(head["origin"], (x, y, z)))] = (
-                code, (x, y, z) in active)
-    return head, held
+        rules = (v.code(image) if image else 0, *guesses(*codes), codes[2])
+        first = 0 if image else 1
+        best = errors.index(min(errors[first:]), first)
+        if best == 0:
+            context = "image", min((errors[best] >> 2).bit_length(), 30)
+        else:
+            context = half_octaves(spread_of(*codes[:6]) + (errors[best] >> 6), 79)
+        far = stream.number("far", context, bits=6)
+        if far:
+            negative = stream.decision("negative", context, negative)
+        code = rules[best] + (-far if negative else far)
+        for k in range(first, 7):
+            errors[k] += 16 * min(abs(code - rules[k]), 1 << 34) - (errors[k] >> 4)
+        v.put(p, code)
+    return head, v.held
 
 
 def content(name, data):
@@ -353,7 +431,7 @@ def content(name, data):
         values = struct.unpack(f"<{n * PLANES[name]}f", data)
         return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
     readers = {"grid": grid, "chunks": chunks, "leaves": leaves, "ellipsoids": ellipsoids,
-               "voxels": voxels, "layered ellipsoids": layered, "layer errors": layer_errors}
+               "voxels of 1.1": old_voxels, "voxels": voxels, "mask": voxels, "layered ellipsoids": layered, "layer errors": layer_errors}
     return readers[name](data) if name in readers else data
 
 
@@ -474,8 +552,35 @@ def check_layered(sections):
                 assert all(first <= origin + e[0][axis] <= last for e in ellipsoids_)
 
 
-def check_voxels(sections):
+def check_mask(sections):
+    """The activity of voxels.esvr's voxels."""
+    assert sections["grid", 0, NONE]["topology"] == 2
+    head, held = sections["mask", 0, NONE]
+    assert head["palette"] == [0.0] and all(held[p] == (0, True) for p in held)
+    assert set(held) == {
+        (x, y, z) for x in range(-8, 0) for y in range(16, 24) for z in range(16)
+        if z > 2 or (x, y, z) == (-5, 18, 1)}
+
+
+def check_mirrored(sections):
     head, held = sections["voxels", 0, NONE]
+    assert (head["form"], head["origin"], head["background"]) == (2, (0, -8, 8), 0.0)
+    active = 0
+    for x in range(16):
+        for y in range(-8, 0):
+            for z in range(8, 16):
+                half = min(x, 15 - x)
+                n = (half * 64 + (y + 8) * 8 + z - 8) * 37 % 512
+                wanted = 0.5 if z % 3 == 0 else 1.0 + n * n / 65536.0
+                code, now = held[x, y, z]
+                value = struct.unpack("<f", struct.pack("<i", code))[0]
+                assert (value, now) == (wanted, half > 1 or n % 5 != 0), (x, y, z)
+                active += now
+    assert 512 < active < len(held) == 1024
+
+
+def check_voxels(sections):
+    head, held = sections["voxels of 1.1", 0, NONE]
     assert (head["form"], head["origin"], head["background"]) == (3, (-8, 16, 0), 0.125)
     values = 0
     for x in range(-8, 0):
@@ -494,7 +599,7 @@ def check_voxels(sections):
 
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
-          "voxels": check_voxels, "kappas_and_chunks": check_kappas_and_chunks}
+          "voxels": check_voxels, "mask": check_mask, "mirrored_voxels": check_mirrored, "kappas_and_chunks": check_kappas_and_chunks}
 
 
 def main():

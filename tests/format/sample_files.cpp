@@ -75,7 +75,7 @@ std::string difference(const Field& a, const Field& b) {
 std::string difference(const EncodedGrid& a, const EncodedGrid& b) {
   if (!(a.descriptor == b.descriptor)) return "descriptor";
   if (!sameBits(a.descriptor.background, b.descriptor.background)) return "background";
-  if (a.topology != b.topology || a.leaves != b.leaves) return "topology";
+  if (a.topology != b.topology || a.leaves != b.leaves || a.mask != b.mask) return "topology";
   if (!sameBits(a.activeThreshold, b.activeThreshold)) return "threshold";
   if (a.withinRange != b.withinRange) return "withinRange";
   if (!(a.activeBox == b.activeBox) || a.activeVoxels != b.activeVoxels) return "active voxels";

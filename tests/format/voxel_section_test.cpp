@@ -6,6 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <map>
+
+#include "../field/random_field.h"
 #include "../fit/volumes.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
@@ -46,6 +50,39 @@ TEST(VoxelSection, PredictsWhatIsSmooth) {
   const VoxelLayer layer = boundedLayer(smooth, 0.01, Activity::kExact);
   // neighbours differ by two steps at most, second differences by a tenth of one
   EXPECT_LT(double(putVoxels(layer).size()) * 8.0, 1.6 * double(smooth.values.size()));
+}
+
+std::size_t bytesOf(const SparseVolume& volume) { return putVoxels(exactLayer(volume)).size(); }
+
+/// Noise is foretold by nothing but its image.
+TEST(VoxelSection, FindsMirrors) {
+  test::Random random(9);
+  std::map<std::array<int, 3>, float> noise;
+  const auto at = [&](int x, int y, int z) {
+    const auto [it, fresh] = noise.try_emplace({x, y, z}, 0.0f);
+    if (fresh) it->second = float(random(0.0, 1.0));
+    return it->second;
+  };
+  const SparseVolume plain =
+      test::volumeOf({}, 4, -1.0f, [&](Coord v) { return at(v.x, v.y, v.z); });
+  const SparseVolume mirrored = test::volumeOf({}, 4, -1.0f, [&](Coord v) {
+    return at(std::min(v.x, 29 - v.x), std::min(v.y, 31 - v.y), v.z);
+  });
+  // a quarter of the voxels, two columns of them without an image; and what it takes to say so
+  EXPECT_LT(double(bytesOf(mirrored)), 0.35 * double(bytesOf(plain)));
+  EXPECT_EQ(getVoxels(putVoxels(exactLayer(mirrored)), "v"), exactLayer(mirrored));
+}
+
+/// Floats that are one value for the most part: what stands between does not spoil the guesses.
+TEST(VoxelSection, KnowsCommonValues) {
+  test::Random random(10);
+  const SparseVolume volume = test::volumeOf(
+      {}, 4, 0.0f, [&](Coord v) { return v.x < 16 ? 0.5f : float(0.6 + 0.4 * random(0.0, 1.0)); });
+  const VoxelLayer layer = exactLayer(volume);
+  ASSERT_EQ(layer.form, VoxelForm::kFloat);
+  // 23 bits of noise for half of the voxels, next to nothing for the others
+  EXPECT_LT(double(putVoxels(layer).size()) * 8.0, 0.5 * 25.0 * double(volume.values.size()));
+  EXPECT_EQ(getVoxels(putVoxels(layer), "v"), layer);
 }
 
 EsvrFile voxelFile() {

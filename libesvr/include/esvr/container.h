@@ -27,6 +27,7 @@ enum class TopologyKind {
   /// As kThreshold, within the stored bricks only. In a level set: the narrow band there, active
   /// where |V| < background - activeThreshold.
   kLeaves = 1,
+  kMask = 2,  ///< the voxels of `mask`, whatever their values
 };
 
 /// What the first importance layers of every chunk come to, against the source. A row of a grid's
@@ -44,7 +45,8 @@ struct EncodedGrid {
   TopologyKind topology = TopologyKind::kThreshold;
   float activeThreshold = 0.0f;  ///< negative: active everywhere
   std::vector<Coord>
-      leaves;  ///< kLeaves: index corners of the source's bricks, increasing; else empty
+      leaves;  ///< kLeaves, kMask: index corners of the source's bricks, increasing; else empty
+  std::vector<BrickMask> mask;             ///< kMask: active voxels of each of the leaves
   bool withinRange = true;                 ///< values come back within that of the source, below
   Box activeBox;                           ///< of the source, index coordinates
   std::uint64_t activeVoxels = 0;          ///< of the source

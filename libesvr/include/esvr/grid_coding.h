@@ -7,6 +7,7 @@
 #include "esvr/ellipsoids.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/sparse_volume.h"
+#include "esvr/voxel_layer.h"
 
 namespace esvr {
 
@@ -15,11 +16,12 @@ namespace esvr {
 ///  - usually a threshold, the one whose active voxels overlap best with the source's (intersection
 ///    over union) among those that add no squared error worth telling (0.004 dB);
 ///  - in a narrow band, the band itself in the source's bricks;
-///  - where no threshold brings a voxel back, since all values equal the background, the source's
-///    bricks, active throughout.
+///  - where no threshold brings a voxel back, since all values equal the background, and where it
+///  is
+///    asked for (`activity`), the source's mask.
 /// The curve is left empty.
 [[nodiscard]] EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source,
-                                     Field field);
+                                     Field field, Activity activity = Activity::kByValue);
 
 /// True for a level set with a half width that none of its active voxels exceeds: what encodeGrid
 /// stores as a narrow band, and FitOptions::narrowBand is meant for. A level set that is active

@@ -8,6 +8,7 @@
 #include "esvr/fit.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/sparse_volume.h"
+#include "esvr/voxel_layer.h"
 
 namespace esvr {
 
@@ -23,6 +24,7 @@ struct RateInput {
   const GridDescriptor& descriptor;
   const SparseVolume& source;
   FitOptions options;
+  Activity activity = Activity::kByValue;  ///< what is stored of which voxels are active
 };
 
 /// The best of so many bytes: a short fit tells what an ellipsoid costs, a second one has as many

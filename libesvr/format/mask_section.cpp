@@ -1,0 +1,52 @@
+#include "format/mask_section.h"
+
+#include <algorithm>
+
+#include "esvr/error.h"
+#include "format/leaves_stream.h"
+#include "format/voxel_section.h"
+
+namespace esvr::format {
+namespace {
+
+/// Corners may be 2^32 apart: a step of that size in bricks still fits.
+std::vector<Coord> bricksFrom(Coord origin, std::span<const Coord> corners) {
+  std::vector<Coord> bricks;
+  for (const Coord corner : corners) bricks.push_back(brickOf(corner) - brickOf(origin));
+  return bricks;
+}
+
+BrickMask inverse(BrickMask mask) {
+  for (auto& word : mask.words) word = ~word;
+  return mask;
+}
+
+}  // namespace
+
+/// Voxels of one value, which then cost nothing but their activity.
+std::vector<std::byte> putMask(std::span<const Coord> leaves, std::span<const BrickMask> active) {
+  requireLeaves(leaves);
+  if (leaves.size() != active.size()) throw RuntimeFailure("a mask without its leaves");
+  VoxelLayer layer;
+  layer.form = VoxelForm::kPalette;
+  layer.palette = {0.0f};
+  layer.origin = leaves.empty() ? Coord{} : leaves.front();
+  for (const Coord leaf : leaves) layer.origin = minCoord(layer.origin, leaf);
+  layer.bricks = bricksFrom(layer.origin, leaves);
+  layer.codes.resize(leaves.size() * kBrickVoxels);
+  layer.active.assign(active.begin(), active.end());
+  for (const BrickMask& mask : active) layer.vacant.push_back(inverse(mask));
+  return putVoxels(layer);
+}
+
+Mask getMask(std::span<const std::byte> content, const std::string& where) {
+  VoxelLayer layer = getVoxels(content, where);
+  if (layer.form != VoxelForm::kPalette || layer.palette.size() != 1)
+    throw BadInput(where + ": a mask of voxels with values");
+  Mask mask;
+  for (const Coord brick : layer.bricks) mask.leaves.push_back(layer.origin + brick * kBrickSide);
+  mask.active = std::move(layer.active);
+  return mask;
+}
+
+}  // namespace esvr::format
