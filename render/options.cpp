@@ -88,6 +88,8 @@ cli::CommandLine commandLine() {
     ("opacity-length", value<double>()->value_name("L")->default_value(1.0),
      "voxels that an opacity holds for: more makes the volume clearer")
     ("step", value<double>()->value_name("S")->default_value(1.0), "voxels between samples")
+    ("min-transmittance", value<double>()->value_name("T"),
+     "a ray ends where less than this part of the light behind shows (default: 1/4096; 0: never)")
     ("resolution", value<std::string>()->value_name("WxH")->default_value("800x800"), "pixels")
     ("background", value<std::string>()->value_name("R,G,B"),
      "0 to 1 each (default: a transparent picture)")
@@ -117,6 +119,9 @@ cli::CommandLine commandLine() {
      "GPU memory to use: less draws large pictures in bands (default: what is free)")
     ("bins", value<int>()->value_name("N"),
      "parts of the depth, 1 to 16, that a GPU draws at once (default: by the first picture's lists)")
+    ("method", value<std::string>()->value_name("M")->default_value("primitives"),
+     "of an .esvr: primitives; bricks, which draws its voxels, decoded once; or auto, whichever is "
+     "faster for the first picture and fits")
     ("values", value<std::string>()->value_name("T"),
      "march voxels in a NanoVDB grid of float, fp4, fp8, fp16 or fpn")
     ("ref", value<std::string>()->value_name("FILE"), "compare with the voxels of a VDB")
@@ -333,6 +338,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   cli::requireRange("step", options.step, kMinStep, 1e6);
   options.opacityLength = a.get<double>("opacity-length");
   cli::requireRange("opacity-length", options.opacityLength, 1e-6, 1e6);
+  options.minTransmittance = a.find<double>("min-transmittance");
   options.background = backgroundOf(a);
   options.bits = bitsOf(a);
   options.mode = modeOf(a);
@@ -344,6 +350,9 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.device = a.get<std::string>("device");
   options.limits = limitsOf(a);
   options.values = valuesOf(a);
+  options.method = cli::choose<Method>(
+      "method", a.get<std::string>("method"),
+      {{"primitives", Method::kPrimitives}, {"bricks", Method::kBricks}, {"auto", Method::kAuto}});
   readMeasuring(a, options);
   options.overwrite = a.get<bool>("force");
   options.threads = a.threads;

@@ -7,6 +7,7 @@
 
 #include "cli/log.h"
 #include "esvr/renderer.h"
+#include "render/scene.h"
 
 namespace esvr::render {
 
@@ -30,8 +31,9 @@ struct Options {
   CameraWish camera;
   Resolution resolution;
   double step = 1.0, opacityLength = 1.0;
-  std::optional<Rgb> background;  ///< none: the picture is transparent
-  int bits = 8;                   ///< of a PNG's channel
+  std::optional<double> minTransmittance;  ///< none: as RenderOptions has it
+  std::optional<Rgb> background;           ///< none: the picture is transparent
+  int bits = 8;                            ///< of a PNG's channel
   RenderMode mode = RenderMode::kComposite;
   std::optional<PlaceBox> clip;
   int turntable = 0;             ///< pictures of a full turn; 0: one picture
@@ -41,6 +43,7 @@ struct Options {
   std::filesystem::path saveTransfer;
   std::string device = "auto";
   RendererLimits limits;
+  Method method = Method::kPrimitives;
   std::optional<NanoValues> values;  ///< of the NanoVDB grid that voxels are marched in
   std::filesystem::path reference;   ///< empty: none
   bool bench = false;

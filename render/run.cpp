@@ -91,6 +91,7 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
                    : rescaled(options.transfer, rangeOf(options, scene));
   r.step = options.step;
   r.opacityLength = options.opacityLength;
+  r.minTransmittance = options.minTransmittance.value_or(r.minTransmittance);
   r.mode = options.mode;
   r.clip = options.clip;
   return r;
@@ -98,20 +99,20 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
 
 /// A file's scene, prepared for drawing.
 struct Drawing {
-  Drawing(const fs::path& file, const std::optional<std::string>& grid,
-          const DrawSettings& settings)
-      : scene(readScene(file, grid)), renderer(scene, settings) {}
+  Drawing(Scene from, const DrawSettings& settings, const RenderOptions& sample)
+      : scene(std::move(from)), renderer(scene, settings, sample) {}
 
   const Scene scene;
   SceneRenderer renderer;
 };
 
 /// The reference is drawn as it is, whatever the values of the other.
-std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings& settings) {
+std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings& settings,
+                                     const RenderOptions& sample) {
   if (options.reference.empty()) return nullptr;
   DrawSettings own = settings;
   if (options.input.extension() != ".esvr") own.values.reset();
-  return std::make_unique<Drawing>(options.reference, std::nullopt, own);
+  return std::make_unique<Drawing>(readScene(options.reference, std::nullopt), own, sample);
 }
 
 std::string summary(const fs::path& file, const Scene& scene, Resolution r, double seconds) {
@@ -209,10 +210,12 @@ void run(const Options& options) {
   const cli::Interrupts interrupts;
   const auto files = options.bench ? std::vector<fs::path>{} : outputs(options);
   checkFiles(options, files);
-  const DrawSettings settings{selectDevice(options.device), options.limits, options.values};
-  Drawing drawing(options.input, options.grid, settings);
-  const auto reference = referenceOf(options, settings);
-  RenderOptions r = renderOptions(options, drawing.scene);
+  const DrawSettings settings{selectDevice(options.device), options.method, options.limits,
+                              options.values};
+  Scene scene = readScene(options.input, options.grid);
+  RenderOptions r = renderOptions(options, scene);
+  Drawing drawing(std::move(scene), settings, r);
+  const auto reference = referenceOf(options, settings, r);
   r.cancel = &interrupts.token();
   saveTransfer(options, r.transfer);
   auto report = reportHead(options, settings.device);

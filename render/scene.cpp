@@ -1,5 +1,6 @@
 #include "render/scene.h"
 
+#include "cli/stopwatch.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
@@ -30,7 +31,7 @@ Scene encoded(const std::filesystem::path& path, const std::optional<std::string
   if (grid.voxels)
     scene.content = VolumeGrid{grid.descriptor, decodeGrid(grid), 0};
   else
-    scene.content = std::move(grid.field);
+    scene.content = grid.field, scene.encoded = std::move(grid);
   return scene;
 }
 
@@ -59,14 +60,54 @@ Scene readScene(const std::filesystem::path& path, const std::optional<std::stri
   return scene;
 }
 
-SceneRenderer::SceneRenderer(const Scene& scene, const DrawSettings& s) {
-  if (const auto* field = std::get_if<Field>(&scene.content)) {
-    renderer_ = makeFieldRenderer(*field, s.device, s.limits);
+namespace {
+
+/// Milliseconds of a picture, once what it needs is there.
+double timeOf(Renderer& renderer, const RenderOptions& options) {
+  renderer.drawOnDevice(options);
+  cli::Stopwatch watch;
+  renderer.drawOnDevice(options);
+  return watch.lap();
+}
+
+/// Nothing where it does not fit.
+std::unique_ptr<Renderer> bricksThatFit(const SparseVolume& volume, const DrawSettings& s,
+                                        const RenderOptions& sample) {
+  try {
+    auto renderer = makeVolumeRenderer(volume, s.device, s.limits);
+    renderer->drawOnDevice(sample);
+    return renderer;
+  } catch (const DeviceError&) {
+    return nullptr;
+  }
+}
+
+}  // namespace
+
+SceneRenderer::SceneRenderer(const Scene& scene, const DrawSettings& s,
+                             const RenderOptions& sample) {
+  if (const auto* field = std::get_if<Field>(&scene.content))
+    drawField(*field, scene, s, sample);
+  else
+    drawVoxels(std::get<VolumeGrid>(scene.content), s);
+}
+
+void SceneRenderer::drawField(const Field& field, const Scene& scene, const DrawSettings& s,
+                              const RenderOptions& sample) {
+  if (s.method != Method::kBricks) renderer_ = makeFieldRenderer(field, s.device, s.limits);
+  if (s.method == Method::kPrimitives) return;
+  decoded_ = decodeGrid(*scene.encoded);
+  if (s.method == Method::kBricks) {
+    renderer_ = makeVolumeRenderer(decoded_, s.device, s.limits);
     return;
   }
-  const auto& grid = std::get<VolumeGrid>(scene.content);
+  auto bricks = bricksThatFit(decoded_, s, sample);
+  if (bricks && timeOf(*bricks, sample) < timeOf(*renderer_, sample)) renderer_ = std::move(bricks);
+}
+
+void SceneRenderer::drawVoxels(const VolumeGrid& grid, const DrawSettings& s) {
   if (s.device.kind == DeviceKind::kCpu && !s.values) {
-    renderer_ = makeVolumeRenderer(grid.volume);
+    renderer_ = makeVolumeRenderer(grid.volume, s.device, s.limits);
     return;
   }
   nano_ = makeNanoVolume(grid, s.values.value_or(NanoValues::kFloat));

@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "esvr/grid_coding.h"
 #include "esvr/renderer.h"
 
 namespace esvr::render {
@@ -16,6 +17,7 @@ struct Scene {
   Box box;           ///< of the active voxels
   ValueRange data;   ///< over the active voxels
   float background = 0.0f;
+  std::optional<EncodedGrid> encoded{};  ///< what a field was read from
 };
 
 /// \param grid  nothing: the first that can be drawn
@@ -24,8 +26,11 @@ struct Scene {
                               const std::optional<std::string>& grid);
 
 /// Where and how to draw.
+enum class Method { kPrimitives, kBricks, kAuto };
+
 struct DrawSettings {
   Device device;
+  Method method = Method::kPrimitives;  ///< of a field
   RendererLimits limits;
   std::optional<NanoValues> values;  ///< march voxels as a NanoVDB grid of these
 };
@@ -33,14 +38,20 @@ struct DrawSettings {
 /// Draws a scene, which must outlive it.
 class SceneRenderer {
  public:
-  /// Voxels are marched as a NanoVDB grid on a CUDA device, or where `values` asks for one.
-  /// \throws DeviceError
-  SceneRenderer(const Scene& scene, const DrawSettings& settings);
+  /// Voxels are marched as a NanoVDB grid on a CUDA device, or where `values` asks for one. A field
+  /// is drawn by Method: its ellipsoids; its voxels, decoded once; or, by trying both with `sample`
+  /// once each, what is faster and fits. \throws DeviceError
+  SceneRenderer(const Scene& scene, const DrawSettings& settings, const RenderOptions& sample);
 
   Renderer* operator->() { return renderer_.get(); }
   Renderer& operator*() { return *renderer_; }
 
  private:
+  void drawField(const Field& field, const Scene& scene, const DrawSettings& settings,
+                 const RenderOptions& sample);
+  void drawVoxels(const VolumeGrid& grid, const DrawSettings& settings);
+
+  SparseVolume decoded_;
   NanoVolume nano_;
   std::unique_ptr<Renderer> renderer_;
 };

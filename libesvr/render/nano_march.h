@@ -5,76 +5,38 @@
 #include <nanovdb/NanoVDB.h>
 #include <nanovdb/util/SampleFromVoxels.h>
 
-#include "render/ray_box.h"
-#include "render/sample_rule.h"
+#include "render/march_scene.h"
 
 namespace esvr {
 
-/// What all rays of a picture share.
-struct NanoScene {
-  View view;
-  PlaceBox box;  ///< outside of it every sample is the background
-  double step;
-  ClipBox clip;
-  SampleRule rule;
-};
-
 namespace nano_march {
-
-using Place = nanovdb::Vec3f;
-
-/// A ray's samples in the box: `first` is where the first one lies, so that float32 will do.
-struct Samples {
-  Place first, apart;
-  float number;  ///< of the first, from the eye
-  int count;
-};
-
-ESVR_HD inline Place placeOf(const Vec3& v) { return {float(v[0]), float(v[1]), float(v[2])}; }
-
-ESVR_HD inline Samples samplesOf(const NanoScene& s, int column, int row) {
-  const Ray ray = s.view.ray(column, row);
-  const SampleRange range =
-      samplesIn(within(ray, s.box), s.step).and_(samplesIn(ray, s.clip, s.step));
-  if (!(range.first <= range.last)) return {Place(0.0f), Place(0.0f), 0.0f, 0};
-  return {placeOf(sum(ray.origin, scaled(ray.direction, range.first * s.step))),
-          placeOf(scaled(ray.direction, s.step)), float(range.first),
-          int(range.last - range.first) + 1};
-}
 
 /// How many samples on the first one lies that may see a voxel outside of an empty node; 0 where
 /// this one may. A node's cells but those on its upper faces have all corners within it.
-ESVR_HD inline int samplesToLeave(const Place& place, const Place& apart, const nanovdb::Coord& at,
-                                  std::uint32_t dim) {
-  constexpr float kRounding = 1e-3f;
-  float leave = 1e30f;
-  for (int a = 0; a < 3; ++a) {
-    const int low = at[a] & ~(int(dim) - 1), high = low + int(dim) - 1;
-    if (at[a] >= high) return 0;
-    const float way = (apart[a] > 0.0f ? float(high) : float(low)) - place[a];
-    const float samples = apart[a] != 0.0f ? way / apart[a] : 1e30f;
-    leave = samples < leave ? samples : leave;
-  }
-  const int whole = int(std::ceil(leave - kRounding));
-  return whole > 1 ? whole : 1;
+ESVR_HD inline int samplesToLeave(const FloatPlace& place, const FloatPlace& apart,
+                                  const nanovdb::Coord& at, std::uint32_t dim) {
+  const int mask = ~(int(dim) - 1), side = int(dim) - 1;
+  const Coord low{at[0] & mask, at[1] & mask, at[2] & mask};
+  const bool within = at[0] < low.x + side && at[1] < low.y + side && at[2] < low.z + side;
+  return within ? march::samplesToLeave(place, apart, low, side) : 0;
 }
 
 }  // namespace nano_march
 
 template <class Build>
-ESVR_HD inline PixelColor marchNano(const nanovdb::NanoGrid<Build>& grid, const NanoScene& scene,
+ESVR_HD inline PixelColor marchNano(const nanovdb::NanoGrid<Build>& grid, const MarchScene& scene,
                                     int column, int row) {
-  using namespace nano_march;
   const auto accessor = grid.getAccessor();
   const auto sample = nanovdb::createSampler<1>(accessor);
-  const Samples samples = samplesOf(scene, column, row);
+  const MarchSamples samples = samplesOf(scene, column, row, SampleRange::all());
   RayState ray;
   for (int i = 0; i < samples.count && scene.rule.open(ray);) {
-    const Place place = samples.first + samples.apart * float(i);
+    const FloatPlace at = samples.at(i);
+    const nanovdb::Vec3f place(at.x, at.y, at.z);
     const nanovdb::Coord voxel = nanovdb::Coord::Floor(place);
     if (accessor.probeLeaf(voxel) == nullptr) {
       const std::uint32_t dim = accessor.getDim(voxel, 0);
-      if (const int skip = samplesToLeave(place, samples.apart, voxel, dim); skip > 0) {
+      if (const int skip = nano_march::samplesToLeave(at, samples.apart, voxel, dim); skip > 0) {
         i += skip;
         continue;
       }

@@ -38,8 +38,10 @@ ESVR_HD inline RayInterval within(const Ray& ray, const PlaceBox& box) {
 struct SampleRange {
   double first, last;
 
+  ESVR_HD static SampleRange all() { return {0.0, std::numeric_limits<double>::infinity()}; }
+
   [[nodiscard]] ESVR_HD bool has(double number) const { return number >= first && number <= last; }
-  [[nodiscard]] ESVR_HD SampleRange and_(const SampleRange& other) const {
+  [[nodiscard]] ESVR_HD SampleRange both(const SampleRange& other) const {
     return {other.first > first ? other.first : first, other.last < last ? other.last : last};
   }
 };
@@ -57,8 +59,7 @@ struct ClipBox {
   return {options.clip.value_or(PlaceBox{}), options.clip.has_value()};
 }
 ESVR_HD inline SampleRange samplesIn(const Ray& ray, const ClipBox& clip, double step) {
-  constexpr double kAll = std::numeric_limits<double>::infinity();
-  return clip.given ? samplesIn(within(ray, clip.box), step) : SampleRange{0.0, kAll};
+  return clip.given ? samplesIn(within(ray, clip.box), step) : SampleRange::all();
 }
 
 }  // namespace esvr

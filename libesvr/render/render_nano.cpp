@@ -14,8 +14,8 @@ namespace {
 template <class Build>
 void drawAs(const NanoVolume& volume, const RenderOptions& o, Picture& picture) {
   const auto& grid = *reinterpret_cast<const nanovdb::NanoGrid<Build>*>(volume.data.get());
-  const NanoScene scene{picture.view, sampledBox(volume), o.step, clipOf(o),
-                        sampleRule(o, picture.table.view(), volume.background)};
+  const MarchScene scene{picture.view, sampledBox(volume), o.step, clipOf(o),
+                         sampleRule(o, picture.table.view(), volume.background)};
   tbb::parallel_for(tbb::blocked_range<int>(0, o.resolution.height), [&](const auto& rows) {
     for (int row = rows.begin(); row != rows.end(); ++row) {
       checkCancelled(o);

@@ -37,7 +37,7 @@ class RayMarch {
     const SampleRange clip = samplesIn(ray, clipOf(options_), options_.step);
     ray.origin = difference(ray.origin, origin_);
     const RayInterval t = within(ray, {sampler_.low(), sampler_.high()});
-    const SampleRange range = samplesIn(t, options_.step).and_(clip);
+    const SampleRange range = samplesIn(t, options_.step).both(clip);
     for (double sample = range.first; range.has(sample) && rule_.open(state);)
       sample = advance(ray, sample, state);
     return rule_.finished(state);

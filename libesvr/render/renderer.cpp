@@ -43,7 +43,9 @@ std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& de
   return std::make_unique<CpuRenderer<Field, renderField>>(field);
 }
 
-std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume) {
+std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume, const Device& device,
+                                             const RendererLimits& limits) {
+  if (device.kind == DeviceKind::kCuda) return cuda::makeCudaVolumeRenderer(volume, device, limits);
   return std::make_unique<CpuRenderer<SparseVolume, renderVolume>>(volume);
 }
 

@@ -14,8 +14,9 @@ struct alignas(16) RayState {
   float transmittance = 1.0f;
 };
 
-/// Premultiplied, but for RenderMode::kDepth.
-struct PixelColor {
+/// Of a pixel: premultiplied, but for RenderMode::kDepth. Of a sample: as SampleRule::prepared
+/// says.
+struct alignas(16) PixelColor {
   float r, g, b, alpha;
 };
 
@@ -34,23 +35,36 @@ struct SampleRule {
     return !(ray.transmittance < minTransmittance) && !(mode == RenderMode::kDepth && ray.g > 0.0f);
   }
 
+  /// What a ray needs of a value: its color, not premultiplied, or where modes keep values, the
+  /// value and an alpha of 1. Where alpha is 0 there is nothing to add.
+  [[nodiscard]] ESVR_HD PixelColor prepared(float value) const {
+    if (mode == RenderMode::kMaximum || mode == RenderMode::kAverage)
+      return {value, 0.0f, 0.0f, 1.0f};
+    const Classified c = table(value);
+    return {c.r, c.g, c.b, c.alpha};
+  }
+
   /// \param number  of the sample, from the eye
-  ESVR_HD void add(RayState& ray, float value, float number) const {
+  ESVR_HD void add(RayState& ray, const PixelColor& sample, float number) const {
+    if (sample.alpha == 0.0f) return;
     switch (mode) {
       case RenderMode::kComposite:
-        return composite(ray, table(value));
+        return composite(ray, sample);
       case RenderMode::kMaximum:
-        if (ray.g == 0.0f || value > ray.r) ray.r = value;
+        if (ray.g == 0.0f || sample.r > ray.r) ray.r = sample.r;
         ray.g += 1.0f;
         return;
       case RenderMode::kAverage:
-        ray.r += value, ray.g += 1.0f;
+        ray.r += sample.r, ray.g += 1.0f;
         return;
       case RenderMode::kDepth:
-        ray.transmittance *= 1.0f - table(value).alpha;
+        ray.transmittance *= 1.0f - sample.alpha;
         if (ray.transmittance < kHalf) ray.r = number * step, ray.g = 1.0f;
         return;
     }
+  }
+  ESVR_HD void add(RayState& ray, float value, float number) const {
+    add(ray, prepared(value), number);
   }
 
   /// What a ray gathered behind. Not for RenderMode::kDepth, which has no parts.
@@ -83,7 +97,7 @@ struct SampleRule {
   }
 
  private:
-  ESVR_HD static void composite(RayState& ray, const Classified& sample) {
+  ESVR_HD static void composite(RayState& ray, const PixelColor& sample) {
     const float weight = ray.transmittance * sample.alpha;
     ray.r += weight * sample.r;
     ray.g += weight * sample.g;

@@ -266,6 +266,12 @@ TEST_F(EsvrRender, ComparesWithAReference) {
   EXPECT_GT(report["comparisons"][0]["ssim"], 0.9);
 }
 
+TEST_F(EsvrRender, BricksAreTheVoxelsOfTheSum) {
+  const auto bricks = picture("in.esvr", {"--method", "bricks", "--device", "cpu"});
+  EXPECT_GE(psnrOf(bricks, picture("in.vdb", {"--device", "cpu"})), 60.0);
+  EXPECT_EQ(draw("in.esvr", "auto.png", {"--method", "auto"}).exitCode, 0);
+}
+
 TEST_F(EsvrRender, MeasuresWithoutKeepingAPicture) {
   const auto run =
       runProgram(ESVR_RENDER, {folder_ / "in.esvr", "--bench", "--turntable", "3", "--resolution",
@@ -324,6 +330,8 @@ TEST_F(EsvrRender, OptionsThatMakeNoSenseAreRefused) {
   expectRefused({"--depth", "z.png"}, 2, ".exr");
   expectRefused({"--bins", "17"}, 2, "--bins");
   expectRefused({"--values", "fp32"}, 2, "fp16");
+  expectRefused({"--min-transmittance", "1"}, 2, "transmittance");
+  expectRefused({"--method", "tubes"}, 2, "bricks");
   expectRefused({"--device", "gpu"}, 2, "gpu");
   expectRefused({"--bench"}, 2, "--bench");
   expectRefused({"--report", "r.json"}, 2, "--ref");

@@ -55,8 +55,14 @@ class Renderer {
 [[nodiscard]] std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& device,
                                                           const RendererLimits& limits = {});
 
-/// Draws as renderVolume, on the CPU.
-[[nodiscard]] std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume);
+/// Draws as renderVolume. On a CUDA device from bricks of 8^3 cells with the 9^3 voxels at their
+/// corners, 2.9 KB each, where any is not the background; it does not need the volume any more.
+/// \throws DeviceError  as makeFieldRenderer; UsageError: on a CUDA device, voxels so far apart
+/// that
+///                      there are more than 2^28 blocks of 64^3 between them
+[[nodiscard]] std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume,
+                                                           const Device& device,
+                                                           const RendererLimits& limits = {});
 
 /// The picture of renderVolume, marched through a NanoVDB grid: the reference that others are
 /// compared with. Places are float32 relative to where a ray enters. 	hrows  as renderField

@@ -41,16 +41,19 @@ SceneMemory::SceneMemory(const Field& field, cudaStream_t stream)
       origins(chunkOrigins(field), stream),
       kernels(rayKernels(field), stream),
       views(ellipsoids.size(), stream),
-      footprints(ellipsoids.size(), stream) {}
+      footprints(ellipsoids.size(), stream),
+      large(ellipsoids.size(), stream) {}
 
 std::size_t SceneMemory::bytes() const {
-  return bytesOf(ellipsoids, origins, kernels, views, footprints);
+  return bytesOf(ellipsoids, origins, kernels, views, footprints, large);
 }
 
 DeviceEllipsoids SceneMemory::view() const {
   return {ellipsoids.data(), std::uint32_t(ellipsoids.size()), origins.data(), kernels.data(),
           kernels.size() > 1 ? 1 : 0};
 }
+
+SeenEllipsoids SceneMemory::seen() { return {views.data(), footprints.data(), large.data()}; }
 
 std::size_t BandMemory::bytes() const {
   return bytesOf(counters, counts, ends, entries, sorted, items, partsOfTile, partsDone, closedAt,
@@ -169,8 +172,7 @@ void FieldRenderer::list(const TileFrame& f) {
       cudaMemsetAsync(band_.counts.data(), 0,
                       std::size_t(f.tiles()) * std::size_t(f.bins) * sizeof(std::uint32_t), stream),
       "clearing counts");
-  const SeenEllipsoids seen{scene_.views.data(), scene_.footprints.data()};
-  launchView(f, scene_.view(), seen, band_.lists(), stream);
+  launchView(f, scene_.view(), scene_.seen(), band_.lists(), multiprocessors_, stream);
   launchPlan(f, band_.lists(), stream);
 }
 
@@ -195,8 +197,8 @@ FrameCounters FieldRenderer::drawOnce(const Scene& scene, const TileFrame& f) {
   const cudaStream_t stream = stream_.get();
   begin_.record(stream);
   list(f);
-  const SeenEllipsoids seen{scene_.views.data(), scene_.footprints.data()};
-  launchFill(f, std::uint32_t(scene_.ellipsoids.size()), seen, band_.lists(), stream);
+  launchFill(f, std::uint32_t(scene_.ellipsoids.size()), scene_.seen(), band_.lists(),
+             multiprocessors_, stream);
   listed_.record(stream);
   band_.pixels.setZero();
   launchDraw({.frame = f,

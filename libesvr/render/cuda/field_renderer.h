@@ -23,9 +23,11 @@ struct SceneMemory {
   DeviceBuffer<RayKernel> kernels;
   DeviceBuffer<PrimitiveView> views;
   DeviceBuffer<Footprint> footprints;
+  DeviceBuffer<std::uint32_t> large;
 
   [[nodiscard]] std::size_t bytes() const;
   [[nodiscard]] DeviceEllipsoids view() const;
+  [[nodiscard]] SeenEllipsoids seen();
 };
 
 /// What a band of a picture takes; grows where a band needs more.

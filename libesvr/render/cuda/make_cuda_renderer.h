@@ -9,6 +9,10 @@ namespace esvr::cuda {
 [[nodiscard]] std::unique_ptr<Renderer> makeCudaFieldRenderer(const Field& field,
                                                               const Device& device,
                                                               const RendererLimits& limits);
+/// From bricks. \throws  as above; UsageError: voxels too far apart
+[[nodiscard]] std::unique_ptr<Renderer> makeCudaVolumeRenderer(const SparseVolume& volume,
+                                                               const Device& device,
+                                                               const RendererLimits& limits);
 /// \throws  as above
 [[nodiscard]] std::unique_ptr<Renderer> makeCudaNanoRenderer(const NanoVolume& volume,
                                                              const Device& device,

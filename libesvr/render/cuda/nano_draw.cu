@@ -18,7 +18,7 @@ struct BandPixels {
 
 template <class Build>
 __global__ void __launch_bounds__(kColumns* kRows)
-    nanoKernel(const nanovdb::NanoGrid<Build>* grid, const NanoScene scene, const BandPixels out) {
+    nanoKernel(const nanovdb::NanoGrid<Build>* grid, const MarchScene scene, const BandPixels out) {
   const int column = int(blockIdx.x * kColumns + threadIdx.x);
   const int row = int(blockIdx.y * kRows + threadIdx.y);
   if (column >= out.width || row >= out.rows) return;
@@ -32,7 +32,7 @@ void launchAs(const NanoDrawArguments& a, cudaStream_t stream) {
   const dim3 threads(kColumns, kRows);
   const dim3 blocks((unsigned(a.resolution.width) + kColumns - 1) / kColumns,
                     (unsigned(a.rows) + kRows - 1) / kRows);
-  const NanoScene scene{a.view, a.box, a.step, a.clip, a.rule};
+  const MarchScene scene{a.view, a.box, a.step, a.clip, a.rule};
   nanoKernel<Build>
       <<<blocks, threads, 0, stream>>>(reinterpret_cast<const nanovdb::NanoGrid<Build>*>(a.grid),
                                        scene, {a.resolution.width, a.firstRow, a.rows, a.pixels});

@@ -20,6 +20,11 @@ std::unique_ptr<Renderer> makeCudaFieldRenderer(const Field&, const Device& devi
   refuse(device);
 }
 
+std::unique_ptr<Renderer> makeCudaVolumeRenderer(const SparseVolume&, const Device& device,
+                                                 const RendererLimits&) {
+  refuse(device);
+}
+
 std::unique_ptr<Renderer> makeCudaNanoRenderer(const NanoVolume&, const Device& device,
                                                const RendererLimits&) {
   refuse(device);

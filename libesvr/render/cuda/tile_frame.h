@@ -15,14 +15,15 @@ namespace esvr::cuda {
 /// The numbers by which drawing on CUDA is tuned; none of them decides on more of a picture than
 /// its rounding.
 struct DrawTuning {
-  static constexpr int kTileSide = 16;  ///< pixels
+  static constexpr int kTileSide = 8;  ///< pixels
   static constexpr int kTilePixels = kTileSide * kTileSide;
-  static constexpr int kWarpColumns = 8, kWarpRows = 4;  ///< pixels of a warp
-  static constexpr int kStage = 32;  ///< ellipsoids in shared memory at once: a lane each
+  static constexpr int kGroups = 4;  ///< of threads that share a tile's ellipsoids among them
+  static constexpr int kDrawThreads = kTilePixels * kGroups;
   static constexpr int kBlocksPerMultiprocessor = 4;
   static constexpr int kListThreads = 128;
   /// An ellipsoid in more lists than this is listed by a whole warp.
-  static constexpr int kManyLists = 64;
+  static constexpr int kManyLists = 24;
+  static constexpr int kListBlocksPerMultiprocessor = 8;
   /// Work begins with the tiles of the longest lists; their lengths are told apart by powers of 2.
   static constexpr int kLengthClasses = 12;
   static constexpr int kMostParts = 16;  ///< of the depth
@@ -63,7 +64,8 @@ struct FrameCounters {
   std::uint32_t occupiedTiles;
   std::uint32_t longestTile;  ///< entries of a tile's lists, at most
   std::uint32_t longestBin;
-  std::uint32_t next;  ///< item to draw
+  std::uint32_t next;   ///< item to draw
+  std::uint32_t large;  ///< ellipsoids in many lists
 };
 
 /// Device memory, borrowed.
@@ -87,7 +89,7 @@ inline constexpr std::uint32_t kNoResult = 0xffffffffu;
 
 /// Only lists longer than a block are sorted in memory; there they lie where their entries do.
 ESVR_HD inline bool needSorting(const FrameCounters& c) {
-  return c.longestBin > std::uint32_t(DrawTuning::kTilePixels);
+  return c.longestBin > std::uint32_t(DrawTuning::kDrawThreads);
 }
 /// Whether the room is enough for what a frame counted.
 ESVR_HD inline bool listsFit(const FrameCounters& c, const TileLists& lists) {
@@ -107,17 +109,20 @@ struct DeviceEllipsoids {
 struct SeenEllipsoids {
   PrimitiveView* views;
   Footprint* footprints;
+  std::uint32_t* large;  ///< numbers of those in many lists, in any order
 };
 
 /// Looks at the ellipsoids and counts the entries of lists. `lists.counts` and the counters are
 /// zero before.
+/// \param multiprocessors  of the device
 void launchView(const TileFrame& frame, const DeviceEllipsoids& ellipsoids,
-                const SeenEllipsoids& seen, const TileLists& lists, cudaStream_t stream);
+                const SeenEllipsoids& seen, const TileLists& lists, int multiprocessors,
+                cudaStream_t stream);
 /// Finds room for each list and orders the work.
 void launchPlan(const TileFrame& frame, const TileLists& lists, cudaStream_t stream);
 /// Does nothing where entries exceed the capacity.
 void launchFill(const TileFrame& frame, std::uint32_t count, const SeenEllipsoids& seen,
-                const TileLists& lists, cudaStream_t stream);
+                const TileLists& lists, int multiprocessors, cudaStream_t stream);
 
 struct DrawArguments {
   TileFrame frame;

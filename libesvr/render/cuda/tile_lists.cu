@@ -15,6 +15,10 @@ unsigned blocksOf(std::size_t items) {
   return unsigned((items + DrawTuning::kListThreads - 1) / DrawTuning::kListThreads);
 }
 
+unsigned largeBlocks(int multiprocessors) {
+  return unsigned(multiprocessors * DrawTuning::kListBlocksPerMultiprocessor);
+}
+
 __device__ ScreenEllipse outlineIn(const Footprint& p) {
   return {p.column, p.row, double(p.xx), double(p.xy), double(p.yy), p.everywhere != 0};
 }
@@ -70,19 +74,31 @@ __device__ __noinline__ Columns binsIn(const TileFrame& frame, const Footprint& 
           int(min(bins.last, last) - frame.firstBin)};
 }
 
+/// The tiles of the band that an ellipsoid's bounds meet.
+struct TileRectangle {
+  int firstColumn, columns, firstRow, rows;
+};
+__device__ TileRectangle tilesOf(const TileFrame& frame, const Footprint& p) {
+  const int firstRow = max(p.firstRow / kSide, frame.firstTileRow);
+  const int lastRow = min(p.lastRow / kSide, frame.firstTileRow + frame.tileRows - 1);
+  const int firstColumn = p.firstColumn / kSide;
+  return {firstColumn, p.lastColumn / kSide - firstColumn + 1, firstRow, lastRow - firstRow + 1};
+}
+
 /// Calls visit(number of the tile times bins + bin) for each list that an ellipsoid belongs to.
 template <class Visit>
 __device__ void visitLists(const TileFrame& frame, const Footprint& p, Lanes lanes, Visit&& visit) {
-  const int lastTileRow = min(p.lastRow / kSide, frame.firstTileRow + frame.tileRows - 1);
-  for (int row = max(p.firstRow / kSide, frame.firstTileRow); row <= lastTileRow; ++row) {
+  const TileRectangle tiles = tilesOf(frame, p);
+  for (int t = lanes.lane; t < tiles.rows * tiles.columns; t += lanes.count) {
+    const int row = tiles.firstRow + t / tiles.columns;
+    const int column = tiles.firstColumn + t % tiles.columns;
     const Columns columns = columnsIn(frame, p, row);
-    if (columns.first > columns.last) continue;
-    for (int column = columns.first / kSide + lanes.lane; column <= columns.last / kSide;
-         column += lanes.count) {
-      const int tile = (row - frame.firstTileRow) * frame.tileColumns + column;
-      const Columns bins = binsIn(frame, p, column, row);
-      for (int bin = bins.first; bin <= bins.last; ++bin) visit(tile * frame.bins + bin);
-    }
+    if (columns.first > min(columns.last, column * kSide + kSide - 1) ||
+        columns.last < column * kSide)
+      continue;
+    const int tile = (row - frame.firstTileRow) * frame.tileColumns + column;
+    const Columns bins = binsIn(frame, p, column, row);
+    for (int bin = bins.first; bin <= bins.last; ++bin) visit(tile * frame.bins + bin);
   }
 }
 
@@ -92,26 +108,18 @@ __device__ bool isSeen(const TileFrame& frame, const Footprint& p) {
 }
 
 __device__ bool inManyLists(const TileFrame& frame, const Footprint& p) {
-  const int columns = p.lastColumn / kSide - p.firstColumn / kSide + 1;
-  const int rows = p.lastRow / kSide - p.firstRow / kSide + 1;
+  const TileRectangle tiles = tilesOf(frame, p);
   const float bins = (p.farthest - p.nearest) / float(frame.step * kBinSamples) + 1.0f;
-  return float(columns) * float(rows) * bins > float(DrawTuning::kManyLists);
+  return float(tiles.columns) * float(tiles.rows) * bins > float(DrawTuning::kManyLists);
 }
 
-/// A thread an ellipsoid; those in many lists by the warp together. All lanes call it; `seen` of
-/// other lanes must be in `footprints` before.
+/// Calls visit(ellipsoid) in all lanes of a warp for each ellipsoid that is in many lists.
 template <class Visit>
-__device__ void visitByWarp(const TileFrame& frame, const Footprint* footprints, std::uint32_t i,
-                            bool seen, Visit&& visit) {
-  Footprint own{};
-  if (seen) own = footprints[i];
-  const bool many = seen && inManyLists(frame, own);
-  if (seen && !many) visitLists(frame, own, {0, 1}, [&](int list) { visit(list, i); });
-  const int lane = int(threadIdx.x) % kWarp;
-  for (unsigned left = __ballot_sync(kAllLanes, many); left != 0; left &= left - 1) {
-    const std::uint32_t other = __shfl_sync(kAllLanes, i, __ffs(int(left)) - 1);
-    visitLists(frame, footprints[other], {lane, kWarp}, [&](int list) { visit(list, other); });
-  }
+__device__ void visitLarge(const FrameCounters& counters, const std::uint32_t* large,
+                           Visit&& visit) {
+  const std::uint32_t warps = gridDim.x * blockDim.x / kWarp;
+  std::uint32_t i = (blockIdx.x * blockDim.x + threadIdx.x) / kWarp;
+  for (; i < counters.large; i += warps) visit(large[i]);
 }
 
 __device__ bool look(const TileFrame& frame, const DeviceEllipsoids& all, const SeenEllipsoids& out,
@@ -133,23 +141,45 @@ __device__ bool look(const TileFrame& frame, const DeviceEllipsoids& all, const 
 
 __global__ void __launch_bounds__(DrawTuning::kListThreads)
     viewKernel(const TileFrame frame, const DeviceEllipsoids all, const SeenEllipsoids out,
-               std::uint32_t* counts) {
+               const TileLists lists) {
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
-  const bool seen = i < all.count && look(frame, all, out, i);
-  __syncwarp();  // lanes read each other's footprints
-  visitByWarp(frame, out.footprints, i, seen,
-              [&](int list, std::uint32_t) { atomicAdd(&counts[list], 1u); });
+  if (i >= all.count || !look(frame, all, out, i)) return;
+  const Footprint own = out.footprints[i];
+  if (inManyLists(frame, own))
+    out.large[atomicAdd(&lists.counters->large, 1u)] = i;
+  else
+    visitLists(frame, own, {0, 1}, [&](int list) { atomicAdd(&lists.counts[list], 1u); });
 }
 
 __global__ void __launch_bounds__(DrawTuning::kListThreads)
-    fillKernel(const TileFrame frame, std::uint32_t count, const Footprint* footprints,
+    countLargeKernel(const TileFrame frame, const SeenEllipsoids seen, const TileLists lists) {
+  visitLarge(*lists.counters, seen.large, [&](std::uint32_t ellipsoid) {
+    visitLists(frame, seen.footprints[ellipsoid], {int(threadIdx.x) % kWarp, kWarp},
+               [&](int list) { atomicAdd(&lists.counts[list], 1u); });
+  });
+}
+
+__device__ void enter(const TileLists& lists, int list, std::uint32_t ellipsoid) {
+  const std::uint32_t at = atomicAdd(&lists.ends[list], 1u);
+  if (at < lists.entryCapacity) lists.entries[at] = ellipsoid;
+}
+
+__global__ void __launch_bounds__(DrawTuning::kListThreads)
+    fillKernel(const TileFrame frame, std::uint32_t count, const SeenEllipsoids seen,
                const TileLists lists) {
-  if (lists.counters->pairs > lists.entryCapacity) return;
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
-  const bool seen = i < count && isSeen(frame, footprints[i]);
-  visitByWarp(frame, footprints, i, seen, [&](int list, std::uint32_t ellipsoid) {
-    const std::uint32_t at = atomicAdd(&lists.ends[list], 1u);
-    if (at < lists.entryCapacity) lists.entries[at] = ellipsoid;
+  if (i >= count || lists.counters->pairs > lists.entryCapacity) return;
+  const Footprint own = seen.footprints[i];
+  if (isSeen(frame, own) && !inManyLists(frame, own))
+    visitLists(frame, own, {0, 1}, [&](int list) { enter(lists, list, i); });
+}
+
+__global__ void __launch_bounds__(DrawTuning::kListThreads)
+    fillLargeKernel(const TileFrame frame, const SeenEllipsoids seen, const TileLists lists) {
+  if (lists.counters->pairs > lists.entryCapacity) return;
+  visitLarge(*lists.counters, seen.large, [&](std::uint32_t ellipsoid) {
+    visitLists(frame, seen.footprints[ellipsoid], {int(threadIdx.x) % kWarp, kWarp},
+               [&](int list) { enter(lists, list, ellipsoid); });
   });
 }
 
@@ -246,11 +276,15 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
 }  // namespace
 
 void launchView(const TileFrame& frame, const DeviceEllipsoids& ellipsoids,
-                const SeenEllipsoids& seen, const TileLists& lists, cudaStream_t stream) {
+                const SeenEllipsoids& seen, const TileLists& lists, int multiprocessors,
+                cudaStream_t stream) {
   if (ellipsoids.count == 0) return;
-  viewKernel<<<blocksOf(ellipsoids.count), DrawTuning::kListThreads, 0, stream>>>(
-      frame, ellipsoids, seen, lists.counts);
+  viewKernel<<<blocksOf(ellipsoids.count), DrawTuning::kListThreads, 0, stream>>>(frame, ellipsoids,
+                                                                                  seen, lists);
   check(cudaGetLastError(), "looking at ellipsoids");
+  countLargeKernel<<<largeBlocks(multiprocessors), DrawTuning::kListThreads, 0, stream>>>(
+      frame, seen, lists);
+  check(cudaGetLastError(), "counting the lists of large ellipsoids");
 }
 
 void launchPlan(const TileFrame& frame, const TileLists& lists, cudaStream_t stream) {
@@ -260,11 +294,13 @@ void launchPlan(const TileFrame& frame, const TileLists& lists, cudaStream_t str
 }
 
 void launchFill(const TileFrame& frame, std::uint32_t count, const SeenEllipsoids& seen,
-                const TileLists& lists, cudaStream_t stream) {
+                const TileLists& lists, int multiprocessors, cudaStream_t stream) {
   if (count == 0) return;
-  fillKernel<<<blocksOf(count), DrawTuning::kListThreads, 0, stream>>>(frame, count,
-                                                                       seen.footprints, lists);
+  fillKernel<<<blocksOf(count), DrawTuning::kListThreads, 0, stream>>>(frame, count, seen, lists);
   check(cudaGetLastError(), "listing ellipsoids");
+  fillLargeKernel<<<largeBlocks(multiprocessors), DrawTuning::kListThreads, 0, stream>>>(
+      frame, seen, lists);
+  check(cudaGetLastError(), "listing large ellipsoids");
 }
 
 }  // namespace esvr::cuda

@@ -1,0 +1,135 @@
+#include "render/brick_atlas.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+
+#include "esvr/error.h"
+#include "field/brick_index.h"
+
+namespace esvr {
+namespace {
+
+constexpr double kMostBlocks = double(1 << 28);  // 1 GB
+
+Coord above(int corner) { return {corner >> 2, (corner >> 1) & 1, corner & 1}; }
+
+/// Bricks some cell of which has a voxel in a brick of the volume.
+std::vector<Coord> candidates(const SparseVolume& volume) {
+  std::vector<Coord> bricks;
+  bricks.reserve(8 * volume.bricks.size());
+  for (const Coord brick : volume.bricks)
+    for (int corner = 0; corner < 8; ++corner) bricks.push_back(brick - above(corner));
+  std::sort(bricks.begin(), bricks.end());
+  bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
+  return bricks;
+}
+
+class CellReader {
+ public:
+  explicit CellReader(const SparseVolume& volume) : volume_(volume), index_(volume.bricks) {}
+
+  /// The voxels at the corners of a brick's cells. \return false where all are the background
+  bool read(Coord brick, float* values) const {
+    std::array<const float*, 8> from{};
+    for (int c = 0; c < 8; ++c) from[c] = find(brick + above(c));
+    bool any = false;
+    for (int x = 0; x < kCellBrickSide; ++x)
+      for (int y = 0; y < kCellBrickSide; ++y)
+        for (int z = 0; z < kCellBrickSide; ++z) {
+          const float v = value(from, {x, y, z});
+          any |= v != volume_.background;
+          *values++ = v;
+        }
+    return any;
+  }
+
+ private:
+  [[nodiscard]] const float* find(Coord brick) const {
+    const std::uint32_t at = index_.find(brick);
+    return at == BrickIndex::kNone ? nullptr : volume_.brickValues(at).data();
+  }
+  [[nodiscard]] float value(const std::array<const float*, 8>& from, Coord at) const {
+    const Coord step = brickOf(at);
+    const float* values = from[std::size_t(step.x << 2 | step.y << 1 | step.z)];
+    return values == nullptr ? volume_.background : values[voxelOffset(localOf(at))];
+  }
+
+  const SparseVolume& volume_;
+  const BrickIndex index_;
+};
+
+/// Those of the candidates that show anything.
+std::vector<Coord> occupied(const CellReader& reader, const std::vector<Coord>& all) {
+  std::vector<char> any(all.size());
+  tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
+    std::array<float, kCellBrickVoxels> values;
+    any[i] = reader.read(all[i], values.data()) ? 1 : 0;
+  });
+  std::vector<Coord> bricks;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (any[i] != 0) bricks.push_back(all[i]);
+  return bricks;
+}
+
+/// Floor division.
+Coord blockOf(Coord brick) {
+  static_assert(kBlockBricks == 8);
+  return {brick.x >> 3, brick.y >> 3, brick.z >> 3};
+}
+
+std::size_t offsetIn(Coord size, Coord at) {
+  return (std::size_t(at.x) * std::size_t(size.y) + std::size_t(at.y)) * std::size_t(size.z) +
+         std::size_t(at.z);
+}
+
+/// Numbers blocks and bricks in the order of the bricks.
+void index(BrickAtlas& atlas) {
+  const Coord bricks{kBlockBricks, kBlockBricks, kBlockBricks};
+  const double blocks = double(atlas.blocks.x) * atlas.blocks.y * atlas.blocks.z;
+  if (blocks > kMostBlocks)
+    throw UsageError("the voxels lie too far apart to be drawn from bricks");
+  atlas.blockOf.assign(std::size_t(blocks), kNoCells);
+  for (std::uint32_t i = 0; i < atlas.bricks.size(); ++i) {
+    const Coord block = blockOf(atlas.bricks[i]);
+    std::uint32_t& number = atlas.blockOf[offsetIn(atlas.blocks, block)];
+    if (number == kNoCells) {
+      number = std::uint32_t(atlas.brickOf.size() / kBricksOfBlock);
+      atlas.brickOf.resize(atlas.brickOf.size() + kBricksOfBlock, kNoCells);
+    }
+    const Coord within = atlas.bricks[i] - block * kBlockBricks;
+    atlas.brickOf[std::size_t(number) * kBricksOfBlock + offsetIn(bricks, within)] = i;
+  }
+}
+
+}  // namespace
+
+BrickAtlas makeBrickAtlas(const SparseVolume& volume) {
+  const CellReader reader(volume);
+  BrickAtlas atlas;
+  atlas.bricks = occupied(reader, candidates(volume));
+  Box blocks;
+  for (const Coord brick : atlas.bricks) blocks.expand(blockOf(brick));
+  if (atlas.bricks.empty()) return atlas;
+  atlas.values.resize(atlas.bricks.size() * kCellBrickVoxels);
+  tbb::parallel_for(std::size_t(0), atlas.bricks.size(), [&](std::size_t i) {
+    (void)reader.read(atlas.bricks[i], &atlas.values[i * kCellBrickVoxels]);
+  });
+  for (Coord& brick : atlas.bricks) brick = brick - blocks.min * kBlockBricks;
+  atlas.origin = volume.origin + blocks.min * kBlockSide;
+  atlas.blocks = blocks.max - blocks.min + Coord{1, 1, 1};
+  index(atlas);
+  return atlas;
+}
+
+PlaceBox cellsOf(const BrickAtlas& atlas) {
+  Box box;
+  for (const Coord brick : atlas.bricks) box.expand(brick);
+  if (box.empty()) return {{1.0, 1.0, 1.0}, {0.0, 0.0, 0.0}};
+  const Coord low = box.min * kBrickSide, high = (box.max + Coord{1, 1, 1}) * kBrickSide;
+  return {{double(low.x), double(low.y), double(low.z)},
+          {double(high.x), double(high.y), double(high.z)}};
+}
+
+}  // namespace esvr

@@ -1,0 +1,71 @@
+#include "render/cuda/march_renderer.h"
+
+#include <algorithm>
+#include <string>
+
+#include "core/cuda/use_device.h"
+#include "esvr/error.h"
+#include "render/picture.h"
+
+namespace esvr::cuda {
+namespace {
+
+Stream streamOn(const Device& device) {
+  useDevice(device);
+  return Stream();
+}
+
+}  // namespace
+
+MarchRenderer::MarchRenderer(const Device& device, const RendererLimits& limits)
+    : limits_(limits), stream_(streamOn(device)) {}
+
+Image MarchRenderer::draw(const RenderOptions& options) {
+  Image image{options.resolution.width, options.resolution.height, {}};
+  drawFrame(options, &image);
+  return image;
+}
+
+void MarchRenderer::drawFrame(const RenderOptions& options, Image* image) {
+  checkRenderOptions(options);
+  if (image != nullptr)
+    image->rgba.assign(std::size_t(4) * std::size_t(image->width) * std::size_t(image->height),
+                       0.0f);
+  stats_ = {.deviceBytes = stats_.deviceBytes};
+  table_.update(options, stream_.get());
+  const int rows = rowsOfBand(options.resolution);
+  for (int first = 0; first < options.resolution.height; first += rows)
+    drawBand(options, {first, std::min(rows, options.resolution.height - first)}, image);
+}
+
+int MarchRenderer::rowsOfBand(Resolution r) const {
+  if (limits_.maxBytes == 0) return r.height;
+  const std::size_t fixed = contentBytes() + table_.bytes();
+  const std::size_t ofRow = std::size_t(r.width) * sizeof(float4) + bytesOfRow(r);
+  if (fixed + ofRow * kBandRows > limits_.maxBytes)
+    throw DeviceError("marching voxels on the GPU needs more than " +
+                      std::to_string(limits_.maxBytes) + " bytes");
+  const std::uint64_t rows = (limits_.maxBytes - fixed) / ofRow / kBandRows * kBandRows;
+  return int(std::min<std::uint64_t>(rows, std::uint64_t(r.height)));
+}
+
+void MarchRenderer::drawBand(const RenderOptions& o, Band band, Image* image) {
+  checkCancelled(o);
+  const std::size_t width = std::size_t(o.resolution.width);
+  const std::size_t count = std::size_t(band.rows) * width;
+  atLeast(pixels_, count, stream());
+  begin_.record(stream());
+  pixels_.setZero();
+  launch(o, band, pixels_.data());
+  drawn_.record(stream());
+  if (image != nullptr)
+    check(cudaMemcpyAsync(&image->rgba[4 * std::size_t(band.firstRow) * width], pixels_.data(),
+                          count * sizeof(float4), cudaMemcpyDeviceToHost, stream()),
+          "copying a picture from the device");
+  stream_.synchronize();
+  stats_.drawMs += drawn_.since(begin_);
+  stats_.deviceBytes = std::max<std::uint64_t>(stats_.deviceBytes,
+                                               contentBytes() + table_.bytes() + pixels_.bytes());
+}
+
+}  // namespace esvr::cuda

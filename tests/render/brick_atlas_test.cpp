@@ -1,0 +1,94 @@
+// Plan: marching through bricks of cells against renderVolume, which looks at the same voxels
+// through their neighbours. Places are float32 here: 1e-5 voxel off, so that a sample now and then
+// falls into the next cell, of nearly the same value. Bricks apart, touching, at negative places,
+// and blocks that are not there in between.
+#include "render/brick_atlas.h"
+
+#include <gtest/gtest.h>
+
+#include "esvr/error.h"
+#include "esvr/field.h"
+#include "field/random_field.h"
+#include "render/picture.h"
+#include "render/reference_picture.h"
+
+namespace esvr::test {
+namespace {
+
+SparseVolume volumeAt(const std::vector<Coord>& corners, float background = 0.0f) {
+  Random random(5);
+  std::vector<BrickInput> bricks;
+  for (const Coord corner : corners) {
+    BrickInput brick{corner, {}, {}};
+    for (float& v : brick.values) v = float(random(0.0, 1.0));
+    brick.active.setAll();
+    bricks.push_back(brick);
+  }
+  return makeVolume(std::move(bricks), background);
+}
+
+RenderOptions optionsFor(const SparseVolume& volume, const CameraWish& wish = {}) {
+  RenderOptions o;
+  o.resolution = {45, 38};
+  o.camera = fitCamera(activeBox(volume), wish, o.resolution);
+  o.transfer = {builtInColorMap("turbo"), builtInOpacity("linear")};
+  o.opacityLength = 10.0;
+  return o;
+}
+
+Image marched(const SparseVolume& volume, const RenderOptions& o) {
+  const BrickAtlas atlas = makeBrickAtlas(volume);
+  Picture picture(o);
+  View view = picture.view;
+  view.eye = difference(view.eye,
+                        {double(atlas.origin.x), double(atlas.origin.y), double(atlas.origin.z)});
+  const MarchScene scene{view, cellsOf(atlas), o.step, clipOf(o),
+                         sampleRule(o, picture.table.view(), volume.background)};
+  for (int row = 0; row < o.resolution.height; ++row)
+    for (int column = 0; column < o.resolution.width; ++column)
+      picture.set(column, row, marchBricks(atlas.view(), scene, column, row, SampleRange::all()));
+  return picture.take();
+}
+
+void expectTheVolumesPicture(const SparseVolume& volume, const CameraWish& wish = {}) {
+  for (const double step : {0.4, 1.0, 3.0}) {
+    RenderOptions o = optionsFor(volume, wish);
+    o.step = step;
+    EXPECT_LE(largestDifference(marched(volume, o), renderVolume(volume, o)), 1e-3) << step;
+  }
+}
+
+TEST(BrickAtlas, MarchesToTheVolumesPicture) {
+  const auto volume = volumeAt({{0, 0, 0}, {0, 0, 8}, {8, 8, 8}, {40, 0, 16}, {-16, 40, -32}});
+  expectTheVolumesPicture(volume);
+  expectTheVolumesPicture(volume, {.projection = Projection::kOrthographic});
+  expectTheVolumesPicture(volume,
+                          {.eye = Vec3{9, 10, 11}, .center = Vec3{40, 12, 20}, .fov = 90.0});
+}
+
+TEST(BrickAtlas, StepsOverBlocksThatAreNotThere) {
+  expectTheVolumesPicture(volumeAt({{0, 0, 0}, {700, 8, 16}, {704, 8, 16}, {344, -640, 0}}));
+}
+
+TEST(BrickAtlas, KnowsItsBackground) {
+  expectTheVolumesPicture(volumeAt({{0, 0, 0}, {16, 0, 0}}, 0.25f));
+}
+
+TEST(BrickAtlas, HoldsEveryCellThatShowsAnythingAndNoOthers) {
+  SparseVolume volume = volumeAt({{0, 0, 0}});
+  EXPECT_EQ(makeBrickAtlas(volume).bricks.size(), 8u) << "cells reach one voxel below";
+  std::fill(volume.values.begin(), volume.values.end(), 0.0f);
+  volume.values[std::size_t(voxelOffset({3, 3, 3}))] = 1.0f;
+  EXPECT_EQ(makeBrickAtlas(volume).bricks.size(), 1u);
+  volume.values[std::size_t(voxelOffset({0, 3, 3}))] = 1.0f;
+  EXPECT_EQ(makeBrickAtlas(volume).bricks.size(), 2u);
+  EXPECT_TRUE(makeBrickAtlas(SparseVolume{}).bricks.empty());
+}
+
+TEST(BrickAtlas, RefusesVoxelsTooFarApart) {
+  const auto volume = volumeAt({{0, 0, 0}, {1 << 20, 1 << 20, 1 << 20}});
+  EXPECT_THROW((void)makeBrickAtlas(volume), UsageError);
+}
+
+}  // namespace
+}  // namespace esvr::test
