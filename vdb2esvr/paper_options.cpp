@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "cli/choice.h"
+#include "cli/number_list.h"
 #include "cli/table.h"
 
 namespace esvr::vdb2esvr {
@@ -59,6 +60,19 @@ void readDensify(const Arguments& a, PaperMethod& method) {
     method.densifyEvery = std::uint32_t(*n);
 }
 
+/// Position, scale, rotation and intensity.
+void readRates(const Arguments& a, PaperRates& rates) {
+  const auto given = a.find<std::string>("rates");
+  if (!given) return;
+  const auto numbers = cli::parseNumbers("rates", *given, 4);
+  for (const double rate : numbers)
+    cli::requireRange("rates", rate, 0.0, std::numeric_limits<double>::max());
+  rates.position = numbers[0];
+  rates.scale = numbers[1];
+  rates.rotation = numbers[2];
+  rates.intensity = numbers[3];
+}
+
 void readPrune(const Arguments& a, PaperMethod& method) {
   const auto passes = a.get<std::string>("prune-passes");
   if (passes == "3")
@@ -85,6 +99,7 @@ PaperMethod readMethod(const Arguments& a) {
   if (const auto epochs = whole(a, "epochs", 1, kMostEpochs))
     method = scaledTo(method, std::uint32_t(*epochs));
   readDensify(a, method);
+  readRates(a, method.rates);
   if (const auto n = whole(a, "points", 1, kMostPrimitives)) method.points = std::size_t(*n);
   if (const auto n = whole(a, "most", 1, kMostPrimitives)) method.most = std::size_t(*n);
   if (const auto n = whole(a, "subvolume", 1, kMostSide)) method.subvolume = int(*n);
@@ -100,6 +115,13 @@ std::string givenWithout(const Arguments& a) {
     if (!given.empty() && !given.defaulted()) return option->long_name();
   }
   return {};
+}
+
+std::string ratesText(const PaperRates& rates) {
+  std::string text;
+  for (const double rate : {rates.position, rates.scale, rates.rotation, rates.intensity})
+    text += (text.empty() ? "" : ",") + cli::shortNumber(rate);
+  return text;
 }
 
 }  // namespace
@@ -121,6 +143,9 @@ cli::po::options_description paperOptions() {
     ("sharpness", value<std::string>()->value_name("K"),
      ("k of the ellipsoids, or 'learned' for each (default: " + cli::shortNumber(m.k) +
       ")").c_str())
+    ("rates", value<std::string>()->value_name("P,S,R,I"),
+     ("first learning rates of position, scale, rotation, intensity (default: " +
+      ratesText(m.rates) + "), which end at a tenth").c_str())
     ("no-densify", bool_switch(), "neither clone nor split")
     ("densify-threshold", value<double>()->value_name("G"),
      ("gradient by position from which they do (default: " +

@@ -8,8 +8,8 @@
 Runs `vdb2esvr --preset paper` in its variants on aneurism and on the paper's five synthetic volumes
 (esvr-sample), and the default fit with as many ellipsoids. FPS of the paper's tables stands on other
 hardware and another renderer; average hits, of which it is a function, are measured in its place.
---epochs shortens every run by the same factor; --jobs runs several at once, whose seconds are then not
-to be quoted.
+--epochs shortens every run by the same factor; its default is the paper's own length. --jobs runs
+several at once, whose seconds are then not to be quoted.
 """
 import argparse
 import concurrent.futures
@@ -74,7 +74,6 @@ def variants(arguments, name):
         yield f"score {score}", paper(arguments, "--prune-score", score)
     yield "k 3", paper(arguments, "--sharpness", "3")
     yield "k learned", paper(arguments, "--sharpness", "learned")
-    yield "score full in three passes", paper(arguments, "--prune-passes", "3")
 
 
 def measure(arguments, job):
@@ -89,9 +88,13 @@ def measure(arguments, job):
     return {"volume": name, "run": key, "grid": grid, "process": report["process"]}
 
 
-def all_of(arguments, jobs):
+def all_of(arguments, jobs, rows):
+    """Appends to the rows, and saves what there is after each: a run may be cut short."""
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        return list(pool.map(lambda job: measure(arguments, job), jobs))
+        for row in pool.map(lambda job: measure(arguments, job), jobs):
+            rows.append(row)
+            save(arguments, "paper_tables.json", {"epochs": arguments.epochs, "rows": rows,
+                                                  "resolution": arguments.resolution})
 
 
 def pruned(rows, name):
@@ -101,27 +104,30 @@ def pruned(rows, name):
 
 
 def second_jobs(arguments, found, rows):
-    """Runs that want as many ellipsoids as others left: the default fit, and no pruning at all."""
+    """Runs that want as many ellipsoids as others left: the default fit, three passes, and no pruning
+    at all, from half as many points."""
     for name, (source, box) in found.items():
         count = pruned(rows, name)
         yield name, "default", source, box, ["--count", count, "--storage", "float32", "--hits"]
         if name in arguments.ablate:
+            yield (name, "score full in three passes", source, box,
+                   paper(arguments, "--prune-passes", "3", "--count", count))
             yield (name, "score none", source, box,
-                   paper(arguments, "--prune-passes", "0", "--points", max(1, count // 2),
-                         "--count", count, "--densify-threshold", "0"))
+                   ["--preset", "paper", "--epochs", arguments.epochs, "--hits", "--prune-passes",
+                    "0", "--points", max(1, count // 2), "--count", count, "--densify-threshold",
+                    "0"])
 
 
 def measure_all(arguments):
     found = sources(arguments)
     jobs = [(name, key, source, box, options) for name, (source, box) in found.items()
             for key, options in variants(arguments, name)]
-    rows = all_of(arguments, jobs)
-    rows += all_of(arguments, list(second_jobs(arguments, found, rows)))
-    save(arguments, "paper_tables.json", {"epochs": arguments.epochs, "rows": rows,
-                                          "resolution": arguments.resolution})
+    rows = []
+    all_of(arguments, jobs, rows)
+    all_of(arguments, list(second_jobs(arguments, found, rows)), rows)
+    print_tables(arguments)
     if arguments.curves:
         measure_curves(arguments)
-    print_tables(arguments)
 
 
 def measure_curves(arguments):
@@ -131,11 +137,12 @@ def measure_curves(arguments):
         box = whole(256) if name == "aneurism" else []
         source = arguments.data / f"{name}.vdb"
         rows.append(measure(arguments, (name, "curve paper", source, box,
-                                        ["--preset", "paper", "--epochs", arguments.epochs])))
+                                        ["--preset", "paper", "--epochs",
+                                         arguments.curve_epochs, *arguments.paper])))
         count = rows[-1]["grid"]["primitives"]
         rows.append(measure(arguments, (name, "curve default", source, box,
                                         ["--count", count, "--storage", "float32"])))
-    save(arguments, "paper_curves.json", rows)
+        save(arguments, "paper_curves.json", rows)
 
 
 def save(arguments, name, content):
@@ -239,6 +246,7 @@ def main():
     parser.add_argument("--paper", type=shlex.split, default=[], metavar="OPTIONS",
                         help="more options of the paper's method, in one word")
     parser.add_argument("--curves", action="store_true", help="and error against time")
+    parser.add_argument("--curve-epochs", type=int, default=PAPER_EPOCHS)
     parser.add_argument("--jobs", type=int, default=1)
     arguments = parser.parse_args()
     if arguments.what == "run" and not arguments.data:

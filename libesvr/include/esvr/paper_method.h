@@ -56,8 +56,10 @@ struct PaperMethod {
   bool densify = true;
   std::uint32_t densifyFrom = 16, densifyUntil = 400, densifyEvery = 4;  ///< epochs
   /// Mean length of the loss's derivative by position, in units of half the longest axis, from
-  /// which a primitive is cloned or split.
-  double gradientThreshold = 2.5e-9;
+  /// which a primitive is cloned or split. The paper's 2.5e-9 is in units that it does not give:
+  /// here nearly all primitives exceed it. With this one Aneurysm's number stays about that of the
+  /// points, as in the paper.
+  double gradientThreshold = 1e-3;
   double percentDense = 0.008;   ///< of half the longest axis: larger scales are split
   std::size_t most = 1'000'000;  ///< primitives: no more are added
 
