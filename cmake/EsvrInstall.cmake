@@ -22,6 +22,11 @@ if(ESVR_WITH_CUDA)
 else()
   set(ESVR_CUDA_IN FALSE)
 endif()
+if(ESVR_WITH_ZFP)
+  set(ESVR_ZFP_IN TRUE)
+else()
+  set(ESVR_ZFP_IN FALSE)
+endif()
 configure_package_config_file(cmake/esvrConfig.cmake.in ${PROJECT_BINARY_DIR}/esvrConfig.cmake
                               INSTALL_DESTINATION ${packageDir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/esvrConfigVersion.cmake
@@ -33,7 +38,7 @@ install(
   DESTINATION ${packageDir}
   COMPONENT library)
 
-foreach(program vdb2esvr esvr2vdb esvr-render esvr-sample swc2vdb raw2vdb)
+foreach(program vdb2esvr esvr2vdb esvr-render esvr-compare esvr-sample swc2vdb raw2vdb)
   if(TARGET ${program})
     install(TARGETS ${program} COMPONENT programs)
   endif()

@@ -1,13 +1,12 @@
 #include "vdb2esvr/options.h"
 
-#include <cmath>
-#include <cstdlib>
 #include <limits>
 
 #include "cli/box_option.h"
 #include "cli/byte_size.h"
 #include "cli/choice.h"
 #include "cli/command_line.h"
+#include "cli/error_bound.h"
 #include "cli/table.h"
 #include "vdb2esvr/paper_options.h"
 
@@ -176,13 +175,9 @@ Storage storageOfPaper(const Arguments& a, const PaperMethod& method) {
 
 /// "0.01", or "1%" of the range of values.
 void readBound(const std::string& text, VoxelDemand& demand) {
-  char* end = nullptr;
-  demand.bound = std::strtod(text.c_str(), &end);
-  demand.relative = std::string(end) == "%";
-  if (demand.relative) demand.bound /= 100.0;
-  const bool number = end != text.c_str() && (*end == '\0' || demand.relative);
-  if (!number || !(demand.bound > 0.0 && std::isfinite(demand.bound)))
-    throw UsageError("--max-error must be a number above 0 such as 0.01 or 1%, not '" + text + "'");
+  const cli::ErrorBound bound = cli::parseErrorBound("max-error", text);
+  demand.bound = bound.amount;
+  demand.relative = bound.relative;
 }
 
 void readVoxels(const Arguments& a, Options& options) {

@@ -48,7 +48,8 @@ void appendSection(std::ostream& out, const char* title, const std::string& text
 CommandLine::CommandLine(ProgramText text)
     : text_(std::move(text)),
       own_("Options", kLineLength, kMinDescriptionLength),
-      common_(commonOptions()) {}
+      common_(commonOptions()),
+      rest_(kRest) {}
 
 void CommandLine::argument(const std::string& name, const std::string& shown) {
   arguments_.push_back({name, shown, true});
@@ -57,6 +58,8 @@ void CommandLine::argument(const std::string& name, const std::string& shown) {
 void CommandLine::optionalArgument(const std::string& name, const std::string& shown) {
   arguments_.push_back({name, shown, false});
 }
+
+void CommandLine::repeatedArgument(const std::string& name) { rest_ = name; }
 
 std::string CommandLine::helpText() const {
   std::ostringstream out;
@@ -78,8 +81,8 @@ po::variables_map CommandLine::parseValues(int argc, const char* const* argv) co
     hidden.add_options()(argument.name.c_str(), po::value<std::string>());
     places.add(argument.name.c_str(), 1);
   }
-  hidden.add_options()(kRest, po::value<std::vector<std::string>>());
-  places.add(kRest, -1);
+  hidden.add_options()(rest_.c_str(), po::value<std::vector<std::string>>());
+  places.add(rest_.c_str(), -1);
   all.add(own_).add(common_).add(hidden);
 
   po::variables_map values;

@@ -61,6 +61,8 @@ class CommandLine {
   void argument(const std::string& name, const std::string& shown);
   /// The same for one that may be left out; those come last.
   void optionalArgument(const std::string& name, const std::string& shown);
+  /// All arguments behind those; the value is a std::vector<std::string>.
+  void repeatedArgument(const std::string& name);
 
   /// \return nothing where --help or --version was printed to stdout
   /// \throws UsageError  what was given makes no sense
@@ -79,6 +81,7 @@ class CommandLine {
   ProgramText text_;
   po::options_description own_, common_;
   std::vector<Argument> arguments_;
+  std::string rest_;  ///< the repeated argument, or a name that nothing asks for
 };
 
 /// \throws UsageError  the option's value lies outside [low, high] or is not a number

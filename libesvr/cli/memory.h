@@ -2,6 +2,7 @@
 /// How much memory the machine has and the process takes.
 
 #include <cstdint>
+#include <optional>
 
 namespace esvr::cli {
 
@@ -10,5 +11,17 @@ namespace esvr::cli {
 
 /// Bytes of the most memory that the process has held at once.
 [[nodiscard]] std::uint64_t peakMemory();
+
+/// What one step of a run holds at most, beyond what was held before it.
+class MemoryMeter {
+ public:
+  /// Begins a step: gives what is free back to the system, and resets the system's own record.
+  MemoryMeter();
+  /// Bytes; nothing where the system keeps no such record.
+  [[nodiscard]] std::optional<std::uint64_t> peakRise() const;
+
+ private:
+  std::optional<std::uint64_t> before_;
+};
 
 }  // namespace esvr::cli

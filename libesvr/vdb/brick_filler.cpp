@@ -46,17 +46,21 @@ void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite) {
                  " NaN, infinite or too large for float; the first is at " + toString(tally.first));
 }
 
+void refuseEmpty(std::size_t bricks, const FillRules& rules) {
+  if (bricks == 0 && !rules.allowEmpty) throw BadInput("it has no active voxel");
+}
+
 SparseVolume layOutBricks(const std::vector<Coord>& corners, float background) {
-  if (corners.empty()) throw BadInput("it has no active voxel");
+  SparseVolume volume;
+  volume.background = background;
+  if (corners.empty()) return volume;
   Coord low = corners.front(), high = low;
   for (const Coord corner : corners) {
     low = minCoord(low, corner);
     high = maxCoord(high, corner);
   }
   refuseTooFarApart(low, high);
-  SparseVolume volume;
   volume.origin = low;
-  volume.background = background;
   volume.bricks.reserve(corners.size());
   for (const Coord corner : corners) {
     const Coord place = brickOf(corner - low);

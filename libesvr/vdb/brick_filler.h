@@ -22,6 +22,7 @@ struct FillRules {
   float background = 0.0f;
   bool levelSet = false;
   NonFinite nonFinite = NonFinite::kRefuse;
+  bool allowEmpty = false;
 };
 
 /// The background as float. \throws BadInput  not finite there
@@ -64,6 +65,9 @@ void appendTile(Coord corner, std::int32_t extent, double value,
 /// \throws BadInput  two of one corner, or corners 2^31 voxels apart
 SparseVolume layOutBricks(const std::vector<Coord>& corners, float background);
 
+/// \throws BadInput  there is no brick, and the rules do not allow that
+void refuseEmpty(std::size_t bricks, const FillRules& rules);
+
 /// An active value as float; counted, and zero, where float cannot hold it.
 inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
   const auto narrow = float(value);
@@ -85,7 +89,8 @@ void fillFromLeaf(const Leaf& leaf, const FillRules& rules, Coord corner, std::s
 }
 
 /// Builds the volume. Access::value(leaf, i) is a leaf's voxel in voxelOffset order,
-/// Access::mask(leaf) its active voxels. \throws BadInput  no active voxel; non-finite voxels
+/// Access::mask(leaf) its active voxels. \throws BadInput  no active voxel, where the rules do not
+/// allow that; non-finite voxels
 template <class Leaf, class Access>
 SparseVolume buildVolume(std::vector<BrickSource<Leaf>> sources, const FillRules& rules,
                          NonFiniteTally& tally) {
@@ -97,6 +102,7 @@ SparseVolume buildVolume(std::vector<BrickSource<Leaf>> sources, const FillRules
   corners.reserve(sources.size());
   for (const auto& source : sources) corners.push_back(source.corner);
 
+  refuseEmpty(corners.size(), rules);
   SparseVolume volume = layOutBricks(corners, rules.background);
   for (std::size_t b = 0; b < sources.size(); ++b) {
     const auto& source = sources[b];

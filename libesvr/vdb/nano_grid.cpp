@@ -166,7 +166,8 @@ void readVoxelsAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGr
       });
   grid.descriptor.background = tree.background();
   const FillRules rules{narrowBackground(tree.background()),
-                        grid.descriptor.gridClass == GridClass::kLevelSet, options.nonFinite};
+                        grid.descriptor.gridClass == GridClass::kLevelSet, options.nonFinite,
+                        options.allowEmpty};
   NonFiniteTally tally;
   grid.volume = buildVolume<Leaf, LeafAccess<Leaf>>(std::move(sources), rules, tally);
   grid.nonFiniteReplaced = tally.count;

@@ -22,7 +22,8 @@ GridSummary summarise(const NanoEntry& entry) {
   grid.gridClass = gridClassOf(entry.gridClass);
   grid.activeVoxels = entry.activeVoxels;
   grid.activeBox = entry.activeBox;
-  grid.skipReason = isScalarFloatNano(entry.gridType) ? "" : notAFloatType(grid.valueType);
+  grid.isScalar = isScalarFloatNano(entry.gridType);
+  grid.skipReason = grid.isScalar ? "" : notAFloatType(grid.valueType);
   if (grid.skipReason.empty() && entry.activeVoxels == 0) grid.skipReason = "has no active voxel";
   return grid;
 }
@@ -45,7 +46,7 @@ VolumeGrid readNanoVdbGrid(InputFile& file, const std::string& name, const ReadO
   const auto grids = summarise(entries);
   const std::size_t i = findGrid(grids, name);
   return inGrid(grids[i].uniqueName, [&] {
-    if (!grids[i].skipReason.empty()) throw BadInput(grids[i].skipReason);
+    if (!isScalarFloatNano(entries[i].gridType)) throw BadInput(grids[i].skipReason);
     const NanoBuffer buffer = readNanoBuffer(file, entries[i], options.maxBytes);
     VolumeGrid grid = readNanoVoxels(buffer, entries[i].gridType, grids[i].gridClass, options);
     grid.descriptor.name = grids[i].name;

@@ -72,6 +72,7 @@ GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHea
   grid.savedAsHalf = entry.savedAsHalf;
   grid.gridClass = gridClassOf(stringValue(head.metadata, GridBase::META_GRID_CLASS));
   if (!countFromStatistics(head.metadata, grid)) countFromTree(archive, entry, grid);
+  grid.isScalar = isScalarFloatTree(entry);
   grid.skipReason = reasonToSkip(entry);
   if (grid.skipReason.empty() && grid.activeVoxels == 0) grid.skipReason = "has no active voxel";
   return grid;

@@ -82,7 +82,7 @@ TreeVoxels readVoxelsAs(Archive& archive, const LocatedTree& located, GridClass 
   TreeVoxels result;
   result.background = double(tree.background());
   const FillRules rules{narrowBackground(result.background), gridClass == GridClass::kLevelSet,
-                        options.nonFinite};
+                        options.nonFinite, options.allowEmpty};
   NonFiniteTally tally;
   result.volume = buildVolume<Leaf, LeafAccess<Leaf>>(brickSources(tree, bricks), rules, tally);
   result.nonFiniteReplaced = tally.count;

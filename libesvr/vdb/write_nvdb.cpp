@@ -1,15 +1,9 @@
 #include "vdb/write_nvdb.h"
 
-#include "vdb/versions.h"
-
-#define NANOVDB_USE_OPENVDB
-#define NANOVDB_USE_ZIP
-#include ESVR_NANOVDB_CREATE
-#include ESVR_NANOVDB_IO
-
 #include <fstream>
 
 #include "esvr/error.h"
+#include "vdb/nano_writers.h"
 #include "vdb/volume_to_tree.h"
 
 namespace esvr::vdb {

@@ -2,34 +2,23 @@
 
 #include "vdb/versions.h"
 
-#include <openvdb/io/Archive.h>
 #include <openvdb/openvdb.h>
 
 #include <fstream>
 
 #include "vdb/metadata.h"
+#include "vdb/stream_archive.h"
 #include "vdb/volume_to_tree.h"
 
 namespace esvr::vdb {
 namespace {
 
-constexpr const char* kWriterKey = "esvr_writer";
 constexpr const char* kWriter = "esvr " ESVR_VERSION;
 
-/// OpenVDB's own File writes to a stream whose errors nobody looks at; this one takes ours, which
-/// throws.
-class StreamArchive : public openvdb::io::Archive {
- public:
-  StreamArchive() {
-    using namespace openvdb::io;
-    setCompression(COMPRESS_ACTIVE_MASK | (hasBloscCompression() ? COMPRESS_BLOSC : COMPRESS_ZIP));
-  }
-  void writeTo(std::ostream& stream, const openvdb::GridPtrVec& grids,
-               const openvdb::MetaMap& metadata) const {
-    constexpr bool kSeekable = true;
-    Archive::write(stream, grids, kSeekable, metadata);
-  }
-};
+std::uint32_t bestCompression() {
+  using namespace openvdb::io;
+  return COMPRESS_ACTIVE_MASK | (Archive::hasBloscCompression() ? COMPRESS_BLOSC : COMPRESS_ZIP);
+}
 
 }  // namespace
 
@@ -48,7 +37,7 @@ void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> f
 
   std::ofstream stream(path, std::ios::binary);
   stream.exceptions(std::ios::badbit | std::ios::failbit);
-  StreamArchive().writeTo(stream, openVdbGrids, metadata);
+  StreamArchive(bestCompression()).writeTo(stream, openVdbGrids, metadata);
   stream.close();
 }
 

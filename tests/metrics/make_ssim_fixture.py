@@ -42,6 +42,7 @@ def box_mean(background_a, background_b, peak):
     return (interior * inside + shell * (SIDE**3 - inside)) / SIDE**3
 
 
-for backgrounds in ((0.0, 0.0), (0.25, 0.25), (0.0, 0.125)):
-    for peak in (1.0, 4.0):
-        print(*backgrounds, peak, repr(box_mean(*backgrounds, peak)))
+if __name__ == '__main__':
+    for backgrounds in ((0.0, 0.0), (0.25, 0.25), (0.0, 0.125)):
+        for peak in (1.0, 4.0):
+            print(*backgrounds, peak, repr(box_mean(*backgrounds, peak)))

@@ -27,6 +27,7 @@ struct GridSummary {
   std::uint64_t activeVoxels = 0;
   Box activeBox;
   std::string skipReason;  ///< empty where the grid can be fitted; else why not, for the user
+  bool isScalar = false;   ///< of floats that readGrid takes, be the grid empty or not
 };
 
 struct VdbSummary {
@@ -45,6 +46,7 @@ enum class NonFinite { kRefuse, kZero };
 
 struct ReadOptions {
   NonFinite nonFinite = NonFinite::kRefuse;
+  bool allowEmpty = false;  ///< a grid without an active voxel is a volume without bricks
   /// Bound on the bricks' memory: active tiles become bricks, and a huge tile would not fit.
   std::uint64_t maxBytes = std::uint64_t{16} << 30;
 };
@@ -62,8 +64,8 @@ struct VolumeGrid {
 /// \param name  "density" (the first of that name), or "density[1]" for the second.
 /// \throws BadInput  as inspectVdb; no such grid (lists those there are); a type that cannot be
 /// fitted;
-///                   no active voxel; non-finite voxels (first coordinate and count); more than
-///                   maxBytes of bricks
+///                   no active voxel (without allowEmpty); non-finite voxels (first coordinate and
+///                   count); more than maxBytes of bricks
 [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                                   const ReadOptions& options = {});
 
@@ -83,6 +85,9 @@ struct WriteOptions {
 /// extension
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const VolumeGrid> grids, const WriteOptions& options = {});
+
+/// The file-level metadata item in which writeGrids leaves its name, unless the source has one.
+inline constexpr const char* kWriterKey = "esvr_writer";
 
 /// A file-level metadata item of type "string".
 [[nodiscard]] MetaItem stringItem(const std::string& name, const std::string& value);

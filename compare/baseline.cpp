@@ -1,0 +1,159 @@
+#include "compare/baseline.h"
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "cli/json_file.h"
+#include "cli/table.h"
+#include "esvr/error.h"
+
+namespace esvr::compare {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kSchema = "esvr-baseline";
+constexpr int kSchemaVersion = 1;
+constexpr double kBytesSlack = 0.01;  // of the file's size
+
+[[noreturn]] void notABaseline(const std::filesystem::path& path, const std::string& why) {
+  throw BadInput(path.string() + ": not a baseline: " + why);
+}
+
+Json readBaseline(const std::filesystem::path& path) {
+  std::ifstream stream(path);
+  if (!stream) throw BadInput(path.string() + ": cannot be read (--update makes it)");
+  Json json = Json::parse(stream, nullptr, false);
+  if (json.is_discarded() || !json.is_object()) notABaseline(path, "no JSON object");
+  if (json.value("schema", Json()) != kSchema)
+    notABaseline(path, std::string("its \"schema\" is not \"") + kSchema + '"');
+  if (json.value("schema_version", Json()) != kSchemaVersion)
+    notABaseline(path, "its \"schema_version\" is not " + std::to_string(kSchemaVersion));
+  if (!json.contains("grids") || !json["grids"].is_object()) notABaseline(path, "no \"grids\"");
+  return json;
+}
+
+struct Entry {
+  double value = 0.0, tolerance = 0.0;
+};
+
+/// \param json  {"value", "tolerance"}
+Entry entryOf(const std::filesystem::path& path, const std::string& what, const Json& json) {
+  const auto number = [&](const char* key) {
+    if (!json.is_object() || !json.contains(key)) notABaseline(path, what + " has no " + key);
+    if (json[key].is_null()) return std::numeric_limits<double>::infinity();
+    if (!json[key].is_number()) notABaseline(path, what + ": " + key + " is no number");
+    return json[key].get<double>();
+  };
+  return {number("value"), number("tolerance")};
+}
+
+enum class Verdict { kWithin, kWorse, kBetter };
+
+Verdict judge(bool higherIsBetter, const Entry& entry, double value) {
+  if (value == entry.value) return Verdict::kWithin;  // both may be infinite
+  const double gain = higherIsBetter ? value - entry.value : entry.value - value;
+  if (gain < -entry.tolerance) return Verdict::kWorse;
+  return gain > entry.tolerance ? Verdict::kBetter : Verdict::kWithin;
+}
+
+void tell(Verdict verdict, const std::string& text, CheckRecord& record) {
+  if (verdict == Verdict::kWorse) record.failures.push_back(text);
+  if (verdict == Verdict::kBetter) record.notes.push_back(text + ": better");
+}
+
+void judgeGrid(const std::filesystem::path& path, const Json& stored, const CheckedGrid& grid,
+               CheckRecord& record) {
+  for (const Figure& figure : allFigures()) {
+    const auto value = valueOf(grid.figures, figure);
+    if (!value || !stored.contains(figure.key)) continue;
+    const std::string where = "grid \"" + grid.name + "\": " + figure.header;
+    const Entry entry = entryOf(path, where, stored[figure.key]);
+    tell(judge(figure.higherIsBetter, entry, *value),
+         where + " " + textOf(figure, *value) + ", baseline " + textOf(figure, entry.value) +
+             " within " + cli::shortNumber(entry.tolerance),
+         record);
+  }
+}
+
+void judgeBytes(const std::filesystem::path& path, const Json& baseline, CheckRecord& record) {
+  if (!baseline.contains("bytes")) return;
+  const Entry entry = entryOf(path, "bytes", baseline["bytes"]);
+  tell(judge(false, entry, double(record.candidateBytes)),
+       std::to_string(record.candidateBytes) + " bytes, baseline " +
+           std::to_string(std::uint64_t(entry.value)) + " within " +
+           cli::shortNumber(entry.tolerance),
+       record);
+}
+
+/// JSON has no infinity.
+Json numberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+double toleranceOf(const Json& old, const char* key, double fallback) {
+  if (!old.is_object() || !old.contains(key)) return fallback;
+  const Json& entry = old[key];
+  const bool has =
+      entry.is_object() && entry.contains("tolerance") && entry["tolerance"].is_number();
+  return has ? entry["tolerance"].get<double>() : fallback;
+}
+
+Json gridEntry(const CheckedGrid& grid, const Json& old) {
+  Json json = Json::object();
+  for (const Figure& figure : allFigures()) {
+    const auto value = valueOf(grid.figures, figure);
+    if (!value) continue;
+    const double scale = std::isfinite(*value) ? std::abs(*value) : 0.0;
+    const double slack = figure.slack.absolute + figure.slack.relative * scale;
+    json[figure.key] = {{"value", numberOrNull(*value)},
+                        {"tolerance", toleranceOf(old, figure.key, slack)}};
+  }
+  return json;
+}
+
+}  // namespace
+
+void judgeBaseline(const std::filesystem::path& path, CheckRecord& record) {
+  const Json baseline = readBaseline(path);
+  judgeBytes(path, baseline, record);
+  const Json& stored = baseline["grids"];
+  for (const auto& grid : record.grids) {
+    if (stored.contains(grid.name))
+      judgeGrid(path, stored[grid.name], grid, record);
+    else
+      record.notes.push_back("grid \"" + grid.name +
+                             "\" is not in the baseline (--update adds it)");
+  }
+  for (const auto& [name, figures] : stored.items()) {
+    const auto same = [&](const CheckedGrid& grid) { return grid.name == name; };
+    if (std::none_of(record.grids.begin(), record.grids.end(), same))
+      record.failures.push_back("grid \"" + name + "\" of the baseline was not compared");
+  }
+}
+
+bool baselineHasSsim(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path)) return false;
+  const Json baseline = readBaseline(path);
+  for (const auto& grid : baseline["grids"])
+    if (grid.contains("ssim")) return true;
+  return false;
+}
+
+void updateBaseline(const std::filesystem::path& path, const CheckRecord& record) {
+  const Json old = std::filesystem::exists(path) ? readBaseline(path) : Json::object();
+  const Json oldGrids = old.value("grids", Json::object());
+  Json grids = Json::object();
+  for (const auto& grid : record.grids)
+    grids[grid.name] = gridEntry(grid, oldGrids.value(grid.name, Json()));
+  const Json json{
+      {"schema", kSchema},
+      {"schema_version", kSchemaVersion},
+      {"bytes",
+       {{"value", record.candidateBytes},
+        {"tolerance", toleranceOf(old, "bytes", kBytesSlack * double(record.candidateBytes))}}},
+      {"grids", std::move(grids)}};
+  cli::writeJson({path.string(), true}, json);
+}
+
+}  // namespace esvr::compare

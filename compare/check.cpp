@@ -1,0 +1,208 @@
+#include "compare/check.h"
+
+#include <algorithm>
+#include <array>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "cli/interrupts.h"
+#include "cli/json_file.h"
+#include "cli/output.h"
+#include "cli/thread_limit.h"
+#include "compare/baseline.h"
+#include "compare/check_report.h"
+#include "compare/grid_file.h"
+#include "compare/limits.h"
+#include "compare/program.h"
+#include "esvr/error.h"
+
+namespace esvr::compare {
+namespace {
+
+/// Places of a grid in either file; nothing where the candidate lacks it.
+struct Pair {
+  std::size_t reference = 0;
+  std::optional<std::size_t> candidate;
+};
+
+void checkFiles(const CheckOptions& options) {
+  std::vector<std::filesystem::path> files;
+  if (options.baseline) files.push_back(*options.baseline);
+  if (!options.report.empty() && options.report != cli::kStandardOutput) {
+    files.emplace_back(options.report);
+    cli::checkOutput(options.report, {".json"}, options.overwrite);
+  }
+  for (const auto& input : {options.reference, options.candidate})
+    for (const auto& file : files) cli::requireDistinct({input, file});
+  cli::requireDistinct(files);
+  if (options.update) cli::checkOutput(*options.baseline, {".json"}, true);
+}
+
+std::optional<std::size_t> counterpart(const GridFile& file, const std::string& uniqueName) {
+  const auto& grids = file.grids();
+  const auto it = std::find_if(grids.begin(), grids.end(), [&](const ListedGrid& grid) {
+    return grid.uniqueName == uniqueName;
+  });
+  if (it == grids.end()) return std::nullopt;
+  return std::size_t(it - grids.begin());
+}
+
+/// All grids of the reference that can be compared; the others are told of.
+std::vector<Pair> pairAll(const GridFile& reference, const GridFile& candidate,
+                          CheckRecord& record) {
+  std::vector<Pair> pairs;
+  for (std::size_t g = 0; g < reference.grids().size(); ++g) {
+    const ListedGrid& grid = reference.grids()[g];
+    if (!grid.comparable)
+      record.skipped.push_back("grid \"" + grid.uniqueName + "\": its values are of type " +
+                               grid.valueType);
+    else if (grid.empty)
+      record.skipped.push_back("grid \"" + grid.uniqueName +
+                               "\": the reference has no active voxel there");
+    else
+      pairs.push_back({g, counterpart(candidate, grid.uniqueName)});
+  }
+  for (const auto& grid : candidate.grids())
+    if (!counterpart(reference, grid.uniqueName)) record.extra.push_back(grid.uniqueName);
+  return pairs;
+}
+
+/// "NAME" or "NAME=OTHER". A name with "=" in it is taken whole where there is such a grid.
+Pair pairNamed(const GridFile& reference, const GridFile& candidate, const std::string& wanted) {
+  const std::size_t split = counterpart(reference, wanted) ? std::string::npos : wanted.find('=');
+  const std::string name = wanted.substr(0, split);
+  const std::string other = split == std::string::npos ? wanted : wanted.substr(split + 1);
+  return {reference.find(name), candidate.find(other)};
+}
+
+std::vector<Pair> choosePairs(const CheckOptions& options, const GridFile& reference,
+                              const GridFile& candidate, CheckRecord& record) {
+  if (options.grids.empty()) return pairAll(reference, candidate, record);
+  std::vector<Pair> pairs;
+  for (const auto& wanted : options.grids) pairs.push_back(pairNamed(reference, candidate, wanted));
+  return pairs;
+}
+
+std::string joinedNames(const GridFile& file) {
+  std::string list;
+  for (const auto& grid : file.grids())
+    list += (list.empty() ? "\"" : ", \"") + grid.uniqueName + '"';
+  return list.empty() ? "none" : list;
+}
+
+void requirePairs(const std::vector<Pair>& pairs, const GridFile& reference,
+                  const GridFile& candidate, const CheckRecord& record) {
+  if (pairs.empty()) {
+    std::string text = reference.path().string() + ": nothing to compare";
+    for (const auto& line : record.skipped) text += "\n  " + line;
+    throw BadInput(text);
+  }
+  if (std::none_of(pairs.begin(), pairs.end(), [](const Pair& p) { return p.candidate; }))
+    throw BadInput("no grid of " + reference.path().string() + " (" + joinedNames(reference) +
+                   ") is in " + candidate.path().string() + " (" + joinedNames(candidate) + ")");
+}
+
+bool disjoint(const Box& a, const Box& b) {
+  const Box common{maxCoord(a.min, b.min), minCoord(a.max, b.max)};
+  return common.empty();
+}
+
+/// Compares one pair of grids after the other: two volumes are in memory at a time.
+class Comparison {
+ public:
+  Comparison(const CheckOptions& options, const GridFile& reference, const GridFile& candidate)
+      : options_(options), reference_(reference), candidate_(candidate) {
+    const bool limit = options.limits[std::size_t(FigureId::kSsim)].has_value();
+    ssim_ = options.ssim || limit || (options.baseline && baselineHasSsim(*options.baseline));
+  }
+
+  void run(const Pair& pair, CheckRecord& record) {
+    const ListedGrid& listed = reference_.grids()[pair.reference];
+    if (!pair.candidate) {
+      record.failures.push_back("grid \"" + listed.uniqueName + "\" is missing in " +
+                                candidate_.path().string());
+      return;
+    }
+    record.grids.push_back(compare(pair, listed.uniqueName, record));
+  }
+  [[nodiscard]] const std::vector<double>& ranges() const { return ranges_; }
+
+ private:
+  CheckedGrid compare(const Pair& pair, const std::string& name, CheckRecord& record) {
+    const VolumeGrid a = reference_.read(pair.reference);
+    const VolumeGrid b = candidate_.read(*pair.candidate);
+    CheckedGrid grid{.name = name, .candidateName = candidate_.grids()[*pair.candidate].uniqueName};
+    requireRange(a.volume, name);
+    grid.metrics = compareVolumes(a.volume, b.volume,
+                                  {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
+    grid.figures = figuresOf(grid.metrics);
+    grid.differences = compareDescriptors(a.descriptor, b.descriptor);
+    if (disjoint(activeBox(a.volume), activeBox(b.volume)))
+      record.failures.push_back("grid \"" + name + "\": " +
+                                (activeVoxelCount(b.volume) == 0
+                                     ? "the candidate has no active voxel"
+                                     : "the active voxels lie in boxes that do not meet"));
+    const ValueRange range = activeRange(a.volume);
+    ranges_.push_back(double(range.max) - double(range.min));
+    return grid;
+  }
+
+  /// There must be something to compare with; and PSNR and SSIM say nothing of a reference that is
+  /// zero throughout.
+  void requireRange(const SparseVolume& reference, const std::string& name) const {
+    const std::string grid = reference_.path().string() + ": grid \"" + name + "\": ";
+    if (activeVoxelCount(reference) == 0) throw BadInput(grid + "it has no active voxel");
+    const ValueRange range = activeRange(reference);
+    if (!options_.peak && range.min == 0.0f && range.max == 0.0f)
+      throw BadInput(grid + "every active voxel is 0, so that PSNR has no peak; give --peak");
+  }
+
+  const CheckOptions& options_;
+  const GridFile &reference_, &candidate_;
+  bool ssim_ = false;
+  std::vector<double> ranges_;
+};
+
+void tell(const CheckOptions& options, const CheckRecord& record) {
+  if (!options.report.empty())
+    cli::writeJson({options.report, options.overwrite}, checkReport(options, record));
+  if (options.report != cli::kStandardOutput && options.verbosity != cli::Verbosity::kQuiet)
+    printCheck(record, std::cout);
+}
+
+void throwFailures(const CheckOptions& options, const CheckRecord& record) {
+  if (record.failures.empty()) return;
+  std::string text = options.candidate.string() + " fails:";
+  for (const auto& failure : record.failures) text += "\n  " + failure;
+  throw TargetMissed(text);
+}
+
+}  // namespace
+
+void check(const CheckOptions& options) {
+  const cli::ThreadLimit threads(options.threads);
+  const cli::Interrupts interrupts;
+  checkFiles(options);
+  const GridFile reference(options.reference), candidate(options.candidate);
+
+  CheckRecord record;
+  record.candidateBytes = candidate.bytes();
+  const auto pairs = choosePairs(options, reference, candidate, record);
+  requirePairs(pairs, reference, candidate, record);
+  record.fileDifferences = compareMetadata(reference.metadata(), candidate.metadata(),
+                                           std::array<std::string, 1>{kWriterKey});
+  Comparison comparison(options, reference, candidate);
+  for (const Pair& pair : pairs) {
+    if (interrupts.token().cancelled()) throw Cancelled();
+    comparison.run(pair, record);
+  }
+  judgeLimits(options, comparison.ranges(), record);
+  judgeDifferences(options, record);
+  if (options.baseline && !options.update) judgeBaseline(*options.baseline, record);
+
+  tell(options, record);
+  throwFailures(options, record);
+  if (options.update) updateBaseline(*options.baseline, record);
+}
+
+}  // namespace esvr::compare

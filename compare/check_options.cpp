@@ -1,0 +1,149 @@
+#include "compare/check_options.h"
+
+#include <limits>
+
+#include "cli/box_option.h"
+#include "cli/byte_size.h"
+#include "cli/choice.h"
+#include "cli/command_line.h"
+#include "compare/program.h"
+#include "compare/report_options.h"
+#include "esvr/error.h"
+
+namespace esvr::compare {
+namespace {
+
+using cli::Arguments;
+using cli::po::bool_switch;
+using cli::po::value;
+
+cli::ProgramText programText() {
+  return {
+      .name = std::string(kProgram) + " check",
+      .purpose =
+          "Compares the grids of a file with those of a reference, by name, and fails where\n"
+          "one of them has drifted further than the limits given.",
+      .usage =
+          "  esvr-compare check REF CAND [--min-psnr DB] [--max-error E] [--max-bytes SIZE] ...\n"
+          "  esvr-compare check REF CAND --baseline FILE.json [--update]",
+      .notes =
+          "REF and CAND may each be .vdb, .nvdb or .esvr. What is compared are grids and never\n"
+          "files: bytes of a .vdb differ from one writing to the next. Voxels are compared in\n"
+          "index space; transforms, names, classes, value types, backgrounds and metadata that\n"
+          "differ are listed, and fail where --fail-on names them. A grid that CAND lacks, or\n"
+          "whose active voxels lie wholly elsewhere, always fails.\n"
+          "\n"
+          "A baseline holds figures and how much worse each may become; --update writes those of\n"
+          "this run and keeps the tolerances that the file has.\n"
+          "\n"
+          "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 input that cannot be\n"
+          "used, 4 a limit was missed, 5 memory.",
+      .examples =
+          "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45 --min-iou 0.98\n"
+          "  esvr-compare check smoke.vdb back.vdb --max-error 1% --fail-on transform,metadata\n"
+          "  esvr-compare check ref.vdb new.vdb -g density=smoke --max-bytes 200KB\n"
+          "  esvr-compare check smoke.vdb smoke.esvr --baseline smoke.json --update"};
+}
+
+cli::CommandLine makeCommandLine() {
+  cli::CommandLine line(programText());
+  line.argument("reference", "REF");
+  line.argument("candidate", "CAND");
+  auto& options = line.options();
+  options.add_options()(
+      "grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
+      "compare this grid only; may be repeated; NAME=OTHER where it is called OTHER in CAND");
+  for (const Figure& figure : allFigures())
+    options.add_options()(figure.option, value<std::string>()->value_name("X"), figure.unit);
+  // clang-format off
+  options.add_options()
+    ("max-bytes", value<std::string>()->value_name("SIZE"), "of the file CAND: 200KB")
+    ("fail-on", value<std::string>()->value_name("KINDS"),
+     "differences that fail: name, class, type, background, transform, metadata, all; "
+     "separated by commas")
+    ("ssim", bool_switch(), "print the SSIM, though no limit asks for it")
+    ("baseline", value<std::string>()->value_name("FILE.json"),
+     "compare with the figures stored there")
+    ("update", bool_switch(), "write this run's figures to --baseline instead")
+    ("box", value<std::string>()->value_name("BOX"),
+     "x0,y0,z0,x1,y1,z1 of the figures (default: the reference's active bounding box)")
+    ("peak", value<double>()->value_name("P"),
+     "of the PSNR (default: the reference's largest value)")
+    ("report", value<std::string>()->value_name("FILE.json"), "all that was measured; - for stdout")
+    ("force,f", bool_switch(), "replace the report if it exists");
+  // clang-format on
+  return line;
+}
+
+std::set<DifferenceKind> kindsOf(const std::string& word) {
+  using Kind = DifferenceKind;
+  if (word == "all")
+    return {Kind::kName,       Kind::kClass,     Kind::kValueType,
+            Kind::kBackground, Kind::kTransform, Kind::kMetadata};
+  return {cli::choose<Kind>("fail-on", word,
+                            {{"name", Kind::kName},
+                             {"class", Kind::kClass},
+                             {"type", Kind::kValueType},
+                             {"background", Kind::kBackground},
+                             {"transform", Kind::kTransform},
+                             {"metadata", Kind::kMetadata}})};
+}
+
+std::set<DifferenceKind> parseKinds(const std::string& list) {
+  std::set<DifferenceKind> kinds;
+  for (const auto& word : splitAtCommas(list)) kinds.merge(kindsOf(word));
+  return kinds;
+}
+
+/// A limit on what is not an error in value units may be 0, and PSNR and SSIM below that.
+cli::ErrorBound limitOf(const Figure& figure, const std::string& text) {
+  if (figure.inValueUnits && text != "0") return cli::parseErrorBound(figure.option, text);
+  std::size_t end = 0;
+  double amount = std::numeric_limits<double>::quiet_NaN();
+  try {
+    amount = std::stod(text, &end);
+  } catch (const std::exception&) {
+  }
+  if (end != text.size() || !(std::abs(amount) < std::numeric_limits<double>::infinity()))
+    throw UsageError("--" + std::string(figure.option) + " must be a number, not '" + text + "'");
+  return {.amount = amount};
+}
+
+void readLimits(const Arguments& a, CheckOptions& options) {
+  for (const Figure& figure : allFigures())
+    if (const auto text = a.find<std::string>(figure.option))
+      options.limits[std::size_t(figure.id)] = limitOf(figure, *text);
+  if (const auto size = a.find<std::string>("max-bytes"))
+    options.maxBytes = cli::parseByteSize("max-bytes", *size);
+  if (const auto kinds = a.find<std::string>("fail-on")) options.failOn = parseKinds(*kinds);
+}
+
+}  // namespace
+
+std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv) {
+  const auto arguments = makeCommandLine().parse(argc, argv);
+  if (!arguments) return std::nullopt;
+  const Arguments& a = *arguments;
+  CheckOptions options;
+  options.reference = a.get<std::string>("reference");
+  options.candidate = a.get<std::string>("candidate");
+  options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
+  readLimits(a, options);
+  options.baseline = a.find<std::string>("baseline");
+  options.update = a.get<bool>("update");
+  if (options.update && !options.baseline) throw UsageError("--update needs --baseline FILE.json");
+  if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
+  options.peak = a.find<double>("peak");
+  if (options.peak)
+    cli::requireRange("peak", *options.peak, std::numeric_limits<double>::min(),
+                      std::numeric_limits<double>::max());
+  options.ssim = a.get<bool>("ssim");
+  options.report = a.find<std::string>("report").value_or("");
+  options.overwrite = a.get<bool>("force");
+  options.threads = a.threads;
+  options.verbosity = a.verbosity;
+  options.commandLine = commandLine(argc, argv);
+  return options;
+}
+
+}  // namespace esvr::compare

@@ -1,0 +1,43 @@
+#pragma once
+/// What `esvr-compare check` is asked to do.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "cli/error_bound.h"
+#include "cli/log.h"
+#include "compare/differences.h"
+#include "compare/figures.h"
+#include "esvr/coord.h"
+
+namespace esvr::compare {
+
+struct CheckOptions {
+  std::filesystem::path reference, candidate;
+  std::vector<std::string> grids;  ///< NAME or NAME=CANDIDATE'S; empty: all
+  std::array<std::optional<cli::ErrorBound>, kFigureCount> limits;
+  std::optional<std::uint64_t> maxBytes;
+  std::set<DifferenceKind> failOn;
+  std::optional<std::filesystem::path> baseline;
+  bool update = false;  ///< write the baseline
+  std::optional<Box> box;
+  std::optional<double> peak;
+  bool ssim = false;   ///< though no limit asks for it
+  std::string report;  ///< a file, "-", or empty
+  bool overwrite = false;
+  int threads = 0;
+  cli::Verbosity verbosity = cli::Verbosity::kNormal;
+  std::vector<std::string> commandLine;
+};
+
+/// \param argv  the job's word first
+/// \return nothing where --help or --version was printed
+/// \throws UsageError
+[[nodiscard]] std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv);
+
+}  // namespace esvr::compare

@@ -1,0 +1,170 @@
+#include "compare/curves_files.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "cli/bytes_file.h"
+#include "cli/json_file.h"
+#include "report/data_table.h"
+#include "report/plot.h"
+
+namespace esvr::compare {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using report::Cell;
+using report::Kind;
+using report::Plot;
+using report::Series;
+
+constexpr const char* kSchema = "esvr-curves";
+constexpr int kSchemaVersion = 1;
+constexpr const char* kOurs = "ESVR";
+
+/// All rows of one name belong to one curve; ours are one curve whatever they are called.
+std::string seriesOf(const TableRow& row) { return row.group == kOurs ? kOurs : row.name; }
+
+/// The rows that have bytes and figures, by series and then by bytes.
+std::map<std::string, std::vector<const TableRow*>> rowsBySeries(const TableRecord& record) {
+  std::map<std::string, std::vector<const TableRow*>> series;
+  for (const auto& row : record.rows)
+    if (row.bytes && row.metrics) series[seriesOf(row)].push_back(&row);
+  for (auto& [name, rows] : series)
+    std::sort(rows.begin(), rows.end(),
+              [](const TableRow* a, const TableRow* b) { return *a->bytes < *b->bytes; });
+  return series;
+}
+
+Cell number(std::optional<double> value) { return value ? Cell(*value) : Cell(); }
+
+/// "fit": a point of a fit's own curve; "file": what a file came to.
+report::DataTable points(const TableRecord& record) {
+  report::DataTable table{{},
+                          {{"kind", "kind", Kind::kText},
+                           {"series", "series", Kind::kText},
+                           {"name", "name", Kind::kText},
+                           {"bytes", "bytes", Kind::kBytes},
+                           {"seconds", "seconds", Kind::kSeconds},
+                           {"psnr_box", "PSNR box", Kind::kDecibels},
+                           {"psnr_active", "active", Kind::kDecibels},
+                           {"max_error", "max error"},
+                           {"fps", "FPS"},
+                           {"setting", "setting", Kind::kText}},
+                          {}};
+  for (const auto& [series, rows] : rowsBySeries(record))
+    for (const TableRow* row : rows) {
+      for (const auto& at : row->curve)
+        table.rows.push_back({std::string("fit"), series, row->name, double(*row->bytes),
+                              at.seconds, at.psnrBox, at.psnrActive, at.maxError, Cell(), Cell()});
+      const auto seconds = row->encode ? std::optional(row->encode->median) : std::nullopt;
+      table.rows.push_back({std::string("file"), series, row->name, double(*row->bytes),
+                            number(seconds), row->metrics->psnrBox, row->metrics->psnrActive,
+                            row->metrics->maxError, number(row->fps), row->setting});
+    }
+  return table;
+}
+
+Plot overBytes(const TableRecord& record, const std::string& title, const std::string& yLabel,
+               const std::function<double(const TableRow&)>& valueOf) {
+  Plot plot{.title = title, .xLabel = "bytes", .yLabel = yLabel, .logarithmicX = true};
+  for (const auto& [name, rows] : rowsBySeries(record)) {
+    Series series{name, {}};
+    for (const TableRow* row : rows) series.points.push_back({double(*row->bytes), valueOf(*row)});
+    plot.series.push_back(std::move(series));
+  }
+  return plot;
+}
+
+/// A curve for each fit that has one, and one through the ends: from voxels to file.
+Plot overSeconds(const TableRecord& record) {
+  Plot plot{.title = "Error over run time",
+            .xLabel = "seconds",
+            .yLabel = "PSNR over the box, dB",
+            .logarithmicX = true};
+  Series ends{"end to end", {}};
+  for (const auto& row : record.rows) {
+    if (row.group != kOurs || row.curve.empty() || !row.metrics) continue;
+    Series series{row.name, {}};
+    for (const auto& at : row.curve) series.points.push_back({at.seconds, at.psnrBox});
+    plot.series.push_back(std::move(series));
+    if (row.encode) ends.points.push_back({row.encode->median, row.metrics->psnrBox});
+  }
+  if (!ends.points.empty()) plot.series.push_back(std::move(ends));
+  return plot;
+}
+
+Json toJson(const report::DataTable& table) {
+  Json points = Json::array();
+  for (const auto& row : table.rows) {
+    Json point = Json::object();
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const auto& key = table.columns[i].key;
+      if (const auto* text = std::get_if<std::string>(&row[i])) point[key] = *text;
+      if (const auto* value = std::get_if<double>(&row[i]))
+        point[key] = std::isfinite(*value) ? Json(*value) : Json();
+    }
+    points.push_back(std::move(point));
+  }
+  return points;
+}
+
+class Writer {
+ public:
+  Writer(const std::string& prefix, bool overwrite) : prefix_(prefix), overwrite_(overwrite) {}
+
+  void text(const std::string& ending, const std::string& bytes) const {
+    cli::writeBytes(prefix_ + ending, std::as_bytes(std::span(bytes)), overwrite_);
+  }
+  void plot(const std::string& ending, const Plot& plot) const {
+    text(ending + ".svg", report::toSvg(plot));
+    text(ending + ".png", report::toPng(plot));
+  }
+  void json(const Json& json) const { cli::writeJson({prefix_ + ".json", overwrite_}, json); }
+
+ private:
+  const std::string& prefix_;
+  bool overwrite_;
+};
+
+bool hasFps(const TableRecord& record) {
+  return std::any_of(record.rows.begin(), record.rows.end(),
+                     [](const TableRow& row) { return row.fps.has_value(); });
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> curveFiles(const std::string& prefix, bool fps) {
+  std::vector<std::filesystem::path> files;
+  for (const char* ending : {".csv", ".json", "-seconds.svg", "-seconds.png", "-bytes.svg",
+                             "-bytes.png", "-fps.svg", "-fps.png"})
+    if (fps || !std::string(ending).starts_with("-fps")) files.emplace_back(prefix + ending);
+  return files;
+}
+
+void writeCurves(const std::string& prefix, const TableRecord& record,
+                 const std::vector<std::string>& commandLine, bool overwrite) {
+  const Writer writer(prefix, overwrite);
+  const report::DataTable data = points(record);
+  writer.text(".csv", report::toCsv(data));
+  writer.json({{"schema", kSchema},
+               {"schema_version", kSchemaVersion},
+               {"command_line", commandLine},
+               {"grid", record.grid},
+               {"peak", record.peak},
+               {"interrupted", record.interrupted},
+               {"points", toJson(data)}});
+  writer.plot("-seconds", overSeconds(record));
+  writer.plot("-bytes", overBytes(record, "Error over bytes", "PSNR over the box, dB",
+                                  [](const TableRow& row) { return row.metrics->psnrBox; }));
+  if (!hasFps(record)) return;
+  Plot fps = overBytes(record, "Pictures a second over bytes", "pictures a second",
+                       [](const TableRow& row) { return row.fps.value_or(NAN); });
+  fps.logarithmicY = true;
+  writer.plot("-fps", fps);
+}
+
+}  // namespace esvr::compare

@@ -1,0 +1,108 @@
+#include "compare/figures.h"
+
+#include <cmath>
+#include <limits>
+
+#include "cli/table.h"
+
+namespace esvr::compare {
+namespace {
+
+constexpr std::array<Figure, kFigureCount> kFigures{{
+    {FigureId::kPsnrBox,
+     "psnr_box",
+     "min-psnr",
+     "PSNR box",
+     "dB over the box",
+     true,
+     false,
+     {.absolute = 0.05}},
+    {FigureId::kPsnrActive,
+     "psnr_active",
+     "min-psnr-active",
+     "active",
+     "dB over the active voxels",
+     true,
+     false,
+     {.absolute = 0.05}},
+    {FigureId::kMaxError,
+     "max_error",
+     "max-error",
+     "max error",
+     "largest error: 0.02, or 1%",
+     false,
+     true,
+     {.relative = 0.02}},
+    {FigureId::kP999Error,
+     "p999_error",
+     "max-p999-error",
+     "p99.9 error",
+     "99.9th percentile of the error: 0.01, or 0.5%",
+     false,
+     true,
+     {.relative = 0.02}},
+    {FigureId::kIou,
+     "iou",
+     "min-iou",
+     "IoU",
+     "overlap of active voxels, 0 to 1",
+     true,
+     false,
+     {.absolute = 0.002}},
+    {FigureId::kSsim,
+     "ssim",
+     "min-ssim",
+     "SSIM",
+     "3D SSIM over the box",
+     true,
+     false,
+     {.absolute = 0.002}},
+    {FigureId::kMassError,
+     "mass_error",
+     "max-mass-error",
+     "mass error",
+     "relative error of the sum of values",
+     false,
+     false,
+     {.absolute = 0.001}},
+}};
+
+bool isPsnr(const Figure& figure) {
+  return figure.id == FigureId::kPsnrBox || figure.id == FigureId::kPsnrActive;
+}
+
+}  // namespace
+
+std::span<const Figure> allFigures() { return kFigures; }
+
+double massError(const VolumeMetrics& m) {
+  const double difference = std::abs(m.massCandidate - m.massReference);
+  if (difference == 0.0) return 0.0;
+  if (m.massReference == 0.0) return std::numeric_limits<double>::infinity();
+  return difference / std::abs(m.massReference);
+}
+
+FigureValues figuresOf(const VolumeMetrics& m) {
+  FigureValues values;
+  const auto set = [&](FigureId id, std::optional<double> value) {
+    values[std::size_t(id)] = value;
+  };
+  set(FigureId::kPsnrBox, m.psnrBox);
+  set(FigureId::kPsnrActive, m.psnrActive);
+  set(FigureId::kMaxError, m.maxError);
+  set(FigureId::kP999Error, m.p999Error);
+  set(FigureId::kIou, m.iou);
+  set(FigureId::kSsim, m.ssim);
+  set(FigureId::kMassError, massError(m));
+  return values;
+}
+
+std::optional<double> valueOf(const FigureValues& values, const Figure& figure) {
+  return values[std::size_t(figure.id)];
+}
+
+std::string textOf(const Figure& figure, double value) {
+  return isPsnr(figure) ? cli::decibels(value) : cli::shortNumber(value);
+}
+
+}  // namespace esvr::compare

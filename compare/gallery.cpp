@@ -1,0 +1,117 @@
+#include "compare/gallery.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "cli/stopwatch.h"
+#include "esvr/image_metrics.h"
+#include "esvr/metrics.h"
+#include "report/png_image.h"
+
+namespace esvr::compare {
+namespace {
+
+constexpr double kErrorGain = 8.0;  // of error maps: an eighth of the range is white
+
+ValueRange rangeOf(const SparseVolume& volume) {
+  const ValueRange range = activeRange(volume);
+  return {std::min(range.min, volume.background), std::max(range.max, volume.background)};
+}
+
+std::vector<RenderOptions> viewsOf(const GalleryOptions& options, const SparseVolume& reference,
+                                   const CancelToken& cancel) {
+  const Camera first = fitCamera(activeBox(reference), {}, options.resolution);
+  std::vector<RenderOptions> views;
+  for (const auto& transfer : options.transfers)
+    for (int view = 0; view < options.views; ++view) {
+      RenderOptions r;
+      r.camera = turned(first, 360.0 * view / options.views);
+      r.resolution = options.resolution;
+      r.transfer = rescaled(transfer.function, rangeOf(reference));
+      r.step = options.step;
+      r.cancel = &cancel;
+      views.push_back(std::move(r));
+    }
+  return views;
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
+}
+
+/// Draws pictures and keeps the time.
+class Clock {
+ public:
+  Image draw(const Gallery::Draw& draw, const RenderOptions& view) {
+    cli::Stopwatch watch;
+    Image image = draw(view);
+    seconds_.push_back(watch.lap());
+    return image;
+  }
+  [[nodiscard]] double fps() const { return 1.0 / median(seconds_); }
+
+ private:
+  std::vector<double> seconds_;
+};
+
+/// Sums over pictures.
+struct Sums {
+  double squares = 0.0, ssim = 0.0, flip = 0.0;
+
+  void add(const Image& reference, const Image& candidate) {
+    const ImageMetrics metrics = compareImages(reference, candidate);
+    squares += std::pow(10.0, -metrics.psnr / 10.0);
+    ssim += metrics.ssim;
+    flip += esvr::flip(reference, candidate).mean;
+  }
+  [[nodiscard]] ImageFigures over(double pictures, double fps) const {
+    constexpr double kPeak = 1.0;
+    return {psnr(squares / pictures, kPeak), ssim / pictures, flip / pictures, fps};
+  }
+};
+
+}  // namespace
+
+TransferFunction withEmptySpace(const TransferFunction& function, double background,
+                                double threshold) {
+  constexpr int kPlaces = 4096;  // the steps at which a renderer looks a function up
+  TransferFunction result = function;
+  const double low = function.colors.points.front().x, high = function.colors.points.back().x;
+  result.opacity.clear();
+  for (int i = 0; i <= kPlaces; ++i) {
+    const double x = low + (high - low) * i / kPlaces;
+    const bool empty = std::abs(x - background) <= threshold;
+    result.opacity.push_back({.x = x, .opacity = empty ? 0.0 : opacityAt(function.opacity, x)});
+  }
+  return result;
+}
+
+Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference,
+                 const CancelToken& cancel)
+    : views_(viewsOf(options, reference, cancel)) {
+  Clock clock;
+  for (const auto& view : views_)
+    references_.push_back(
+        clock.draw([&](const RenderOptions& r) { return renderVolume(reference, r); }, view));
+  referencePng_ = report::toPng(references_.front());
+  referenceFps_ = clock.fps();
+}
+
+Gallery::Compared Gallery::compare(const Draw& draw) const {
+  Clock clock;
+  Sums sums;
+  Compared result;
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    const Image image = clock.draw(draw, views_[i]);
+    sums.add(references_[i], image);
+    if (i == 0)
+      result.shown = {report::toPng(image),
+                      report::toPng(errorMap(references_[i], image, kErrorGain))};
+  }
+  result.figures = sums.over(double(views_.size()), clock.fps());
+  return result;
+}
+
+}  // namespace esvr::compare

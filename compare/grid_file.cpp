@@ -1,0 +1,67 @@
+#include "compare/grid_file.h"
+
+#include <utility>
+
+#include "cli/names.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
+
+namespace esvr::compare {
+namespace {
+
+std::vector<std::string> storedNames(const std::vector<ListedGrid>& grids) {
+  std::vector<std::string> names;
+  for (const auto& grid : grids) names.push_back(grid.name);
+  return names;
+}
+
+}  // namespace
+
+GridFile::GridFile(std::filesystem::path path) : path_(std::move(path)) {
+  if (path_.extension() == ".esvr")
+    listEsvr();
+  else
+    listVdb();
+}
+
+void GridFile::listEsvr() {
+  esvr_ = std::make_unique<EsvrFile>(readEsvr(path_));
+  bytes_ = inspectEsvr(path_).fileBytes;
+  metadata_ = esvr_->metadata;
+  for (const auto& grid : esvr_->grids)
+    grids_.push_back({.name = grid.descriptor.name,
+                      .empty = grid.activeVoxels == 0,
+                      .valueType = cli::nameOf(grid.descriptor.valueType)});
+  const auto unique = uniqueNames(storedNames(grids_));
+  for (std::size_t g = 0; g < grids_.size(); ++g) grids_[g].uniqueName = unique[g];
+}
+
+void GridFile::listVdb() {
+  VdbSummary summary = inspectVdb(path_);
+  bytes_ = summary.fileBytes;
+  metadata_ = std::move(summary.metadata);
+  for (const auto& grid : summary.grids)
+    grids_.push_back(
+        {grid.name, grid.uniqueName, grid.isScalar, grid.activeVoxels == 0, grid.valueType});
+}
+
+std::size_t GridFile::find(const std::string& name) const {
+  return findGrid(storedNames(grids_), name, path_);
+}
+
+std::size_t GridFile::firstWithVoxels() const {
+  for (std::size_t g = 0; g < grids_.size(); ++g)
+    if (grids_[g].comparable && !grids_[g].empty) return g;
+  throw BadInput(path_.string() + ": no grid of floats has an active voxel");
+}
+
+VolumeGrid GridFile::read(std::size_t g) const {
+  if (!esvr_) return readGrid(path_, grids_[g].uniqueName, {.allowEmpty = true});
+  VolumeGrid grid;
+  grid.descriptor = esvr_->grids[g].descriptor;
+  grid.volume = decodeGrid(esvr_->grids[g]);
+  return grid;
+}
+
+}  // namespace esvr::compare

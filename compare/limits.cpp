@@ -1,0 +1,47 @@
+#include "compare/limits.h"
+
+namespace esvr::compare {
+namespace {
+
+bool misses(const Figure& figure, double value, double limit) {
+  return figure.higherIsBetter ? value < limit : value > limit;
+}
+
+void judgeGrid(const CheckOptions& options, double range, const CheckedGrid& grid,
+               std::vector<std::string>& failures) {
+  for (const Figure& figure : allFigures()) {
+    const auto& bound = options.limits[std::size_t(figure.id)];
+    const auto value = valueOf(grid.figures, figure);
+    if (!bound || !value) continue;
+    const double limit = bound->absolute(range);
+    if (misses(figure, *value, limit))
+      failures.push_back("grid \"" + grid.name + "\": " + figure.header + " " +
+                         textOf(figure, *value) + ", --" + figure.option + " " +
+                         textOf(figure, limit));
+  }
+}
+
+}  // namespace
+
+void judgeLimits(const CheckOptions& options, std::span<const double> ranges, CheckRecord& record) {
+  for (std::size_t g = 0; g < record.grids.size(); ++g)
+    judgeGrid(options, ranges[g], record.grids[g], record.failures);
+  if (options.maxBytes && record.candidateBytes > *options.maxBytes)
+    record.failures.push_back(std::to_string(record.candidateBytes) + " bytes, --max-bytes " +
+                              std::to_string(*options.maxBytes));
+}
+
+void judgeDifferences(const CheckOptions& options, CheckRecord& record) {
+  const auto judge = [&](const std::string& where, const std::vector<Difference>& differences) {
+    for (const auto& difference : differences)
+      if (options.failOn.contains(difference.kind))
+        record.failures.push_back(where + difference.text);
+  };
+  judge("file ", record.fileDifferences);
+  for (const auto& grid : record.grids) judge("grid \"" + grid.name + "\": ", grid.differences);
+  if (!options.failOn.contains(DifferenceKind::kName)) return;
+  for (const auto& name : record.extra)
+    record.failures.push_back("grid \"" + name + "\" is not in the reference");
+}
+
+}  // namespace esvr::compare

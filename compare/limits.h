@@ -1,0 +1,16 @@
+#pragma once
+/// Figures against limits.
+
+#include "compare/check_options.h"
+#include "compare/check_record.h"
+
+namespace esvr::compare {
+
+/// Appends a line to the record's failures for every limit that a grid or the file misses.
+/// \param ranges  of the reference's values, by grid: for limits that are shares of it
+void judgeLimits(const CheckOptions& options, std::span<const double> ranges, CheckRecord& record);
+
+/// The same for differences that were to fail.
+void judgeDifferences(const CheckOptions& options, CheckRecord& record);
+
+}  // namespace esvr::compare

@@ -1,0 +1,322 @@
+#include "compare/measure.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "cli/memory.h"
+#include "cli/names.h"
+#include "cli/stopwatch.h"
+#include "cli/table.h"
+#include "compare/program.h"
+#include "esvr/compact.h"
+#include "esvr/error.h"
+#include "esvr/fit.h"
+#include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
+#include "esvr/rate_control.h"
+
+namespace esvr::compare {
+namespace {
+
+/// Runs once to warm up, then so often, and gives each run's seconds.
+template <class Run>
+Timing timed(int runs, const Run& run) {
+  (void)run();
+  std::vector<double> seconds;
+  for (int i = 0; i < runs; ++i) seconds.push_back(run());
+  return timingOf(std::move(seconds));
+}
+
+const char* nameOf(PackedForm form) {
+  switch (form) {
+    case PackedForm::kOpenVdbFloat:
+      return "OpenVDB float";
+    case PackedForm::kOpenVdbHalf:
+      return "OpenVDB half";
+    case PackedForm::kNanoFloat:
+      return "NanoVDB float";
+    case PackedForm::kNanoFp16:
+      return "NanoVDB Fp16";
+    case PackedForm::kNanoFp8:
+      return "NanoVDB Fp8";
+    case PackedForm::kNanoFp4:
+      return "NanoVDB Fp4";
+    case PackedForm::kNanoFpN:
+      break;
+  }
+  return "NanoVDB FpN";
+}
+
+const char* nameOf(PackedCodec codec) {
+  switch (codec) {
+    case PackedCodec::kZip:
+      return " Zip";
+    case PackedCodec::kBlosc:
+      return " Blosc";
+    case PackedCodec::kNone:
+      break;
+  }
+  return " raw";
+}
+
+std::string shellWord(const std::string& word) {
+  const bool plain =
+      !word.empty() &&
+      word.find_first_not_of(
+          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./=,:+%") ==
+          std::string::npos;
+  if (plain) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+std::vector<SearchStep> searchOf(const Match& match) {
+  std::vector<SearchStep> steps;
+  for (const auto& step : match.steps)
+    steps.push_back({toString(step.setting), step.bytes,
+                     std::isnan(step.psnr) ? std::nullopt : std::optional(step.psnr)});
+  return steps;
+}
+
+EncodedGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::string& name) {
+  std::vector<std::string> names;
+  for (const auto& grid : file.grids) names.push_back(grid.descriptor.name);
+  const std::size_t place = names.size() == 1 ? 0 : findGrid(names, name, path);
+  return std::move(file.grids[place]);
+}
+
+/// A grid of an .esvr by the reference's name of it; where the file has one grid, that one.
+std::size_t placeOf(const GridFile& file, const std::string& name) {
+  return file.grids().size() == 1 ? 0 : file.find(name);
+}
+
+void requireOverlap(const std::filesystem::path& path, const Box& a, const Box& b) {
+  const Box common{maxCoord(a.min, b.min), minCoord(a.max, b.max)};
+  if (!b.empty() && common.empty())
+    throw BadInput(path.string() +
+                   ": its active voxels and the reference's lie in boxes that do not meet");
+}
+
+/// The ellipsoids as they are. A grid that holds its voxels, and a narrow band, whose ellipsoids
+/// say nothing of what lies beyond it, are drawn from their voxels.
+Image drawEsvr(const EncodedGrid& grid, const SparseVolume& voxels, const RenderOptions& view) {
+  if (grid.voxels || grid.topology != TopologyKind::kThreshold) return renderVolume(voxels, view);
+  RenderOptions own = view;
+  own.transfer = withEmptySpace(view.transfer, grid.descriptor.background, grid.activeThreshold);
+  return renderField(grid.field, own);
+}
+
+Timing once(double seconds) { return {seconds, seconds, seconds, 1}; }
+
+/// As --fit takes it.
+std::string wordOf(const FitWish& wish) {
+  if (wish.paper) return "paper";
+  return wish.bytes ? std::to_string(*wish.bytes) : "default";
+}
+
+EncodedGrid fitSized(const RateInput& input, std::uint64_t bytes, TableRow& row) {
+  RatedGrid rated = fitToSize(input, bytes);
+  row.curve = std::move(rated.fit.curve);
+  return std::move(rated.grid);
+}
+
+/// With the defaults, or as the paper does: in float32.
+EncodedGrid fitPlain(const RateInput& input, TableRow& row) {
+  FitResult fit = esvr::fit(input.source, input.options);
+  row.curve = std::move(fit.curve);
+  EncodedGrid grid = encodeGrid(input.descriptor, input.source, std::move(fit.field));
+  if (input.options.paper) return grid;
+  return compactGrid(grid, input.source, {.box = input.options.box}).grid;
+}
+
+std::uint64_t bytesOf(const GridFile& file, const std::filesystem::path& path, std::size_t grid) {
+  return file.grids().size() == 1 ? file.bytes() : cli::storedBytes(inspectEsvr(path), grid);
+}
+
+}  // namespace
+
+Timing timingOf(std::vector<double> seconds) {
+  std::sort(seconds.begin(), seconds.end());
+  const std::size_t n = seconds.size();
+  return {(seconds[(n - 1) / 2] + seconds[n / 2]) / 2, seconds.front(), seconds.back(), int(n)};
+}
+
+std::string displayName(const BaselineSetting& setting) {
+  if (const auto* packing = std::get_if<VoxelPacking>(&setting.how))
+    return std::string(nameOf(packing->form)) + nameOf(packing->codec);
+  return std::get<ZfpSetting>(setting.how).mode == ZfpMode::kAccuracy ? "ZFP accuracy"
+                                                                      : "ZFP precision";
+}
+
+RowMaker::RowMaker(const TableScene& scene)
+    : scene_(scene),
+      encoder_({.grid = scene.reference,
+                .box = scene.box,
+                .peak = scene.peak,
+                .folder = scene.folder,
+                .maxDenseBytes = scene.options.maxDense,
+                .cancel = &scene.cancel}) {}
+
+VolumeMetrics RowMaker::compare(const SparseVolume& volume) const {
+  return compareVolumes(scene_.reference.volume, volume,
+                        {.box = scene_.box, .peak = scene_.peak, .ssim = true});
+}
+
+void RowMaker::measurePictures(const Gallery::Draw& draw, TableRow& row) const {
+  if (!scene_.gallery) return;
+  auto compared = scene_.gallery->compare(draw);
+  row.images = compared.figures;
+  row.shown = std::move(compared.shown);
+  row.fps = compared.figures.fps;
+}
+
+void RowMaker::measureVoxels(const SparseVolume& volume, TableRow& row) const {
+  row.metrics = compare(volume);
+  measurePictures([&](const RenderOptions& view) { return renderVolume(volume, view); }, row);
+}
+
+std::string RowMaker::command(const std::string& arguments) const {
+  const TableOptions& o = scene_.options;
+  std::string text = std::string(kProgram) + " table " + shellWord(o.reference.string());
+  if (o.grid) text += " -g " + shellWord(*o.grid);
+  if (o.box) {
+    const Coord a = o.box->min, b = o.box->max;
+    text += " --box";
+    for (const int side : {a.x, a.y, a.z, b.x, b.y, b.z})
+      text += (text.ends_with("box") ? " " : ",") + std::to_string(side);
+  }
+  if (o.peak) text += " --peak " + std::to_string(*o.peak);
+  return text + " " + arguments;
+}
+
+void RowMaker::measure(const BaselineSetting& setting, TableRow& row) {
+  row.setting = toString(setting);
+  row.command = command("--row " + shellWord(row.setting));
+  row.bytes = encoder_.encode(setting).bytes;  // builds what the method starts from, too
+  const cli::MemoryMeter encoding;
+  row.encode = timed(scene_.options.runs, [&] { return encoder_.encode(setting).seconds; });
+  row.memory = encoding.peakRise();
+  const cli::MemoryMeter decoding;
+  row.decode = timed(scene_.options.runs, [&] { return encoder_.secondsToDecode(); });
+  row.memory = std::max(row.memory, decoding.peakRise());
+  measureVoxels(encoder_.decode(), row);
+}
+
+TableRow RowMaker::baseline(const std::string& group, const BaselineSetting& setting,
+                            const std::string& name) try {
+  TableRow row{.name = name, .group = group};
+  measure(setting, row);
+  return row;
+} catch (const UsageError& error) {
+  return {.name = name, .group = group, .note = error.what()};
+}
+
+TableRow RowMaker::matched(const BaselineSetting& like, const std::string& group,
+                           const std::function<Match()>& search) try {
+  TableRow row{.name = displayName(like), .group = group};
+  const Match match = search();
+  row.search = searchOf(match);
+  if (match.found)
+    measure(match.best.setting, row);
+  else
+    row.note = "out of reach";
+  return row;
+} catch (const UsageError& error) {
+  return {.name = displayName(like), .group = group, .note = error.what()};
+}
+
+TableRow RowMaker::sizeMatched(const BaselineSetting& like, std::uint64_t bytes) {
+  return matched(like, "at " + std::to_string(bytes) + " bytes",
+                 [&] { return matchSize(encoder_, like, bytes); });
+}
+
+TableRow RowMaker::psnrMatched(const BaselineSetting& like, double psnr) {
+  return matched(like, "at " + cli::decibels(psnr) + " dB",
+                 [&] { return matchPsnr(encoder_, like, psnr); });
+}
+
+TableRow RowMaker::external(const External& external) {
+  TableRow row{.name = external.name, .group = "external"};
+  row.command = "--external " + shellWord(external.text);
+  row.bytes = external.bytes;
+  if (external.encodeSeconds) row.encode = once(*external.encodeSeconds);
+  if (external.decodeSeconds) row.decode = once(*external.decodeSeconds);
+  row.note = "times as given";
+  measureVoxels(
+      readExternal(external, {scene_.gridName, scene_.box, scene_.reference.volume.background}),
+      row);
+  if (external.fps) row.fps = external.fps;
+  return row;
+}
+
+void RowMaker::measureEsvr(const std::filesystem::path& path, TableRow& row) {
+  SparseVolume volume;
+  const cli::MemoryMeter decoding;
+  row.decode = timed(scene_.options.runs, [&] {
+    cli::Stopwatch watch;
+    volume = decodeGrid(gridOf(readEsvr(path), path, scene_.gridName));
+    return watch.lap();
+  });
+  row.memory = decoding.peakRise();
+  requireOverlap(path, activeBox(scene_.reference.volume), activeBox(volume));
+  row.metrics = compare(volume);
+  const EncodedGrid grid = gridOf(readEsvr(path), path, scene_.gridName);
+  measurePictures([&](const RenderOptions& view) { return drawEsvr(grid, volume, view); }, row);
+}
+
+TableRow RowMaker::candidate(const std::filesystem::path& path) {
+  TableRow row{.name = path.filename().string(), .group = "ESVR"};
+  const GridFile file(path);
+  if (!file.esvr())
+    throw BadInput(path.string() + ": a candidate is an .esvr file; see --external");
+  const std::size_t place = placeOf(file, scene_.gridName);
+  row.bytes = bytesOf(file, path, place);
+  row.command = command(shellWord(path.string()) + " --rows none");
+  const auto& curve = file.esvr()->grids[place].curve;
+  row.curve = curve;
+  if (!curve.empty()) {
+    row.encode = once(curve.back().seconds);
+    row.note = "seconds to encode: the fit's, from the file";
+  }
+  measureEsvr(path, row);
+  return row;
+}
+
+RateInput RowMaker::rateInput(const FitWish& wish) const {
+  RateInput input{scene_.reference.descriptor, scene_.reference.volume, {}};
+  input.options.box = scene_.box;
+  input.options.cancel = &scene_.cancel;
+  input.options.device = selectDevice(scene_.options.device);
+  input.options.narrowBand = isNarrowBand(input.descriptor, input.source);
+  if (wish.paper) input.options.paper.emplace();
+  return input;
+}
+
+TableRow RowMaker::fitted(const FitWish& wish) {
+  const std::string word = wordOf(wish);
+  TableRow row{.name = "ESVR fitted, " + word, .group = "ESVR"};
+  row.command = command("--rows none --fit " + word);
+  const RateInput input = rateInput(wish);
+  const auto path = scene_.folder / "fitted.esvr";
+
+  const cli::MemoryMeter encoding;
+  cli::Stopwatch watch;
+  EsvrFile file;
+  file.metadata = scene_.metadata;
+  const std::uint64_t head = encodeEsvr(file).size();
+  if (wish.bytes && *wish.bytes <= head)
+    throw UsageError("--fit " + word + " has no room for a grid");
+  file.grids.push_back(wish.bytes ? fitSized(input, *wish.bytes - head, row)
+                                  : fitPlain(input, row));
+  row.bytes = writeEsvr(path, file, {.overwrite = true});
+  row.encode = once(watch.lap());
+  if (scene_.cancel.cancelled()) throw Cancelled();
+  row.note = "one fit, on " + deviceName(input.options.device);
+  const auto memory = encoding.peakRise();
+  measureEsvr(path, row);
+  row.memory = std::max(row.memory, memory);
+  return row;
+}
+
+}  // namespace esvr::compare

@@ -1,0 +1,61 @@
+#include "compare/scene_files.h"
+
+#include "esvr/error.h"
+
+namespace esvr::compare {
+namespace {
+
+VolumeGrid readReference(const GridFile& file, std::size_t place) {
+  VolumeGrid reference = file.read(place);
+  if (activeVoxelCount(reference.volume) == 0)
+    throw BadInput(file.path().string() + ": grid \"" + file.grids()[place].uniqueName +
+                   "\" has no active voxel");
+  return reference;
+}
+
+double choosePeak(const TableOptions& options, const VolumeGrid& reference) {
+  if (options.peak) return *options.peak;
+  const ValueRange range = activeRange(reference.volume);
+  if (range.min == 0.0f && range.max == 0.0f)
+    throw BadInput(options.reference.string() +
+                   ": every active voxel is 0, so that PSNR has no peak; give --peak");
+  return peakOf(reference.volume);
+}
+
+}  // namespace
+
+SceneFiles::SceneFiles(const TableOptions& options, const CancelToken& cancel)
+    : options_(options),
+      cancel_(cancel),
+      file_(options.reference),
+      place_(options.grid ? file_.find(*options.grid) : file_.firstWithVoxels()),
+      reference_(readReference(file_, place_)),
+      box_(options.box.value_or(activeBox(reference_.volume))),
+      peak_(choosePeak(options, reference_)) {
+  if (options.images.views > 0) gallery_.emplace(options.images, reference_.volume, cancel);
+}
+
+TableScene SceneFiles::scene() const {
+  return {options_,
+          file_.grids()[place_].uniqueName,
+          reference_,
+          file_.metadata(),
+          box_,
+          peak_,
+          folder_.path(),
+          cancel_,
+          gallery_ ? &*gallery_ : nullptr};
+}
+
+TableRecord SceneFiles::record() const {
+  TableRecord record;
+  record.grid = file_.grids()[place_].uniqueName;
+  record.referenceBytes = file_.bytes();
+  record.box = box_;
+  record.peak = peak_;
+  record.activeVoxels = activeVoxelCount(reference_.volume);
+  if (gallery_) record.referencePng = gallery_->referencePng();
+  return record;
+}
+
+}  // namespace esvr::compare

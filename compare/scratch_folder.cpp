@@ -1,0 +1,23 @@
+#include "compare/scratch_folder.h"
+
+#include <cstdlib>
+#include <string>
+#include <system_error>
+
+#include "esvr/error.h"
+
+namespace esvr::compare {
+
+ScratchFolder::ScratchFolder() {
+  std::string pattern = std::filesystem::temp_directory_path() / "esvr-compare-XXXXXX";
+  if (mkdtemp(pattern.data()) == nullptr)
+    throw RuntimeFailure("cannot make a folder like " + pattern);
+  path_ = pattern;
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+}  // namespace esvr::compare

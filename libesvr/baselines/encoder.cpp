@@ -1,0 +1,118 @@
+#include <fstream>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "baselines/dense_box.h"
+#include "baselines/drop_voxels.h"
+#include "baselines/zfp_codec.h"
+#include "core/add_seconds.h"
+#include "esvr/baseline.h"
+#include "esvr/error.h"
+
+namespace esvr {
+namespace {
+
+using baselines::DenseBox;
+
+void writeBytes(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  std::ofstream stream(path, std::ios::binary);
+  stream.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+  stream.close();
+  if (!stream) throw RuntimeFailure("cannot write " + path.string());
+}
+
+std::vector<std::byte> readBytes(const std::filesystem::path& path) {
+  std::vector<std::byte> bytes(std::filesystem::file_size(path));
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(bytes.size()));
+  if (!stream) throw RuntimeFailure("cannot read " + path.string());
+  return bytes;
+}
+
+}  // namespace
+
+/// What one setting after the other shares: the grid without the voxels of the last threshold as
+/// OpenVDB has it, and the array for ZFP. Either is made when it is first asked for.
+struct BaselineEncoder::State {
+  explicit State(const BaselineSource& s) : source(s) {}
+
+  BaselineSource source;
+  std::optional<double> packedThreshold;
+  std::unique_ptr<VoxelPacker> packer;
+  std::optional<DenseBox> dense;
+  BaselineSetting last;
+
+  [[nodiscard]] std::filesystem::path file() const {
+    const auto* packing = std::get_if<VoxelPacking>(&last.how);
+    const char* ending = !packing ? "zfp" : isNanoVdb(packing->form) ? "nvdb" : "vdb";
+    return source.folder / (std::string("baseline.") + ending);
+  }
+  const VoxelPacker& packerOf(double threshold) {
+    if (packedThreshold != threshold) {
+      packer = threshold > 0.0
+                   ? std::make_unique<VoxelPacker>(baselines::withoutVoxels(source.grid, threshold))
+                   : std::make_unique<VoxelPacker>(source.grid);
+      packedThreshold = threshold;
+    }
+    return *packer;
+  }
+  double encodeZfp(const ZfpSetting& setting) {
+    if (!dense) dense = baselines::densify(source.grid.volume, source.box, source.maxDenseBytes);
+    double seconds = 0.0;
+    {
+      const AddSeconds clock(seconds);
+      writeBytes(file(), baselines::compressZfp(*dense, setting));
+    }
+    return seconds;
+  }
+  void decodeZfp(DenseBox& into) const { baselines::decompressZfp(readBytes(file()), into); }
+};
+
+BaselineEncoder::BaselineEncoder(const BaselineSource& source)
+    : state_(std::make_unique<State>(source)) {}
+
+BaselineEncoder::~BaselineEncoder() {
+  std::error_code ignored;
+  for (const char* name : {"baseline.zfp", "baseline.nvdb", "baseline.vdb"})
+    std::filesystem::remove(state_->source.folder / name, ignored);
+}
+
+const BaselineSource& BaselineEncoder::source() const { return state_->source; }
+
+BaselineEncoder::Encoded BaselineEncoder::encode(const BaselineSetting& setting) {
+  if (state_->source.cancel && state_->source.cancel->cancelled()) throw Cancelled();
+  state_->last = setting;
+  Encoded encoded;
+  if (const auto* packing = std::get_if<VoxelPacking>(&setting.how))
+    encoded.seconds = state_->packerOf(setting.threshold).write(state_->file(), *packing);
+  else
+    encoded.seconds = state_->encodeZfp(std::get<ZfpSetting>(setting.how));
+  encoded.bytes = std::filesystem::file_size(state_->file());
+  return encoded;
+}
+
+double BaselineEncoder::secondsToDecode() const {
+  if (const auto* packing = std::get_if<VoxelPacking>(&state_->last.how))
+    return secondsToRead(state_->file(), packing->form);
+  DenseBox dense{state_->dense->box, std::vector<float>(state_->dense->values.size())};
+  double seconds = 0.0;
+  {
+    const AddSeconds clock(seconds);
+    state_->decodeZfp(dense);
+  }
+  return seconds;
+}
+
+SparseVolume BaselineEncoder::decode() const {
+  if (std::holds_alternative<VoxelPacking>(state_->last.how)) {
+    const auto name = inspectVdb(state_->file()).grids.front().uniqueName;
+    return readGrid(state_->file(), name, {.allowEmpty = true}).volume;
+  }
+  DenseBox dense{state_->dense->box, std::vector<float>(state_->dense->values.size())};
+  state_->decodeZfp(dense);
+  const SparseVolume& source = state_->source.grid.volume;
+  return baselines::sparsify(dense, source.background, baselines::activityThreshold(source));
+}
+
+}  // namespace esvr

@@ -1,0 +1,185 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
+
+#include "baselines/drop_voxels.h"
+#include "esvr/baseline.h"
+#include "esvr/error.h"
+#include "esvr/metrics.h"
+
+namespace esvr {
+namespace {
+
+constexpr double kNotNeeded = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNearEnough = 0.98;  // of the bytes asked for
+constexpr int kMostBisections = 24;   // a million distinct values, and some
+
+/// FpN's tolerances that a size is tried with, as shares of the peak, from coarse to fine in steps
+/// of about sqrt(2).
+constexpr std::array kTolerances{0.5,    0.35,   0.25,   0.17, 0.12,  0.085, 0.06,   0.042,
+                                 0.03,   0.02,   0.014,  0.01, 0.007, 0.005, 0.0035, 0.0025,
+                                 1.7e-3, 1.2e-3, 8.5e-4, 6e-4, 4e-4,  3e-4,  2e-4,   1e-4};
+constexpr int kPatience = 2;  // tolerances in a row that bring nothing end the search
+
+constexpr int kAccuracySteps = 40;  // powers of two below the peak
+constexpr int kMostPlanes = 32;
+
+/// Tries settings and keeps what came of them.
+class Search {
+ public:
+  explicit Search(BaselineEncoder& encoder) : encoder_(encoder) {}
+
+  /// \return the bytes
+  std::uint64_t tryBytes(const BaselineSetting& setting) {
+    match_.steps.push_back({setting, encoder_.encode(setting).bytes, kNotNeeded});
+    return match_.steps.back().bytes;
+  }
+  /// The PSNR of what was tried last.
+  double measure() {
+    const BaselineSource& source = encoder_.source();
+    const auto metrics = compareVolumes(source.grid.volume, encoder_.decode(),
+                                        {.box = source.box, .peak = source.peak});
+    return match_.steps.back().psnr = metrics.psnrBox;
+  }
+  const MatchStep& last() const { return match_.steps.back(); }
+
+  void keepIfCloser() {
+    if (!match_.found || last().psnr > match_.best.psnr) keep();
+  }
+  void keepIfSmaller() {
+    if (!match_.found || last().bytes < match_.best.bytes) keep();
+  }
+  [[nodiscard]] double bestPsnr() const {
+    return match_.found ? match_.best.psnr : -std::numeric_limits<double>::infinity();
+  }
+  Match take() { return std::move(match_); }
+  [[nodiscard]] const BaselineSource& source() const { return encoder_.source(); }
+
+ private:
+  void keep() {
+    match_.best = last();
+    match_.found = true;
+  }
+
+  BaselineEncoder& encoder_;
+  Match match_;
+};
+
+/// The lowest threshold whose file is small enough, by bisection over those that make a difference;
+/// measured and kept where it is the closest so far. \return false where even one voxel is too much
+bool matchThreshold(Search& search, BaselineSetting setting, std::span<const float> thresholds,
+                    std::uint64_t bytes) {
+  setting.threshold = 0.0;
+  if (search.tryBytes(setting) <= bytes) {
+    search.measure();
+    search.keepIfCloser();
+    return true;
+  }
+  std::size_t low = 0, high = thresholds.size();  // the last would leave no voxel
+  std::optional<double> found;
+  for (int i = 0; i < kMostBisections && low + 1 < high; ++i) {
+    const std::size_t middle = low + (high - low) / 2;
+    setting.threshold = thresholds[middle - 1];
+    const std::uint64_t size = search.tryBytes(setting);
+    (size > bytes ? low : high) = middle;
+    if (size <= bytes) found = setting.threshold;
+    if (size <= bytes && double(size) >= kNearEnough * double(bytes)) break;
+  }
+  if (!found) return false;
+  setting.threshold = *found;
+  search.tryBytes(setting);
+  search.measure();
+  search.keepIfCloser();
+  return true;
+}
+
+void matchToleranceAndThreshold(Search& search, const BaselineSetting& like,
+                                std::span<const float> thresholds, std::uint64_t bytes) {
+  int idle = 0;
+  for (const double share : kTolerances) {
+    BaselineSetting setting = like;
+    std::get<VoxelPacking>(setting.how).tolerance = share * search.source().peak;
+    const double before = search.bestPsnr();
+    const bool fits = matchThreshold(search, setting, thresholds, bytes);
+    idle = fits && search.bestPsnr() > before ? 0 : idle + 1;
+    if (idle == kPatience) return;
+  }
+}
+
+/// ZFP's settings of a mode from coarse to fine.
+std::vector<BaselineSetting> ladder(ZfpMode mode, double peak) {
+  std::vector<BaselineSetting> settings;
+  if (mode == ZfpMode::kPrecision) {
+    for (int planes = 1; planes <= kMostPlanes; ++planes)
+      settings.push_back({.how = ZfpSetting{mode, double(planes)}});
+    return settings;
+  }
+  const int first = std::ilogb(peak) + 3;  // ZFP keeps well within its bound
+  for (int i = 0; i < kAccuracySteps; ++i)
+    settings.push_back({.how = ZfpSetting{mode, std::ldexp(1.0, first - i)}});
+  return settings;
+}
+
+void matchZfpSize(Search& search, ZfpMode mode, std::uint64_t bytes) {
+  for (const auto& setting : ladder(mode, search.source().peak)) {
+    if (search.tryBytes(setting) > bytes) return;
+    search.measure();
+    search.keepIfCloser();
+  }
+}
+
+void matchZfpPsnr(Search& search, ZfpMode mode, double psnr) {
+  for (const auto& setting : ladder(mode, search.source().peak)) {
+    search.tryBytes(setting);
+    if (search.measure() < psnr) continue;
+    search.keepIfSmaller();
+    return;
+  }
+}
+
+/// The coarsest tolerance that reaches a PSNR, by bisection of its logarithm.
+void matchTolerance(Search& search, BaselineSetting setting, double psnr) {
+  constexpr int kSteps = 12;  // to a 400th of a factor of e
+  auto& tolerance = std::get<VoxelPacking>(setting.how).tolerance;
+  double coarse = std::log(search.source().peak), fine = coarse + std::log(1e-5);
+  for (int i = 0; i < kSteps; ++i) {
+    const double middle = (coarse + fine) / 2;
+    tolerance = std::exp(middle);
+    search.tryBytes(setting);
+    const bool reached = search.measure() >= psnr;
+    if (reached) search.keepIfSmaller();
+    (reached ? fine : coarse) = middle;
+  }
+}
+
+}  // namespace
+
+Match matchSize(BaselineEncoder& encoder, const BaselineSetting& like, std::uint64_t bytes) {
+  Search search(encoder);
+  if (const auto* zfp = std::get_if<ZfpSetting>(&like.how)) {
+    matchZfpSize(search, zfp->mode, bytes);
+    return search.take();
+  }
+  const auto thresholds = baselines::thresholds(encoder.source().grid);
+  if (std::get<VoxelPacking>(like.how).form == PackedForm::kNanoFpN)
+    matchToleranceAndThreshold(search, like, thresholds, bytes);
+  else
+    (void)matchThreshold(search, like, thresholds, bytes);
+  return search.take();
+}
+
+Match matchPsnr(BaselineEncoder& encoder, const BaselineSetting& like, double psnr) {
+  Search search(encoder);
+  if (const auto* zfp = std::get_if<ZfpSetting>(&like.how))
+    matchZfpPsnr(search, zfp->mode, psnr);
+  else if (std::get<VoxelPacking>(like.how).form == PackedForm::kNanoFpN)
+    matchTolerance(search, like, psnr);
+  else
+    throw UsageError("only FpN and ZFP have a setting that a PSNR decides");
+  return search.take();
+}
+
+}  // namespace esvr

@@ -1,0 +1,84 @@
+#include "baselines/zfp_codec.h"
+
+#include <zfp.h>
+
+#include <memory>
+#include <string>
+
+#include "esvr/error.h"
+
+namespace esvr {
+namespace {
+
+struct FreeField {
+  void operator()(zfp_field* field) const { zfp_field_free(field); }
+};
+struct CloseStream {
+  void operator()(zfp_stream* stream) const { zfp_stream_close(stream); }
+};
+struct CloseBits {
+  void operator()(bitstream* bits) const { stream_close(bits); }
+};
+using Field = std::unique_ptr<zfp_field, FreeField>;
+using Stream = std::unique_ptr<zfp_stream, CloseStream>;
+using Bits = std::unique_ptr<bitstream, CloseBits>;
+
+constexpr unsigned kMostPlanes = 32;  // of float
+
+Field fieldOf(baselines::DenseBox& dense) {
+  const auto [nx, ny, nz] = dense.side();
+  return Field(zfp_field_3d(dense.values.data(), zfp_type_float, nx, ny, nz));
+}
+
+void apply(const ZfpSetting& setting, zfp_stream* stream) {
+  if (setting.mode == ZfpMode::kAccuracy) {
+    zfp_stream_set_accuracy(stream, setting.amount);
+    return;
+  }
+  const auto planes = unsigned(setting.amount);
+  if (double(planes) != setting.amount || planes < 1 || planes > kMostPlanes)
+    throw UsageError("zfp: precision must be a whole number from 1 to " +
+                     std::to_string(kMostPlanes));
+  zfp_stream_set_precision(stream, planes);
+}
+
+}  // namespace
+
+std::string zfpVersion() {
+  return "ZFP " + std::to_string(ZFP_VERSION_MAJOR) + "." + std::to_string(ZFP_VERSION_MINOR) +
+         "." + std::to_string(ZFP_VERSION_PATCH);
+}
+
+namespace baselines {
+
+std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& setting) {
+  DenseBox& source = const_cast<DenseBox&>(dense);  // ZFP's interface knows no const; it only reads
+  const Field field = fieldOf(source);
+  const Stream stream(zfp_stream_open(nullptr));
+  apply(setting, stream.get());
+  std::vector<std::byte> bytes(zfp_stream_maximum_size(stream.get(), field.get()));
+  const Bits bits(stream_open(bytes.data(), bytes.size()));
+  zfp_stream_set_bit_stream(stream.get(), bits.get());
+  zfp_stream_rewind(stream.get());
+  if (zfp_write_header(stream.get(), field.get(), ZFP_HEADER_FULL) == 0)
+    throw RuntimeFailure("ZFP cannot describe this array");
+  const std::size_t size = zfp_compress(stream.get(), field.get());
+  if (size == 0) throw RuntimeFailure("ZFP failed to compress");
+  bytes.resize(size);
+  return bytes;
+}
+
+void decompressZfp(std::span<const std::byte> bytes, DenseBox& dense) {
+  const Field field = fieldOf(dense);
+  const Stream stream(zfp_stream_open(nullptr));
+  const Bits bits(stream_open(const_cast<std::byte*>(bytes.data()), bytes.size()));
+  zfp_stream_set_bit_stream(stream.get(), bits.get());
+  zfp_stream_rewind(stream.get());
+  const bool read = zfp_read_header(stream.get(), field.get(), ZFP_HEADER_FULL) != 0 &&
+                    zfp_field_size(field.get(), nullptr) == dense.values.size() &&
+                    zfp_decompress(stream.get(), field.get()) != 0;
+  if (!read) throw BadInput("is no ZFP stream of this box");
+}
+
+}  // namespace baselines
+}  // namespace esvr

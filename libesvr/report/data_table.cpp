@@ -1,0 +1,116 @@
+#include "report/data_table.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+#include "cli/table.h"
+
+namespace esvr::report {
+namespace {
+
+std::string formatted(const char* format, double value) {
+  std::array<char, 64> text;
+  std::snprintf(text.data(), text.size(), format, value);
+  return text.data();
+}
+
+std::string numberText(Kind kind, double value) {
+  switch (kind) {
+    case Kind::kBytes:
+      return formatted("%.0f", value);
+    case Kind::kDecibels:
+      return cli::decibels(value);
+    case Kind::kError:
+      return formatted("%.2g", value);
+    case Kind::kShare:
+      return formatted("%.4f", value);
+    default:
+      return formatted("%.3g", value);
+  }
+}
+
+std::string csvField(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
+std::string markdownField(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    if (c == '|') escaped += '\\';
+    escaped += c == '\n' ? ' ' : c;
+  }
+  return escaped;
+}
+
+template <class FieldOf>
+std::string line(std::size_t fields, const char* before, const char* between, const char* after,
+                 const FieldOf& fieldOf) {
+  std::string text = before;
+  for (std::size_t i = 0; i < fields; ++i) text += (i == 0 ? "" : between) + fieldOf(i);
+  return text + after + '\n';
+}
+
+std::string markdownLine(std::size_t fields, const auto& fieldOf) {
+  return line(fields, "| ", " | ", " |", fieldOf);
+}
+
+}  // namespace
+
+std::string cellText(const Column& column, const Cell& cell) {
+  if (const auto* text = std::get_if<std::string>(&cell)) return *text;
+  if (const auto* value = std::get_if<double>(&cell)) return numberText(column.kind, *value);
+  return "-";
+}
+
+std::string exactText(const Cell& cell) {
+  if (const auto* text = std::get_if<std::string>(&cell)) return *text;
+  const auto* value = std::get_if<double>(&cell);
+  if (!value) return {};
+  if (std::isinf(*value)) return *value > 0 ? "inf" : "-inf";
+  std::array<char, 32> text;
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), *value).ptr};
+}
+
+DataTable withColumns(const DataTable& table, const std::vector<std::string>& keys) {
+  DataTable result{table.title, {}, std::vector<Row>(table.rows.size())};
+  for (const auto& key : keys) {
+    const auto column = std::find_if(table.columns.begin(), table.columns.end(),
+                                     [&](const Column& c) { return c.key == key; });
+    if (column == table.columns.end()) throw std::logic_error("no column is called " + key);
+    result.columns.push_back(*column);
+    const auto at = std::size_t(column - table.columns.begin());
+    for (std::size_t r = 0; r < table.rows.size(); ++r) result.rows[r].push_back(table.rows[r][at]);
+  }
+  return result;
+}
+
+std::string toCsv(const DataTable& table) {
+  const std::size_t n = table.columns.size();
+  const auto csvLine = [&](const auto& fieldOf) { return line(n, "", ",", "", fieldOf); };
+  std::string text = csvLine([&](std::size_t i) { return csvField(table.columns[i].key); });
+  for (const auto& row : table.rows)
+    text += csvLine([&](std::size_t i) { return csvField(exactText(row[i])); });
+  return text;
+}
+
+std::string toMarkdown(const DataTable& table) {
+  const std::size_t n = table.columns.size();
+  std::string text = table.title.empty() ? "" : "## " + table.title + "\n\n";
+  text += markdownLine(n, [&](std::size_t i) { return markdownField(table.columns[i].header); });
+  text += line(n, "|", "|", "|", [&](std::size_t i) {
+    return std::string(table.columns[i].kind == Kind::kText ? "---" : "--:");
+  });
+  for (const auto& row : table.rows)
+    text += markdownLine(
+        n, [&](std::size_t i) { return markdownField(cellText(table.columns[i], row[i])); });
+  return text;
+}
+
+}  // namespace esvr::report

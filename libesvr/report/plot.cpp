@@ -1,0 +1,178 @@
+#include "report/plot.h"
+
+#include <cairo-svg.h>
+
+#include <array>
+#include <cmath>
+
+#include "report/axis.h"
+#include "report/cairo_surface.h"
+#include "report/utf8.h"
+
+namespace esvr::report {
+namespace {
+
+struct Rgb {
+  double r, g, b;
+};
+/// Okabe and Ito's colors, which those who see few colors can tell apart, without yellow on white.
+constexpr std::array kPalette{Rgb{0.00, 0.45, 0.70}, Rgb{0.84, 0.37, 0.00}, Rgb{0.00, 0.62, 0.45},
+                              Rgb{0.80, 0.47, 0.65}, Rgb{0.00, 0.00, 0.00}, Rgb{0.34, 0.71, 0.91},
+                              Rgb{0.90, 0.62, 0.00}, Rgb{0.50, 0.50, 0.50}};
+constexpr Rgb kInk{0.1, 0.1, 0.1}, kGrid{0.88, 0.88, 0.88};
+
+constexpr double kTextSize = 13.0, kTitleSize = 16.0, kLine = 1.8, kHair = 1.0, kMarker = 3.2;
+constexpr double kLeft = 74.0, kRight = 18.0, kTop = 42.0, kBottom = 52.0, kLegendLine = 18.0;
+constexpr double kLegendMark = 24.0, kTickGap = 8.0;
+constexpr double kTurn = 6.283185307179586, kQuarter = kTurn / 4;
+
+enum class Anchor { kStart, kMiddle, kEnd };
+
+/// Draws one plot on a surface of its size.
+class Painter {
+ public:
+  Painter(const Plot& plot, const Surface& surface)
+      : plot_(plot),
+        cr_(cairo_create(surface.get())),
+        x_(valuesOf(&Point::x), plot.logarithmicX),
+        y_(valuesOf(&Point::y), plot.logarithmicY) {}
+
+  void paint() {
+    color({1, 1, 1});
+    cairo_paint(cr_.get());
+    drawAxes();
+    for (std::size_t i = 0; i < plot_.series.size(); ++i) drawSeries(i);
+    drawLegend();
+    check(cairo_status(cr_.get()));
+  }
+
+ private:
+  [[nodiscard]] std::vector<double> valuesOf(double Point::*coordinate) const {
+    std::vector<double> values;
+    for (const auto& series : plot_.series)
+      for (const auto& point : series.points) values.push_back(point.*coordinate);
+    return values;
+  }
+
+  [[nodiscard]] double right() const { return plot_.width - kRight; }
+  [[nodiscard]] double bottom() const { return plot_.height - kBottom; }
+  [[nodiscard]] double pixelX(double x) const { return kLeft + x_.place(x) * (right() - kLeft); }
+  [[nodiscard]] double pixelY(double y) const { return bottom() - y_.place(y) * (bottom() - kTop); }
+
+  void color(const Rgb& c) { cairo_set_source_rgb(cr_.get(), c.r, c.g, c.b); }
+  [[nodiscard]] static const Rgb& colorOf(std::size_t series) {
+    return kPalette[series % kPalette.size()];
+  }
+
+  void line(double x0, double y0, double x1, double y1, double width) {
+    cairo_set_line_width(cr_.get(), width);
+    cairo_move_to(cr_.get(), x0, y0);
+    cairo_line_to(cr_.get(), x1, y1);
+    cairo_stroke(cr_.get());
+  }
+
+  void text(const std::string& given, double x, double y, Anchor anchor, double size = kTextSize) {
+    const std::string shown = validUtf8(given);
+    cairo_select_font_face(cr_.get(), "sans-serif", CAIRO_FONT_SLANT_NORMAL,
+                           CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_font_size(cr_.get(), size);
+    cairo_text_extents_t extents;
+    cairo_text_extents(cr_.get(), shown.c_str(), &extents);
+    const double shift = anchor == Anchor::kStart    ? 0.0
+                         : anchor == Anchor::kMiddle ? extents.x_advance / 2
+                                                     : extents.x_advance;
+    cairo_move_to(cr_.get(), x - shift, y);
+    cairo_show_text(cr_.get(), shown.c_str());
+  }
+
+  void drawAxes() {
+    for (const Tick& tick : x_.ticks()) {
+      color(kGrid);
+      line(pixelX(tick.value), kTop, pixelX(tick.value), bottom(), kHair);
+      color(kInk);
+      text(tick.label, pixelX(tick.value), bottom() + kTextSize + kTickGap / 2, Anchor::kMiddle);
+    }
+    for (const Tick& tick : y_.ticks()) {
+      color(kGrid);
+      line(kLeft, pixelY(tick.value), right(), pixelY(tick.value), kHair);
+      color(kInk);
+      text(tick.label, kLeft - kTickGap, pixelY(tick.value) + kTextSize / 3, Anchor::kEnd);
+    }
+    line(kLeft, bottom(), right(), bottom(), kHair);
+    line(kLeft, kTop, kLeft, bottom(), kHair);
+    drawTitles();
+  }
+
+  void drawTitles() {
+    text(plot_.title, plot_.width / 2.0, kTop / 2 + kTitleSize / 3, Anchor::kMiddle, kTitleSize);
+    text(plot_.xLabel, (kLeft + right()) / 2, plot_.height - kTextSize, Anchor::kMiddle);
+    cairo_save(cr_.get());
+    cairo_translate(cr_.get(), kTextSize + kTickGap, (kTop + bottom()) / 2);
+    cairo_rotate(cr_.get(), -kQuarter);
+    text(plot_.yLabel, 0.0, 0.0, Anchor::kMiddle);
+    cairo_restore(cr_.get());
+  }
+
+  void marker(double x, double y) {
+    cairo_arc(cr_.get(), x, y, kMarker, 0.0, kTurn);
+    cairo_fill(cr_.get());
+  }
+
+  void drawSeries(std::size_t i) {
+    constexpr std::size_t kMostMarkers = 40;  // more would hide the line
+    const auto& points = plot_.series[i].points;
+    color(colorOf(i));
+    cairo_set_line_width(cr_.get(), kLine);
+    cairo_new_path(cr_.get());  // a text leaves its end as the current point
+    for (const Point& point : points)
+      if (shows(point)) cairo_line_to(cr_.get(), pixelX(point.x), pixelY(point.y));
+    cairo_stroke(cr_.get());
+    if (points.size() > kMostMarkers) return;
+    for (const Point& point : points)
+      if (shows(point)) marker(pixelX(point.x), pixelY(point.y));
+  }
+
+  [[nodiscard]] bool shows(const Point& point) const {
+    return x_.holds(point.x) && y_.holds(point.y);
+  }
+
+  /// In the lower right corner, where curves of quality have no business.
+  void drawLegend() {
+    double y = bottom() - kTickGap - kLegendLine * double(plot_.series.size() - 1);
+    for (std::size_t i = 0; i < plot_.series.size(); ++i, y += kLegendLine) {
+      color(kInk);
+      text(plot_.series[i].name, right() - kLegendMark - kTickGap, y, Anchor::kEnd);
+      color(colorOf(i));
+      line(right() - kLegendMark, y - kTextSize / 3, right(), y - kTextSize / 3, kLine);
+    }
+  }
+
+  const Plot& plot_;
+  Context cr_;
+  Axis x_, y_;
+};
+
+}  // namespace
+
+std::string toSvg(const Plot& plot) {
+  std::string bytes;
+  {
+    const Surface surface(
+        cairo_svg_surface_create_for_stream(appendBytes, &bytes, plot.width, plot.height));
+    check(cairo_surface_status(surface.get()));
+    Painter(plot, surface).paint();
+    cairo_surface_finish(surface.get());
+    check(cairo_surface_status(surface.get()));
+  }
+  return bytes;
+}
+
+std::string toPng(const Plot& plot) {
+  const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24, plot.width, plot.height));
+  check(cairo_surface_status(surface.get()));
+  Painter(plot, surface).paint();
+  cairo_surface_flush(surface.get());
+  return pngBytes(surface);
+}
+
+}  // namespace esvr::report

@@ -1,0 +1,179 @@
+#include "esvr/voxel_packer.h"
+
+#include "vdb/versions.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <type_traits>
+
+#include "core/add_seconds.h"
+#include "esvr/error.h"
+#include "vdb/errors.h"
+#include "vdb/nano_writers.h"
+#include "vdb/stream_archive.h"
+#include "vdb/volume_to_tree.h"
+
+namespace esvr {
+namespace {
+
+using NanoHandle = nanovdb::GridHandle<nanovdb::HostBuffer>;
+
+nanovdb::io::Codec nanoCodec(PackedCodec codec) {
+  switch (codec) {
+    case PackedCodec::kZip:
+      return nanovdb::io::Codec::ZIP;
+    case PackedCodec::kBlosc:
+      return nanovdb::io::Codec::BLOSC;
+    case PackedCodec::kNone:
+      break;
+  }
+  return nanovdb::io::Codec::NONE;
+}
+
+std::uint32_t openVdbFlags(PackedCodec codec) {
+  using namespace openvdb::io;
+  switch (codec) {
+    case PackedCodec::kZip:
+      return COMPRESS_ACTIVE_MASK | COMPRESS_ZIP;
+    case PackedCodec::kBlosc:
+      return COMPRESS_ACTIVE_MASK | COMPRESS_BLOSC;
+    case PackedCodec::kNone:
+      break;
+  }
+  return COMPRESS_ACTIVE_MASK;
+}
+
+#ifdef ESVR_NANOVDB_HAS_CREATE
+template <class Build>
+NanoHandle makeNano(const openvdb::FloatGrid& grid, double tolerance) {
+  vdb::nanotools::CreateNanoGrid<openvdb::FloatGrid> create(grid);
+  if constexpr (std::is_same_v<Build, nanovdb::FpN>)
+    return create.template getHandle<Build>(vdb::nanotools::AbsDiff(float(tolerance)));
+  else
+    return create.template getHandle<Build>();
+}
+#else
+template <class Build>
+NanoHandle makeNano(const openvdb::FloatGrid& grid, double tolerance) {
+  nanovdb::OpenToNanoVDB<float, Build> create;
+  if constexpr (std::is_same_v<Build, nanovdb::FpN>)
+    create.oracle() = nanovdb::AbsDiff(float(tolerance));
+  return create(grid);
+}
+#endif
+
+NanoHandle makeNano(const openvdb::FloatGrid& grid, const VoxelPacking& packing) {
+  switch (packing.form) {
+    case PackedForm::kNanoFp16:
+      return makeNano<nanovdb::Fp16>(grid, packing.tolerance);
+    case PackedForm::kNanoFp8:
+      return makeNano<nanovdb::Fp8>(grid, packing.tolerance);
+    case PackedForm::kNanoFp4:
+      return makeNano<nanovdb::Fp4>(grid, packing.tolerance);
+    case PackedForm::kNanoFpN:
+      return makeNano<nanovdb::FpN>(grid, packing.tolerance);
+    default:
+      return makeNano<float>(grid, packing.tolerance);
+  }
+}
+
+void checkPacking(const VoxelPacking& packing, const GridDescriptor& descriptor) {
+  if (packing.form == PackedForm::kNanoFpN && !(packing.tolerance > 0.0))
+    throw UsageError("FpN needs a tolerance above 0");
+  if (isNanoVdb(packing.form) && !descriptor.transform.affine)
+    throw UsageError("NanoVDB holds affine transforms only, not a " + descriptor.transform.mapType);
+}
+
+/// Seconds that body() takes.
+template <class Body>
+double timed(const Body& body) {
+  double seconds = 0.0;
+  {
+    const AddSeconds clock(seconds);
+    body();
+  }
+  return seconds;
+}
+
+constexpr float kLargestHalf = 65504.0f;
+
+bool fitsHalf(const SparseVolume& volume) {
+  if (volume.brickCount() == 0) return true;
+  const ValueRange range = activeRange(volume);
+  return std::max({std::abs(range.min), std::abs(range.max), std::abs(volume.background)}) <=
+         kLargestHalf;
+}
+
+openvdb::FloatGrid::Ptr makeFloatGrid(VolumeGrid grid) {
+  grid.descriptor.valueType = ValueType::kFloat;  // what the volume holds, be the source of doubles
+  return openvdb::gridPtrCast<openvdb::FloatGrid>(
+      vdb::makeOpenVdbGrid(grid, {.half = HalfMode::kOff}));
+}
+
+void writeOpenVdb(openvdb::FloatGrid& source, const VoxelPacking& packing, std::ostream& stream) {
+  const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(source.copyGrid());  // one tree
+  grid->setSaveFloatAsHalf(packing.form == PackedForm::kOpenVdbHalf);
+  if (packing.codec == PackedCodec::kZip) grid->setGridClass(openvdb::GRID_UNKNOWN);
+  vdb::StreamArchive(openVdbFlags(packing.codec)).writeTo(stream, {grid}, {});
+}
+
+void writeNano(const openvdb::FloatGrid& source, const VoxelPacking& packing,
+               std::ostream& stream) {
+  nanovdb::io::writeGrid(stream, makeNano(source, packing), nanoCodec(packing.codec));
+}
+
+}  // namespace
+
+bool isNanoVdb(PackedForm form) {
+  return form != PackedForm::kOpenVdbFloat && form != PackedForm::kOpenVdbHalf;
+}
+
+struct VoxelPacker::Source {
+  openvdb::FloatGrid::Ptr grid;
+  GridDescriptor descriptor;
+  bool fitsHalf = true;
+};
+
+VoxelPacker::VoxelPacker(const VolumeGrid& grid)
+    : source_(std::make_unique<Source>(
+          Source{makeFloatGrid(grid), grid.descriptor, fitsHalf(grid.volume)})) {}
+
+VoxelPacker::~VoxelPacker() = default;
+
+double VoxelPacker::write(const std::filesystem::path& path, const VoxelPacking& packing) const {
+  checkPacking(packing, source_->descriptor);
+  if (packing.form == PackedForm::kOpenVdbHalf && !source_->fitsHalf)
+    throw UsageError("has values beyond 65504, the largest that half precision holds");
+  return vdb::whileWriting(path, [&] {
+    return timed([&] {
+      std::ofstream stream(path, std::ios::binary);
+      stream.exceptions(std::ios::badbit | std::ios::failbit);
+      if (isNanoVdb(packing.form))
+        writeNano(*source_->grid, packing, stream);
+      else
+        writeOpenVdb(*source_->grid, packing, stream);
+      stream.close();
+    });
+  });
+}
+
+double secondsToRead(const std::filesystem::path& path, PackedForm form) {
+  vdb::initializeOpenVdb();
+  return vdb::whileReading(path, [&] {
+    return timed([&] {
+      if (isNanoVdb(form)) {
+        (void)nanovdb::io::readGrid(path.string());
+        return;
+      }
+      constexpr bool kDelayLoad = false;
+      openvdb::io::File file(path.string());
+      file.open(kDelayLoad);
+      (void)file.getGrids();
+    });
+  });
+}
+
+}  // namespace esvr

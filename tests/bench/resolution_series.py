@@ -1,0 +1,144 @@
+#!/usr/bin/env python3
+"""One skeleton rasterised at rising resolutions: bytes at 25 dB over the active voxels.
+
+    resolution_series.py fit  --bin BUILD --swc FILE.swc --out OUT [--device cuda] [--resolutions 256 512 ...]
+    resolution_series.py page --bin BUILD --swc FILE.swc --out OUT [--resolutions 256 512 ...]
+
+`fit` makes the volumes and, for each, .esvr files of more and more ellipsoids until one is above 25 dB; from the two
+about it follows the number that should reach it, which is fitted once more. `page` matches NanoVDB FpN and ZFP to that
+file's PSNR and prints a Markdown table with the exponents by which bytes grow.
+"""
+import argparse
+import json
+import math
+import pathlib
+import subprocess
+import sys
+
+TARGET = 25.0  # dB over the active voxels
+NEAR = 0.3     # dB that the file taken may be off
+FIRST = 1500   # ellipsoids at 256; twice as many at twice the resolution, to begin with
+STEP = 1.7
+MOST_FITS = 6
+
+
+def run(words):
+    done = subprocess.run([str(w) for w in words], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise SystemExit(f'{" ".join(map(str, words))}\n{done.stderr}')
+    return done.stdout
+
+
+class Resolution:
+    def __init__(self, options, resolution):
+        self.options, self.resolution = options, resolution
+        self.volume = options.out / f'tree-{resolution}.vdb'
+        self.best = options.out / f'tree-{resolution}.esvr'
+        self.report = self.best.with_suffix('.report.json')
+
+    def make_volume(self):
+        if not self.volume.exists():
+            run([self.options.bin / 'samples/swc2vdb', self.options.swc, self.volume,
+                 '--resolution', self.resolution])
+
+    def fit(self, count):
+        """\\return PSNR over the active voxels; the file is kept where it is the nearest so far."""
+        path = self.options.out / 'attempt.esvr'
+        text = run([self.options.bin / 'vdb2esvr/vdb2esvr', self.volume, path, '--count', count,
+                    '--device', self.options.device, '--report', '-', '-f'])
+        psnr = json.loads(text)['grids'][0]['metrics']['psnr_active']
+        print(self.resolution, count, psnr, file=sys.stderr, flush=True)
+        if not self.report.exists() or abs(psnr - TARGET) < abs(self.psnr() - TARGET):
+            path.replace(self.best)
+            self.report.write_text(text)
+        return psnr
+
+    def psnr(self):
+        return json.loads(self.report.read_text())['grids'][0]['metrics']['psnr_active']
+
+    def search(self):
+        """Steps up or down until 25 dB lies between two fits, then secants in log(count)."""
+        self.make_volume()
+        if self.report.exists() and abs(self.psnr() - TARGET) <= NEAR:
+            return
+        points = []
+        count = FIRST * self.resolution // 256
+        for _ in range(MOST_FITS):
+            points.append((math.log(count), self.fit(count)))
+            if abs(points[-1][1] - TARGET) <= NEAR:
+                return
+            count = self.next_count(points)
+
+    @staticmethod
+    def next_count(points):
+        below = max((p for p in points if p[1] < TARGET), key=lambda p: p[1], default=None)
+        above = min((p for p in points if p[1] >= TARGET), key=lambda p: p[1], default=None)
+        if not above:
+            return int(math.exp(below[0]) * STEP)
+        if not below:
+            return int(math.exp(above[0]) / STEP)
+        share = (TARGET - below[1]) / (above[1] - below[1])
+        return int(math.exp(below[0] + share * (above[0] - below[0])))
+
+    def rows(self):
+        kept = self.options.out / f'tree-{self.resolution}.table.json'
+        if not kept.exists():
+            run([self.options.bin / 'compare/esvr-compare', 'table', self.volume, self.best,
+                 '--rows', 'matched,zfp', '--runs', '3', '--max-dense', '1GB', '--report', kept, '-q'])
+        table = json.loads(kept.read_text())
+        ours = next(r for r in table['rows'] if r['group'] == 'ESVR')
+        matched = [r for r in table['rows'] if r['group'].endswith(' dB')]
+        return table, [dict(ours, name='ESVR')] + matched
+
+
+def exponent(points):
+    """Slope of log(bytes) over log(resolution), least squares."""
+    if len(points) < 2:
+        return float('nan')
+    xs, ys = [math.log(p[0]) for p in points], [math.log(p[1]) for p in points]
+    mx, my = sum(xs) / len(xs), sum(ys) / len(ys)
+    return sum((x - mx) * (y - my) for x, y in zip(xs, ys)) / sum((x - mx) ** 2 for x in xs)
+
+
+def figure(row, key, form):
+    return form.format(row[key]) if row.get(key) is not None else '-'
+
+
+def page(options):
+    print('| resolution | active voxels | row | bytes | PSNR box | active | decode s |')
+    print('|--:|--:|---|--:|--:|--:|--:|')
+    sizes = {}
+    for resolution in options.resolutions:
+        table, rows = Resolution(options, resolution).rows()
+        for row in rows:
+            print(f"| {resolution} | {table['active_voxels']} | {row['name']} | "
+                  f"{figure(row, 'bytes', '{}')} | {figure(row, 'psnr_box', '{:.2f}')} | "
+                  f"{figure(row, 'psnr_active', '{:.2f}')} | {figure(row, 'decode_s', '{:.4f}')} |")
+            if 'bytes' in row:
+                sizes.setdefault(row['name'], []).append((resolution, row['bytes']))
+    print()
+    for name, points in sizes.items():
+        print(f'- {name}: bytes grow as resolution^{exponent(points):.2f} '
+              f'({points[0][0]} to {points[-1][0]})')
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('job', choices=('fit', 'page'))
+    parser.add_argument('--bin', type=pathlib.Path, required=True, help='the build folder')
+    parser.add_argument('--swc', type=pathlib.Path, required=True)
+    parser.add_argument('--out', type=pathlib.Path, required=True)
+    parser.add_argument('--device', default='auto')
+    parser.add_argument('--resolutions', type=int, nargs='+', default=[256, 512, 1024, 2048, 4096])
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    if options.job == 'page':
+        return page(options)
+    for resolution in options.resolutions:
+        Resolution(options, resolution).search()
+    return None
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,320 @@
+// Plan: `esvr-compare check` as a script runs it: files of all three kinds against their source,
+// each limit met and missed, baselines, differences that fail on demand, and what it refuses, with
+// code and words.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "cli/converters.h"
+#include "cli/vdb_inputs.h"
+#include "esvr/vdb_io.h"
+
+namespace esvr {
+namespace {
+
+using nlohmann::json;
+using test::InputGrid;
+using test::softBall;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+test::ProgramRun compare(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "check");
+  return test::runProgram(ESVR_COMPARE, arguments);
+}
+
+/// A folder with a source of two grids.
+class CompareCheck : public testing::Test {
+ protected:
+  void SetUp() override { write("ref.vdb", {ball(), heat()}); }
+
+  static InputGrid ball() { return {.voxels = softBall({})}; }
+  static InputGrid heat() {
+    return {.name = "heat", .voxels = softBall({40, 0, 0}, 2.0f, 1.0f), .background = 1.0f};
+  }
+  /// The ball with every voxel a little too high: an error of 0.01 throughout.
+  static InputGrid drifted() {
+    InputGrid grid = ball();
+    for (auto& voxel : grid.voxels) voxel.value += 0.01f;
+    return grid;
+  }
+  void write(const std::string& name, const std::vector<InputGrid>& grids) const {
+    test::writeInput(folder_ / name, grids);
+  }
+  [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] test::ProgramRun check(const std::string& candidate,
+                                       std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {at("ref.vdb"), at(candidate)});
+    return compare(more);
+  }
+  [[nodiscard]] json reportOf(const std::string& candidate,
+                              std::vector<std::string> more = {}) const {
+    more.insert(more.end(), {"--report", "-"});
+    const auto run = check(candidate, more);
+    return json::parse(run.out, nullptr, false);
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(CompareCheck, findsNoErrorInTheFileItself) {
+  const auto report = reportOf("ref.vdb", {"--ssim"});
+  ASSERT_EQ(report["grids"].size(), 2u);
+  for (const auto& grid : report["grids"]) {
+    EXPECT_TRUE(grid["psnr_box"].is_null()) << "infinite";
+    EXPECT_EQ(grid["max_error"], 0.0);
+    EXPECT_EQ(grid["iou"], 1.0);
+    EXPECT_EQ(grid["ssim"], 1.0);
+    EXPECT_EQ(grid["mass_error"], 0.0);
+    EXPECT_TRUE(grid["differences"].empty());
+  }
+  EXPECT_TRUE(report["file_differences"].empty());
+}
+
+TEST_F(CompareCheck, seesNoDifferenceWhereOnlyTheHeadersDiffer) {
+  write("again.vdb", {ball(), heat()});  // another UUID
+  ASSERT_NE(test::readText(at("ref.vdb")), test::readText(at("again.vdb")));
+  const auto run =
+      check("again.vdb", {"--min-psnr", "200", "--max-error", "0", "--fail-on", "all"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("exact"));
+}
+
+TEST_F(CompareCheck, readsEsvrAndNanoVdbToo) {
+  ASSERT_EQ(test::quickFit(at("ref.vdb"), at("fit.esvr")).exitCode, 0);
+  ASSERT_EQ(test::esvr2vdb({at("fit.esvr"), at("back.nvdb")}).exitCode, 0);
+  const auto esvr = reportOf("fit.esvr"), nano = reportOf("back.nvdb");
+  for (const char* figure : {"psnr_box", "max_error", "iou"})
+    EXPECT_EQ(esvr["grids"][0][figure], nano["grids"][0][figure]) << figure;
+  EXPECT_TRUE(esvr["grids"][0]["differences"].empty());
+  const auto reversed = compare({at("back.nvdb"), at("fit.esvr"), "--min-psnr", "200"});
+  EXPECT_EQ(reversed.exitCode, 0) << reversed.err << "the same voxels";
+}
+
+struct Limit {
+  const char *option, *met, *missed;
+};
+class CompareLimit : public CompareCheck, public testing::WithParamInterface<Limit> {};
+
+TEST_P(CompareLimit, passesOrFailsWithTheFigure) {
+  write("off.vdb", {drifted(), heat()});
+  const auto [option, met, missed] = GetParam();
+  const std::string dashed = std::string("--") + option;
+  EXPECT_EQ(check("off.vdb", {"-g", "density", dashed, met}).exitCode, 0);
+  const auto run = check("off.vdb", {"-g", "density", dashed, missed, "-q"});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("grid \"density\""), HasSubstr(dashed + " ")));
+  EXPECT_THAT(run.out, IsEmpty());
+}
+
+// An error of 0.01 at every active voxel and a peak of 1 are 40 dB over them; the ball fills 485 of
+// the 729 voxels of its box, which adds 1.8 dB. Its values sum up to about 0.43 of its voxels.
+INSTANTIATE_TEST_SUITE_P(
+    All, CompareLimit,
+    testing::Values(Limit{"min-psnr", "41.7", "41.9"}, Limit{"min-psnr-active", "39.9", "40.1"},
+                    Limit{"max-error", "0.011", "0.009"}, Limit{"max-p999-error", "0.011", "0.009"},
+                    Limit{"min-iou", "1", "1.01"}, Limit{"min-ssim", "0.9", "1.1"},
+                    Limit{"max-mass-error", "0.03", "0.02"}),
+    [](const auto& tested) {
+      std::string name = tested.param.option;
+      std::erase(name, '-');
+      return name;
+    });
+
+TEST_F(CompareCheck, takesErrorsAsAShareOfTheRange) {
+  write("off.vdb", {drifted(), heat()});  // the ball's values range over 0.96
+  EXPECT_EQ(check("off.vdb", {"--max-error", "1.1%"}).exitCode, 0);
+  EXPECT_EQ(check("off.vdb", {"--max-error", "0.9%"}).exitCode, 4);
+}
+
+TEST_F(CompareCheck, boundsTheFilesBytes) {
+  EXPECT_EQ(check("ref.vdb", {"--max-bytes", "1MB"}).exitCode, 0);
+  const auto run = check("ref.vdb", {"--max-bytes", "100"});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("--max-bytes 100"));
+}
+
+TEST_F(CompareCheck, failsWhereAGridIsMissing) {
+  write("one.vdb", {ball()});
+  const auto run = check("one.vdb");
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("\"heat\" is missing"));
+  EXPECT_EQ(check("one.vdb", {"-g", "density"}).exitCode, 0);
+}
+
+TEST_F(CompareCheck, comparesGridsOfOtherNamesWhereTold) {
+  InputGrid renamed = ball();
+  renamed.name = "smoke";
+  write("renamed.vdb", {renamed});
+  const auto run = check("renamed.vdb", {"-g", "density=smoke"});
+  EXPECT_EQ(run.exitCode, 0);
+  EXPECT_THAT(run.out, HasSubstr("name: \"density\", \"smoke\""));
+  EXPECT_EQ(check("renamed.vdb", {"-g", "density=smoke", "--fail-on", "name"}).exitCode, 4);
+}
+
+TEST_F(CompareCheck, tellsDifferencesBesidesTheVoxels) {
+  InputGrid other = ball();
+  other.map = test::InputMap::kRotated;
+  other.levelSet = true;
+  other.background = 3.0f;
+  write("other.vdb", {other, heat()});
+  const auto run = check("other.vdb");
+  EXPECT_EQ(run.exitCode, 0);
+  EXPECT_THAT(run.out, AllOf(HasSubstr("transform: "), HasSubstr("class: fog volume, level set"),
+                             HasSubstr("background: 0, 3")));
+  for (const char* kind : {"transform", "class", "background", "all", "name,transform"})
+    EXPECT_EQ(check("other.vdb", {"--fail-on", kind}).exitCode, 4) << kind;
+  EXPECT_EQ(check("other.vdb", {"--fail-on", "name,metadata"}).exitCode, 0);
+}
+
+TEST_F(CompareCheck, tellsMetadataThatDoNotComeBack) {
+  ASSERT_EQ(test::quickFit(at("ref.vdb"), at("fit.esvr")).exitCode, 0);
+  ASSERT_EQ(test::esvr2vdb({at("fit.esvr"), at("back.nvdb")}).exitCode, 0);
+  const auto run = check("back.nvdb", {"--fail-on", "metadata"});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("file metadata \"creator\": missing"),
+                             HasSubstr("metadata \"note\": missing")));
+  ASSERT_EQ(test::esvr2vdb({at("fit.esvr"), at("back.vdb")}).exitCode, 0);
+  EXPECT_EQ(check("back.vdb", {"--fail-on", "all"}).exitCode, 0) << "our own mark is no difference";
+}
+
+TEST_F(CompareCheck, failsWhereTheVoxelsLieElsewhere) {
+  write("moved.vdb", {{.voxels = softBall({100, 0, 0})}, heat()});
+  const auto run = check("moved.vdb");
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("boxes that do not meet"));
+}
+
+TEST_F(CompareCheck, failsWhereTheCandidateIsEmpty) {
+  write("empty.vdb", {{.voxels = {}}, heat()});
+  const auto run = check("empty.vdb");
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("the candidate has no active voxel"));
+}
+
+TEST_F(CompareCheck, passesOverGridsThatHoldNothingToCompare) {
+  test::writeMixedInput(at("mixed.vdb"), {ball(), {.name = "none"}});
+  const auto run = compare({at("mixed.vdb"), at("mixed.vdb")});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("skipped grid \"vec3s\""), HasSubstr("type int32"),
+                             HasSubstr("skipped grid \"none\"")));
+}
+
+TEST_F(CompareCheck, holdsARunAgainstItsBaseline) {
+  const std::vector<std::string> baseline{"--baseline", at("base.json")};
+  write("off.vdb", {drifted(), heat()});
+  EXPECT_EQ(check("off.vdb", {"--baseline", at("base.json"), "--update"}).exitCode, 0);
+  EXPECT_EQ(check("off.vdb", baseline).exitCode, 0);
+
+  InputGrid worse = drifted();
+  worse.voxels.front().value += 0.1f;
+  write("worse.vdb", {worse, heat()});
+  const auto run = check("worse.vdb", baseline);
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err,
+              AllOf(HasSubstr("max error"), HasSubstr("baseline 0.01"), Not(HasSubstr("IoU"))));
+
+  const auto better = check("ref.vdb", baseline);
+  EXPECT_EQ(better.exitCode, 0) << better.err;
+  EXPECT_THAT(better.out, HasSubstr("better"));
+}
+
+TEST_F(CompareCheck, keepsTheTolerancesOfABaseline) {
+  write("off.vdb", {drifted(), heat()});
+  ASSERT_EQ(check("off.vdb", {"--baseline", at("base.json"), "--update"}).exitCode, 0);
+  auto stored = json::parse(test::readText(at("base.json")));
+  stored["grids"]["density"]["max_error"]["tolerance"] = 5.0;
+  test::writeText(at("base.json"), stored.dump());
+  ASSERT_EQ(check("ref.vdb", {"--baseline", at("base.json"), "--update"}).exitCode, 0);
+  const auto updated = json::parse(test::readText(at("base.json")));
+  EXPECT_EQ(updated["grids"]["density"]["max_error"]["tolerance"], 5.0);
+  EXPECT_EQ(updated["grids"]["density"]["max_error"]["value"], 0.0);
+  EXPECT_TRUE(updated["grids"]["density"]["psnr_box"]["value"].is_null());
+  EXPECT_EQ(check("off.vdb", {"--baseline", at("base.json")}).exitCode, 4) << "exact before";
+}
+
+TEST_F(CompareCheck, wantsEveryGridOfTheBaseline) {
+  ASSERT_EQ(check("ref.vdb", {"--baseline", at("base.json"), "--update"}).exitCode, 0);
+  const auto run = check("ref.vdb", {"--baseline", at("base.json"), "-g", "density"});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("\"heat\" of the baseline was not compared"));
+}
+
+TEST_F(CompareCheck, leavesTheBaselineWhereALimitIsMissed) {
+  write("off.vdb", {drifted(), heat()});
+  const auto run =
+      check("off.vdb", {"--baseline", at("base.json"), "--update", "--max-error", "0.001"});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_FALSE(std::filesystem::exists(at("base.json")));
+}
+
+TEST_F(CompareCheck, reportsFailuresInJson) {
+  write("off.vdb", {drifted(), heat()});
+  const auto report = reportOf("off.vdb", {"--max-error", "0.001"});
+  EXPECT_EQ(report["schema"], "esvr-check");
+  ASSERT_EQ(report["failures"].size(), 1u);
+  EXPECT_NEAR(report["grids"][0]["max_error"].get<double>(), 0.01, 1e-7);  // float32 near 1
+}
+
+struct Refusal {
+  std::vector<std::string> arguments;  ///< "DIR/x" stands for a file of the fixture's folder
+  int code;
+  const char* words;
+};
+std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
+  return out << testing::PrintToString(refusal.arguments);
+}
+class RefusedCheck : public CompareCheck, public testing::WithParamInterface<Refusal> {};
+
+TEST_P(RefusedCheck, isExplainedAndLeavesNoFile) {
+  write("zero.vdb", {{.voxels = {{{0, 0, 0}, 0.0f}, {{1, 0, 0}, 0.0f}}}});
+  write("none.vdb", {{.voxels = {}}});
+  write("else.vdb", {{.name = "fuel", .voxels = softBall({})}});
+  test::writeText(at("broken.vdb"), "no such thing");
+  test::writeText(at("notes.json"), "[1, 2]");
+  std::vector<std::string> arguments = GetParam().arguments;
+  for (std::string& argument : arguments)
+    if (argument.starts_with("DIR/")) argument = at(argument.substr(4));
+  const auto run = compare(arguments);
+  EXPECT_EQ(run.exitCode, GetParam().code);
+  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  EXPECT_THAT(folder_.names(), ElementsAre("broken.vdb", "else.vdb", "none.vdb", "notes.json",
+                                           "ref.vdb", "zero.vdb"));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, RefusedCheck,
+    testing::Values(
+        Refusal{{}, 2, "REF"}, Refusal{{"DIR/ref.vdb"}, 2, "CAND"},
+        Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--max-error", "much"}, 2, "--max-error"},
+        Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--min-psnr", "inf"}, 2, "--min-psnr"},
+        Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--fail-on", "colour"}, 2, "colour"},
+        Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--update"}, 2, "--baseline"},
+        Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--peak", "0"}, 2, "--peak"},
+        Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--report", "DIR/x.txt"}, 2, ".json"},
+        Refusal{{"DIR/missing.vdb", "DIR/ref.vdb"}, 3, "missing.vdb"},
+        Refusal{{"DIR/ref.vdb", "DIR/missing.esvr"}, 3, "missing.esvr"},
+        Refusal{{"DIR/ref.vdb", "DIR/broken.vdb"}, 3, "broken.vdb"},
+        Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "-g", "smoke"}, 3, "\"density\""},
+        Refusal{{"DIR/ref.vdb", "DIR/else.vdb"}, 3, "\"fuel\""},
+        Refusal{{"DIR/none.vdb", "DIR/ref.vdb"}, 3, "nothing to compare"},
+        Refusal{{"DIR/none.vdb", "DIR/ref.vdb", "-g", "density"}, 3, "no active voxel"},
+        Refusal{{"DIR/zero.vdb", "DIR/zero.vdb"}, 3, "--peak"},
+        Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--baseline", "DIR/no.json"}, 3, "no.json"},
+        Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--baseline", "DIR/notes.json"}, 3, "baseline"}));
+
+TEST(CompareProgram, namesItsJobs) {
+  const auto run = test::runProgram(ESVR_COMPARE, {"chekc", "a", "b"});
+  EXPECT_EQ(run.exitCode, 2);
+  EXPECT_EQ(test::runProgram(ESVR_COMPARE, {"--help"}).exitCode, 0);
+  EXPECT_THAT(test::runProgram(ESVR_COMPARE, {"check", "--help"}).out, HasSubstr("--min-psnr"));
+}
+
+}  // namespace
+}  // namespace esvr

@@ -1,0 +1,122 @@
+// Plan: `esvr-compare curves` as a user runs it: the points in either form of data, the pictures
+// that are there, sizes that it chooses itself, and what it refuses.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "cli/converters.h"
+#include "cli/vdb_inputs.h"
+
+namespace esvr {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+test::ProgramRun curves(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "curves");
+  return test::runProgram(ESVR_COMPARE, arguments);
+}
+
+class CompareCurves : public testing::Test {
+ protected:
+  void SetUp() override {
+    test::writeInput(at("ref.vdb"), {{.voxels = test::softBall({})}});
+    ASSERT_EQ(test::quickFit(at("ref.vdb"), at("fit.esvr")).exitCode, 0);
+  }
+  [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] json points() const { return json::parse(test::readText(at("c.json")))["points"]; }
+  test::TemporaryFolder folder_;
+};
+
+std::set<std::string> seriesOf(const json& points) {
+  std::set<std::string> names;
+  for (const auto& point : points) names.insert(point["series"]);
+  return names;
+}
+
+TEST_F(CompareCurves, hasACandidatesOwnCurveAndItsFile) {
+  const auto run = curves({at("ref.vdb"), at("fit.esvr"), "--no-baselines", "-o", at("c")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  int ofFit = 0, ofFile = 0;
+  double last = 0.0;
+  for (const auto& point : points()) {
+    EXPECT_EQ(point["series"], "ESVR");
+    if (point["kind"] == "file") ++ofFile;
+    if (point["kind"] != "fit") continue;
+    ++ofFit;
+    EXPECT_GE(point["seconds"].get<double>(), last) << "time goes on";
+    last = point["seconds"];
+  }
+  EXPECT_GT(ofFit, 1);
+  EXPECT_EQ(ofFile, 1);
+  EXPECT_THAT(test::readText(at("c.csv")), StartsWith("kind,series,name,bytes,seconds,"));
+  EXPECT_THAT(folder_.names(),
+              testing::ElementsAre("c-bytes.png", "c-bytes.svg", "c-seconds.png", "c-seconds.svg",
+                                   "c.csv", "c.json", "fit.esvr", "ref.vdb"));
+}
+
+TEST_F(CompareCurves, SlowHasBaselinesAtEachSizeAndFramesASecond) {
+  const auto run = curves({at("ref.vdb"), "--fit", "3KB", "--fit", "5KB", "--device", "cpu",
+                           "--fps", "24", "-o", at("c")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto all = points();
+  EXPECT_THAT(seriesOf(all), testing::IsSupersetOf({"ESVR", "NanoVDB FpN Zip"}));
+  for (const auto& point : all)
+    if (point["kind"] == "file") {
+      EXPECT_GT(point["fps"].get<double>(), 0.0);
+      EXPECT_LE(point["bytes"].get<double>(), 5000);
+    }
+  EXPECT_THAT(test::readText(at("c-fps.svg")), HasSubstr("<svg"));
+}
+
+TEST_F(CompareCurves, SlowChoosesSixSizesAndTellsThoseThatAreTooSmall) {
+  const auto run = curves({at("ref.vdb"), "--no-baselines", "--device", "cpu", "-o", at("c")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  // The ball's VDB takes so little that there is no room for a grid in a 100th of it and below.
+  std::size_t files = 0, refused = 0;
+  for (const auto& point : points()) files += point["kind"] == "file";
+  for (std::size_t at = 0; (at = run.err.find("no fit of", at)) != std::string::npos; ++at)
+    ++refused;
+  EXPECT_GT(files, 0u);
+  EXPECT_GT(refused, 0u);
+  EXPECT_EQ(files + refused, 6u);
+}
+
+struct Refusal {
+  std::vector<std::string> arguments;  ///< "DIR/x" stands for a file of the fixture's folder
+  int code;
+  const char* words;
+};
+std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
+  return out << testing::PrintToString(refusal.arguments);
+}
+class RefusedCurves : public CompareCurves, public testing::WithParamInterface<Refusal> {};
+
+TEST_P(RefusedCurves, isExplainedAndLeavesNoFile) {
+  test::writeText(at("there.csv"), "precious");
+  std::vector<std::string> arguments = GetParam().arguments;
+  for (std::string& argument : arguments)
+    if (argument.starts_with("DIR/")) argument = at(argument.substr(4));
+  const auto run = curves(arguments);
+  EXPECT_EQ(run.exitCode, GetParam().code);
+  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  EXPECT_THAT(folder_.names(), testing::ElementsAre("fit.esvr", "ref.vdb", "there.csv"));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, RefusedCurves,
+    testing::Values(Refusal{{}, 2, "REF.vdb"}, Refusal{{"DIR/ref.vdb"}, 2, "--output"},
+                    Refusal{{"DIR/ref.vdb", "-o", "DIR/there"}, 1, "there.csv"},
+                    Refusal{{"DIR/ref.vdb", "-o", "DIR/c", "--fps", "0"}, 2, "--fps"},
+                    Refusal{{"DIR/ref.vdb", "-o", "DIR/none/c"}, 1, "none"},
+                    Refusal{{"DIR/none.vdb", "-o", "DIR/c"}, 3, "none.vdb"},
+                    Refusal{{"DIR/ref.vdb", "DIR/none.esvr", "-o", "DIR/c"}, 3, "none.esvr"}));
+
+}  // namespace
+}  // namespace esvr

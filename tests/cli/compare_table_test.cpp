@@ -1,0 +1,254 @@
+// Plan: `esvr-compare table` as a user runs it, on a small grid: which rows there are, that figures
+// are what the files give, that a row's command makes the same row, sizes that match, external
+// results, reports in each form, and what it refuses.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "cli/converters.h"
+#include "cli/vdb_inputs.h"
+
+namespace esvr {
+namespace {
+
+using nlohmann::json;
+using test::softBall;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+test::ProgramRun table(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "table");
+  return test::runProgram(ESVR_COMPARE, arguments);
+}
+
+/// A folder with a grid and its fit. The ball spans (-4, -4, -4) to (4, 4, 4).
+class CompareTable : public testing::Test {
+ protected:
+  void SetUp() override {
+    test::writeInput(at("ref.vdb"), {{.voxels = softBall({})}});
+    ASSERT_EQ(test::quickFit(at("ref.vdb"), at("fit.esvr")).exitCode, 0);
+  }
+  [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] json reportOf(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), at("ref.vdb"));
+    arguments.insert(arguments.end(), {"--runs", "1", "--report", "-"});
+    const auto run = table(arguments);
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    return json::parse(run.out, nullptr, false);
+  }
+  /// Raw float32 of the ball's box, with `error` added to every voxel.
+  void writeRaw(const std::string& name, float error) const {
+    std::ofstream stream(at(name), std::ios::binary);
+    for (int z = -4; z <= 4; ++z)
+      for (int y = -4; y <= 4; ++y)
+        for (int x = -4; x <= 4; ++x) {
+          const float value = std::max(0.0f, 1.0f - float(x * x + y * y + z * z) / 25.0f) + error;
+          stream.write(reinterpret_cast<const char*>(&value), sizeof value);
+        }
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+const json* rowOf(const json& report, const std::string& name, const std::string& group = {}) {
+  for (const auto& row : report["rows"])
+    if (row["name"] == name && (group.empty() || row["group"] == group)) return &row;
+  return nullptr;
+}
+
+TEST_F(CompareTable, hasLosslessRowsWithoutError) {
+  const auto report = reportOf({"--rows", "lossless"});
+  for (const char* name : {"OpenVDB float Blosc", "OpenVDB float Zip", "NanoVDB float raw",
+                           "NanoVDB float Zip", "NanoVDB float Blosc"}) {
+    const json* row = rowOf(report, name);
+    ASSERT_NE(row, nullptr) << name;
+    EXPECT_TRUE((*row)["psnr_box"].is_null()) << name << " infinite";
+    EXPECT_EQ((*row)["max_error"], 0.0) << name;
+    EXPECT_EQ((*row)["iou"], 1.0) << name;
+    EXPECT_NEAR((*row)["ssim"].get<double>(), 1.0, 1e-12) << name;
+    EXPECT_GT((*row)["encode_s"].get<double>(), 0.0);
+    EXPECT_GT((*row)["decode_s"].get<double>(), 0.0);
+  }
+  ASSERT_NE(rowOf(report, "OpenVDB half Blosc"), nullptr);
+  EXPECT_EQ((*rowOf(report, "OpenVDB half Blosc"))["ratio"], 1.0) << "what ratios are to";
+}
+
+TEST_F(CompareTable, hasQuantisedRowsWithinTheirBounds) {
+  const auto report = reportOf({"--rows", "quantised"});
+  EXPECT_LE((*rowOf(report, "NanoVDB Fp8 Zip"))["max_error"].get<double>(), 0.51 / 255);
+  EXPECT_LE((*rowOf(report, "NanoVDB Fp4 raw"))["max_error"].get<double>(), 0.51 / 15);
+  EXPECT_THAT((*rowOf(report, "NanoVDB FpN/256 raw"))["setting"], HasSubstr("tolerance="));
+}
+
+TEST_F(CompareTable, matchesACandidatesSizeAndShowsTheSearch) {
+  const auto report = reportOf({at("fit.esvr"), "--rows", "matched,zfp", "--size", "2KB"});
+  const json* candidate = rowOf(report, "fit.esvr");
+  ASSERT_NE(candidate, nullptr);
+  const auto bytes = (*candidate)["bytes"].get<std::uint64_t>();
+  EXPECT_EQ(bytes, std::filesystem::file_size(at("fit.esvr")));
+  const json* matched = rowOf(report, "OpenVDB half Blosc", "at 2000 bytes");
+  ASSERT_NE(matched, nullptr);
+  EXPECT_FALSE((*matched)["search"].empty());
+  int rows = 0;
+  for (const auto& row : report["rows"])
+    if (row["group"].get<std::string>().starts_with("at ") && row.contains("bytes") &&
+        row["group"] == "at " + std::to_string(bytes) + " bytes") {
+      EXPECT_LE(row["bytes"].get<std::uint64_t>(), bytes);
+      ++rows;
+    }
+  EXPECT_TRUE(rows > 0 || bytes < 1500) << "the smallest VDB has some 1500 bytes";
+  EXPECT_THAT(table({at("ref.vdb"), at("fit.esvr"), "--runs", "1", "-v"}).out,
+              AllOf(HasSubstr("tries"), HasSubstr(" bytes,")));
+}
+
+TEST_F(CompareTable, namesACommandThatMakesTheSameRow) {
+  const auto report = reportOf({"--rows", "matched", "--size", "3KB"});
+  const json* row = rowOf(report, "NanoVDB Fp8 Zip", "at 3000 bytes");
+  ASSERT_NE(row, nullptr);
+  ASSERT_TRUE(row->contains("setting")) << row->dump();
+  std::istringstream words((*row)["command"].get<std::string>());
+  std::vector<std::string> arguments;
+  for (std::string word; words >> word;) arguments.push_back(word);
+  ASSERT_THAT(std::vector<std::string>(arguments.begin(), arguments.begin() + 2),
+              ElementsAre("esvr-compare", "table"));
+  arguments.erase(arguments.begin(), arguments.begin() + 3);
+  const auto alone = reportOf(arguments);
+  ASSERT_EQ(alone["rows"].size(), 1u);
+  EXPECT_EQ(alone["rows"][0]["bytes"], (*row)["bytes"]);
+  EXPECT_EQ(alone["rows"][0]["psnr_box"], (*row)["psnr_box"]);
+}
+
+TEST_F(CompareTable, fitsEllipsoidsWhereAsked) {
+  const auto report = reportOf({"--rows", "none", "--fit", "2KB", "--device", "cpu"});
+  const json* row = rowOf(report, "ESVR fitted, 2000");
+  ASSERT_NE(row, nullptr);
+  EXPECT_LE((*row)["bytes"].get<double>(), 2000);
+  EXPECT_GT((*row)["psnr_box"].get<double>(), 20.0);
+}
+
+TEST_F(CompareTable, takesExternalResults) {
+  writeRaw("out.raw", 0.01f);
+  const auto report = reportOf({"--rows", "none", "--external",
+                                "Mine=" + at("out.raw") + ":1234:9x9x9:float32:encode=4.5:fps=60",
+                                "--external", "Same=" + at("ref.vdb") + ":99"});
+  const json* mine = rowOf(report, "Mine");
+  ASSERT_NE(mine, nullptr);
+  EXPECT_EQ((*mine)["bytes"], 1234);
+  EXPECT_EQ((*mine)["encode_s"], 4.5);
+  EXPECT_EQ((*mine)["fps"], 60.0);
+  EXPECT_NEAR((*mine)["psnr_box"].get<double>(), 40.0, 1e-4) << "an error of 0.01 of a peak of 1";
+  EXPECT_EQ((*rowOf(report, "Same"))["max_error"], 0.0);
+}
+
+TEST_F(CompareTable, writesReportsInEachForm) {
+  const auto run =
+      table({at("ref.vdb"), at("fit.esvr"), "--rows", "lossless", "--runs", "1", "--markdown",
+             at("t.md"), "--csv", at("t.csv"), "--html", at("t.html"), "--report", at("t.json")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(test::readText(at("t.md")), AllOf(HasSubstr("| fit.esvr |"), HasSubstr("OpenVDB 1")));
+  EXPECT_THAT(test::readText(at("t.csv")),
+              HasSubstr("\nOpenVDB float Blosc,lossless,vdb-float-blosc,"));
+  EXPECT_THAT(test::readText(at("t.html")), AllOf(HasSubstr("<table>"), HasSubstr("fit.esvr")));
+  EXPECT_EQ(json::parse(test::readText(at("t.json")))["schema"], "esvr-table");
+}
+
+TEST_F(CompareTable, SlowFitsHundredColumns) {
+  const auto run = table({at("ref.vdb"), at("fit.esvr"), "--runs", "1"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  std::istringstream lines(run.out);
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_TRUE(line.find(':') != std::string::npos || line.size() <= 100) << line;
+}
+
+TEST_F(CompareTable, leavesRowsThatCannotBeWithTheirReason) {
+  if (reportOf({"--rows", "none"})["versions"].dump().find("ZFP") == std::string::npos)
+    GTEST_SKIP() << "built without ZFP";
+  const auto report = reportOf({"--rows", "zfp", "--size", "2KB", "--max-dense", "100"});
+  const json* row = rowOf(report, "ZFP accuracy", "at 2000 bytes");
+  ASSERT_NE(row, nullptr);
+  EXPECT_THAT((*row)["note"].get<std::string>(), HasSubstr("more than the bound"));
+}
+
+TEST_F(CompareTable, SlowComparesPictures) {
+  const auto report = reportOf({at("fit.esvr"), "--rows", "lossless", "--images", "2",
+                                "--image-size", "40", "--colors", "viridis:tent"});
+  const json* same = rowOf(report, "OpenVDB float Blosc");
+  EXPECT_TRUE((*same)["image_psnr"].is_null()) << "infinite";
+  EXPECT_EQ((*same)["flip"], 0.0);
+  EXPECT_NEAR((*same)["image_ssim"].get<double>(), 1.0, 1e-12);
+  const json* fit = rowOf(report, "fit.esvr");
+  EXPECT_GT((*fit)["flip"].get<double>(), 0.0);
+  EXPECT_GT((*fit)["image_psnr"].get<double>(), 15.0);
+  EXPECT_GT((*fit)["fps"].get<double>(), 0.0);
+}
+
+TEST_F(CompareTable, SlowPutsPicturesOnThePage) {
+  const auto run = table({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--runs", "1",
+                          "--images", "1", "--image-size", "32", "--html", at("p.html")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const std::string page = test::readText(at("p.html"));
+  EXPECT_THAT(page, AllOf(HasSubstr("data:image/png;base64,"), HasSubstr("errors, 8 times"),
+                          HasSubstr("type=\"range\"")));
+  EXPECT_THAT(run.out, HasSubstr("FLIP"));
+}
+
+struct Refusal {
+  std::vector<std::string> arguments;  ///< "DIR/x" stands for a file of the fixture's folder
+  int code;
+  const char* words;
+};
+std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
+  return out << testing::PrintToString(refusal.arguments);
+}
+class RefusedTable : public CompareTable, public testing::WithParamInterface<Refusal> {};
+
+TEST_P(RefusedTable, isExplainedAndLeavesNoFile) {
+  writeRaw("out.raw", 0.0f);
+  test::writeInput(at("zero.vdb"), {{.voxels = {{{0, 0, 0}, 0.0f}}}});
+  test::writeInput(at("none.vdb"), {{.voxels = {}}});
+  test::writeInput(at("far.vdb"), {{.voxels = softBall({100, 0, 0})}});
+  ASSERT_EQ(test::quickFit(at("far.vdb"), at("far.esvr")).exitCode, 0);
+  const auto before = folder_.names();
+  std::vector<std::string> arguments = GetParam().arguments;
+  for (std::string& argument : arguments)
+    for (std::size_t i; (i = argument.find("DIR/")) != std::string::npos;)
+      argument.replace(i, 4, at(""));
+  const auto run = table(arguments);
+  EXPECT_EQ(run.exitCode, GetParam().code);
+  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  EXPECT_EQ(folder_.names(), before);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, RefusedTable,
+    testing::Values(
+        Refusal{{}, 2, "REF.vdb"}, Refusal{{"DIR/ref.vdb", "--rows", "best"}, 2, "best"},
+        Refusal{{"DIR/ref.vdb", "--row", "gzip"}, 2, "gzip"},
+        Refusal{{"DIR/ref.vdb", "--runs", "0"}, 2, "--runs"},
+        Refusal{{"DIR/ref.vdb", "--images", "0"}, 2, "--images"},
+        Refusal{{"DIR/ref.vdb", "--images", "1", "--colors", "mauve"}, 2, "mauve"},
+        Refusal{{"DIR/ref.vdb", "--colors", "viridis"}, 2, "--images"},
+        Refusal{{"DIR/ref.vdb", "--external", "DIR/out.raw:1"}, 2, "NAME=FILE:BYTES"},
+        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1:9x9x9"}, 2, "come together"},
+        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1:nine"}, 2, "nine"},
+        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1:8x9x9:float32"}, 3, "(9, 9, 9)"},
+        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1:9x9x9:uint8"}, 3, "729"},
+        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/no.raw:1:9x9x9:uint8"}, 3, "no.raw"},
+        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1"}, 3, "out.raw"},
+        Refusal{{"DIR/ref.vdb", "DIR/far.esvr"}, 3, "do not meet"},
+        Refusal{{"DIR/ref.vdb", "DIR/far.vdb"}, 3, "--external"},
+        Refusal{{"DIR/ref.vdb", "DIR/no.esvr"}, 3, "no.esvr"},
+        Refusal{{"DIR/ref.vdb", "-g", "heat"}, 3, "heat"}, Refusal{{"DIR/zero.vdb"}, 3, "--peak"},
+        Refusal{{"DIR/none.vdb"}, 3, "active voxel"},
+        Refusal{{"DIR/ref.vdb", "--csv", "DIR/ref.vdb"}, 2, "one file"},
+        Refusal{{"DIR/ref.vdb", "--csv", "DIR/out.txt"}, 2, ".csv"}));
+
+}  // namespace
+}  // namespace esvr

@@ -1,0 +1,57 @@
+// Plan: ticks at round numbers within the axis, linear and logarithmic; values that cannot be
+// shown; axes of one value and of none.
+
+#include "report/axis.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace esvr::report {
+namespace {
+
+std::vector<std::string> labels(const Axis& axis) {
+  std::vector<std::string> texts;
+  for (const auto& tick : axis.ticks()) texts.push_back(tick.label);
+  return texts;
+}
+using Labels = std::vector<std::string>;
+
+TEST(Axis, hasTicksAtRoundNumbers) {
+  const std::vector<double> values{31.2, 44.9};
+  EXPECT_EQ(labels(Axis(values, false)), (Labels{"32", "34", "36", "38", "40", "42", "44"}));
+}
+
+TEST(Axis, hasTicksAtPowersWhereItIsLogarithmic) {
+  const std::vector<double> values{8e3, 1.2e6};
+  EXPECT_EQ(labels(Axis(values, true)),
+            (Labels{"10000", "20000", "50000", "100000", "200000", "500000", "1e+06"}));
+  const std::vector<double> wide{1e-4, 1e4};
+  EXPECT_EQ(labels(Axis(wide, true)).size(), 9u);
+}
+
+TEST(Axis, placesValuesBetweenItsEnds) {
+  const std::vector<double> values{0.0, 10.0};
+  const Axis axis(values, false);
+  EXPECT_NEAR(axis.place(5.0), 0.5, 1e-15);
+  EXPECT_GT(axis.place(0.0), 0.0) << "some room";
+  EXPECT_LT(axis.place(10.0), 1.0);
+}
+
+TEST(Axis, holdsOnlyWhatItCanShow) {
+  const std::vector<double> values{-1.0, 1.0, 100.0, std::numeric_limits<double>::infinity()};
+  const Axis axis(values, true);
+  EXPECT_FALSE(axis.holds(-1.0));
+  EXPECT_FALSE(axis.holds(std::numeric_limits<double>::infinity()));
+  EXPECT_FALSE(axis.holds(std::numeric_limits<double>::quiet_NaN()));
+  EXPECT_TRUE(axis.holds(100.0));
+}
+
+TEST(Axis, isThereForOneValueAndForNone) {
+  const std::vector<double> one{7.0};
+  EXPECT_NEAR(Axis(one, false).place(7.0), 0.5, 1e-15);
+  EXPECT_FALSE(Axis({}, false).ticks().empty());
+}
+
+}  // namespace
+}  // namespace esvr::report

@@ -1,0 +1,57 @@
+// Plan: cells as people and as programs read them, and tables in each form.
+
+#include "report/data_table.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace esvr::report {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+DataTable table() {
+  return {"Sizes",
+          {{"name", "row", Kind::kText},
+           {"bytes", "bytes", Kind::kBytes},
+           {"psnr", "PSNR", Kind::kDecibels}},
+          {{std::string("a, \"b\""), 48214.0, 44.712}, {std::string("c|d"), Cell(), kInfinity}}};
+}
+
+TEST(CellText, isShortForPeople) {
+  EXPECT_EQ(cellText({"", "", Kind::kBytes}, 1234567.0), "1234567");
+  EXPECT_EQ(cellText({"", "", Kind::kDecibels}, 44.7123), "44.71");
+  EXPECT_EQ(cellText({"", "", Kind::kDecibels}, kInfinity), "exact");
+  EXPECT_EQ(cellText({"", "", Kind::kShare}, 0.99876), "0.9988");
+  EXPECT_EQ(cellText({"", "", Kind::kNumber}, 0.00123456), "0.00123");
+  EXPECT_EQ(cellText({"", "", Kind::kNumber}, Cell()), "-");
+  EXPECT_EQ(cellText({"", "", Kind::kText}, std::string("x")), "x");
+}
+
+TEST(ExactText, losesNothing) {
+  EXPECT_EQ(exactText(1.0 / 3.0), "0.3333333333333333");
+  EXPECT_EQ(exactText(kInfinity), "inf");
+  EXPECT_EQ(exactText(Cell()), "");
+}
+
+TEST(Csv, quotesWhatItMust) {
+  EXPECT_EQ(toCsv(table()), "name,bytes,psnr\n\"a, \"\"b\"\"\",48214,44.712\nc|d,,inf\n");
+}
+
+TEST(Markdown, isATableUnderAHeading) {
+  EXPECT_EQ(toMarkdown(table()),
+            "## Sizes\n\n| row | bytes | PSNR |\n|---|--:|--:|\n| a, \"b\" | 48214 | 44.71 |\n"
+            "| c\\|d | - | exact |\n");
+}
+
+TEST(WithColumns, takesThemInTheirOrder) {
+  const DataTable some = withColumns(table(), {"psnr", "name"});
+  ASSERT_EQ(some.columns.size(), 2u);
+  EXPECT_EQ(some.columns[0].key, "psnr");
+  EXPECT_EQ(exactText(some.rows[0][1]), "a, \"b\"");
+  EXPECT_THROW((void)withColumns(table(), {"colour"}), std::logic_error);
+}
+
+}  // namespace
+}  // namespace esvr::report

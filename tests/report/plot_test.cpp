@@ -1,0 +1,77 @@
+// Plan: what a plot draws, as files of either kind and by its pixels: a line where it should be,
+// the same picture for the same plot, and texts and values that cannot be drawn.
+
+#include "report/plot.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "report/png_image.h"
+
+namespace esvr::report {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr const char* kPngSignature = "\x89PNG\r\n\x1a\n";
+
+Plot plot() {
+  return {.title = "Error over bytes",
+          .xLabel = "bytes",
+          .yLabel = "PSNR, dB",
+          .logarithmicX = true,
+          .series = {{"ESVR", {{1e4, 35.0}, {1e5, 45.0}}}, {"ZFP", {{5e4, 30.0}, {2e5, 44.0}}}}};
+}
+
+/// Width and height from a PNG's header.
+std::pair<int, int> sizeOf(const std::string& png) {
+  const auto number = [&](std::size_t at) {
+    int value = 0;
+    for (std::size_t i = at; i < at + 4; ++i) value = value * 256 + std::uint8_t(png.at(i));
+    return value;
+  };
+  return {number(16), number(20)};
+}
+
+TEST(Plot, isAPngOfItsSize) {
+  const std::string png = toPng(plot());
+  EXPECT_THAT(png, StartsWith(kPngSignature));
+  EXPECT_EQ(sizeOf(png), (std::pair{900, 560}));
+}
+
+TEST(Plot, isAnSvgWithItsLines) {
+  const std::string svg = toSvg(plot());
+  EXPECT_THAT(svg, HasSubstr("<svg "));
+  EXPECT_THAT(svg, HasSubstr("</svg>"));
+  EXPECT_THAT(svg, HasSubstr("<path "));
+}
+
+TEST(Plot, isTheSameForTheSameCurves) {
+  EXPECT_TRUE(toPng(plot()) == toPng(plot()));
+  Plot other = plot();
+  other.series[0].points[1].y = 46.0;
+  EXPECT_FALSE(toPng(plot()) == toPng(other));
+}
+
+TEST(Plot, passesOverWhatCannotBeDrawn) {
+  Plot with = plot();
+  with.series[0].points.push_back({2e5, std::numeric_limits<double>::infinity()});
+  with.series[1].points.push_back({0.0, 40.0});
+  EXPECT_TRUE(toPng(with) == toPng(plot()));
+}
+
+TEST(Plot, isThereWithoutCurvesAndWithAnyText) {
+  EXPECT_THAT(toPng({.title = "\xff<&>\x1b"}), StartsWith(kPngSignature));
+  EXPECT_THAT(toSvg({.title = "\xff<&>\x1b", .series = {{"\xff", {}}}}), HasSubstr("</svg>"));
+}
+
+TEST(PngImage, hasThePicturesSize) {
+  const Image image{3, 2, std::vector<float>(24, 0.5f)};
+  EXPECT_EQ(sizeOf(toPng(image)), (std::pair{3, 2}));
+}
+
+}  // namespace
+}  // namespace esvr::report
