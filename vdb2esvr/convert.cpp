@@ -22,13 +22,12 @@ EncodedGrid throughTheFormat(EncodedGrid grid) {
 
 void recordFit(const FitResult& fitted, ConvertedGrid& grid) {
   grid.end = fitted.end;
-  grid.pilot = fitted.pilot;
+  grid.kappaLearned = fitted.kappaLearned;
   grid.pairs = fitted.pairs;
   grid.deviceBytes = fitted.deviceBytes;
   grid.signedIntensities = fitted.signedIntensities;
   grid.paper = fitted.paper;
   grid.seconds.seed = fitted.secondsSeed;
-  grid.seconds.pilot = fitted.secondsPilot;
   grid.seconds.optimise = fitted.secondsOptimise;
 }
 

@@ -15,9 +15,9 @@
 namespace esvr::vdb2esvr {
 
 struct PhaseSeconds {
-  double read = 0.0, seed = 0.0, pilot = 0.0, optimise = 0.0, encode = 0.0, measure = 0.0;
-  [[nodiscard]] double fit() const { return seed + pilot + optimise; }
-  [[nodiscard]] double total() const { return read + seed + pilot + optimise + encode + measure; }
+  double read = 0.0, seed = 0.0, optimise = 0.0, encode = 0.0, measure = 0.0;
+  [[nodiscard]] double fit() const { return seed + optimise; }
+  [[nodiscard]] double total() const { return read + seed + optimise + encode + measure; }
 };
 
 /// What quantising the ellipsoids did.
@@ -34,7 +34,7 @@ struct ConvertedGrid {
   std::size_t bricks = 0;  ///< of the source
   std::uint64_t nonFiniteReplaced = 0;
   FitEnd end = FitEnd::kScheduleDone;
-  std::vector<PilotPoint> pilot;
+  bool kappaLearned = false;
   std::string device;           ///< that fitted it
   std::size_t deviceBytes = 0;  ///< FitResult::deviceBytes
   std::uint64_t pairs = 0;

@@ -113,11 +113,12 @@ Json topologyOf(const EncodedGrid& grid) {
 }
 
 Json fitOf(const ConvertedGrid& grid) {
-  Json pilot = Json::array();
-  for (const auto& point : grid.pilot)
-    pilot.push_back({{"kappa", point.kappa}, {"psnr_box", point.psnrBox}});
-  return {{"end", nameOf(grid.end)}, {"device", grid.device}, {"device_bytes", grid.deviceBytes},
-          {"pilot", pilot},          {"pairs", grid.pairs},   {"hits", orNull(grid.hits)}};
+  return {{"end", nameOf(grid.end)},
+          {"device", grid.device},
+          {"device_bytes", grid.deviceBytes},
+          {"kappa_learned", grid.kappaLearned},
+          {"pairs", grid.pairs},
+          {"hits", orNull(grid.hits)}};
 }
 
 Json compactOf(const ConvertedGrid& grid) {
@@ -166,8 +167,11 @@ Json metricsOf(const VolumeMetrics& m) {
 }
 
 Json secondsOf(const PhaseSeconds& s) {
-  return {{"read", s.read},         {"seed", s.seed},     {"pilot", s.pilot},
-          {"optimise", s.optimise}, {"encode", s.encode}, {"measure", s.measure}};
+  return {{"read", s.read},
+          {"seed", s.seed},
+          {"optimise", s.optimise},
+          {"encode", s.encode},
+          {"measure", s.measure}};
 }
 
 Json sectionsOf(const EsvrSummary& file, std::size_t grid) {
@@ -242,7 +246,7 @@ PhaseSeconds sumOf(const std::vector<ConvertedGrid>& grids) {
   PhaseSeconds sum;
   for (const auto& grid : grids) {
     const PhaseSeconds& s = grid.seconds;
-    sum.read += s.read, sum.seed += s.seed, sum.pilot += s.pilot;
+    sum.read += s.read, sum.seed += s.seed;
     sum.optimise += s.optimise, sum.encode += s.encode, sum.measure += s.measure;
   }
   return sum;

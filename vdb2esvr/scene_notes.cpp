@@ -16,8 +16,7 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   const auto lacks = [&](const char* kind) { return !hasSection(record.output, g, kind); };
 
   if (grid.stored.voxels)
-    return {{"ellipsoids", "every voxel was asked for, exactly or within a bound"},
-            {"pilot", "nothing needed a fit"}};
+    return {{"ellipsoids", "every voxel was asked for, exactly or within a bound"}};
 
   std::vector<LeftOut> notes;
   const bool compact = grid.compact.has_value();
@@ -40,7 +39,6 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
     notes.push_back({"curve", "a size or a PSNR was asked for; the report has it",
                      grid.curve.size() * sizeof(CurvePoint)});
   notes.push_back({"residual", "no bound on the largest error was asked for"});
-  if (grid.pilot.empty()) notes.push_back({"pilot", "kappa was given, or nothing needed a fit"});
   return notes;
 }
 

@@ -1,5 +1,7 @@
 #include "compact/choose_steps.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -154,7 +156,9 @@ double meanOf(const std::array<double, kStreams.size()>& slopes) {
 /// of its step.
 QuantiserSteps balanced(const TrialMaker& maker, const Trial& here) {
   std::array<double, kStreams.size()> slopes{};
-  for (std::size_t k = 0; k < slopes.size(); ++k) slopes[k] = slopeOf(maker, here, kStreams[k]);
+  // side by side: the coding of a trial's bytes keeps to one thread
+  tbb::parallel_for(std::size_t{0}, slopes.size(),
+                    [&](std::size_t k) { slopes[k] = slopeOf(maker, here, kStreams[k]); });
   const double mean = meanOf(slopes);
   QuantiserSteps steps = here.steps;
   for (std::size_t k = 0; k < slopes.size(); ++k) {

@@ -165,7 +165,6 @@ class RateControl {
     FitOptions options = input_.options;
     options.count = std::size_t(std::clamp(std::floor(count), 1.0, double(voxels_)));
     options.psnr.reset();
-    if (!options.kappa) options.kappa = kappa_;
     if (draft && options.iterations)
       options.iterations = std::max(*options.iterations / kDraftShare, 1u);
     else if (draft)
@@ -173,8 +172,6 @@ class RateControl {
     Attempt result;
     result.asked = *options.count;
     result.fit = fit(input_.source, options);
-    kappa_ = result.fit.field.kernel.kappa;
-    if (!result.fit.pilot.empty()) pilot_ = result.fit.pilot;
     result.grid =
         encodeGrid(input_.descriptor, input_.source, std::move(result.fit.field), input_.activity);
     result.psnr = compareVolumes(input_.source, decodeGrid(result.grid),
@@ -205,14 +202,11 @@ class RateControl {
     result.compact = compactGrid(attempt.grid, input_.source, options);
     result.grid = std::move(result.compact.grid);
     result.fit = std::move(attempt.fit);
-    result.fit.pilot = pilot_;
     return result;
   }
 
   const RateInput& input_;
   std::uint64_t voxels_;
-  std::optional<float> kappa_;
-  std::vector<PilotPoint> pilot_;
 };
 
 }  // namespace

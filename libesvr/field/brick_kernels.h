@@ -27,7 +27,7 @@ struct PairMoments {
   float w2;                          ///< sum r phi' t t
   float rPhi;                        ///< sum r phi
   float phi2;                        ///< sum phi phi
-  float w0;                          ///< sum r phi'
+  float rEdge;                       ///< sum r (phi + base)(1 - phi): by kappa, over slope
 };
 
 /// The two of them that need no derivative.

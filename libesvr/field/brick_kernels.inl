@@ -155,14 +155,10 @@ inline Vec phiOf(const KernelConstants<float>& k, Vec m) {
       m);
 }
 
-/// phi' from phi, times the residual: zero where phi is, which is outside the support.
-inline Vec weightOf(const KernelConstants<float>& k, Vec phi, Vec residual) {
-  return each(
-      [&k](Native p, Native r) {
-        const Native quotient = p + k.base;
-        return p > 0.0f ? r * (quotient * (quotient * k.slope - 1.0f)) : Native{};
-      },
-      phi, residual);
+/// The residual times phi + base: zero where phi is, which is outside the support.
+inline Vec weightedQuotient(const KernelConstants<float>& k, Vec phi, Vec residual) {
+  return each([&k](Native p, Native r) { return p > 0.0f ? r * (p + k.base) : Native{}; }, phi,
+              residual);
 }
 
 template <bool kTape>
@@ -209,7 +205,8 @@ void forward(const LineForm& f, const float corner[3], const KernelConstants<flo
 void backward(const LineForm& f, const float corner[3], const KernelConstants<float>& k,
               const float* r, const PairTape& tape, PairMoments& moments) {
   const Local l = localise(f, corner);
-  Vec s0{}, s0x{}, s0xx{}, s1{}, s1x{}, s2{}, rPhi{}, phi2{};
+  Vec s0{}, s0x{}, s0xx{}, s1{}, s1x{}, s2{}, rPhi{}, phi2{}, rEdge{};
+  const float slopeBase = k.slope * k.base - 1.0f;
   const float* in = tape.phi;
   for (int x = tape.xBegin; x < tape.xEnd; ++x) {
     const float dx = float(x) - l.cx;
@@ -219,13 +216,15 @@ void backward(const LineForm& f, const float corner[3], const KernelConstants<fl
     Vec w0{}, w1{};
     for (int y = begin; y < end; y += kRows, row += kLanes, in += kLanes, t += float(kRows)) {
       const Vec phi = load(in), g = load(row);
-      const Vec w = weightOf(k, phi, g);
+      const Vec rq = weightedQuotient(k, phi, g);
+      const Vec w = rq * (phi * k.slope + slopeBase);  // r phi'
       const Vec wt = w * t;
       w0 += w;
       w1 += wt;
       s2 += wt * t;
       rPhi += g * phi;
       phi2 += phi * phi;
+      rEdge += rq - rq * phi;
     }
     s0 += w0;
     s0x += w0 * dx;
@@ -244,7 +243,7 @@ void backward(const LineForm& f, const float corner[3], const KernelConstants<fl
              sumLanes(s2),
              sumLanes(rPhi),
              sumLanes(phi2),
-             sumLanes(s0)};
+             sumLanes(rEdge)};
 }
 
 /// Calls visit(phi, row of 512 values) for every row of a tape, in its order.

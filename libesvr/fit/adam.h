@@ -41,7 +41,7 @@ struct PrimitiveLimits {
 struct PrimitiveGradient {
   ParameterVector byParameter;  ///< of half the sum of squared residuals, or of the given loss
   double phi2;                  ///< sum over voxels of phi^2: the curvature by intensity
-  double slopes;                ///< sum over voxels of the loss's derivative by V times phi'
+  double byKappa;               ///< the kernel's edge, the scales held
 };
 
 /// One step of every primitive.

@@ -11,6 +11,7 @@
 #include "field/gather.h"
 #include "fit/fit_errors.h"
 #include "fit/parameter_gradient.h"
+#include "fit/primitive_math.h"
 #include "fit/scene.h"
 
 namespace esvr {
@@ -122,6 +123,23 @@ double CpuOptimiser::iterate(std::span<const double> factors) {
 FitErrors CpuOptimiser::measure() {
   refreshResiduals();
   return errorsOf(target_, {engine_.index(), residuals_});
+}
+
+double CpuOptimiser::kappaSlope() {
+  double slope = 0.0;
+  const double logMByKappa = kernelWidth(engine_.kernel()).logMByKappa;
+  for (const PrimitiveGradient& g : gradients_) slope += edgeGradient(g, logMByKappa);
+  return slope;
+}
+
+void CpuOptimiser::setKappa(float kappa) {
+  const double before = kernelWidth(engine_.kernel()).m;
+  options_.kernel.kappa = kappa;
+  engine_.setKernel(kernelConstants<double>(options_.kernel));
+  unitVariance_ = kernelVariance(engine_.kernel());
+  const double factor = std::sqrt(kernelWidth(engine_.kernel()).m / before);
+  for (Primitive& p : primitives_) shrinkBy(p, factor);
+  iterationsSinceRebuild_ = kListsStale;
 }
 
 void CpuOptimiser::dropUnseen() {

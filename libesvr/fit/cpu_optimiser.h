@@ -25,6 +25,9 @@ class CpuOptimiser final : public Optimiser {
   [[nodiscard]] std::uint32_t batchSize() const override { return 1; }
   [[nodiscard]] FitErrors measure() override;
   void dropUnseen() override;
+  [[nodiscard]] const Kernel& kernel() const override { return options_.kernel; }
+  [[nodiscard]] double kappaSlope() override;
+  void setKappa(float kappa) override;
 
   [[nodiscard]] std::size_t primitiveCount() const override { return primitives_.size(); }
   [[nodiscard]] std::vector<Primitive> primitives() const override { return primitives_; }

@@ -30,11 +30,15 @@ double sumOfSquares(const float* r) {
 }  // namespace
 
 FitEngine::FitEngine(const FitTarget& target, const KernelConstants<double>& kernel)
-    : target_(target),
-      kernel_(kernel),
-      kernelFloat_(narrowed(kernel)),
-      radius_(supportRadius(kernel)),
-      index_(target.bricks) {}
+    : target_(target), index_(target.bricks) {
+  setKernel(kernel);
+}
+
+void FitEngine::setKernel(const KernelConstants<double>& kernel) {
+  kernel_ = kernel;
+  kernelFloat_ = narrowed(kernel);
+  radius_ = supportRadius(kernel);
+}
 
 void FitEngine::rebuild(std::span<const Primitive> primitives, double slack) {
   std::vector<Support> reach(primitives.size());
@@ -118,7 +122,7 @@ void FitEngine::reduce(std::span<const Primitive> primitives,
       PairSums sums{};
       for (auto k = pairs_.ellipsoidBegin[i]; k != pairs_.ellipsoidBegin[i + 1]; ++k)
         sums.add(moments_[pairs_.pairOf[k]]);
-      out[i] = {parameterGradient(forms_[i], sums), sums.phi2, sums.w0};
+      out[i] = primitiveGradient(forms_[i], sums, double(kernelOf(i).slope));
     }
   });
 }

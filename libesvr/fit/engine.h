@@ -43,6 +43,9 @@ class FitEngine {
   void gradientsOf(std::span<const Primitive> primitives, std::span<const float> lossByValue,
                    std::span<PrimitiveGradient> out);
 
+  /// Another kernel: lists must be built anew.
+  void setKernel(const KernelConstants<double>& kernel);
+
   [[nodiscard]] const BrickIndex& index() const { return index_; }
   [[nodiscard]] std::size_t targetBricks() const { return target_.bricks.size(); }
   [[nodiscard]] std::size_t brickCount() const { return index_.size(); }

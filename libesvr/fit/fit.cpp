@@ -6,7 +6,6 @@
 #include "esvr/error.h"
 #include "fit/export_field.h"
 #include "fit/paper/fit_paper.h"
-#include "fit/pilot.h"
 #include "fit/run.h"
 
 namespace esvr {
@@ -61,6 +60,8 @@ RunPlan planFor(const FitTarget& target, const FitOptions& options) {
   RunPlan plan;
   plan.psnr = options.psnr;
   plan.seconds = options.seconds;
+  // the paper's kernel has its kappa given
+  plan.learnKappa = !options.kappa && options.loss == Loss::kSquared;
   plan.largestCount = most(options.count.value_or(voxels));
   plan.count = options.psnr ? most(std::size_t(double(byPreset) / kFirstGuess))
                             : most(options.count.value_or(byPreset));
@@ -102,31 +103,25 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   const RunPlan plan = planFor(target, options);
   OptimiserOptions optimiserOptions{{},           options.loss,   options.beta,
                                     options.seed, options.device, options.maxDeviceBytes};
-  FitResult result;
-  if (options.kappa) {
-    optimiserOptions.kernel.kappa = *options.kappa;
-  } else {
-    const auto pilot = chooseKappa(target, plan.count, optimiserOptions, tuning, recorder);
-    optimiserOptions.kernel.kappa = pilot.kappa;
-    result.pilot = pilot.points;
-  }
-  result.secondsPilot = recorder.seconds();
+  optimiserOptions.kernel.kappa = options.kappa.value_or(tuning.firstKappa);
 
+  FitResult result;
   const auto optimiser = makeOptimiser(target, optimiserOptions, tuning);
   const RunEnd end = run(*optimiser, target, recorder, plan, tuning);
   if (end.end == FitEnd::kCancelled && optimiser->primitiveCount() == 0) throw Cancelled();
   optimiser->dropUnseen();
   recorder.record(*optimiser, end.iterations);
 
-  result.field = exportField(optimiser->primitives(), {volume.origin, target.scale,
-                                                       volume.background, optimiserOptions.kernel});
+  result.field = exportField(optimiser->primitives(),
+                             {volume.origin, target.scale, volume.background, optimiser->kernel()});
+  result.kappaLearned = plan.learnKappa;
   result.end = end.end;
   result.curve = recorder.curve();
   result.deviceBytes = optimiser->deviceBytes();
   result.pairs = optimiser->pairCount();
   result.signedIntensities = anyNegative(result.field);
   result.secondsSeed = optimiser->secondsSeeding();
-  result.secondsOptimise = recorder.seconds() - result.secondsPilot - result.secondsSeed;
+  result.secondsOptimise = recorder.seconds() - result.secondsSeed;
   return result;
 }
 

@@ -13,7 +13,7 @@ namespace esvr {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
-constexpr std::size_t kBrickGrain = 4;
+constexpr std::size_t kBrickGrain = 4, kEllipsoidGrain = 256;
 /// Pairs whose tapes are kept from pass to pass: some 200 MB. More are worked out anew each time.
 constexpr std::size_t kMostKept = 400'000;
 
@@ -108,9 +108,11 @@ void IntensityProblem::pass(std::vector<double>* rPhi, std::vector<double>* phi2
   const auto reduce = [&](std::vector<double>* out, float PairProjection::*value) {
     if (!out) return;
     out->assign(n, 0.0);
-    for (std::size_t i = 0; i < n; ++i)
-      for (auto k = pairs.ellipsoidBegin[i]; k != pairs.ellipsoidBegin[i + 1]; ++k)
-        (*out)[i] += double(projections_[pairs.pairOf[k]].*value);
+    tbb::parallel_for(Range(0, n, kEllipsoidGrain), [&](const Range& range) {
+      for (std::size_t i = range.begin(); i != range.end(); ++i)
+        for (auto k = pairs.ellipsoidBegin[i]; k != pairs.ellipsoidBegin[i + 1]; ++k)
+          (*out)[i] += double(projections_[pairs.pairOf[k]].*value);
+    });
   };
   reduce(rPhi, &PairProjection::rPhi);
   reduce(phi2, &PairProjection::phi2);

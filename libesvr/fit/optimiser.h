@@ -61,6 +61,15 @@ class Optimiser {
 
   [[nodiscard]] virtual FitErrors measure() = 0;
 
+  /// The kernel as it is now.
+  [[nodiscard]] virtual const Kernel& kernel() const = 0;
+
+  /// Sum over the primitives of dL/dkappa at the last gradients, half widths held; 0 before any.
+  [[nodiscard]] virtual double kappaSlope() = 0;
+
+  /// Gives all primitives another edge; scales change so that their half widths stay.
+  virtual void setKappa(float kappa) = 0;
+
   /// Drops primitives that no voxel sees. They cost bytes and change nothing.
   virtual void dropUnseen() = 0;
 

@@ -2,18 +2,19 @@
 /// From a pair's moments to the gradient by a primitive's parameters: the chain rule, once.
 
 #include "field/brick_kernels.h"
+#include "fit/adam.h"
 #include "fit/primitive.h"
 
 namespace esvr {
 
 /// Moments of a primitive's pairs, summed in float64 in the pairs' order.
 struct PairSums {
-  double w0x, w0z, w0xx, w0xz, w0zz, w1, w1x, w1z, w2, rPhi, phi2, w0;
+  double w0x, w0z, w0xx, w0xz, w0zz, w1, w1x, w1z, w2, rPhi, phi2, rEdge;
 
   ESVR_HD void add(const PairMoments& m) {
     w0x += m.w0x, w0z += m.w0z, w0xx += m.w0xx, w0xz += m.w0xz, w0zz += m.w0zz;
     w1 += m.w1, w1x += m.w1x, w1z += m.w1z, w2 += m.w2, rPhi += m.rPhi, phi2 += m.phi2;
-    w0 += m.w0;
+    rEdge += m.rEdge;
   }
 };
 
@@ -37,6 +38,21 @@ struct PairSums {
           c * second(1, 1),     c * second(2, 2),
           2 * c * second(0, 1), 2 * c * second(0, 2),
           2 * c * second(1, 2), s.rPhi};
+}
+
+/// All that a pass tells of a primitive. \param slope  KernelConstants::slope of its kernel
+[[nodiscard]] ESVR_HD inline PrimitiveGradient primitiveGradient(const LineForm& f,
+                                                                 const PairSums& s, double slope) {
+  return {parameterGradient(f, s), s.phi2, double(f.intensity) * slope * s.rEdge};
+}
+
+/// dL/dkappa where half widths stay: what a wider or narrower kernel would do is the scales'
+/// affair, which shrink by d ln m / 2 as kappa grows, the direction of the three diagonal
+/// parameters. \param logMByKappa  KernelWidth's
+[[nodiscard]] ESVR_HD inline double edgeGradient(const PrimitiveGradient& gradient,
+                                                 double logMByKappa) {
+  const ParameterVector& g = gradient.byParameter;
+  return gradient.byKappa - 0.5 * logMByKappa * (g[3] + g[4] + g[5]);
 }
 
 /// How much the sum of squares would grow if the primitive vanished:

@@ -48,6 +48,11 @@ ESVR_HD inline void applyStep(Primitive& p, const ParameterVector& step) {
   p.intensity += step[9];
 }
 
+/// Divides every scale by a factor.
+ESVR_HD inline void shrinkBy(Primitive& p, double factor) {
+  for (double& l : p.L) l *= factor;
+}
+
 /// Keeps every semi-axis's scale within [smallest, largest] voxels; the frame is kept.
 ESVR_HD inline void clampScales(Primitive& p, double smallest, double largest) {
   using namespace primitive_math;

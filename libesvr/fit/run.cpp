@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "fit/kappa_descent.h"
+
 namespace esvr {
 namespace {
 
@@ -15,8 +17,9 @@ constexpr double kReachedMargin = 1e-3;  // dB: float32 storage must not undo it
 /// One stretch of iterations with its own schedule.
 class Stretch {
  public:
-  Stretch(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan)
-      : optimiser_(optimiser), target_(target), recorder_(recorder), plan_(plan) {}
+  Stretch(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,
+          KappaDescent& kappa)
+      : optimiser_(optimiser), target_(target), recorder_(recorder), plan_(plan), kappa_(kappa) {}
 
   /// \return why it ended; kScheduleDone when it ran to its end
   FitEnd run(const Schedule& schedule, std::uint32_t firstIteration) {
@@ -61,7 +64,14 @@ class Stretch {
     return optimiser_.iterate(factors);
   }
 
+  void descendKappa(double factor) {
+    const float now = optimiser_.kernel().kappa;
+    const float next = kappa_.next(now, optimiser_.kappaSlope(), factor);
+    if (next != now) optimiser_.setKappa(next);
+  }
+
   void events(const Schedule& schedule, double fraction) {
+    if (plan_.learnKappa && done_ > 0) descendKappa(schedule.stepAt(fraction, done_));
     if (done_ > 0)
       optimiser_.relocate(schedule.relocationsAt(fraction, optimiser_.primitiveCount()));
     optimiser_.growTo(schedule.countAt(fraction));
@@ -86,6 +96,7 @@ class Stretch {
   const FitTarget& target_;
   Recorder& recorder_;
   const RunPlan& plan_;
+  KappaDescent& kappa_;
   std::uint32_t done_ = 0;
   double started_ = 0.0;
 };
@@ -107,8 +118,9 @@ RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, co
            const Tuning& tuning) {
   Schedule schedule{firstCount(plan, tuning), plan.count, plan.iterations, tuning};
   RunEnd result{FitEnd::kScheduleDone, 0};
+  KappaDescent kappa(tuning.kappaStep);
   for (;;) {
-    Stretch stretch(optimiser, target, recorder, plan);
+    Stretch stretch(optimiser, target, recorder, plan, kappa);
     result.end = stretch.run(schedule, result.iterations);
     result.iterations += stretch.iterations();
     if (result.end != FitEnd::kScheduleDone || !plan.psnr) return result;

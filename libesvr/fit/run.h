@@ -16,7 +16,8 @@ struct RunPlan {
   std::uint32_t iterations = 0;
   std::optional<double> psnr;  ///< dB over the box
   std::optional<double>
-      seconds;  ///< since the recorder's start; replaces `iterations` as the clock
+      seconds;              ///< since the recorder's start; replaces `iterations` as the clock
+  bool learnKappa = false;  ///< else the kernel stays as it is
 };
 
 struct RunEnd {

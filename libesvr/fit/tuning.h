@@ -20,6 +20,8 @@ struct Tuning {
   double eventEvery = 0.01;     ///< of the run
   int eventSpacing = 15;        ///< iterations between events at least: new primitives must settle
   int graceSteps = 14;          ///< a primitive younger than this is not relocated
+  float firstKappa = 0.5f;      ///< where its descent begins
+  double kappaStep = 0.1;       ///< largest change of kappa by an event
   double seedIntensity = 1.0;   ///< of the residual at a seed
   double seedWindow = 0.35;     ///< half width over the spacing of seeds
   double intensityHeadroom = 1.5;  ///< intensities stay within so many times the target's range

@@ -116,7 +116,7 @@ def gpu_row(row):
     seconds = grid["seconds"]
     return (f"| {row['file']} | `{' '.join(row['options'][:2])}` | {row['storage']} | "
             f"{grid['primitives']} | {grid['metrics']['psnr_box']:.2f} | "
-            f"{grid['kernel']['kappa']:g} | {seconds['pilot']:.2f} | "
+            f"{grid['kernel']['kappa']:.2f} | "
             f"{seconds['optimise'] + seconds['seed']:.2f} | {seconds['encode']:.2f} | "
             f"{row['process']['seconds']:.2f} | {grid['fit']['device_bytes'] / 1e6:.0f} | "
             f"{row['bytes_out'] / 1e3:.0f} | {row['asked']} |")
@@ -166,7 +166,7 @@ def draw_curves(pyplot, rows):
         pyplot.plot([p["seconds"] for p in curve], [p["psnr_box"] for p in curve],
                     label=f"{row['file']} {row['options'][1]}")
     pyplot.xscale("log")
-    pyplot.xlabel("seconds since the fit began, pilot included (2 cores)")
+    pyplot.xlabel("seconds since the fit began (2 cores)")
     pyplot.ylabel("PSNR over the box, dB")
     pyplot.grid(True, which="both", alpha=0.3)
     pyplot.legend(fontsize="small")

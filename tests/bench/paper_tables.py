@@ -222,7 +222,7 @@ def draw(arguments):
                     label=f"{row['volume']}, {row['grid']['primitives']} ellipsoids, "
                           + ("the paper's method" if of_paper else "default"))
     pyplot.xscale("log")
-    pyplot.xlabel("seconds since the fit began, pilot included")
+    pyplot.xlabel("seconds since the fit began")
     pyplot.ylabel("PSNR over the box, dB")
     pyplot.grid(True, which="both", alpha=0.3)
     pyplot.legend(fontsize="small")

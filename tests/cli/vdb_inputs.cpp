@@ -1,9 +1,10 @@
 #include "cli/vdb_inputs.h"
 
 #include <openvdb/openvdb.h>
-#include <openvdb/points/PointConversion.h>
 
 #include <cmath>
+
+#include "vdb/point_grid.h"
 
 namespace esvr::test {
 namespace {
@@ -61,15 +62,6 @@ openvdb::GridBase::Ptr typed() {
   return grid;
 }
 
-openvdb::GridBase::Ptr points() {
-  const std::vector<openvdb::Vec3s> positions{{0, 0, 0}, {1, 2, 3}};
-  const auto grid = openvdb::points::createPointDataGrid<openvdb::points::NullCodec,
-                                                         openvdb::points::PointDataGrid>(
-      positions, *math::Transform::createLinearTransform(1.0));
-  grid->setName("points");
-  return grid;
-}
-
 template <class Value>
 std::vector<InputVoxel> cube(int reach, const Value& valueAt) {
   std::vector<InputVoxel> voxels;
@@ -89,7 +81,7 @@ void writeInput(const std::filesystem::path& path, const std::vector<InputGrid>&
 void writeMixedInput(const std::filesystem::path& path, const std::vector<InputGrid>& inputs) {
   openvdb::GridPtrVec grids = floatGrids(inputs);
   grids.insert(grids.begin(), {typed<openvdb::BoolGrid>(), typed<openvdb::Int32Grid>(),
-                               typed<openvdb::Vec3SGrid>(), points()});
+                               typed<openvdb::Vec3SGrid>(), pointGrid("points")});
   write(path, grids);
 }
 

@@ -134,6 +134,19 @@ TEST_P(KernelOfKappa, MovesByItsDerivativeWhenKappaMoves) {
   }
 }
 
+TEST_P(KernelOfKappa, IsHalfAtItsWidth) {
+  const auto c = constants<double>();
+  EXPECT_NEAR(kernelPhi(c, kernelWidth(c).m), 0.5, kRounding<double> * (1.0 + c.shift));
+  const double h = 1e-5;
+  const auto logMAt = [&](double kappa) {
+    return std::log(kernelWidth(kernelConstants<double>(kernelOf(GetParam()), kappa)).m);
+  };
+  const double difference = (logMAt(GetParam() + h) - logMAt(GetParam() - h)) / (2 * h);
+  // as in the test above
+  EXPECT_NEAR(kernelWidth(c).logMByKappa, difference,
+              1e-10 + kRounding<double> * (1.0 + std::abs(double(GetParam()))) / h);
+}
+
 template <class Real>
 void KernelOfKappa::expectEndsWithoutAJump() const {
   const auto c = constants<Real>();

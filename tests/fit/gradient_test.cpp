@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "fit/engine.h"
+#include "fit/parameter_gradient.h"
 #include "fit/primitive_math.h"
 #include "random_primitives.h"
 
@@ -81,6 +82,35 @@ TEST_P(GradientKappa, AgreesWithCentralDifferences) {
     EXPECT_LT(std::sqrt(error2), 3e-4 * std::sqrt(norm2)) << "primitive " << i;
   }
 }
+// By kappa with half widths held: scales follow, as a run's steps of kappa have them.
+TEST_P(GradientKappa, AgreesWithCentralDifferencesByKappa) {
+  const SparseVolume volume = denseVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  const Kernel kernel{.kappa = GetParam()};
+  const auto k = kernelConstants<double>(kernel);
+  const auto primitives = randomPrimitives(3, 1.5, 2.0);
+  FitEngine engine(target, k);
+  engine.rebuild(primitives, 0.1);
+  std::vector<PrimitiveGradient> gradients(primitives.size());
+  engine.gradients(primitives, gradients);
+
+  constexpr double kStep = 1e-6;
+  const auto lossAt = [&](double step) {
+    const auto moved = kernelConstants<double>(kernel, double(kernel.kappa) + step);
+    auto scaled = primitives;
+    for (Primitive& p : scaled) shrinkBy(p, std::sqrt(kernelWidth(moved).m / kernelWidth(k).m));
+    return referenceLoss(scaled, moved, volume, target, 14);
+  };
+  const double difference = (lossAt(kStep) - lossAt(-kStep)) / (2 * kStep);
+  double slope = 0.0, terms = 0.0;
+  for (const PrimitiveGradient& g : gradients) {
+    slope += edgeGradient(g, kernelWidth(k).logMByKappa);
+    for (int j = 3; j < 6; ++j) terms += std::abs(g.byParameter[j]);
+  }
+  // Sums as above; a Gaussian's slope is nothing, beside the loss's own rounding over the step.
+  EXPECT_NEAR(slope, difference, 3e-4 * std::max(terms * kernelWidth(k).logMByKappa, 1.0));
+}
+
 INSTANTIATE_TEST_SUITE_P(Kernels, GradientKappa, testing::Values(-30.f, -3.f, 2.f, 5.f));
 
 }  // namespace

@@ -84,6 +84,39 @@ TEST_P(OptimiserOn, DropsWhatNoVoxelSees) {
   EXPECT_TRUE(std::isfinite(optimiser->measure().squaredSum));
 }
 
+TEST_P(OptimiserOn, AnotherEdgeKeepsTheHalfWidths) {
+  const auto optimiser = make();
+  optimiser->growTo(20);
+  const auto before = optimiser->primitives();
+  const double m = kernelWidth(kernelConstants<double>(optimiser->kernel())).m;
+  optimiser->setKappa(4.0f);
+  EXPECT_EQ(optimiser->kernel().kappa, 4.0f);
+  const double moved = kernelWidth(kernelConstants<double>(optimiser->kernel())).m;
+  const auto after = optimiser->primitives();
+  for (std::size_t i = 0; i < before.size(); ++i)
+    for (int k = 0; k < 9; ++k)  // a product of two rounded numbers, a square root among them
+      EXPECT_NEAR(after[i].L[k] / std::sqrt(moved), before[i].L[k] / std::sqrt(m),
+                  1e-14 * std::sqrt(before[i].L[0] * before[i].L[0] + 1.0));
+}
+
+TEST_P(OptimiserOn, SlopeByKappaIsTheLosssDifference) {
+  const auto optimiser = make();
+  optimiser->growTo(50);
+  for (int i = 0; i < 40; ++i) optimiser->iterate(std::array{0.5});
+  EXPECT_NE(optimiser->kappaSlope(), 0.0);
+  optimiser->iterate(std::array{0.0});  // gradients where it stands
+  const float kappa = optimiser->kernel().kappa;
+  const double slope = optimiser->kappaSlope();
+  const auto lossAt = [&](float k) {
+    optimiser->setKappa(k);
+    return 0.5 * optimiser->measure().squaredSum;
+  };
+  constexpr float kStep = 1.0f / 64;
+  const double difference = (lossAt(kappa + kStep) - lossAt(kappa - kStep)) / (2 * kStep);
+  // the third derivative over a step of 1/64, and kinks at the ends of supports
+  EXPECT_NEAR(slope, difference, 0.02 * std::abs(difference));
+}
+
 TEST_P(OptimiserOn, SeedsNothingWhereThereIsNothingToMend) {
   std::fill(target_.values.begin(), target_.values.end(), 0.0f);
   const auto optimiser = make();

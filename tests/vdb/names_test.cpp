@@ -3,10 +3,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/points/PointConversion.h>
 
 #include "esvr/error.h"
 #include "vdb/made_files.h"
+#include "vdb/point_grid.h"
 #include "vdb/test_files.h"
 
 namespace esvr {
@@ -98,16 +98,9 @@ openvdb::GridBase::Ptr typed(const std::string& name) {
 
 TEST_F(Names, OfGridsThatCannotBeFittedComeWithTheirType) {
   openvdb::initialize();
-  const std::vector<openvdb::Vec3s> positions{{0, 0, 0}, {1, 2, 3}};
-  openvdb::GridPtrVec grids{typed<openvdb::BoolGrid>("b"),
-                            typed<openvdb::MaskGrid>("m"),
-                            typed<openvdb::Int32Grid>("i"),
-                            typed<openvdb::Int64Grid>("l"),
-                            typed<openvdb::Vec3DGrid>("v"),
-                            openvdb::points::createPointDataGrid<openvdb::points::NullCodec,
-                                                                 openvdb::points::PointDataGrid>(
-                                positions, *openvdb::math::Transform::createLinearTransform(1.0))};
-  grids.back()->setName("p");
+  openvdb::GridPtrVec grids{typed<openvdb::BoolGrid>("b"),  typed<openvdb::MaskGrid>("m"),
+                            typed<openvdb::Int32Grid>("i"), typed<openvdb::Int64Grid>("l"),
+                            typed<openvdb::Vec3DGrid>("v"), test::pointGrid("p")};
   grids.push_back(test::smallGrid());
   test::save(path(), grids);
   const auto listed = inspectVdb(path()).grids;

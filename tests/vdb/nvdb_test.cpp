@@ -3,10 +3,6 @@
 
 #include "vdb/versions.h"
 
-#define NANOVDB_USE_OPENVDB
-#define NANOVDB_USE_BLOSC
-#define NANOVDB_USE_ZIP
-#include ESVR_NANOVDB_CREATE
 #include ESVR_NANOVDB_IO
 
 #include <gmock/gmock.h>
@@ -19,16 +15,17 @@
 #include "esvr/error.h"
 #include "vdb/expect_same.h"
 #include "vdb/made_files.h"
+#include "vdb/nano_files.h"
 #include "vdb/test_files.h"
 
 namespace esvr {
 namespace {
 
-using nanovdb::io::Codec;
+using test::NanoCodec;
+using test::NanoFloats;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-using Handles = std::vector<nanovdb::GridHandle<nanovdb::HostBuffer>>;
 using Bytes = std::vector<std::byte>;
 
 /// Leaves, tiles of two levels, a background that is not zero.
@@ -45,10 +42,8 @@ openvdb::FloatGrid::Ptr sourceGrid() {
 class Nvdb : public testing::Test {
  protected:
   [[nodiscard]] std::filesystem::path path() const { return directory_ / "in.nvdb"; }
-  void save(const openvdb::GridPtrVec& grids, Codec codec = Codec::NONE) const {
-    Handles handles;
-    for (const auto& grid : grids) handles.push_back(vdb::nanotools::openToNanoVDB(grid));
-    nanovdb::io::writeGrids(path().string(), handles, codec);
+  void save(const openvdb::GridPtrVec& grids, NanoCodec codec = NanoCodec::kNone) const {
+    test::saveNano(path(), grids, codec);
   }
   bool readable(const Bytes& bytes) const {
     test::writeBytes(path(), bytes);
@@ -73,7 +68,7 @@ TEST_F(Nvdb, OfEveryCodecReadsAsItsSource) {
   const auto source = sourceGrid();
   test::save(directory_ / "in.vdb", {source});
   const auto expected = readGrid(directory_ / "in.vdb", "density");
-  for (const Codec codec : {Codec::NONE, Codec::ZIP, Codec::BLOSC}) {
+  for (const NanoCodec codec : {NanoCodec::kNone, NanoCodec::kZip, NanoCodec::kBlosc}) {
     save({source}, codec);
     const auto listed = inspectVdb(path());
     EXPECT_EQ(listed.format, "NanoVDB");
@@ -102,22 +97,11 @@ TEST_F(Nvdb, OfDoublesReadsAsItsSource) {
   EXPECT_EQ(valueAt(grid.volume, {-1, 2, 3}), 0.3f);
 }
 
-template <class Build>
-nanovdb::GridHandle<nanovdb::HostBuffer> quantised(openvdb::FloatGrid& grid) {
-#ifdef ESVR_NANOVDB_HAS_CREATE
-  return vdb::nanotools::createNanoGrid<openvdb::FloatGrid, Build>(grid);
-#else
-  return nanovdb::OpenToNanoVDB<float, Build>()(grid);
-#endif
-}
-
 /// Writes under a quantised type and expects each value within `tolerance` of its source.
-template <class Build>
-void expectQuantised(const std::filesystem::path& path, const char* type, float tolerance) {
+void expectQuantised(const std::filesystem::path& path, NanoFloats floats, const char* type,
+                     float tolerance) {
   const auto source = sourceGrid();
-  Handles handles;
-  handles.push_back(quantised<Build>(*source));
-  nanovdb::io::writeGrids(path.string(), handles);
+  test::saveQuantised(path, *source, floats);
   EXPECT_EQ(inspectVdb(path).grids.front().valueType, type);
   const auto grid = readGrid(path, "density");
   EXPECT_EQ(activeVoxelCount(grid.volume), source->activeVoxelCount());
@@ -129,10 +113,10 @@ void expectQuantised(const std::filesystem::path& path, const char* type, float 
 
 TEST_F(Nvdb, OfQuantisedFloatsReadsWithinTheirStep) {
   // A leaf spans at most 3: half a step of 2^-n of that, and float's rounding.
-  expectQuantised<nanovdb::Fp4>(path(), "fp4", 0.5f * 3 / 15 + 1e-6f);
-  expectQuantised<nanovdb::Fp8>(path(), "fp8", 0.5f * 3 / 255 + 1e-6f);
-  expectQuantised<nanovdb::Fp16>(path(), "fp16", 0.5f * 3 / 65535 + 1e-6f);
-  expectQuantised<nanovdb::FpN>(path(), "fpn", 0.01f + 1e-6f);  // its default for fog
+  expectQuantised(path(), NanoFloats::kFp4, "fp4", 0.5f * 3 / 15 + 1e-6f);
+  expectQuantised(path(), NanoFloats::kFp8, "fp8", 0.5f * 3 / 255 + 1e-6f);
+  expectQuantised(path(), NanoFloats::kFp16, "fp16", 0.5f * 3 / 65535 + 1e-6f);
+  expectQuantised(path(), NanoFloats::kFpN, "fpn", 0.01f + 1e-6f);  // its default for fog
 }
 
 TEST_F(Nvdb, OfALevelSetKeepsInsideAndOutsideApart) {
@@ -205,7 +189,7 @@ TEST_F(Nvdb, CannotHoldHalf) {
 }
 
 TEST_F(Nvdb, CutAnywhereIsRefused) {
-  for (const Codec codec : {Codec::NONE, Codec::ZIP, Codec::BLOSC}) {
+  for (const NanoCodec codec : {NanoCodec::kNone, NanoCodec::kZip, NanoCodec::kBlosc}) {
     save({sourceGrid()}, codec);
     const Bytes whole = test::bytesOf(path());
     ASSERT_TRUE(readable(whole));
@@ -215,7 +199,7 @@ TEST_F(Nvdb, CutAnywhereIsRefused) {
 }
 
 TEST_F(Nvdb, AnyByteMayBeWrong) {
-  for (const Codec codec : {Codec::NONE, Codec::ZIP, Codec::BLOSC}) {
+  for (const NanoCodec codec : {NanoCodec::kNone, NanoCodec::kZip, NanoCodec::kBlosc}) {
     save({test::smallGrid()}, codec);
     const Bytes whole = test::bytesOf(path());
     // Every byte of the headers; of the nodes, which are large and mostly empty, some.

@@ -2,44 +2,42 @@
 #include "fit/cuda/brick_pass.h"
 #include "fit/cuda/launch.h"
 #include "fit/cuda/pair_lines.cuh"
+#include "fit/cuda/threads_per_brick.h"
 
 namespace esvr::cuda {
 namespace {
 
-/// Threads for one brick: few keep more bricks going at once, many are done sooner with a full one.
-constexpr int kUsualThreads = 256, kThreadsForFullBricks = 512;
 constexpr unsigned kAllLanes = 0xffffffffu;
 constexpr int kMomentSlots = 16;  // kMoments, made a power of two
 static_assert(kMomentSlots % kGroup == 0, "each lane ends with some of the moments");
 
 enum class Pass { kGradients, kResiduals, kGivenGradients };
 
-/// The same on every thread, summed in one order.
-template <int kThreads, class Real>
-__device__ Real blockSum(Real value) {
-  __shared__ Real parts[kThreads / kWarp];
-  for (int d = kWarp / 2; d > 0; d /= 2) value += __shfl_xor_sync(kAllLanes, value, d);
+/// Of all threads, on every thread.
+template <int kThreads>
+__device__ float blockMax(float value) {
+  __shared__ float parts[kThreads / kWarp];
+  for (int d = kWarp / 2; d > 0; d /= 2) value = fmaxf(value, __shfl_xor_sync(kAllLanes, value, d));
   if (threadIdx.x % kWarp == 0) parts[threadIdx.x / kWarp] = value;
   __syncthreads();
-  Real sum = 0;
-  for (const Real part : parts) sum += part;
+  for (const float part : parts) value = fmaxf(value, part);
   __syncthreads();
-  return sum;
+  return value;
 }
 
 struct BrickEntries {
   std::uint32_t begin, end;
 };
 
-/// Values are summed as integers, whose sum has no order, in units of 2^-exponent: as fine as the
-/// sum of the brick's intensities, which bounds every value, allows 31 bits to be.
+/// Values are summed as integers, whose sum has no order, in units of 2^-exponent: as fine as 31
+/// bits allow where all of the brick's ellipsoids have their maximum at one voxel.
 template <int kThreads>
 __device__ int sumExponent(const BrickPassArguments& a, BrickEntries entries) {
   constexpr int kBits = 29, kFarthest = 100;
-  float bound = 0.0f;
+  float most = 0.0f;
   for (std::uint32_t k = entries.begin + threadIdx.x; k < entries.end; k += kThreads)
-    bound += fabsf(a.forms[a.lists.primitive[k]].form.intensity);
-  bound = blockSum<kThreads>(bound);
+    most = fmaxf(most, fabsf(a.forms[a.lists.primitive[k]].form.intensity));
+  const float bound = blockMax<kThreads>(most) * float(entries.end - entries.begin);
   return bound > 0.0f ? max(-kFarthest, min(kBits - ilogbf(bound), kFarthest)) : 0;
 }
 
@@ -74,20 +72,32 @@ __device__ float residualOf(const BrickPassArguments& a, std::uint32_t brick, in
   return a.narrowBand ? fminf(fmaxf(r, a.lowest - t), a.highest - t) : r;
 }
 
-/// Leaves r in the shared memory that held the sums. \return a thread's part of sum r^2
+/// Sum over a warp, on its first lane.
+__device__ double warpSum(double value) {
+  for (int d = kWarp / 2; d > 0; d /= 2) value += __shfl_down_sync(kAllLanes, value, d);
+  return value;
+}
+
+/// Leaves r in the shared memory that held the sums, and sum r^2 in the brick's loss: voxels are
+/// summed in the same order whatever the number of threads.
 template <int kThreads>
-__device__ float toResiduals(const BrickPassArguments& a, std::uint32_t brick, int exponent,
-                             int* sums) {
+__device__ void toResiduals(const BrickPassArguments& a, std::uint32_t brick, int exponent,
+                            int* sums) {
+  __shared__ double parts[kBrickVoxels / kWarp];
   const float unit = ldexpf(1.0f, -exponent);
-  float loss = 0.0f;
   for (int v = int(threadIdx.x); v < kBrickVoxels; v += kThreads) {
     const int at = paddedOffset(v);
     const float r = residualOf(a, brick, v, float(sums[at]) * unit);
     sums[at] = __float_as_int(r);
-    loss += r * r;
     if (a.residual != nullptr) a.residual[std::size_t(brick) * kBrickVoxels + v] = r;
+    const double squares = warpSum(double(r) * double(r));
+    if (v % kWarp == 0) parts[v / kWarp] = squares;
   }
-  return loss;
+  __syncthreads();
+  if (threadIdx.x != 0) return;
+  double loss = 0.0;
+  for (const double part : parts) loss += part;
+  a.brickLoss[brick] = loss;
 }
 
 /// Puts the given derivatives where residuals would be.
@@ -101,18 +111,21 @@ __device__ void loadGiven(const BrickPassArguments& a, std::uint32_t brick, int*
 /// A lane's moments of a pair, in the order of PairMoments.
 __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
                            const int* r, float (&s)[kMomentSlots]) {
+  const float slopeBase = kernel.slope * kernel.base - 1.0f;
   visitLines(p, corner, kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
     float w0 = 0.0f, w1 = 0.0f, t = line.t;
     for (int y = line.yBegin; y < line.yEnd; ++y, t += 1.0f) {
       const float phi = fastPhi(kernel, squaredAt(p.form, line.closest, t));
       const float g = __int_as_float(r[line.offset + y * kBrickSide]);
-      const float w = g * fastSlope(kernel, phi);
+      const float gq = phi > 0.0f ? g * (phi + kernel.base) : 0.0f;
+      const float w = gq * (phi * kernel.slope + slopeBase);  // r phi'
       const float wt = w * t;
       w0 += w;
       w1 += wt;
       s[8] += wt * t;
       s[9] += g * phi;
       s[10] += phi * phi;
+      s[11] += gq - gq * phi;
     }
     const float w0x = w0 * line.dx, w0z = w0 * line.dz;
     s[0] += w0x;
@@ -123,7 +136,6 @@ __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kern
     s[5] += w1;
     s[6] += w1 * line.dx;
     s[7] += w1 * line.dz;
-    s[11] += w0;
   });
 }
 
@@ -152,12 +164,12 @@ __device__ void writeMoments(const BrickPassArguments& a, std::uint32_t entry, C
   const PairForm p = a.forms[a.lists.primitive[entry]];
   float s[kMomentSlots] = {};
   sumMoments(p, kernelOf<kOwnKernels>(a, entry), corner, r, s);
-  float* const out = a.moments + std::size_t(a.lists.pair[entry]) * kMomentStride;
+  float* const out = a.moments + std::size_t(a.lists.pair[entry]) * kMoments;
 #pragma unroll
   for (int first = 0; first < kMomentSlots; first += kGroup) {
     const float value = transposeSum(s + first);
     const int moment = first + int(threadIdx.x % kGroup);
-    if (moment < kMomentStride) out[moment] = value;
+    if (moment < kMoments) out[moment] = value;
   }
 }
 
@@ -171,8 +183,7 @@ __device__ void sumBrick(const BrickPassArguments& a, std::uint32_t brick, Coord
        k += kThreads / kGroup)
     addPair<kOwnKernels>(a, k, corner, ldexpf(1.0f, exponent), sums);
   __syncthreads();
-  const double loss = blockSum<kThreads>(double(toResiduals<kThreads>(a, brick, exponent, sums)));
-  if (threadIdx.x == 0) a.brickLoss[brick] = loss;
+  toResiduals<kThreads>(a, brick, exponent, sums);
 }
 
 /// One block a brick, one group of lanes a pair.
@@ -194,36 +205,35 @@ __global__ void __launch_bounds__(kThreads) brickPass(const BrickPassArguments a
       writeMoments<kOwnKernels>(a, k, corner, sums);
 }
 
-template <Pass kPass, bool kOwnKernels>
-void launchWith(const BrickPassArguments& arguments, cudaStream_t stream) {
-  if (arguments.fewFullBricks)
-    brickPass<kPass, kThreadsForFullBricks, kOwnKernels>
-        <<<arguments.brickCount, kThreadsForFullBricks, 0, stream>>>(arguments);
-  else
-    brickPass<kPass, kUsualThreads, kOwnKernels>
-        <<<arguments.brickCount, kUsualThreads, 0, stream>>>(arguments);
-  check(cudaGetLastError(), "starting a pass over the bricks");
-}
-
-template <Pass kPass>
+template <Pass kPass, int kChoice>
 void launch(const BrickPassArguments& arguments, cudaStream_t stream) {
+  constexpr int kThreads = ThreadsPerBrick::threads(kChoice);
   if (arguments.brickCount == 0) return;
   if (arguments.kernels != nullptr)
-    launchWith<kPass, true>(arguments, stream);
+    brickPass<kPass, kThreads, true><<<arguments.brickCount, kThreads, 0, stream>>>(arguments);
   else
-    launchWith<kPass, false>(arguments, stream);
+    brickPass<kPass, kThreads, false><<<arguments.brickCount, kThreads, 0, stream>>>(arguments);
+  check(cudaGetLastError(), "starting a pass over the bricks");
 }
 
 }  // namespace
 
-void launchGradients(const BrickPassArguments& arguments, cudaStream_t stream) {
-  launch<Pass::kGradients>(arguments, stream);
+void launchGradients(const BrickPassArguments& arguments, int threads, cudaStream_t stream) {
+  static_assert(ThreadsPerBrick::kChoices == 3);
+  if (threads == ThreadsPerBrick::threads(0))
+    launch<Pass::kGradients, 0>(arguments, stream);
+  else if (threads == ThreadsPerBrick::threads(1))
+    launch<Pass::kGradients, 1>(arguments, stream);
+  else
+    launch<Pass::kGradients, 2>(arguments, stream);
 }
+
 void launchGivenGradients(const BrickPassArguments& arguments, cudaStream_t stream) {
-  launch<Pass::kGivenGradients>(arguments, stream);
+  launch<Pass::kGivenGradients, 1>(arguments, stream);
 }
+
 void launchResiduals(const BrickPassArguments& arguments, cudaStream_t stream) {
-  launch<Pass::kResiduals>(arguments, stream);
+  launch<Pass::kResiduals, 1>(arguments, stream);
 }
 
 }  // namespace esvr::cuda

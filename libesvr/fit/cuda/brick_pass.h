@@ -14,24 +14,24 @@ struct BrickPassArguments {
   const Coord* bricks;
   std::uint32_t brickCount, targetCount;
   PairListsView lists;
-  bool fewFullBricks;     ///< some bricks have so many pairs that they bound a pass's time
   const PairForm* forms;  ///< a primitive's
   KernelConstants<float> kernel;
   const float* target;    ///< kBrickVoxels a target brick
   bool narrowBand;        ///< residuals saturate at the target's range
   float lowest, highest;  ///< that range
   double* brickLoss;      ///< out, a brick's: sum of r^2
-  float* moments;         ///< out, kMomentStride a pair; not written for residuals alone
+  float* moments;         ///< out, kMoments a pair; not written for residuals alone
   float* residual;        ///< kBrickVoxels a brick; out, or null
   const KernelConstants<float>* kernels = nullptr;  ///< a primitive's; null: all have `kernel`
   const float* lossByValue = nullptr;  ///< kBrickVoxels a brick, for launchGivenGradients
 };
 
 /// Values of a pair in `moments`: PairMoments, in its order.
-inline constexpr int kMoments = 12, kMomentStride = 12;
+inline constexpr int kMoments = 12;
 
-/// Loss and moments for gradients of 1/2 sum r^2.
-void launchGradients(const BrickPassArguments& arguments, cudaStream_t stream);
+/// Loss and moments for gradients of 1/2 sum r^2. \param threads  ThreadsPerBrick::threads of a
+/// choice
+void launchGradients(const BrickPassArguments& arguments, int threads, cudaStream_t stream);
 /// Moments for gradients of a loss whose derivative by V is given. Writes no loss.
 void launchGivenGradients(const BrickPassArguments& arguments, cudaStream_t stream);
 /// Loss and residuals.

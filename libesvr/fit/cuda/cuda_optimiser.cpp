@@ -22,9 +22,6 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
     : target_(target),
       options_(options),
       tuning_(tuning),
-      kernel_(kernelConstants<double>(options.kernel)),
-      radius_(supportRadius(kernel_)),
-      unitVariance_(kernelVariance(kernel_)),
       bricks_(target.bricks, stream_.get()),
       lists_(stream_.get()),
       targetValues_(target.values, stream_.get()),
@@ -38,19 +35,22 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       brickLoss_(stream_.get()),
       chunkSums_(stream_.get()),
       loss_(stream_.get()),
+      slope_(stream_.get()),
       diverged_(1, stream_.get()),
       draw_(stream_.get()),
       ranking_(stream_.get()),
       errorSums_(stream_.get()),
       paperLoss_(stream_.get()) {
+  setKernel();
   loss_.reserve(1);
+  slope_.reserve(1);
   diverged_.setZero();
 }
 
-bool CudaOptimiser::fewFullBricks() const {
-  // Measured on one with 132 multiprocessors, which hold about four blocks of a pass each.
-  constexpr std::size_t kBlocksAtOnce = 4 * 132;
-  return lists_.mostPairsOfBrick() * kBlocksAtOnce > lists_.pairCount();
+void CudaOptimiser::setKernel() {
+  kernel_ = kernelConstants<double>(options_.kernel);
+  radius_ = supportRadius(kernel_);
+  unitVariance_ = kernelVariance(kernel_);
 }
 
 BrickPassArguments CudaOptimiser::passArguments() {
@@ -58,7 +58,6 @@ BrickPassArguments CudaOptimiser::passArguments() {
           .brickCount = std::uint32_t(bricks_.size()),
           .targetCount = std::uint32_t(bricks_.targetCount()),
           .lists = lists_.view(),
-          .fewFullBricks = fewFullBricks(),
           .forms = forms_.data(),
           .kernel = narrowed(kernel_),
           .target = targetValues_.data(),
@@ -85,6 +84,7 @@ StepArguments CudaOptimiser::stepArguments(double factor) {
           .usefulness = usefulness_.data(),
           .diverged = diverged_.data(),
           .radius = radius_,
+          .edge = {kernel_.slope, kernelWidth(kernel_).logMByKappa},
           .factor = factor,
           .sizes = tuning_.steps,
           .adam = tuning_.adam,
@@ -95,9 +95,10 @@ void CudaOptimiser::rebuildLists(double slack) {
   const SupportSource supports{primitives_.data(), count_, radius_, slack};
   if (!target_.narrowBand) bricks_.findReached(supports);
   lists_.rebuild(supports, bricks_);
+  threads_.listsChanged();
   if (options_.loss == Loss::kPaper) paperLoss_.setBricks(bricks_);
-  moments_.reserve(lists_.pairCount() * kMomentStride);
-  chunkSums_.reserve(lists_.chunkCount() * kMomentStride);
+  moments_.reserve(lists_.pairCount() * kMoments);
+  chunkSums_.reserve(lists_.chunkCount() * kMoments);
   brickLoss_.reserve(bricks_.size());
   iterationsSinceRebuild_ = 0;
 }
@@ -180,15 +181,17 @@ void CudaOptimiser::takePaperGradients() {
   launchGivenGradients(pass, stream_.get());
 }
 
-void CudaOptimiser::takeGradients() {
+void CudaOptimiser::takeGradients(std::optional<int> threads) {
   if (options_.loss == Loss::kPaper) return takePaperGradients();
-  launchGradients(passArguments(), stream_.get());
+  if (threads) return launchGradients(passArguments(), *threads, stream_.get());
+  threads_.run(stream_.get(),
+               [&](int best) { launchGradients(passArguments(), best, stream_.get()); });
 }
 
 /// What a removal costs is counted in squares, whatever loss is descended.
 void CudaOptimiser::refreshUsefulness() {
   rebuildLists(tuning_.listSlack);
-  launchGradients(passArguments(), stream_.get());
+  launchGradients(passArguments(), ThreadsPerBrick::threads(1), stream_.get());
   launchSums(stepArguments(0.0), stream_.get());
   launchUsefulness(stepArguments(0.0), stream_.get());
 }
@@ -201,6 +204,7 @@ void CudaOptimiser::step(double factor) {
   const StepArguments arguments = stepArguments(factor);
   launchSums(arguments, stream_.get());
   launchStep(arguments, stream_.get());
+  stepped_ = count_;
 }
 
 double CudaOptimiser::iterate(std::span<const double> factors) {
@@ -209,6 +213,21 @@ double CudaOptimiser::iterate(std::span<const double> factors) {
   if (!std::isfinite(loss) || downloadValue(diverged_.data(), stream_.get()) != 0)
     throw RuntimeFailure("the fit diverged: an ellipsoid is not finite");
   return loss;
+}
+
+double CudaOptimiser::kappaSlope() {
+  launchEdgeSum(usefulness_.data(), std::uint32_t(stepped_), slope_.data(), stream_.get());
+  return downloadValue(slope_.data(), stream_.get());
+}
+
+void CudaOptimiser::setKappa(float kappa) {
+  const double before = kernelWidth(kernel_).m;
+  options_.kernel.kappa = kappa;
+  setKernel();
+  launchShrink(primitives_.data(), std::uint32_t(count_),
+               std::sqrt(kernelWidth(kernel_).m / before), stream_.get());
+  launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+  iterationsSinceRebuild_ = kListsStale;
 }
 
 FitErrors CudaOptimiser::measure() {
@@ -240,9 +259,9 @@ void CudaOptimiser::setPrimitives(std::span<const Primitive> primitives) {
   iterationsSinceRebuild_ = kListsStale;
 }
 
-std::vector<PrimitiveGradient> CudaOptimiser::gradients() {
+std::vector<PrimitiveGradient> CudaOptimiser::gradients(int threads) {
   rebuildLists(tuning_.listSlack);
-  takeGradients();
+  takeGradients(threads);
   launchSums(stepArguments(0.0), stream_.get());
   DeviceBuffer<PrimitiveGradient> out(count_, stream_.get());
   launchReadGradients(stepArguments(0.0), out.data(), stream_.get());

@@ -11,6 +11,7 @@
 #include "fit/cuda/paper_loss.h"
 #include "fit/cuda/rank_primitives.h"
 #include "fit/cuda/step.h"
+#include "fit/cuda/threads_per_brick.h"
 #include "fit/optimiser.h"
 
 namespace esvr::cuda {
@@ -26,6 +27,9 @@ class CudaOptimiser final : public Optimiser {
   [[nodiscard]] std::uint32_t batchSize() const override { return kBatch; }
   [[nodiscard]] FitErrors measure() override;
   void dropUnseen() override;
+  [[nodiscard]] const Kernel& kernel() const override { return options_.kernel; }
+  [[nodiscard]] double kappaSlope() override;
+  void setKappa(float kappa) override;
 
   [[nodiscard]] std::size_t primitiveCount() const override { return count_; }
   [[nodiscard]] std::vector<Primitive> primitives() const override;
@@ -34,7 +38,8 @@ class CudaOptimiser final : public Optimiser {
   [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
 
   /// Gradients of 1/2 sum r^2, or of the paper's loss, where the primitives are.
-  [[nodiscard]] std::vector<PrimitiveGradient> gradients();
+  /// \param threads  ThreadsPerBrick::threads of a choice; changes no bit
+  [[nodiscard]] std::vector<PrimitiveGradient> gradients(int threads = ThreadsPerBrick::threads(1));
   /// Takes over primitives as they are; they have taken no step yet.
   void setPrimitives(std::span<const Primitive> primitives);
 
@@ -43,17 +48,18 @@ class CudaOptimiser final : public Optimiser {
   static constexpr std::uint32_t kBatch = 64;
   static constexpr int kListsStale = -1;
 
+  void setKernel();
   void rebuildLists(double slack);
   void refreshResiduals();
   void step(double factor);
-  void takeGradients();
+  /// \param threads  of a brick; default: the best measured
+  void takeGradients(std::optional<int> threads = std::nullopt);
   void takePaperGradients();
   void refreshUsefulness();
   void reserve(std::size_t primitives);
   void requireMemoryFor(std::size_t primitives) const;
   /// \return how many seeds there are: `count`, fewer where errors are few
   std::size_t placeSeeds(std::size_t count, std::size_t primitives, const std::uint32_t* into);
-  [[nodiscard]] bool fewFullBricks() const;
   [[nodiscard]] BrickPassArguments passArguments();
   [[nodiscard]] StepArguments stepArguments(double factor);
 
@@ -66,6 +72,7 @@ class CudaOptimiser final : public Optimiser {
   Stream stream_;
   BrickTable bricks_;
   PairLists lists_;
+  ThreadsPerBrick threads_;
   DeviceBuffer<float> targetValues_;
   DeviceBuffer<BrickMask> active_;
   GrowingBuffer<Primitive> primitives_;
@@ -73,7 +80,8 @@ class CudaOptimiser final : public Optimiser {
   GrowingBuffer<PairForm> forms_;
   GrowingBuffer<Usefulness> usefulness_;
   GrowingBuffer<float> moments_, residual_;
-  GrowingBuffer<double> brickLoss_, chunkSums_, loss_;
+  GrowingBuffer<double> brickLoss_, chunkSums_, loss_, slope_;
+  std::size_t stepped_ = 0;  ///< primitives that took part in the last step
   DeviceBuffer<int> diverged_;
   VoxelDraw draw_;
   PrimitiveRanking ranking_;

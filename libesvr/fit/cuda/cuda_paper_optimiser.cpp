@@ -67,7 +67,6 @@ BrickPassArguments CudaPaperOptimiser::passArguments(const Part& part) {
           .brickCount = std::uint32_t(part.bricks.size()),
           .targetCount = std::uint32_t(part.bricks.targetCount()),
           .lists = part.lists.view(),
-          .fewFullBricks = false,
           .forms = forms_.data(),
           .kernel = narrowed(constants_),
           .target = part.values.data(),
@@ -105,8 +104,8 @@ void CudaPaperOptimiser::rebuildLists(Part& part, double slack) {
 
 /// Room in what all subvolumes use in turn.
 void CudaPaperOptimiser::takeResiduals(Part& part) {
-  moments_.reserve(part.lists.pairCount() * kMomentStride);
-  chunkSums_.reserve(part.lists.chunkCount() * kMomentStride);
+  moments_.reserve(part.lists.pairCount() * kMoments);
+  chunkSums_.reserve(part.lists.chunkCount() * kMoments);
   brickLoss_.reserve(part.bricks.size());
   residual_.reserve(part.bricks.size() * kBrickVoxels);
   launchResiduals(passArguments(part), stream_.get());

@@ -24,10 +24,10 @@ constexpr double kBytesPerBrick = double(kBrickVoxels * sizeof(float) + sizeof(C
 constexpr double kBytesPerTarget = double(kBrickVoxels * sizeof(float) + sizeof(BrickMask));
 constexpr double kBytesPerReached = kSlotsPerEntry * sizeof(ReachedSlot);
 constexpr double kBytesPerPair =
-    double(kMomentStride * sizeof(float)) + 8.0 * sizeof(std::uint32_t);  // lists, sorted and not
+    double(kMoments * sizeof(float)) + 8.0 * sizeof(std::uint32_t);  // lists, sorted and not
 constexpr double kBytesPerPrimitive =
     double(sizeof(Primitive) + sizeof(AdamState) + sizeof(PairForm) + sizeof(Usefulness)) +
-    double(kMomentStride * sizeof(double)) + 9.0 * sizeof(std::uint32_t) + sizeof(Coord) * 2;
+    double(kMoments * sizeof(double)) + 9.0 * sizeof(std::uint32_t) + sizeof(Coord) * 2;
 
 double pairsOf(const FitTarget& target, double primitives) {
   const double distance = std::cbrt(double(target.activeVoxels) / primitives);

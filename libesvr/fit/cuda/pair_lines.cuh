@@ -75,10 +75,4 @@ __device__ inline float fastPhi(const KernelConstants<float>& k, float m) {
   return __fdividef(k.numerator, k.plateau + __expf(m - k.shift)) - k.base;
 }
 
-/// phi' from phi; zero where phi is.
-__device__ inline float fastSlope(const KernelConstants<float>& k, float phi) {
-  const float quotient = phi + k.base;
-  return phi > 0.0f ? quotient * (quotient * k.slope - 1.0f) : 0.0f;
-}
-
 }  // namespace esvr::cuda

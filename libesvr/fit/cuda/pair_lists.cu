@@ -16,17 +16,17 @@ namespace {
 
 constexpr unsigned kAllLanes = 0xffffffffu;
 
-/// Calls visit(brick's number, position among the primitive's pairs) for each of its pairs.
+/// Calls visit(brick's number, brick, position among the primitive's pairs) for each pair.
 /// \return how many there are, on all lanes
 template <class Visit>
-__device__ std::uint32_t visitPairs(const SupportSource& source, const BrickTableView& bricks,
-                                    std::size_t i, Visit&& visit) {
+__device__ std::uint32_t visitPairs(const Support& support, const BrickTableView& bricks,
+                                    Visit&& visit) {
   std::uint32_t before = 0;
-  visitReachedBricks(source, i, [&](Coord brick, bool reached) {
+  visitReachedBricks(support, [&](Coord brick, bool reached) {
     const std::uint32_t number = reached ? bricks.find(brick) : kNoBrick;
     const unsigned present = __ballot_sync(kAllLanes, number != kNoBrick);
     const unsigned below = present & ((1u << threadIdx.x % kWarp) - 1u);
-    if (number != kNoBrick) visit(number, before + std::uint32_t(__popc(below)));
+    if (number != kNoBrick) visit(number, brick, before + std::uint32_t(__popc(below)));
     before += std::uint32_t(__popc(present));
   });
   return before;
@@ -36,21 +36,40 @@ __global__ void countPairsKernel(SupportSource source, BrickTableView bricks, st
                                  std::uint32_t* chunks) {
   const std::size_t i = warpNumber();
   if (i >= source.count) return;
-  const std::uint32_t n = visitPairs(source, bricks, i, [](std::uint32_t, std::uint32_t) {});
+  const std::uint32_t n =
+      visitPairs(supportOf(source, i), bricks, [](std::uint32_t, Coord, std::uint32_t) {});
   if (threadIdx.x % kWarp != 0) return;
   counts[i] = n;
   // Every primitive has a chunk: one that reaches nothing still takes a step, of zero.
   chunks[i] = n == 0 ? 1 : (n - 1) / PairListsView::kChunk + 1;
 }
 
+/// Entries of a brick stand in the order of their lines, the longest work first and neighbours
+/// alike: lanes of one warp then end together.
+constexpr int kLinesBits = 3;
+
+__device__ int voxelsOfBrick(double center, double half, std::int32_t brick) {
+  const double first = double(brick) * kBrickSide, last = first + kBrickSide - 1;
+  const double low = fmax(ceil(center - half), first), high = fmin(floor(center + half), last);
+  return max(int(high - low) + 1, 1);
+}
+
+/// 0 for all lines of a brick to 7 for few.
+__device__ std::uint32_t linesRank(const Support& s, Coord brick) {
+  const int lines = voxelsOfBrick(s.center[0], s.half[0], brick.x) *
+                    voxelsOfBrick(s.center[2], s.half[2], brick.z);
+  return std::uint32_t(kBrickSide * kBrickSide - lines) >> (2 * kBrickLog2 - kLinesBits);
+}
+
 __global__ void listPairsKernel(SupportSource source, BrickTableView bricks,
-                                const std::uint32_t* begin, std::uint32_t* brickOf,
-                                std::uint32_t* pair, std::uint32_t* owner) {
+                                const std::uint32_t* begin, std::uint32_t* key, std::uint32_t* pair,
+                                std::uint32_t* owner) {
   const std::size_t i = warpNumber();
   if (i >= source.count) return;
-  visitPairs(source, bricks, i, [&](std::uint32_t number, std::uint32_t n) {
+  const Support support = supportOf(source, i);
+  visitPairs(support, bricks, [&](std::uint32_t number, Coord brick, std::uint32_t n) {
     const std::uint32_t at = begin[i] + n;
-    brickOf[at] = number;
+    key[at] = number << kLinesBits | linesRank(support, brick);
     pair[at] = at;
     owner[at] = std::uint32_t(i);
   });
@@ -63,13 +82,13 @@ __global__ void listChunks(const std::uint32_t* begin, std::uint32_t primitives,
   for (std::uint32_t c = begin[i]; c < begin[i + 1]; ++c) owner[c] = i;
 }
 
-/// From the sorted bricks of all entries to where each brick's begin.
+/// From the sorted keys of all entries to where each brick's begin.
 __global__ void findBrickBegins(const std::uint32_t* sorted, std::uint32_t entries,
                                 std::uint32_t bricks, std::uint32_t* begin) {
   const std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x;
   if (k > entries) return;
-  const std::uint32_t first = k == 0 ? 0 : sorted[k - 1] + 1;
-  const std::uint32_t last = k == entries ? bricks : sorted[k];
+  const std::uint32_t first = k == 0 ? 0 : (sorted[k - 1] >> kLinesBits) + 1;
+  const std::uint32_t last = k == entries ? bricks : sorted[k] >> kLinesBits;
   for (std::uint32_t b = first; b <= last; ++b) begin[b] = k;
 }
 
@@ -96,8 +115,8 @@ PairLists::PairLists(cudaStream_t stream)
       primitiveBegin_(stream),
       chunkBegin_(stream),
       chunkOwner_(stream),
-      brickOf_(stream),
-      brickOfSorted_(stream),
+      key_(stream),
+      keySorted_(stream),
       pair_(stream),
       pairSorted_(stream),
       owner_(stream),
@@ -151,13 +170,13 @@ void PairLists::readTotals(std::size_t n) {
 
 void PairLists::listPairs(const SupportSource& supports, const BrickTableView& bricks) {
   const std::size_t n = supports.count;
-  std::uint32_t* const brickOf = brickOf_.reserve(pairCount_);
+  std::uint32_t* const key = key_.reserve(pairCount_);
   std::uint32_t* const pair = pair_.reserve(pairCount_);
   std::uint32_t* const owner = owner_.reserve(pairCount_);
   std::uint32_t* const chunkOwner = chunkOwner_.reserve(chunkCount_);
   if (n == 0) return;
   listPairsKernel<<<blocksFor(n * kWarp, kBlock), kBlock, 0, stream_>>>(
-      supports, bricks, primitiveBegin_.data(), brickOf, pair, owner);
+      supports, bricks, primitiveBegin_.data(), key, pair, owner);
   check(cudaGetLastError(), "listing pairs");
   listChunks<<<blocksFor(n, kBlock), kBlock, 0, stream_>>>(chunkBegin_.data(), std::uint32_t(n),
                                                            chunkOwner);
@@ -166,14 +185,14 @@ void PairLists::listPairs(const SupportSource& supports, const BrickTableView& b
 
 void PairLists::sortByBrick(std::size_t bricks) {
   const auto entries = std::uint32_t(pairCount_);
-  std::uint32_t* const sorted = brickOfSorted_.reserve(pairCount_);
+  std::uint32_t* const sorted = keySorted_.reserve(pairCount_);
   std::uint32_t* const pair = pairSorted_.reserve(pairCount_);
   if (entries > 0)
     withTemporary(temporary_, "sorting pairs", [&](void* memory, std::size_t& bytes) {
-      // Stable: within a brick the primitives keep their order.
-      return cub::DeviceRadixSort::SortPairs(memory, bytes, brickOf_.data(), sorted, pair_.data(),
-                                             pair, pairCount_, 0, int(std::bit_width(bricks)),
-                                             stream_);
+      // Stable: primitives of as many lines keep their order.
+      return cub::DeviceRadixSort::SortPairs(memory, bytes, key_.data(), sorted, pair_.data(), pair,
+                                             pairCount_, 0,
+                                             int(std::bit_width(bricks)) + kLinesBits, stream_);
     });
   findBrickBegins<<<blocksFor(pairCount_ + 1, kBlock), kBlock, 0, stream_>>>(
       sorted, entries, std::uint32_t(bricks), brickBegin_.reserve(bricks + 1));
@@ -187,7 +206,6 @@ void PairLists::sortByBrick(std::size_t bricks) {
 
 /// Blocks start in order: the fullest bricks first, so that none is left over for the end.
 void PairLists::orderBricks(std::size_t bricks) {
-  mostPairsOfBrick_ = 0;
   if (bricks == 0) return;
   std::uint32_t* const pairs = brickPairs_.reserve(bricks);
   std::uint32_t* const sorted = brickPairsSorted_.reserve(bricks);
@@ -200,10 +218,13 @@ void PairLists::orderBricks(std::size_t bricks) {
     return cub::DeviceRadixSort::SortPairsDescending(memory, bytes, pairs, sorted, brick, order,
                                                      bricks, 0, 32, stream_);
   });
-  mostPairsOfBrick_ = downloadValue(sorted, stream_);
 }
 
 void PairLists::rebuild(const SupportSource& supports, const BrickTable& bricks) {
+  constexpr std::size_t kMostBricks = std::size_t{1} << (32 - kLinesBits);
+  if (bricks.size() >= kMostBricks)
+    throw DeviceError("fitting on the GPU: " + std::to_string(bricks.size()) +
+                      " bricks are more than the lists can hold");
   countPairs(supports, bricks.view());
   readTotals(supports.count);
   listPairs(supports, bricks.view());

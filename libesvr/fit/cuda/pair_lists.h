@@ -15,7 +15,7 @@ struct PairListsView {
 
   const std::uint32_t* brickOrder;      ///< bricks, those with the most pairs first
   const std::uint32_t* brickBegin;      ///< bricks + 1: range of a brick's entries
-  const std::uint32_t* primitive;       ///< an entry's
+  const std::uint32_t* primitive;       ///< an entry's; those with the most lines first
   const std::uint32_t* pair;            ///< an entry's number among the primitives' pairs
   const std::uint32_t* primitiveBegin;  ///< primitives + 1: range of a primitive's pairs
   const std::uint32_t* chunkBegin;      ///< primitives + 1: range of a primitive's chunks
@@ -26,12 +26,10 @@ class PairLists {
  public:
   explicit PairLists(cudaStream_t stream);
 
-  /// \throws DeviceError  2^32 pairs or more
+  /// \throws DeviceError  2^32 pairs or more, 2^29 bricks or more
   void rebuild(const SupportSource& supports, const BrickTable& bricks);
 
   [[nodiscard]] std::size_t pairCount() const { return pairCount_; }
-  /// Of the fullest brick.
-  [[nodiscard]] std::size_t mostPairsOfBrick() const { return mostPairsOfBrick_; }
   [[nodiscard]] std::size_t chunkCount() const { return chunkCount_; }
   [[nodiscard]] PairListsView view() const;
 
@@ -43,9 +41,9 @@ class PairLists {
   void orderBricks(std::size_t bricks);
 
   cudaStream_t stream_;
-  std::size_t pairCount_ = 0, chunkCount_ = 0, mostPairsOfBrick_ = 0;
+  std::size_t pairCount_ = 0, chunkCount_ = 0;
   GrowingBuffer<std::uint32_t> counts_, chunkCounts_, primitiveBegin_, chunkBegin_, chunkOwner_;
-  GrowingBuffer<std::uint32_t> brickOf_, brickOfSorted_, pair_, pairSorted_, owner_, primitive_;
+  GrowingBuffer<std::uint32_t> key_, keySorted_, pair_, pairSorted_, owner_, primitive_;
   GrowingBuffer<std::uint32_t> brickBegin_, brickPairs_, brickPairsSorted_, bricks_, brickOrder_;
   GrowingBuffer<std::uint64_t> total_;
   GrowingBuffer<char> temporary_;

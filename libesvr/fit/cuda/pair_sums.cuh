@@ -10,10 +10,10 @@ namespace esvr::cuda {
 __device__ inline PairSums sumsOf(const StepArguments& a, std::uint32_t i) {
   PairSums s{};
   for (std::uint32_t c = a.lists.chunkBegin[i]; c < a.lists.chunkBegin[i + 1]; ++c) {
-    const double* const m = a.chunkSums + std::size_t(c) * kMomentStride;
+    const double* const m = a.chunkSums + std::size_t(c) * kMoments;
     s.w0x += m[0], s.w0z += m[1], s.w0xx += m[2], s.w0xz += m[3], s.w0zz += m[4];
     s.w1 += m[5], s.w1x += m[6], s.w1z += m[7], s.w2 += m[8], s.rPhi += m[9], s.phi2 += m[10];
-    s.w0 += m[11];
+    s.rEdge += m[11];
   }
   return s;
 }

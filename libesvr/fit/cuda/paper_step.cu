@@ -30,9 +30,8 @@ __device__ void writeForms(const PaperPrimitives& a, std::uint32_t i,
 __device__ paper::PaperVector gradientOf(const PaperPrimitives& a, const StepArguments& s,
                                          std::uint32_t i, const paper::PaperPrimitive& p) {
   const PairSums sums = sumsOf(s, i);
-  const PrimitiveGradient own{parameterGradient(a.forms[i].form, sums), sums.phi2, sums.w0};
   const double slope = a.kernels != nullptr ? double(a.kernels[i].slope) : a.constants.slope;
-  return byPaperParameters(p, a.units[i], own, slope);
+  return byPaperParameters(p, a.units[i], primitiveGradient(a.forms[i].form, sums, slope));
 }
 
 __global__ void __launch_bounds__(kStepBlock) formsKernel(const PaperPrimitives a) {

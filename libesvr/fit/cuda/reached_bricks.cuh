@@ -14,12 +14,16 @@ __device__ inline std::size_t warpNumber() {
   return (std::size_t(blockIdx.x) * blockDim.x + threadIdx.x) / kWarp;
 }
 
-/// Calls visit(brick, reached) on all lanes together until every brick near primitive i has been
+/// Primitive i's.
+__device__ inline Support supportOf(const SupportSource& source, std::size_t i) {
+  const Primitive& p = source.primitives[i];
+  return makeSupport(p.center, p.L, source.radiusOf(i), source.slack);
+}
+
+/// Calls visit(brick, reached) on all lanes together until every brick near a support has been
 /// visited by one lane, lanes and rounds in increasing order of the bricks.
 template <class Visit>
-__device__ void visitReachedBricks(const SupportSource& source, std::size_t i, Visit&& visit) {
-  const Primitive& p = source.primitives[i];
-  const Support support = makeSupport(p.center, p.L, source.radiusOf(i), source.slack);
+__device__ void visitReachedBricks(const Support& support, Visit&& visit) {
   const Box range = brickRange(support);
   const auto nx = std::int64_t(range.max.x) - range.min.x + 1;
   const auto ny = std::int64_t(range.max.y) - range.min.y + 1;

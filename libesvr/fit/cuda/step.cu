@@ -11,7 +11,7 @@ namespace {
 constexpr int kLanes = 16;      // of a chunk: one a moment, and some to spare
 constexpr int kStepBlock = 64;  // small: few primitives are to use many processors
 constexpr int kLossBlock = 1024;
-static_assert(kLanes >= kMomentStride);
+static_assert(kLanes >= kMoments);
 
 /// One lane a moment: the pairs of a chunk lie side by side.
 __global__ void sumChunks(const StepArguments a) {
@@ -25,24 +25,41 @@ __global__ void sumChunks(const StepArguments a) {
   double sum = 0.0;
 #pragma unroll 4
   for (std::uint32_t k = begin; k < end; ++k)
-    sum += double(a.moments[std::size_t(k) * kMomentStride + lane]);
-  a.chunkSums[std::size_t(chunk) * kMomentStride + lane] = sum;
+    sum += double(a.moments[std::size_t(k) * kMoments + lane]);
+  a.chunkSums[std::size_t(chunk) * kMoments + lane] = sum;
 }
 
-/// In one order, by one block.
-__global__ void __launch_bounds__(kLossBlock) sumLoss(const StepArguments a) {
+/// Sum of value(0 .. count - 1) in one order, by one block.
+template <class Value>
+__device__ void sumByOneBlock(std::uint32_t count, const Value& value, double* out) {
   __shared__ double parts[kLossBlock];
   double sum = 0.0;
-  for (std::uint32_t b = threadIdx.x; b < a.brickCount; b += kLossBlock) sum += a.brickLoss[b];
+  for (std::uint32_t k = threadIdx.x; k < count; k += kLossBlock) sum += value(k);
   parts[threadIdx.x] = sum;
   for (int half = kLossBlock / 2; half > 0; half /= 2) {
     __syncthreads();
     if (threadIdx.x < half) parts[threadIdx.x] += parts[threadIdx.x + half];
   }
-  if (threadIdx.x == 0) *a.loss = parts[0];
+  if (threadIdx.x == 0) *out = parts[0];
+}
+
+__global__ void __launch_bounds__(kLossBlock) sumLoss(const StepArguments a) {
+  sumByOneBlock(
+      a.brickCount, [&](std::uint32_t b) { return a.brickLoss[b]; }, a.loss);
+}
+
+__global__ void __launch_bounds__(kLossBlock)
+    sumEdges(const Usefulness* usefulness, std::uint32_t count, double* out) {
+  sumByOneBlock(
+      count, [&](std::uint32_t i) { return double(usefulness[i].edge); }, out);
 }
 
 __device__ std::uint32_t ownPrimitive() { return blockIdx.x * kStepBlock + threadIdx.x; }
+
+__device__ Usefulness usefulnessOf(const StepArguments& a, const PairSums& sums,
+                                   const PrimitiveGradient& gradient) {
+  return {float(sums.phi2), float(sums.rPhi), float(edgeGradient(gradient, a.edge.logMByKappa))};
+}
 
 __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   const std::uint32_t i = ownPrimitive();
@@ -51,13 +68,13 @@ __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   const PairSums sums = sumsOf(a, i);
   Primitive p = a.primitives[i];
   AdamState adam = a.states[i];
-  const ParameterVector gradient = parameterGradient(a.forms[i].form, sums);
+  const PrimitiveGradient gradient = primitiveGradient(a.forms[i].form, sums, a.edge.slope);
   const ParameterVector largest = largestStep(p, a.sizes.scaled(a.factor));
-  moveWithin(p, adamDirection(adam, gradient, a.adam, largest), a.limits);
+  moveWithin(p, adamDirection(adam, gradient.byParameter, a.adam, largest), a.limits);
   a.primitives[i] = p;
   a.states[i] = adam;
   a.forms[i] = pairForm(p, a.radius);
-  a.usefulness[i] = {float(sums.phi2), float(sums.rPhi)};
+  a.usefulness[i] = usefulnessOf(a, sums, gradient);
   if (!finite(p)) *a.diverged = 1;  // integer sums would hide it
 }
 
@@ -65,21 +82,26 @@ __global__ void __launch_bounds__(kStepBlock) writeUsefulness(const StepArgument
   const std::uint32_t i = ownPrimitive();
   if (i >= a.primitiveCount) return;
   const PairSums sums = sumsOf(a, i);
-  a.usefulness[i] = {float(sums.phi2), float(sums.rPhi)};
+  a.usefulness[i] = usefulnessOf(a, sums, primitiveGradient(a.forms[i].form, sums, a.edge.slope));
 }
 
 __global__ void __launch_bounds__(kStepBlock)
     readGradients(const StepArguments a, PrimitiveGradient* out) {
   const std::uint32_t i = ownPrimitive();
   if (i >= a.primitiveCount) return;
-  const PairSums sums = sumsOf(a, i);
-  out[i] = {parameterGradient(a.forms[i].form, sums), sums.phi2, sums.w0};
+  out[i] = primitiveGradient(a.forms[i].form, sumsOf(a, i), a.edge.slope);
 }
 
 __global__ void __launch_bounds__(kStepBlock)
     writeForms(const Primitive* primitives, std::uint32_t count, double radius, PairForm* forms) {
   const std::uint32_t i = ownPrimitive();
   if (i < count) forms[i] = pairForm(primitives[i], radius);
+}
+
+__global__ void __launch_bounds__(kStepBlock)
+    shrink(Primitive* primitives, std::uint32_t count, double factor) {
+  const std::uint32_t i = ownPrimitive();
+  if (i < count) shrinkBy(primitives[i], factor);
 }
 
 }  // namespace
@@ -108,6 +130,18 @@ void launchReadGradients(const StepArguments& a, PrimitiveGradient* out, cudaStr
   if (a.primitiveCount == 0) return;
   readGradients<<<blocksFor(a.primitiveCount, kStepBlock), kStepBlock, 0, stream>>>(a, out);
   check(cudaGetLastError(), "starting to read gradients");
+}
+
+void launchEdgeSum(const Usefulness* usefulness, std::uint32_t count, double* sum,
+                   cudaStream_t stream) {
+  sumEdges<<<1, kLossBlock, 0, stream>>>(usefulness, count, sum);
+  check(cudaGetLastError(), "starting the sum of slopes by kappa");
+}
+
+void launchShrink(Primitive* primitives, std::uint32_t count, double factor, cudaStream_t stream) {
+  if (count == 0) return;
+  shrink<<<blocksFor(count, kStepBlock), kStepBlock, 0, stream>>>(primitives, count, factor);
+  check(cudaGetLastError(), "starting to shrink primitives");
 }
 
 void launchForms(const Primitive* primitives, std::uint32_t count, double radius, PairForm* forms,

@@ -5,22 +5,30 @@
 
 #include "fit/adam.h"
 #include "fit/cuda/brick_pass.h"
+#include "fit/parameter_gradient.h"
 
 namespace esvr::cuda {
+
+/// How the kernel, which all share, changes with kappa.
+struct KernelEdge {
+  double slope;        ///< KernelConstants::slope
+  double logMByKappa;  ///< KernelWidth::logMByKappa
+};
 
 /// What a primitive is worth, from the last gradients.
 struct Usefulness {
   float phi2;  ///< sum of phi^2
   float rPhi;  ///< sum of r phi
+  float edge;  ///< edgeGradient()
 };
 
 /// Pointers are to device memory, borrowed.
 struct StepArguments {
   std::uint32_t primitiveCount, chunkCount, brickCount;
   PairListsView lists;
-  const float* moments;     ///< kMomentStride a pair
+  const float* moments;     ///< kMoments a pair
   const double* brickLoss;  ///< a brick's
-  double* chunkSums;        ///< kMomentStride a chunk
+  double* chunkSums;        ///< kMoments a chunk
   double* loss;             ///< one value: sum of r^2 before the step
   Primitive* primitives;
   AdamState* states;
@@ -28,6 +36,7 @@ struct StepArguments {
   Usefulness* usefulness;
   int* diverged;  ///< set to 1 where a primitive is not finite
   double radius;  ///< of the support in the unit frame
+  KernelEdge edge;
   double factor;  ///< of the step sizes
   StepSizes sizes;
   AdamOptions adam;
@@ -43,6 +52,13 @@ void launchUsefulness(const StepArguments& arguments, cudaStream_t stream);
 /// Writes the gradients of all primitives; wants launchSums before.
 void launchReadGradients(const StepArguments& arguments, PrimitiveGradient* out,
                          cudaStream_t stream);
+
+/// Sums byKappa of `count` primitives, in one order.
+void launchEdgeSum(const Usefulness* usefulness, std::uint32_t count, double* sum,
+                   cudaStream_t stream);
+
+/// Divides the scales of `count` primitives by a factor.
+void launchShrink(Primitive* primitives, std::uint32_t count, double factor, cudaStream_t stream);
 
 /// Writes the forms of `count` primitives.
 void launchForms(const Primitive* primitives, std::uint32_t count, double radius, PairForm* forms,

@@ -23,7 +23,6 @@ void forEachPrimitive(std::size_t count, Visit&& visit) {
 CpuPaperOptimiser::CpuPaperOptimiser(const FitTarget& target, const PaperOptions& options)
     : options_(options) {
   const auto kernel = kernelConstants<double>(kernelOf(options.kind));
-  slope_ = kernel.slope;
   const Space space = spaceOf(target);
   for (auto& volume : cutSubvolumes(target, space, options.subvolumeSide)) {
     FitEngine engine(volume->target, kernel);
@@ -59,12 +58,8 @@ void CpuPaperOptimiser::rebuildLists(Part& part, double slack) {
   part.motionLeft = slack;
 }
 
-double CpuPaperOptimiser::slopeOf(std::size_t primitive) const {
-  return options_.kind.learnK ? double(kernels_.constants[primitive].slope) : slope_;
-}
-
 PaperVector CpuPaperOptimiser::gradientOf(std::size_t i) const {
-  return byPaperParameters(population_.primitives[i], primitives_[i], gradients_[i], slopeOf(i));
+  return byPaperParameters(population_.primitives[i], primitives_[i], gradients_[i]);
 }
 
 double CpuPaperOptimiser::takeGradients(Part& part) {

@@ -33,11 +33,9 @@ class CpuPaperOptimiser final : public PaperOptimiser {
   void formPrimitives();
   void rebuildLists(Part& part, double slack);
   double takeGradients(Part& part);
-  [[nodiscard]] double slopeOf(std::size_t primitive) const;
   [[nodiscard]] PaperVector gradientOf(std::size_t primitive) const;
 
   PaperOptions options_;
-  double slope_;  ///< KernelConstants::slope of the scene's kernel
   std::vector<Part> parts_;
   Population population_;
   std::vector<Primitive> primitives_;  ///< the same in the form that passes take

@@ -5,6 +5,7 @@
 
 #include "fit/adam.h"
 #include "fit/paper/paper_primitive.h"
+#include "fit/parameter_gradient.h"
 
 namespace esvr::paper {
 
@@ -77,9 +78,8 @@ ESVR_HD inline std::array<double, 4> byQuaternion(const PaperPrimitive& p,
 
 /// From the gradient in the primitive's own frame (primitive.h) to that by the paper's parameters.
 /// \param unit  primitiveOf(p)
-/// \param slope KernelConstants::slope of this primitive's kernel, which has no shift
 ESVR_HD inline PaperVector byPaperParameters(const PaperPrimitive& p, const Primitive& unit,
-                                             const PrimitiveGradient& gradient, double slope) {
+                                             const PrimitiveGradient& gradient) {
   const ParameterVector& g = gradient.byParameter;
   PaperVector out{};
   // center = F delta, so that d/d center = L^T d/d delta.
@@ -90,10 +90,8 @@ ESVR_HD inline PaperVector byPaperParameters(const PaperPrimitive& p, const Prim
   const auto quaternion = paper_math::byQuaternion(p, turn);
   for (int j = 0; j < 4; ++j) out[6 + j] = quaternion[j];
   out[10] = g[9];
-  // At fixed q = m / k: d phi / d kappa = slope (phi - phi^2), and sum r phi' = slope sum r phi^2 -
-  // sum r phi; the trace of A's gradient is -2 I sum r phi' m.
-  out[11] =
-      p.intensity * ((slope - 1.0) * g[9] - gradient.slopes) - 0.5 * (g[3] + g[4] + g[5]) / p.k;
+  // At fixed q = m / k, so that m grows with k.
+  out[11] = edgeGradient(gradient, 1.0 / p.k);
   return out;
 }
 

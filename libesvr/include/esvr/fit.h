@@ -41,7 +41,7 @@ struct FitOptions {
   Preset preset = Preset::kStandard;
   Loss loss = Loss::kSquared;
   double beta = 0.2;           ///< of the paper's loss
-  std::optional<float> kappa;  ///< the scene's edge; default: a short pilot decides
+  std::optional<float> kappa;  ///< the scene's edge; default: descended on with all else
   std::optional<Box> box;      ///< of 'PSNR over the box'; default: the active bounding box
   /// Instead of all else that decides how: the paper's method, with its own loss and kernel. Takes
   /// no kappa and no iterations; `count` is what its last pruning leaves.
@@ -58,19 +58,13 @@ struct FitOptions {
 
 enum class FitEnd { kScheduleDone, kPsnrReached, kTimeUp, kCancelled, kPsnrMissed };
 
-/// One candidate of the pilot that chooses kappa.
-struct PilotPoint {
-  float kappa = 0.0f;
-  double psnrBox = 0.0;
-};
-
 struct FitResult {
   Field field;
   std::vector<CurvePoint> curve;
   FitEnd end = FitEnd::kScheduleDone;
-  std::vector<PilotPoint> pilot;  ///< empty where kappa was given
+  bool kappaLearned = false;  ///< else it was given
   /// Wall clock by phase; seeding (at the start, growth, relocation) is not in secondsOptimise.
-  double secondsSeed = 0.0, secondsPilot = 0.0, secondsOptimise = 0.0;
+  double secondsSeed = 0.0, secondsOptimise = 0.0;
   std::size_t deviceBytes = 0;       ///< GPU memory held at most; 0 on the CPU
   std::uint64_t pairs = 0;           ///< (primitive, brick) pairs that the final field evaluates
   bool signedIntensities = false;    ///< some intensity is negative

@@ -106,6 +106,22 @@ ESVR_HD inline KernelValue<Real> kernelValue(const KernelConstants<Real>& c, Rea
   return {quotient - c.base, -quotient * y * inv, norm * c.plateau * (y - c.expNegS) * inv * inv};
 }
 
+/// Where phi = 1/2: the half width of every ellipsoid, squared, in units of its scales.
+struct KernelWidth {
+  double m;            ///< phi(m) = 1/2
+  double logMByKappa;  ///< d ln m / d kappa
+};
+
+/// \param c  of a continuous kernel
+inline KernelWidth kernelWidth(const KernelConstants<double>& c) {
+  const double half = 0.5 + c.base;  // the quotient where phi is 1/2
+  const double y = c.numerator / half - c.plateau;
+  const double m = c.shift + std::log(y);
+  // m = ln((1 + E) / h - E), h = half (1 - eps): dm / dkappa = E (1 / h - 1) / (...)
+  const double h = half / (1.0 + c.base);
+  return {m, c.plateau * (1.0 / h - 1.0) / y / m};
+}
+
 /// Radius of the support in units of the scales: x is inside where |S^-1 R^T (x - mu)| < radius.
 template <class Real>
 ESVR_HD inline Real supportRadius(const KernelConstants<Real>& c) {

@@ -41,14 +41,17 @@ void expectAgreement(const FitTarget& target, const Kernel& kernel,
   onGpu.setPrimitives(primitives);
   const auto found = onGpu.gradients();
   ASSERT_EQ(found.size(), expected.size());
-  double largest = 0.0, largestPhi2 = 0.0;
+  double largest = 0.0, largestPhi2 = 0.0, largestByKappa = 0.0;
   for (const auto& g : expected) {
     largest = std::max(largest, distance(g.byParameter, {}));
     largestPhi2 = std::max(largestPhi2, g.phi2);
+    largestByKappa = std::max(largestByKappa, std::abs(g.byKappa));
   }
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_LT(distance(found[i].byParameter, expected[i].byParameter), tolerance * largest) << i;
     EXPECT_NEAR(found[i].phi2, expected[i].phi2, tolerance * largestPhi2) << i;
+    // the difference of two sums of the size of the other gradients
+    EXPECT_NEAR(found[i].byKappa, expected[i].byKappa, tolerance * (largestByKappa + largest)) << i;
   }
   EXPECT_NEAR(onGpu.measure().squaredSum, loss, 1e-5 * loss);
 }

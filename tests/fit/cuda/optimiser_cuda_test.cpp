@@ -57,6 +57,21 @@ TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
   EXPECT_LE(differing, 2);
 }
 
+TEST_F(OptimiserOnGpu, TheThreadsOfABrickChangeNoBit) {
+  const SparseVolume volume = test::denseVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  CudaOptimiser onGpu(target, {}, {});
+  onGpu.setPrimitives(test::randomPrimitives(2000, 0.5, 4.0));
+  const auto expected = onGpu.gradients(cuda::ThreadsPerBrick::threads(0));
+  for (int choice = 1; choice < cuda::ThreadsPerBrick::kChoices; ++choice) {
+    const auto found = onGpu.gradients(cuda::ThreadsPerBrick::threads(choice));
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      EXPECT_EQ(found[i].byParameter, expected[i].byParameter) << i;
+      EXPECT_EQ(found[i].byKappa, expected[i].byKappa) << i;
+    }
+  }
+}
+
 TEST_F(OptimiserOnGpu, SeedsAsTheCpuDoes) {
   const SparseVolume volume = test::tubeVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);

@@ -1,0 +1,33 @@
+#pragma once
+/// A CUDA event that measures time, released with its owner.
+
+#include <cuda_runtime_api.h>
+
+#include <utility>
+
+#include "core/cuda/check.h"
+
+namespace esvr::cuda {
+
+class Event {
+ public:
+  Event() { check(cudaEventCreate(&event_), "making an event"); }
+  Event(const Event&) = delete;
+  Event& operator=(const Event&) = delete;
+  ~Event() { cudaEventDestroy(event_); }
+
+  void record(cudaStream_t stream) { check(cudaEventRecord(event_, stream), "recording an event"); }
+
+  /// From `start` to this one; both must have been passed, or are waited for.
+  [[nodiscard]] float millisecondsSince(const Event& start) const {
+    check(cudaEventSynchronize(event_), "waiting for an event");
+    float milliseconds = 0.0f;
+    check(cudaEventElapsedTime(&milliseconds, start.event_, event_), "reading a time");
+    return milliseconds;
+  }
+
+ private:
+  cudaEvent_t event_ = nullptr;
+};
+
+}  // namespace esvr::cuda

@@ -1,0 +1,24 @@
+#include "fit/cuda/threads_per_brick.h"
+
+#include <algorithm>
+
+namespace esvr::cuda {
+namespace {
+
+constexpr int kListsServed = 8;  // a measurement costs two slower passes of some eighty
+
+}  // namespace
+
+void ThreadsPerBrick::listsChanged() {
+  if (tried_ != kChoices) return;  // not all have been tried on the lists before
+  if (served_ == 0) {
+    std::array<float, kChoices> times{};
+    for (int k = 0; k < kChoices; ++k)
+      times[std::size_t(k)] =
+          trials_[std::size_t(k)].end.millisecondsSince(trials_[std::size_t(k)].begin);
+    best_ = int(std::min_element(times.begin(), times.end()) - times.begin());
+  }
+  if (++served_ == kListsServed) served_ = tried_ = 0;
+}
+
+}  // namespace esvr::cuda
