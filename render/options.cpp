@@ -125,6 +125,8 @@ cli::CommandLine commandLine() {
     ("values", value<std::string>()->value_name("T"),
      "march voxels in a NanoVDB grid of float, fp4, fp8, fp16 or fpn")
     ("ref", value<std::string>()->value_name("FILE"), "compare with the voxels of a VDB")
+    ("sheet", value<std::string>()->value_name("FILE.png"),
+     "write the picture, that of --ref and their error beside each other")
     ("bench", bool_switch(),
      "measure: 720 views of a full turn, or as many as --turntable says")
     ("report", value<std::string>()->value_name("FILE.json"),
@@ -303,7 +305,10 @@ RendererLimits limitsOf(const Arguments& a) {
 
 void readMeasuring(const Arguments& a, Options& options) {
   options.reference = a.find<std::string>("ref").value_or("");
+  options.sheet = a.find<std::string>("sheet").value_or("");
   options.bench = a.get<bool>("bench");
+  if (!options.sheet.empty() && (options.reference.empty() || options.bench))
+    throw UsageError("--sheet shows a picture beside that of --ref; give both");
   options.report = a.find<std::string>("report").value_or("");
   if (options.bench && !options.depth.empty())
     throw UsageError("--bench keeps no picture; leave --depth out");

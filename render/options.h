@@ -46,6 +46,7 @@ struct Options {
   Method method = Method::kPrimitives;
   std::optional<NanoValues> values;  ///< of the NanoVDB grid that voxels are marched in
   std::filesystem::path reference;   ///< empty: none
+  std::filesystem::path sheet;       ///< empty: none
   bool bench = false;
   std::string report;  ///< empty: none
   bool overwrite = false;

@@ -1,6 +1,7 @@
 #include "render/run.h"
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -45,6 +46,12 @@ std::vector<fs::path> outputs(const Options& options) {
   return frameNames(options, options.output);
 }
 
+std::vector<fs::path> sheetOutputs(const Options& options) {
+  if (options.sheet.empty()) return {};
+  if (options.turntable == 0) return {options.sheet};
+  return frameNames(options, options.sheet);
+}
+
 std::vector<fs::path> depthOutputs(const Options& options) {
   if (options.depth.empty()) return {};
   if (options.turntable == 0) return {options.depth};
@@ -69,6 +76,10 @@ void checkFiles(const Options& options, const std::vector<fs::path>& files) {
   for (const auto& file : depthOutputs(options)) {
     cli::requireDistinct({options.input, file});
     cli::checkOutput(file, {".exr"}, options.overwrite);
+  }
+  for (const auto& file : sheetOutputs(options)) {
+    cli::requireDistinct({options.input, options.reference, file});
+    cli::checkOutput(file, {".png"}, options.overwrite);
   }
   if (!options.saveTransfer.empty())
     cli::checkOutput(options.saveTransfer, {".json"}, options.overwrite);
@@ -128,13 +139,14 @@ class Frames {
         drawing_(drawing),
         reference_(reference) {}
 
-  void draw(const RenderOptions& r, const fs::path& file) {
+  /// \param sheet  empty: none
+  void draw(const RenderOptions& r, const fs::path& file, const fs::path& sheet) {
     cli::Stopwatch watch;
     const Image image = drawing_.renderer->draw(r);
     const double seconds = watch.lap();
     write(file, image, options_.background);
     log_.info(summary(file, drawing_.scene, r.resolution, seconds));
-    if (reference_ != nullptr) compare(r, image, file);
+    if (reference_ != nullptr) compare(r, image, file, sheet);
   }
   void drawDepth(RenderOptions r, const fs::path& file) {
     r.mode = RenderMode::kDepth;
@@ -156,11 +168,15 @@ class Frames {
 
   static std::string software() { return std::string(kProgram) + " " + cli::programVersion(); }
 
-  void compare(const RenderOptions& r, const Image& image, const fs::path& file) {
+  void compare(const RenderOptions& r, const Image& image, const fs::path& file,
+               const fs::path& sheet) {
     constexpr double kGain = 10.0;  // as --help has it
     const Image expected = reference_->renderer->draw(r);
     const ImageMetrics m = compareImages(expected, image);
-    write(errorName(file), errorMap(expected, image, kGain), std::nullopt);
+    const Image error = errorMap(expected, image, kGain);
+    write(errorName(file), error, std::nullopt);
+    if (!sheet.empty())
+      write(sheet, sideBySide(std::array{image, expected, error}), options_.background);
     log_.info(errorName(file).string() + ": PSNR " + cli::shortNumber(m.psnr) + " dB, SSIM " +
               cli::shortNumber(m.ssim) + ", largest error " + cli::shortNumber(m.maxError));
     comparisons_.push_back({{"picture", file.string()},
@@ -189,11 +205,12 @@ void writeReport(const Options& options, const nlohmann::ordered_json& report) {
 
 void drawFrames(const Options& options, RenderOptions r, Frames& frames) {
   const auto files = outputs(options), depths = depthOutputs(options);
+  const auto sheets = sheetOutputs(options);
   const Camera first = r.camera;
   for (std::size_t i = 0; i < files.size(); ++i) {
     const std::size_t number = std::size_t(options.firstFrame) + i;
     if (number > 0) r.camera = turned(first, 360.0 * double(number) / options.turntable);
-    frames.draw(r, files[i]);
+    frames.draw(r, files[i], sheets.empty() ? fs::path{} : sheets[i]);
     if (!depths.empty()) frames.drawDepth(r, depths[i]);
   }
 }

@@ -177,4 +177,18 @@ Image errorMap(const Image& reference, const Image& candidate, double gain) {
   return map;
 }
 
+Image sideBySide(std::span<const Image> images) {
+  if (images.empty()) throw UsageError("no pictures to put beside each other");
+  for (const Image& image : images) checkSizes(images.front(), image);
+  const std::size_t ofRow = std::size_t(kChannels) * std::size_t(images.front().width);
+  Image all{int(images.size()) * images.front().width, images.front().height, {}};
+  all.rgba.reserve(images.size() * images.front().rgba.size());
+  for (std::size_t row = 0; row < std::size_t(all.height); ++row)
+    for (const Image& image : images) {
+      const auto from = image.rgba.begin() + std::ptrdiff_t(row * ofRow);
+      all.rgba.insert(all.rgba.end(), from, from + std::ptrdiff_t(ofRow));
+    }
+  return all;
+}
+
 }  // namespace esvr

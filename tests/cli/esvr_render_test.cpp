@@ -258,9 +258,11 @@ TEST_F(EsvrRender, ASavedTransferFunctionDrawsTheSame) {
 
 TEST_F(EsvrRender, ComparesWithAReference) {
   const auto run = draw("in.esvr", "out.png",
-                        {"--ref", folder_ / "in.vdb", "--report", folder_ / "report.json"});
+                        {"--ref", folder_ / "in.vdb", "--report", folder_ / "report.json",
+                         "--sheet", folder_ / "sheet.png"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out.error.png"));
+  EXPECT_EQ(readPng(folder_ / "sheet.png").header.width, 3u * 64u);
   const auto report = nlohmann::json::parse(readText(folder_ / "report.json"));
   EXPECT_GT(report["comparisons"][0]["psnr"], 30.0);
   EXPECT_GT(report["comparisons"][0]["ssim"], 0.9);
@@ -330,6 +332,7 @@ TEST_F(EsvrRender, OptionsThatMakeNoSenseAreRefused) {
   expectRefused({"--depth", "z.png"}, 2, ".exr");
   expectRefused({"--bins", "17"}, 2, "--bins");
   expectRefused({"--values", "fp32"}, 2, "fp16");
+  expectRefused({"--sheet", "s.png"}, 2, "--ref");
   expectRefused({"--min-transmittance", "1"}, 2, "transmittance");
   expectRefused({"--method", "tubes"}, 2, "bricks");
   expectRefused({"--device", "gpu"}, 2, "gpu");

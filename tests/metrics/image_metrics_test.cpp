@@ -115,5 +115,18 @@ TEST(ErrorMap, ShowsTheLargestDifferenceOfAPixel) {
   EXPECT_EQ(errorMap(a, b, 100.0).rgba[4], 1.0f);
 }
 
+TEST(SideBySide, PutsRowsTogether) {
+  const Image a = constant(2, 2, 0.5f), b = constant(2, 2, 0.25f);
+  const Image both = sideBySide(std::vector<Image>{a, b});
+  EXPECT_EQ(both.width, 4);
+  EXPECT_EQ(both.height, 2);
+  EXPECT_EQ(both.rgba[0], 0.5f);
+  EXPECT_EQ(both.rgba[8], 0.25f);
+  EXPECT_EQ(both.rgba[16], 0.5f);
+  EXPECT_EQ(both.rgba[24], 0.25f);
+  EXPECT_THROW((void)sideBySide({}), UsageError);
+  EXPECT_THROW((void)sideBySide(std::vector<Image>{a, constant(1, 2, 0.0f)}), UsageError);
+}
+
 }  // namespace
 }  // namespace esvr::test

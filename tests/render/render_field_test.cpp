@@ -172,6 +172,22 @@ TEST(RenderField, FullOpacityShowsTheFirstSampleAndNoneShowsNothing) {
   for (const float v : renderField(randomField({}), o).rgba) ASSERT_EQ(v, 0.0f);
 }
 
+TEST(RenderField, ATransferFunctionBesideTheDataIsTheColorAtItsEnd) {
+  Field field = randomField({.count = 50});
+  for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+  RenderOptions o = optionsFor();
+  o.transfer.colors.points = {{100.0, {0.5, 0.25, 0.0}}, {200.0, {0.0, 0.0, 1.0}}};
+  o.transfer.opacity = {{100.0, 1.0}, {200.0, 0.0}};
+  const Image image = renderField(field, o);
+  double lit = 0.0;
+  for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
+    lit += image.rgba[i + 3];
+    ASSERT_NEAR(image.rgba[i], 0.5 * image.rgba[i + 3], 1e-6);
+    ASSERT_NEAR(image.rgba[i + 1], 0.25 * image.rgba[i + 3], 1e-6);
+  }
+  EXPECT_GT(lit, 0.0);
+}
+
 TEST(RenderField, OptionsThatMakeNoSenseAreRefused) {
   const auto refused = [](auto&& spoil) {
     RenderOptions o = optionsFor();
@@ -186,6 +202,8 @@ TEST(RenderField, OptionsThatMakeNoSenseAreRefused) {
   refused([](auto& o) { o.minTransmittance = 1.0; });
   refused([](auto& o) { o.resolution.width = 0; });
   refused([](auto& o) { o.transfer.opacity.clear(); });
+  refused([](auto& o) { o.transfer.opacity[0].x = std::nan(""); });
+  refused([](auto& o) { std::swap(o.transfer.opacity.front(), o.transfer.opacity.back()); });
   refused([](auto& o) { o.camera.eye = o.camera.center; });
 }
 

@@ -2,6 +2,8 @@
 /// How far a picture is from its reference. Compared are the colors in front of black, each channel
 /// from 0 to 1; alpha takes no part, since two pictures of one look may differ in it.
 
+#include <span>
+
 #include "esvr/image.h"
 
 namespace esvr {
@@ -22,5 +24,9 @@ struct ImageMetrics {
 /// Gray, opaque: of each pixel the largest difference of a channel, times `gain`, at most 1.
 /// \throws UsageError  pictures of different sizes
 [[nodiscard]] Image errorMap(const Image& reference, const Image& candidate, double gain);
+
+/// Pictures of one size beside each other, from left to right.
+/// \throws UsageError  none, or of different sizes
+[[nodiscard]] Image sideBySide(std::span<const Image> images);
 
 }  // namespace esvr

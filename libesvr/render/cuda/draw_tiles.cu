@@ -203,6 +203,12 @@ __device__ std::uint32_t addSorted(const DrawArguments& a, Shared& s, const Plac
   return touched;
 }
 
+/// Without __reduce_or_sync, which devices before sm_80 lack.
+__device__ std::uint32_t orOfWarp(std::uint32_t bits) {
+  for (int d = kWarp / 2; d > 0; d /= 2) bits |= __shfl_xor_sync(kAllLanes, bits, d);
+  return bits;
+}
+
 /// All of a bin's list. Leaves the samples touched by any ray in s.touched.
 __device__ void addBin(const DrawArguments& a, Shared& s, const Place& place, const Work& work,
                        std::size_t list, int bin) {
@@ -220,7 +226,7 @@ __device__ void addBin(const DrawArguments& a, Shared& s, const Place& place, co
     sortInMemory(a.lists.entries + begin, n, sorted, s);
     touched = addSorted(a, s, place, work, open, sorted, int(n), firstSample);
   }
-  touched = __reduce_or_sync(kAllLanes, touched);
+  touched = orOfWarp(touched);
   if (place.lane == 0 && touched != 0) atomicOr(&s.touched, touched);
   __syncthreads();
 }

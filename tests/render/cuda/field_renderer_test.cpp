@@ -172,6 +172,10 @@ TEST_F(FieldOnGpu, DrawsInBandsWhereMemoryIsShort) {
   EXPECT_THROW((void)makeFieldRenderer(field, device_, {.maxBytes = 1000})->draw(o), DeviceError);
 }
 
+TEST_F(FieldOnGpu, DrawsTheWidestPicture) {
+  expectTheCpusPicture(randomField({.count = 300}), optionsFor({}, {16384, 9}));
+}
+
 TEST_F(FieldOnGpu, GivesTheSameBitsInEveryRun) {
   const Field field = randomField({.count = 5000, .extent = 40.0});
   const auto renderer = makeFieldRenderer(field, device_, {.depthParts = 3});
