@@ -40,6 +40,7 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       draw_(stream_.get()),
       ranking_(stream_.get()),
       errorSums_(stream_.get()),
+      windows_({}, stream_.get()),
       paperLoss_(stream_.get()) {
   setKernel();
   loss_.reserve(1);
@@ -96,7 +97,7 @@ void CudaOptimiser::rebuildLists(double slack) {
   if (!target_.narrowBand) bricks_.findReached(supports);
   lists_.rebuild(supports, bricks_);
   threads_.listsChanged();
-  if (options_.loss == Loss::kPaper) paperLoss_.setBricks(bricks_);
+  if (options_.loss == Loss::kPaper) windows_.findAround(bricks_);
   moments_.reserve(lists_.pairCount() * kMoments);
   chunkSums_.reserve(lists_.chunkCount() * kMoments);
   brickLoss_.reserve(bricks_.size());
@@ -172,7 +173,9 @@ void CudaOptimiser::takePaperGradients() {
   BrickPassArguments pass = passArguments();
   pass.residual = residual_.reserve(bricks_.size() * kBrickVoxels);
   launchResiduals(pass, stream_.get());
-  pass.lossByValue = paperLoss_.derivative({.residual = pass.residual,
+  pass.lossByValue = paperLoss_.derivative({.bricks = bricks_,
+                                            .windows = windows_,
+                                            .residual = pass.residual,
                                             .target = targetValues_.data(),
                                             .targetBricks = bricks_.targetCount(),
                                             .voxels = target_.boxVoxels,

@@ -86,6 +86,7 @@ class CudaOptimiser final : public Optimiser {
   VoxelDraw draw_;
   PrimitiveRanking ranking_;
   ErrorSums errorSums_;
+  BrickTable windows_;  ///< of the paper's loss
   PaperLoss paperLoss_;
   std::size_t count_ = 0;
   double secondsSeeding_ = 0.0;

@@ -15,13 +15,23 @@
 namespace esvr {
 namespace cuda {
 
-CudaPaperOptimiser::Part::Part(std::unique_ptr<paper::Subvolume> from, cudaStream_t stream)
+namespace {
+
+double windowBytes(const FitTarget& target) {
+  constexpr double kWithReached = 2.0;  // bricks that supports reach beyond the target's
+  return PaperLoss::bytesFor(kWithReached * double(target.bricks.size()));
+}
+
+}  // namespace
+
+CudaPaperOptimiser::Part::Part(std::unique_ptr<paper::Subvolume> from, bool visitOnly,
+                               cudaStream_t stream)
     : volume(std::move(from)),
-      values(volume->target.values, stream),
-      active(volume->active, stream),
       bricks(volume->target.bricks, stream),
-      lists(stream),
-      loss(stream) {}
+      windows({}, stream),
+      lists(stream) {
+  if (!visitOnly) values = DeviceBuffer<float>(volume->target.values, stream);
+}
 
 CudaPaperOptimiser::CudaPaperOptimiser(const FitTarget& target, const paper::PaperOptions& options)
     : target_(target),
@@ -36,15 +46,18 @@ CudaPaperOptimiser::CudaPaperOptimiser(const FitTarget& target, const paper::Pap
       radii_(stream_.get()),
       moments_(stream_.get()),
       residual_(stream_.get()),
+      visited_(stream_.get()),
+      active_(stream_.get()),
       brickLoss_(stream_.get()),
       chunkSums_(stream_.get()),
       squares_(stream_.get()),
       diverged_(1, stream_.get()),
-      errorSums_(stream_.get()) {
+      errorSums_(stream_.get()),
+      loss_(stream_.get()) {
   squares_.reserve(1);
   diverged_.setZero();
   for (auto& volume : paper::cutSubvolumes(target, paper::spaceOf(target), options.subvolumeSide))
-    parts_.push_back(std::make_unique<Part>(std::move(volume), stream_.get()));
+    parts_.push_back(std::make_unique<Part>(std::move(volume), options.visitOnly, stream_.get()));
 }
 
 PaperPrimitives CudaPaperOptimiser::primitives() {
@@ -69,7 +82,7 @@ BrickPassArguments CudaPaperOptimiser::passArguments(const Part& part) {
           .lists = part.lists.view(),
           .forms = forms_.data(),
           .kernel = narrowed(constants_),
-          .target = part.values.data(),
+          .target = values_,
           .narrowBand = false,
           .lowest = float(target_.lowest),
           .highest = float(target_.highest),
@@ -98,8 +111,17 @@ void CudaPaperOptimiser::rebuildLists(Part& part, double slack) {
   const Box within = *part.volume->target.within;
   part.bricks.findReached(supports, within);
   part.lists.rebuild(supports, part.bricks);
-  part.loss.setBricks(part.bricks, within);
+  part.windows.findAround(part.bricks, within);
   part.motionLeft = slack;
+}
+
+/// The target's values of a subvolume: there from the start, or for this visit.
+void CudaPaperOptimiser::bring(const Part& part) {
+  values_ = part.values.data();
+  const std::span<const float> values(part.volume->target.values);
+  if (!options_.visitOnly || values.empty()) return;
+  uploadTo(visited_.reserve(values.size()), values, stream_.get());
+  values_ = visited_.data();
 }
 
 /// Room in what all subvolumes use in turn.
@@ -108,18 +130,21 @@ void CudaPaperOptimiser::takeResiduals(Part& part) {
   chunkSums_.reserve(part.lists.chunkCount() * kMoments);
   brickLoss_.reserve(part.bricks.size());
   residual_.reserve(part.bricks.size() * kBrickVoxels);
+  bring(part);
   launchResiduals(passArguments(part), stream_.get());
 }
 
 void CudaPaperOptimiser::takeGradients(Part& part) {
   takeResiduals(part);
   BrickPassArguments pass = passArguments(part);
-  pass.lossByValue = part.loss.derivative({.residual = residual_.data(),
-                                           .target = part.values.data(),
-                                           .targetBricks = part.bricks.targetCount(),
-                                           .voxels = part.volume->target.boxVoxels,
-                                           .beta = options_.beta,
-                                           .peak = target_.highest - target_.lowest});
+  pass.lossByValue = loss_.derivative({.bricks = part.bricks,
+                                       .windows = part.windows,
+                                       .residual = residual_.data(),
+                                       .target = values_,
+                                       .targetBricks = part.bricks.targetCount(),
+                                       .voxels = part.volume->target.boxVoxels,
+                                       .beta = options_.beta,
+                                       .peak = target_.highest - target_.lowest});
   launchGivenGradients(pass, stream_.get());
   launchSums(sumArguments(part), stream_.get());
 }
@@ -133,9 +158,12 @@ void CudaPaperOptimiser::iterate(std::size_t subvolume, const paper::PaperStep& 
 }
 
 void CudaPaperOptimiser::requireMemoryFor(std::size_t count) const {
-  constexpr double kWithReached = 2.0;  // bricks that supports reach beyond the target's
-  const double windows = PaperLoss::bytesFor(kWithReached * double(target_.bricks.size()));
-  requireMemory(target_, count, options_.maxDeviceBytes, windows);
+  const auto fullest = std::max_element(parts_.begin(), parts_.end(), [](auto& a, auto& b) {
+    return a->volume->target.bricks.size() < b->volume->target.bricks.size();
+  });
+  const FitTarget& largest = (*fullest)->volume->target;
+  const FitTarget& held = options_.visitOnly ? largest : target_;
+  requireMemory(held, count, options_.maxDeviceBytes, windowBytes(largest));
 }
 
 void CudaPaperOptimiser::put(const paper::Population& population) {
@@ -172,9 +200,11 @@ FitErrors CudaPaperOptimiser::measure() {
     pairCount_ += part->lists.pairCount();
     if (part->bricks.size() == 0) continue;
     takeResiduals(*part);
+    const std::span<const BrickMask> active(part->volume->active);
+    uploadTo(active_.reserve(active.size()), active, stream_.get());
     errors.add(errorSums_.sum({.residual = residual_.data(),
                                .bricks = part->bricks.view().bricks,
-                               .active = part->active.data(),
+                               .active = active_.data(),
                                .brickCount = std::uint32_t(part->bricks.size()),
                                .targetCount = std::uint32_t(part->bricks.targetCount()),
                                .box = target_.box}));
@@ -190,7 +220,7 @@ paper::LossGradients CudaPaperOptimiser::gradients(std::size_t subvolume) {
   takeGradients(part);
   DeviceBuffer<paper::PaperVector> out(count_, stream_.get());
   launchPaperGradients(primitives(), sumArguments(part), out.data(), stream_.get());
-  paper::LossGradients result{part.loss.loss(), std::vector<paper::PaperVector>(count_)};
+  paper::LossGradients result{loss_.loss(), std::vector<paper::PaperVector>(count_)};
   out.download(result.byPrimitive);
   return result;
 }
@@ -202,8 +232,9 @@ std::unique_ptr<paper::PaperOptimiser> paper::makeCudaPaperOptimiser(const FitTa
   cuda::useDevice(options.device);
   cuda::keepFreedMemory();
   cuda::forgetPeakMemory();
-  cuda::requireMemory(target, 1, options.maxDeviceBytes);
-  return std::make_unique<cuda::CudaPaperOptimiser>(target, options);
+  PaperOptions chosen = options;
+  chosen.visitOnly = chosen.visitOnly || !cuda::fitsInMemory(target, options.maxDeviceBytes);
+  return std::make_unique<cuda::CudaPaperOptimiser>(target, chosen);
 }
 
 }  // namespace esvr

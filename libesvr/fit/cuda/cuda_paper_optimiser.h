@@ -33,19 +33,18 @@ class CudaPaperOptimiser final : public paper::PaperOptimiser {
  private:
   /// A subvolume and what belongs to it on the device.
   struct Part {
-    Part(std::unique_ptr<paper::Subvolume> from, cudaStream_t stream);
+    Part(std::unique_ptr<paper::Subvolume> from, bool visitOnly, cudaStream_t stream);
 
     std::unique_ptr<paper::Subvolume> volume;
-    DeviceBuffer<float> values;
-    DeviceBuffer<BrickMask> active;
-    BrickTable bricks;
+    DeviceBuffer<float> values;  ///< empty where it is there for a visit only
+    BrickTable bricks, windows;
     PairLists lists;
-    PaperLoss loss;
     double motionLeft = -1.0;  ///< voxels that supports may still move by; below 0: lists are stale
   };
 
   void requireMemoryFor(std::size_t primitives) const;
   void rebuildLists(Part& part, double slack);
+  void bring(const Part& part);
   void takeGradients(Part& part);
   void takeResiduals(Part& part);
   [[nodiscard]] PaperPrimitives primitives();
@@ -64,10 +63,13 @@ class CudaPaperOptimiser final : public paper::PaperOptimiser {
   GrowingBuffer<PairForm> forms_;
   GrowingBuffer<KernelConstants<float>> kernels_;
   GrowingBuffer<double> radii_;
-  GrowingBuffer<float> moments_, residual_;
+  GrowingBuffer<float> moments_, residual_, visited_;
+  GrowingBuffer<BrickMask> active_;
+  const float* values_ = nullptr;  ///< of the subvolume that is visited
   GrowingBuffer<double> brickLoss_, chunkSums_, squares_;
   DeviceBuffer<int> diverged_;
   ErrorSums errorSums_;
+  PaperLoss loss_;
   std::size_t count_ = 0;
   std::uint64_t pairCount_ = 0;
 };

@@ -92,6 +92,10 @@ void requireMemory(const FitTarget& target, std::size_t primitives, std::optiona
                                : "; the bricks alone do not fit: use --device cpu"));
 }
 
+bool fitsInMemory(const FitTarget& target, std::optional<std::size_t> most) {
+  return 2.0 * double(predictedBytes(target, 1)) <= double(most ? *most : freeBytes());
+}
+
 std::size_t peakMemory() {
   std::uint64_t peak = 0;
   check(cudaMemPoolGetAttribute(currentPool(), cudaMemPoolAttrUsedMemHigh, &peak),

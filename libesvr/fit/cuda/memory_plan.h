@@ -18,6 +18,9 @@ namespace esvr::cuda {
 void requireMemory(const FitTarget& target, std::size_t primitives, std::optional<std::size_t> most,
                    double extra = 0.0);
 
+/// Whether a fit of the target with few primitives leaves half of the memory free.
+[[nodiscard]] bool fitsInMemory(const FitTarget& target, std::optional<std::size_t> most);
+
 /// The most bytes that the current device's pool has handed out since the last call of
 /// forgetPeakMemory().
 [[nodiscard]] std::size_t peakMemory();

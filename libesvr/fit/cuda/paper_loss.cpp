@@ -18,7 +18,6 @@ double sumOf(const double* device, std::size_t count, cudaStream_t stream) {
 
 PaperLoss::PaperLoss(cudaStream_t stream)
     : stream_(stream),
-      windows_({}, stream),
       byR_(stream),
       windowLoss_(stream),
       valueLoss_(stream),
@@ -26,20 +25,15 @@ PaperLoss::PaperLoss(cudaStream_t stream)
       byTr_(stream),
       lossByValue_(stream) {}
 
-void PaperLoss::setBricks(const BrickTable& bricks, const Box& within) {
-  bricks_ = &bricks;
-  windows_.findAround(bricks, within);
-}
-
 SsimPassArguments PaperLoss::passArguments(const PaperLossArguments& a) {
-  const std::size_t windowVoxels = windows_.size() * kBrickVoxels;
-  return {.values = bricks_->view(),
-          .valueCount = std::uint32_t(bricks_->size()),
+  const std::size_t windowVoxels = a.windows.size() * kBrickVoxels;
+  return {.values = a.bricks.view(),
+          .valueCount = std::uint32_t(a.bricks.size()),
           .targetCount = std::uint32_t(a.targetBricks),
           .residual = a.residual,
           .target = a.target,
-          .windows = windows_.view(),
-          .windowCount = std::uint32_t(windows_.size()),
+          .windows = a.windows.view(),
+          .windowCount = std::uint32_t(a.windows.size()),
           .weights = weights_,
           .constants = ssimConstants(a.peak),
           .absoluteScale = a.beta / (a.voxels * a.peak),
@@ -47,22 +41,23 @@ SsimPassArguments PaperLoss::passArguments(const PaperLossArguments& a) {
           .byR = byR_.reserve(windowVoxels),
           .byRr = byRr_.reserve(windowVoxels),
           .byTr = byTr_.reserve(windowVoxels),
-          .windowLoss = windowLoss_.reserve(windows_.size()),
-          .valueLoss = valueLoss_.reserve(bricks_->size()),
-          .lossByValue = lossByValue_.reserve(bricks_->size() * kBrickVoxels)};
+          .windowLoss = windowLoss_.reserve(a.windows.size()),
+          .valueLoss = valueLoss_.reserve(a.bricks.size()),
+          .lossByValue = lossByValue_.reserve(a.bricks.size() * kBrickVoxels)};
 }
 
 const float* PaperLoss::derivative(const PaperLossArguments& a) {
   const SsimPassArguments pass = passArguments(a);
   const bool dissimilar = pass.ssimScale != 0.0;
   windowShares_ = dissimilar ? pass.windowCount : 0;
+  valueShares_ = pass.valueCount;
   if (dissimilar) launchWindowSide(pass, stream_);
   launchValueSide(pass, stream_);
   return pass.lossByValue;
 }
 
 double PaperLoss::loss() const {
-  return sumOf(valueLoss_.data(), bricks_->size(), stream_) +
+  return sumOf(valueLoss_.data(), valueShares_, stream_) +
          sumOf(windowLoss_.data(), windowShares_, stream_);
 }
 

@@ -12,21 +12,19 @@
 
 namespace esvr::cuda {
 
-/// As PaperLossInput, on the device. Pointers are borrowed.
+/// As PaperLossInput, on the device. Pointers and tables are borrowed.
 struct PaperLossArguments {
-  const float* residual;     ///< prediction - target, kBrickVoxels a brick of the table
-  const float* target;       ///< of the table's first bricks; zero in the others
-  std::size_t targetBricks;  ///< how many
+  const BrickTable& bricks;   ///< every brick where prediction or target may be non-zero
+  const BrickTable& windows;  ///< around whose voxels windows lie: findAround(bricks), or a part
+  const float* residual;      ///< prediction - target, kBrickVoxels a brick of the table
+  const float* target;        ///< of the table's first bricks; zero in the others
+  std::size_t targetBricks;   ///< how many
   double voxels, beta, peak;
 };
 
 class PaperLoss {
  public:
   explicit PaperLoss(cudaStream_t stream);
-
-  /// To be called whenever bricks come or go. The table must stay until the next call.
-  /// \param within  in bricks: only the windows of its voxels count
-  void setBricks(const BrickTable& bricks, const Box& within = kAllBricks);
 
   /// \return the loss's derivative by the prediction, laid out as the residual, on the device until
   ///         the next call
@@ -43,11 +41,9 @@ class PaperLoss {
 
   cudaStream_t stream_;
   std::array<double, kSsimTaps> weights_ = ssimWeights();
-  const BrickTable* bricks_ = nullptr;
-  BrickTable windows_;
   GrowingBuffer<double> byR_, windowLoss_, valueLoss_;
   GrowingBuffer<float> byRr_, byTr_, lossByValue_;
-  std::size_t windowShares_ = 0;  ///< of windowLoss_ that the last derivative wrote
+  std::size_t windowShares_ = 0, valueShares_ = 0;  ///< of the loss that the last derivative wrote
 };
 
 }  // namespace esvr::cuda

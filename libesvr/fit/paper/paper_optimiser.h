@@ -20,6 +20,8 @@ struct PaperOptions {
   int subvolumeSide = 0;  ///< voxels
   Device device;
   std::optional<std::size_t> maxDeviceBytes;
+  /// On a GPU: only the subvolume that is visited is there. So it is, too, where all do not fit.
+  bool visitOnly = false;
 };
 
 struct LossGradients {

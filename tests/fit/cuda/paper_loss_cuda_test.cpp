@@ -32,8 +32,11 @@ LossAndGradient evaluate(const Scene& scene) {
   const cuda::DeviceBuffer<float> r(std::span<const float>(residual), stream.get());
   const cuda::DeviceBuffer<float> t(target, stream.get());
   cuda::PaperLoss loss(stream.get());
-  loss.setBricks(table, scene.within.value_or(cuda::kAllBricks));
-  const float* const device = loss.derivative({.residual = r.data(),
+  cuda::BrickTable windows({}, stream.get());
+  windows.findAround(table, scene.within.value_or(cuda::kAllBricks));
+  const float* const device = loss.derivative({.bricks = table,
+                                               .windows = windows,
+                                               .residual = r.data(),
                                                .target = t.data(),
                                                .targetBricks = scene.targetBricks,
                                                .voxels = scene.voxels,

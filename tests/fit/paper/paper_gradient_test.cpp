@@ -2,9 +2,11 @@
 // the paper (position, log scales, quaternion of any length, intensity, k) against central
 // differences of a float64 loss: the paper's formula at every voxel, the textbook's SSIM. For the
 // paper's ellipsoid, for Gaussians, and for ellipsoids of different k. The forms agree: the paper's
-// ellipsoid and the one that passes take are the same function.
+// ellipsoid and the one that passes take are the same function. A GPU that holds one subvolume at a
+// time computes the same bits.
 
 #include <cmath>
+#include <optional>
 
 #include "../dense_paper_loss.h"
 #include "../random_primitives.h"
@@ -113,7 +115,8 @@ class PaperGradientOn : public test::OnDevice {
                                                        .beta = kBeta,
                                                        .subvolumeSide = kBrickSide,
                                                        .device = device_,
-                                                       .maxDeviceBytes = {}});
+                                                       .maxDeviceBytes = {},
+                                                       .visitOnly = false});
     ASSERT_EQ(optimiser->subvolumeCount(), 8u);
     const Population population = fewPrimitives();
     optimiser->put(population);
@@ -141,6 +144,30 @@ class PaperGradientOn : public test::OnDevice {
 TEST_P(PaperGradientOn, OfThePapersEllipsoidAgreesWithDifferences) { expectDifferences({}); }
 TEST_P(PaperGradientOn, OfGaussiansAgreesWithDifferences) { expectDifferences({.gaussian = true}); }
 TEST_P(PaperGradientOn, OfOwnKAgreesWithDifferences) { expectDifferences({.learnK = true}); }
+
+TEST_P(PaperGradientOn, IsTheSameWhereOnlyTheVisitedSubvolumeIsThere) {
+  const SparseVolume volume = smallVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  PaperOptions options{.kind = {},
+                       .beta = 0.2,
+                       .subvolumeSide = kBrickSide,
+                       .device = device_,
+                       .maxDeviceBytes = {},
+                       .visitOnly = false};
+  const auto all = makePaperOptimiser(target, options);
+  options.visitOnly = true;
+  const auto visited = makePaperOptimiser(target, options);
+  PaperStep step;
+  step.rates.fill(1e-3);
+  step.smallestLogScale = -3.0, step.largestLogScale = 3.0;
+  for (PaperOptimiser* optimiser : {all.get(), visited.get()}) {
+    optimiser->put(fewPrimitives());
+    for (std::size_t s = 0; s < optimiser->subvolumeCount(); ++s) optimiser->iterate(s, step);
+  }
+  EXPECT_EQ(all->measure().squaredSum, visited->measure().squaredSum);
+  EXPECT_EQ(all->gradients(kSubvolume).byPrimitive, visited->gradients(kSubvolume).byPrimitive);
+}
+
 ESVR_ON_DEVICES(PaperGradientOn);
 
 TEST(PaperPrimitive, IsTheSameFunctionInBothForms) {
