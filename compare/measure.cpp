@@ -250,7 +250,7 @@ TableRow RowMaker::external(const External& external) {
   return row;
 }
 
-void RowMaker::measureEsvr(const std::filesystem::path& path, TableRow& row) {
+void RowMaker::measureEsvr(const std::filesystem::path& path, Drawing drawing, TableRow& row) {
   SparseVolume volume;
   const cli::MemoryMeter decoding;
   row.decode = timed(scene_.options.runs, [&] {
@@ -262,11 +262,17 @@ void RowMaker::measureEsvr(const std::filesystem::path& path, TableRow& row) {
   requireOverlap(path, activeBox(scene_.reference.volume), activeBox(volume));
   row.metrics = compare(volume);
   const EncodedGrid grid = gridOf(readEsvr(path), path, scene_.gridName);
-  measurePictures([&](const RenderOptions& view) { return drawEsvr(grid, volume, view); }, row);
+  measurePictures(
+      [&](const RenderOptions& view) {
+        return drawing == Drawing::kBricks ? renderVolume(volume, view)
+                                           : drawEsvr(grid, volume, view);
+      },
+      row);
 }
 
-TableRow RowMaker::candidate(const std::filesystem::path& path) {
-  TableRow row{.name = path.filename().string(), .group = "ESVR"};
+TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing) {
+  const std::string how = drawing == Drawing::kBricks ? ", bricks" : "";
+  TableRow row{.name = path.filename().string() + how, .group = "ESVR"};
   const GridFile file(path);
   if (!file.esvr())
     throw BadInput(path.string() + ": a candidate is an .esvr file; see --external");
@@ -279,7 +285,7 @@ TableRow RowMaker::candidate(const std::filesystem::path& path) {
     row.encode = once(curve.back().seconds);
     row.note = "seconds to encode: the fit's, from the file";
   }
-  measureEsvr(path, row);
+  measureEsvr(path, drawing, row);
   return row;
 }
 
@@ -314,7 +320,7 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   if (scene_.cancel.cancelled()) throw Cancelled();
   row.note = "one fit, on " + deviceName(input.options.device);
   const auto memory = encoding.peakRise();
-  measureEsvr(path, row);
+  measureEsvr(path, Drawing::kPrimitives, row);
   row.memory = std::max(row.memory, memory);
   return row;
 }

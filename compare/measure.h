@@ -26,6 +26,12 @@ struct TableScene {
   const Gallery* gallery = nullptr;  ///< null: no pictures
 };
 
+/// How an .esvr is drawn, in esvr-render's words.
+enum class Drawing {
+  kPrimitives,  ///< its ellipsoids, where they say all: not of a narrow band or a stored mask
+  kBricks       ///< the voxels that it decodes to
+};
+
 struct FitWish {
   std::optional<std::uint64_t> bytes{};  ///< of the file; nothing: whatever the defaults take
   bool paper = false;                    ///< by the paper's method, stored as float32
@@ -43,7 +49,7 @@ class RowMaker {
   TableRow psnrMatched(const BaselineSetting& like, double psnr);
   TableRow external(const External& external);
   /// \throws BadInput  a candidate that cannot be compared: no such grid, nothing in common
-  TableRow candidate(const std::filesystem::path& path);
+  TableRow candidate(const std::filesystem::path& path, Drawing drawing = Drawing::kPrimitives);
   /// Ellipsoids fitted here.
   TableRow fitted(const FitWish& wish);
 
@@ -52,7 +58,7 @@ class RowMaker {
   TableRow matched(const BaselineSetting& like, const std::string& group,
                    const std::function<Match()>& search);
   [[nodiscard]] RateInput rateInput(const FitWish& wish) const;
-  void measureEsvr(const std::filesystem::path& path, TableRow& row);
+  void measureEsvr(const std::filesystem::path& path, Drawing drawing, TableRow& row);
   [[nodiscard]] VolumeMetrics compare(const SparseVolume& volume) const;
   /// Figures of the voxels and, where pictures were asked for, of what they look like.
   void measureVoxels(const SparseVolume& volume, TableRow& row) const;

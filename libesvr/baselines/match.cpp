@@ -22,7 +22,7 @@ constexpr int kMostBisections = 24;   // a million distinct values, and some
 constexpr std::array kTolerances{0.5,    0.35,   0.25,   0.17, 0.12,  0.085, 0.06,   0.042,
                                  0.03,   0.02,   0.014,  0.01, 0.007, 0.005, 0.0035, 0.0025,
                                  1.7e-3, 1.2e-3, 8.5e-4, 6e-4, 4e-4,  3e-4,  2e-4,   1e-4};
-constexpr int kPatience = 2;  // tolerances in a row that bring nothing end the search
+constexpr int kPatience = 3;  // tolerances in a row that are worse end the search
 
 constexpr int kAccuracySteps = 40;  // powers of two below the peak
 constexpr int kMostPlanes = 32;
@@ -104,7 +104,9 @@ void matchToleranceAndThreshold(Search& search, const BaselineSetting& like,
     std::get<VoxelPacking>(setting.how).tolerance = share * search.source().peak;
     const double before = search.bestPsnr();
     const bool fits = matchThreshold(search, setting, thresholds, bytes);
-    idle = fits && search.bestPsnr() > before ? 0 : idle + 1;
+    // As good as before is no reason to end: a leaf's bits are 1, 2, 4, 8 or 16, so that many
+    // tolerances give one file.
+    idle = fits && search.last().psnr >= before ? 0 : idle + 1;
     if (idle == kPatience) return;
   }
 }

@@ -199,6 +199,18 @@ TEST_F(CompareTable, SlowPutsPicturesOnThePage) {
   EXPECT_THAT(run.out, HasSubstr("FLIP"));
 }
 
+TEST_F(CompareTable, SlowKeepsTheRowsThatAreMadeWhenInterrupted) {
+  // So many runs that the table takes a quarter of an hour, and its first row a second or two.
+  const auto run = test::runProgram(
+      "/usr/bin/timeout", {"--preserve-status", "-s", "TERM", "6", ESVR_COMPARE, "table",
+                           at("ref.vdb"), at("fit.esvr"), "--runs", "1000", "--csv", at("t.csv")});
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("interrupted"), HasSubstr("rows were made")));
+  EXPECT_THAT(run.out, HasSubstr("fit.esvr"));
+  EXPECT_THAT(run.out, Not(HasSubstr("NanoVDB FpN/64 Zip")));
+  EXPECT_THAT(test::readText(at("t.csv")), HasSubstr("\nfit.esvr,ESVR,"));
+}
+
 struct Refusal {
   std::vector<std::string> arguments;  ///< "DIR/x" stands for a file of the fixture's folder
   int code;
