@@ -8,9 +8,15 @@
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "esvr/rate_control.h"
+#include "esvr/residual.h"
 
 namespace esvr::vdb2esvr {
 namespace {
+
+/// Bytes that a grid adds to a file.
+std::uint64_t bytesAdded(const EncodedGrid& grid) {
+  return encodeEsvr({{}, {grid}}).size() - encodeEsvr({}).size();
+}
 
 /// What a reader gets: through the file's own bytes, so that what is measured is what was stored.
 EncodedGrid throughTheFormat(EncodedGrid grid) {
@@ -76,9 +82,25 @@ EncodedGrid storeVoxels(const VoxelDemand& demand, Activity activity, const Volu
   return encodeVoxels(source.descriptor, source.volume, std::move(layer));
 }
 
+/// Voxels alone, or ellipsoids and what they miss: whichever is smaller.
+EncodedGrid storeBounded(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
+  EncodedGrid voxels = storeVoxels(*options.voxels, options.activity, source);
+  const double bound = boundOf(*options.voxels, source);
+  if (options.voxels->exact || bound == 0.0 || isNarrowBand(source.descriptor, source.volume))
+    return voxels;
+  grid.bound = BoundRecord{bytesAdded(voxels), 0};
+  BoundedFit fitted = fitWithin({source.descriptor, source.volume, options.fit, options.activity},
+                                bound, grid.bound->voxelBytes);
+  grid.bound->ellipsoidBytes = fitted.bytes;
+  if (!fitted.rated) return voxels;
+  recordFit(fitted.rated->fit, grid);
+  recordCompact(fitted.rated->compact, fitted.rated->grid, grid);
+  return std::move(fitted.rated->grid);
+}
+
 /// What is promised is checked on what the file holds.
 void checkVoxels(const VoxelDemand& demand, const VolumeGrid& source, const EncodedGrid& stored) {
-  const double error = largestError(source.volume, *stored.voxels);
+  const double error = largestDifference(source.volume, decodeGrid(stored));
   if (error > boundOf(demand, source))
     throw RuntimeFailure("grid '" + source.descriptor.name + "': an error of " +
                          std::to_string(error) + " is beyond what was asked for");
@@ -86,7 +108,7 @@ void checkVoxels(const VoxelDemand& demand, const VolumeGrid& source, const Enco
 
 EncodedGrid encode(const Options& options, const VolumeGrid& source,
                    std::optional<std::uint64_t> bytes, ConvertedGrid& grid) {
-  if (options.voxels) return storeVoxels(*options.voxels, options.activity, source);
+  if (options.voxels) return storeBounded(options, source, grid);
   RateInput input{source.descriptor, source.volume, options.fit, options.activity};
   input.options.narrowBand = isNarrowBand(source.descriptor, source.volume);
   return bytes || searchesForPsnr(options) ? fitRated(input, bytes, grid)

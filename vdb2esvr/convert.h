@@ -27,6 +27,12 @@ struct CompactRecord {
   StreamBytes bytes;
 };
 
+/// What a bound on the error took.
+struct BoundRecord {
+  std::uint64_t voxelBytes = 0;      ///< of the grid with its voxels alone
+  std::uint64_t ellipsoidBytes = 0;  ///< of the smallest with ellipsoids that was tried; 0: none
+};
+
 struct ConvertedGrid {
   std::string uniqueName;  ///< in the input
   EncodedGrid stored;      ///< as a reader of the file will get it
@@ -39,9 +45,10 @@ struct ConvertedGrid {
   std::size_t deviceBytes = 0;  ///< FitResult::deviceBytes
   std::uint64_t pairs = 0;
   bool signedIntensities = false;
-  std::optional<double> hits;            ///< averageHits, where it was asked for
-  std::optional<PaperRecord> paper;      ///< FitResult::paper
-  std::vector<CurvePoint> curve;         ///< of the fit, whether the file has it or not
+  std::optional<double> hits;        ///< averageHits, where it was asked for
+  std::optional<PaperRecord> paper;  ///< FitResult::paper
+  std::vector<CurvePoint> curve;     ///< of the fit, whether the file has it or not
+  std::optional<BoundRecord> bound;
   std::optional<CompactRecord> compact;  ///< nothing where float32 is stored
   PhaseSeconds seconds;
 };

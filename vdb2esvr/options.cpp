@@ -71,7 +71,8 @@ void addFitOptions(cli::po::options_description& options) {
     ("psnr", value<double>()->value_name("DB"), "reach this PSNR over the box, in few bytes")
     ("lossless", bool_switch(), "voxels and active mask bit for bit, no ellipsoids")
     ("max-error", value<std::string>()->value_name("E"),
-     "every voxel within E of the source, or E% of its range; no ellipsoids")
+     "every voxel within E of the source, or E% of its range: voxels alone or ellipsoids with a "
+     "residual, whichever is smaller")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
      "threshold (voxels are active by their values) or exact (the source's mask is stored)")
     ("seconds", value<double>()->value_name("S"), "the best within this time, each grid")
@@ -188,7 +189,7 @@ void readVoxels(const Arguments& a, Options& options) {
   const std::string given = exact ? "--lossless" : "--max-error";
   for (const char* option : {"count", "psnr", "seconds", "size", "ratio"})
     if (a.has(option))
-      throw UsageError(given + " stores voxels, not ellipsoids; it takes no --" + option);
+      throw UsageError(given + " chooses itself what to store; it takes no --" + option);
   VoxelDemand demand;
   demand.exact = exact;
   if (bound) readBound(*bound, demand);

@@ -121,6 +121,14 @@ Json fitOf(const ConvertedGrid& grid) {
           {"hits", orNull(grid.hits)}};
 }
 
+Json boundOf(const ConvertedGrid& grid) {
+  if (!grid.bound) return nullptr;
+  const std::uint64_t tried = grid.bound->ellipsoidBytes;
+  return {{"stored", grid.stored.voxels ? "voxels" : "ellipsoids and residual"},
+          {"voxel_bytes", grid.bound->voxelBytes},
+          {"ellipsoid_bytes", tried > 0 ? Json(tried) : Json(nullptr)}};
+}
+
 Json compactOf(const ConvertedGrid& grid) {
   if (!grid.compact) return nullptr;
   const auto& [loss, steps, bytes] = *grid.compact;
@@ -219,6 +227,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"fit", fitOf(grid)},
           {"paper", grid.paper ? paperJson(*grid.paper) : Json(nullptr)},
           {"compact", compactOf(grid)},
+          {"bound", boundOf(grid)},
           {"layers", layersOf(grid.stored)},
           {"metrics", metricsOf(grid.metrics)},
           {"seconds", secondsOf(grid.seconds)},

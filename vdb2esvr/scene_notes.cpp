@@ -15,6 +15,9 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   const std::uint64_t primitives = grid.stored.field.primitiveCount();
   const auto lacks = [&](const char* kind) { return !hasSection(record.output, g, kind); };
 
+  if (grid.stored.voxels && grid.bound && grid.bound->ellipsoidBytes > 0)
+    return {{"ellipsoids", "voxels alone keep the bound in fewer bytes",
+             grid.bound->ellipsoidBytes - grid.bound->voxelBytes}};
   if (grid.stored.voxels)
     return {{"ellipsoids", "every voxel was asked for, exactly or within a bound"}};
 
@@ -38,7 +41,8 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   if (lacks("curve") && !grid.curve.empty())
     notes.push_back({"curve", "a size or a PSNR was asked for; the report has it",
                      grid.curve.size() * sizeof(CurvePoint)});
-  notes.push_back({"residual", "no bound on the largest error was asked for"});
+  if (!grid.stored.residual)
+    notes.push_back({"residual", "no bound on the largest error was asked for"});
   return notes;
 }
 

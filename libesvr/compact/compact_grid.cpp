@@ -4,10 +4,8 @@
 #include <utility>
 
 #include "compact/choose_steps.h"
+#include "compact/measure_layers.h"
 #include "esvr/error.h"
-#include "esvr/grid_coding.h"
-#include "esvr/level_of_detail.h"
-#include "esvr/metrics.h"
 
 namespace esvr {
 namespace {
@@ -33,19 +31,6 @@ void requireOneKappa(const EncodedGrid& grid) {
                            "': its ellipsoids have kappas of their own");
 }
 
-/// Each prefix of the layers against the source.
-std::vector<LayerError> layerErrors(const EncodedGrid& grid, const SparseVolume& source,
-                                    const Box& box) {
-  std::vector<LayerError> errors;
-  const std::size_t layers = layerCount(grid);
-  for (std::size_t k = 1; k <= layers && layers > 1; ++k) {
-    const auto metrics = compareVolumes(source, decodeGrid(firstLayers(grid, k)),
-                                        {.box = box, .peak = {}, .ssim = false});
-    errors.push_back({float(metrics.psnrBox), float(metrics.maxError)});
-  }
-  return errors;
-}
-
 }  // namespace
 
 CompactResult compactGrid(const EncodedGrid& grid, const SparseVolume& source,
@@ -58,7 +43,7 @@ CompactResult compactGrid(const EncodedGrid& grid, const SparseVolume& source,
   Trial chosen = choose(maker, source, box, options);
   result.grid.field = std::move(chosen.field);
   result.grid.quantised = std::move(chosen.quantised);
-  result.grid.layerErrors = layerErrors(result.grid, source, box);
+  result.grid.layerErrors = measureLayers(result.grid, source, box);
   result.steps = chosen.steps;
   result.bytes = chosen.bytes;
   result.loss = maker.error() > 0.0 ? 10.0 * std::log10(chosen.error / maker.error()) : 0.0;

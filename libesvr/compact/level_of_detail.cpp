@@ -54,12 +54,14 @@ void keep(const std::vector<std::size_t>& places, Ellipsoids& e) {
 }  // namespace
 
 EncodedGrid firstLayers(EncodedGrid grid, std::size_t layers) {
+  const std::size_t all = layerCount(grid);
   for (std::size_t c = 0; c < grid.quantised.size(); ++c) {
     QuantisedEllipsoids& q = grid.quantised[c];
     if (q.layerEnds.size() <= layers) continue;
     keepLayers(layers, q);
     grid.field.chunks[c].ellipsoids = dequantise(q);
   }
+  if (layerCount(grid) < all) grid.residual.reset();
   if (grid.layerErrors.size() > layers) grid.layerErrors.resize(layers);
   return grid;
 }
@@ -76,6 +78,7 @@ EncodedGrid heaviest(EncodedGrid grid, std::size_t count) {
   }
   grid.quantised.clear();
   grid.layerErrors.clear();
+  grid.residual.reset();
   return grid;
 }
 

@@ -188,17 +188,29 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
   return volume;
 }
 
-double largestError(const SparseVolume& volume, const VoxelLayer& layer) {
-  const SparseVolume back = volumeOf(layer);
+namespace {
+
+/// Over the bricks of the first.
+double largestOver(const SparseVolume& a, const SparseVolume& b) {
   double largest = 0.0;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    const auto at = findBrick(back, volume.bricks[b]);
+  for (std::size_t i = 0; i < a.brickCount(); ++i) {
+    const auto at = findBrick(b, brickOf(a.brickCorner(i)) - brickOf(b.origin));
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
-      const float now = at ? back.brickValues(*at)[v] : back.background;
-      largest = std::max(largest, std::abs(double(volume.brickValues(b)[v]) - double(now)));
+      const float other = at ? b.brickValues(*at)[v] : b.background;
+      largest = std::max(largest, std::abs(double(a.brickValues(i)[v]) - double(other)));
     }
   }
   return largest;
+}
+
+}  // namespace
+
+double largestDifference(const SparseVolume& a, const SparseVolume& b) {
+  return std::max(largestOver(a, b), largestOver(b, a));
+}
+
+double largestError(const SparseVolume& volume, const VoxelLayer& layer) {
+  return largestDifference(volume, volumeOf(layer));
 }
 
 }  // namespace esvr

@@ -53,6 +53,7 @@ class GridDecoder {
     if (grid.topology == TopologyKind::kLeaves) readLeaves(grid);
     if (grid.topology == TopologyKind::kMask) readMask(grid);
     readVoxels(grid);
+    readResidual(grid);
     readLayerErrors(grid);
     readCurve(grid);
     return grid;
@@ -229,6 +230,14 @@ class GridDecoder {
       grid.voxels = getVoxels(sections_.get(section), sections_.place(section));
     else if (sections_.has(old))
       grid.voxels = getOldVoxels(sections_.get(old), sections_.place(old));
+  }
+
+  /// Of all layers: some of them alone have none.
+  void readResidual(EncodedGrid& grid) {
+    const auto section = id(SectionKind::kResidual);
+    if (!sections_.has(section) || layers_ != kAllLayers) return;
+    grid.residual = getVoxels(sections_.get(section), sections_.place(section));
+    refuse(residualFaultOf(grid));
   }
 
   /// Those of the layers that were read; of a box nothing is known.

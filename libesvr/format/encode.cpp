@@ -107,6 +107,7 @@ void checkGrid(const EncodedGrid& grid) {
   if (!grid.quantised.empty() && grid.quantised.size() != grid.field.chunks.size())
     refuse(grid, "its quantised chunks are not those of its field");
   checkLayers(grid);
+  if (const auto fault = residualFaultOf(grid)) refuse(grid, fault->text);
   for (std::size_t c = 0; c < grid.field.chunks.size(); ++c) {
     const auto& ellipsoids = grid.field.chunks[c].ellipsoids;
     checkInvariants(ellipsoids);
@@ -184,6 +185,7 @@ void addExtras(Sections& out, std::uint32_t g, const EncodedGrid& grid) {
     out.addRaw({SectionKind::kMask, g}, kRequired, putMask(grid.leaves, grid.mask));
   else if (!grid.leaves.empty())
     out.add({SectionKind::kLeaves, g}, kRequired, putLeaves(grid.leaves), kFloatSize);
+  if (grid.residual) out.addRaw({SectionKind::kResidual, g}, kRequired, putVoxels(*grid.residual));
   if (grid.voxels) out.addRaw({SectionKind::kVoxels, g}, kRequired, putVoxels(*grid.voxels));
   if (!grid.layerErrors.empty())
     out.addRaw({SectionKind::kLayerErrors, g}, kOptional, putLayerErrors(grid.layerErrors));

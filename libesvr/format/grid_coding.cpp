@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "esvr/field.h"
 #include "format/active_threshold.h"
 #include "format/grid_rule.h"
+#include "format/residual_value.h"
 
 namespace esvr {
 namespace {
@@ -137,7 +139,60 @@ std::optional<std::vector<Coord>> bricksWanted(const EncodedGrid& grid,
   return bricks;
 }
 
+/// Bricks of the sum and those of its residual.
+std::vector<Coord> withResidualBricks(const VoxelLayer& residual, std::vector<Coord> bricks,
+                                      const DecodeOptions& options) {
+  std::vector<Coord> own, all;
+  for (const Coord brick : residual.bricks) {
+    const Coord corner = residual.origin + brick * kBrickSide;
+    if (!options.box || meets(*options.box, corner)) own.push_back(corner);
+  }
+  std::set_union(bricks.begin(), bricks.end(), own.begin(), own.end(), std::back_inserter(all));
+  return all;
+}
+
+void addResidual(const VoxelLayer& residual, SparseVolume& volume) {
+  for (std::size_t r = 0; r < residual.bricks.size(); ++r) {
+    const Coord corner = residual.origin + residual.bricks[r] * kBrickSide;
+    const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin));
+    if (!b) continue;
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+      float& value = volume.brickValues(*b)[v];
+      value = format::corrected(value, residual.codes[r * kBrickVoxels + v], residual.divisor);
+    }
+  }
+}
+
+/// As revoxelise() would have it, of values that are not a field's.
+SparseVolume settled(const SparseVolume& volume, const ActivityRule& rule, float threshold) {
+  std::vector<BrickInput> bricks;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    BrickInput brick{volume.brickCorner(b), {}, {}};
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const float value = volume.brickValues(b)[v];
+      const bool active = rule.activity(value) > threshold;
+      brick.values[std::size_t(v)] = active ? value : rule.inactiveValue(value);
+      if (active) brick.active.set(v);
+    }
+    bricks.push_back(brick);
+  }
+  return makeVolume(std::move(bricks), volume.background);
+}
+
+SparseVolume evaluatedWithResidual(const EncodedGrid& grid, const DecodeOptions& options) {
+  const ActivityRule rule = ruleOf(grid);
+  auto bricks = bricksWanted(grid, options).value_or(reachedBricks(grid.field));
+  bricks = withResidualBricks(*grid.residual, std::move(bricks), options);
+  SparseVolume volume = revoxelise(grid.field, {.threshold = kAlwaysActive,
+                                                .range = rule.range,
+                                                .bricks = bricks,
+                                                .restrictToBricks = true});
+  addResidual(*grid.residual, volume);
+  return settled(volume, rule, options.threshold.value_or(grid.activeThreshold));
+}
+
 SparseVolume evaluated(const EncodedGrid& grid, const DecodeOptions& options) {
+  if (grid.residual) return evaluatedWithResidual(grid, options);
   const ActivityRule rule = ruleOf(grid);
   const auto bricks = bricksWanted(grid, options);
   return revoxelise(grid.field,
@@ -154,7 +209,8 @@ void applyMask(const EncodedGrid& grid, SparseVolume& volume) {
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
     const auto leaf =
         std::lower_bound(grid.leaves.begin(), grid.leaves.end(), volume.brickCorner(b));
-    volume.active[b] = grid.mask[std::size_t(leaf - grid.leaves.begin())];
+    const bool stored = leaf != grid.leaves.end() && *leaf == volume.brickCorner(b);
+    volume.active[b] = stored ? grid.mask[std::size_t(leaf - grid.leaves.begin())] : BrickMask{};
     for (int v = 0; v < kBrickVoxels; ++v)
       if (!volume.active[b].test(v))
         volume.brickValues(b)[v] = rule.inactiveValue(volume.brickValues(b)[v]);

@@ -28,6 +28,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kLayered, "layered ellipsoids"},
     {SectionKind::kMask, "mask"},
     {SectionKind::kVoxels, "voxels"},
+    {SectionKind::kResidual, "residual"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
 
@@ -62,6 +63,7 @@ std::uint16_t minorOf(SectionKind kind) {
     case SectionKind::kLayered:
     case SectionKind::kMask:
     case SectionKind::kVoxels:
+    case SectionKind::kResidual:
       return 2;
     default:
       return kFirstMinor;

@@ -43,6 +43,7 @@ enum class SectionKind : std::uint32_t {
   kLayered = 34,
   kMask = 35,
   kVoxels = 36,
+  kResidual = 37,
 };
 
 enum class Codec : std::uint16_t {

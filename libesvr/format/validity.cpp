@@ -49,6 +49,16 @@ std::optional<Fault> faultOf(const EncodedGrid& grid) {
   return std::nullopt;
 }
 
+std::optional<Fault> residualFaultOf(const EncodedGrid& grid) {
+  const auto fault = [](const char* text) { return Fault{SectionKind::kResidual, text}; };
+  if (!grid.residual) return std::nullopt;
+  if (grid.voxels) return fault("a residual to voxels that are stored themselves");
+  if (grid.residual->form != VoxelForm::kLattice) return fault("a residual that is no lattice");
+  for (const BrickMask& mask : grid.residual->active)
+    if (mask.count() != kBrickVoxels) return fault("a residual with voxels that are not active");
+  return std::nullopt;
+}
+
 std::optional<Fault> faultOf(const Ellipsoids& e) {
   if (auto f = nonFinite(SectionKind::kCenters, "the center", e.center)) return f;
   if (auto f = nonFinite(SectionKind::kScales, "a scale", e.logScale)) return f;

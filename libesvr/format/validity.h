@@ -19,6 +19,7 @@ struct Fault {
 [[nodiscard]] std::optional<Fault> faultOf(const EncodedGrid& grid);
 
 /// Finite parameters, quaternions of unit length.
+[[nodiscard]] std::optional<Fault> residualFaultOf(const EncodedGrid& grid);
 [[nodiscard]] std::optional<Fault> faultOf(const Ellipsoids& ellipsoids);
 
 }  // namespace esvr::format

@@ -329,10 +329,10 @@ TEST_F(Vdb2Esvr, reportsWhatDocsReportSaysAndNothingElse) {
                                   "asked", "input", "output", "ratio", "grids", "skipped",
                                   "seconds", "peak_memory_bytes", "interrupted", "exit_code"));
   const Json& grid = report["grids"][0];
-  EXPECT_THAT(keysOf(grid),
-              testing::UnorderedElementsAre("name", "source", "primitives", "bytes", "sections",
-                                            "kernel", "topology", "fit", "paper", "compact",
-                                            "layers", "metrics", "seconds", "left_out", "curve"));
+  EXPECT_THAT(keysOf(grid), testing::UnorderedElementsAre(
+                                "name", "source", "primitives", "bytes", "sections", "kernel",
+                                "topology", "fit", "paper", "compact", "layers", "bound", "metrics",
+                                "seconds", "left_out", "curve"));
   EXPECT_TRUE(grid["paper"].is_null());
   EXPECT_EQ(report["schema"], "esvr-report");
   EXPECT_EQ(report["exit_code"], 0);
@@ -359,6 +359,22 @@ TEST_F(Vdb2Esvr, reportsWhatThePapersMethodUsed) {
   EXPECT_EQ(paper["prunes"][0]["epoch"], 12);
   EXPECT_EQ(paper["prunes"][0]["after"], 40);
   EXPECT_GT(report["grids"][0]["fit"]["hits"], 1.0);
+}
+
+/// Smooth as it is, the ball needs next to no residual; whichever is stored, the report says so.
+TEST_F(Vdb2Esvr, takesEllipsoidsForABoundWhereTheyAreSmaller) {
+  const std::string report = folder_ / "r.json";
+  const auto run = vdb2esvr({in(), out(), "--max-error", "5%", "--kappa", "0", "--report", report});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const Json bound = Json::parse(test::readText(report))["grids"][0]["bound"];
+  const EncodedGrid grid = readEsvr(out()).grids[0];
+  EXPECT_EQ(bound["stored"], grid.voxels ? "voxels" : "ellipsoids and residual");
+  if (!bound["ellipsoid_bytes"].is_null()) {
+    EXPECT_EQ(bound["ellipsoid_bytes"] < bound["voxel_bytes"], grid.residual.has_value());
+  }
+  const SparseVolume source = readGrid(in(), "density").volume;
+  const ValueRange range = activeRange(source);
+  EXPECT_LE(largestDifference(source, decodeGrid(grid)), 0.05 * (double(range.max) - range.min));
 }
 
 TEST_F(Vdb2Esvr, reportsNullForAPsnrWithoutError) {

@@ -79,6 +79,22 @@ EncodedGrid masked() {
   return grid;
 }
 
+/// An ellipsoid with three corrections in a brick.
+EncodedGrid corrected() {
+  EncodedGrid grid = oneEllipsoid();
+  VoxelLayer& residual = grid.residual.emplace();
+  residual.form = VoxelForm::kLattice;
+  residual.divisor = 64.0;
+  residual.origin = {8, -24, 1024};
+  residual.bricks = {{}};
+  residual.codes.resize(kBrickVoxels);
+  residual.codes[0] = 3, residual.codes[77] = -2, residual.codes[511] = 1;
+  residual.active.resize(1);
+  residual.active[0].setAll();
+  residual.vacant.resize(1);
+  return grid;
+}
+
 }  // namespace
 
 std::vector<GoldenFile> goldenFiles() {
@@ -94,6 +110,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"voxels", fileOf(fewValues()), false},
       {"mirrored_voxels", fileOf(mirroredValues())},
       {"mask", fileOf(masked())},
+      {"residual", fileOf(corrected())},
       {"unknown_section", fileOf(oneEllipsoid()), true, true},
   };
 }

@@ -17,7 +17,8 @@ PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 96500
 NONE = 0xFFFFFFFF
 KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 5: "curve", 16: "centers",
          17: "scales", 18: "rotations", 19: "intensities", 20: "kappas", 32: "ellipsoids",
-         33: "voxels of 1.1", 6: "layer errors", 34: "layered ellipsoids", 35: "mask", 36: "voxels"}
+         33: "voxels of 1.1", 6: "layer errors", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
+         37: "residual"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
 
@@ -431,7 +432,8 @@ def content(name, data):
         values = struct.unpack(f"<{n * PLANES[name]}f", data)
         return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
     readers = {"grid": grid, "chunks": chunks, "leaves": leaves, "ellipsoids": ellipsoids,
-               "voxels of 1.1": old_voxels, "voxels": voxels, "mask": voxels, "layered ellipsoids": layered, "layer errors": layer_errors}
+               "voxels of 1.1": old_voxels, "voxels": voxels, "mask": voxels, "residual": voxels,
+               "layered ellipsoids": layered, "layer errors": layer_errors}
     return readers[name](data) if name in readers else data
 
 
@@ -562,6 +564,14 @@ def check_mask(sections):
         if z > 2 or (x, y, z) == (-5, 18, 1)}
 
 
+def check_residual(sections):
+    head, held = sections["residual", 0, NONE]
+    assert (head["form"], head["divisor"], head["origin"]) == (0, 64.0, (8, -24, 1024))
+    assert len(held) == 512 and all(active for _, active in held.values())
+    assert {p: code for p, (code, _) in held.items() if code} == {
+        (8, -24, 1024): 3, (9, -23, 1029): -2, (15, -17, 1031): 1}
+
+
 def check_mirrored(sections):
     head, held = sections["voxels", 0, NONE]
     assert (head["form"], head["origin"], head["background"]) == (2, (0, -8, 8), 0.0)
@@ -599,7 +609,7 @@ def check_voxels(sections):
 
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
-          "voxels": check_voxels, "mask": check_mask, "mirrored_voxels": check_mirrored, "kappas_and_chunks": check_kappas_and_chunks}
+          "voxels": check_voxels, "mask": check_mask, "residual": check_residual, "mirrored_voxels": check_mirrored, "kappas_and_chunks": check_kappas_and_chunks}
 
 
 def main():

@@ -82,6 +82,7 @@ std::string difference(const EncodedGrid& a, const EncodedGrid& b) {
   if (!sameBits(a.valueMin, b.valueMin) || !sameBits(a.valueMax, b.valueMax)) return "value range";
   if (a.curve != b.curve) return "curve";
   if (a.voxels != b.voxels) return "voxels";
+  if (a.residual != b.residual) return "residual";
   if (a.quantised != b.quantised) return "quantised";
   if (a.layerErrors != b.layerErrors) return "errors of layers";
   return difference(a.field, b.field);

@@ -24,6 +24,7 @@ namespace {
 using format::getVoxels;
 using format::putVoxels;
 using format::SectionKind;
+using test::CraftedFile;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
@@ -104,6 +105,25 @@ TEST(VoxelFile, GivesBackItsVoxels) {
 
 TEST(VoxelFile, TakesNoThreshold) {
   EXPECT_THROW((void)decodeGrid(voxelFile().grids[0], {.threshold = 0.1f}), UsageError);
+}
+
+TEST(Residual, IsRefusedWhereItIsNone) {
+  const SparseVolume tube = test::tubeVolume();
+  EncodedGrid grid = test::emptyGrid();
+  grid.residual = exactLayer(tube);  // no lattice
+  EXPECT_THROW((void)encodeEsvr({{}, {grid}}), RuntimeFailure);
+  grid.residual = boundedLayer(tube, 0.1, Activity::kExact);  // not all of it active
+  EXPECT_THROW((void)encodeEsvr({{}, {grid}}), RuntimeFailure);
+  for (BrickMask& mask : grid.residual->active) mask.setAll();
+  for (BrickMask& mask : grid.residual->vacant) mask = {};
+  EXPECT_NO_THROW((void)encodeEsvr({{}, {grid}}));
+  grid.voxels = exactLayer(tube);
+  EXPECT_THROW((void)encodeEsvr({{}, {grid}}), RuntimeFailure);
+
+  CraftedFile lie(encodeEsvr(voxelFile()));
+  lie.add({SectionKind::kResidual, 0}, format::kRequired, putVoxels(exactLayer(tube)));
+  EXPECT_THAT([&] { (void)decodeEsvr(lie.assemble(), "f"); },
+              ThrowsMessage<BadInput>(HasSubstr("residual")));
 }
 
 /// Offsets in the section (docs/format.md, "Voxels").

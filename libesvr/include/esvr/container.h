@@ -56,6 +56,9 @@ struct EncodedGrid {
   /// ellipsoids are then exactly what it stands for (dequantise).
   std::vector<QuantisedEllipsoids> quantised;
   std::vector<LayerError> layerErrors;  ///< empty, or one for each of the most layers of a chunk
+  /// Added to the sum, voxel by voxel, before it is told which are active; of VoxelForm::kLattice,
+  /// all of them active, 0 in other bricks. Not together with `voxels`.
+  std::optional<VoxelLayer> residual;
   /// The voxels themselves, exact or within a bound: what decodeGrid() gives back then.
   std::optional<VoxelLayer> voxels;
 };

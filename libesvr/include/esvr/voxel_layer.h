@@ -51,7 +51,10 @@ enum class Activity {
 
 [[nodiscard]] SparseVolume volumeOf(const VoxelLayer& layer);
 
-/// Largest |difference| of a layer's voxels from its volume's, over all bricks.
+/// Largest |difference| of two volumes' voxels, over the bricks of both, active or not.
+[[nodiscard]] double largestDifference(const SparseVolume& a, const SparseVolume& b);
+
+/// That of a layer's voxels from its volume's.
 [[nodiscard]] double largestError(const SparseVolume& volume, const VoxelLayer& layer);
 
 }  // namespace esvr

@@ -1,0 +1,21 @@
+#include "compact/measure_layers.h"
+
+#include "esvr/grid_coding.h"
+#include "esvr/level_of_detail.h"
+#include "esvr/metrics.h"
+
+namespace esvr {
+
+std::vector<LayerError> measureLayers(const EncodedGrid& grid, const SparseVolume& source,
+                                      const Box& box) {
+  std::vector<LayerError> errors;
+  const std::size_t layers = layerCount(grid);
+  for (std::size_t k = 1; k <= layers && layers > 1; ++k) {
+    const auto metrics = compareVolumes(source, decodeGrid(firstLayers(grid, k)),
+                                        {.box = box, .peak = {}, .ssim = false});
+    errors.push_back({float(metrics.psnrBox), float(metrics.maxError)});
+  }
+  return errors;
+}
+
+}  // namespace esvr
