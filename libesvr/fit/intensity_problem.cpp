@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "esvr/field.h"
@@ -16,6 +17,8 @@ using Range = tbb::blocked_range<std::size_t>;
 constexpr std::size_t kBrickGrain = 4, kEllipsoidGrain = 256;
 /// Pairs whose tapes are kept from pass to pass: some 200 MB. More are worked out anew each time.
 constexpr std::size_t kMostKept = 400'000;
+/// Of the gradient's square, preconditioned: intensities are rounded to coarser steps than that.
+constexpr double kEnough = 1e-6;
 
 std::vector<Coord> cornersOf(const Field& field, const IntensityTarget& target) {
   std::vector<Coord> corners(target.bricks.begin(), target.bricks.end());
@@ -27,6 +30,24 @@ std::vector<Coord> cornersOf(const Field& field, const IntensityTarget& target) 
   std::sort(corners.begin(), corners.end());
   corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
   return corners;
+}
+
+/// Sets the voxels of a mask to 0; most words of it are all ones or none.
+void clearVoxels(const BrickMask& mask, float* values) {
+  for (const std::uint64_t word : mask.words) {
+    if (word == ~std::uint64_t{0}) {
+      std::fill_n(values, 64, 0.0f);
+    } else {
+      for (std::uint64_t left = word; left != 0; left &= left - 1)
+        values[std::countr_zero(left)] = 0.0f;
+    }
+    values += 64;
+  }
+}
+
+bool contains(const Box& box, Coord corner) {
+  return box.contains(corner) &&
+         box.contains(corner + Coord{kBrickSide - 1, kBrickSide - 1, kBrickSide - 1});
 }
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
@@ -120,14 +141,19 @@ void IntensityProblem::pass(std::vector<double>* rPhi, std::vector<double>* phi2
 
 double IntensityProblem::residualOf(std::size_t brick, float* sum, BrickMask* exact) const {
   const auto at = findBrick(source_, brickOf(corners_[brick] - source_.origin));
+  const float* const values = at ? source_.brickValues(*at).data() : nullptr;
+  const bool inBox = contains(box_, corners_[brick]);
   double error = 0.0;
   for (int v = 0; v < kBrickVoxels; ++v) {
-    const float wanted = at ? source_.brickValues(*at)[std::size_t(v)] : source_.background;
+    const float wanted = values ? values[v] : source_.background;
     const float value = background_ + sum[v];
     const double missed = double(stored_(value)) - double(wanted);
-    if (missed != 0.0 && box_.contains(corners_[brick] + voxelLocal(v))) error += missed * missed;
     sum[v] = missed == 0.0 ? 0.0f : value - wanted;
-    if (exact && missed == 0.0) exact->set(v);
+    if (missed == 0.0) {
+      if (exact) exact->set(v);
+    } else if (inBox || box_.contains(corners_[brick] + voxelLocal(v))) {
+      error += missed * missed;
+    }
   }
   return error;
 }
@@ -161,10 +187,7 @@ double IntensityProblem::gradientAt(std::span<const float> intensities,
 void IntensityProblem::applyNormal(std::span<const double> direction, std::vector<double>& out) {
   for (std::size_t i = 0; i < direction.size(); ++i)
     plan_.field.forms[i].intensity = float(direction[i]);
-  pass(&out, nullptr, [&](std::size_t b, float* sum) {
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if (exact_[b].test(v)) sum[v] = 0.0f;
-  });
+  pass(&out, nullptr, [&](std::size_t b, float* sum) { clearVoxels(exact_[b], sum); });
 }
 
 /// The step x that lowers |A x + r|^2, from A^T r.
@@ -180,7 +203,7 @@ std::vector<double> IntensityProblem::conjugateGradients(std::vector<double> res
   precondition();
   p = z;
   double rho = dot(residual, z);
-  const double enough = rho * 1e-10;
+  const double enough = rho * kEnough;
   for (int k = 0; k < iterations && rho > enough; ++k) {
     applyNormal(p, q);
     const double alpha = rho / dot(p, q);
