@@ -232,6 +232,8 @@ def section(size):
         lines += ['', 'Out of reach at this size: ' + ', '.join(
             f"{r['name']} ({r['note']})" if r['note'] != 'out of reach' else r['name']
             for r in size.missing) + '.']
+    if not size.externals:
+        lines += ['', 'There is no external point at or under this size.']
     return lines + ['']
 
 
@@ -243,7 +245,8 @@ def introduction(tables):
             'ESVR are those of the whole `vdb2esvr --size` on the device that the row names; all other times are',
             'of two CPU cores busy with other work, medians of three runs; those of externals as measured elsewhere.',
             'Pictures: one view, viridis with linear opacity, 256 x 256, one voxel between samples, on the CPU. Rows',
-            'without picture figures are of systems whose voxels were not at hand. Ellipsoids drawn as they are show what',
+            'without picture figures are externals, whose voxels were not at hand; there are points of four volumes,',
+            'and not at every size, so that a table without them is no win over them. Ellipsoids drawn as they are show what',
             'their sum does between voxels, which the fit never looked at; drawn from the voxels that the file decodes to',
             '(`esvr-render --method bricks`), by the same rule as every other row, they do not.', '',
             '    ' + '\n    '.join(table['versions']), '']
