@@ -3,7 +3,13 @@
 /// over nodes that are not there, as large as the tree says. Written once for host and device.
 
 #include <nanovdb/NanoVDB.h>
+#if __has_include(<nanovdb/math/SampleFromVoxels.h>)  // OpenVDB 12 and up
+#include <nanovdb/math/SampleFromVoxels.h>
+#define ESVR_NANOVDB_MATH nanovdb::math
+#else
 #include <nanovdb/util/SampleFromVoxels.h>
+#define ESVR_NANOVDB_MATH nanovdb
+#endif
 
 #include "render/march_scene.h"
 
@@ -27,7 +33,7 @@ template <class Build>
 ESVR_HD inline PixelColor marchNano(const nanovdb::NanoGrid<Build>& grid, const MarchScene& scene,
                                     int column, int row) {
   const auto accessor = grid.getAccessor();
-  const auto sample = nanovdb::createSampler<1>(accessor);
+  const auto sample = ESVR_NANOVDB_MATH::createSampler<1>(accessor);
   const MarchSamples samples = samplesOf(scene, column, row, SampleRange::all());
   RayState ray;
   for (int i = 0; i < samples.count && scene.rule.open(ray);) {
