@@ -152,16 +152,17 @@ class BlockCoder {
 
 std::vector<Run> blockRuns(std::size_t count, std::span<const std::size_t> layerEnds) {
   std::vector<Run> runs;
-  const auto cut = [&](std::size_t first, std::size_t end) {
-    for (; first < end; first += kBlockEllipsoids)
-      runs.push_back({first, std::min(kBlockEllipsoids, end - first)});
-  };
+  if (layerEnds.empty())
+    for (std::size_t first = 0; first < count; first += kBlockEllipsoids)
+      runs.push_back({first, std::min(kBlockEllipsoids, count - first)});
   std::size_t first = 0;
   for (const std::size_t end : layerEnds) {
-    cut(first, end);
+    const std::size_t size = end - first;
+    const std::size_t blocks = (size + kLayerBlockEllipsoids - 1) / kLayerBlockEllipsoids;
+    const auto begin = [&](std::size_t k) { return first + size * k / blocks; };
+    for (std::size_t k = 0; k < blocks; ++k) runs.push_back({begin(k), begin(k + 1) - begin(k)});
     first = end;
   }
-  cut(first, count);
   return runs;
 }
 

@@ -14,14 +14,16 @@
 
 namespace esvr::format {
 
-/// Blocks are decoded one without the other.
-inline constexpr std::size_t kBlockEllipsoids = 4096;
+/// Blocks are decoded one without the other. Those of layers are smaller, so that a box needs fewer
+/// ellipsoids; each block has to learn its models anew, which is what that costs.
+inline constexpr std::size_t kBlockEllipsoids = 4096, kLayerBlockEllipsoids = 2048;
 
 inline constexpr std::size_t kStreams = 4;  ///< positions, scales, rotations, intensities
 using BlockStreams = std::array<std::vector<std::byte>, kStreams>;
 using BlockBytes = std::array<std::span<const std::byte>, kStreams>;
 
-/// The ellipsoids of each block, layer by layer.
+/// The ellipsoids of each block, layer by layer: without layers full blocks and a rest, in a layer
+/// blocks as equal as can be.
 [[nodiscard]] std::vector<Run> blockRuns(std::size_t count, std::span<const std::size_t> layerEnds);
 [[nodiscard]] inline std::vector<Run> blockRuns(const QuantisedEllipsoids& q) {
   return blockRuns(q.size(), q.layerEnds);

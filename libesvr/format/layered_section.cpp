@@ -101,12 +101,13 @@ std::vector<BlockEntry> getEntries(ByteReader& in, const BlockDirectory& directo
 /// The directory without its size and its checksum, which has been checked.
 std::vector<std::byte> readDirectory(const ByteSource& section) {
   constexpr std::uint64_t kSizeBytes = sizeof(std::uint32_t);
-  const auto head = section.read(0, kSizeBytes);
-  const std::uint64_t size = ByteReader(head, section.name()).get<std::uint32_t>();
+  auto bytes = section.read(0, kSizeBytes);
+  const std::uint64_t size = ByteReader(bytes, section.name()).get<std::uint32_t>();
   if (size > section.size() || size < kSizeBytes + kChecksumBytes)
     throw BadInput(section.name() + ": a directory of " + std::to_string(size) + " bytes in " +
                    std::to_string(section.size()));
-  auto bytes = section.read(0, size);
+  const auto rest = section.read(kSizeBytes, size - kSizeBytes);
+  bytes.insert(bytes.end(), rest.begin(), rest.end());
   const auto covered = std::span(bytes).first(size - kChecksumBytes);
   const auto stored = std::span(bytes).last(kChecksumBytes);
   if (ByteReader(stored, section.name()).get<std::uint64_t>() != checksum(covered))

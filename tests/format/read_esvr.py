@@ -279,7 +279,8 @@ def layered(data):
     assert len(ends) > 1 and ends == sorted(set(ends)) and ends[-1] == count, "layers"
     counts = []
     for first, end in zip([0] + ends, ends):
-        counts += [min(4096, end - at) for at in range(first, end, 4096)]
+        n, parts = end - first, (end - first + 2047) // 2048
+        counts += [n * (k + 1) // parts - n * k // parts for k in range(parts)]
     entries = [(r.get("6B"), r.get("4I"), r.get("Q")) for _ in counts]
     assert r.at == size - 8 and r.get("Q") == xxh64(data[:size - 8]), "directory"
     blocks = []
