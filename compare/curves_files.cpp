@@ -91,7 +91,7 @@ Plot overSeconds(const TableRecord& record) {
     Series series{row.name, {}};
     for (const auto& at : row.curve) series.points.push_back({at.seconds, at.psnrBox});
     plot.series.push_back(std::move(series));
-    if (row.encode) ends.points.push_back({row.encode->median, row.metrics->psnrBox});
+    if (row.fittedHere) ends.points.push_back({row.encode->median, row.metrics->psnrBox});
   }
   if (!ends.points.empty()) plot.series.push_back(std::move(ends));
   return plot;

@@ -301,7 +301,7 @@ RateInput RowMaker::rateInput(const FitWish& wish) const {
 
 TableRow RowMaker::fitted(const FitWish& wish) {
   const std::string word = wordOf(wish);
-  TableRow row{.name = "ESVR fitted, " + word, .group = "ESVR"};
+  TableRow row{.name = "ESVR fitted, " + word, .group = "ESVR", .fittedHere = true};
   row.command = command("--rows none --fit " + word);
   const RateInput input = rateInput(wish);
   const auto path = scene_.folder / "fitted.esvr";

@@ -64,15 +64,19 @@ std::vector<double> Axis::linearTicks() const {
   return values;
 }
 
-/// Powers of ten, and between them 2 and 5 where there are few.
+/// Powers of ten, and between them 2 and 5, or every digit, where there are few.
 std::vector<double> Axis::logarithmicTicks() const {
-  constexpr double kFewDecades = 3.0;
-  const bool between = high_ - low_ <= kFewDecades;
+  constexpr double kFewDecades = 3.0, kOneDecade = 1.0;
+  const double decades = high_ - low_;
+  const std::vector<double> digits = decades > kFewDecades ? std::vector<double>{1}
+                                     : decades > kOneDecade
+                                         ? std::vector<double>{1, 2, 5}
+                                         : std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9};
   std::vector<double> values;
   for (double decade = std::floor(low_); decade <= high_; ++decade)
-    for (const double digit : {1.0, 2.0, 5.0}) {
+    for (const double digit : digits) {
       const double value = digit * std::pow(10.0, decade);
-      if ((digit == 1.0 || between) && holds(value)) values.push_back(value);
+      if (holds(value)) values.push_back(value);
     }
   return values;
 }

@@ -2,6 +2,7 @@
 
 #include <cairo-svg.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -18,7 +19,8 @@ struct Rgb {
 /// Okabe and Ito's colors, which those who see few colors can tell apart, without yellow on white.
 constexpr std::array kPalette{Rgb{0.00, 0.45, 0.70}, Rgb{0.84, 0.37, 0.00}, Rgb{0.00, 0.62, 0.45},
                               Rgb{0.80, 0.47, 0.65}, Rgb{0.00, 0.00, 0.00}, Rgb{0.34, 0.71, 0.91},
-                              Rgb{0.90, 0.62, 0.00}, Rgb{0.50, 0.50, 0.50}};
+                              Rgb{0.90, 0.62, 0.00}, Rgb{0.50, 0.50, 0.50}, Rgb{0.45, 0.20, 0.55},
+                              Rgb{0.45, 0.55, 0.10}};
 constexpr Rgb kInk{0.1, 0.1, 0.1}, kGrid{0.88, 0.88, 0.88};
 
 constexpr double kTextSize = 13.0, kTitleSize = 16.0, kLine = 1.8, kHair = 1.0, kMarker = 3.2;
@@ -38,6 +40,7 @@ class Painter {
         y_(valuesOf(&Point::y), plot.logarithmicY) {}
 
   void paint() {
+    measureLegend();
     color({1, 1, 1});
     cairo_paint(cr_.get());
     drawAxes();
@@ -54,7 +57,7 @@ class Painter {
     return values;
   }
 
-  [[nodiscard]] double right() const { return plot_.width - kRight; }
+  [[nodiscard]] double right() const { return plot_.width - kRight - legendWidth_; }
   [[nodiscard]] double bottom() const { return plot_.height - kBottom; }
   [[nodiscard]] double pixelX(double x) const { return kLeft + x_.place(x) * (right() - kLeft); }
   [[nodiscard]] double pixelY(double y) const { return bottom() - y_.place(y) * (bottom() - kTop); }
@@ -71,16 +74,22 @@ class Painter {
     cairo_stroke(cr_.get());
   }
 
-  void text(const std::string& given, double x, double y, Anchor anchor, double size = kTextSize) {
-    const std::string shown = validUtf8(given);
+  /// Sets the font, too.
+  double widthOf(const std::string& shown, double size) {
     cairo_select_font_face(cr_.get(), "sans-serif", CAIRO_FONT_SLANT_NORMAL,
                            CAIRO_FONT_WEIGHT_NORMAL);
     cairo_set_font_size(cr_.get(), size);
     cairo_text_extents_t extents;
     cairo_text_extents(cr_.get(), shown.c_str(), &extents);
+    return extents.x_advance;
+  }
+
+  void text(const std::string& given, double x, double y, Anchor anchor, double size = kTextSize) {
+    const std::string shown = validUtf8(given);
+    const double width = widthOf(shown, size);
     const double shift = anchor == Anchor::kStart    ? 0.0
-                         : anchor == Anchor::kMiddle ? extents.x_advance / 2
-                                                     : extents.x_advance;
+                         : anchor == Anchor::kMiddle ? width / 2
+                                                     : width;
     cairo_move_to(cr_.get(), x - shift, y);
     cairo_show_text(cr_.get(), shown.c_str());
   }
@@ -136,20 +145,28 @@ class Painter {
     return x_.holds(point.x) && y_.holds(point.y);
   }
 
-  /// In the lower right corner, where curves of quality have no business.
+  /// Beside the curves, so that it hides none.
+  void measureLegend() {
+    for (const auto& series : plot_.series)
+      legendWidth_ = std::max(
+          legendWidth_, widthOf(validUtf8(series.name), kTextSize) + kLegendMark + 2 * kTickGap);
+  }
+
   void drawLegend() {
-    double y = bottom() - kTickGap - kLegendLine * double(plot_.series.size() - 1);
+    double y = kTop + kLegendLine;
     for (std::size_t i = 0; i < plot_.series.size(); ++i, y += kLegendLine) {
-      color(kInk);
-      text(plot_.series[i].name, right() - kLegendMark - kTickGap, y, Anchor::kEnd);
+      const double begin = right() + kTickGap;
       color(colorOf(i));
-      line(right() - kLegendMark, y - kTextSize / 3, right(), y - kTextSize / 3, kLine);
+      line(begin, y - kTextSize / 3, begin + kLegendMark, y - kTextSize / 3, kLine);
+      color(kInk);
+      text(plot_.series[i].name, begin + kLegendMark + kTickGap, y, Anchor::kStart);
     }
   }
 
   const Plot& plot_;
   Context cr_;
   Axis x_, y_;
+  double legendWidth_ = 0.0;
 };
 
 }  // namespace

@@ -56,6 +56,18 @@ TEST(CommandLine, takesArgumentsAndOptionsInAnyOrder) {
   EXPECT_EQ(a->threads, 0);
 }
 
+TEST(CommandLine, collectsAllFurtherArgumentsWhereThatIsWanted) {
+  CommandLine line = exampleLine();
+  line.repeatedArgument("more");
+  const char* given[] = {"esvr-example", "in", "out", "a", "--size", "3", "b"};
+  const auto a = line.parse(7, given);
+  ASSERT_TRUE(a);
+  EXPECT_EQ(a->get<std::vector<std::string>>("more"), (std::vector<std::string>{"a", "b"}));
+  const auto none = line.parse(3, given);
+  ASSERT_TRUE(none);
+  EXPECT_FALSE(none->has("more"));
+}
+
 TEST(CommandLine, knowsDefaultsAndWhatWasNotGiven) {
   const auto a = parse({"in", "out"});
   EXPECT_EQ(a->get<int>("size"), 7);

@@ -26,6 +26,8 @@ TEST(Axis, hasTicksAtPowersWhereItIsLogarithmic) {
   const std::vector<double> values{8e3, 1.2e6};
   EXPECT_EQ(labels(Axis(values, true)),
             (Labels{"10000", "20000", "50000", "100000", "200000", "500000", "1e+06"}));
+  const std::vector<double> narrow{3.2, 6.8};
+  EXPECT_EQ(labels(Axis(narrow, true)), (Labels{"4", "5", "6", "7"}));
   const std::vector<double> wide{1e-4, 1e4};
   EXPECT_EQ(labels(Axis(wide, true)).size(), 9u);
 }
