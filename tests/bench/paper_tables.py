@@ -15,12 +15,12 @@ import argparse
 import concurrent.futures
 import json
 import pathlib
-import shlex
 
 from fit_benchmarks import convert, run
 
 SYNTHETIC = ["8area", "empty-sphere", "synth-tube", "synth-wiggle", "diffuse-scalar"]
 CURVES = ["aneurism", "smoke1"]
+CURVE_MOST = 150_000  # primitives before pruning; smoke would else grow to a million
 PAPER_EPOCHS = 2800  # of PaperMethod
 # Primitives in thousands, PSNR, average hits; before and after pruning (tables 'Primitive type').
 PAPER_TYPES = {
@@ -60,20 +60,24 @@ def sources(arguments):
     return {name: found[name] for name in arguments.volumes}
 
 
-def paper(arguments, *options):
-    return ["--preset", "paper", "--epochs", arguments.epochs, "--hits", *arguments.paper, *options]
+def paper(arguments, name, *options):
+    """Densification ends at the number that the paper's table has before pruning: the paper matches
+    numbers by the threshold."""
+    most = 1000 * PAPER_TYPES[name]["ellipsoid"][0][0]
+    return ["--preset", "paper", "--epochs", arguments.epochs, "--hits", "--points", most // 2,
+            "--most", most, "--densify-threshold", arguments.threshold, *options]
 
 
 def variants(arguments, name):
     """What is run on a volume: key and options."""
-    yield "ellipsoid", paper(arguments)
-    yield "gaussian", paper(arguments, "--primitive", "gaussian")
+    yield "ellipsoid", paper(arguments, name)
+    yield "gaussian", paper(arguments, name, "--primitive", "gaussian")
     if name not in arguments.ablate:
         return
     for score in ["no-fa", "only-fa", "contribution"]:
-        yield f"score {score}", paper(arguments, "--prune-score", score)
-    yield "k 3", paper(arguments, "--sharpness", "3")
-    yield "k learned", paper(arguments, "--sharpness", "learned")
+        yield f"score {score}", paper(arguments, name, "--prune-score", score)
+    yield "k 3", paper(arguments, name, "--sharpness", "3")
+    yield "k learned", paper(arguments, name, "--sharpness", "learned")
 
 
 def measure(arguments, job):
@@ -111,7 +115,7 @@ def second_jobs(arguments, found, rows):
         yield name, "default", source, box, ["--count", count, "--storage", "float32", "--hits"]
         if name in arguments.ablate:
             yield (name, "score full in three passes", source, box,
-                   paper(arguments, "--prune-passes", "3", "--count", count))
+                   paper(arguments, name, "--prune-passes", "3", "--count", count))
             yield (name, "score none", source, box,
                    ["--preset", "paper", "--epochs", arguments.epochs, "--hits", "--prune-passes",
                     "0", "--points", max(1, count // 2), "--count", count, "--densify-threshold",
@@ -138,7 +142,7 @@ def measure_curves(arguments):
         source = arguments.data / f"{name}.vdb"
         rows.append(measure(arguments, (name, "curve paper", source, box,
                                         ["--preset", "paper", "--epochs",
-                                         arguments.curve_epochs, *arguments.paper])))
+                                         arguments.curve_epochs, "--most", CURVE_MOST])))
         count = rows[-1]["grid"]["primitives"]
         rows.append(measure(arguments, (name, "curve default", source, box,
                                         ["--count", count, "--storage", "float32"])))
@@ -243,8 +247,7 @@ def main():
     parser.add_argument("--volumes", nargs="+", default=["aneurism", *SYNTHETIC])
     parser.add_argument("--ablate", nargs="*", default=["aneurism"],
                         help="volumes of the tables 'Pruning score' and 'k'")
-    parser.add_argument("--paper", type=shlex.split, default=[], metavar="OPTIONS",
-                        help="more options of the paper's method, in one word")
+    parser.add_argument("--threshold", default="1e-4", help="of densification, in the tables")
     parser.add_argument("--curves", action="store_true", help="and error against time")
     parser.add_argument("--curve-epochs", type=int, default=PAPER_EPOCHS)
     parser.add_argument("--jobs", type=int, default=1)
