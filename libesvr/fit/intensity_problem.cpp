@@ -17,8 +17,7 @@ using Range = tbb::blocked_range<std::size_t>;
 constexpr std::size_t kBrickGrain = 4, kEllipsoidGrain = 256;
 /// Pairs whose tapes are kept from pass to pass: some 200 MB. More are worked out anew each time.
 constexpr std::size_t kMostKept = 400'000;
-/// Of the gradient's square, preconditioned: intensities are rounded to coarser steps than that.
-constexpr double kEnough = 1e-6;
+constexpr double kEnough = 1e-10;  // of the gradient's square, preconditioned
 
 std::vector<Coord> cornersOf(const Field& field, const IntensityTarget& target) {
   std::vector<Coord> corners(target.bricks.begin(), target.bricks.end());
