@@ -80,7 +80,7 @@ void addFitOptions(cli::po::options_description& options) {
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
      "draft, standard or high: what is not given otherwise; paper: the paper's method")
     ("kappa", value<float>()->value_name("K"),
-     "edge of the ellipsoids (default: fitted with the rest)")
+     "edge of the ellipsoids (default: fitted with the rest, for squared errors)")
     ("loss", value<std::string>()->value_name("L")->default_value("squared"),
      "squared (what PSNR asks for) or paper (L1 + D-SSIM)")
     ("beta", value<double>()->value_name("B")->default_value(beta, cli::shortNumber(beta)),

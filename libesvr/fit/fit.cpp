@@ -60,7 +60,7 @@ RunPlan planFor(const FitTarget& target, const FitOptions& options) {
   RunPlan plan;
   plan.psnr = options.psnr;
   plan.seconds = options.seconds;
-  // the paper's kernel has its kappa given
+  // under the paper's loss the descent gained nothing
   plan.learnKappa = !options.kappa && options.loss == Loss::kSquared;
   plan.largestCount = most(options.count.value_or(voxels));
   plan.count = options.psnr ? most(std::size_t(double(byPreset) / kFirstGuess))

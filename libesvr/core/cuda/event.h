@@ -3,8 +3,6 @@
 
 #include <cuda_runtime_api.h>
 
-#include <utility>
-
 #include "core/cuda/check.h"
 
 namespace esvr::cuda {
@@ -19,11 +17,11 @@ class Event {
   void record(cudaStream_t stream) { check(cudaEventRecord(event_, stream), "recording an event"); }
 
   /// From `start` to this one; both must have been passed, or are waited for.
-  [[nodiscard]] float millisecondsSince(const Event& start) const {
+  [[nodiscard]] double millisecondsSince(const Event& start) const {
     check(cudaEventSynchronize(event_), "waiting for an event");
     float milliseconds = 0.0f;
     check(cudaEventElapsedTime(&milliseconds, start.event_, event_), "reading a time");
-    return milliseconds;
+    return double(milliseconds);
   }
 
  private:

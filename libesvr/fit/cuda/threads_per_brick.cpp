@@ -12,7 +12,7 @@ constexpr int kListsServed = 8;  // a measurement costs two slower passes of som
 void ThreadsPerBrick::listsChanged() {
   if (tried_ != kChoices) return;  // not all have been tried on the lists before
   if (served_ == 0) {
-    std::array<float, kChoices> times{};
+    std::array<double, kChoices> times{};
     for (int k = 0; k < kChoices; ++k)
       times[std::size_t(k)] =
           trials_[std::size_t(k)].end.millisecondsSince(trials_[std::size_t(k)].begin);

@@ -41,7 +41,7 @@ struct FitOptions {
   Preset preset = Preset::kStandard;
   Loss loss = Loss::kSquared;
   double beta = 0.2;           ///< of the paper's loss
-  std::optional<float> kappa;  ///< the scene's edge; default: descended on with all else
+  std::optional<float> kappa;  ///< the scene's edge; default: fitted, for squared errors
   std::optional<Box> box;      ///< of 'PSNR over the box'; default: the active bounding box
   /// Instead of all else that decides how: the paper's method, with its own loss and kernel. Takes
   /// no kappa and no iterations; `count` is what its last pruning leaves.

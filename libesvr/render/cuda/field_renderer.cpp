@@ -259,8 +259,8 @@ void FieldRenderer::drawBand(const Scene& scene, Band band, Image* image) {
 
 void FieldRenderer::count(const TileFrame& f, const FrameCounters& c) {
   tiles_ += std::uint64_t(f.tiles()), occupied_ += c.occupiedTiles;
-  stats_.listMs += listed_.since(begin_);
-  stats_.drawMs += drawn_.since(listed_);
+  stats_.listMs += listed_.millisecondsSince(begin_);
+  stats_.drawMs += drawn_.millisecondsSince(listed_);
   stats_.pairs += c.pairs;
   stats_.occupancy = double(occupied_) / double(tiles_);
   stats_.depthParts = f.parts;

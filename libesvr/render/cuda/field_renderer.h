@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "core/cuda/device_buffer.h"
+#include "core/cuda/event.h"
 #include "core/cuda/stream.h"
 #include "esvr/renderer.h"
 #include "render/cuda/device_table.h"
-#include "render/cuda/event.h"
 #include "render/cuda/tile_frame.h"
 #include "render/scene_depth.h"
 

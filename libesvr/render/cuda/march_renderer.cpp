@@ -63,7 +63,7 @@ void MarchRenderer::drawBand(const RenderOptions& o, Band band, Image* image) {
                           count * sizeof(float4), cudaMemcpyDeviceToHost, stream()),
           "copying a picture from the device");
   stream_.synchronize();
-  stats_.drawMs += drawn_.since(begin_);
+  stats_.drawMs += drawn_.millisecondsSince(begin_);
   stats_.deviceBytes = std::max<std::uint64_t>(stats_.deviceBytes,
                                                contentBytes() + table_.bytes() + pixels_.bytes());
 }

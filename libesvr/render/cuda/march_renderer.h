@@ -1,10 +1,10 @@
 #pragma once
 /// What renderers that march through voxels on a CUDA device share: bands, pixels, times.
 
+#include "core/cuda/event.h"
 #include "core/cuda/stream.h"
 #include "esvr/renderer.h"
 #include "render/cuda/device_table.h"
-#include "render/cuda/event.h"
 
 namespace esvr::cuda {
 
