@@ -58,9 +58,11 @@ EncodedGrid fitPlain(const RateInput& input, const Options& options, ConvertedGr
       encodeGrid(input.descriptor, input.source, std::move(fitted.field), input.activity);
   encoded.curve = grid.curve = std::move(fitted.curve);
   if (options.storage == Storage::kFloat32) return encoded;
-  CompactResult compact =
-      compactGrid(encoded, input.source,
-                  {.loss = options.storageLoss, .psnr = options.fit.psnr, .box = options.fit.box});
+  CompactResult compact = compactGrid(encoded, input.source,
+                                      {.loss = options.storageLoss,
+                                       .psnr = options.fit.psnr,
+                                       .box = options.fit.box,
+                                       .device = options.fit.device});
   recordCompact(compact, compact.grid, grid);
   return std::move(compact.grid);
 }

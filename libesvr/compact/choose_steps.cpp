@@ -1,7 +1,5 @@
 #include "compact/choose_steps.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,16 +8,20 @@
 namespace esvr {
 namespace {
 
-constexpr int kSearchIterations = 6, kFinalIterations = 24;  // of the solver
-constexpr int kFirstScalings = 3, kMostScalings = 12;
-constexpr double kParameters = 10.0;      // of an ellipsoid
-constexpr double kEnough = 0.93;          // of the budget: the next scaling would gain little
+constexpr int kFirstTrials = 3, kMostTrials = 10;
+constexpr double kNear = 1.6;          // a factor of the steps: slopes are alike within
+constexpr double kParameters = 10.0;   // of an ellipsoid
+constexpr double kEnough = 0.93;       // of the budget: the next scaling would gain little
+constexpr double kAim = 0.965;         // of the budget: between that and all of it
+constexpr double kErrorNarrow = 1.05;  // a factor of the steps: less is a hundredth of the bytes
+constexpr double kSizeNarrow = 1.01;
 constexpr double kFullEnough = 0.994;     // of the bytes
 constexpr double kFull = 0.985;           // of the bytes: less was not asked for
 constexpr double kProbe = 1.41421356237;  // half a bit
 constexpr double kMostChange = 2.0;       // of one stream's step against the others
 constexpr double kLeastAdded = 0.02;      // of the budget: below, scale boldly
 constexpr double kLeastGuess = 0.02;      // of the error allowed
+constexpr double kLeft = 0.75;            // of the error of rounding, by solving for intensities
 constexpr double kFirstLoss = 0.2;        // of the error: usual where bytes are short
 constexpr double kFine = 0.1;             // of the first guess: adds a hundredth of the budget
 
@@ -38,6 +40,9 @@ class Goal {
   [[nodiscard]] virtual bool met(const Trial& trial) const = 0;
   [[nodiscard]] virtual bool metByFinerSteps() const = 0;
   [[nodiscard]] virtual bool nearlyMissed(const Trial& trial) const = 0;
+  /// Factor between steps that meet it and steps that do not: less would gain little. Errors jump
+  /// where the lattice does.
+  [[nodiscard]] virtual double narrow() const = 0;
   /// Of two that meet it, or of two that do not.
   [[nodiscard]] virtual bool better(const Trial& a, const Trial& b) const = 0;
   /// Factor of the steps that should bring a trial to the goal's edge.
@@ -53,6 +58,7 @@ class ErrorGoal : public Goal {
 
   [[nodiscard]] bool met(const Trial& trial) const override { return trial.error <= allowed_; }
   [[nodiscard]] bool metByFinerSteps() const override { return true; }
+  [[nodiscard]] double narrow() const override { return kErrorNarrow; }
   [[nodiscard]] bool nearlyMissed(const Trial& trial) const override {
     return trial.error >= allowed_ - (1.0 - kEnough) * budget();
   }
@@ -61,7 +67,7 @@ class ErrorGoal : public Goal {
   }
   [[nodiscard]] double correction(const Trial& trial, const Trial&) const override {
     const double added = std::max(trial.error - base_, kLeastAdded * budget());
-    return std::clamp(std::sqrt(budget() / added), 0.25, 4.0);
+    return std::clamp(std::sqrt(kAim * budget() / added), 0.25, 4.0);
   }
 
  private:
@@ -78,6 +84,7 @@ class SizeGoal : public Goal {
 
   [[nodiscard]] bool met(const Trial& trial) const override { return trial.bytes <= bytes_; }
   [[nodiscard]] bool metByFinerSteps() const override { return false; }
+  [[nodiscard]] double narrow() const override { return kSizeNarrow; }
   [[nodiscard]] bool nearlyMissed(const Trial& trial) const override {
     return double(trial.bytes) >= kFullEnough * double(bytes_);
   }
@@ -110,80 +117,105 @@ class SizeGoal : public Goal {
 
 /// Independent roundings, each with a variance of a twelfth of its step's square.
 QuantiserSteps stepsThatAdd(double error, std::size_t ellipsoids) {
-  const double step = std::sqrt(12.0 * error / (kParameters * double(ellipsoids)));
+  const double step = std::sqrt(12.0 * error / (kLeft * kParameters * double(ellipsoids)));
   return {step, step, step, step};
 }
 
+/// Steps scaled together until a goal is near.
+Trial approach(TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps) {
+  Trial trial = maker.make(steps);
+  for (int n = 1; n < kFirstTrials; ++n) {
+    const double factor = goal.correction(trial, trial);
+    if (factor < kNear && factor > 1.0 / kNear) break;
+    trial = maker.make(scaled(trial.steps, factor));
+  }
+  return trial;
+}
+
 /// Steps scaled together until a goal is all but missed.
-Trial scaleTo(const TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps,
-              int iterations, int most) {
-  Trial best = maker.make(steps, iterations);
+Trial scaleTo(TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps) {
+  Trial best = maker.make(steps);
   Trial last = best, before = best;
   double high = HUGE_VAL, low = 0.0, factor = 1.0;  // factors known to lie beyond and short of it
-  for (int n = 1; n < most; ++n) {
-    if (goal.met(best) && goal.nearlyMissed(best)) break;
+  for (int n = 1; n < kMostTrials; ++n) {
+    if (goal.met(best) && (goal.nearlyMissed(best) || high < goal.narrow() * low)) break;
     (goal.met(last) == goal.metByFinerSteps() ? low : high) = factor;
     factor *= goal.correction(last, before);
     if (factor <= low || factor >= high)
       factor = low > 0.0 && high < HUGE_VAL ? std::sqrt(low * high) : factor;
     before = std::move(last);
-    last = maker.make(scaled(steps, factor), iterations);
+    last = maker.make(scaled(steps, factor));
     if (goal.met(last) != goal.met(best) ? goal.met(last) : goal.better(last, best)) best = last;
   }
   return best;
 }
 
-/// Error added by a byte saved, where a stream's step is made coarser; 0 where coarser costs
-/// nothing, infinite where it saves nothing.
-double slopeOf(const TrialMaker& maker, const Trial& here, double QuantiserSteps::*stream) {
-  QuantiserSteps coarser = here.steps;
-  coarser.*stream *= kProbe;
-  const Trial there = maker.make(coarser, kSearchIterations);
-  const double saved = double(here.bytes) - double(there.bytes);
-  return saved > 0.0 ? std::max(there.error - here.error, 0.0) / saved : HUGE_VAL;
+/// What half a bit less of one stream does.
+struct Probe {
+  double added = 0.0;  ///< error
+  double saved = 0.0;  ///< bytes
+
+  /// Error added by a byte saved: 0 where coarser costs nothing, infinite where it saves nothing.
+  [[nodiscard]] double slope() const { return saved > 0.0 ? added / saved : HUGE_VAL; }
+};
+using Probes = std::array<Probe, kStreams.size()>;
+
+Probes probe(TrialMaker& maker, const Trial& here) {
+  std::array<QuantiserSteps, kStreams.size()> coarser;
+  coarser.fill(here.steps);
+  for (std::size_t k = 0; k < kStreams.size(); ++k) coarser[k].*kStreams[k] *= kProbe;
+  const auto there = maker.make(coarser);
+  Probes probes;
+  for (std::size_t k = 0; k < probes.size(); ++k)
+    probes[k] = {std::max(there[k].error - here.error, 0.0),
+                 double(here.bytes) - double(there[k].bytes)};
+  return probes;
 }
 
-/// The geometric mean of those that are neither 0 nor infinite; 0 where there are none.
-double meanOf(const std::array<double, kStreams.size()>& slopes) {
+/// The geometric mean of slopes that are neither 0 nor infinite; 0 where there are none.
+double meanSlope(const Probes& probes) {
   double sum = 0.0;
   int counted = 0;
-  for (const double slope : slopes)
-    if (slope > 0.0 && slope < HUGE_VAL) sum += std::log(slope), ++counted;
+  for (const Probe& p : probes)
+    if (p.slope() > 0.0 && p.slope() < HUGE_VAL) sum += std::log(p.slope()), ++counted;
   return counted > 0 ? std::exp(sum / counted) : 0.0;
 }
 
 /// What a saved byte costs must be the same in every stream; a stream's cost grows with the square
-/// of its step.
-QuantiserSteps balanced(const TrialMaker& maker, const Trial& here) {
-  std::array<double, kStreams.size()> slopes{};
-  // side by side: the coding of a trial's bytes keeps to one thread
-  tbb::parallel_for(std::size_t{0}, slopes.size(),
-                    [&](std::size_t k) { slopes[k] = slopeOf(maker, here, kStreams[k]); });
-  const double mean = meanOf(slopes);
-  QuantiserSteps steps = here.steps;
-  for (std::size_t k = 0; k < slopes.size(); ++k) {
-    const double change = slopes[k] > 0.0 ? std::sqrt(mean / slopes[k]) : kMostChange;
-    steps.*kStreams[k] *= std::clamp(change, 1.0 / kMostChange, kMostChange);
+/// of its step. \return  steps, and the error and the bytes to expect of them
+Trial balanced(TrialMaker& maker, const Trial& here) {
+  const Probes probes = probe(maker, here);
+  const double mean = meanSlope(probes);
+  Trial expected{here.steps, {}, {}, here.error, here.bytes};
+  double saved = 0.0;
+  for (std::size_t k = 0; k < probes.size(); ++k) {
+    const double slope = probes[k].slope();
+    const double change = std::clamp(slope > 0.0 ? std::sqrt(mean / slope) : kMostChange,
+                                     1.0 / kMostChange, kMostChange);
+    expected.steps.*kStreams[k] *= change;
+    expected.error += probes[k].added * (change * change - 1.0) / (kProbe * kProbe - 1.0);
+    saved += probes[k].saved * std::log(change) / std::log(kProbe);
   }
-  return steps;
+  expected.bytes = std::uint64_t(std::max(double(here.bytes) - saved, 0.0));
+  return expected;
 }
 
-Trial search(const TrialMaker& maker, const Goal& goal, const QuantiserSteps& guess) {
-  const Trial near = scaleTo(maker, goal, guess, kSearchIterations, kFirstScalings);
-  return scaleTo(maker, goal, balanced(maker, near), kFinalIterations, kMostScalings);
+Trial search(TrialMaker& maker, const Goal& goal, const QuantiserSteps& guess) {
+  const Trial near = approach(maker, goal, guess);
+  const Trial expected = balanced(maker, near);
+  return scaleTo(maker, goal, scaled(expected.steps, goal.correction(expected, expected)));
 }
 
 }  // namespace
 
-Trial chooseStepsWithin(const TrialMaker& maker, double allowed) {
-  const double left = std::max(allowed - maker.error(), kLeastGuess * allowed);
+Trial chooseStepsWithin(TrialMaker& maker, double allowed) {
+  const double left = std::max(allowed - maker.leastError(), kLeastGuess * allowed);
   const QuantiserSteps guess = stepsThatAdd(left, maker.count());
-  Trial fine = maker.make(scaled(guess, kFine), kFinalIterations);
-  if (fine.error >= allowed) return fine;
-  return search(maker, ErrorGoal(allowed, fine.error), guess);
+  if (maker.leastError() >= allowed) return maker.make(scaled(guess, kFine));
+  return search(maker, ErrorGoal(allowed, maker.leastError()), guess);
 }
 
-Trial chooseStepsFor(const TrialMaker& maker, std::uint64_t bytes) {
+Trial chooseStepsFor(TrialMaker& maker, std::uint64_t bytes) {
   const double likely = kFirstLoss * std::max(maker.error(), maker.invisibleError());
   return search(maker, SizeGoal(bytes, maker.count()), stepsThatAdd(likely, maker.count()));
 }

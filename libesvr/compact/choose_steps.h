@@ -11,10 +11,10 @@ namespace esvr {
 /// is measured and made equal, then all steps are scaled together. Where no trial stays within the
 /// error, the one with the smallest error.
 /// \param allowed  sum of squares over the box
-[[nodiscard]] Trial chooseStepsWithin(const TrialMaker& maker, double allowed);
+[[nodiscard]] Trial chooseStepsWithin(TrialMaker& maker, double allowed);
 
 /// The other way round: the smallest error of the trials of at most so many bytes; where none is,
 /// the smallest.
-[[nodiscard]] Trial chooseStepsFor(const TrialMaker& maker, std::uint64_t bytes);
+[[nodiscard]] Trial chooseStepsFor(TrialMaker& maker, std::uint64_t bytes);
 
 }  // namespace esvr

@@ -111,6 +111,14 @@ class RateControl {
                        [&](const Attempt& attempt) { return attempt.psnr > psnr; });
   }
 
+  /// The PSNR of the attempt that reached one and came nearest.
+  static double leastAbove(const std::vector<Attempt>& attempts, double psnr) {
+    double least = HUGE_VAL;
+    for (const Attempt& attempt : attempts)
+      if (attempt.psnr > psnr) least = std::min(least, attempt.psnr);
+    return least;
+  }
+
   /// From the last attempt, or between the nearest on either side.
   [[nodiscard]] double nextCount(const std::vector<Attempt>& attempts, double psnr) const {
     const Attempt* below = nullptr;
@@ -134,9 +142,10 @@ class RateControl {
       if (!ended(best)) best.fit.end = FitEnd::kPsnrMissed;
       return rated(std::move(best), options);
     }
+    const double most = std::max(leastAbove(attempts, psnr), psnr + kTooMuchLoss);
     std::optional<RatedGrid> smallest;
     for (Attempt& attempt : attempts) {
-      if (attempt.psnr <= psnr) continue;
+      if (attempt.psnr <= psnr || attempt.psnr > most) continue;
       if (!ended(attempt)) attempt.fit.end = FitEnd::kPsnrReached;
       RatedGrid now = rated(std::move(attempt), options);
       if (!smallest || now.compact.bytes < smallest->compact.bytes) smallest = std::move(now);
@@ -158,6 +167,7 @@ class RateControl {
     CompactOptions options;
     options.loss = loss;
     options.box = input_.options.box;
+    options.device = input_.options.device;
     return options;
   }
 

@@ -1,5 +1,8 @@
 #include "compact/trial.h"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -11,6 +14,10 @@ namespace esvr {
 namespace {
 
 constexpr double kInvisiblePsnr = 110.0;
+
+/// Of the solver. Rounded shapes begin with the intensities of the float32 ones: what four
+/// iterations leave is a thousandth of the error.
+constexpr int kFirstIterations = 8, kIterations = 4;
 
 std::vector<std::vector<double>> byChunk(const Field& field, const std::vector<double>& all) {
   std::vector<std::vector<double>> result;
@@ -33,6 +40,29 @@ void storeIntensities(std::span<const float> intensities, Trial& trial) {
   }
 }
 
+void countBytes(Trial& trial) {
+  for (const auto& chunk : trial.quantised) trial.bytes += format::storedBytes(chunk);
+}
+
+std::size_t layersOf(const Trial& trial) {
+  std::size_t layers = 1;
+  for (const auto& chunk : trial.quantised) layers = std::max(layers, chunk.layerEnds.size());
+  return layers;
+}
+
+/// A trial's intensities, zero beyond the first layers.
+std::vector<float> ofFirstLayers(const Trial& trial, std::size_t layers) {
+  std::vector<float> all = intensitiesOf(trial.field);
+  auto chunk = all.begin();
+  for (const auto& q : trial.quantised) {
+    const auto end = chunk + std::ptrdiff_t(q.size());
+    if (q.layerEnds.size() > layers)
+      std::fill(chunk + std::ptrdiff_t(q.layerEnds[layers - 1]), end, 0.0f);
+    chunk = end;
+  }
+  return all;
+}
+
 }  // namespace
 
 double squaresOf(double psnr, const SparseVolume& source, const Box& box) {
@@ -40,45 +70,67 @@ double squaresOf(double psnr, const SparseVolume& source, const Box& box) {
   return peak * peak * box.volume() * std::pow(10.0, -psnr / 10.0);
 }
 
-TrialMaker::TrialMaker(const EncodedGrid& grid, const SparseVolume& source, const Box& box)
-    : field_(grid.field),
-      target_{source,
+TrialMaker::TrialMaker(const EncodedGrid& grid, const TrialTarget& target)
+    : target_{target.source,
               {format::ruleOf(grid), grid.activeThreshold},
-              box,
+              target.box,
               grid.leaves,
-              grid.topology != TopologyKind::kThreshold} {
-  IntensityProblem problem(field_, target_);
-  error_ = problem.error(intensitiesOf(field_));
-  curvature_ = byChunk(field_, problem.curvature());
-  invisible_ = squaresOf(kInvisiblePsnr, source, box);
+              grid.topology != TopologyKind::kThreshold},
+      problem_(target_, target.device),
+      field_(grid.field),
+      invisible_(squaresOf(kInvisiblePsnr, target.source, target.box)) {
+  problem_.setShapes(field_);
+  auto intensities = intensitiesOf(field_);
+  error_ = problem_.error(intensities).squares;
+  leastError_ = problem_.solve(intensities, kFirstIterations);
+  setIntensities(intensities, field_);
+  curvature_ = byChunk(field_, problem_.curvature());
 }
 
 /// The field then has rounded shapes and its old intensities, in the file's order.
 void TrialMaker::quantiseChunks(Trial& trial) const {
-  for (std::size_t c = 0; c < field_.chunks.size(); ++c) {
+  trial.quantised.resize(field_.chunks.size());
+  tbb::parallel_for(std::size_t{0}, field_.chunks.size(), [&](std::size_t c) {
     const Ellipsoids& e = field_.chunks[c].ellipsoids;
     std::vector<std::size_t> order;
-    trial.quantised.push_back(quantise(e, chooseLattice(e, curvature_[c], trial.steps), order));
+    trial.quantised[c] = quantise(e, chooseLattice(e, curvature_[c], trial.steps), order);
     Ellipsoids& rounded = trial.field.chunks[c].ellipsoids;
-    rounded = dequantise(trial.quantised.back());
+    rounded = dequantise(trial.quantised[c]);
     for (std::size_t i = 0; i < order.size(); ++i) rounded.intensity[i] = e.intensity[order[i]];
-  }
+  });
 }
 
-void TrialMaker::solveIntensities(Trial& trial, int iterations) const {
-  IntensityProblem problem(trial.field, target_);
+void TrialMaker::solveIntensities(Trial& trial) {
+  problem_.setShapes(trial.field);
   auto intensities = intensitiesOf(trial.field);
-  if (iterations > 0) problem.solve(intensities, iterations);
+  problem_.solve(intensities, kIterations);
   storeIntensities(intensities, trial);
-  trial.error = problem.error(intensitiesOf(trial.field));
+  trial.error = problem_.error(intensitiesOf(trial.field)).squares;
 }
 
-Trial TrialMaker::make(const QuantiserSteps& steps, int iterations) const {
-  Trial trial{steps, field_, {}, 0.0, 0};
-  quantiseChunks(trial);
-  solveIntensities(trial, iterations);
-  for (const auto& chunk : trial.quantised) trial.bytes += format::storedBytes(chunk);
-  return trial;
+Trial TrialMaker::make(const QuantiserSteps& steps) {
+  return std::move(make(std::span(&steps, 1)).front());
+}
+
+std::vector<Trial> TrialMaker::make(std::span<const QuantiserSteps> steps) {
+  std::vector<Trial> trials(steps.size());
+  tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t k) {
+    trials[k] = {steps[k], field_, {}, 0.0, 0};
+    quantiseChunks(trials[k]);
+  });
+  for (Trial& trial : trials) solveIntensities(trial);  // each has all threads, or the GPU
+  tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t k) { countBytes(trials[k]); });
+  return trials;
+}
+
+std::vector<StoredError> TrialMaker::layerErrors(const Trial& trial) {
+  std::vector<StoredError> errors;
+  const std::size_t layers = layersOf(trial);
+  if (layers < 2) return errors;
+  problem_.setShapes(trial.field);
+  for (std::size_t k = 1; k <= layers; ++k)
+    errors.push_back(problem_.error(ofFirstLayers(trial, k)));
+  return errors;
 }
 
 }  // namespace esvr

@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "esvr/container.h"
+#include "esvr/device.h"
 #include "esvr/quantised.h"
 #include "esvr/sparse_volume.h"
 #include "fit/intensity_problem.h"
@@ -20,10 +22,17 @@ struct Trial {
   std::uint64_t bytes = 0;  ///< of the ellipsoids
 };
 
+/// What is measured against: where it counts, and where the work is done.
+struct TrialTarget {
+  const SparseVolume& source;
+  Box box;
+  Device device;
+};
+
 class TrialMaker {
  public:
-  /// All must outlive the maker.
-  TrialMaker(const EncodedGrid& grid, const SparseVolume& source, const Box& box);
+  /// Grid and source must outlive the maker. \throws DeviceError  the GPU cannot be used
+  TrialMaker(const EncodedGrid& grid, const TrialTarget& target);
 
   /// Where the fit is exact, or nearly, there is nothing to compare a loss with: an error that no
   /// one sees.
@@ -31,19 +40,28 @@ class TrialMaker {
 
   /// Error of the float32 field.
   [[nodiscard]] double error() const { return error_; }
+  /// The same with the intensities that serve its shapes best: what finer steps come near to.
+  [[nodiscard]] double leastError() const { return leastError_; }
   [[nodiscard]] std::size_t count() const { return field_.primitiveCount(); }
 
-  /// \param iterations  of the solver that fits the intensities to the rounded shapes
-  [[nodiscard]] Trial make(const QuantiserSteps& steps, int iterations) const;
+  /// Rounds the shapes, fits the intensities to what became of them, and rounds these.
+  [[nodiscard]] Trial make(const QuantiserSteps& steps);
+  /// Several at once, each as it would be alone.
+  [[nodiscard]] std::vector<Trial> make(std::span<const QuantiserSteps> steps);
+
+  /// How far off each prefix of the layers is, the last the trial itself; nothing where there is
+  /// but one layer.
+  [[nodiscard]] std::vector<StoredError> layerErrors(const Trial& trial);
 
  private:
   void quantiseChunks(Trial& trial) const;
-  void solveIntensities(Trial& trial, int iterations) const;
+  void solveIntensities(Trial& trial);
 
-  const Field& field_;
   IntensityTarget target_;
+  IntensityProblem problem_;
+  Field field_;  ///< float32, with its best intensities: those of rounded shapes are not far
   std::vector<std::vector<double>> curvature_;  ///< by chunk
-  double error_ = 0.0, invisible_ = 0.0;
+  double error_ = 0.0, leastError_ = 0.0, invisible_ = 0.0;
 };
 
 /// Sum of squares over a box of a PSNR.

@@ -45,23 +45,31 @@ struct PairTapes {
   }
 };
 
-/// Tapes of one brick that stay, as short as they are.
-struct KeptTapes {
-  std::vector<PairTape> tapes;
-  AlignedFloats phi;
-
-  KeptTapes() = default;
-  explicit KeptTapes(std::span<const PairTape> from) : tapes(from.begin(), from.end()) {
+/// Tapes of one brick that stay, as short as they are; their memory is used again for the next.
+class KeptTapes {
+ public:
+  void keep(std::span<const PairTape> from) {
     std::size_t floats = 0;
     for (const PairTape& tape : from) floats += std::size_t(tape.floats);
-    phi = AlignedFloats(floats);
-    float* at = phi.get();
-    for (PairTape& tape : tapes) {
+    if (floats > capacity_) {
+      capacity_ = floats + floats / kSpare;
+      phi_ = AlignedFloats(capacity_);
+    }
+    tapes_.assign(from.begin(), from.end());
+    float* at = phi_.get();
+    for (PairTape& tape : tapes_) {
       std::copy_n(tape.phi, tape.floats, at);
       tape.phi = at;
       at += tape.floats;
     }
   }
+  [[nodiscard]] std::span<const PairTape> tapes() const { return tapes_; }
+
+ private:
+  static constexpr std::size_t kSpare = 8;  ///< one part in so many: shapes change a little
+  std::vector<PairTape> tapes_;
+  AlignedFloats phi_;
+  std::size_t capacity_ = 0;
 };
 
 }  // namespace esvr

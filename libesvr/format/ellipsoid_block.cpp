@@ -1,5 +1,7 @@
 #include "format/ellipsoid_block.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <bit>
 #include <type_traits>
@@ -186,8 +188,11 @@ BlockStreams encodeBlock(QuantisedEllipsoids& q, Run run) {
 }
 
 std::vector<BlockStreams> encodeBlocks(QuantisedEllipsoids q) {
-  std::vector<BlockStreams> blocks;
-  for (const Run run : blockRuns(q)) blocks.push_back(encodeBlock(q, run));
+  const std::vector<Run> runs = blockRuns(q);
+  std::vector<BlockStreams> blocks(runs.size());
+  // coding writes back what it reads, each block to its own run
+  tbb::parallel_for(std::size_t{0}, runs.size(),
+                    [&](std::size_t b) { blocks[b] = encodeBlock(q, runs[b]); });
   return blocks;
 }
 

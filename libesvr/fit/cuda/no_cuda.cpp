@@ -2,6 +2,7 @@
 
 #include "core/cuda_probe.h"
 #include "esvr/error.h"
+#include "fit/cuda/make_cuda_intensity_passes.h"
 #include "fit/cuda/make_cuda_optimiser.h"
 #include "fit/cuda/make_cuda_paper_optimiser.h"
 
@@ -18,6 +19,11 @@ namespace {
 std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget&, const OptimiserOptions& options,
                                              const Tuning&) {
   refuse(options.device);
+}
+
+std::unique_ptr<IntensityPasses> makeCudaIntensityPasses(const IntensityTarget&,
+                                                         const Device& device) {
+  refuse(device);
 }
 
 namespace paper {

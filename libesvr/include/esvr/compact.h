@@ -7,19 +7,21 @@
 
 #include "esvr/container.h"
 #include "esvr/coord.h"
+#include "esvr/device.h"
 #include "esvr/quantised.h"
 #include "esvr/sparse_volume.h"
 
 namespace esvr {
 
 struct CompactOptions {
-  static constexpr double kDefaultLoss = 0.3;
+  static constexpr double kDefaultLoss = 0.1;
 
   /// dB of PSNR over the box that quantising may cost, against the same ellipsoids in float32.
   double loss = kDefaultLoss;
   std::optional<double> psnr{};  ///< dB over the box: instead of `loss`, as small as reaches this
   std::optional<std::uint64_t> bytes{};  ///< of the ellipsoids: instead of both, as good as fits
   std::optional<Box> box{};              ///< default: the active bounding box
+  Device device{};                       ///< that tries the bits out
 };
 
 struct CompactResult {
@@ -29,9 +31,10 @@ struct CompactResult {
   std::uint64_t bytes = 0;  ///< of the ellipsoids
 };
 
-/// Deterministic. Where the PSNR or the size asked for is out of reach, the result is as near as
-/// rounding comes. \param grid  as encodeGrid made it from `source`; without kappas of each
-/// ellipsoid \throws RuntimeFailure  ellipsoids that no lattice holds
+/// Deterministic; devices round differently, and may come to other bits. Where the PSNR or the size
+/// asked for is out of reach, the result is as near as rounding comes.
+/// \param grid  as encodeGrid made it from `source`; without kappas of each ellipsoid
+/// \throws RuntimeFailure  ellipsoids that no lattice holds; DeviceError  the GPU cannot be used
 [[nodiscard]] CompactResult compactGrid(const EncodedGrid& grid, const SparseVolume& source,
                                         const CompactOptions& options = {});
 

@@ -1,0 +1,164 @@
+#include "fit/cuda/cuda_intensity_passes.h"
+
+#include <algorithm>
+
+#include "core/cuda/use_device.h"
+#include "esvr/error.h"
+#include "field/gather.h"
+#include "fit/cuda/copy.h"
+#include "fit/cuda/make_cuda_intensity_passes.h"
+#include "fit/cuda/memory_pool.h"
+#include "fit/cuda/step.h"
+
+namespace esvr {
+namespace cuda {
+namespace {
+
+/// Relative to a frame, in bricks.
+std::vector<Coord> bricksOf(const IntensityTarget& target) {
+  std::vector<Coord> bricks = knownCorners(target);
+  for (Coord& b : bricks) b = brickOf(b - target.source.origin);
+  return bricks;
+}
+
+/// Values of the known bricks, in their order.
+std::vector<float> valuesOf(const IntensityTarget& target) {
+  std::vector<float> all;
+  for (const Coord corner : knownCorners(target)) {
+    const float* const values = sourceValues(target.source, corner);
+    if (values != nullptr)
+      all.insert(all.end(), values, values + kBrickVoxels);
+    else
+      all.insert(all.end(), std::size_t(kBrickVoxels), target.source.background);
+  }
+  return all;
+}
+
+std::vector<Primitive> primitivesOf(const Field& field, Coord origin) {
+  std::vector<Primitive> all;
+  all.reserve(field.primitiveCount());
+  for (const auto& chunk : field.chunks) {
+    const Ellipsoids& e = chunk.ellipsoids;
+    if (!e.kappa.empty()) throw RuntimeFailure("solving on a GPU takes one kappa for all");
+    const Coord frame = chunk.origin - origin;
+    for (std::size_t i = 0; i < e.size(); ++i)
+      all.push_back({{frame.x + double(e.center[0][i]), frame.y + double(e.center[1][i]),
+                      frame.z + double(e.center[2][i])},
+                     unitFrame(e, i),
+                     0.0});
+  }
+  return all;
+}
+
+}  // namespace
+
+CudaIntensityPasses::CudaIntensityPasses(const IntensityTarget& target)
+    : origin_(target.source.origin),
+      sourceBackground_(target.source.background),
+      stored_(storedRule(target.stored)),
+      box_{target.box.min - origin_, target.box.max - origin_},
+      restricted_(target.restrictToBricks),
+      bricks_(bricksOf(target), stream_.get()),
+      lists_(stream_.get()),
+      source_(valuesOf(target), stream_.get()),
+      primitives_(stream_.get()),
+      forms_(stream_.get()),
+      heights_(stream_.get()),
+      errors_(stream_.get()),
+      exact_(stream_.get()),
+      projections_(stream_.get()),
+      sums_(stream_.get()) {}
+
+void CudaIntensityPasses::setShapes(const Field& field) {
+  const auto primitives = primitivesOf(field, origin_);
+  const double radius = supportRadius(kernelConstants<double>(field.kernel));
+  fieldBackground_ = field.background;
+  kernel_ = kernelConstants<float>(field.kernel);
+  count_ = primitives.size();
+  uploadTo(primitives_.reserve(count_), std::span<const Primitive>(primitives), stream_.get());
+  launchForms(primitives_.data(), std::uint32_t(count_), radius, forms_.reserve(count_),
+              stream_.get());
+  const SupportSource supports{primitives_.data(), count_, radius, kRoundingSlack};
+  if (!restricted_) bricks_.findReached(supports);
+  lists_.rebuild(supports, bricks_);
+  errors_.reserve(bricks_.size());
+  exact_.reserve(bricks_.size() * IntensityPassArguments::kMaskWords);
+  projections_.reserve(lists_.pairCount());
+  sums_.reserve(2 * count_);
+}
+
+IntensityPassArguments CudaIntensityPasses::arguments(std::span<const float> heights) {
+  uploadTo(heights_.reserve(count_), heights, stream_.get());
+  return {.bricks = bricks_.view().bricks,
+          .brickCount = std::uint32_t(bricks_.size()),
+          .targetCount = std::uint32_t(bricks_.targetCount()),
+          .lists = lists_.view(),
+          .forms = forms_.data(),
+          .heights = heights_.data(),
+          .kernel = kernel_,
+          .source = source_.data(),
+          .sourceBackground = sourceBackground_,
+          .fieldBackground = fieldBackground_,
+          .stored = stored_,
+          .box = box_,
+          .errors = errors_.data(),
+          .exact = exact_.data(),
+          .projections = projections_.data()};
+}
+
+StoredError CudaIntensityPasses::totalError() {
+  brickErrors_.resize(bricks_.size());
+  downloadTo(std::span<StoredError>(brickErrors_), errors_.data(), stream_.get());
+  StoredError total;
+  for (const StoredError& e : brickErrors_) {
+    total.squares += e.squares;
+    total.largest = std::max(total.largest, e.largest);
+  }
+  return total;
+}
+
+void CudaIntensityPasses::sumPairs(std::vector<double>* rPhi, std::vector<double>* phi2) {
+  double* const sums = sums_.data();
+  launchProjectionSums({.projections = projections_.data(),
+                        .primitiveBegin = lists_.view().primitiveBegin,
+                        .primitiveCount = std::uint32_t(count_),
+                        .rPhi = sums,
+                        .phi2 = phi2 ? sums + count_ : nullptr},
+                       stream_.get());
+  const auto download = [&](std::vector<double>* to, const double* from) {
+    if (!to) return;
+    to->resize(count_);
+    downloadTo(std::span<double>(*to), from, stream_.get());
+  };
+  download(rPhi, sums);
+  download(phi2, sums + count_);
+}
+
+StoredError CudaIntensityPasses::error(std::span<const float> intensities) {
+  launchStoredErrors(arguments(intensities), stream_.get());
+  return totalError();
+}
+
+StoredError CudaIntensityPasses::gradient(std::span<const float> intensities,
+                                          IntensityGradient& out) {
+  launchIntensityGradient(arguments(intensities), stream_.get());
+  sumPairs(&out.byIntensity, &out.curvature);
+  return totalError();
+}
+
+void CudaIntensityPasses::applyNormal(std::span<const double> direction, std::vector<double>& out) {
+  const std::vector<float> heights(direction.begin(), direction.end());
+  launchNormalProduct(arguments(heights), stream_.get());
+  sumPairs(&out, nullptr);
+}
+
+}  // namespace cuda
+
+std::unique_ptr<IntensityPasses> makeCudaIntensityPasses(const IntensityTarget& target,
+                                                         const Device& device) {
+  cuda::useDevice(device);
+  cuda::keepFreedMemory();
+  return std::make_unique<cuda::CudaIntensityPasses>(target);
+}
+
+}  // namespace esvr

@@ -1,0 +1,48 @@
+#pragma once
+/// IntensityPasses on a GPU. Phi is worked out in each pass: that takes less time there than to
+/// read it.
+
+#include "core/cuda/stream.h"
+#include "fit/cuda/brick_table.h"
+#include "fit/cuda/intensity_pass.h"
+#include "fit/cuda/pair_lists.h"
+
+namespace esvr::cuda {
+
+class CudaIntensityPasses final : public IntensityPasses {
+ public:
+  /// The device that is to be used must be the current one.
+  explicit CudaIntensityPasses(const IntensityTarget& target);
+
+  void setShapes(const Field& field) override;
+  [[nodiscard]] StoredError error(std::span<const float> intensities) override;
+  StoredError gradient(std::span<const float> intensities, IntensityGradient& out) override;
+  void applyNormal(std::span<const double> direction, std::vector<double>& out) override;
+
+ private:
+  [[nodiscard]] IntensityPassArguments arguments(std::span<const float> heights);
+  [[nodiscard]] StoredError totalError();
+  void sumPairs(std::vector<double>* rPhi, std::vector<double>* phi2);
+
+  Coord origin_;  ///< of the bricks' frame
+  float sourceBackground_, fieldBackground_ = 0.0f;
+  StoredRule stored_;
+  Box box_;
+  bool restricted_;
+  KernelConstants<float> kernel_{};
+  std::size_t count_ = 0;  ///< of primitives
+  Stream stream_;
+  BrickTable bricks_;
+  PairLists lists_;
+  DeviceBuffer<float> source_;
+  GrowingBuffer<Primitive> primitives_;
+  GrowingBuffer<PairForm> forms_;
+  GrowingBuffer<float> heights_;
+  GrowingBuffer<StoredError> errors_;
+  GrowingBuffer<std::uint32_t> exact_;
+  GrowingBuffer<PairProjection> projections_;
+  GrowingBuffer<double> sums_;
+  std::vector<StoredError> brickErrors_;
+};
+
+}  // namespace esvr::cuda

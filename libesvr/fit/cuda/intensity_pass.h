@@ -1,0 +1,51 @@
+#pragma once
+/// Passes over the bricks for a solve of intensities: sums, what a reader makes of them, and back
+/// to the primitives.
+
+#include <cuda_runtime_api.h>
+
+#include "field/brick_kernels.h"
+#include "fit/cuda/pair_form.h"
+#include "fit/cuda/pair_lists.h"
+#include "fit/intensity_passes.h"
+#include "fit/stored_rule.h"
+
+namespace esvr::cuda {
+
+/// Pointers are to device memory, borrowed.
+struct IntensityPassArguments {
+  /// Of a brick in `exact`: bit v of them says that voxel v was stored exactly.
+  static constexpr std::uint32_t kMaskWords = kBrickVoxels / 32;
+
+  const Coord* bricks;
+  std::uint32_t brickCount, targetCount;
+  PairListsView lists;
+  const PairForm* forms;  ///< a primitive's; without their intensity
+  const float* heights;   ///< instead of it
+  KernelConstants<float> kernel;
+  const float* source;  ///< kBrickVoxels a target brick
+  float sourceBackground, fieldBackground;
+  StoredRule stored;
+  Box box;                      ///< of errors, in the bricks' frame
+  StoredError* errors;          ///< out, a brick's
+  std::uint32_t* exact;         ///< kMaskWords a brick
+  PairProjection* projections;  ///< out, a pair's
+};
+
+/// Writes errors.
+void launchStoredErrors(const IntensityPassArguments& arguments, cudaStream_t stream);
+/// Writes errors, exact voxels, and projections of residuals.
+void launchIntensityGradient(const IntensityPassArguments& arguments, cudaStream_t stream);
+/// Writes projections of the sum, less its exact voxels.
+void launchNormalProduct(const IntensityPassArguments& arguments, cudaStream_t stream);
+
+/// Sums of the projections of each primitive's pairs, in one order.
+struct ProjectionSums {
+  const PairProjection* projections;
+  const std::uint32_t* primitiveBegin;
+  std::uint32_t primitiveCount;
+  double *rPhi, *phi2;  ///< out, a primitive's; null: not wanted
+};
+void launchProjectionSums(const ProjectionSums& sums, cudaStream_t stream);
+
+}  // namespace esvr::cuda

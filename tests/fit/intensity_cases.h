@@ -1,0 +1,191 @@
+#pragma once
+/// Plan, for each device: the solution against one of dense normal equations in float64, exact data
+/// recovered, errors as a reader has them, voxels that come back exactly left alone, and nothing
+/// left over from the field before.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "esvr/error.h"
+#include "esvr/field.h"
+#include "esvr/metrics.h"
+#include "fit/intensity_problem.h"
+#include "volumes.h"
+
+namespace esvr::test {
+
+class Intensities : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    try {
+      device_ = selectDevice(GetParam());
+    } catch (const DeviceError& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+  [[nodiscard]] IntensityProblem problemOf(const Field& field, const IntensityTarget& target) {
+    IntensityProblem problem(target, device_);
+    problem.setShapes(field);
+    return problem;
+  }
+  Device device_;
+};
+
+inline Field someField() {
+  return randomField(
+      {.count = 12, .extent = 14.0, .smallest = 1.5, .aspect = 2.0, .origin = {6, 16, 11}});
+}
+
+/// Every voxel active.
+inline IntensityTarget targetOf(const SparseVolume& volume) {
+  return {volume, {{}, -1.0f}, activeBox(volume)};
+}
+
+TEST_P(Intensities, ThatMadeTheVolumeAreFound) {
+  const Field truth = someField();
+  const SparseVolume volume = revoxelise(truth, {});
+  auto problem = problemOf(truth, targetOf(volume));
+  std::vector<float> guess(truth.primitiveCount(), 0.1f);
+  guess[3] = -0.1f;  // signs are allowed then
+  EXPECT_GT(problem.error(guess).squares, 1.0);
+  // 12 unknowns: exact after 12 steps but for rounding in float32 brick sums
+  EXPECT_LT(problem.solve(guess, 30), 1e-7);
+  const auto& wanted = truth.chunks[0].ellipsoids.intensity;
+  for (std::size_t i = 0; i < guess.size(); ++i) EXPECT_NEAR(guess[i], wanted[i], 1e-3) << i;
+}
+
+using Row = std::vector<double>;
+
+/// Gauss's way, in place. \return x of A x = b
+inline Row solved(std::vector<Row> A, Row b) {
+  const std::size_t n = b.size();
+  for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t r = k + 1; r < n; ++r) {
+      const double f = A[r][k] / A[k][k];
+      for (std::size_t c = k; c < n; ++c) A[r][c] -= f * A[k][c];
+      b[r] -= f * b[k];
+    }
+  for (std::size_t k = n; k-- > 0;) {
+    for (std::size_t c = k + 1; c < n; ++c) b[k] -= A[k][c] * b[c];
+    b[k] /= A[k][k];
+  }
+  return b;
+}
+
+/// Every ellipsoid alone, with an intensity of 1.
+inline std::vector<Field> kernelsOf(const Field& field) {
+  std::vector<Field> kernels(field.primitiveCount(), field);
+  for (std::size_t i = 0; i < kernels.size(); ++i) {
+    auto& intensity = kernels[i].chunks[0].ellipsoids.intensity;
+    std::fill(intensity.begin(), intensity.end(), 0.0f);
+    intensity[i] = 1.0f;
+  }
+  return kernels;
+}
+
+TEST_P(Intensities, AgreeWithDenseNormalEquations) {
+  const Field field = someField();
+  const SparseVolume volume = tubeVolume();
+  auto problem = problemOf(field, targetOf(volume));
+  std::vector<float> solution(field.primitiveCount(), -0.01f);
+  (void)problem.solve(solution, 60);
+
+  const auto kernels = kernelsOf(field);
+  std::vector<Row> normal(solution.size(), Row(solution.size()));
+  Row right(solution.size());
+  const auto add = [&](Coord voxel, double wanted) {
+    Row phi;
+    for (const Field& kernel : kernels) phi.push_back(evaluateReference(kernel, voxel));
+    for (std::size_t r = 0; r < phi.size(); ++r) {
+      right[r] += phi[r] * wanted;
+      for (std::size_t c = 0; c < phi.size(); ++c) normal[r][c] += phi[r] * phi[c];
+    }
+  };
+  // all voxels that a support reaches, and all of the volume's
+  for (std::int32_t x = 0; x < 40; ++x)
+    for (std::int32_t y = 0; y < 40; ++y)
+      for (std::int32_t z = 0; z < 40; ++z) {
+        const auto at = findBrick(volume, brickOf(Coord{x, y, z} - volume.origin));
+        const int offset = voxelOffset(localOf({x, y, z}));
+        add({x, y, z}, at ? double(volume.brickValues(*at)[std::size_t(offset)]) : 0.0);
+      }
+  const Row exact = solved(normal, right);
+  // sums over a brick are float32: 1e-6 of sums of about 100, over curvatures of about 10
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    EXPECT_NEAR(solution[i], exact[i], 1e-4) << i;
+    EXPECT_NEAR(problem.curvature()[i], normal[i][i], 1e-4 * normal[i][i]);
+  }
+}
+
+/// A reader's rule that leaves voxels inactive and clamps others.
+struct ReaderRule {
+  RevoxeliseOptions options{.threshold = 0.2f, .range = ValueRange{0.0f, 0.9f}};
+  StoredValue stored{{.range = options.range}, options.threshold};
+};
+
+TEST_P(Intensities, HaveTheErrorThatAReaderGets) {
+  const Field field = someField();
+  const SparseVolume volume = tubeVolume();
+  const ReaderRule rule;
+  Box box = activeBox(volume);
+  box.min.x += 3, box.max.z -= 5;  // not along bricks
+  const auto found = problemOf(field, {volume, rule.stored, box}).error(intensitiesOf(field));
+  const auto metrics = compareVolumes(volume, revoxelise(field, rule.options), {.box = box});
+  // values within 1e-6, errors up to 1, some 20,000 voxels whose differences cancel
+  EXPECT_NEAR(found.squares, metrics.mseBox * metrics.boxVoxels, 1e-4);
+  EXPECT_NEAR(found.largest, metrics.maxError, 1e-5);
+}
+
+TEST_P(Intensities, KeepTheirSignWhereThereIsOne) {
+  const Field field = someField();
+  const SparseVolume volume = tubeVolume();
+  auto problem = problemOf(field, targetOf(volume));
+  std::vector<float> intensities(field.primitiveCount(), 0.2f);
+  const double before = problem.error(intensities).squares;
+  EXPECT_LE(problem.solve(intensities, 20), before);
+  for (const float i : intensities) EXPECT_GE(i, 0.0f);
+}
+
+TEST_P(Intensities, LeaveExactVoxelsAlone) {
+  const Field field = someField();
+  const SparseVolume volume = tubeVolume();
+  // nothing is active: every voxel of the background is exact, and no other matters to the fit
+  IntensityTarget target = targetOf(volume);
+  target.stored.threshold = 1e6f;
+  auto passes = makeIntensityPasses(target, device_);
+  passes->setShapes(field);
+  IntensityGradient gradient;
+  (void)passes->gradient(intensitiesOf(field), gradient);
+  const std::vector<double> direction(field.primitiveCount(), 1.0);
+  std::vector<double> some, all;
+  passes->applyNormal(direction, some);
+  target.stored.threshold = -1.0f;
+  auto unrestricted = makeIntensityPasses(target, device_);
+  unrestricted->setShapes(field);
+  (void)unrestricted->gradient(std::vector<float>(direction.size(), 0.5f), gradient);
+  unrestricted->applyNormal(direction, all);
+  double sumSome = 0.0, sumAll = 0.0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EXPECT_LE(some[i], all[i] * (1.0 + 1e-5)) << i;
+    sumSome += some[i], sumAll += all[i];
+  }
+  EXPECT_LT(sumSome, 0.9 * sumAll);  // much of the field lies beside the tube
+}
+
+TEST_P(Intensities, DoNotDependOnTheFieldBefore) {
+  const SparseVolume volume = tubeVolume();
+  const Field field = someField();
+  const Field other = randomField(
+      {.count = 40, .extent = 60.0, .smallest = 2.0, .aspect = 3.0, .origin = {-9, 2, 5}});
+  const IntensityTarget target = targetOf(volume);
+  auto fresh = problemOf(field, target);
+  auto used = problemOf(other, target);
+  std::vector<float> a(field.primitiveCount(), 0.2f), b = a, c(other.primitiveCount(), 0.1f);
+  (void)used.solve(c, 3);
+  used.setShapes(field);
+  EXPECT_EQ(fresh.solve(a, 10), used.solve(b, 10));
+  EXPECT_EQ(a, b);
+}
+
+}  // namespace esvr::test
