@@ -17,7 +17,7 @@ namespace {
 /// Quantising may cost so much where bytes are short: the same bytes do as much in more ellipsoids
 /// as in more bits (docs/benchmarks.md has the measurement).
 constexpr double kLoss = 0.9;                         // dB
-constexpr double kLeastLoss = 0.35, kMostLoss = 1.5;  // near enough: the optimum is flat
+constexpr double kLeastLoss = 0.35, kMostLoss = 2.0;  // near enough: the optimum is flat
 constexpr double kBytesEach = 8.0;                    // first guess
 constexpr double kDbPerDoubling = 4.5;                // of the number of ellipsoids
 constexpr double kDraftBehind = 2.5;                  // dB that a short fit stays behind a full one
