@@ -1,61 +1,28 @@
 #include "esvr/nano_volume.h"
 
-#include "vdb/versions.h"
-
-#define NANOVDB_USE_OPENVDB
-#include ESVR_NANOVDB_CREATE
-
 #include <cstring>
 #include <new>
-#include <stdexcept>
 
+#include "vdb/make_nano.h"
 #include "vdb/volume_to_tree.h"
 
 namespace esvr {
 namespace {
 
-using Handle = nanovdb::GridHandle<nanovdb::HostBuffer>;
 constexpr std::align_val_t kAlignment{32};
 
-template <class Build>
-Handle converted(const openvdb::FloatGrid& grid) {
-#ifdef ESVR_NANOVDB_HAS_CREATE
-  return vdb::nanotools::createNanoGrid<openvdb::FloatGrid, Build>(grid);
-#else
-  nanovdb::OpenToNanoVDB<float, Build> convert;
-  convert.enableDithering(false);
-  return convert(grid);
-#endif
-}
-
-Handle converted(const openvdb::FloatGrid& grid, NanoValues values) {
-  switch (values) {
-    case NanoValues::kFloat:
-      return converted<float>(grid);
-    case NanoValues::kFp4:
-      return converted<nanovdb::Fp4>(grid);
-    case NanoValues::kFp8:
-      return converted<nanovdb::Fp8>(grid);
-    case NanoValues::kFp16:
-      return converted<nanovdb::Fp16>(grid);
-    case NanoValues::kFpN:
-      return converted<nanovdb::FpN>(grid);
-  }
-  throw std::logic_error("makeNanoVolume: no such values");
-}
-
 /// Every brick a leaf of floats, and no tiles, whose values a renderer would have to know.
-openvdb::FloatGrid::Ptr asFloats(const VolumeGrid& from) {
+openvdb::GridBase::Ptr asFloats(const VolumeGrid& from) {
   VolumeGrid grid = from;
   grid.descriptor.valueType = ValueType::kFloat;
   grid.descriptor.gridClass = GridClass::kFogVolume;
   WriteOptions options;
   options.half = HalfMode::kOff;
   options.constantTiles = false;
-  return openvdb::gridPtrCast<openvdb::FloatGrid>(vdb::makeOpenVdbGrid(grid, options));
+  return vdb::makeOpenVdbGrid(grid, options);
 }
 
-std::shared_ptr<const std::byte[]> copied(const Handle& handle) {
+std::shared_ptr<const std::byte[]> copied(const vdb::NanoHandle& handle) {
   auto* bytes = static_cast<std::byte*>(::operator new[](handle.size(), kAlignment));
   std::memcpy(bytes, handle.data(), handle.size());
   return {bytes,
@@ -75,7 +42,7 @@ Box leavesOf(const SparseVolume& volume) {
 
 NanoVolume makeNanoVolume(const VolumeGrid& grid, NanoValues values) {
   vdb::initializeOpenVdb();
-  const Handle handle = converted(*asFloats(grid), values);
+  const auto handle = vdb::makeNano(*asFloats(grid), {values});
   return {values, copied(handle), handle.size(), grid.volume.background, leavesOf(grid.volume)};
 }
 

@@ -2,7 +2,7 @@
 
 #include "vdb/versions.h"
 
-#include <openvdb/openvdb.h>
+#include "vdb/scalar_trees.h"
 
 #include <stdexcept>
 

@@ -1,8 +1,8 @@
 #include "vdb/volume_to_tree.h"
 
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
+#include "vdb/scalar_trees.h"
 
 #include <cmath>
 

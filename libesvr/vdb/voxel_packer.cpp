@@ -1,25 +1,19 @@
 #include "esvr/voxel_packer.h"
 
-#include "vdb/versions.h"
-
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <type_traits>
 
 #include "core/add_seconds.h"
 #include "esvr/error.h"
 #include "vdb/errors.h"
-#include "vdb/nano_writers.h"
+#include "vdb/make_nano.h"
+#include "vdb/scalar_trees.h"
 #include "vdb/stream_archive.h"
 #include "vdb/volume_to_tree.h"
 
 namespace esvr {
 namespace {
-
-using NanoHandle = nanovdb::GridHandle<nanovdb::HostBuffer>;
 
 nanovdb::io::Codec nanoCodec(PackedCodec codec) {
   switch (codec) {
@@ -46,37 +40,18 @@ std::uint32_t openVdbFlags(PackedCodec codec) {
   return COMPRESS_ACTIVE_MASK;
 }
 
-#ifdef ESVR_NANOVDB_HAS_CREATE
-template <class Build>
-NanoHandle makeNano(const openvdb::FloatGrid& grid, double tolerance) {
-  vdb::nanotools::CreateNanoGrid<openvdb::FloatGrid> create(grid);
-  if constexpr (std::is_same_v<Build, nanovdb::FpN>)
-    return create.template getHandle<Build>(vdb::nanotools::AbsDiff(float(tolerance)));
-  else
-    return create.template getHandle<Build>();
-}
-#else
-template <class Build>
-NanoHandle makeNano(const openvdb::FloatGrid& grid, double tolerance) {
-  nanovdb::OpenToNanoVDB<float, Build> create;
-  if constexpr (std::is_same_v<Build, nanovdb::FpN>)
-    create.oracle() = nanovdb::AbsDiff(float(tolerance));
-  return create(grid);
-}
-#endif
-
-NanoHandle makeNano(const openvdb::FloatGrid& grid, const VoxelPacking& packing) {
-  switch (packing.form) {
+NanoValues nanoValues(PackedForm form) {
+  switch (form) {
     case PackedForm::kNanoFp16:
-      return makeNano<nanovdb::Fp16>(grid, packing.tolerance);
+      return NanoValues::kFp16;
     case PackedForm::kNanoFp8:
-      return makeNano<nanovdb::Fp8>(grid, packing.tolerance);
+      return NanoValues::kFp8;
     case PackedForm::kNanoFp4:
-      return makeNano<nanovdb::Fp4>(grid, packing.tolerance);
+      return NanoValues::kFp4;
     case PackedForm::kNanoFpN:
-      return makeNano<nanovdb::FpN>(grid, packing.tolerance);
+      return NanoValues::kFpN;
     default:
-      return makeNano<float>(grid, packing.tolerance);
+      return NanoValues::kFloat;
   }
 }
 
@@ -122,7 +97,8 @@ void writeOpenVdb(openvdb::FloatGrid& source, const VoxelPacking& packing, std::
 
 void writeNano(const openvdb::FloatGrid& source, const VoxelPacking& packing,
                std::ostream& stream) {
-  nanovdb::io::writeGrid(stream, makeNano(source, packing), nanoCodec(packing.codec));
+  const auto handle = vdb::makeNano(source, {nanoValues(packing.form), float(packing.tolerance)});
+  nanovdb::io::writeGrid(stream, handle, nanoCodec(packing.codec));
 }
 
 }  // namespace

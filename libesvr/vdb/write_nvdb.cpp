@@ -3,7 +3,7 @@
 #include <fstream>
 
 #include "esvr/error.h"
-#include "vdb/nano_writers.h"
+#include "vdb/make_nano.h"
 #include "vdb/volume_to_tree.h"
 
 namespace esvr::vdb {
@@ -25,9 +25,8 @@ void writeNanoVdb(const std::filesystem::path& path, std::span<const VolumeGrid>
   for (const auto& grid : grids) refuseWhatNanoVdbLacks(grid, options);
   WriteOptions whole = options;
   whole.half = HalfMode::kOff;
-  std::vector<nanovdb::GridHandle<nanovdb::HostBuffer>> handles;
-  for (const auto& grid : grids)
-    handles.push_back(nanotools::openToNanoVDB(makeOpenVdbGrid(grid, whole)));
+  std::vector<NanoHandle> handles;
+  for (const auto& grid : grids) handles.push_back(makeNano(*makeOpenVdbGrid(grid, whole)));
 
   std::ofstream stream(path, std::ios::binary);
   stream.exceptions(std::ios::badbit | std::ios::failbit);

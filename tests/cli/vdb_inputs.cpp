@@ -1,10 +1,9 @@
 #include "cli/vdb_inputs.h"
 
-#include <openvdb/openvdb.h>
-
 #include <cmath>
 
-#include "vdb/point_grid.h"
+#include "vdb/empty_grid.h"
+#include "vdb/scalar_trees.h"
 
 namespace esvr::test {
 namespace {
@@ -55,13 +54,6 @@ void write(const std::filesystem::path& path, const openvdb::GridPtrVec& grids) 
   openvdb::io::File(path.string()).write(grids, metadata);
 }
 
-template <class Grid>
-openvdb::GridBase::Ptr typed() {
-  auto grid = Grid::create();
-  grid->setName(grid->valueType());
-  return grid;
-}
-
 template <class Value>
 std::vector<InputVoxel> cube(int reach, const Value& valueAt) {
   std::vector<InputVoxel> voxels;
@@ -80,8 +72,10 @@ void writeInput(const std::filesystem::path& path, const std::vector<InputGrid>&
 
 void writeMixedInput(const std::filesystem::path& path, const std::vector<InputGrid>& inputs) {
   openvdb::GridPtrVec grids = floatGrids(inputs);
-  grids.insert(grids.begin(), {typed<openvdb::BoolGrid>(), typed<openvdb::Int32Grid>(),
-                               typed<openvdb::Vec3SGrid>(), pointGrid("points")});
+  grids.insert(
+      grids.begin(),
+      {emptyGrid("Tree_bool_5_4_3", "bool"), emptyGrid("Tree_int32_5_4_3", "int32"),
+       emptyGrid("Tree_vec3s_5_4_3", "vec3s"), emptyGrid("Tree_ptdataidx32_5_4_3", "points")});
   write(path, grids);
 }
 

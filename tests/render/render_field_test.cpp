@@ -87,7 +87,7 @@ TEST(RenderField, AgreesForOneEllipsoidThatCoversEverything) {
 
 TEST(RenderField, AgreesForEachKernel) {
   for (const float kappa : {-3.0f, 0.0f, 12.0f})
-    EXPECT_GE(agreement(randomField({.kappa = kappa}), optionsFor()), kAsked) << kappa;
+    EXPECT_GE(agreement(randomField({.kappa = kappa}), optionsFor({}, {25, 18})), kAsked) << kappa;
   Field field = randomField({.count = 15, .kappa = 5.0f});
   field.chunks[0].ellipsoids.kappa.assign(15, 1.0f);
   field.chunks[0].ellipsoids.kappa[3] = 20.0f;
@@ -96,7 +96,7 @@ TEST(RenderField, AgreesForEachKernel) {
 
 TEST(RenderField, AgreesForOtherSteps) {
   for (const double step : {0.3, 2.5}) {
-    RenderOptions o = optionsFor();
+    RenderOptions o = optionsFor({}, {25, 18});
     o.step = step;
     EXPECT_GE(agreement(randomField({}), o), kAsked) << step;
   }

@@ -23,7 +23,7 @@ constexpr Box kBox{{0, 0, 0}, {39, 39, 39}};
 RenderOptions optionsFor(RenderMode mode, Projection projection = Projection::kPerspective) {
   RenderOptions o;
   o.mode = mode;
-  o.resolution = {50, 37};
+  o.resolution = {30, 22};
   o.camera = fitCamera(kBox, {.projection = projection}, o.resolution);
   o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
   o.opacityLength = 8.0;
@@ -83,7 +83,7 @@ double shareOff(const Field& field, const RenderOptions& o, double tolerance) {
 }
 
 TEST(RenderModes, ShowTheLargestAndTheMeanValue) {
-  const Field field = randomField({.count = 60});
+  const Field field = randomField({.count = 40});
   for (const auto projection : {Projection::kPerspective, Projection::kOrthographic})
     for (const auto mode : {RenderMode::kMaximum, RenderMode::kAverage})
       // A sample on the end of a support counts for one and not for the other: its value is 0.
@@ -91,7 +91,7 @@ TEST(RenderModes, ShowTheLargestAndTheMeanValue) {
 }
 
 TEST(RenderModes, ShowHowDeepHalfOfTheLightComes) {
-  const Field field = randomField({.count = 200});
+  const Field field = randomField({.count = 100});
   EXPECT_LE(shareOff(field, optionsFor(RenderMode::kDepth), 1e-3), 0.005);
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 /// Files made with OpenVDB itself, so that the reader is tested against what others write.
 
-#include <openvdb/openvdb.h>
+#include "vdb/scalar_trees.h"
 
 #include <cstddef>
 #include <filesystem>

@@ -4,9 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstring>
+
 #include "esvr/error.h"
+#include "vdb/empty_grid.h"
 #include "vdb/made_files.h"
-#include "vdb/point_grid.h"
 #include "vdb/test_files.h"
 
 namespace esvr {
@@ -89,18 +92,10 @@ TEST_F(Names, OfAFileWithoutGridsAreNone) {
   EXPECT_THAT([&] { (void)readGrid(path(), "a"); }, ThrowsMessage<BadInput>(HasSubstr("none")));
 }
 
-template <class Grid>
-openvdb::GridBase::Ptr typed(const std::string& name) {
-  auto grid = Grid::create();
-  grid->setName(name);
-  return grid;
-}
-
 TEST_F(Names, OfGridsThatCannotBeFittedComeWithTheirType) {
-  openvdb::initialize();
-  openvdb::GridPtrVec grids{typed<openvdb::BoolGrid>("b"),  typed<openvdb::MaskGrid>("m"),
-                            typed<openvdb::Int32Grid>("i"), typed<openvdb::Int64Grid>("l"),
-                            typed<openvdb::Vec3DGrid>("v"), test::pointGrid("p")};
+  openvdb::GridPtrVec grids;
+  for (const char* type : {"bool", "mask", "int32", "int64", "vec3d", "ptdataidx32"})
+    grids.push_back(test::emptyGrid(std::string("Tree_") + type + "_5_4_3", type));
   grids.push_back(test::smallGrid());
   test::save(path(), grids);
   const auto listed = inspectVdb(path()).grids;
@@ -112,19 +107,23 @@ TEST_F(Names, OfGridsThatCannotBeFittedComeWithTheirType) {
   EXPECT_THAT(listed[4].skipReason, HasSubstr("vec3d"));
   EXPECT_THAT(listed[5].skipReason, HasSubstr("points"));
   EXPECT_EQ(listed[6].skipReason, "");
-  EXPECT_THAT([&] { (void)readGrid(path(), "v"); }, ThrowsMessage<BadInput>(HasSubstr("vec3d")));
+  EXPECT_THAT([&] { (void)readGrid(path(), "vec3d"); },
+              ThrowsMessage<BadInput>(HasSubstr("of type vec3d")));
   EXPECT_EQ(activeVoxelCount(readGrid(path(), "density").volume), 3u);
 }
 
 TEST_F(Names, OfTypesThatOpenVdbDoesNotKnowAreListedToo) {
-  // A tree of another shape: the type exists here and is not registered, as in a host's file.
-  using OddTree = openvdb::tree::Tree4<float, 4, 3, 3>::Type;
-  using OddGrid = openvdb::Grid<OddTree>;
-  openvdb::initialize();
-  auto odd = OddGrid::create();
-  odd->setName("odd");
-  odd->tree().setValue({0, 0, 0}, 1.0f);
-  test::save(path(), {odd, test::smallGrid()});
+  // A tree of another shape, as in a host's file: the first grid's type, rewritten.
+  const auto other = test::smallGrid();
+  other->setName("other");
+  test::save(path(), {other, test::smallGrid()});
+  auto bytes = test::bytesOf(path());
+  const std::string known = "Tree_float_5_4_3", odd = "Tree_float_4_3_3";
+  const auto asByte = [](std::byte b, char c) { return b == std::byte(c); };
+  const auto at = std::search(bytes.begin(), bytes.end(), known.begin(), known.end(), asByte);
+  ASSERT_NE(at, bytes.end());
+  std::memcpy(&*at, odd.data(), odd.size());
+  test::writeBytes(path(), bytes);
   const auto listed = inspectVdb(path()).grids;
   ASSERT_EQ(listed.size(), 2u);
   EXPECT_EQ(listed[0].valueType, "float");

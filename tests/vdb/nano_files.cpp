@@ -1,14 +1,12 @@
 #include "vdb/nano_files.h"
 
-#include "vdb/versions.h"
+#include "vdb/make_nano.h"
+#include "vdb/scalar_trees.h"
 
 #include ESVR_NANOVDB_CREATE
-#include ESVR_NANOVDB_IO
 
 namespace esvr::test {
 namespace {
-
-using Handles = std::vector<nanovdb::GridHandle<nanovdb::HostBuffer>>;
 
 nanovdb::io::Codec codecOf(NanoCodec codec) {
   switch (codec) {
@@ -22,42 +20,31 @@ nanovdb::io::Codec codecOf(NanoCodec codec) {
   return nanovdb::io::Codec::NONE;
 }
 
-template <class Build>
-nanovdb::GridHandle<nanovdb::HostBuffer> quantised(openvdb::FloatGrid& grid) {
+vdb::NanoHandle vectors(const openvdb::Vec3SGrid& grid) {
 #ifdef ESVR_NANOVDB_HAS_CREATE
-  return vdb::nanotools::createNanoGrid<openvdb::FloatGrid, Build>(grid);
+  return vdb::nanotools::createNanoGrid<openvdb::Vec3SGrid>(grid);
 #else
-  return nanovdb::OpenToNanoVDB<float, Build>()(grid);
+  return nanovdb::OpenToNanoVDB<openvdb::Vec3f, nanovdb::Vec3f>()(grid);
 #endif
 }
 
-nanovdb::GridHandle<nanovdb::HostBuffer> quantised(openvdb::FloatGrid& grid, NanoFloats floats) {
-  switch (floats) {
-    case NanoFloats::kFp4:
-      return quantised<nanovdb::Fp4>(grid);
-    case NanoFloats::kFp8:
-      return quantised<nanovdb::Fp8>(grid);
-    case NanoFloats::kFp16:
-      return quantised<nanovdb::Fp16>(grid);
-    case NanoFloats::kFpN:
-      break;
-  }
-  return quantised<nanovdb::FpN>(grid);
+vdb::NanoHandle handleOf(const openvdb::GridBase& grid) {
+  return grid.isType<openvdb::Vec3SGrid>() ? vectors(static_cast<const openvdb::Vec3SGrid&>(grid))
+                                           : vdb::makeNano(grid);
 }
 
 }  // namespace
 
 void saveNano(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
               NanoCodec codec) {
-  Handles handles;
-  for (const auto& grid : grids) handles.push_back(vdb::nanotools::openToNanoVDB(grid));
+  std::vector<vdb::NanoHandle> handles;
+  for (const auto& grid : grids) handles.push_back(handleOf(*grid));
   nanovdb::io::writeGrids(path.string(), handles, codecOf(codec));
 }
 
-void saveQuantised(const std::filesystem::path& path, openvdb::FloatGrid& grid, NanoFloats floats) {
-  Handles handles;
-  handles.push_back(quantised(grid, floats));
-  nanovdb::io::writeGrids(path.string(), handles);
+void saveNanoAs(const std::filesystem::path& path, const openvdb::GridBase& grid,
+                NanoValues values) {
+  nanovdb::io::writeGrid(path.string(), vdb::makeNano(grid, {values}));
 }
 
 }  // namespace esvr::test

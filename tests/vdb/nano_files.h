@@ -1,18 +1,21 @@
 #pragma once
-/// Files made with NanoVDB's own writer. Its templates take minutes to compile: they are in one
-/// translation unit, which nothing speeds up by being optimised.
+/// Files made with NanoVDB's own writer.
 
-#include <openvdb/openvdb.h>
+#include <openvdb/Grid.h>
 
 #include <filesystem>
+
+#include "esvr/nano_volume.h"
 
 namespace esvr::test {
 
 enum class NanoCodec { kNone, kZip, kBlosc };
-enum class NanoFloats { kFp4, kFp8, kFp16, kFpN };
 
+/// Grids of floats, doubles or vectors of three floats.
 void saveNano(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
               NanoCodec codec = NanoCodec::kNone);
-void saveQuantised(const std::filesystem::path& path, openvdb::FloatGrid& grid, NanoFloats floats);
+/// A grid of floats in one of NanoVDB's forms.
+void saveNanoAs(const std::filesystem::path& path, const openvdb::GridBase& grid,
+                NanoValues values);
 
 }  // namespace esvr::test
