@@ -66,12 +66,19 @@ class Resolution:
         if self.report.exists() and abs(self.psnr() - TARGET) <= NEAR:
             return
         points = []
-        count = FIRST * self.resolution // 256
+        count = self.first_count()
         for _ in range(MOST_FITS):
             points.append((math.log(count), self.fit(count)))
             if abs(points[-1][1] - TARGET) <= NEAR:
                 return
             count = self.next_count(points)
+
+    def first_count(self):
+        """Of half the resolution, where that is known, half as many again."""
+        coarser = Resolution(self.options, self.resolution // 2).report
+        if not coarser.exists():
+            return FIRST * self.resolution // 256
+        return json.loads(coarser.read_text())['grids'][0]['primitives'] * 3 // 2
 
     @staticmethod
     def next_count(points):

@@ -53,7 +53,7 @@ class GradientKappa : public testing::TestWithParam<float> {};
 // The loss is about 1e4 and float64, so differences of step 1e-6 carry errors near 1e-6; the step
 // is that small because phi has a kink at the end of its support, which few voxels then straddle.
 // The gradient itself is a float32 sum over some thousand voxels.
-TEST_P(GradientKappa, AgreesWithCentralDifferences) {
+TEST_P(GradientKappa, SlowAgreesWithCentralDifferences) {
   const SparseVolume volume = denseVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
   const auto k = kernelConstants<double>({.kappa = GetParam()});

@@ -104,7 +104,7 @@ TEST(PaperLoss, OfFewVoxelsIsThatOfTheTextbook) {
 // Differences of step h err by h^2/6 of the third derivative. SSIM changes over sqrt(C2) = 0.03 of
 // a window's values, of which a voxel has a weight of 0.02 at most: (1e-3 * 0.02 / 0.03)^2 < 1e-6.
 // Rounding: 1e-16 of the loss over 2 h, far less. No residual is within h of L1's kink.
-TEST(PaperLossGradient, AgreesWithCentralDifferences) {
+TEST(PaperLossGradient, SlowAgreesWithCentralDifferences) {
   constexpr double kStep = 1e-3;
   Scene scene = randomScene(11, {{-1, 0, 0}, {0, -1, 0}});
   const DenseValues target = denseOf(scene, scene.target);

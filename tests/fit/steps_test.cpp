@@ -78,7 +78,7 @@ TEST(Adam, LeavesALimitWhenTheGradientPointsBackInside) {
   EXPECT_GT(push(-1.0, 60), 2 * kSmallest);
 }
 
-TEST(Adam, KeepsAShapeValidOverAHundredThousandSteps) {
+TEST(Adam, SlowKeepsAShapeValidOverAHundredThousandSteps) {
   test::Random random(11);
   std::vector<Primitive> p{{{0, 0, 0}, {1, 0, 0, 0, 0.5, 0, 0, 0, 2}, 1.0}};
   std::vector<AdamState> state(1);

@@ -91,7 +91,7 @@ TEST(RenderModes, ShowTheLargestAndTheMeanValue) {
 }
 
 TEST(RenderModes, ShowHowDeepHalfOfTheLightComes) {
-  const Field field = randomField({.count = 100});
+  const Field field = randomField({.count = 200});
   EXPECT_LE(shareOff(field, optionsFor(RenderMode::kDepth), 1e-3), 0.005);
 }
 

@@ -142,8 +142,8 @@ class PaperGradientOn : public test::OnDevice {
 };
 
 TEST_P(PaperGradientOn, OfThePapersEllipsoidAgreesWithDifferences) { expectDifferences({}); }
-TEST_P(PaperGradientOn, OfGaussiansAgreesWithDifferences) { expectDifferences({.gaussian = true}); }
-TEST_P(PaperGradientOn, OfOwnKAgreesWithDifferences) { expectDifferences({.learnK = true}); }
+TEST_P(PaperGradientOn, SlowOfGaussiansAgreesWithDifferences) { expectDifferences({.gaussian = true}); }
+TEST_P(PaperGradientOn, SlowOfOwnKAgreesWithDifferences) { expectDifferences({.learnK = true}); }
 
 TEST_P(PaperGradientOn, IsTheSameWhereOnlyTheVisitedSubvolumeIsThere) {
   const SparseVolume volume = smallVolume();
