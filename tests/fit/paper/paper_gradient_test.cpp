@@ -142,7 +142,9 @@ class PaperGradientOn : public test::OnDevice {
 };
 
 TEST_P(PaperGradientOn, OfThePapersEllipsoidAgreesWithDifferences) { expectDifferences({}); }
-TEST_P(PaperGradientOn, SlowOfGaussiansAgreesWithDifferences) { expectDifferences({.gaussian = true}); }
+TEST_P(PaperGradientOn, SlowOfGaussiansAgreesWithDifferences) {
+  expectDifferences({.gaussian = true});
+}
 TEST_P(PaperGradientOn, SlowOfOwnKAgreesWithDifferences) { expectDifferences({.learnK = true}); }
 
 TEST_P(PaperGradientOn, IsTheSameWhereOnlyTheVisitedSubvolumeIsThere) {
