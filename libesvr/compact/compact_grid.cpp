@@ -6,23 +6,20 @@
 #include "compact/choose_steps.h"
 #include "compact/measure_layers.h"
 #include "esvr/error.h"
-#include "esvr/metrics.h"
 
 namespace esvr {
 namespace {
 
 constexpr double kMargin = 5e-4;  // dB: sums in another order, or by a GPU, must not fall short
 
-double allowedError(const TrialMaker& maker, const SparseVolume& source, const Box& box,
-                    const CompactOptions& options) {
-  if (options.psnr) return squaresOf(*options.psnr + kMargin, source, box);
+double allowedError(const TrialMaker& maker, const CompactOptions& options) {
+  if (options.psnr) return maker.squaresOf(*options.psnr + kMargin);
   return maker.error() * std::pow(10.0, options.loss / 10.0) + maker.invisibleError();
 }
 
-Trial choose(TrialMaker& maker, const SparseVolume& source, const Box& box,
-             const CompactOptions& options) {
+Trial choose(TrialMaker& maker, const CompactOptions& options) {
   if (options.bytes) return chooseStepsFor(maker, *options.bytes);
-  return chooseStepsWithin(maker, allowedError(maker, source, box, options));
+  return chooseStepsWithin(maker, allowedError(maker, options));
 }
 
 void requireOneKappa(const EncodedGrid& grid) {
@@ -30,16 +27,6 @@ void requireOneKappa(const EncodedGrid& grid) {
     if (!chunk.ellipsoids.kappa.empty())
       throw RuntimeFailure("cannot quantise grid '" + grid.descriptor.name +
                            "': its ellipsoids have kappas of their own");
-}
-
-/// Of the voxels that the field's values make active; a mask would decide otherwise.
-std::vector<LayerError> layerErrors(TrialMaker& maker, const Trial& chosen,
-                                    const SparseVolume& source, const Box& box) {
-  const double peak = peakOf(source);
-  std::vector<LayerError> errors;
-  for (const StoredError& error : maker.layerErrors(chosen))
-    errors.push_back({float(psnr(error.squares / box.volume(), peak)), float(error.largest)});
-  return errors;
 }
 
 }  // namespace
@@ -51,9 +38,10 @@ CompactResult compactGrid(const EncodedGrid& grid, const SparseVolume& source,
   if (grid.field.primitiveCount() == 0) return result;
   const Box box = options.box.value_or(activeBox(source));
   TrialMaker maker(grid, {source, box, options.device});
-  Trial chosen = choose(maker, source, box, options);
+  Trial chosen = choose(maker, options);
+  // a mask decides on voxels that the field's values do not show
   const bool byValues = grid.topology != TopologyKind::kMask;
-  if (byValues) result.grid.layerErrors = layerErrors(maker, chosen, source, box);
+  if (byValues) result.grid.layerErrors = maker.layerErrors(chosen);
   result.grid.field = std::move(chosen.field);
   result.grid.quantised = std::move(chosen.quantised);
   if (!byValues) result.grid.layerErrors = measureLayers(result.grid, source, box);

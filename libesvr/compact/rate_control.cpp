@@ -103,7 +103,7 @@ class RateControl {
   [[nodiscard]] bool goodEnough(const Attempt& attempt, double psnr) const {
     const double over = attempt.psnr - psnr;
     const bool allThereIs = attempt.asked >= voxels_;
-    return (over >= kLeastLoss && over <= kMostLoss) || (over < 0.0 && allThereIs);
+    return leavesUsualLoss(over) || (over < 0.0 && allThereIs);
   }
 
   static bool reached(const std::vector<Attempt>& attempts, double psnr) {
@@ -111,12 +111,17 @@ class RateControl {
                        [&](const Attempt& attempt) { return attempt.psnr > psnr; });
   }
 
-  /// The PSNR of the attempt that reached one and came nearest.
-  static double leastAbove(const std::vector<Attempt>& attempts, double psnr) {
-    double least = HUGE_VAL;
-    for (const Attempt& attempt : attempts)
-      if (attempt.psnr > psnr) least = std::min(least, attempt.psnr);
-    return least;
+  static bool leavesUsualLoss(double over) { return over >= kLeastLoss && over <= kMostLoss; }
+
+  /// Of those that reached a PSNR: where some leave the usual loss only these, else the nearest.
+  static bool worthRating(const Attempt& attempt, const std::vector<Attempt>& all, double psnr) {
+    double nearest = HUGE_VAL;
+    bool anyUsual = false;
+    for (const Attempt& a : all) {
+      if (a.psnr > psnr) nearest = std::min(nearest, a.psnr);
+      anyUsual = anyUsual || leavesUsualLoss(a.psnr - psnr);
+    }
+    return anyUsual ? leavesUsualLoss(attempt.psnr - psnr) : attempt.psnr == nearest;
   }
 
   /// From the last attempt, or between the nearest on either side.
@@ -142,10 +147,9 @@ class RateControl {
       if (!ended(best)) best.fit.end = FitEnd::kPsnrMissed;
       return rated(std::move(best), options);
     }
-    const double most = std::max(leastAbove(attempts, psnr), psnr + kTooMuchLoss);
     std::optional<RatedGrid> smallest;
     for (Attempt& attempt : attempts) {
-      if (attempt.psnr <= psnr || attempt.psnr > most) continue;
+      if (!worthRating(attempt, attempts, psnr)) continue;
       if (!ended(attempt)) attempt.fit.end = FitEnd::kPsnrReached;
       RatedGrid now = rated(std::move(attempt), options);
       if (!smallest || now.compact.bytes < smallest->compact.bytes) smallest = std::move(now);

@@ -65,11 +65,6 @@ std::vector<float> ofFirstLayers(const Trial& trial, std::size_t layers) {
 
 }  // namespace
 
-double squaresOf(double psnr, const SparseVolume& source, const Box& box) {
-  const double peak = peakOf(source);
-  return peak * peak * box.volume() * std::pow(10.0, -psnr / 10.0);
-}
-
 TrialMaker::TrialMaker(const EncodedGrid& grid, const TrialTarget& target)
     : target_{target.source,
               {format::ruleOf(grid), grid.activeThreshold},
@@ -78,7 +73,7 @@ TrialMaker::TrialMaker(const EncodedGrid& grid, const TrialTarget& target)
               grid.topology != TopologyKind::kThreshold},
       problem_(target_, target.device),
       field_(grid.field),
-      invisible_(squaresOf(kInvisiblePsnr, target.source, target.box)) {
+      peak_(peakOf(target.source)) {
   problem_.setShapes(field_);
   auto intensities = intensitiesOf(field_);
   error_ = problem_.error(intensities).squares;
@@ -86,6 +81,12 @@ TrialMaker::TrialMaker(const EncodedGrid& grid, const TrialTarget& target)
   setIntensities(intensities, field_);
   curvature_ = byChunk(field_, problem_.curvature());
 }
+
+double TrialMaker::squaresOf(double psnr) const {
+  return peak_ * peak_ * target_.box.volume() * std::pow(10.0, -psnr / 10.0);
+}
+
+double TrialMaker::invisibleError() const { return squaresOf(kInvisiblePsnr); }
 
 /// The field then has rounded shapes and its old intensities, in the file's order.
 void TrialMaker::quantiseChunks(Trial& trial) const {
@@ -123,13 +124,16 @@ std::vector<Trial> TrialMaker::make(std::span<const QuantiserSteps> steps) {
   return trials;
 }
 
-std::vector<StoredError> TrialMaker::layerErrors(const Trial& trial) {
-  std::vector<StoredError> errors;
+std::vector<LayerError> TrialMaker::layerErrors(const Trial& trial) {
+  std::vector<LayerError> errors;
   const std::size_t layers = layersOf(trial);
   if (layers < 2) return errors;
   problem_.setShapes(trial.field);
-  for (std::size_t k = 1; k <= layers; ++k)
-    errors.push_back(problem_.error(ofFirstLayers(trial, k)));
+  for (std::size_t k = 1; k <= layers; ++k) {
+    const StoredError error = problem_.error(ofFirstLayers(trial, k));
+    errors.push_back(
+        {float(psnr(error.squares / target_.box.volume(), peak_)), float(error.largest)});
+  }
   return errors;
 }
 

@@ -34,9 +34,12 @@ class TrialMaker {
   /// Grid and source must outlive the maker. \throws DeviceError  the GPU cannot be used
   TrialMaker(const EncodedGrid& grid, const TrialTarget& target);
 
+  /// Sum of squares over the box of a PSNR.
+  [[nodiscard]] double squaresOf(double psnr) const;
+
   /// Where the fit is exact, or nearly, there is nothing to compare a loss with: an error that no
   /// one sees.
-  [[nodiscard]] double invisibleError() const { return invisible_; }
+  [[nodiscard]] double invisibleError() const;
 
   /// Error of the float32 field.
   [[nodiscard]] double error() const { return error_; }
@@ -51,7 +54,7 @@ class TrialMaker {
 
   /// How far off each prefix of the layers is, the last the trial itself; nothing where there is
   /// but one layer.
-  [[nodiscard]] std::vector<StoredError> layerErrors(const Trial& trial);
+  [[nodiscard]] std::vector<LayerError> layerErrors(const Trial& trial);
 
  private:
   void quantiseChunks(Trial& trial) const;
@@ -61,10 +64,7 @@ class TrialMaker {
   IntensityProblem problem_;
   Field field_;  ///< float32, with its best intensities: those of rounded shapes are not far
   std::vector<std::vector<double>> curvature_;  ///< by chunk
-  double error_ = 0.0, leastError_ = 0.0, invisible_ = 0.0;
+  double peak_, error_ = 0.0, leastError_ = 0.0;
 };
-
-/// Sum of squares over a box of a PSNR.
-[[nodiscard]] double squaresOf(double psnr, const SparseVolume& source, const Box& box);
 
 }  // namespace esvr

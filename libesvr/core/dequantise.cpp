@@ -1,3 +1,6 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -7,6 +10,9 @@
 
 namespace esvr {
 namespace {
+
+using Range = tbb::blocked_range<std::size_t>;
+constexpr std::size_t kGrain = 256;  // ellipsoids
 
 /// A quaternion's components but the largest lie within +-sqrt(1/2).
 constexpr double kRotationSide = std::numbers::sqrt2;
@@ -48,6 +54,14 @@ void putIntensity(const QuantisedEllipsoids& q, std::size_t i, int shift, Ellips
   e.intensity[i] = float(code < 0 ? -magnitude : magnitude);
 }
 
+void put(const QuantisedEllipsoids& q, std::size_t i, Ellipsoids& e) {
+  const CoarseScales s = coarseScales(q, i);
+  putScales(q, i, e);
+  putCenter(q, i, positionBits(q.lattice, q.precision[i], s), e);
+  putRotation(q, i, rotationBits(q.lattice, q.precision[i], s), e);
+  putIntensity(q, i, intensityShift(q.lattice, s), e);
+}
+
 }  // namespace
 
 void QuantisedEllipsoids::resize(std::size_t n) {
@@ -61,13 +75,9 @@ void QuantisedEllipsoids::resize(std::size_t n) {
 Ellipsoids dequantise(const QuantisedEllipsoids& q) {
   Ellipsoids e;
   e.resize(q.size());
-  for (std::size_t i = 0; i < q.size(); ++i) {
-    const CoarseScales s = coarseScales(q, i);
-    putScales(q, i, e);
-    putCenter(q, i, positionBits(q.lattice, q.precision[i], s), e);
-    putRotation(q, i, rotationBits(q.lattice, q.precision[i], s), e);
-    putIntensity(q, i, intensityShift(q.lattice, s), e);
-  }
+  tbb::parallel_for(Range(0, q.size(), kGrain), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) put(q, i, e);
+  });
   return e;
 }
 

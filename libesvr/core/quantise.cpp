@@ -1,7 +1,11 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <cmath>
+#include <compare>
 #include <numbers>
-#include <numeric>
 #include <string>
 #include <utility>
 
@@ -14,6 +18,8 @@
 namespace esvr {
 namespace {
 
+using Range = tbb::blocked_range<std::size_t>;
+constexpr std::size_t kGrain = 256;  // ellipsoids
 constexpr double kRotationSide = std::numbers::sqrt2;
 
 /// The cell of a value counted in coarse steps, cut into 2^bits. \throws RuntimeFailure
@@ -80,13 +86,20 @@ std::size_t layerOf(const LatticeChoice& choice, std::size_t i) {
 }
 
 std::vector<std::size_t> fileOrder(const Ellipsoids& e, const LatticeChoice& choice) {
-  std::vector<std::pair<std::size_t, std::uint64_t>> keys(e.size());
-  for (std::size_t i = 0; i < e.size(); ++i)
-    keys[i] = {layerOf(choice, i), keyOf(e, i, choice.lattice)};
+  struct Place {
+    std::size_t layer;
+    std::uint64_t key;
+    std::size_t ellipsoid;  // of equals those that come first
+    auto operator<=>(const Place&) const = default;
+  };
+  std::vector<Place> places(e.size());
+  tbb::parallel_for(Range(0, e.size(), kGrain), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      places[i] = {layerOf(choice, i), keyOf(e, i, choice.lattice), i};
+  });
+  tbb::parallel_sort(places.begin(), places.end());
   std::vector<std::size_t> order(e.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return keys[a] < keys[b]; });
+  for (std::size_t i = 0; i < e.size(); ++i) order[i] = places[i].ellipsoid;
   return order;
 }
 
@@ -100,6 +113,16 @@ std::vector<std::size_t> layerEnds(const LatticeChoice& choice,
   return ends;
 }
 
+/// All of ellipsoid `from` but its precision, which is there already, in place i.
+void put(const Ellipsoids& e, std::size_t from, std::size_t i, QuantisedEllipsoids& q) {
+  const SortedAxes axes = sortedAxes(e, from);
+  putScales(axes.logScale, i, q);
+  const CoarseScales s = coarseScales(q, i);
+  putCenter(cellsOf(e, from, q.lattice), i, positionBits(q.lattice, q.precision[i], s), q);
+  putRotation(axes.rotation, i, rotationBits(q.lattice, q.precision[i], s), q);
+  putIntensity(e.intensity[from], i, q);
+}
+
 }  // namespace
 
 QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
@@ -109,21 +132,19 @@ QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
   q.resize(e.size());
   order = fileOrder(e, choice);
   q.layerEnds = layerEnds(choice, order);
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const std::size_t from = order[i];
-    q.precision[i] = choice.precision[from];
-    const SortedAxes axes = sortedAxes(e, from);
-    putScales(axes.logScale, i, q);
-    const CoarseScales s = coarseScales(q, i);
-    putCenter(cellsOf(e, from, q.lattice), i, positionBits(q.lattice, q.precision[i], s), q);
-    putRotation(axes.rotation, i, rotationBits(q.lattice, q.precision[i], s), q);
-    putIntensity(e.intensity[from], i, q);
-  }
+  tbb::parallel_for(Range(0, order.size(), kGrain), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      q.precision[i] = choice.precision[order[i]];
+      put(e, order[i], i, q);
+    }
+  });
   return q;
 }
 
 void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids& q) {
-  for (std::size_t i = 0; i < q.size(); ++i) putIntensity(intensities[i], i, q);
+  tbb::parallel_for(Range(0, q.size(), kGrain), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) putIntensity(intensities[i], i, q);
+  });
 }
 
 }  // namespace esvr

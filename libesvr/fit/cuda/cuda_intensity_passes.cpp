@@ -9,6 +9,7 @@
 #include "fit/cuda/make_cuda_intensity_passes.h"
 #include "fit/cuda/memory_pool.h"
 #include "fit/cuda/step.h"
+#include "fit/import_field.h"
 
 namespace esvr {
 namespace cuda {
@@ -23,8 +24,10 @@ std::vector<Coord> bricksOf(const IntensityTarget& target) {
 
 /// Values of the known bricks, in their order.
 std::vector<float> valuesOf(const IntensityTarget& target) {
+  const auto corners = knownCorners(target);
   std::vector<float> all;
-  for (const Coord corner : knownCorners(target)) {
+  all.reserve(corners.size() * kBrickVoxels);
+  for (const Coord corner : corners) {
     const float* const values = sourceValues(target.source, corner);
     if (values != nullptr)
       all.insert(all.end(), values, values + kBrickVoxels);
@@ -34,20 +37,10 @@ std::vector<float> valuesOf(const IntensityTarget& target) {
   return all;
 }
 
-std::vector<Primitive> primitivesOf(const Field& field, Coord origin) {
-  std::vector<Primitive> all;
-  all.reserve(field.primitiveCount());
-  for (const auto& chunk : field.chunks) {
-    const Ellipsoids& e = chunk.ellipsoids;
-    if (!e.kappa.empty()) throw RuntimeFailure("solving on a GPU takes one kappa for all");
-    const Coord frame = chunk.origin - origin;
-    for (std::size_t i = 0; i < e.size(); ++i)
-      all.push_back({{frame.x + double(e.center[0][i]), frame.y + double(e.center[1][i]),
-                      frame.z + double(e.center[2][i])},
-                     unitFrame(e, i),
-                     0.0});
-  }
-  return all;
+void requireOneKappa(const Field& field) {
+  for (const auto& chunk : field.chunks)
+    if (!chunk.ellipsoids.kappa.empty())
+      throw RuntimeFailure("solving for intensities on a GPU takes one kappa for all");
 }
 
 }  // namespace
@@ -70,7 +63,8 @@ CudaIntensityPasses::CudaIntensityPasses(const IntensityTarget& target)
       sums_(stream_.get()) {}
 
 void CudaIntensityPasses::setShapes(const Field& field) {
-  const auto primitives = primitivesOf(field, origin_);
+  requireOneKappa(field);
+  const auto primitives = importField(field, origin_, 1.0);
   const double radius = supportRadius(kernelConstants<double>(field.kernel));
   fieldBackground_ = field.background;
   kernel_ = kernelConstants<float>(field.kernel);
