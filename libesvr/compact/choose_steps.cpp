@@ -152,7 +152,7 @@ Trial scaleTo(TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps) 
 
 /// What half a bit less of one stream does.
 struct Probe {
-  double added = 0.0;  ///< error
+  double added = 0.0;  ///< error of a sample: no unit
   double saved = 0.0;  ///< bytes
 
   /// Error added by a byte saved: 0 where coarser costs nothing, infinite where it saves nothing.
@@ -160,15 +160,15 @@ struct Probe {
 };
 using Probes = std::array<Probe, kStreams.size()>;
 
-Probes probe(TrialMaker& maker, const Trial& here) {
-  std::array<QuantiserSteps, kStreams.size()> coarser;
-  coarser.fill(here.steps);
-  for (std::size_t k = 0; k < kStreams.size(); ++k) coarser[k].*kStreams[k] *= kProbe;
-  const auto there = maker.make(coarser);
+Probes probe(TrialMaker& maker, const QuantiserSteps& steps) {
+  std::array<QuantiserSteps, 1 + kStreams.size()> tried;  // as they are, then one coarser each
+  tried.fill(steps);
+  for (std::size_t k = 0; k < kStreams.size(); ++k) tried[1 + k].*kStreams[k] *= kProbe;
+  const auto trials = maker.sample(tried);
   Probes probes;
   for (std::size_t k = 0; k < probes.size(); ++k)
-    probes[k] = {std::max(there[k].error - here.error, 0.0),
-                 double(here.bytes) - double(there[k].bytes)};
+    probes[k] = {std::max(trials[1 + k].error - trials[0].error, 0.0),
+                 double(trials[0].bytes) - double(trials[1 + k].bytes)};
   return probes;
 }
 
@@ -181,23 +181,33 @@ double meanSlope(const Probes& probes) {
   return counted > 0 ? std::exp(sum / counted) : 0.0;
 }
 
-/// What a saved byte costs must be the same in every stream; a stream's cost grows with the square
-/// of its step. \return  steps, and the error and the bytes to expect of them
+/// Factor of a stream's step that makes its slope the mean one: a stream's cost grows with the
+/// square of its step.
+double changeOf(const Probe& probe, double mean) {
+  const double change = probe.slope() > 0.0 ? std::sqrt(mean / probe.slope()) : kMostChange;
+  return std::clamp(change, 1.0 / kMostChange, kMostChange);
+}
+
+/// What a saved byte costs must be the same in every stream.
+/// \return  steps, and the error and the bytes to expect of them
 Trial balanced(TrialMaker& maker, const Trial& here) {
-  const Probes probes = probe(maker, here);
+  const Probes probes = probe(maker, here.steps);
   const double mean = meanSlope(probes);
-  Trial expected{here.steps, {}, {}, here.error, here.bytes};
-  double saved = 0.0;
+  QuantiserSteps steps = here.steps;
+  double before = 0.0, after = 0.0, saved = 0.0;
   for (std::size_t k = 0; k < probes.size(); ++k) {
-    const double slope = probes[k].slope();
-    const double change = std::clamp(slope > 0.0 ? std::sqrt(mean / slope) : kMostChange,
-                                     1.0 / kMostChange, kMostChange);
-    expected.steps.*kStreams[k] *= change;
-    expected.error += probes[k].added * (change * change - 1.0) / (kProbe * kProbe - 1.0);
+    const double change = changeOf(probes[k], mean);
+    steps.*kStreams[k] *= change;
+    // twice the square of a step adds as much error as there is of it
+    before += probes[k].added, after += probes[k].added * change * change;
     saved += probes[k].saved * std::log(change) / std::log(kProbe);
   }
-  expected.bytes = std::uint64_t(std::max(double(here.bytes) - saved, 0.0));
-  return expected;
+  const double added = std::max(here.error - maker.leastError(), 0.0);
+  return {steps,
+          {},
+          {},
+          maker.leastError() + added * (before > 0.0 ? after / before : 1.0),
+          std::uint64_t(std::max(double(here.bytes) - saved, 0.0))};
 }
 
 Trial search(TrialMaker& maker, const Goal& goal, const QuantiserSteps& guess) {

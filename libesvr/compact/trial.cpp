@@ -15,9 +15,14 @@ namespace {
 
 constexpr double kInvisiblePsnr = 110.0;
 
-/// Of the solver. Rounded shapes begin with the intensities of the float32 ones: what four
+/// Of the solver. Rounded shapes begin with the intensities of the float32 ones: what three
 /// iterations leave is a thousandth of the error.
-constexpr int kFirstIterations = 8, kIterations = 4;
+constexpr int kFirstIterations = 8, kIterations = 3;
+
+/// One of so many cubes of bricks is a sample, where there are bricks enough to tell.
+constexpr std::int32_t kSampled = 4;
+constexpr int kCubeLog2 = 2;  // of its side, in bricks
+constexpr std::size_t kLeastSampled = 1024;
 
 std::vector<std::vector<double>> byChunk(const Field& field, const std::vector<double>& all) {
   std::vector<std::vector<double>> result;
@@ -38,6 +43,33 @@ void storeIntensities(std::span<const float> intensities, Trial& trial) {
     intensities = intensities.subspan(q.size());
     trial.field.chunks[c].ellipsoids = dequantise(q);
   }
+}
+
+/// Fits the intensities to the shapes of the trial's field, and rounds them.
+void solveIntensities(IntensityProblem& problem, Trial& trial) {
+  problem.setShapes(trial.field);
+  const auto before = intensitiesOf(trial.field);
+  auto intensities = before;
+  const double least = problem.step(intensities, kIterations);
+  storeIntensities(intensities, trial);
+  trial.error = problem.error(intensitiesOf(trial.field)).squares;
+  if (trial.error <= least) return;
+  intensities = before;  // a shorter step, if there is one that serves
+  (void)problem.solve(intensities, kIterations);
+  storeIntensities(intensities, trial);
+  trial.error = problem.error(intensitiesOf(trial.field)).squares;
+}
+
+/// Empty where there are too few.
+std::vector<Coord> sampleOf(std::vector<Coord> corners) {
+  if (corners.size() < kLeastSampled) return {};
+  std::erase_if(corners, [](Coord corner) {
+    const Coord brick = brickOf(corner);
+    const std::int32_t cube =
+        (brick.x >> kCubeLog2) + (brick.y >> kCubeLog2) + (brick.z >> kCubeLog2);
+    return (cube & (kSampled - 1)) != 0;
+  });
+  return corners;
 }
 
 void countBytes(Trial& trial) {
@@ -71,7 +103,10 @@ TrialMaker::TrialMaker(const EncodedGrid& grid, const TrialTarget& target)
               target.box,
               grid.leaves,
               grid.topology != TopologyKind::kThreshold},
+      sampleBricks_(sampleOf(knownCorners(target_))),
+      sampleTarget_{target.source, target_.stored, target.box, sampleBricks_, true},
       problem_(target_, target.device),
+      sampleProblem_(sampleTarget_, target.device),
       field_(grid.field),
       peak_(peakOf(target.source)) {
   problem_.setShapes(field_);
@@ -101,25 +136,26 @@ void TrialMaker::quantiseChunks(Trial& trial) const {
   });
 }
 
-void TrialMaker::solveIntensities(Trial& trial) {
-  problem_.setShapes(trial.field);
-  auto intensities = intensitiesOf(trial.field);
-  problem_.solve(intensities, kIterations);
-  storeIntensities(intensities, trial);
-  trial.error = problem_.error(intensitiesOf(trial.field)).squares;
-}
-
 Trial TrialMaker::make(const QuantiserSteps& steps) {
   return std::move(make(std::span(&steps, 1)).front());
 }
 
 std::vector<Trial> TrialMaker::make(std::span<const QuantiserSteps> steps) {
+  return make(steps, problem_);
+}
+
+std::vector<Trial> TrialMaker::sample(std::span<const QuantiserSteps> steps) {
+  return make(steps, sampleBricks_.empty() ? problem_ : sampleProblem_);
+}
+
+std::vector<Trial> TrialMaker::make(std::span<const QuantiserSteps> steps,
+                                    IntensityProblem& problem) const {
   std::vector<Trial> trials(steps.size());
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t k) {
     trials[k] = {steps[k], field_, {}, 0.0, 0};
     quantiseChunks(trials[k]);
   });
-  for (Trial& trial : trials) solveIntensities(trial);  // each has all threads, or the GPU
+  for (Trial& trial : trials) solveIntensities(problem, trial);  // with all threads, or the GPU
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t k) { countBytes(trials[k]); });
   return trials;
 }

@@ -51,6 +51,9 @@ class TrialMaker {
   [[nodiscard]] Trial make(const QuantiserSteps& steps);
   /// Several at once, each as it would be alone.
   [[nodiscard]] std::vector<Trial> make(std::span<const QuantiserSteps> steps);
+  /// The same to compare with one another: their errors are of a part of the bricks, and so is the
+  /// fit of their intensities. Bytes are of all.
+  [[nodiscard]] std::vector<Trial> sample(std::span<const QuantiserSteps> steps);
 
   /// How far off each prefix of the layers is, the last the trial itself; nothing where there is
   /// but one layer.
@@ -58,10 +61,13 @@ class TrialMaker {
 
  private:
   void quantiseChunks(Trial& trial) const;
-  void solveIntensities(Trial& trial);
+  [[nodiscard]] std::vector<Trial> make(std::span<const QuantiserSteps> steps,
+                                        IntensityProblem& problem) const;
 
   IntensityTarget target_;
-  IntensityProblem problem_;
+  std::vector<Coord> sampleBricks_;
+  IntensityTarget sampleTarget_;
+  IntensityProblem problem_, sampleProblem_;
   Field field_;  ///< float32, with its best intensities: those of rounded shapes are not far
   std::vector<std::vector<double>> curvature_;  ///< by chunk
   double peak_, error_ = 0.0, leastError_ = 0.0;

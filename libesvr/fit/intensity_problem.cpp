@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace esvr {
 namespace {
@@ -16,6 +17,18 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
 
 void addScaled(std::vector<double>& a, double scale, const std::vector<double>& b) {
   for (std::size_t i = 0; i < a.size(); ++i) a[i] += scale * b[i];
+}
+
+/// A share of a step further; none changes its sign where there is but one.
+std::vector<float> moved(const std::vector<float>& intensities, const std::vector<double>& step,
+                         double share) {
+  const bool signs = std::any_of(intensities.begin(), intensities.end(),
+                                 [](float intensity) { return intensity < 0.0f; });
+  const double lowest = signs ? -HUGE_VAL : 0.0;
+  std::vector<float> to(intensities.size());
+  for (std::size_t i = 0; i < to.size(); ++i)
+    to[i] = float(std::max(lowest, intensities[i] + share * step[i]));
+  return to;
 }
 
 }  // namespace
@@ -50,19 +63,20 @@ std::vector<double> IntensityProblem::conjugateGradients(int iterations) {
   return x;
 }
 
+double IntensityProblem::step(std::vector<float>& intensities, int iterations) {
+  const double before = passes_->gradient(intensities, gradient_).squares;
+  intensities = moved(intensities, conjugateGradients(iterations), 1.0);
+  return before;
+}
+
 double IntensityProblem::solve(std::vector<float>& intensities, int iterations) {
   const double before = passes_->gradient(intensities, gradient_).squares;
   const auto step = conjugateGradients(iterations);
-  std::vector<float> tried(intensities.size());
-  const bool signs = std::any_of(intensities.begin(), intensities.end(),
-                                 [](float intensity) { return intensity < 0.0f; });
-  const double lowest = signs ? -HUGE_VAL : 0.0;
   for (double share = 1.0; share > 0.1; share *= 0.5) {
-    for (std::size_t i = 0; i < tried.size(); ++i)
-      tried[i] = float(std::max(lowest, intensities[i] + share * step[i]));
+    auto tried = moved(intensities, step, share);
     const double after = passes_->error(tried).squares;
     if (!(after < before)) continue;
-    intensities = tried;
+    intensities = std::move(tried);
     return after;
   }
   return before;

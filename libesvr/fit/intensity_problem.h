@@ -32,6 +32,10 @@ class IntensityProblem {
   /// the one before
   double solve(std::vector<float>& intensities, int iterations);
 
+  /// The step of solve() in full length, whatever becomes of the error: a pass less.
+  /// \return the sum of squared errors before it
+  double step(std::vector<float>& intensities, int iterations);
+
   /// sum phi^2 over voxels, for each ellipsoid; of the last field solved for.
   [[nodiscard]] const std::vector<double>& curvature() const { return gradient_.curvature; }
 

@@ -59,7 +59,8 @@ TEST(CompactGrid, SpendsFewerBytesWhereMoreLossIsAllowed) {
   const auto size = [](double loss) {
     return bytesOf(compactGrid(tube().grid, tube().source, {.loss = loss}).grid).size();
   };
-  const std::size_t fine = size(0.05), usual = size(0.3), coarse = size(2.0);
+  // of 60 ellipsoids the bytes jump by a twentieth where the lattice does
+  const std::size_t fine = size(0.05), usual = size(1.0), coarse = size(3.0);
   EXPECT_LT(usual, fine);
   EXPECT_LT(coarse, usual);
   EXPECT_LT(2 * usual, bytesOf(tube().grid).size());
