@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "cli/stopwatch.h"
+#include "compare/row_renderer.h"
 #include "esvr/image_metrics.h"
 #include "esvr/metrics.h"
 #include "report/png_image.h"
@@ -41,18 +42,34 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Draws pictures and keeps the time.
+/// Draws pictures and keeps the time: on a CUDA device that of drawing without bringing the picture
+/// to the host, which is the same for all.
 class Clock {
  public:
-  Image draw(const Gallery::Draw& draw, const RenderOptions& view) {
+  Clock(Renderer& renderer, const Device& device)
+      : renderer_(renderer), onDevice_(device.kind == DeviceKind::kCuda) {}
+
+  Image draw(const RenderOptions& view) {
     cli::Stopwatch watch;
-    Image image = draw(view);
+    if (!onDevice_) {
+      Image image = renderer_.draw(view);
+      seconds_.push_back(watch.lap());
+      return image;
+    }
+    renderer_.drawOnDevice(view);
     seconds_.push_back(watch.lap());
-    return image;
+    return renderer_.draw(view);
   }
-  [[nodiscard]] double fps() const { return 1.0 / median(seconds_); }
+  [[nodiscard]] ImageFigures cost() const {
+    ImageFigures figures;
+    figures.fps = 1.0 / median(seconds_);
+    if (onDevice_) figures.deviceBytes = renderer_.stats().deviceBytes;
+    return figures;
+  }
 
  private:
+  Renderer& renderer_;
+  bool onDevice_;
   std::vector<double> seconds_;
 };
 
@@ -66,9 +83,10 @@ struct Sums {
     ssim += metrics.ssim;
     flip += esvr::flip(reference, candidate).mean;
   }
-  [[nodiscard]] ImageFigures over(double pictures, double fps) const {
+  [[nodiscard]] ImageFigures over(double pictures, const ImageFigures& cost) const {
     constexpr double kPeak = 1.0;
-    return {psnr(squares / pictures, kPeak), ssim / pictures, flip / pictures, fps};
+    return {psnr(squares / pictures, kPeak), ssim / pictures, flip / pictures, cost.fps,
+            cost.deviceBytes};
   }
 };
 
@@ -88,29 +106,28 @@ TransferFunction withEmptySpace(const TransferFunction& function, double backgro
   return result;
 }
 
-Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference,
+Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference, const Device& device,
                  const CancelToken& cancel)
-    : views_(viewsOf(options, reference, cancel)) {
-  Clock clock;
-  for (const auto& view : views_)
-    references_.push_back(
-        clock.draw([&](const RenderOptions& r) { return renderVolume(reference, r); }, view));
+    : views_(viewsOf(options, reference, cancel)), device_(device) {
+  const auto renderer = makeVoxelRenderer(reference, NanoValues::kFloat, device);
+  Clock clock(*renderer, device);
+  for (const auto& view : views_) references_.push_back(clock.draw(view));
   referencePng_ = report::toPng(references_.front());
-  referenceFps_ = clock.fps();
+  referenceCost_ = clock.cost();
 }
 
-Gallery::Compared Gallery::compare(const Draw& draw) const {
-  Clock clock;
+Gallery::Compared Gallery::compare(Renderer& renderer, const OwnView& own) const {
+  Clock clock(renderer, device_);
   Sums sums;
   Compared result;
   for (std::size_t i = 0; i < views_.size(); ++i) {
-    const Image image = clock.draw(draw, views_[i]);
+    const Image image = clock.draw(own ? own(views_[i]) : views_[i]);
     sums.add(references_[i], image);
     if (i == 0)
       result.shown = {report::toPng(image),
                       report::toPng(errorMap(references_[i], image, kErrorGain))};
   }
-  result.figures = sums.over(double(views_.size()), clock.fps());
+  result.figures = sums.over(double(views_.size()), clock.cost());
   return result;
 }
 

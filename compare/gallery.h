@@ -9,7 +9,7 @@
 #include "esvr/flip.h"
 #include "esvr/image.h"
 #include "esvr/progress.h"
-#include "esvr/render.h"
+#include "esvr/renderer.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::compare {
@@ -35,6 +35,7 @@ struct GalleryOptions {
 struct ImageFigures {
   double psnr = 0.0, ssim = 0.0, flip = 0.0;
   double fps = 0.0;  ///< pictures in a second of drawing, by the median picture
+  std::optional<std::uint64_t> deviceBytes{};  ///< that the renderer held; of a CUDA device
 };
 
 /// The first picture of a row, and where it errs.
@@ -42,26 +43,32 @@ struct Shown {
   std::string picturePng, errorPng;
 };
 
+/// What of a view is a row's own; nothing: the view as it is.
+using OwnView = std::function<RenderOptions(const RenderOptions&)>;
+
 class Gallery {
  public:
-  /// Draws the reference. \throws UsageError  as renderVolume; Cancelled
-  Gallery(const GalleryOptions& options, const SparseVolume& reference, const CancelToken& cancel);
+  /// Draws the reference on a device. \throws UsageError  as renderVolume; Cancelled; DeviceError
+  Gallery(const GalleryOptions& options, const SparseVolume& reference, const Device& device,
+          const CancelToken& cancel);
 
-  using Draw = std::function<Image(const RenderOptions&)>;
   struct Compared {
     ImageFigures figures;
     Shown shown;
   };
-  [[nodiscard]] Compared compare(const Draw& draw) const;
+  /// \throws  as Renderer::draw
+  [[nodiscard]] Compared compare(Renderer& renderer, const OwnView& own = {}) const;
   [[nodiscard]] const std::string& referencePng() const { return referencePng_; }
-  /// Pictures in a second of drawing the reference, by the median picture.
-  [[nodiscard]] double referenceFps() const { return referenceFps_; }
+  /// Of drawing the reference: fps and deviceBytes only.
+  [[nodiscard]] const ImageFigures& referenceCost() const { return referenceCost_; }
+  [[nodiscard]] const Device& device() const { return device_; }
 
  private:
   std::vector<RenderOptions> views_;
+  Device device_;
   std::vector<Image> references_;
   std::string referencePng_;
-  double referenceFps_ = 0.0;
+  ImageFigures referenceCost_;
 };
 
 }  // namespace esvr::compare

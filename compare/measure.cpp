@@ -1,4 +1,5 @@
 #include "compare/measure.h"
+#include "compare/row_renderer.h"
 
 #include <algorithm>
 #include <cmath>
@@ -98,13 +99,21 @@ void requireOverlap(const std::filesystem::path& path, const Box& a, const Box& 
                    ": its active voxels and the reference's lie in boxes that do not meet");
 }
 
-/// The ellipsoids as they are. A grid that holds its voxels, and a narrow band, whose ellipsoids
-/// say nothing of what lies beyond it, are drawn from their voxels.
-Image drawEsvr(const EncodedGrid& grid, const SparseVolume& voxels, const RenderOptions& view) {
-  if (grid.voxels || grid.topology != TopologyKind::kThreshold) return renderVolume(voxels, view);
-  RenderOptions own = view;
-  own.transfer = withEmptySpace(view.transfer, grid.descriptor.background, grid.activeThreshold);
-  return renderField(grid.field, own);
+/// How NanoVDB holds a row's voxels while they are drawn.
+NanoValues valuesOf(const BaselineSetting& setting) {
+  const auto* packing = std::get_if<VoxelPacking>(&setting.how);
+  switch (packing ? packing->form : PackedForm::kOpenVdbFloat) {
+    case PackedForm::kNanoFp16:
+      return NanoValues::kFp16;
+    case PackedForm::kNanoFp8:
+      return NanoValues::kFp8;
+    case PackedForm::kNanoFp4:
+      return NanoValues::kFp4;
+    case PackedForm::kNanoFpN:
+      return NanoValues::kFpN;
+    default:
+      return NanoValues::kFloat;
+  }
 }
 
 Timing once(double seconds) { return {seconds, seconds, seconds, 1}; }
@@ -163,17 +172,17 @@ VolumeMetrics RowMaker::compare(const SparseVolume& volume) const {
                         {.box = scene_.box, .peak = scene_.peak, .ssim = true});
 }
 
-void RowMaker::measurePictures(const Gallery::Draw& draw, TableRow& row) const {
-  if (!scene_.gallery) return;
-  auto compared = scene_.gallery->compare(draw);
+void RowMaker::measurePictures(Renderer& renderer, const OwnView& own, TableRow& row) const {
+  auto compared = scene_.gallery->compare(renderer, own);
   row.images = compared.figures;
   row.shown = std::move(compared.shown);
   row.fps = compared.figures.fps;
 }
 
-void RowMaker::measureVoxels(const SparseVolume& volume, TableRow& row) const {
+void RowMaker::measureVoxels(const SparseVolume& volume, NanoValues values, TableRow& row) const {
   row.metrics = compare(volume);
-  measurePictures([&](const RenderOptions& view) { return renderVolume(volume, view); }, row);
+  if (!scene_.gallery) return;
+  measurePictures(*makeVoxelRenderer(volume, values, scene_.gallery->device()), {}, row);
 }
 
 std::string RowMaker::command(const std::string& arguments) const {
@@ -200,7 +209,7 @@ void RowMaker::measure(const BaselineSetting& setting, TableRow& row) {
   const cli::MemoryMeter decoding;
   row.decode = timed(scene_.options.runs, [&] { return encoder_.secondsToDecode(); });
   row.memory = std::max(row.memory, decoding.peakRise());
-  measureVoxels(encoder_.decode(), row);
+  measureVoxels(encoder_.decode(), valuesOf(setting), row);
 }
 
 TableRow RowMaker::baseline(const std::string& group, const BaselineSetting& setting,
@@ -245,7 +254,7 @@ TableRow RowMaker::external(const External& external) {
   row.note = "times as given";
   measureVoxels(
       readExternal(external, {scene_.gridName, scene_.box, scene_.reference.volume.background}),
-      row);
+      NanoValues::kFloat, row);
   if (external.fps) row.fps = external.fps;
   return row;
 }
@@ -261,13 +270,21 @@ void RowMaker::measureEsvr(const std::filesystem::path& path, Drawing drawing, T
   row.memory = decoding.peakRise();
   requireOverlap(path, activeBox(scene_.reference.volume), activeBox(volume));
   row.metrics = compare(volume);
-  const EncodedGrid grid = gridOf(readEsvr(path), path, scene_.gridName);
-  measurePictures(
-      [&](const RenderOptions& view) {
-        return drawing == Drawing::kBricks ? renderVolume(volume, view)
-                                           : drawEsvr(grid, volume, view);
-      },
-      row);
+  if (scene_.gallery) drawEsvr(gridOf(readEsvr(path), path, scene_.gridName), volume, drawing, row);
+}
+
+void RowMaker::drawEsvr(const EncodedGrid& grid, const SparseVolume& voxels, Drawing drawing,
+                        TableRow& row) const {
+  const Device& device = scene_.gallery->device();
+  if (drawing == Drawing::kBricks || !saysAll(grid))
+    return measurePictures(*makeVolumeRenderer(voxels, device), {}, row);
+  const auto own = [&](const RenderOptions& view) {
+    RenderOptions result = view;
+    result.transfer =
+        withEmptySpace(view.transfer, grid.descriptor.background, grid.activeThreshold);
+    return result;
+  };
+  measurePictures(*makeFieldRenderer(grid.field, device), own, row);
 }
 
 TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing) {

@@ -61,8 +61,10 @@ class RowMaker {
   void measureEsvr(const std::filesystem::path& path, Drawing drawing, TableRow& row);
   [[nodiscard]] VolumeMetrics compare(const SparseVolume& volume) const;
   /// Figures of the voxels and, where pictures were asked for, of what they look like.
-  void measureVoxels(const SparseVolume& volume, TableRow& row) const;
-  void measurePictures(const Gallery::Draw& draw, TableRow& row) const;
+  void measureVoxels(const SparseVolume& volume, NanoValues values, TableRow& row) const;
+  void measurePictures(Renderer& renderer, const OwnView& own, TableRow& row) const;
+  void drawEsvr(const EncodedGrid& grid, const SparseVolume& voxels, Drawing drawing,
+                TableRow& row) const;
   [[nodiscard]] std::string command(const std::string& arguments) const;
 
   const TableScene& scene_;

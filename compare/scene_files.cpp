@@ -32,7 +32,8 @@ SceneFiles::SceneFiles(const TableOptions& options, const CancelToken& cancel)
       reference_(readReference(file_, place_)),
       box_(options.box.value_or(activeBox(reference_.volume))),
       peak_(choosePeak(options, reference_)) {
-  if (options.images.views > 0) gallery_.emplace(options.images, reference_.volume, cancel);
+  if (options.images.views > 0)
+    gallery_.emplace(options.images, reference_.volume, selectDevice(options.device), cancel);
 }
 
 TableScene SceneFiles::scene() const {
@@ -54,7 +55,10 @@ TableRecord SceneFiles::record() const {
   record.box = box_;
   record.peak = peak_;
   record.activeVoxels = activeVoxelCount(reference_.volume);
-  if (gallery_) record.referencePng = gallery_->referencePng();
+  if (!gallery_) return record;
+  record.referencePng = gallery_->referencePng();
+  record.referenceCost = gallery_->referenceCost();
+  record.drawnOn = deviceName(gallery_->device());
   return record;
 }
 

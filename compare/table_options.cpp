@@ -89,7 +89,7 @@ cli::CommandLine makeCommandLine() {
     ("tf", value<Words>()->value_name("FILE")->composing(),
      "a transfer function from a ParaView preset; may be repeated")
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
-     "of --fit: auto, cpu, cuda or cuda:N");
+     "of --fit and --images: auto, cpu, cuda or cuda:N");
   // clang-format on
   addReportOptions(line.options());
   return line;

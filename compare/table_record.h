@@ -54,7 +54,9 @@ struct TableRecord {
   double peak = 0.0;
   std::uint64_t activeVoxels = 0;
   std::vector<TableRow> rows;
-  std::string referencePng{};  ///< with pictures
+  std::string referencePng{};                   ///< with pictures
+  std::optional<ImageFigures> referenceCost{};  ///< with pictures, as Gallery has it
+  std::string drawnOn{};                        ///< with pictures: the device's name
   bool interrupted = false;
 };
 

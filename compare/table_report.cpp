@@ -64,6 +64,11 @@ Cell mass(const TableRow& row, const TableRecord&) {
   return row.metrics ? Cell(massError(*row.metrics)) : Cell();
 }
 
+Cell deviceMegabytes(const TableRow& row, const TableRecord&) {
+  const bool known = row.images && row.images->deviceBytes;
+  return known ? Cell(double(*row.images->deviceBytes) / 1e6) : Cell();
+}
+
 const std::vector<TableColumn>& tableColumns() {
   using R = TableRow;
   using T = TableRecord;
@@ -94,6 +99,7 @@ const std::vector<TableColumn>& tableColumns() {
       {{"image_ssim", "image SSIM", Kind::kShare}, image<&ImageFigures::ssim>},
       {{"flip", "FLIP", Kind::kShare}, image<&ImageFigures::flip>},
       {{"fps", "FPS"}, [](const R& r, const T&) { return number(r.fps); }},
+      {{"vram_bytes", "VRAM MB"}, deviceMegabytes},
       {{"note", "note", Kind::kText}, [](const R& r, const T&) -> Cell { return r.note; }},
       {{"command", "command", Kind::kText}, [](const R& r, const T&) -> Cell { return r.command; }},
   };
@@ -116,7 +122,8 @@ const std::vector<std::string> kQuality{"name",        "bytes",     "ratio",    
                                         "iou",         "mass_error"};
 const std::vector<std::string> kCost{"name",     "encode_s",     "encode_min_s", "encode_max_s",
                                      "decode_s", "decode_min_s", "decode_max_s", "memory_bytes"};
-const std::vector<std::string> kLooks{"name", "image_psnr", "image_ssim", "flip", "fps"};
+const std::vector<std::string> kLooks{"name", "image_psnr", "image_ssim",
+                                      "flip", "fps",        "vram_bytes"};
 
 /// Rows of one group that follow each other.
 std::vector<std::span<const TableRow>> groups(const TableRecord& record) {
@@ -148,6 +155,18 @@ std::string sceneLine(const TableRecord& record) {
   return "grid \"" + record.grid + "\", " + std::to_string(record.activeVoxels) +
          " active voxels, box " + toString(record.box.min) + " to " + toString(record.box.max) +
          ", peak " + cli::shortNumber(record.peak);
+}
+
+/// Where pictures were drawn, and what the reference's took.
+std::string pictureLine(const TableRecord& record) {
+  if (!record.referenceCost) return {};
+  const ImageFigures& cost = *record.referenceCost;
+  std::string text = "Pictures drawn on " + record.drawnOn + ", the reference's at " +
+                     cli::shortNumber(cost.fps) + " a second";
+  if (cost.deviceBytes)
+    text += ", as a NanoVDB float grid in " + cli::shortNumber(double(*cost.deviceBytes) / 1e6) +
+            " MB of the device";
+  return text + ".";
 }
 
 void printNotes(std::span<const TableRow> rows, bool search, std::ostream& out) {
@@ -201,6 +220,7 @@ std::string interruption(const TableRecord& record) {
 std::string markdown(const TableOptions& options, const TableRecord& record) {
   std::string text = "# " + options.reference.filename().string() + "\n\n" + sceneLine(record) +
                      ". Ratio to the half-float Blosc VDB.\n\n";
+  if (record.referenceCost) text += pictureLine(record) + "\n\n";
   if (record.interrupted) text += interruption(record) + "\n\n";
   for (const auto rows : groups(record)) {
     DataTable table = withoutEmptyColumns(dataTable(record, rows));
@@ -235,7 +255,7 @@ std::string html(const TableOptions& options, const TableRecord& record) {
   report::HtmlPage page;
   page.title = "esvr-compare: " + options.reference.filename().string();
   page.paragraphs = {sceneLine(record) + ". Ratio to the half-float Blosc VDB.",
-                     interruption(record)};
+                     pictureLine(record), interruption(record)};
   page.tables = {withoutEmptyColumns(dataTable(record, record.rows))};
   addPictures(record, page);
   page.commands = versions();
@@ -272,10 +292,19 @@ Json rowJson(const TableRow& row, const TableRecord& record) {
   }
   if (row.memory) json["memory_bytes"] = *row.memory;
   if (row.bytes) json["bytes"] = *row.bytes;
+  if (row.images && row.images->deviceBytes) json["vram_bytes"] = *row.images->deviceBytes;
   json["encode"] = toJson(row.encode);
   json["decode"] = toJson(row.decode);
   json["search"] = searchJson(row);
   return json;
+}
+
+Json picturesJson(const TableRecord& record) {
+  if (!record.referenceCost) return {};
+  const auto bytes = record.referenceCost->deviceBytes;
+  return {{"device", record.drawnOn},
+          {"reference_fps", record.referenceCost->fps},
+          {"reference_vram_bytes", bytes ? Json(*bytes) : Json()}};
 }
 
 Json tableJson(const TableOptions& options, const TableRecord& record) {
@@ -294,6 +323,7 @@ Json tableJson(const TableOptions& options, const TableRecord& record) {
           {"reference_bytes", record.referenceBytes},
           {"half_blosc_bytes", record.halfBlosc ? Json(*record.halfBlosc) : Json()},
           {"interrupted", record.interrupted},
+          {"pictures", picturesJson(record)},
           {"rows", std::move(rows)}};
 }
 
@@ -305,6 +335,7 @@ void writeText(const std::string& path, const std::string& text, bool overwrite)
 
 void printTable(const TableRecord& record, bool search, std::ostream& out) {
   out << cli::printable(sceneLine(record)) << '\n';
+  if (record.referenceCost) out << cli::printable(pictureLine(record)) << '\n';
   for (const auto rows : groups(record)) {
     out << "\n" << cli::printable(rows.front().group) << '\n';
     print(withColumns(dataTable(record, rows), kQuality), out);
@@ -312,7 +343,7 @@ void printTable(const TableRecord& record, bool search, std::ostream& out) {
     print(withColumns(dataTable(record, rows), kCost), out);
     if (!record.referencePng.empty()) {
       out << '\n';
-      print(withColumns(dataTable(record, rows), kLooks), out);
+      print(withoutEmptyColumns(withColumns(dataTable(record, rows), kLooks)), out);
     }
     printNotes(rows, search, out);
   }

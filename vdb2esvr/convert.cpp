@@ -1,6 +1,7 @@
 #include "vdb2esvr/convert.h"
 
 #include <utility>
+#include <vector>
 
 #include "cli/stopwatch.h"
 #include "esvr/compact.h"
@@ -117,6 +118,13 @@ EncodedGrid encode(const Options& options, const VolumeGrid& source,
                                            : fitPlain(input, options, grid);
 }
 
+void countHits(const SparseVolume& source, ConvertedGrid& grid) {
+  std::vector<Coord> corners;
+  for (std::size_t b = 0; b < source.brickCount(); ++b) corners.push_back(source.brickCorner(b));
+  grid.hits = averageHits(grid.stored.field);
+  grid.voxelPairs = esvr::countHits(grid.stored.field, corners).pairs;
+}
+
 }  // namespace
 
 ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
@@ -132,11 +140,11 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
   grid.device = deviceName(options.fit.device);
   grid.stored = throughTheFormat(encode(options, source, bytes, grid));
   if (options.voxels) checkVoxels(*options.voxels, source, grid.stored);
-  if (options.countHits) grid.hits = averageHits(grid.stored.field);
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
 
   grid.metrics = compareVolumes(source.volume, decodeGrid(grid.stored), {.box = options.fit.box});
   grid.seconds.measure = watch.lap();
+  if (options.countHits) countHits(source.volume, grid);
   return grid;
 }
 

@@ -45,9 +45,10 @@ struct ConvertedGrid {
   std::size_t deviceBytes = 0;  ///< FitResult::deviceBytes
   std::uint64_t pairs = 0;
   bool signedIntensities = false;
-  std::optional<double> hits;        ///< averageHits, where it was asked for
-  std::optional<PaperRecord> paper;  ///< FitResult::paper
-  std::vector<CurvePoint> curve;     ///< of the fit, whether the file has it or not
+  std::optional<double> hits;               ///< averageHits, where it was asked for
+  std::optional<std::uint64_t> voxelPairs;  ///< countHits in the source's bricks, likewise
+  std::optional<PaperRecord> paper;         ///< FitResult::paper
+  std::vector<CurvePoint> curve;            ///< of the fit, whether the file has it or not
   std::optional<BoundRecord> bound;
   std::optional<CompactRecord> compact;  ///< nothing where float32 is stored
   PhaseSeconds seconds;

@@ -118,7 +118,8 @@ Json fitOf(const ConvertedGrid& grid) {
           {"device_bytes", grid.deviceBytes},
           {"kappa_learned", grid.kappaLearned},
           {"pairs", grid.pairs},
-          {"hits", orNull(grid.hits)}};
+          {"hits", orNull(grid.hits)},
+          {"voxel_pairs", orNull(grid.voxelPairs)}};
 }
 
 Json boundOf(const ConvertedGrid& grid) {

@@ -9,10 +9,6 @@
 namespace esvr {
 namespace {
 
-struct Hits {
-  std::uint64_t hits = 0, voxels = 0;
-};
-
 using Counts = std::array<std::uint32_t, kBrickVoxels>;
 
 /// Adds 1 to every voxel of a brick that lies in an ellipsoid's support.
@@ -31,34 +27,42 @@ void addHits(const LineForm& f, const std::array<float, 3>& corner, float cutoff
     }
 }
 
-Hits totalOf(const Counts& counts) {
-  Hits total;
+PrimitiveHits totalOf(const Counts& counts) {
+  PrimitiveHits total;
   for (const std::uint32_t count : counts) {
-    total.hits += count;
+    total.pairs += count;
     total.voxels += count > 0 ? 1 : 0;
   }
   return total;
 }
 
+/// What the ellipsoids of a brick's list do in it.
+PrimitiveHits hitsInBrick(const EvaluatePlan& plan, std::size_t b, Coord brickCorner) {
+  Counts counts{};
+  for (auto pair = plan.pairs.brickBegin[b]; pair != plan.pairs.brickBegin[b + 1]; ++pair) {
+    const std::size_t i = plan.pairs.ellipsoid[pair];
+    const Coord corner = brickCorner - plan.field.origin(i);
+    addHits(plan.field.forms[i], {float(corner.x), float(corner.y), float(corner.z)},
+            plan.field.kernel(i).cutoff, counts);
+  }
+  return totalOf(counts);
+}
+
 }  // namespace
 
-double averageHits(const Field& field) {
-  const std::vector<Coord> corners = reachedBricks(field);
+PrimitiveHits countHits(const Field& field, std::span<const Coord> corners) {
   const EvaluatePlan plan = planEvaluation(field, corners);
-  std::vector<Hits> hits(corners.size());
-  tbb::parallel_for(std::size_t(0), corners.size(), [&](std::size_t b) {
-    Counts counts{};
-    for (auto pair = plan.pairs.brickBegin[b]; pair != plan.pairs.brickBegin[b + 1]; ++pair) {
-      const std::size_t i = plan.pairs.ellipsoid[pair];
-      const Coord corner = corners[b] - plan.field.origin(i);
-      addHits(plan.field.forms[i], {float(corner.x), float(corner.y), float(corner.z)},
-              plan.field.kernel(i).cutoff, counts);
-    }
-    hits[b] = totalOf(counts);
-  });
-  Hits total;
-  for (const Hits& h : hits) total.hits += h.hits, total.voxels += h.voxels;
-  return total.voxels > 0 ? double(total.hits) / double(total.voxels) : 0.0;
+  std::vector<PrimitiveHits> hits(corners.size());
+  tbb::parallel_for(std::size_t(0), corners.size(),
+                    [&](std::size_t b) { hits[b] = hitsInBrick(plan, b, corners[b]); });
+  PrimitiveHits total;
+  for (const PrimitiveHits& h : hits) total.pairs += h.pairs, total.voxels += h.voxels;
+  return total;
+}
+
+double averageHits(const Field& field) {
+  const PrimitiveHits total = countHits(field, reachedBricks(field));
+  return total.voxels > 0 ? double(total.pairs) / double(total.voxels) : 0.0;
 }
 
 }  // namespace esvr

@@ -26,7 +26,7 @@ FILES = {'aneurism': 'aneurism', 'smoke1': 'smoke1', 'wdas': 'wdas_cloud_sixteen
          'neuron_m207': 'neuron_m207'}
 PARTS = (50, 10)
 LOW, HIGH = PARTS
-IMAGES = ['--images', '1', '--image-size', '256']
+IMAGES = ['--images', '4', '--image-size', '400']
 MEASURE = ['--rows', 'matched,zfp', '--runs', '3', '--max-dense', '1GB']
 HERE = pathlib.Path(__file__).parent
 
@@ -72,7 +72,7 @@ class Volume:
         kept = self.options.out / f'{self.name}.table.json'
         if not kept.exists():
             words = [self.compare, 'table', self.path, *[self.esvr(p) for p in PARTS], *self.box,
-                     *MEASURE, *IMAGES, '--report', kept, '-q']
+                     *MEASURE, *IMAGES, '--device', self.options.device, '--report', kept, '-q']
             run(words)
         return json.loads(kept.read_text())
 
@@ -203,13 +203,15 @@ def verdict(low, high):
 
 COLUMNS = [('bytes', 0), ('psnr_box', 2), ('psnr_active', 2), ('max_error', 4), ('ssim', 4),
            ('iou', 4), ('mass_error', 4), ('image_psnr', 2), ('flip', 4), ('encode_s', 3),
-           ('decode_s', 4), ('fps', 1)]
+           ('decode_s', 4), ('fps', 0), ('vram_mb', 1)]
 HEADER = ('| row | bytes | PSNR box | active | max error | SSIM | IoU | mass error | image PSNR | '
-          'FLIP | encode s | decode s | FPS | setting |\n'
+          'FLIP | encode s | decode s | FPS | VRAM MB | setting |\n'
           '|---|' + '--:|' * len(COLUMNS) + '---|')
 
 
 def figure(row, key, digits):
+    if key == 'vram_mb':
+        return text(row['vram_bytes'] / 1e6, digits) if row.get('vram_bytes') else '-'
     value = psnr(row, key) if 'psnr' in key else row.get(key)
     return text(value, digits)
 
@@ -243,13 +245,22 @@ def introduction(tables):
             'Made by `tests/bench/comparison.py`; the rules of the rows are in [compare.md](compare.md).',
             'Sizes are the half-float Blosc VDB of the grid over 50 and over 10, pruned first. Encode seconds of',
             'ESVR are those of the whole `vdb2esvr --size` on the device that the row names; all other times are',
-            'of two CPU cores busy with other work, medians of three runs; those of externals as measured elsewhere.',
-            'Pictures: one view, viridis with linear opacity, 256 x 256, one voxel between samples, on the CPU. Rows',
-            'without picture figures are externals, whose voxels were not at hand; there are points of four volumes,',
-            'and not at every size, so that a table without them is no win over them. Ellipsoids drawn as they are show what',
-            'their sum does between voxels, which the fit never looked at; drawn from the voxels that the file decodes to',
-            '(`esvr-render --method bricks`), by the same rule as every other row, they do not.', '',
+            'of the CPU beside it, medians of three runs; those of externals as measured elsewhere. Pictures: four',
+            'views, viridis with linear opacity, 400 x 400, one voxel between samples, drawn on the device that each',
+            'volume names; FPS are pictures a second, VRAM is what drawing held on the device: NanoVDB grids for voxels,',
+            'quantised ones for quantised rows. Rows without picture figures are externals, whose voxels were not at hand;',
+            'there are points of four volumes, and not at every size, so that a table without them is no win over them.',
+            'ESVR is drawn from its ellipsoids, and in a second row from the voxels that the file decodes to',
+            '(`esvr-render --method bricks`).', '',
             '    ' + '\n    '.join(table['versions']), '']
+
+
+def reference_cost(table):
+    pictures = table['pictures']
+    vram = pictures['reference_vram_bytes']
+    held = f', {vram / 1e6:.1f} MB' if vram else ''
+    return (f"The reference is drawn at {pictures['reference_fps']:.0f} pictures a second{held} "
+            f"({pictures['device']}).")
 
 
 def page(options):
@@ -260,7 +271,8 @@ def page(options):
     lines = introduction(tables) + verdict(sizes[LOW], sizes[HIGH])
     for name in volumes:
         lines += [f'## {name}', '', f"{tables[name]['active_voxels']} active voxels; half-float "
-                  f"Blosc VDB {tables[name]['half_blosc_bytes']} bytes.", '']
+                  f"Blosc VDB {tables[name]['half_blosc_bytes']} bytes. "
+                  + reference_cost(tables[name]), '']
         for part in PARTS:
             lines += section(sizes[part][name])
     options.page.write_text('\n'.join(lines).rstrip() + '\n')

@@ -359,6 +359,7 @@ TEST_F(Vdb2Esvr, reportsWhatThePapersMethodUsed) {
   EXPECT_EQ(paper["prunes"][0]["epoch"], 12);
   EXPECT_EQ(paper["prunes"][0]["after"], 40);
   EXPECT_GT(report["grids"][0]["fit"]["hits"], 1.0);
+  EXPECT_GT(report["grids"][0]["fit"]["voxel_pairs"], 1);
 }
 
 /// Smooth as it is, the ball needs next to no residual; whichever is stored, the report says so.

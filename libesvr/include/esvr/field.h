@@ -2,6 +2,7 @@
 /// Evaluates a Field on bricks. Primitives are gathered in their order in the field, brick by
 /// brick, so a result is the same bits for any number of threads (the calling TBB arena's).
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -22,6 +23,13 @@ namespace esvr {
 /// \param corners  index corners, multiples of 8
 /// \param out      kBrickVoxels a brick, in voxelOffset order
 void evaluateBricks(const Field& field, std::span<const Coord> corners, std::span<float> out);
+
+struct PrimitiveHits {
+  std::uint64_t pairs = 0;   ///< of an ellipsoid and a voxel that its support holds
+  std::uint64_t voxels = 0;  ///< that any support holds
+};
+/// \param corners  index corners of the bricks whose voxels count, multiples of 8
+[[nodiscard]] PrimitiveHits countHits(const Field& field, std::span<const Coord> corners);
 
 /// Average number of ellipsoids whose support holds a voxel, over the voxels that any does (the
 /// paper's 'average primitive hits'); 0 where there are none.
