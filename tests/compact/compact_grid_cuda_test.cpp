@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "../fit/volumes.h"
 #include "esvr/compact.h"
 #include "esvr/error.h"
@@ -70,6 +72,18 @@ TEST_P(CompactGridOnGpu, GivesTheSameBytesInEveryRun) {
   const auto first = bytes();
   EXPECT_EQ(bytes(), first);
   EXPECT_EQ(bytes(), first);
+}
+
+TEST_P(CompactGridOnGpu, HoldsNearFloat32sOwnPrecision) {
+  const SparseVolume source = test::ellipsoidVolume(300, 0.2, 1.0);
+  // what that volume was made of: without rounding the error is zero
+  Field field =
+      test::randomField({.count = 300, .extent = 30.0, .smallest = 1.5, .aspect = 2.0, .seed = 9});
+  test::Random random(17);
+  for (float& i : field.chunks[0].ellipsoids.intensity) i = float(random(0.2, 1.0));
+  const EncodedGrid grid = encodeGrid({}, source, std::move(field));
+  const auto compact = compactGrid(grid, source, {.psnr = 105.0, .device = device_});
+  EXPECT_GE(compareVolumes(source, decodeGrid(compact.grid)).psnrBox, 105.0);
 }
 
 INSTANTIATE_TEST_SUITE_P(FogAndBand, CompactGridOnGpu, testing::Bool());
