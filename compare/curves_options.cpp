@@ -1,11 +1,9 @@
 #include "compare/curves_options.h"
 
-#include <limits>
-
-#include "cli/box_option.h"
 #include "cli/byte_size.h"
 #include "cli/command_line.h"
 #include "compare/program.h"
+#include "compare/scene_options.h"
 #include "esvr/error.h"
 
 namespace esvr::compare {
@@ -42,26 +40,16 @@ cli::ProgramText programText() {
 
 cli::CommandLine makeCommandLine() {
   cli::CommandLine line(programText());
-  line.argument("reference", "REF.vdb");
-  line.repeatedArgument("candidates");
   // clang-format off
   line.options().add_options()
     ("output,o", value<std::string>()->value_name("PREFIX"), "of the files to write")
-    ("grid,g", value<std::string>()->value_name("NAME"),
-     "the grid to compare, in every file (default: the first with voxels)")
     ("fit", value<Words>()->value_name("BYTES")->composing(),
      "fit ellipsoids to this size, here; may be repeated")
     ("no-baselines", bool_switch(), "no VDB and ZFP files of the same sizes")
     ("fps", value<int>()->value_name("PX"), "draw a picture of so many pixels a side, and time it")
-    ("max-dense", value<std::string>()->value_name("BYTES")->default_value("1GB"),
-     "skip ZFP where the box as an array of floats takes more")
-    ("box", value<std::string>()->value_name("BOX"),
-     "x0,y0,z0,x1,y1,z1 of the PSNR (default: the reference's active bounding box)")
-    ("peak", value<double>()->value_name("P"), "of the PSNR (default: the reference's largest value)")
-    ("device", value<std::string>()->value_name("D")->default_value("auto"),
-     "of the fits: auto, cpu, cuda or cuda:N")
     ("force,f", bool_switch(), "replace files that exist");
   // clang-format on
+  addSceneOptions(line);
   return line;
 }
 
@@ -77,24 +65,12 @@ void readImages(const Arguments& a, TableOptions& options) {
 
 TableOptions tableOptions(const Arguments& a) {
   TableOptions options;
-  options.reference = a.get<std::string>("reference");
-  for (const auto& candidate : a.find<Words>("candidates").value_or(Words{}))
-    options.candidates.emplace_back(candidate);
-  options.grid = a.find<std::string>("grid");
+  readSceneOptions(a, options);
   options.matched = options.zfp = !a.get<bool>("no-baselines");
   for (const auto& text : a.find<Words>("fit").value_or(Words{}))
     options.fits.push_back(cli::parseByteSize("fit", text));
   options.runs = 1;
-  options.maxDense = cli::parseByteSize("max-dense", a.get<std::string>("max-dense"));
-  if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
-  options.peak = a.find<double>("peak");
-  if (options.peak)
-    cli::requireRange("peak", *options.peak, std::numeric_limits<double>::min(),
-                      std::numeric_limits<double>::max());
-  options.device = a.get<std::string>("device");
   readImages(a, options);
-  options.threads = a.threads;
-  options.verbosity = a.verbosity;
   return options;
 }
 

@@ -1,12 +1,10 @@
 #include "compare/table_options.h"
 
-#include <limits>
-
-#include "cli/box_option.h"
 #include "cli/byte_size.h"
 #include "cli/command_line.h"
 #include "compare/program.h"
 #include "compare/report_options.h"
+#include "compare/scene_options.h"
 #include "esvr/error.h"
 
 namespace esvr::compare {
@@ -53,12 +51,8 @@ cli::ProgramText programText() {
 
 cli::CommandLine makeCommandLine() {
   cli::CommandLine line(programText());
-  line.argument("reference", "REF.vdb");
-  line.repeatedArgument("candidates");
   // clang-format off
   line.options().add_options()
-    ("grid,g", value<std::string>()->value_name("NAME"),
-     "the grid to compare, in every file (default: the first with voxels)")
     ("rows", value<std::string>()->value_name("KINDS")->default_value("lossless,quantised,matched,zfp"),
      "which baselines, separated by commas")
     ("row", value<Words>()->value_name("SETTING")->composing(),
@@ -73,11 +67,6 @@ cli::CommandLine makeCommandLine() {
      "and any of :encode=S, :decode=S, :fps=N; may be repeated")
     ("runs", value<int>()->value_name("N")->default_value(TableOptions{}.runs),
      "of which times are medians")
-    ("max-dense", value<std::string>()->value_name("BYTES")->default_value("1GB"),
-     "skip ZFP where the box as an array of floats takes more")
-    ("box", value<std::string>()->value_name("BOX"),
-     "x0,y0,z0,x1,y1,z1 of the figures (default: the reference's active bounding box)")
-    ("peak", value<double>()->value_name("P"), "of the PSNR (default: the reference's largest value)")
     ("images", value<int>()->value_name("N"),
      "pictures of each row from N views of a full turn, and how far they are from the reference's")
     ("image-size", value<int>()->value_name("PX")->default_value(GalleryOptions{}.resolution.width),
@@ -87,10 +76,9 @@ cli::CommandLine makeCommandLine() {
     ("colors", value<Words>()->value_name("MAP[:CURVE]")->composing(),
      "a transfer function, as esvr-render names them (default: viridis:linear); may be repeated")
     ("tf", value<Words>()->value_name("FILE")->composing(),
-     "a transfer function from a ParaView preset; may be repeated")
-    ("device", value<std::string>()->value_name("D")->default_value("auto"),
-     "of --fit and --images: auto, cpu, cuda or cuda:N");
+     "a transfer function from a ParaView preset; may be repeated");
   // clang-format on
+  addSceneOptions(line);
   addReportOptions(line.options());
   return line;
 }
@@ -164,27 +152,15 @@ std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv)
   if (!arguments) return std::nullopt;
   const Arguments& a = *arguments;
   TableOptions options;
-  options.reference = a.get<std::string>("reference");
-  for (const auto& candidate : a.find<Words>("candidates").value_or(Words{}))
-    options.candidates.emplace_back(candidate);
-  options.grid = a.find<std::string>("grid");
+  readSceneOptions(a, options);
   readRows(a, options);
   readSizes(a, options);
   for (const auto& text : a.find<Words>("external").value_or(Words{}))
     options.externals.push_back(parseExternal(text));
   options.runs = a.get<int>("runs");
   cli::requireRange("runs", options.runs, 1, kMostRuns);
-  options.maxDense = cli::parseByteSize("max-dense", a.get<std::string>("max-dense"));
-  if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
-  options.peak = a.find<double>("peak");
-  if (options.peak)
-    cli::requireRange("peak", *options.peak, std::numeric_limits<double>::min(),
-                      std::numeric_limits<double>::max());
   readImages(a, options);
-  options.device = a.get<std::string>("device");
   options.files = reportFiles(a);
-  options.threads = a.threads;
-  options.verbosity = a.verbosity;
   options.commandLine = commandLine(argc, argv);
   return options;
 }

@@ -1,0 +1,46 @@
+#include "compare/scene_options.h"
+
+#include <limits>
+
+#include "cli/box_option.h"
+#include "cli/byte_size.h"
+
+namespace esvr::compare {
+
+using cli::po::value;
+
+void addSceneOptions(cli::CommandLine& line) {
+  line.argument("reference", "REF.vdb");
+  line.repeatedArgument("candidates");
+  // clang-format off
+  line.options().add_options()
+    ("grid,g", value<std::string>()->value_name("NAME"),
+     "the grid to compare, in every file (default: the first with voxels)")
+    ("box", value<std::string>()->value_name("BOX"),
+     "x0,y0,z0,x1,y1,z1 of the figures (default: the reference's active bounding box)")
+    ("peak", value<double>()->value_name("P"), "of the PSNR (default: the reference's largest value)")
+    ("max-dense", value<std::string>()->value_name("BYTES")->default_value("1GB"),
+     "skip ZFP where the box as an array of floats takes more")
+    ("device", value<std::string>()->value_name("D")->default_value("auto"),
+     "of fits and pictures: auto, cpu, cuda or cuda:N");
+  // clang-format on
+}
+
+void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
+  options.reference = a.get<std::string>("reference");
+  for (const auto& candidate :
+       a.find<std::vector<std::string>>("candidates").value_or(std::vector<std::string>{}))
+    options.candidates.emplace_back(candidate);
+  options.grid = a.find<std::string>("grid");
+  if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
+  options.peak = a.find<double>("peak");
+  if (options.peak)
+    cli::requireRange("peak", *options.peak, std::numeric_limits<double>::min(),
+                      std::numeric_limits<double>::max());
+  options.maxDense = cli::parseByteSize("max-dense", a.get<std::string>("max-dense"));
+  options.device = a.get<std::string>("device");
+  options.threads = a.threads;
+  options.verbosity = a.verbosity;
+}
+
+}  // namespace esvr::compare
