@@ -284,7 +284,7 @@ void RowMaker::drawEsvr(const EncodedGrid& grid, const SparseVolume& voxels, Dra
         withEmptySpace(view.transfer, grid.descriptor.background, grid.activeThreshold);
     return result;
   };
-  measurePictures(*makeFieldRenderer(grid.field, device), own, row);
+  measurePictures(*makeFieldRenderer(grid.field, device, {}, voxelRule(grid)), own, row);
 }
 
 TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing) {

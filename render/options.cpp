@@ -24,7 +24,7 @@ cli::ProgramText programText() {
   return {.name = kProgram,
           .purpose =
               "Draws an .esvr file, or for comparison a VDB, through a transfer function. The\n"
-              "ellipsoids of an .esvr are sampled along each ray, without voxels in between.",
+              "ellipsoids of an .esvr are drawn as they are: no voxels are kept of them.",
           .usage =
               "  esvr-render IN.esvr OUT.png|OUT.exr [OPTION]...\n"
               "  esvr-render IN.vdb OUT.png|OUT.exr [OPTION]...\n"
@@ -122,6 +122,9 @@ cli::CommandLine commandLine() {
     ("method", value<std::string>()->value_name("M")->default_value("primitives"),
      "of an .esvr: primitives; bricks, which draws its voxels, decoded once; or auto, whichever is "
      "faster for the first picture and fits")
+    ("between", value<std::string>()->value_name("B")->default_value("voxels"),
+     "what primitives show between voxels: voxels, their trilinear interpolation; or sum, the sum "
+     "of ellipsoids itself, faster where a pixel holds many voxels")
     ("values", value<std::string>()->value_name("T"),
      "march voxels in a NanoVDB grid of float, fp4, fp8, fp16 or fpn")
     ("ref", value<std::string>()->value_name("FILE"), "compare with the voxels of a VDB")
@@ -358,6 +361,8 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.method = cli::choose<Method>(
       "method", a.get<std::string>("method"),
       {{"primitives", Method::kPrimitives}, {"bricks", Method::kBricks}, {"auto", Method::kAuto}});
+  options.between = cli::choose<Between>("between", a.get<std::string>("between"),
+                                         {{"voxels", Between::kVoxels}, {"sum", Between::kSum}});
   readMeasuring(a, options);
   options.overwrite = a.get<bool>("force");
   options.threads = a.threads;

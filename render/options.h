@@ -34,6 +34,7 @@ struct Options {
   std::optional<double> minTransmittance;  ///< none: as RenderOptions has it
   std::optional<Rgb> background;           ///< none: the picture is transparent
   int bits = 8;                            ///< of a PNG's channel
+  Between between = Between::kVoxels;
   RenderMode mode = RenderMode::kComposite;
   std::optional<PlaceBox> clip;
   int turntable = 0;             ///< pictures of a full turn; 0: one picture

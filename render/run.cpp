@@ -104,6 +104,7 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
   r.opacityLength = options.opacityLength;
   r.minTransmittance = options.minTransmittance.value_or(r.minTransmittance);
   r.mode = options.mode;
+  r.between = options.between;
   r.clip = options.clip;
   return r;
 }

@@ -94,7 +94,8 @@ SceneRenderer::SceneRenderer(const Scene& scene, const DrawSettings& s,
 
 void SceneRenderer::drawField(const Field& field, const Scene& scene, const DrawSettings& s,
                               const RenderOptions& sample) {
-  if (s.method != Method::kBricks) renderer_ = makeFieldRenderer(field, s.device, s.limits);
+  if (s.method != Method::kBricks)
+    renderer_ = makeFieldRenderer(field, s.device, s.limits, voxelRule(*scene.encoded));
   if (s.method == Method::kPrimitives) return;
   decoded_ = decodeGrid(*scene.encoded);
   if (s.method == Method::kBricks) {

@@ -235,6 +235,11 @@ void clip(const Box& box, const ActivityRule& rule, SparseVolume& volume) {
 
 }  // namespace
 
+RevoxeliseOptions voxelRule(const EncodedGrid& grid) {
+  const ActivityRule rule = ruleOf(grid);
+  return {.threshold = grid.activeThreshold, .range = rule.range, .narrowBand = rule.narrowBand};
+}
+
 SparseVolume decodeGrid(const EncodedGrid& grid, const DecodeOptions& options) {
   if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));

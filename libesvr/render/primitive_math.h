@@ -127,6 +127,19 @@ ESVR_HD inline SeenEllipsoid seenBy(const View& view, const PackedEllipsoid& e,
           {double(e.scale[0]), double(e.scale[1]), double(e.scale[2])}};
 }
 
+/// An ellipsoid whose support, of radius 1 in its unit frame, holds all places that are
+/// interpolated from a voxel in the support of `e`: a ball around a cell, added to it. Of the
+/// ellipsoids that hold both, the one whose squared axes have the least sum.
+ESVR_HD inline SeenEllipsoid widenedByCells(const SeenEllipsoid& e, double radius) {
+  constexpr double kCell2 = 3.0;  // squared, from a voxel to the end of the cells around it
+  const Vec3 half = scaled(e.scale, radius);
+  const double p = std::sqrt(inner(half, half) / (3.0 * kCell2));
+  SeenEllipsoid wide = e;
+  for (int i = 0; i < 3; ++i)
+    wide.scale[i] = std::sqrt((1.0 + 1.0 / p) * half[i] * half[i] + (1.0 + p) * kCell2);
+  return wide;
+}
+
 /// \param radius  of the support in the unit frame
 ESVR_HD inline ScreenEllipse outlineOf(const View& view, const SeenEllipsoid& e, double radius) {
   using namespace primitive_math;
@@ -159,6 +172,22 @@ ESVR_HD inline ScreenBounds boundsOf(const ScreenEllipse& o, const SeenEllipsoid
 
 ESVR_HD inline bool visible(const ScreenBounds& b) {
   return b.farthest >= 0.0 && b.firstColumn <= b.lastColumn && b.firstRow <= b.lastRow;
+}
+
+/// Where an ellipsoid shows.
+struct Seen {
+  ScreenEllipse outline;
+  ScreenBounds bounds;
+};
+
+/// \param radius    of the support in the unit frame
+/// \param ofVoxels  true: where anything shows that is interpolated from voxels in the support
+ESVR_HD inline Seen lookAt(const View& view, const SeenEllipsoid& e, double radius, bool ofVoxels,
+                           Resolution resolution) {
+  const SeenEllipsoid shown = ofVoxels ? widenedByCells(e, radius) : e;
+  const double reach = ofVoxels ? 1.0 : radius;
+  const ScreenEllipse outline = outlineOf(view, shown, reach);
+  return {outline, boundsOf(outline, shown, reach, resolution)};
 }
 
 /// The columns that an outline covers between two rows; low > high where it does not come there.

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "render/lattice_scene.h"
+
 namespace esvr {
 namespace {
 
@@ -59,21 +61,24 @@ std::vector<RayKernel> rayKernels(const Field& field) {
   return kernels;
 }
 
-VisiblePrimitives visiblePrimitives(const Field& field, const View& view, Resolution resolution) {
+VisiblePrimitives visiblePrimitives(const Field& field, const View& view, Resolution resolution,
+                                    Between between) {
   const auto ellipsoids = packed(field);
   const auto origins = chunkOrigins(field);
   const auto kernels = rayKernels(field);
+  const bool ofVoxels = between == Between::kVoxels;
   VisiblePrimitives out;
   for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
     const PackedEllipsoid& e = ellipsoids[i];
     const RayKernel& kernel = kernels[kernels.size() == 1 ? 0 : i];
-    const double radius = std::sqrt(double(kernel.cutoff));
     const SeenEllipsoid seen = seenBy(view, e, difference(origins[e.chunk], view.eye));
-    const ScreenEllipse outline = outlineOf(view, seen, radius);
-    const ScreenBounds bounds = boundsOf(outline, seen, radius, resolution);
-    if (!visible(bounds)) continue;
-    out.bounds.push_back(bounds);
-    out.views.push_back(viewOf(view, seen, outline.everywhere, e.intensity, kernel));
+    const Seen s = lookAt(view, seen, std::sqrt(double(kernel.cutoff)), ofVoxels, resolution);
+    if (!visible(s.bounds)) continue;
+    out.bounds.push_back(s.bounds);
+    if (ofVoxels)
+      out.forms.push_back(latticeForm(e, kernel));
+    else
+      out.views.push_back(viewOf(view, seen, s.outline.everywhere, e.intensity, kernel));
   }
   return out;
 }

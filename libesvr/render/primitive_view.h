@@ -4,19 +4,21 @@
 #include <cstdint>
 #include <vector>
 
-#include "esvr/ellipsoids.h"
+#include "esvr/render.h"
+#include "render/lattice_form.h"
 #include "render/primitive_math.h"
 
 namespace esvr {
 
 /// The ellipsoids that some ray of the picture may meet, in their order in the field.
 struct VisiblePrimitives {
-  std::vector<PrimitiveView> views;
   std::vector<ScreenBounds> bounds;
+  std::vector<PrimitiveView> views;  ///< for Between::kSum
+  std::vector<LatticeForm> forms;    ///< for Between::kVoxels
 };
 
 [[nodiscard]] VisiblePrimitives visiblePrimitives(const Field& field, const View& view,
-                                                  Resolution resolution);
+                                                  Resolution resolution, Between between);
 
 /// What a camera is shown of a field's ellipsoids; `chunk` counts the field's chunks.
 [[nodiscard]] std::vector<PackedEllipsoid> packed(const Field& field);

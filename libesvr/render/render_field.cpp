@@ -29,19 +29,26 @@ void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
   const Lists lists = primitivesOfTiles(scene.primitives, firstRow, tiles);
   tbb::parallel_for(0, tiles, [&](int t) {
     if (lists[t].empty()) return;
-    Tile tile(scene, {t * kTileSide, firstRow});
-    tile.draw(lists[t]);
-    tile.copyTo(picture);
+    const auto tile = makeTile(scene, {t * kTileSide, firstRow});
+    tile->draw(lists[t]);
+    tile->copyTo(picture);
   });
 }
 
 }  // namespace
 
-Image renderField(const Field& field, const RenderOptions& options) {
+Image renderField(const Field& field, const RenderOptions& options,
+                  const RevoxeliseOptions& voxels) {
   Picture picture(options);
-  const auto primitives = visiblePrimitives(field, picture.view, options.resolution);
-  const TileScene scene{options, picture.view, primitives,
-                        sampleRule(options, picture.table.view(), field.background)};
+  const auto primitives =
+      visiblePrimitives(field, picture.view, options.resolution, options.between);
+  const auto origins = chunkOrigins(field);
+  const TileScene scene{options,
+                        picture.view,
+                        primitives,
+                        origins,
+                        sampleRule(options, picture.table.view(), field.background),
+                        voxelValue(field.background, voxels)};
   tbb::parallel_for(0, tilesAlong(options.resolution.height), [&](int row) {
     checkCancelled(options);
     drawRow(scene, row * kTileSide, picture);

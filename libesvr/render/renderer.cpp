@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <string>
+#include <utility>
 
 #include "esvr/error.h"
 #include "render/cuda/make_cuda_renderer.h"
@@ -12,14 +13,14 @@ namespace {
 constexpr int kMostDepthParts = 16;
 
 /// Draws with a function of render.h.
-template <class Content, Image (*kDraw)(const Content&, const RenderOptions&)>
+template <class Draw>
 class CpuRenderer final : public Renderer {
  public:
-  explicit CpuRenderer(const Content& content) : content_(content) {}
+  explicit CpuRenderer(Draw draw) : draw_(std::move(draw)) {}
 
   Image draw(const RenderOptions& options) override {
     const auto begin = std::chrono::steady_clock::now();
-    Image image = kDraw(content_, options);
+    Image image = draw_(options);
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
     stats_.drawMs = took.count();
     return image;
@@ -28,31 +29,39 @@ class CpuRenderer final : public Renderer {
   FrameStats stats() const override { return stats_; }
 
  private:
-  const Content& content_;
+  Draw draw_;
   FrameStats stats_;
 };
+
+template <class Draw>
+std::unique_ptr<Renderer> makeCpuRenderer(Draw draw) {
+  return std::make_unique<CpuRenderer<Draw>>(std::move(draw));
+}
 
 }  // namespace
 
 std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& device,
-                                            const RendererLimits& limits) {
+                                            const RendererLimits& limits,
+                                            const RevoxeliseOptions& voxels) {
   if (limits.depthParts < 0 || limits.depthParts > kMostDepthParts)
     throw UsageError("parts of the depth must be from 1 to " + std::to_string(kMostDepthParts) +
                      ", or 0 to have them chosen");
-  if (device.kind == DeviceKind::kCuda) return cuda::makeCudaFieldRenderer(field, device, limits);
-  return std::make_unique<CpuRenderer<Field, renderField>>(field);
+  if (device.kind == DeviceKind::kCuda)
+    return cuda::makeCudaFieldRenderer(field, device, limits, voxels);
+  return makeCpuRenderer(
+      [&field, voxels](const RenderOptions& o) { return renderField(field, o, voxels); });
 }
 
 std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume, const Device& device,
                                              const RendererLimits& limits) {
   if (device.kind == DeviceKind::kCuda) return cuda::makeCudaVolumeRenderer(volume, device, limits);
-  return std::make_unique<CpuRenderer<SparseVolume, renderVolume>>(volume);
+  return makeCpuRenderer([&volume](const RenderOptions& o) { return renderVolume(volume, o); });
 }
 
 std::unique_ptr<Renderer> makeNanoRenderer(const NanoVolume& volume, const Device& device,
                                            const RendererLimits& limits) {
   if (device.kind == DeviceKind::kCuda) return cuda::makeCudaNanoRenderer(volume, device, limits);
-  return std::make_unique<CpuRenderer<NanoVolume, renderNano>>(volume);
+  return makeCpuRenderer([&volume](const RenderOptions& o) { return renderNano(volume, o); });
 }
 
 }  // namespace esvr

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "esvr/ellipsoids.h"
+#include "esvr/render.h"
 #include "render/primitive_math.h"
 #include "render/ray_box.h"
 
@@ -11,6 +11,9 @@ namespace esvr {
 
 /// Around the supports of all ellipsoids; nothing where there are none.
 [[nodiscard]] std::optional<PlaceBox> supportBox(const Field& field);
+
+/// What shows of a support's box: with the cells around its voxels, where they are interpolated.
+[[nodiscard]] PlaceBox shownBox(const PlaceBox& support, Between between);
 
 /// The bins of the rays' samples that may lie in a box; last < first where none does.
 [[nodiscard]] BinRange binsWithin(const PlaceBox& box, const View& view, double step);

@@ -261,6 +261,22 @@ TEST(GridCoding, ABoxLeavesTheVoxelsOutsideInactive) {
   }
 }
 
+TEST(GridCoding, TheRuleOfTheVoxelsIsWhatDecodingGoesBy) {
+  const auto expectDecoded = [](const GridDescriptor& descriptor, const Field& field) {
+    const EncodedGrid grid = encodeGrid(descriptor, revoxelise(field, {}), perturbed(field));
+    EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
+    const SparseVolume decoded = decodeGrid(grid), byRule = revoxelise(grid.field, voxelRule(grid));
+    EXPECT_EQ(byRule.bricks, decoded.bricks);
+    EXPECT_EQ(byRule.active, decoded.active);
+    EXPECT_EQ(byRule.values, decoded.values);
+  };
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) expectDecoded(kFog, positiveField(seed));
+  expectDecoded(kFog, test::randomField({.count = 20, .extent = 30.0}));
+  const EncodedGrid band =
+      encodeGrid(kLevelSet, revoxelise(ball(), {.threshold = 0.01f, .narrowBand = true}), ball());
+  EXPECT_TRUE(voxelRule(band).narrowBand);
+}
+
 TEST(GridCoding, AGivenThresholdReplacesTheStoredOne) {
   const Field field = positiveField(5);
   const EncodedGrid grid = encodeGrid(kFog, revoxelise(field, {.threshold = 0.01f}), field);

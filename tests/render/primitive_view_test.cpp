@@ -86,7 +86,7 @@ TEST_P(Bounds, HoldEveryPixelThatMeetsTheSupport) {
       const Field field = randomField({.count = 1, .smallest = 0.5, .aspect = 20.0, .seed = seed});
       const View view(cameraFor(GetParam(), eye), kPicture);
       const Meeting meeting = meetingOf(field, view);
-      const auto visible = visiblePrimitives(field, view, kPicture);
+      const auto visible = visiblePrimitives(field, view, kPicture, Between::kSum);
       if (!meeting.any) continue;
       ++met;
       ASSERT_EQ(visible.bounds.size(), 1u) << "seed " << seed;
@@ -101,7 +101,7 @@ TEST_P(Bounds, AreNoLargerThanNeeded) {
     const View view(cameraFor(GetParam(), {60, 45, 90}), kPicture);
     const Meeting meeting = meetingOf(field, view);
     ASSERT_TRUE(meeting.any);
-    expectTight(meeting, visiblePrimitives(field, view, kPicture).bounds.at(0));
+    expectTight(meeting, visiblePrimitives(field, view, kPicture, Between::kSum).bounds.at(0));
   }
 }
 
@@ -111,7 +111,8 @@ INSTANTIATE_TEST_SUITE_P(Projections, Bounds,
 TEST(VisiblePrimitives, LeaveOutWhatLiesBehindTheEye) {
   const Field field = randomField({.count = 10});
   const Camera away{.eye = {20, 20, 100}, .center = {20, 20, 200}, .up = {0, 1, 0}};
-  EXPECT_TRUE(visiblePrimitives(field, View(away, kPicture), kPicture).bounds.empty());
+  EXPECT_TRUE(
+      visiblePrimitives(field, View(away, kPicture), kPicture, Between::kSum).bounds.empty());
 }
 
 }  // namespace

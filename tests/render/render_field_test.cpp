@@ -1,4 +1,5 @@
-// Plan: pictures of random ellipsoids against the float64 reference (reference_picture.h), from
+// Plan: pictures of sums of random ellipsoids (Between::kSum; lattice_tile_test.cpp has the other)
+// against the float64 reference (reference_picture.h), from
 // every kind of camera. What may differ: sums in float32 (1e-6 of the intensities), the table of
 // the transfer function where the color map bends (1e-5 of a color), samples on the end of a
 // support, which are 0 to rounding, and the light behind minTransmittance, at most 1/4096 of a
@@ -32,6 +33,7 @@ RenderOptions optionsFor(const CameraWish& wish = {}, Resolution resolution = {5
   o.camera = fitCamera(kBox, wish, resolution);
   o.transfer = viridis();
   o.opacityLength = 8.0;
+  o.between = Between::kSum;
   return o;
 }
 

@@ -27,6 +27,7 @@ RenderOptions optionsFor(RenderMode mode, Projection projection = Projection::kP
   o.camera = fitCamera(kBox, {.projection = projection}, o.resolution);
   o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
   o.opacityLength = 8.0;
+  o.between = Between::kSum;
   return o;
 }
 
@@ -93,6 +94,12 @@ TEST(RenderModes, ShowTheLargestAndTheMeanValue) {
 TEST(RenderModes, ShowHowDeepHalfOfTheLightComes) {
   const Field field = randomField({.count = 200});
   EXPECT_LE(shareOff(field, optionsFor(RenderMode::kDepth), 1e-3), 0.005);
+  RenderOptions o = optionsFor(RenderMode::kDepth);
+  o.between = Between::kVoxels;
+  const Image expected = renderVolume(revoxelise(field, {}), o), drawn = renderField(field, o);
+  int off = 0;
+  for (std::size_t i = 0; i < drawn.rgba.size(); ++i) off += drawn.rgba[i] != expected.rgba[i];
+  EXPECT_LE(off, int(drawn.rgba.size() / 200));
 }
 
 TEST(RenderModes, OfVoxelsAreThoseOfTheirField) {
@@ -103,6 +110,8 @@ TEST(RenderModes, OfVoxelsAreThoseOfTheirField) {
     RenderOptions o = optionsFor(mode);
     o.transfer = rescaled(o.transfer, {0.0f, 5.0f});
     EXPECT_GE(imagePsnr(renderField(field, o), renderVolume(volume, o)), 35.0);
+    o.between = Between::kVoxels;
+    EXPECT_GE(imagePsnr(renderField(field, o), renderVolume(volume, o)), 70.0);
   }
 }
 
@@ -121,6 +130,8 @@ TEST(ClipBox, LeavesWhatIsInIt) {
     EXPECT_GE(imagePsnr(referencePicture({clipped, 0.0, 300.0}, o), renderField(field, o)), 70.0);
     const SparseVolume volume = revoxelise(field, {.threshold = -1.0f});
     EXPECT_GE(imagePsnr(renderField(field, o), renderVolume(volume, o)), 25.0) << "roughly";
+    o.between = Between::kVoxels;
+    EXPECT_GE(imagePsnr(renderField(field, o), renderVolume(volume, o)), 70.0);
   }
 }
 

@@ -120,6 +120,7 @@ TEST(Renderers, AgreeOnSmoothFields) {
   RenderOptions o = optionsFor(volume);
   o.transfer = rescaled(o.transfer, {0.0f, 5.0f});
   o.opacityLength = 20.0;
+  o.between = Between::kSum;
   EXPECT_GE(imagePsnr(renderField(field, o), renderVolume(volume, o)), 45.0);
 }
 

@@ -5,6 +5,7 @@
 
 #include "esvr/container.h"
 #include "esvr/ellipsoids.h"
+#include "esvr/field.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/voxel_layer.h"
@@ -31,6 +32,10 @@ namespace esvr {
 /// A grid that holds its voxels and no ellipsoids. \param layer  of `source` (voxel_layer.h)
 [[nodiscard]] EncodedGrid encodeVoxels(const GridDescriptor& descriptor, const SparseVolume& source,
                                        VoxelLayer layer);
+
+/// By what rule decodeGrid() makes voxels of the sum: the grid's threshold, range and band, without
+/// its bricks, mask and residual.
+[[nodiscard]] RevoxeliseOptions voxelRule(const EncodedGrid& grid);
 
 struct DecodeOptions {
   std::optional<float> threshold{};  ///< instead of the grid's own; 0 or above

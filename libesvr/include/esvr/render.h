@@ -11,7 +11,7 @@
 #include <optional>
 
 #include "esvr/camera.h"
-#include "esvr/ellipsoids.h"
+#include "esvr/field.h"
 #include "esvr/image.h"
 #include "esvr/progress.h"
 #include "esvr/sparse_volume.h"
@@ -27,6 +27,12 @@ enum class RenderMode {
   /// Red: how far away half of the light is stopped, in voxels (orthographic: from the plane of the
   /// eye). Alpha: 1, or 0 where more comes through, and red is 0 too.
   kDepth
+};
+
+/// What a field is between its voxels.
+enum class Between {
+  kVoxels,  ///< interpolated trilinearly from the voxels that revoxelise() has: as renderVolume
+  kSum      ///< the sum of ellipsoids itself, which a fit that looks at voxels leaves open there
 };
 
 /// A box of places. Voxel (i, j, k) reaches half a voxel to each side of (i, j, k).
@@ -46,16 +52,23 @@ struct RenderOptions {
   /// that costs a 16th of a level of 255.
   double minTransmittance = 1.0 / 4096;
   RenderMode mode = RenderMode::kComposite;
+  Between between = Between::kVoxels;   ///< of a field
   std::optional<PlaceBox> clip{};       ///< samples outside of it count as empty space
   const CancelToken* cancel = nullptr;  ///< looked at before each row of tiles
 };
 
-/// Draws the sum of ellipsoids without ever making voxels of it (paper, section "Per-primitive ray
-/// sampling", algorithm 2): each ellipsoid adds to those samples of each ray that lie in its
-/// support, found by solving for entry and exit. \throws UsageError  as checkCamera and
-/// checkTransferFunction; step, opacityLength or
+/// Draws the sum of ellipsoids without keeping voxels of it (paper, section "Per-primitive ray
+/// sampling", algorithm 2), by tiles of pixels and bins of samples. Between::kSum: each ellipsoid
+/// adds to those samples of each ray that lie in its support, found by solving for entry and exit.
+/// Between::kVoxels: each adds to those voxels of its support that a tile's samples in a bin lie
+/// between; the samples are interpolated from these. That is the picture of
+/// renderVolume(revoxelise(field, voxels)), but for rounding.
+/// \param voxels  how sums become voxels; its bricks are not looked at. Of a narrow band, voxels
+///                inside are -background wherever an ellipsoid reaches
+/// \throws UsageError  as checkCamera and checkTransferFunction; step, opacityLength or
 ///                     minTransmittance out of range; a clip box that is no box; Cancelled
-[[nodiscard]] Image renderField(const Field& field, const RenderOptions& options);
+[[nodiscard]] Image renderField(const Field& field, const RenderOptions& options,
+                                const RevoxeliseOptions& voxels = {});
 
 /// Marches rays through voxels with trilinear interpolation and jumps over bricks that are not
 /// there. \throws  as renderField

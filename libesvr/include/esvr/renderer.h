@@ -53,7 +53,8 @@ class Renderer {
 /// Draws as renderField. \throws DeviceError  no such device, a build without CUDA, out of memory;
 ///                                             UsageError: limits out of range
 [[nodiscard]] std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& device,
-                                                          const RendererLimits& limits = {});
+                                                          const RendererLimits& limits = {},
+                                                          const RevoxeliseOptions& voxels = {});
 
 /// Draws as renderVolume. On a CUDA device from bricks of 8^3 cells with the 9^3 voxels at their
 /// corners, 2.9 KB each, where any is not the background; it does not need the volume any more.
@@ -65,7 +66,8 @@ class Renderer {
                                                            const RendererLimits& limits = {});
 
 /// The picture of renderVolume, marched through a NanoVDB grid: the reference that others are
-/// compared with. Places are float32 relative to where a ray enters. 	hrows  as renderField
+/// compared with. Places are float32 relative to where a ray enters. \throws  as
+/// renderField
 [[nodiscard]] Image renderNano(const NanoVolume& volume, const RenderOptions& options);
 
 /// Draws as renderNano. Does not need the volume any more once it is made on a CUDA device.

@@ -1,11 +1,13 @@
 #include "render/cuda/field_renderer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "core/cuda/use_device.h"
 #include "esvr/error.h"
 #include "render/cuda/make_cuda_renderer.h"
+#include "render/lattice_scene.h"
 #include "render/picture.h"
 #include "render/primitive_view.h"
 
@@ -32,6 +34,14 @@ std::size_t bytesOf(const Buffers&... buffers) {
   return (buffers.bytes() + ...);
 }
 
+float largestIntensity(const Field& field) {
+  float most = 0.0f;
+  for (const Chunk& chunk : field.chunks)
+    for (const float intensity : chunk.ellipsoids.intensity)
+      most = std::max(most, std::abs(intensity));
+  return most;
+}
+
 int tilesAlong(int pixels) { return (pixels + kSide - 1) / kSide; }
 
 }  // namespace
@@ -40,12 +50,18 @@ SceneMemory::SceneMemory(const Field& field, cudaStream_t stream)
     : ellipsoids(packed(field), stream),
       origins(chunkOrigins(field), stream),
       kernels(rayKernels(field), stream),
-      views(ellipsoids.size(), stream),
       footprints(ellipsoids.size(), stream),
       large(ellipsoids.size(), stream) {}
 
+void SceneMemory::prepare(const Field& field, Between between, cudaStream_t stream) {
+  if (between == Between::kSum)
+    atLeast(views, ellipsoids.size(), stream);
+  else if (forms.size() < ellipsoids.size())
+    forms = DeviceBuffer<LatticeForm>(latticeForms(field), stream);
+}
+
 std::size_t SceneMemory::bytes() const {
-  return bytesOf(ellipsoids, origins, kernels, views, footprints, large);
+  return bytesOf(ellipsoids, origins, kernels, views, forms, footprints, large);
 }
 
 DeviceEllipsoids SceneMemory::view() const {
@@ -87,9 +103,12 @@ struct FieldRenderer::Scene {
   BinRange bins{0, -1};
 };
 
-FieldRenderer::FieldRenderer(const Field& field, const Device& device, const RendererLimits& limits)
-    : limits_(limits),
-      background_(field.background),
+FieldRenderer::FieldRenderer(const Field& field, const Device& device, const RendererLimits& limits,
+                             const RevoxeliseOptions& voxels)
+    : field_(field),
+      limits_(limits),
+      voxelValue_(voxelValue(field.background, voxels)),
+      bound_(largestIntensity(field)),
       box_(supportBox(field)),
       multiprocessors_(multiprocessorsOf(device)),
       scene_(field, stream_.get()),
@@ -110,9 +129,10 @@ void FieldRenderer::drawFrame(const RenderOptions& options, Image* image) {
                        0.0f);
   stats_ = {.deviceBytes = stats_.deviceBytes};
   tiles_ = occupied_ = 0;
-  if (box_) scene.bins = binsWithin(*box_, scene.view, options.step);
+  if (box_) scene.bins = binsWithin(shownBox(*box_, options.between), scene.view, options.step);
   if (scene.bins.last < scene.bins.first) return;
   table_.update(options, stream_.get());
+  scene_.prepare(field_, options.between, stream_.get());
   drawBand(scene, {0, tilesAlong(options.resolution.height)}, image);
 }
 
@@ -135,7 +155,8 @@ TileFrame FieldRenderer::frameOf(const Scene& scene, Band band) const {
           .firstBin = scene.bins.first,
           .bins = int(bins),
           .parts = parts,
-          .binsOfPart = (int(bins) + parts - 1) / parts};
+          .binsOfPart = (int(bins) + parts - 1) / parts,
+          .between = scene.options.between};
 }
 
 /// What `reserve` makes, without lists and results, whose sizes the scene decides.
@@ -183,14 +204,27 @@ FrameCounters FieldRenderer::readCounters() {
 }
 
 /// As many as it takes for the longest tile to be no longer than what each block has to do anyway.
+/// Where samples are interpolated, a part that another one hides costs more than a block that
+/// waits.
 int FieldRenderer::chosenParts(const TileFrame& f) {
   list(f);
   const FrameCounters c = readCounters();
   if (c.pairs == 0) return 1;
   const double blocks = double(multiprocessors_) * DrawTuning::kBlocksPerMultiprocessor;
+  if (f.between == Between::kVoxels && c.occupiedTiles >= blocks) return 1;
   const double share = double(c.pairs) / blocks;
   return int(std::clamp(std::ceil(double(c.longestTile) / (2.0 * share)), 1.0,
                         double(DrawTuning::kMostParts)));
+}
+
+void FieldRenderer::launch(const DrawArguments& a) {
+  if (a.frame.between == Between::kSum)
+    launchDrawSums({a, scene_.views.data(), scene_.footprints.data()}, multiprocessors_,
+                   stream_.get());
+  else
+    launchDrawVoxels({a, scene_.forms.data(), scene_.footprints.data(), scene_.origins.data(),
+                      bound_, voxelValue_},
+                     multiprocessors_, stream_.get());
 }
 
 FrameCounters FieldRenderer::drawOnce(const Scene& scene, const TileFrame& f) {
@@ -201,25 +235,22 @@ FrameCounters FieldRenderer::drawOnce(const Scene& scene, const TileFrame& f) {
              multiprocessors_, stream);
   listed_.record(stream);
   band_.pixels.setZero();
-  launchDraw({.frame = f,
-              .views = scene_.views.data(),
-              .footprints = scene_.footprints.data(),
-              .lists = band_.lists(),
-              .rule = sampleRule(scene.options, table_.view(), background_),
-              .clip = clipOf(scene.options),
-              .pixels = band_.pixels.data()},
-             multiprocessors_, stream);
+  launch({.frame = f,
+          .lists = band_.lists(),
+          .rule = sampleRule(scene.options, table_.view(), field_.background),
+          .clip = clipOf(scene.options),
+          .pixels = band_.pixels.data()});
   drawn_.record(stream);
   return readCounters();
 }
 
-void FieldRenderer::grow(const FrameCounters& c) {
+void FieldRenderer::grow(const FrameCounters& c, Between between) {
   if (c.pairs > std::uint64_t(kMostLists))
     throw DeviceError("drawing on the GPU: " + std::to_string(c.pairs) +
                       " pairs of ellipsoids and tiles are more than the lists can hold");
   const cudaStream_t stream = stream_.get();
   if (c.pairs > band_.entries.size()) atLeast(band_.entries, withSpare(c.pairs), stream);
-  if (needSorting(c)) atLeast(band_.sorted, band_.entries.size(), stream);
+  if (needSorting(c, between)) atLeast(band_.sorted, band_.entries.size(), stream);
   if (std::uint64_t(c.results) * DrawTuning::kTilePixels > band_.results.size())
     atLeast(band_.results, std::size_t(c.results + c.results / 4) * DrawTuning::kTilePixels,
             stream);
@@ -248,8 +279,8 @@ void FieldRenderer::drawBand(const Scene& scene, Band band, Image* image) {
     reserve(f);
   }
   FrameCounters counters = drawOnce(scene, f);
-  while (!listsFit(counters, band_.lists())) {
-    grow(counters);
+  while (!listsFit(counters, band_.lists(), f.between)) {
+    grow(counters, f.between);
     if (tooLarge(fixedBytes() + band_.bytes())) return halves();
     counters = drawOnce(scene, f);
   }
@@ -279,8 +310,9 @@ void FieldRenderer::download(const TileFrame& f, Image& image) {
 }
 
 std::unique_ptr<Renderer> makeCudaFieldRenderer(const Field& field, const Device& device,
-                                                const RendererLimits& limits) {
-  return std::make_unique<FieldRenderer>(field, device, limits);
+                                                const RendererLimits& limits,
+                                                const RevoxeliseOptions& voxels) {
+  return std::make_unique<FieldRenderer>(field, device, limits, voxels);
 }
 
 }  // namespace esvr::cuda

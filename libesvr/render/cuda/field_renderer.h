@@ -18,10 +18,14 @@ namespace esvr::cuda {
 struct SceneMemory {
   SceneMemory(const Field& field, cudaStream_t stream);
 
+  /// What only one kind of picture needs is made for the first of that kind.
+  void prepare(const Field& field, Between between, cudaStream_t stream);
+
   DeviceBuffer<PackedEllipsoid> ellipsoids;
   DeviceBuffer<Vec3> origins;
   DeviceBuffer<RayKernel> kernels;
-  DeviceBuffer<PrimitiveView> views;
+  DeviceBuffer<PrimitiveView> views;  ///< for Between::kSum
+  DeviceBuffer<LatticeForm> forms;    ///< for Between::kVoxels
   DeviceBuffer<Footprint> footprints;
   DeviceBuffer<std::uint32_t> large;
 
@@ -45,7 +49,8 @@ struct BandMemory {
 
 class FieldRenderer final : public Renderer {
  public:
-  FieldRenderer(const Field& field, const Device& device, const RendererLimits& limits);
+  FieldRenderer(const Field& field, const Device& device, const RendererLimits& limits,
+                const RevoxeliseOptions& voxels);
 
   Image draw(const RenderOptions& options) override;
   void drawOnDevice(const RenderOptions& options) override;
@@ -66,14 +71,17 @@ class FieldRenderer final : public Renderer {
   void reserve(const TileFrame& frame);
   void list(const TileFrame& frame);
   [[nodiscard]] int chosenParts(const TileFrame& frame);
+  void launch(const DrawArguments& arguments);
   [[nodiscard]] FrameCounters drawOnce(const Scene& scene, const TileFrame& frame);
-  void grow(const FrameCounters& counters);
+  void grow(const FrameCounters& counters, Between between);
   [[nodiscard]] FrameCounters readCounters();
   void download(const TileFrame& frame, Image& image);
   void count(const TileFrame& frame, const FrameCounters& counters);
 
+  const Field& field_;
   RendererLimits limits_;
-  float background_;
+  VoxelValue voxelValue_;
+  float bound_;
   std::optional<PlaceBox> box_;
   int multiprocessors_ = 0;
   Stream stream_;

@@ -16,7 +16,7 @@ namespace {
 }  // namespace
 
 std::unique_ptr<Renderer> makeCudaFieldRenderer(const Field&, const Device& device,
-                                                const RendererLimits&) {
+                                                const RendererLimits&, const RevoxeliseOptions&) {
   refuse(device);
 }
 

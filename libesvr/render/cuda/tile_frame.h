@@ -6,9 +6,11 @@
 
 #include <cstdint>
 
+#include "render/lattice_form.h"
 #include "render/primitive_math.h"
 #include "render/ray_box.h"
 #include "render/sample_rule.h"
+#include "render/voxel_value.h"
 
 namespace esvr::cuda {
 
@@ -20,6 +22,11 @@ struct DrawTuning {
   static constexpr int kGroups = 4;  ///< of threads that share a tile's ellipsoids among them
   static constexpr int kDrawThreads = kTilePixels * kGroups;
   static constexpr int kBlocksPerMultiprocessor = 4;
+  /// Of a window of voxels: as much as a block of threads can have in shared memory.
+  static constexpr int kWindowVoxels = 8192, kWindowSlabs = 64;
+  static constexpr int kLanesOfForm = 8;  ///< threads that share an ellipsoid's voxels
+  /// Fewer samples at once only where the window of a single ray is too large.
+  static constexpr int kFewSamples = 8;
   static constexpr int kListThreads = 128;
   /// An ellipsoid in more lists than this is listed by a whole warp.
   static constexpr int kManyLists = 24;
@@ -47,6 +54,7 @@ struct TileFrame {
   int bins;
   int parts;       ///< of the depth, drawn at once
   int binsOfPart;  ///< the last part may have less
+  Between between;
 
   [[nodiscard]] ESVR_HD int tiles() const { return tileColumns * tileRows; }
 };
@@ -87,14 +95,15 @@ struct TileLists {
 
 inline constexpr std::uint32_t kNoResult = 0xffffffffu;
 
-/// Only lists longer than a block are sorted in memory; there they lie where their entries do.
-ESVR_HD inline bool needSorting(const FrameCounters& c) {
-  return c.longestBin > std::uint32_t(DrawTuning::kDrawThreads);
+/// Only sums in float32 have an order, and only lists longer than a block are sorted in memory;
+/// there they lie where their entries do.
+ESVR_HD inline bool needSorting(const FrameCounters& c, Between between) {
+  return between == Between::kSum && c.longestBin > std::uint32_t(DrawTuning::kDrawThreads);
 }
 /// Whether the room is enough for what a frame counted.
-ESVR_HD inline bool listsFit(const FrameCounters& c, const TileLists& lists) {
+ESVR_HD inline bool listsFit(const FrameCounters& c, const TileLists& lists, Between between) {
   return c.pairs <= lists.entryCapacity && c.results <= lists.resultCapacity &&
-         (!needSorting(c) || c.pairs <= lists.sortedCapacity);
+         (!needSorting(c, between) || c.pairs <= lists.sortedCapacity);
 }
 
 struct DeviceEllipsoids {
@@ -107,7 +116,7 @@ struct DeviceEllipsoids {
 
 /// Ellipsoids seen by a frame.
 struct SeenEllipsoids {
-  PrimitiveView* views;
+  PrimitiveView* views;  ///< for Between::kSum
   Footprint* footprints;
   std::uint32_t* large;  ///< numbers of those in many lists, in any order
 };
@@ -124,17 +133,32 @@ void launchPlan(const TileFrame& frame, const TileLists& lists, cudaStream_t str
 void launchFill(const TileFrame& frame, std::uint32_t count, const SeenEllipsoids& seen,
                 const TileLists& lists, int multiprocessors, cudaStream_t stream);
 
+/// What drawing needs, whatever is between voxels.
 struct DrawArguments {
   TileFrame frame;
-  const PrimitiveView* views;
-  const Footprint* footprints;
   TileLists lists;
   SampleRule rule;
   ClipBox clip;
   float4* pixels;  ///< of the band, row after row: red, green, blue, alpha
 };
 
-/// Does nothing where the lists did not fit. \param multiprocessors  of the device
-void launchDraw(const DrawArguments& arguments, int multiprocessors, cudaStream_t stream);
+struct SumArguments {
+  DrawArguments draw;
+  const PrimitiveView* views;
+  const Footprint* footprints;
+};
+
+struct VoxelArguments {
+  DrawArguments draw;
+  const LatticeForm* forms;
+  const Footprint* footprints;
+  const Vec3* origins;  ///< of the chunks
+  float bound;          ///< of all intensities: what sums are exact by
+  VoxelValue value;
+};
+
+/// Both do nothing where the lists did not fit. \param multiprocessors  of the device
+void launchDrawSums(const SumArguments& arguments, int multiprocessors, cudaStream_t stream);
+void launchDrawVoxels(const VoxelArguments& arguments, int multiprocessors, cudaStream_t stream);
 
 }  // namespace esvr::cuda

@@ -1,17 +1,11 @@
-#include "core/cuda/check.h"
-#include "render/cuda/tile_frame.h"
+#include "render/cuda/draw_work.cuh"
 
 namespace esvr::cuda {
 namespace {
 
-constexpr int kWarp = 32;
-constexpr unsigned kAllLanes = 0xffffffffu;
-constexpr int kSide = DrawTuning::kTileSide, kRays = DrawTuning::kTilePixels;
-constexpr int kGroups = DrawTuning::kGroups, kThreads = DrawTuning::kDrawThreads;
-constexpr int kWarps = kThreads / kWarp, kHalves = kRays / kWarp;
 constexpr int kStage = kWarp * kGroups;  // a lane of each warp looks at one staged ellipsoid
 constexpr int kRowsOfHalf = kSide / kHalves;
-static_assert(kRays == 64 && kGroups == 4, "sums and colors of a sample share their place");
+static_assert(kGroups == 4, "sums and colors of a sample share their place");
 
 /// An ellipsoid placed: from the tile's first pixel and the bin's first sample.
 struct alignas(16) Staged {
@@ -25,65 +19,34 @@ static_assert(sizeof(Staged) == sizeof(PrimitiveView) &&
                   offsetof(Staged, form) == offsetof(PrimitiveView, form),
               "staged in place of what was read");
 
-struct Shared {
+/// The groups share a list's ellipsoids among them.
+struct Shared : WorkShared {
   /// Of a sample the partial sums of each group for all rays; then, in the same place, of each ray
   /// what the rule made of the whole sum. A warp's rays meet no bank twice.
-  float sums[kBinSamples][kGroups][kRays];
+  alignas(16) float sums[kBinSamples][kGroups][kRays];
   Staged staged[kStage];
   std::uint32_t ids[kThreads], sortedIds[kThreads];
-  std::uint32_t openRays[kHalves];  ///< a bit a ray
-  std::uint32_t touched;            ///< a bit a sample
-  TilePart item;
-  int hasItem;
-  int isLast;
+  std::uint32_t touched;  ///< a bit a sample
 };
 
-/// Threads of a group are a thread a ray, and the groups share the ellipsoids among them.
-struct Place {
-  int group, half, lane;
-  int ray, column, row;
-
-  __device__ Place() {
-    const int warp = int(threadIdx.x) / kWarp;
-    group = warp / kHalves, half = warp % kHalves, lane = int(threadIdx.x) % kWarp;
-    ray = half * kWarp + lane, column = ray % kSide, row = ray / kSide;
-  }
-};
-
-/// What a block knows of its tile, and a thread of its ray.
-struct Work {
-  int firstColumn, firstRow;  ///< pixels of the picture
-  double middleUnit;          ///< samples for each unit along forward, on the tile's middle ray
-  bool inPicture;
+/// What a thread knows besides of its ray.
+struct SumWork : Work {
+  double middleUnit;  ///< samples for each unit along forward, on the tile's middle ray
   RayScale scale;
-  /// Samples that the clip box leaves, counted from the frame's first.
-  float firstSample, lastSample;
 };
 
-__device__ void clipTo(const DrawArguments& a, const Place& place, Work& w) {
-  w.firstSample = 0.0f, w.lastSample = float(a.frame.bins) * kBinSamples;
-  if (!a.clip.given) return;
-  const Ray ray = a.frame.view.ray(w.firstColumn + place.column, w.firstRow + place.row);
-  const SampleRange range = samplesIn(ray, a.clip, a.frame.step);
-  const double first = double(a.frame.firstBin) * kBinSamples;
-  w.firstSample = float(range.first - first), w.lastSample = float(range.last - first);
-}
-
-__device__ Work workOf(const DrawArguments& a, std::uint32_t tile, const Place& place) {
-  const TileFrame& frame = a.frame;
+__device__ SumWork sumWorkOf(const SumArguments& a, std::uint32_t tile, const Place& place) {
+  const TileFrame& frame = a.draw.frame;
   const View& view = frame.view;
-  Work w;
-  w.firstColumn = int(tile) % frame.tileColumns * kSide;
-  w.firstRow = (int(tile) / frame.tileColumns + frame.firstTileRow) * kSide;
+  SumWork w;
+  static_cast<Work&>(w) = workOf(a.draw, tile, place);
   constexpr double kMiddle = (kSide - 1) / 2.0;
   w.middleUnit =
       view.unitAlong(view.planeX(w.firstColumn + kMiddle), view.planeY(w.firstRow + kMiddle)) /
       frame.step;
   const int column = w.firstColumn + place.column, row = w.firstRow + place.row;
-  w.inPicture = column < frame.resolution.width && row < frame.resolution.height;
   const double unit = view.unitAlong(view.planeX(column), view.planeY(row)) / frame.step;
   w.scale = {float(unit), float(unit - w.middleUnit)};
-  clipTo(a, place, w);
   return w;
 }
 
@@ -127,7 +90,7 @@ __device__ std::uint32_t halvesOf(const Footprint& f, int firstRow) {
 }
 
 /// Copies a view, 16 bytes a thread; the first two replace what only places it.
-__device__ void stageOne(const DrawArguments& a, Shared& s, const Work& work, std::uint32_t id,
+__device__ void stageOne(const SumArguments& a, Shared& s, const SumWork& work, std::uint32_t id,
                          int slot, int word, double firstSample) {
   float4 v = reinterpret_cast<const float4*>(&a.views[id])[word];
   const int depthLow = __shfl_down_sync(kAllLanes, __float_as_int(v.x), 1);
@@ -143,8 +106,8 @@ __device__ void stageOne(const DrawArguments& a, Shared& s, const Work& work, st
   reinterpret_cast<float4*>(&s.staged[slot])[word] = v;
 }
 
-__device__ void stage(const DrawArguments& a, Shared& s, const Work& work, const std::uint32_t* ids,
-                      int count, double firstSample) {
+__device__ void stage(const SumArguments& a, Shared& s, const SumWork& work,
+                      const std::uint32_t* ids, int count, double firstSample) {
   constexpr int kWords = sizeof(Staged) / sizeof(float4);
   constexpr int kAtOnce = kThreads / kWords;
   const int word = int(threadIdx.x) % kWords;
@@ -161,7 +124,8 @@ __device__ std::uint32_t samplesFrom(int first, int last) {
 }
 
 /// \return the samples of the thread's ray that something was added to
-__device__ std::uint32_t addOne(Shared& s, const Staged& e, const Place& place, const Work& work) {
+__device__ std::uint32_t addOne(Shared& s, const Staged& e, const Place& place,
+                                const SumWork& work) {
   const RaySpan span = spanOn(e.form, e.dx + float(place.column), e.dy + float(place.row),
                               work.scale, e.depth, e.middleAhead);
   // Two at a time: the exponentials of one wait for nothing of the other.
@@ -175,7 +139,7 @@ __device__ std::uint32_t addOne(Shared& s, const Staged& e, const Place& place, 
 }
 
 /// The group's share of what is staged.
-__device__ std::uint32_t addStaged(Shared& s, const Place& place, const Work& work, bool open,
+__device__ std::uint32_t addStaged(Shared& s, const Place& place, const SumWork& work, bool open,
                                    int count) {
   const int own = place.lane * kGroups + place.group;
   const bool near = own < count && (s.staged[own].halves >> place.half & 1u) != 0;
@@ -189,8 +153,8 @@ __device__ std::uint32_t addStaged(Shared& s, const Place& place, const Work& wo
 }
 
 /// Ids in order.
-__device__ std::uint32_t addSorted(const DrawArguments& a, Shared& s, const Place& place,
-                                   const Work& work, bool open, const std::uint32_t* ids, int n,
+__device__ std::uint32_t addSorted(const SumArguments& a, Shared& s, const Place& place,
+                                   const SumWork& work, bool open, const std::uint32_t* ids, int n,
                                    double firstSample) {
   std::uint32_t touched = 0;
   for (int first = 0; first < n; first += kStage) {
@@ -210,20 +174,20 @@ __device__ std::uint32_t orOfWarp(std::uint32_t bits) {
 }
 
 /// All of a bin's list. Leaves the samples touched by any ray in s.touched.
-__device__ void addBin(const DrawArguments& a, Shared& s, const Place& place, const Work& work,
+__device__ void addBin(const SumArguments& a, Shared& s, const Place& place, const SumWork& work,
                        std::size_t list, int bin) {
-  const bool open = (s.openRays[place.half] >> place.lane & 1u) != 0;
-  const std::uint32_t n = a.lists.counts[list], begin = a.lists.ends[list] - n;
-  const double firstSample = double(a.frame.firstBin + bin) * kBinSamples;
+  const bool open = isOpen(s, place);
+  const std::uint32_t n = a.draw.lists.counts[list], begin = a.draw.lists.ends[list] - n;
+  const double firstSample = double(a.draw.frame.firstBin + bin) * kBinSamples;
   std::uint32_t touched = 0;
   if (n <= kThreads) {
-    if (threadIdx.x < n) s.ids[threadIdx.x] = a.lists.entries[begin + threadIdx.x];
+    if (threadIdx.x < n) s.ids[threadIdx.x] = a.draw.lists.entries[begin + threadIdx.x];
     __syncthreads();
     sortInShared(s, n);
     touched = addSorted(a, s, place, work, open, s.sortedIds, int(n), firstSample);
   } else {
-    std::uint32_t* const sorted = a.lists.sorted + begin;
-    sortInMemory(a.lists.entries + begin, n, sorted, s);
+    std::uint32_t* const sorted = a.draw.lists.sorted + begin;
+    sortInMemory(a.draw.lists.entries + begin, n, sorted, s);
     touched = addSorted(a, s, place, work, open, sorted, int(n), firstSample);
   }
   touched = orOfWarp(touched);
@@ -252,8 +216,8 @@ __device__ void classify(const DrawArguments& a, Shared& s) {
 }
 
 /// By the threads of the first group; leaves the sums zero.
-__device__ void composite(const DrawArguments& a, Shared& s, const Place& place, const Work& work,
-                          float firstSample, RayState& ray) {
+__device__ void composite(const DrawArguments& a, Shared& s, const Place& place,
+                          const SumWork& work, float firstSample, RayState& ray) {
   if (place.group == 0) {
     const float toEye = float(a.frame.firstBin) * kBinSamples;
     for (std::uint32_t left = s.touched; left != 0; left &= left - 1) {
@@ -272,134 +236,30 @@ __device__ void composite(const DrawArguments& a, Shared& s, const Place& place,
   __syncthreads();
 }
 
-__device__ bool anyOpen(const Shared& s) { return (s.openRays[0] | s.openRays[1]) != 0; }
-
-/// The bins of a part, from front to back, until no ray of the tile shows what is behind. The
-/// result is that of the first group's threads.
-__device__ RayState drawPart(const DrawArguments& a, Shared& s, const TilePart& item,
-                             const Place& place, const Work& work) {
-  const unsigned inside = __ballot_sync(kAllLanes, work.inPicture);
-  if (place.group == 0 && place.lane == 0) s.openRays[place.half] = inside;
-  __syncthreads();
-  RayState ray;
-  const int first = int(item.part) * a.frame.binsOfPart;
-  const int end = min(first + a.frame.binsOfPart, a.frame.bins);
-  for (int bin = first; bin < end && anyOpen(s); ++bin) {
-    const std::size_t list = std::size_t(item.tile) * a.frame.bins + bin;
-    if (a.lists.counts[list] == 0) continue;
-    addBin(a, s, place, work, list, bin);
-    classify(a, s);
-    composite(a, s, place, work, float(bin * kBinSamples), ray);
-  }
-  return ray;
-}
-
-__device__ void writePixel(const DrawArguments& a, const Place& place, const Work& work,
-                           const RayState& ray) {
-  if (!work.inPicture || place.group != 0) return;
-  const int row = work.firstRow + place.row - a.frame.firstTileRow * kSide;
-  const int column = work.firstColumn + place.column;
-  const PixelColor c = a.rule.finished(ray);
-  a.pixels[std::size_t(row) * a.frame.resolution.width + column] =
-      make_float4(c.r, c.g, c.b, c.alpha);
-}
-
-__device__ RayState loadResult(const RayState* results, std::uint32_t result, int ray) {
-  const float4 v = __ldcg(
-      reinterpret_cast<const float4*>(&results[std::size_t(result) * kRays + std::size_t(ray)]));
-  return {v.x, v.y, v.z, v.w};
-}
-
-/// Whoever finishes a tile's last part puts them over each other.
-__device__ void joinParts(const DrawArguments& a, const TilePart& item, const Place& place,
-                          const Work& work) {
-  if (place.group != 0) return;
-  const std::uint32_t* const resultOf = &a.lists.resultOf[std::size_t(item.tile) * a.frame.parts];
-  RayState ray;
-  for (int part = 0; part < a.frame.parts && a.rule.open(ray); ++part)
-    if (resultOf[part] != kNoResult)
-      a.rule.join(ray, loadResult(a.lists.results, resultOf[part], place.ray));
-  writePixel(a, place, work, ray);
-}
-
-/// \return true in all threads where the other parts of the tile are done, and visible
-__device__ bool storeResult(const DrawArguments& a, Shared& s, const TilePart& item,
-                            const Place& place, const RayState& ray) {
-  const std::uint32_t result = a.lists.resultOf[std::size_t(item.tile) * a.frame.parts + item.part];
-  if (place.group == 0) a.lists.results[std::size_t(result) * kRays + std::size_t(place.ray)] = ray;
-  __threadfence();
-  __syncthreads();
-  if (threadIdx.x == 0) {
-    if (!anyOpen(s)) atomicMin(&a.lists.closedAt[item.tile], item.part);
-    const std::uint32_t before = atomicAdd(&a.lists.partsDone[item.tile], 1u);
-    s.isLast = before + 1 == a.lists.partsOfTile[item.tile] ? 1 : 0;
-    __threadfence();
-  }
-  __syncthreads();
-  return s.isLast != 0;
-}
-
-/// The next item of work, the longest lists first.
-__device__ void takeItem(const DrawArguments& a, Shared& s) {
-  FrameCounters& counters = *a.lists.counters;
-  std::uint32_t n = atomicAdd(&counters.next, 1u);
-  s.hasItem = 0;
-  const std::size_t room = std::size_t(a.frame.tiles()) * a.frame.parts;
-  for (int of = 0; of < DrawTuning::kLengthClasses; ++of) {
-    if (n < counters.items[of]) {
-      s.item = a.lists.items[of * room + n];
-      s.hasItem = 1;
-      return;
-    }
-    n -= counters.items[of];
-  }
-}
-
-/// True where a part before this one lets nothing through: then this one shows nowhere.
-__device__ bool isHidden(const DrawArguments& a, const TilePart& item) {
-  return __ldcg(&a.lists.closedAt[item.tile]) < item.part;
-}
-
-__device__ void drawItem(const DrawArguments& a, Shared& s, const TilePart& item,
-                         const Place& place) {
-  const Work work = workOf(a, item.tile, place);
-  if (a.lists.partsOfTile[item.tile] == 1)
-    return writePixel(a, place, work, drawPart(a, s, item, place, work));
-  const bool hidden = __syncthreads_or(threadIdx.x == 0 && isHidden(a, item));
-  if (hidden && threadIdx.x < kHalves) s.openRays[threadIdx.x] = 1;
-  const RayState ray = hidden ? RayState{} : drawPart(a, s, item, place, work);
-  if (storeResult(a, s, item, place, ray)) joinParts(a, item, place, work);
-}
-
 __global__ void __launch_bounds__(kThreads, DrawTuning::kBlocksPerMultiprocessor)
-    drawKernel(const DrawArguments a) {
+    drawSumsKernel(const SumArguments a) {
   extern __shared__ float4 memory[];
   Shared& s = *reinterpret_cast<Shared*>(memory);
-  if (!listsFit(*a.lists.counters, a.lists)) return;
+  if (!listsFit(*a.draw.lists.counters, a.draw.lists, a.draw.frame.between)) return;
   const Place place;
   for (int i = int(threadIdx.x); i < kBinSamples * kThreads; i += kThreads)
     (&s.sums[0][0][0])[i] = 0.0f;
   if (threadIdx.x == 0) s.touched = 0;
-  while (true) {
-    if (threadIdx.x == 0) takeItem(a, s);
-    __syncthreads();
-    if (s.hasItem == 0) return;
-    const TilePart item = s.item;
-    __syncthreads();  // before the next item is written
-    drawItem(a, s, item, place);
-    __syncthreads();
-  }
+  forEachItem(a.draw, s, [&](const TilePart& item) {
+    const SumWork work = sumWorkOf(a, item.tile, place);
+    drawItem(a.draw, s, item, place, work, [&](std::size_t list, int bin, RayState& ray) {
+      addBin(a, s, place, work, list, bin);
+      classify(a.draw, s);
+      composite(a.draw, s, place, work, float(bin * kBinSamples), ray);
+    });
+  });
 }
 
 }  // namespace
 
-void launchDraw(const DrawArguments& arguments, int multiprocessors, cudaStream_t stream) {
-  const unsigned blocks = unsigned(multiprocessors * DrawTuning::kBlocksPerMultiprocessor);
-  check(cudaFuncSetAttribute(drawKernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                             int(sizeof(Shared))),
-        "asking for shared memory");
-  drawKernel<<<blocks, kThreads, sizeof(Shared), stream>>>(arguments);
-  check(cudaGetLastError(), "drawing tiles");
+void launchDrawSums(const SumArguments& arguments, int multiprocessors, cudaStream_t stream) {
+  launchOverTiles(drawSumsKernel, arguments, sizeof(Shared),
+                  multiprocessors * DrawTuning::kBlocksPerMultiprocessor, stream);
 }
 
 }  // namespace esvr::cuda
