@@ -92,6 +92,7 @@ EncodedGrid storeBounded(const Options& options, const VolumeGrid& source, Conve
   if (options.voxels->exact || bound == 0.0 || isNarrowBand(source.descriptor, source.volume))
     return voxels;
   grid.bound = BoundRecord{bytesAdded(voxels), 0};
+  if (options.voxels->alone) return voxels;
   BoundedFit fitted = fitWithin({source.descriptor, source.volume, options.fit, options.activity},
                                 bound, grid.bound->voxelBytes);
   grid.bound->ellipsoidBytes = fitted.bytes;

@@ -73,6 +73,7 @@ void addFitOptions(cli::po::options_description& options) {
     ("max-error", value<std::string>()->value_name("E"),
      "every voxel within E of the source, or E% of its range: voxels alone or ellipsoids with a "
      "residual, whichever is smaller")
+    ("voxels-only", bool_switch(), "with --max-error: voxels alone, without trying ellipsoids")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
      "threshold (voxels are active by their values) or exact (the source's mask is stored)")
     ("seconds", value<double>()->value_name("S"), "the best within this time, each grid")
@@ -184,6 +185,8 @@ void readBound(const std::string& text, VoxelDemand& demand) {
 void readVoxels(const Arguments& a, Options& options) {
   const bool exact = a.get<bool>("lossless");
   const auto bound = a.find<std::string>("max-error");
+  const bool alone = a.get<bool>("voxels-only");
+  if (alone && !bound) throw UsageError("--voxels-only says how --max-error is met; give that too");
   if (!exact && !bound) return;
   if (exact && bound) throw UsageError("--lossless leaves no error: it takes no --max-error");
   const std::string given = exact ? "--lossless" : "--max-error";
@@ -192,6 +195,7 @@ void readVoxels(const Arguments& a, Options& options) {
       throw UsageError(given + " chooses itself what to store; it takes no --" + option);
   VoxelDemand demand;
   demand.exact = exact;
+  demand.alone = alone;
   if (bound) readBound(*bound, demand);
   options.voxels = demand;
 }

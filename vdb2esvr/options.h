@@ -26,6 +26,7 @@ struct VoxelDemand {
   bool exact = false;
   double bound = 0.0;     ///< in the grid's values, or a share of their range
   bool relative = false;  ///< `bound` is a share
+  bool alone = false;     ///< without trying ellipsoids and a residual
 };
 
 struct Options {

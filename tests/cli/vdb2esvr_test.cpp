@@ -180,6 +180,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"--size", "9KB", "--ratio", "9"}, 2, "--ratio"},
         Refusal{{"--ratio", "0.5"}, 2, "--ratio"}, Refusal{{"--max-error", "0"}, 2, "--max-error"},
         Refusal{{"--max-error", "1x"}, 2, "--max-error"},
+        Refusal{{"--voxels-only"}, 2, "--max-error"},
         Refusal{{"--lossless", "--psnr", "40"}, 2, "--psnr"}, Refusal{{"--size", "99"}, 2, "bytes"},
         Refusal{{"--count", "0"}, 2, "--count"}, Refusal{{"--count", "x"}, 2, "x"},
         Refusal{{"--psnr", "-1"}, 2, "--psnr"}, Refusal{{"--psnr", "nan"}, 2, "psnr"},
@@ -376,6 +377,17 @@ TEST_F(Vdb2Esvr, takesEllipsoidsForABoundWhereTheyAreSmaller) {
   const SparseVolume source = readGrid(in(), "density").volume;
   const ValueRange range = activeRange(source);
   EXPECT_LE(largestDifference(source, decodeGrid(grid)), 0.05 * (double(range.max) - range.min));
+}
+
+TEST_F(Vdb2Esvr, triesNoEllipsoidsForABoundWhereTold) {
+  const std::string report = folder_ / "r.json";
+  const auto run =
+      vdb2esvr({in(), out(), "--max-error", "5%", "--voxels-only", "--report", report});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const Json bound = Json::parse(test::readText(report))["grids"][0]["bound"];
+  EXPECT_EQ(bound["stored"], "voxels");
+  EXPECT_TRUE(bound["ellipsoid_bytes"].is_null());
+  EXPECT_TRUE(readEsvr(out()).grids[0].voxels.has_value());
 }
 
 TEST_F(Vdb2Esvr, reportsNullForAPsnrWithoutError) {
