@@ -21,7 +21,7 @@ void checkFiles(const CurvesOptions& options) {
   for (const auto& file : curveFiles(options.prefix, options.table.images.views > 0)) {
     cli::requireDistinct({options.table.reference, file});
     for (const auto& candidate : options.table.candidates) cli::requireDistinct({candidate, file});
-    cli::checkOutput(file, {".csv", ".json", ".svg", ".png"}, options.overwrite);
+    cli::checkOutput(file, {".csv", ".json", ".html", ".svg", ".png"}, options.overwrite);
   }
 }
 
@@ -84,7 +84,7 @@ void curves(const CurvesOptions& options) {
   TableRecord record = files.record();
   const TableScene scene = files.scene();
   CurvesRun(scene, record, log).run();
-  writeCurves(options.prefix, record, options.table.commandLine, options.overwrite);
+  writeCurves(options.prefix, {record, options.table.commandLine}, options.overwrite);
   for (const auto& file : curveFiles(options.prefix, options.table.images.views > 0))
     log.info("wrote " + file.string());
   if (record.interrupted)

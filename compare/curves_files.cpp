@@ -9,7 +9,10 @@
 
 #include "cli/bytes_file.h"
 #include "cli/json_file.h"
+#include "compare/program.h"
+#include "compare/report_versions.h"
 #include "report/data_table.h"
+#include "report/html_page.h"
 #include "report/plot.h"
 
 namespace esvr::compare {
@@ -119,10 +122,6 @@ class Writer {
   void text(const std::string& ending, const std::string& bytes) const {
     cli::writeBytes(prefix_ + ending, std::as_bytes(std::span(bytes)), overwrite_);
   }
-  void plot(const std::string& ending, const Plot& plot) const {
-    text(ending + ".svg", report::toSvg(plot));
-    text(ending + ".png", report::toPng(plot));
-  }
   void json(const Json& json) const { cli::writeJson({prefix_ + ".json", overwrite_}, json); }
 
  private:
@@ -135,36 +134,65 @@ bool hasFps(const TableRecord& record) {
                      [](const TableRow& row) { return row.fps.has_value(); });
 }
 
+/// A picture, and the end of its file's name.
+struct NamedPlot {
+  std::string ending;
+  Plot plot;
+};
+
+std::vector<NamedPlot> plotsOf(const TableRecord& record) {
+  std::vector<NamedPlot> plots;
+  plots.push_back({"-seconds", overSeconds(record)});
+  plots.push_back({"-bytes", overBytes(record, "Error over bytes", "PSNR over the box, dB",
+                                       [](const TableRow& row) { return row.metrics->psnrBox; })});
+  if (!hasFps(record)) return plots;
+  Plot fps = overBytes(record, "Pictures a second over bytes", "pictures a second",
+                       [](const TableRow& row) { return row.fps.value_or(NAN); });
+  fps.logarithmicY = true;
+  plots.push_back({"-fps", std::move(fps)});
+  return plots;
+}
+
+std::string page(const CurvesReport& report, const report::DataTable& data,
+                 const std::vector<NamedPlot>& plots) {
+  report::HtmlPage page;
+  page.title = std::string(kProgram) + ": " + report.record.grid;
+  for (const auto& [ending, plot] : plots)
+    page.pictures.push_back({plot.title, "image/svg+xml", report::toSvg(plot)});
+  page.tables = {data};
+  page.commands = versions();
+  page.commands.insert(page.commands.begin(), joined(report.commandLine));
+  return report::toHtml(page);
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> curveFiles(const std::string& prefix, bool fps) {
   std::vector<std::filesystem::path> files;
-  for (const char* ending : {".csv", ".json", "-seconds.svg", "-seconds.png", "-bytes.svg",
+  for (const char* ending : {".csv", ".json", ".html", "-seconds.svg", "-seconds.png", "-bytes.svg",
                              "-bytes.png", "-fps.svg", "-fps.png"})
     if (fps || !std::string(ending).starts_with("-fps")) files.emplace_back(prefix + ending);
   return files;
 }
 
-void writeCurves(const std::string& prefix, const TableRecord& record,
-                 const std::vector<std::string>& commandLine, bool overwrite) {
+void writeCurves(const std::string& prefix, const CurvesReport& report, bool overwrite) {
   const Writer writer(prefix, overwrite);
+  const TableRecord& record = report.record;
   const report::DataTable data = points(record);
   writer.text(".csv", report::toCsv(data));
   writer.json({{"schema", kSchema},
                {"schema_version", kSchemaVersion},
-               {"command_line", commandLine},
+               {"command_line", report.commandLine},
                {"grid", record.grid},
                {"peak", record.peak},
                {"interrupted", record.interrupted},
                {"points", toJson(data)}});
-  writer.plot("-seconds", overSeconds(record));
-  writer.plot("-bytes", overBytes(record, "Error over bytes", "PSNR over the box, dB",
-                                  [](const TableRow& row) { return row.metrics->psnrBox; }));
-  if (!hasFps(record)) return;
-  Plot fps = overBytes(record, "Pictures a second over bytes", "pictures a second",
-                       [](const TableRow& row) { return row.fps.value_or(NAN); });
-  fps.logarithmicY = true;
-  writer.plot("-fps", fps);
+  const auto plots = plotsOf(record);
+  for (const auto& [ending, plot] : plots) {
+    writer.text(ending + ".svg", report::toSvg(plot));
+    writer.text(ending + ".png", report::toPng(plot));
+  }
+  writer.text(".html", page(report, data, plots));
 }
 
 }  // namespace esvr::compare

@@ -24,8 +24,8 @@ cli::ProgramText programText() {
           ".esvr files and of VDB and ZFP files of the same sizes.",
       .usage = "  esvr-compare curves REF.vdb [CAND.esvr ...] --output PREFIX [--fit BYTES]...",
       .notes =
-          "Writes PREFIX.csv and PREFIX.json with every point, and PREFIX-seconds, -bytes and,\n"
-          "with --fps, -fps as .svg and .png.\n"
+          "Writes PREFIX.csv and PREFIX.json with every point, PREFIX-seconds, -bytes and, with\n"
+          "--fps, -fps as .svg and .png, and PREFIX.html with all of it.\n"
           "\n"
           "Without CAND and --fit, ellipsoids are fitted here to six sizes: the half-float Blosc\n"
           "VDB's over 10, 20, 50, 100, 200 and 400. Seconds are those of the optimisation, which\n"

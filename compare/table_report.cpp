@@ -9,9 +9,9 @@
 #include "cli/json_file.h"
 #include "cli/printable.h"
 #include "cli/table.h"
-#include "cli/version_text.h"
 #include "compare/figures.h"
 #include "compare/program.h"
+#include "compare/report_versions.h"
 #include "report/data_table.h"
 #include "report/html_page.h"
 
@@ -195,22 +195,8 @@ DataTable withoutEmptyColumns(const DataTable& table) {
   return withColumns(table, keys);
 }
 
-std::vector<std::string> versions() {
-  std::vector<std::string> lines;
-  std::string text = cli::versionText(kProgram);
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    lines.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  if (!zfpVersion().empty()) lines.push_back(zfpVersion());
-  return lines;
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const auto& word : words) text += (text.empty() ? "" : " ") + word;
-  return text;
+if (!zfpVersion().empty()) lines.push_back(zfpVersion());
+return lines;
 }
 
 std::string interruption(const TableRecord& record) {

@@ -58,7 +58,9 @@ TEST_F(CompareCurves, hasACandidatesOwnCurveAndItsFile) {
   EXPECT_THAT(test::readText(at("c.csv")), StartsWith("kind,series,name,bytes,seconds,"));
   EXPECT_THAT(folder_.names(),
               testing::ElementsAre("c-bytes.png", "c-bytes.svg", "c-seconds.png", "c-seconds.svg",
-                                   "c.csv", "c.json", "fit.esvr", "ref.vdb"));
+                                   "c.csv", "c.html", "c.json", "fit.esvr", "ref.vdb"));
+  EXPECT_THAT(test::readText(at("c.html")),
+              testing::AllOf(HasSubstr("Error over run time"), HasSubstr("image/svg+xml")));
 }
 
 TEST_F(CompareCurves, SlowHasBaselinesAtEachSizeAndFramesASecond) {
