@@ -22,5 +22,8 @@ std::vector<std::string> versions() {
     lines.push_back(text.substr(begin, end - begin));
     begin = end + 1;
   }
+  if (!zfpVersion().empty()) lines.push_back(zfpVersion());
+  return lines;
+}
 
 }  // namespace esvr::compare

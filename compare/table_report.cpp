@@ -195,10 +195,6 @@ DataTable withoutEmptyColumns(const DataTable& table) {
   return withColumns(table, keys);
 }
 
-if (!zfpVersion().empty()) lines.push_back(zfpVersion());
-return lines;
-}
-
 std::string interruption(const TableRecord& record) {
   return record.interrupted ? "Interrupted: rows are missing." : "";
 }
