@@ -27,6 +27,7 @@ using report::Series;
 constexpr const char* kSchema = "esvr-curves";
 constexpr int kSchemaVersion = 1;
 constexpr const char* kOurs = "ESVR";
+constexpr const char* kFile = "file";
 
 /// All rows of one name belong to one curve; ours are one curve whatever they are called.
 std::string seriesOf(const TableRow& row) { return row.group == kOurs ? kOurs : row.name; }
@@ -64,7 +65,7 @@ report::DataTable points(const TableRecord& record) {
         table.rows.push_back({std::string("fit"), series, row->name, double(*row->bytes),
                               at.seconds, at.psnrBox, at.psnrActive, at.maxError, Cell(), Cell()});
       const auto seconds = row->encode ? std::optional(row->encode->median) : std::nullopt;
-      table.rows.push_back({std::string("file"), series, row->name, double(*row->bytes),
+      table.rows.push_back({std::string(kFile), series, row->name, double(*row->bytes),
                             number(seconds), row->metrics->psnrBox, row->metrics->psnrActive,
                             row->metrics->maxError, number(row->fps), row->setting});
     }
@@ -153,13 +154,20 @@ std::vector<NamedPlot> plotsOf(const TableRecord& record) {
   return plots;
 }
 
+/// Of files alone: the points of fits are in the pictures.
+report::DataTable filesOf(report::DataTable points) {
+  std::erase_if(points.rows,
+                [](const report::Row& row) { return row.front() != Cell(std::string(kFile)); });
+  return points;
+}
+
 std::string page(const CurvesReport& report, const report::DataTable& data,
                  const std::vector<NamedPlot>& plots) {
   report::HtmlPage page;
   page.title = std::string(kProgram) + ": " + report.record.grid;
   for (const auto& [ending, plot] : plots)
     page.pictures.push_back({plot.title, "image/svg+xml", report::toSvg(plot)});
-  page.tables = {data};
+  page.tables = {filesOf(data)};
   page.commands = versions();
   page.commands.insert(page.commands.begin(), joined(report.commandLine));
   return report::toHtml(page);

@@ -75,18 +75,23 @@ class Clock {
 
 /// Sums over pictures.
 struct Sums {
-  double squares = 0.0, ssim = 0.0, flip = 0.0;
+  double squares = 0.0, ssim = 0.0, flip = 0.0, lpips = 0.0;
 
-  void add(const Image& reference, const Image& candidate) {
+  void add(const Image& reference, const Image& candidate,
+           const std::optional<PictureMetric>& metric) {
     const ImageMetrics metrics = compareImages(reference, candidate);
     squares += std::pow(10.0, -metrics.psnr / 10.0);
     ssim += metrics.ssim;
     flip += esvr::flip(reference, candidate).mean;
+    if (metric) lpips += metric->of(reference, candidate);
   }
-  [[nodiscard]] ImageFigures over(double pictures, const ImageFigures& cost) const {
+  /// \param cost  fps and deviceBytes
+  [[nodiscard]] ImageFigures over(double pictures, ImageFigures cost) const {
     constexpr double kPeak = 1.0;
-    return {psnr(squares / pictures, kPeak), ssim / pictures, flip / pictures, cost.fps,
-            cost.deviceBytes};
+    cost.psnr = psnr(squares / pictures, kPeak);
+    cost.ssim = ssim / pictures;
+    cost.flip = flip / pictures;
+    return cost;
   }
 };
 
@@ -107,8 +112,9 @@ TransferFunction withEmptySpace(const TransferFunction& function, double backgro
 }
 
 Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference, const Device& device,
-                 const CancelToken& cancel)
+                 const std::filesystem::path& folder, const CancelToken& cancel)
     : views_(viewsOf(options, reference, cancel)), device_(device) {
+  if (!options.lpips.empty()) lpips_.emplace(options.lpips, folder);
   const auto renderer = makeVoxelRenderer(reference, NanoValues::kFloat, device);
   Clock clock(*renderer, device);
   for (const auto& view : views_) references_.push_back(clock.draw(view));
@@ -122,12 +128,13 @@ Gallery::Compared Gallery::compare(Renderer& renderer, const OwnView& own) const
   Compared result;
   for (std::size_t i = 0; i < views_.size(); ++i) {
     const Image image = clock.draw(own ? own(views_[i]) : views_[i]);
-    sums.add(references_[i], image);
+    sums.add(references_[i], image, lpips_);
     if (i == 0)
       result.shown = {report::toPng(image),
                       report::toPng(errorMap(references_[i], image, kErrorGain))};
   }
   result.figures = sums.over(double(views_.size()), clock.cost());
+  if (lpips_) result.figures.lpips = sums.lpips / double(views_.size());
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "compare/picture_metric.h"
 #include "esvr/flip.h"
 #include "esvr/image.h"
 #include "esvr/progress.h"
@@ -24,6 +25,7 @@ struct GalleryOptions {
   Resolution resolution{400, 400};
   double step = 1.0;
   std::vector<NamedTransfer> transfers;
+  std::string lpips;  ///< a command, as PictureMetric takes it; empty: none
 };
 
 /// The function with values no further than `threshold` from the background transparent: what an
@@ -36,6 +38,7 @@ struct ImageFigures {
   double psnr = 0.0, ssim = 0.0, flip = 0.0;
   double fps = 0.0;  ///< pictures in a second of drawing, by the median picture
   std::optional<std::uint64_t> deviceBytes{};  ///< that the renderer held; of a CUDA device
+  std::optional<double> lpips{};               ///< where a command was given
 };
 
 /// The first picture of a row, and where it errs.
@@ -49,14 +52,15 @@ using OwnView = std::function<RenderOptions(const RenderOptions&)>;
 class Gallery {
  public:
   /// Draws the reference on a device. \throws UsageError  as renderVolume; Cancelled; DeviceError
+  /// \param folder  for files that come and go
   Gallery(const GalleryOptions& options, const SparseVolume& reference, const Device& device,
-          const CancelToken& cancel);
+          const std::filesystem::path& folder, const CancelToken& cancel);
 
   struct Compared {
     ImageFigures figures;
     Shown shown;
   };
-  /// \throws  as Renderer::draw
+  /// \throws  as Renderer::draw, PictureMetric
   [[nodiscard]] Compared compare(Renderer& renderer, const OwnView& own = {}) const;
   [[nodiscard]] const std::string& referencePng() const { return referencePng_; }
   /// Of drawing the reference: fps and deviceBytes only.
@@ -66,6 +70,7 @@ class Gallery {
  private:
   std::vector<RenderOptions> views_;
   Device device_;
+  std::optional<PictureMetric> lpips_;
   std::vector<Image> references_;
   std::string referencePng_;
   ImageFigures referenceCost_;

@@ -1,5 +1,6 @@
 #include "compare/measure.h"
 #include "compare/row_renderer.h"
+#include "compare/shell_word.h"
 
 #include <algorithm>
 #include <cmath>
@@ -58,18 +59,6 @@ const char* nameOf(PackedCodec codec) {
       break;
   }
   return " raw";
-}
-
-std::string shellWord(const std::string& word) {
-  const bool plain =
-      !word.empty() &&
-      word.find_first_not_of(
-          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./=,:+%") ==
-          std::string::npos;
-  if (plain) return word;
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
 }
 
 std::vector<SearchStep> searchOf(const Match& match) {

@@ -33,7 +33,8 @@ SceneFiles::SceneFiles(const TableOptions& options, const CancelToken& cancel)
       box_(options.box.value_or(activeBox(reference_.volume))),
       peak_(choosePeak(options, reference_)) {
   if (options.images.views > 0)
-    gallery_.emplace(options.images, reference_.volume, selectDevice(options.device), cancel);
+    gallery_.emplace(options.images, reference_.volume, selectDevice(options.device),
+                     folder_.path(), cancel);
 }
 
 TableScene SceneFiles::scene() const {

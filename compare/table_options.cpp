@@ -73,6 +73,8 @@ cli::CommandLine makeCommandLine() {
      "of a picture's side")
     ("image-step", value<double>()->value_name("S")->default_value(GalleryOptions{}.step),
      "voxels between samples, the same for every row")
+    ("lpips", value<std::string>()->value_name("COMMAND"),
+     "LPIPS too, by a program of yours: COMMAND REFERENCE.png PICTURE.png prints it last")
     ("colors", value<Words>()->value_name("MAP[:CURVE]")->composing(),
      "a transfer function, as esvr-render names them (default: viridis:linear); may be repeated")
     ("tf", value<Words>()->value_name("FILE")->composing(),
@@ -130,9 +132,10 @@ void readImages(const Arguments& a, TableOptions& options) {
     images.transfers.push_back(builtInTransfer(text));
   for (const auto& file : a.find<Words>("tf").value_or(Words{}))
     images.transfers.push_back({file, readParaViewPreset(file)});
+  images.lpips = a.find<std::string>("lpips").value_or("");
   if (!a.has("images")) {
-    if (!images.transfers.empty())
-      throw UsageError("--colors and --tf say nothing without --images");
+    if (!images.transfers.empty() || !images.lpips.empty())
+      throw UsageError("--colors, --tf and --lpips say nothing without --images");
     return;
   }
   images.views = a.get<int>("images");

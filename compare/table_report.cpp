@@ -98,6 +98,8 @@ const std::vector<TableColumn>& tableColumns() {
       {{"image_psnr", "image PSNR", Kind::kDecibels}, image<&ImageFigures::psnr>},
       {{"image_ssim", "image SSIM", Kind::kShare}, image<&ImageFigures::ssim>},
       {{"flip", "FLIP", Kind::kShare}, image<&ImageFigures::flip>},
+      {{"lpips", "LPIPS"},
+       [](const R& r, const T&) { return r.images ? number(r.images->lpips) : Cell(); }},
       {{"fps", "FPS"}, [](const R& r, const T&) { return number(r.fps); }},
       {{"vram_bytes", "VRAM MB"}, deviceMegabytes},
       {{"note", "note", Kind::kText}, [](const R& r, const T&) -> Cell { return r.note; }},
@@ -122,8 +124,8 @@ const std::vector<std::string> kQuality{"name",        "bytes",     "ratio",    
                                         "iou",         "mass_error"};
 const std::vector<std::string> kCost{"name",     "encode_s",     "encode_min_s", "encode_max_s",
                                      "decode_s", "decode_min_s", "decode_max_s", "memory_bytes"};
-const std::vector<std::string> kLooks{"name", "image_psnr", "image_ssim",
-                                      "flip", "fps",        "vram_bytes"};
+const std::vector<std::string> kLooks{"name",  "image_psnr", "image_ssim", "flip",
+                                      "lpips", "fps",        "vram_bytes"};
 
 /// Rows of one group that follow each other.
 std::vector<std::span<const TableRow>> groups(const TableRecord& record) {

@@ -189,6 +189,24 @@ TEST_F(CompareTable, SlowComparesPictures) {
   EXPECT_GT((*fit)["fps"].get<double>(), 0.0);
 }
 
+TEST_F(CompareTable, takesLpipsFromAProgramOfTheUsers) {
+  // In its place the bytes of two files, so that the reference's picture, compared with itself, has
+  // twice its own.
+  const std::string command = "sh -c 'echo two files; cat \"$@\" | wc -c' sizes";
+  const auto report = reportOf({at("fit.esvr"), "--row", "nvdb-float-raw", "--images", "1",
+                                "--image-size", "16", "--lpips", command});
+  EXPECT_GT((*rowOf(report, "fit.esvr"))["lpips"].get<double>(), 100.0);
+  const auto run = [&](const std::string& program) {
+    return table({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--images", "1", "--image-size",
+                  "16", "--lpips", program});
+  };
+  const auto failed = run("false"), wordy = run("echo no figure #");
+  EXPECT_EQ(failed.exitCode, 1);
+  EXPECT_THAT(failed.err, HasSubstr("ended with code 1"));
+  EXPECT_EQ(wordy.exitCode, 1);
+  EXPECT_THAT(wordy.err, HasSubstr("no number"));
+}
+
 TEST_F(CompareTable, SlowPutsPicturesOnThePage) {
   const auto run = table({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--runs", "1",
                           "--images", "1", "--image-size", "32", "--html", at("p.html")});

@@ -1,0 +1,69 @@
+#include "compare/picture_metric.h"
+
+#include <sys/wait.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <span>
+#include <sstream>
+#include <utility>
+
+#include "cli/bytes_file.h"
+#include "compare/shell_word.h"
+#include "esvr/error.h"
+#include "report/png_image.h"
+
+namespace esvr::compare {
+namespace {
+
+std::filesystem::path written(const Image& image, const std::filesystem::path& path) {
+  constexpr bool kOverwrite = true;
+  const std::string png = report::toPng(image);
+  cli::writeBytes(path, std::as_bytes(std::span(png)), kOverwrite);
+  return path;
+}
+
+/// What a shell's command prints. \throws RuntimeFailure  it ends with another code than 0
+std::string outputOf(const std::string& command) {
+  FILE* pipe = popen(command.c_str(), "r");
+  if (!pipe) throw RuntimeFailure("--lpips: cannot run " + command);
+  std::string text;
+  std::array<char, 256> part{};
+  while (std::fgets(part.data(), int(part.size()), pipe)) text += part.data();
+  const int status = pclose(pipe);
+  if (status != 0)
+    throw RuntimeFailure("--lpips: " + command + " ended with code " +
+                         std::to_string(WIFEXITED(status) ? WEXITSTATUS(status) : status));
+  return text;
+}
+
+double lastNumber(const std::string& command, const std::string& text) {
+  std::istringstream words(text);
+  std::string word, last;
+  while (words >> word) last = word;
+  std::size_t used = 0;
+  double value = NAN;
+  try {
+    value = std::stod(last, &used);
+  } catch (const std::logic_error&) {  // no number at all, or one that no double holds
+  }
+  if (used != last.size() || !std::isfinite(value))
+    throw RuntimeFailure("--lpips: " + command + " printed '" + last + "', which is no number");
+  return value;
+}
+
+}  // namespace
+
+PictureMetric::PictureMetric(std::string command, std::filesystem::path folder)
+    : command_(std::move(command)), folder_(std::move(folder)) {}
+
+double PictureMetric::of(const Image& reference, const Image& picture) const {
+  const auto command = command_ + " " +
+                       shellWord(written(reference, folder_ / "reference.png").string()) + " " +
+                       shellWord(written(picture, folder_ / "picture.png").string());
+  return lastNumber(command_, outputOf(command));
+}
+
+}  // namespace esvr::compare
