@@ -193,7 +193,7 @@ TEST_F(CompareTable, takesLpipsFromAProgramOfTheUsers) {
   // In its place the bytes of two files, so that the reference's picture, compared with itself, has
   // twice its own.
   const std::string command = "sh -c 'echo two files; cat \"$@\" | wc -c' sizes";
-  const auto report = reportOf({at("fit.esvr"), "--row", "nvdb-float-raw", "--images", "1",
+  const auto report = reportOf({at("fit.esvr"), "--row", "nvdb-float", "--images", "1",
                                 "--image-size", "16", "--lpips", command});
   EXPECT_GT((*rowOf(report, "fit.esvr"))["lpips"].get<double>(), 100.0);
   const auto run = [&](const std::string& program) {
