@@ -71,6 +71,17 @@ RunPlan planFor(const FitTarget& target, const FitOptions& options) {
   return plan;
 }
 
+/// Growth towards a PSNR goes in short attempts. Where they miss it with the largest number that
+/// was allowed, that number is worth a run of its own, from the start and whole.
+std::optional<RunPlan> wholeRun(const RunPlan& plan, const RunEnd& end, const FitOptions& options) {
+  if (end.end != FitEnd::kPsnrMissed || !options.count || options.iterations) return std::nullopt;
+  RunPlan whole = plan;
+  whole.count = plan.largestCount;
+  whole.iterations = iterationsOf(valuesOf(options.preset), options.device.kind);
+  whole.firstIteration = end.iterations;
+  return whole;
+}
+
 bool anyNegative(const Field& field) {
   return std::any_of(field.chunks.begin(), field.chunks.end(), [](const Chunk& chunk) {
     const auto& i = chunk.ellipsoids.intensity;
@@ -106,8 +117,13 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   optimiserOptions.kernel.kappa = options.kappa.value_or(tuning.firstKappa);
 
   FitResult result;
-  const auto optimiser = makeOptimiser(target, optimiserOptions, tuning);
-  const RunEnd end = run(*optimiser, target, recorder, plan, tuning);
+  auto optimiser = makeOptimiser(target, optimiserOptions, tuning);
+  RunEnd end = run(*optimiser, target, recorder, plan, tuning);
+  if (const auto whole = wholeRun(plan, end, options)) {
+    optimiser.reset();  // its memory first
+    optimiser = makeOptimiser(target, optimiserOptions, tuning);
+    end = run(*optimiser, target, recorder, *whole, tuning);
+  }
   if (end.end == FitEnd::kCancelled && optimiser->primitiveCount() == 0) throw Cancelled();
   optimiser->dropUnseen();
   recorder.record(*optimiser, end.iterations);

@@ -117,7 +117,7 @@ std::size_t nextCount(std::size_t now, double missing, std::size_t largest) {
 RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,
            const Tuning& tuning) {
   Schedule schedule{firstCount(plan, tuning), plan.count, plan.iterations, tuning};
-  RunEnd result{FitEnd::kScheduleDone, 0};
+  RunEnd result{FitEnd::kScheduleDone, plan.firstIteration};
   KappaDescent kappa(tuning.kappaStep);
   for (;;) {
     Stretch stretch(optimiser, target, recorder, plan, kappa);

@@ -14,7 +14,8 @@ struct RunPlan {
   std::size_t count = 0;         ///< with psnr: the first attempt
   std::size_t largestCount = 0;  ///< with psnr: growth ends here
   std::uint32_t iterations = 0;
-  std::optional<double> psnr;  ///< dB over the box
+  std::uint32_t firstIteration = 0;  ///< done before, as the curve counts them
+  std::optional<double> psnr;        ///< dB over the box
   std::optional<double>
       seconds;              ///< since the recorder's start; replaces `iterations` as the clock
   bool learnKappa = false;  ///< else the kernel stays as it is

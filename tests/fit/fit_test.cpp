@@ -174,6 +174,16 @@ TEST(Fit, SaysSoWhereThePsnrIsOutOfReach) {
   EXPECT_LE(result.field.primitiveCount(), 3u);
 }
 
+TEST(Fit, GivesItsLargestNumberAWholeRunBeforeItSaysSo) {
+  FitOptions options = quick(3);
+  options.iterations.reset();
+  const auto whole = fit(test::tubeVolume(), options).curve.back().iteration;
+  options.psnr = 90.0;
+  const FitResult result = fit(test::tubeVolume(), options);
+  EXPECT_EQ(result.end, FitEnd::kPsnrMissed);
+  EXPECT_GT(result.curve.back().iteration, whole) << "and the short attempt before it";
+}
+
 TEST(Fit, EndsInTime) {
   FitOptions options = quick();
   options.iterations.reset();
