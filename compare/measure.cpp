@@ -91,18 +91,7 @@ void requireOverlap(const std::filesystem::path& path, const Box& a, const Box& 
 /// How NanoVDB holds a row's voxels while they are drawn.
 NanoValues valuesOf(const BaselineSetting& setting) {
   const auto* packing = std::get_if<VoxelPacking>(&setting.how);
-  switch (packing ? packing->form : PackedForm::kOpenVdbFloat) {
-    case PackedForm::kNanoFp16:
-      return NanoValues::kFp16;
-    case PackedForm::kNanoFp8:
-      return NanoValues::kFp8;
-    case PackedForm::kNanoFp4:
-      return NanoValues::kFp4;
-    case PackedForm::kNanoFpN:
-      return NanoValues::kFpN;
-    default:
-      return NanoValues::kFloat;
-  }
+  return packing ? nanoValues(packing->form) : NanoValues::kFloat;
 }
 
 Timing once(double seconds) { return {seconds, seconds, seconds, 1}; }

@@ -40,21 +40,6 @@ std::uint32_t openVdbFlags(PackedCodec codec) {
   return COMPRESS_ACTIVE_MASK;
 }
 
-NanoValues nanoValues(PackedForm form) {
-  switch (form) {
-    case PackedForm::kNanoFp16:
-      return NanoValues::kFp16;
-    case PackedForm::kNanoFp8:
-      return NanoValues::kFp8;
-    case PackedForm::kNanoFp4:
-      return NanoValues::kFp4;
-    case PackedForm::kNanoFpN:
-      return NanoValues::kFpN;
-    default:
-      return NanoValues::kFloat;
-  }
-}
-
 void checkPacking(const VoxelPacking& packing, const GridDescriptor& descriptor) {
   if (packing.form == PackedForm::kNanoFpN && !(packing.tolerance > 0.0))
     throw UsageError("FpN needs a tolerance above 0");
@@ -105,6 +90,21 @@ void writeNano(const openvdb::FloatGrid& source, const VoxelPacking& packing,
 
 bool isNanoVdb(PackedForm form) {
   return form != PackedForm::kOpenVdbFloat && form != PackedForm::kOpenVdbHalf;
+}
+
+NanoValues nanoValues(PackedForm form) {
+  switch (form) {
+    case PackedForm::kNanoFp16:
+      return NanoValues::kFp16;
+    case PackedForm::kNanoFp8:
+      return NanoValues::kFp8;
+    case PackedForm::kNanoFp4:
+      return NanoValues::kFp4;
+    case PackedForm::kNanoFpN:
+      return NanoValues::kFpN;
+    default:
+      return NanoValues::kFloat;
+  }
 }
 
 struct VoxelPacker::Source {

@@ -7,29 +7,21 @@
 
 #include <algorithm>
 
-#include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/metrics.h"
 #include "fit/intensity_problem.h"
+#include "paper/on_device.h"
 #include "volumes.h"
 
 namespace esvr::test {
 
-class Intensities : public testing::TestWithParam<const char*> {
+class Intensities : public OnDevice {
  protected:
-  void SetUp() override {
-    try {
-      device_ = selectDevice(GetParam());
-    } catch (const DeviceError& error) {
-      GTEST_SKIP() << error.what();
-    }
-  }
   [[nodiscard]] IntensityProblem problemOf(const Field& field, const IntensityTarget& target) {
     IntensityProblem problem(target, device_);
     problem.setShapes(field);
     return problem;
   }
-  Device device_;
 };
 
 inline Field someField() {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "esvr/nano_volume.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr {
@@ -30,6 +31,8 @@ struct VoxelPacking {
 };
 
 [[nodiscard]] bool isNanoVdb(PackedForm form);
+/// What a NanoVDB grid of the form holds; kFloat of OpenVDB's.
+[[nodiscard]] NanoValues nanoValues(PackedForm form);
 
 class VoxelPacker {
  public:
