@@ -13,7 +13,7 @@ std::unique_ptr<Renderer> makeVoxelRenderer(const SparseVolume& volume, NanoValu
 }
 
 bool saysAll(const EncodedGrid& grid) {
-  return !grid.voxels && grid.topology == TopologyKind::kThreshold;
+  return !grid.voxels && !grid.residual && grid.topology == TopologyKind::kThreshold;
 }
 
 }  // namespace esvr::compare

@@ -14,7 +14,7 @@ namespace esvr::compare {
                                                           NanoValues values, const Device& device);
 
 /// True where a grid's ellipsoids say all: not of a narrow band, of which they say nothing beyond
-/// it, nor where voxels or a mask are stored.
+/// it, nor where voxels, a residual or a mask are stored.
 [[nodiscard]] bool saysAll(const EncodedGrid& grid);
 
 }  // namespace esvr::compare
