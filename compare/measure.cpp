@@ -69,7 +69,7 @@ std::vector<SearchStep> searchOf(const Match& match) {
   return steps;
 }
 
-EncodedGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::string& name) {
+StoredGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::string& name) {
   std::vector<std::string> names;
   for (const auto& grid : file.grids) names.push_back(grid.descriptor.name);
   const std::size_t place = names.size() == 1 ? 0 : findGrid(names, name, path);
@@ -102,17 +102,17 @@ std::string wordOf(const FitWish& wish) {
   return wish.bytes ? std::to_string(*wish.bytes) : "default";
 }
 
-EncodedGrid fitSized(const RateInput& input, std::uint64_t bytes, TableRow& row) {
+StoredGrid fitSized(const RateInput& input, std::uint64_t bytes, TableRow& row) {
   RatedGrid rated = fitToSize(input, bytes);
   row.curve = std::move(rated.fit.curve);
   return std::move(rated.grid);
 }
 
 /// With the defaults, or as the paper does: in float32.
-EncodedGrid fitPlain(const RateInput& input, TableRow& row) {
+StoredGrid fitPlain(const RateInput& input, TableRow& row) {
   FitResult fit = esvr::fit(input.source, input.options);
   row.curve = std::move(fit.curve);
-  EncodedGrid grid = encodeGrid(input.descriptor, input.source, std::move(fit.field));
+  StoredGrid grid = makeStoredGrid(input.descriptor, input.source, std::move(fit.field));
   if (input.options.paper) return grid;
   return compactGrid(grid, input.source, {.box = input.options.box}).grid;
 }
@@ -251,7 +251,7 @@ void RowMaker::measureEsvr(const std::filesystem::path& path, Drawing drawing, T
   if (scene_.gallery) drawEsvr(gridOf(readEsvr(path), path, scene_.gridName), volume, drawing, row);
 }
 
-void RowMaker::drawEsvr(const EncodedGrid& grid, const SparseVolume& voxels, Drawing drawing,
+void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Drawing drawing,
                         TableRow& row) const {
   const Device& device = scene_.gallery->device();
   if (drawing == Drawing::kBricks || !saysAll(grid))
@@ -274,12 +274,6 @@ TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing)
   const std::size_t place = placeOf(file, scene_.gridName);
   row.bytes = bytesOf(file, path, place);
   row.command = command(shellWord(path.string()) + " --rows none");
-  const auto& curve = file.esvr()->grids[place].curve;
-  row.curve = curve;
-  if (!curve.empty()) {
-    row.encode = once(curve.back().seconds);
-    row.note = "seconds to encode: the fit's, from the file";
-  }
   measureEsvr(path, drawing, row);
   return row;
 }
@@ -315,7 +309,7 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   if (scene_.cancel.cancelled()) throw Cancelled();
   row.note = "one fit, on " + deviceName(input.options.device);
   const auto memory = encoding.peakRise();
-  measureEsvr(path, Drawing::kPrimitives, row);
+  measureEsvr(path, Drawing::kEllipsoids, row);
   row.memory = std::max(row.memory, memory);
   return row;
 }

@@ -15,12 +15,12 @@ namespace esvr::vdb2esvr {
 namespace {
 
 /// Bytes that a grid adds to a file.
-std::uint64_t bytesAdded(const EncodedGrid& grid) {
+std::uint64_t bytesAdded(const StoredGrid& grid) {
   return encodeEsvr({{}, {grid}}).size() - encodeEsvr({}).size();
 }
 
 /// What a reader gets: through the file's own bytes, so that what is measured is what was stored.
-EncodedGrid throughTheFormat(EncodedGrid grid) {
+StoredGrid throughTheFormat(StoredGrid grid) {
   EsvrFile file;
   file.grids.push_back(std::move(grid));
   const auto bytes = encodeEsvr(file);
@@ -38,13 +38,13 @@ void recordFit(const FitResult& fitted, ConvertedGrid& grid) {
   grid.seconds.optimise = fitted.secondsOptimise;
 }
 
-void recordCompact(const CompactResult& compact, const EncodedGrid& stored, ConvertedGrid& grid) {
+void recordCompact(const CompactResult& compact, const StoredGrid& stored, ConvertedGrid& grid) {
   grid.compact = {compact.loss, compact.steps, streamBytes(stored)};
 }
 
 /// Count, bits and all else from the size or the PSNR that was asked for.
-EncodedGrid fitRated(const RateInput& input, std::optional<std::uint64_t> bytes,
-                     ConvertedGrid& grid) {
+StoredGrid fitRated(const RateInput& input, std::optional<std::uint64_t> bytes,
+                    ConvertedGrid& grid) {
   RatedGrid rated = bytes ? fitToSize(input, *bytes) : fitToPsnr(input, *input.options.psnr);
   recordFit(rated.fit, grid);
   recordCompact(rated.compact, rated.grid, grid);
@@ -52,12 +52,13 @@ EncodedGrid fitRated(const RateInput& input, std::optional<std::uint64_t> bytes,
   return std::move(rated.grid);
 }
 
-EncodedGrid fitPlain(const RateInput& input, const Options& options, ConvertedGrid& grid) {
+StoredGrid fitPlain(const RateInput& input, const Options& options, ConvertedGrid& grid) {
   FitResult fitted = fit(input.source, input.options);
   recordFit(fitted, grid);
-  EncodedGrid encoded =
-      encodeGrid(input.descriptor, input.source, std::move(fitted.field), input.activity);
-  encoded.curve = grid.curve = std::move(fitted.curve);
+  StoredGrid encoded =
+      makeStoredGrid(input.descriptor, input.source, std::move(fitted.field), input.activity);
+  encoded.curve = withoutTimes(fitted.curve);
+  grid.curve = std::move(fitted.curve);
   if (options.storage == Storage::kFloat32) return encoded;
   CompactResult compact = compactGrid(encoded, input.source,
                                       {.loss = options.storageLoss,
@@ -78,16 +79,16 @@ double boundOf(const VoxelDemand& demand, const VolumeGrid& source) {
   return demand.bound * (double(range.max) - double(range.min));
 }
 
-EncodedGrid storeVoxels(const VoxelDemand& demand, Activity activity, const VolumeGrid& source) {
+StoredGrid storeVoxels(const VoxelDemand& demand, Activity activity, const VolumeGrid& source) {
   const double bound = boundOf(demand, source);
   VoxelLayer layer = demand.exact || bound == 0.0 ? exactLayer(source.volume)
                                                   : boundedLayer(source.volume, bound, activity);
-  return encodeVoxels(source.descriptor, source.volume, std::move(layer));
+  return makeStoredVoxels(source.descriptor, source.volume, std::move(layer));
 }
 
 /// Voxels alone, or ellipsoids and what they miss: whichever is smaller.
-EncodedGrid storeBounded(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
-  EncodedGrid voxels = storeVoxels(*options.voxels, options.activity, source);
+StoredGrid storeBounded(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
+  StoredGrid voxels = storeVoxels(*options.voxels, options.activity, source);
   const double bound = boundOf(*options.voxels, source);
   if (options.voxels->exact || bound == 0.0 || isNarrowBand(source.descriptor, source.volume))
     return voxels;
@@ -103,15 +104,15 @@ EncodedGrid storeBounded(const Options& options, const VolumeGrid& source, Conve
 }
 
 /// What is promised is checked on what the file holds.
-void checkVoxels(const VoxelDemand& demand, const VolumeGrid& source, const EncodedGrid& stored) {
+void checkVoxels(const VoxelDemand& demand, const VolumeGrid& source, const StoredGrid& stored) {
   const double error = largestDifference(source.volume, decodeGrid(stored));
   if (error > boundOf(demand, source))
     throw RuntimeFailure("grid '" + source.descriptor.name + "': an error of " +
                          std::to_string(error) + " is beyond what was asked for");
 }
 
-EncodedGrid encode(const Options& options, const VolumeGrid& source,
-                   std::optional<std::uint64_t> bytes, ConvertedGrid& grid) {
+StoredGrid encode(const Options& options, const VolumeGrid& source,
+                  std::optional<std::uint64_t> bytes, ConvertedGrid& grid) {
   if (options.voxels) return storeBounded(options, source, grid);
   RateInput input{source.descriptor, source.volume, options.fit, options.activity};
   input.options.narrowBand = isNarrowBand(source.descriptor, source.volume);

@@ -35,7 +35,7 @@ struct BoundRecord {
 
 struct ConvertedGrid {
   std::string uniqueName;  ///< in the input
-  EncodedGrid stored;      ///< as a reader of the file will get it
+  StoredGrid stored;       ///< as a reader of the file will get it
   VolumeMetrics metrics;   ///< of the voxels that it gives back
   std::size_t bricks = 0;  ///< of the source
   std::uint64_t nonFiniteReplaced = 0;
@@ -48,7 +48,7 @@ struct ConvertedGrid {
   std::optional<double> hits;               ///< averageHits, where it was asked for
   std::optional<std::uint64_t> voxelPairs;  ///< countHits in the source's bricks, likewise
   std::optional<PaperRecord> paper;         ///< FitResult::paper
-  std::vector<CurvePoint> curve;            ///< of the fit, whether the file has it or not
+  std::vector<TimedCurvePoint> curve;       ///< of the fit, whether the file has it or not
   std::optional<BoundRecord> bound;
   std::optional<CompactRecord> compact;  ///< nothing where float32 is stored
   PhaseSeconds seconds;

@@ -18,14 +18,14 @@ using cli::requireRange;
 using cli::po::bool_switch;
 using cli::po::value;
 
-constexpr std::int64_t kMostPrimitives = std::numeric_limits<std::uint32_t>::max();
-constexpr std::int64_t kMostIterations = 10'000'000;
+constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max();
+constexpr std::int64_t kMaxIterations = 10'000'000;
 constexpr double kHighestPsnr = 300.0;  // dB; float32 ends at about 150
 constexpr double kLongestRun = 1e9;     // seconds
 constexpr double kLargestRatio = 1e9;
-constexpr double kMostLoss = 20.0;                    // dB
-constexpr double kLeastVram = 1e-3, kMostVram = 1e6;  // GB
-constexpr float kLargestKappa = 1e4f;                 // kernel.h
+constexpr double kMaxLoss = 20.0;                  // dB
+constexpr double kMinVram = 1e-3, kMaxVram = 1e6;  // GB
+constexpr float kLargestKappa = 1e4f;              // kernel.h
 
 cli::ProgramText programText() {
   return {
@@ -139,10 +139,10 @@ std::optional<To> bounded(const Arguments& arguments, const std::string& option,
 
 FitOptions fitOptions(const Arguments& a) {
   FitOptions fit;
-  fit.count = bounded<std::size_t>(a, "count", std::int64_t{1}, kMostPrimitives);
+  fit.count = bounded<std::size_t>(a, "count", std::int64_t{1}, kMaxEllipsoids);
   fit.psnr = bounded<double>(a, "psnr", 0.0, kHighestPsnr);
   fit.seconds = bounded<double>(a, "seconds", 1e-3, kLongestRun);
-  fit.iterations = bounded<std::uint32_t>(a, "iterations", std::int64_t{1}, kMostIterations);
+  fit.iterations = bounded<std::uint32_t>(a, "iterations", std::int64_t{1}, kMaxIterations);
   fit.paper = paperMethod(a);
   fit.preset = cli::choose<Preset>("preset", a.get<std::string>("preset"),
                                    {{"draft", Preset::kDraft},
@@ -152,7 +152,7 @@ FitOptions fitOptions(const Arguments& a) {
   fit.loss = cli::choose<Loss>("loss", a.get<std::string>("loss"),
                                {{"squared", Loss::kSquared}, {"paper", Loss::kPaper}});
   fit.beta = *bounded<double>(a, "beta", 0.0, 1.0);
-  if (const auto gigabytes = bounded<double>(a, "max-vram", kLeastVram, kMostVram))
+  if (const auto gigabytes = bounded<double>(a, "max-vram", kMinVram, kMaxVram))
     fit.maxDeviceBytes = std::size_t(*gigabytes * 1e9);
   fit.kappa = bounded<float>(a, "kappa", -kLargestKappa, kLargestKappa);
   if (const auto box = a.find<std::string>("box")) fit.box = cli::parseBox(*box);
@@ -247,7 +247,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
   options.fit = fitOptions(a);
   options.storage = options.fit.paper ? storageOfPaper(a, *options.fit.paper) : storage(a);
-  options.storageLoss = *bounded<double>(a, "storage-loss", 0.0, kMostLoss);
+  options.storageLoss = *bounded<double>(a, "storage-loss", 0.0, kMaxLoss);
   options.activity = activity(a);
   readVoxels(a, options);
   readSize(a, options);

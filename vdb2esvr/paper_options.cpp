@@ -15,8 +15,8 @@ using cli::po::bool_switch;
 using cli::po::value;
 
 constexpr const char* kGroup = "With --preset paper (the paper's method, for comparison with it)";
-constexpr std::int64_t kMostEpochs = 10'000'000, kMostSide = 1 << 20;
-constexpr std::int64_t kMostPrimitives = std::numeric_limits<std::uint32_t>::max();
+constexpr std::int64_t kMaxEpochs = 10'000'000, kMaxSide = 1 << 20;
+constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max();
 constexpr double kSmallestK = 0.5, kLargestK = 1e4;
 
 /// A whole number within [low, high], or nothing.
@@ -27,8 +27,8 @@ std::optional<std::int64_t> whole(const Arguments& a, const std::string& option,
   return given;
 }
 
-void readPrimitive(const Arguments& a, PaperMethod& method) {
-  method.gaussian = cli::choose<bool>("primitive", a.get<std::string>("primitive"),
+void readEllipsoid(const Arguments& a, PaperMethod& method) {
+  method.gaussian = cli::choose<bool>("ellipsoid", a.get<std::string>("ellipsoid"),
                                       {{"ellipsoid", false}, {"gaussian", true}});
   const auto k = a.find<std::string>("sharpness");
   if (!k) return;
@@ -52,11 +52,11 @@ void readDensify(const Arguments& a, PaperMethod& method) {
     cli::requireRange("percent-dense", *percent, 1e-9, 1.0);
     method.percentDense = *percent;
   }
-  if (const auto n = whole(a, "densify-from", 1, kMostEpochs))
+  if (const auto n = whole(a, "densify-from", 1, kMaxEpochs))
     method.densifyFrom = std::uint32_t(*n);
-  if (const auto n = whole(a, "densify-until", 1, kMostEpochs))
+  if (const auto n = whole(a, "densify-until", 1, kMaxEpochs))
     method.densifyUntil = std::uint32_t(*n);
-  if (const auto n = whole(a, "densify-every", 1, kMostEpochs))
+  if (const auto n = whole(a, "densify-every", 1, kMaxEpochs))
     method.densifyEvery = std::uint32_t(*n);
 }
 
@@ -94,15 +94,15 @@ void readPrune(const Arguments& a, PaperMethod& method) {
 
 PaperMethod readMethod(const Arguments& a) {
   PaperMethod method;
-  readPrimitive(a, method);
+  readEllipsoid(a, method);
   readPrune(a, method);
-  if (const auto epochs = whole(a, "epochs", 1, kMostEpochs))
+  if (const auto epochs = whole(a, "epochs", 1, kMaxEpochs))
     method = scaledTo(method, std::uint32_t(*epochs));
   readDensify(a, method);
   readRates(a, method.rates);
-  if (const auto n = whole(a, "points", 1, kMostPrimitives)) method.points = std::size_t(*n);
-  if (const auto n = whole(a, "most", 1, kMostPrimitives)) method.most = std::size_t(*n);
-  if (const auto n = whole(a, "subvolume", 1, kMostSide)) method.subvolume = int(*n);
+  if (const auto n = whole(a, "points", 1, kMaxEllipsoids)) method.points = std::size_t(*n);
+  if (const auto n = whole(a, "most", 1, kMaxEllipsoids)) method.maxEllipsoids = std::size_t(*n);
+  if (const auto n = whole(a, "subvolume", 1, kMaxSide)) method.subvolume = int(*n);
   method.countHits = a.get<bool>("hits");
   return method;
 }
@@ -138,7 +138,7 @@ cli::po::options_description paperOptions() {
      ("ellipsoids at the start (default: " + std::to_string(m.points) + ")").c_str())
     ("subvolume", value<std::int64_t>()->value_name("VOXELS"),
      "side of the cubes fitted in turn (default: half the longest axis, or the shortest)")
-    ("primitive", value<std::string>()->value_name("P")->default_value("ellipsoid"),
+    ("ellipsoid", value<std::string>()->value_name("P")->default_value("ellipsoid"),
      "ellipsoid, or gaussian (3 sigma)")
     ("sharpness", value<std::string>()->value_name("K"),
      ("k of the ellipsoids, or 'learned' for each (default: " + cli::shortNumber(m.k) +

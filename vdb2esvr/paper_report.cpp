@@ -41,7 +41,7 @@ Json densifyOf(const PaperRecord& record) {
           {"threshold", m.gradientThreshold},
           {"first_median_gradient", record.firstGradient},
           {"percent_dense", m.percentDense},
-          {"most", m.most},
+          {"most", m.maxEllipsoids},
           {"cloned", record.cloned},
           {"split", record.split}};
 }
@@ -62,7 +62,7 @@ Json prunesOf(const PaperRecord& record) {
 
 Json paperJson(const PaperRecord& record) {
   const PaperMethod& m = record.method;
-  return {{"primitive", m.gaussian ? "gaussian" : "ellipsoid"},
+  return {{"ellipsoid", m.gaussian ? "gaussian" : "ellipsoid"},
           {"k", m.gaussian ? Json(nullptr) : (m.learnK ? Json("learned") : Json(m.k))},
           {"points", record.points},
           {"epochs", m.epochs},

@@ -90,7 +90,7 @@ Json asked(const Options& options) {
 }
 
 Json sourceOf(const ConvertedGrid& grid) {
-  const EncodedGrid& stored = grid.stored;
+  const StoredGrid& stored = grid.stored;
   return {{"class", cli::nameOf(stored.descriptor.gridClass)},
           {"value_type", cli::nameOf(stored.descriptor.valueType)},
           {"background", stored.descriptor.background},
@@ -106,7 +106,7 @@ Json kernelOf(const Kernel& kernel) {
   return {{"form", cli::nameOf(kernel.form)}, {"kappa", kernel.kappa}, {"epsilon", kernel.epsilon}};
 }
 
-Json topologyOf(const EncodedGrid& grid) {
+Json topologyOf(const StoredGrid& grid) {
   return {{"kind", cli::nameOf(grid.topology)},
           {"threshold", grid.activeThreshold},
           {"bricks", grid.leaves.size()}};
@@ -147,14 +147,14 @@ Json compactOf(const ConvertedGrid& grid) {
 }
 
 /// What a reader gets of the first layers.
-Json layersOf(const EncodedGrid& grid) {
+Json layersOf(const StoredGrid& grid) {
   Json layers = Json::array();
   const auto sizes = layerSizes(grid);
   LayerSize sum;
   for (std::size_t k = 0; k < grid.layerErrors.size(); ++k) {
     sum.ellipsoids += sizes[k].ellipsoids;
     sum.bytes += sizes[k].bytes;
-    layers.push_back({{"primitives", sum.ellipsoids},
+    layers.push_back({{"ellipsoids", sum.ellipsoids},
                       {"bytes", sum.bytes},
                       {"psnr_box", grid.layerErrors[k].psnrBox},
                       {"max_error", grid.layerErrors[k].maxError}});
@@ -204,12 +204,12 @@ Json leftOutOf(const RunRecord& record, std::size_t grid) {
   return notes;
 }
 
-Json curveOf(const std::vector<CurvePoint>& curve) {
+Json curveOf(const std::vector<TimedCurvePoint>& curve) {
   Json points = Json::array();
   for (const auto& p : curve)
     points.push_back({{"seconds", p.seconds},
                       {"iteration", p.iteration},
-                      {"primitives", p.primitives},
+                      {"ellipsoids", p.ellipsoids},
                       {"psnr_box", p.psnrBox},
                       {"psnr_active", p.psnrActive},
                       {"max_error", p.maxError}});
@@ -220,7 +220,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
   const ConvertedGrid& grid = record.grids[g];
   return {{"name", grid.uniqueName},
           {"source", sourceOf(grid)},
-          {"primitives", grid.stored.field.primitiveCount()},
+          {"ellipsoids", grid.stored.field.ellipsoidCount()},
           {"bytes", cli::storedBytes(record.output, g)},
           {"sections", sectionsOf(record.output, g)},
           {"kernel", kernelOf(grid.stored.field.kernel)},

@@ -16,7 +16,7 @@ struct Unit {
 };
 constexpr Unit kUnits[] = {{"", 1.0},   {"b", 1.0},      {"kb", 1e3},     {"mb", 1e6},
                            {"gb", 1e9}, {"kib", 0x1p10}, {"mib", 0x1p20}, {"gib", 0x1p30}};
-constexpr double kMost = 1e15;
+constexpr double kMaxBytes = 1e15;
 
 std::string lowered(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
@@ -39,7 +39,7 @@ std::uint64_t parseByteSize(const std::string& option, const std::string& text) 
                                  [&](const Unit& u) { return name == u.name; });
   if (unit == std::end(kUnits)) throw refuse();
   const double bytes = std::floor(number * unit->bytes);
-  if (!(bytes >= 1.0 && bytes <= kMost)) throw refuse();
+  if (!(bytes >= 1.0 && bytes <= kMaxBytes)) throw refuse();
   return std::uint64_t(bytes);
 }
 

@@ -12,7 +12,7 @@ constexpr std::uint64_t kEllipsoidShare = 4;  // of the voxels' bytes, one part
 constexpr double kHopeful = 1.15;             // of them: what a short fit may take for a full one
 constexpr std::uint32_t kShortShare = 4;      // of the iterations
 
-std::uint64_t bytesOf(const EncodedGrid& grid) {
+std::uint64_t bytesOf(const StoredGrid& grid) {
   return encodeEsvr({{}, {grid}}).size() - encodeEsvr({}).size();
 }
 

@@ -16,24 +16,24 @@ namespace {
 
 /// Quantising may cost so much where bytes are short: the same bytes do as much in more ellipsoids
 /// as in more bits (docs/benchmarks.md has the measurement).
-constexpr double kLoss = 0.9;                         // dB
-constexpr double kLeastLoss = 0.35, kMostLoss = 2.0;  // near enough: the optimum is flat
-constexpr double kBytesEach = 8.0;                    // first guess
-constexpr double kDbPerDoubling = 4.5;                // of the number of ellipsoids
-constexpr double kDraftBehind = 2.5;                  // dB that a short fit stays behind a full one
-constexpr double kDraftCheaper = 0.94;  // than a full fit's ellipsoids at the same loss
-constexpr double kVoxelsEach = 35.0;    // first guess of a PSNR run
-constexpr double kTooMuchLoss = 2.5;    // dB: fewer ellipsoids would be better
-constexpr double kFewer = 1.25;         // bytes each, from repair to repair at least
-constexpr int kMostRepairs = 3;
-constexpr double kMostGrowth = 8.0;
+constexpr double kLoss = 0.9;                      // dB
+constexpr double kMinLoss = 0.35, kMaxLoss = 2.0;  // near enough: the optimum is flat
+constexpr double kBytesPerEllipsoid = 8.0;         // first guess
+constexpr double kDbPerDoubling = 4.5;             // of the number of ellipsoids
+constexpr double kDraftBehind = 2.5;               // dB that a short fit stays behind a full one
+constexpr double kDraftCheaper = 0.94;             // than a full fit's ellipsoids at the same loss
+constexpr double kVoxelsPerEllipsoid = 35.0;       // first guess of a PSNR run
+constexpr double kTooMuchLoss = 2.5;               // dB: fewer ellipsoids would be better
+constexpr double kFewer = 1.25;                    // bytes each, from repair to repair at least
+constexpr int kMaxRepairs = 3;
+constexpr double kMaxGrowth = 8.0;
 constexpr std::uint32_t kDraftShare = 4;  // of the iterations
-constexpr std::size_t kMostFits = 3;      // and more until one reaches the PSNR
+constexpr std::size_t kMaxFits = 3;       // and more until one reaches the PSNR
 constexpr std::uint64_t kNoticed = 100;   // a hundredth of the size is worth another search
 
 struct Attempt {
   FitResult fit;
-  EncodedGrid grid;  ///< float32
+  StoredGrid grid;  ///< float32
   double psnr = 0.0;
   std::size_t asked = 0;  ///< ellipsoids
 };
@@ -44,7 +44,7 @@ class RateControl {
       : input_(input), voxels_(activeVoxelCount(input.source)) {}
 
   RatedGrid toSize(std::uint64_t bytes) {
-    Attempt last = attempt(double(bytes) / kBytesEach, true);
+    Attempt last = attempt(double(bytes) / kBytesPerEllipsoid, true);
     Price price = priceOf(last);
     if (price.own >= bytes) refuse(price.own, bytes);
     std::uint64_t left = bytes - price.own;
@@ -62,7 +62,7 @@ class RateControl {
         now = rated(last, left);
       }
       const bool fits = now.compact.bytes <= left;
-      if (fits && (now.compact.loss <= kTooMuchLoss || n + 1 >= kMostRepairs)) return now;
+      if (fits && (now.compact.loss <= kTooMuchLoss || n + 1 >= kMaxRepairs)) return now;
       if (!fits && last.asked == 1) refuse(price.own + now.compact.bytes, bytes);
       // the short fit promised too much: price the full one's ellipsoids, and fewer each time
       each = std::max(priceOf(last).each, kFewer * each);
@@ -71,14 +71,14 @@ class RateControl {
   }
 
   RatedGrid toPsnr(double psnr) {
-    const Attempt draft = attempt(double(voxels_) / kVoxelsEach, true);
+    const Attempt draft = attempt(double(voxels_) / kVoxelsPerEllipsoid, true);
     std::vector<Attempt> attempts;
     double count = scaledCount(draft, psnr + kLoss - kDraftBehind);
     do {
       attempts.push_back(attempt(count, false));
       if (goodEnough(attempts.back(), psnr) || ended(attempts.back())) break;
       count = nextCount(attempts, psnr + kLoss);
-    } while (attempts.size() < kMostFits || !reached(attempts, psnr));
+    } while (attempts.size() < kMaxFits || !reached(attempts, psnr));
     return smallest(std::move(attempts), psnr);
   }
 
@@ -111,7 +111,7 @@ class RateControl {
                        [&](const Attempt& attempt) { return attempt.psnr > psnr; });
   }
 
-  static bool leavesUsualLoss(double over) { return over >= kLeastLoss && over <= kMostLoss; }
+  static bool leavesUsualLoss(double over) { return over >= kMinLoss && over <= kMaxLoss; }
 
   /// Of those that reached a PSNR: where some leave the usual loss only these, else the nearest.
   static bool worthRating(const Attempt& attempt, const std::vector<Attempt>& all, double psnr) {
@@ -158,13 +158,13 @@ class RateControl {
   }
 
   static bool ended(const Attempt& attempt) { return attempt.fit.end == FitEnd::kCancelled; }
-  static std::size_t countOf(const Attempt& attempt) { return attempt.grid.field.primitiveCount(); }
+  static std::size_t countOf(const Attempt& attempt) { return attempt.grid.field.ellipsoidCount(); }
 
   /// How many ellipsoids should reach a PSNR, from what an attempt reached.
   [[nodiscard]] double scaledCount(const Attempt& from, double psnr) const {
     const double factor = std::exp2((psnr - from.psnr) / kDbPerDoubling);
     return double(std::max<std::size_t>(countOf(from), 1)) *
-           std::clamp(factor, 1.0 / kMostGrowth, kMostGrowth);
+           std::clamp(factor, 1.0 / kMaxGrowth, kMaxGrowth);
   }
 
   [[nodiscard]] CompactOptions compactOptions(double loss) const {
@@ -186,8 +186,8 @@ class RateControl {
     Attempt result;
     result.asked = *options.count;
     result.fit = fit(input_.source, options);
-    result.grid =
-        encodeGrid(input_.descriptor, input_.source, std::move(result.fit.field), input_.activity);
+    result.grid = makeStoredGrid(input_.descriptor, input_.source, std::move(result.fit.field),
+                                 input_.activity);
     result.psnr = compareVolumes(input_.source, decodeGrid(result.grid),
                                  {.box = input_.options.box, .peak = {}, .ssim = false})
                       .psnrBox;
@@ -195,13 +195,13 @@ class RateControl {
   }
 
   /// What a grid adds to a file but for its ellipsoids' section.
-  static std::uint64_t bytesBesides(const EncodedGrid& grid, std::uint64_t ellipsoids) {
+  static std::uint64_t bytesBesides(const StoredGrid& grid, std::uint64_t ellipsoids) {
     EsvrFile with, without;
     with.grids.push_back(grid);
     // sections begin at multiples of 8
     return encodeEsvr(with).size() - encodeEsvr(without).size() - ellipsoids + paddingOf(grid);
   }
-  static std::uint64_t paddingOf(const EncodedGrid& grid) {
+  static std::uint64_t paddingOf(const StoredGrid& grid) {
     return grid.field.chunks.size() * (format::kAlignment - 1);
   }
 

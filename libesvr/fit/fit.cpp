@@ -13,7 +13,7 @@ namespace {
 
 /// What a preset stands for.
 struct PresetValues {
-  double voxelsPerPrimitive;  ///< active voxels
+  double voxelsPerEllipsoid;  ///< active voxels
   std::uint32_t iterations;   ///< on the CPU
 };
 PresetValues valuesOf(Preset preset) {
@@ -55,16 +55,16 @@ void check(const FitOptions& options) {
 RunPlan planFor(const FitTarget& target, const FitOptions& options) {
   const PresetValues preset = valuesOf(options.preset);
   const auto voxels = std::size_t(target.activeVoxels);
-  const auto most = [&](std::size_t n) { return std::clamp<std::size_t>(n, 1, voxels); };
-  const auto byPreset = most(std::size_t(double(voxels) / preset.voxelsPerPrimitive));
+  const auto clampCount = [&](std::size_t n) { return std::clamp<std::size_t>(n, 1, voxels); };
+  const auto byPreset = clampCount(std::size_t(double(voxels) / preset.voxelsPerEllipsoid));
   RunPlan plan;
   plan.psnr = options.psnr;
   plan.seconds = options.seconds;
   // under the paper's loss the descent gained nothing
   plan.learnKappa = !options.kappa && options.loss == Loss::kSquared;
-  plan.largestCount = most(options.count.value_or(voxels));
-  plan.count = options.psnr ? most(std::size_t(double(byPreset) / kFirstGuess))
-                            : most(options.count.value_or(byPreset));
+  plan.largestCount = clampCount(options.count.value_or(voxels));
+  plan.count = options.psnr ? clampCount(std::size_t(double(byPreset) / kFirstGuess))
+                            : clampCount(options.count.value_or(byPreset));
   plan.count = std::min(plan.count, plan.largestCount);
   plan.iterations = options.iterations.value_or(
       options.psnr ? kStretchIterations : iterationsOf(preset, options.device.kind));
@@ -94,7 +94,7 @@ FitResult emptyFit(const SparseVolume& volume, const FitOptions& options) {
   FitResult result;
   result.field.background = volume.background;
   result.field.kernel.kappa = options.kappa.value_or(Kernel{}.kappa);
-  CurvePoint point;
+  TimedCurvePoint point;
   point.psnrBox = point.psnrActive = kPerfectPsnr;
   result.curve.push_back(point);
   return result;
@@ -124,11 +124,11 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
     optimiser = makeOptimiser(target, optimiserOptions, tuning);
     end = run(*optimiser, target, recorder, *whole, tuning);
   }
-  if (end.end == FitEnd::kCancelled && optimiser->primitiveCount() == 0) throw Cancelled();
+  if (end.end == FitEnd::kCancelled && optimiser->ellipsoidCount() == 0) throw Cancelled();
   optimiser->dropUnseen();
   recorder.record(*optimiser, end.iterations);
 
-  result.field = exportField(optimiser->primitives(),
+  result.field = exportField(optimiser->ellipsoids(),
                              {volume.origin, target.scale, volume.background, optimiser->kernel()});
   result.kappaLearned = plan.learnKappa;
   result.end = end.end;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint32_t kCurvePoints = 32;  // of one stretch
 constexpr double kDbPerDoubling = 5.0;      // typical: sizes the next stretch of a --psnr run
-constexpr double kLeastGrowth = 1.2, kMostGrowth = 3.0;
+constexpr double kMinGrowth = 1.2, kMaxGrowth = 3.0;
 constexpr double kReachedMargin = 1e-3;  // dB: float32 storage must not undo it
 
 /// One stretch of iterations with its own schedule.
@@ -73,15 +73,15 @@ class Stretch {
   void events(const Schedule& schedule, double fraction) {
     if (plan_.learnKappa && done_ > 0) descendKappa(schedule.stepAt(fraction, done_));
     if (done_ > 0)
-      optimiser_.relocate(schedule.relocationsAt(fraction, optimiser_.primitiveCount()));
+      optimiser_.relocate(schedule.relocationsAt(fraction, optimiser_.ellipsoidCount()));
     optimiser_.growTo(schedule.countAt(fraction));
   }
 
   void report(double psnr, std::uint32_t firstIteration, double fraction) {
-    CurvePoint now;
+    TimedCurvePoint now;
     now.seconds = recorder_.seconds();
     now.iteration = firstIteration + done_;
-    now.primitives = optimiser_.primitiveCount();
+    now.ellipsoids = optimiser_.ellipsoidCount();
     now.psnrBox = psnr;
     recorder_.report(now, fraction);
   }
@@ -106,9 +106,9 @@ std::size_t firstCount(const RunPlan& plan, const Tuning& tuning) {
   return std::clamp<std::size_t>(share, 1, plan.count);
 }
 
-/// How many primitives the next stretch should aim at, from how many dB are missing.
+/// How many ellipsoids the next stretch should aim at, from how many dB are missing.
 std::size_t nextCount(std::size_t now, double missing, std::size_t largest) {
-  const double factor = std::clamp(std::exp2(missing / kDbPerDoubling), kLeastGrowth, kMostGrowth);
+  const double factor = std::clamp(std::exp2(missing / kDbPerDoubling), kMinGrowth, kMaxGrowth);
   return std::min(largest, std::size_t(std::ceil(double(now) * factor)));
 }
 
@@ -129,7 +129,7 @@ RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, co
       result.end = FitEnd::kPsnrMissed;
       return result;
     }
-    schedule.from = optimiser.primitiveCount();
+    schedule.from = optimiser.ellipsoidCount();
     schedule.to =
         std::max(schedule.from, nextCount(schedule.to, *plan.psnr - reached, plan.largestCount));
   }

@@ -65,7 +65,7 @@ class Volume:
         report = json.loads(self.report(part).read_text())
         grid = report['grids'][0]
         return {'seconds': report['seconds']['total'], 'device': grid['fit']['device'],
-                'primitives': grid['primitives']}
+                'ellipsoids': grid['ellipsoids']}
 
     def table(self):
         """All rows; kept in OUT."""
@@ -134,7 +134,7 @@ class Size:
     def better_pictures(self):
         return self.better('image_psnr', self.rows, self.bricks)
 
-    def better_than_primitives(self):
+    def better_than_ellipsoids(self):
         return self.better('image_psnr', self.rows)
 
 
@@ -184,14 +184,14 @@ def verdict(low, high):
         lines += losses(f'{at}, PSNR of pictures drawn from voxels', 'image_psnr',
                         lost(sizes, Size.better_pictures), lambda n: sizes[n].bricks)
         lines += losses(f'{at}, PSNR of pictures drawn as ellipsoids', 'image_psnr',
-                        lost(sizes, Size.better_than_primitives), lambda n: sizes[n].ours)
+                        lost(sizes, Size.better_than_ellipsoids), lambda n: sizes[n].ours)
         lines += flip_losses(f'{at}, FLIP of pictures drawn from voxels', sizes)
     lines += ['', '## Where ESVR is', '', f'Of {len(low)} volumes, above', '',
               won(low, f'every other row in PSNR over the box, at 1/{LOW}',
                   lambda s: s.better('psnr_box', s.rows + s.externals)),
               won(low, f'every row that was drawn in PSNR of pictures, at 1/{LOW}, drawn from voxels',
                   Size.better_pictures),
-              won(low, 'the same, drawn as ellipsoids', Size.better_than_primitives),
+              won(low, 'the same, drawn as ellipsoids', Size.better_than_ellipsoids),
               won(high, f'every OpenVDB, NanoVDB-memory and ZFP row in PSNR over the box, at 1/{HIGH}',
                   lambda s: s.better('psnr_box', built_in(s))),
               won(high, f'every other row in PSNR over the box, at 1/{HIGH}',
@@ -224,7 +224,7 @@ def line(row, bold):
 
 def section(size):
     ours = dict(size.ours, encode_s=size.time['seconds'], name='ESVR',
-                setting=f"{size.time['primitives']} ellipsoids, {size.time['device']}")
+                setting=f"{size.time['ellipsoids']} ellipsoids, {size.time['device']}")
     bricks = dict(size.bricks, encode_s=size.time['seconds'], name='ESVR, drawn from voxels')
     rows = [ours, bricks] + size.rows + size.externals
     rows.sort(key=lambda r: -psnr(r))

@@ -78,7 +78,7 @@ class Resolution:
         coarser = Resolution(self.options, self.resolution // 2).report
         if not coarser.exists():
             return FIRST * self.resolution // 256
-        return json.loads(coarser.read_text())['grids'][0]['primitives'] * 3 // 2
+        return json.loads(coarser.read_text())['grids'][0]['ellipsoids'] * 3 // 2
 
     @staticmethod
     def next_count(points):

@@ -18,7 +18,7 @@ void require(bool holds, const std::string& otherwise) {
 void checkPrunes(const PaperMethod& method) {
   std::uint32_t last = 0;
   for (const PrunePass& pass : method.prunes) {
-    require(pass.share >= 0.0 && pass.share < 1.0, "a pass must leave some primitives");
+    require(pass.share >= 0.0 && pass.share < 1.0, "a pass must leave some ellipsoids");
     require(pass.epoch > last, "pruning passes must be in order, from epoch 1 on");
     last = pass.epoch;
   }
@@ -31,7 +31,7 @@ PaperMethod methodFor(const FitOptions& options) {
   if (!method.prunes.empty())
     method.keep = options.count;
   else
-    method.most = *options.count;
+    method.maxEllipsoids = *options.count;
   return method;
 }
 
@@ -47,8 +47,8 @@ PaperRecord newRecord(const FitTarget& target, const FitOptions& options) {
 }
 
 bool anyNegative(const Population& population) {
-  return std::any_of(population.primitives.begin(), population.primitives.end(),
-                     [](const PaperPrimitive& p) { return p.intensity < 0.0; });
+  return std::any_of(population.ellipsoids.begin(), population.ellipsoids.end(),
+                     [](const PaperEllipsoid& p) { return p.intensity < 0.0; });
 }
 
 }  // namespace

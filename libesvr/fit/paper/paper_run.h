@@ -1,5 +1,5 @@
 #pragma once
-/// Epochs, densification and pruning: the paper's algorithm (appendix, 'Structure-aware primitive
+/// Epochs, densification and pruning: the paper's algorithm (appendix, 'Structure-aware ellipsoid
 /// learning').
 
 #include "esvr/paper_method.h"

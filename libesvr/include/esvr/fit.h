@@ -26,7 +26,7 @@ enum class Preset { kDraft, kStandard, kHigh };
 
 /// What a run reports while it goes on, about four times a second.
 struct FitProgress {
-  CurvePoint point;
+  TimedCurvePoint point;
   double fraction = 0.0;     ///< of the run, 0..1
   double secondsLeft = 0.0;  ///< estimate
 };
@@ -60,13 +60,13 @@ enum class FitEnd { kScheduleDone, kPsnrReached, kTimeUp, kCancelled, kPsnrMisse
 
 struct FitResult {
   Field field;
-  std::vector<CurvePoint> curve;
+  std::vector<TimedCurvePoint> curve;
   FitEnd end = FitEnd::kScheduleDone;
   bool kappaLearned = false;  ///< else it was given
   /// Wall clock by phase; seeding (at the start, growth, relocation) is not in secondsOptimise.
   double secondsSeed = 0.0, secondsOptimise = 0.0;
   std::size_t deviceBytes = 0;       ///< GPU memory held at most; 0 on the CPU
-  std::uint64_t pairs = 0;           ///< (primitive, brick) pairs that the final field evaluates
+  std::uint64_t pairs = 0;           ///< (ellipsoid, brick) pairs that the final field evaluates
   bool signedIntensities = false;    ///< some intensity is negative
   std::optional<PaperRecord> paper;  ///< where FitOptions::paper was given
 };

@@ -15,7 +15,7 @@ namespace esvr {
 /// A grid on its way into a file.
 struct RatedGrid {
   FitResult fit;  ///< without its field and its curve, which the grid has
-  EncodedGrid grid;
+  StoredGrid grid;
   CompactResult compact;  ///< without its grid
 };
 

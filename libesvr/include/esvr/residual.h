@@ -14,9 +14,9 @@ namespace esvr {
 /// file is read: evaluations differ by rounding between machines (field.h), for which a margin is
 /// kept. By value, the grid's threshold becomes half the bound. Nothing where the margin would take
 /// too much of the bound.
-/// \param grid  as encodeGrid made it from `source`, no narrow band \param bound  above 0
-[[nodiscard]] std::optional<EncodedGrid> withResidual(EncodedGrid grid, const SparseVolume& source,
-                                                      double bound);
+/// \param grid  as makeStoredGrid made it from `source`, no narrow band \param bound  above 0
+[[nodiscard]] std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& source,
+                                                     double bound);
 
 struct BoundedFit {
   std::optional<RatedGrid> rated;  ///< with its residual; nothing where voxels alone are smaller
