@@ -25,15 +25,15 @@ Field exportField(std::span<const Ellipsoid> ellipsoids, const ExportFrame& fram
   std::map<Coord, Ellipsoids> byChunk;
   for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
     const Coord chunk = frameOf(ellipsoids[i].center);
-    Ellipsoids& ellipsoids = byChunk[chunk];
-    append(ellipsoids, ellipsoids[i], chunk, frame.scale);
-    if (!frame.kappas.empty()) ellipsoids.kappa.push_back(float(frame.kappas[i]));
+    Ellipsoids& stored = byChunk[chunk];
+    append(stored, ellipsoids[i], chunk, frame.scale);
+    if (!frame.kappas.empty()) stored.kappa.push_back(float(frame.kappas[i]));
   }
   Field field;
   field.background = frame.background;
   field.kernel = frame.kernel;
-  for (auto& [chunk, ellipsoids] : byChunk)
-    field.chunks.push_back({frame.origin + chunk, std::move(ellipsoids)});
+  for (auto& [chunk, stored] : byChunk)
+    field.chunks.push_back({frame.origin + chunk, std::move(stored)});
   return field;
 }
 
