@@ -107,9 +107,9 @@ __device__ void toResiduals(const IntensityPassArguments& a, std::uint32_t brick
     sums[at] = __float_as_int(missed.residual);
     const unsigned exact = __ballot_sync(kAllLanes, missed.stored == 0.0);
     const double counted = a.box.contains(corner + voxelLocal(v)) ? missed.stored : 0.0;
-    const double square = warpSum(counted * counted), largest = warpMax(fabs(counted));
+    const double square = warpSum(counted * counted), peak = warpMax(fabs(counted));
     if (v % kWarp != 0) continue;
-    squares[warp] = square, largest[warp] = largest;
+    squares[warp] = square, largest[warp] = peak;
     if (kMarksExact)
       a.exact[std::size_t(brick) * IntensityPassArguments::kMaskWords + std::size_t(warp)] = exact;
   }
