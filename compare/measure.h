@@ -8,8 +8,8 @@
 #include "compare/table_options.h"
 #include "compare/table_record.h"
 #include "esvr/baseline.h"
+#include "esvr/convert.h"
 #include "esvr/device.h"
-#include "esvr/rate_control.h"
 
 namespace esvr::compare {
 
@@ -57,7 +57,8 @@ class RowMaker {
   void measure(const BaselineSetting& setting, TableRow& row);
   TableRow matched(const BaselineSetting& like, const std::string& group,
                    const std::function<Match()>& search);
-  [[nodiscard]] RateInput rateInput(const FitWish& wish) const;
+  /// \param head  bytes of a file without grids
+  [[nodiscard]] Conversion convert(const FitWish& wish, std::uint64_t head) const;
   void measureEsvr(const std::filesystem::path& path, Drawing drawing, TableRow& row);
   [[nodiscard]] VolumeMetrics compare(const SparseVolume& volume) const;
   /// Figures of the voxels and, where pictures were asked for, of what they look like.

@@ -40,8 +40,7 @@ std::optional<std::uint64_t> ByteShares::of(const GridSummary& grid) const {
 void ByteShares::take(const GridSummary& grid, const StoredGrid& stored) {
   voxelsLeft_ -= weightOf(grid);
   if (!left_) return;
-  const std::uint64_t taken = encodeEsvr({{}, {stored}}).size() - encodeEsvr({}).size();
-  *left_ -= std::min(*left_, taken);
+  *left_ -= std::min(*left_, bytesAdded(stored));
 }
 
 }  // namespace esvr::vdb2esvr

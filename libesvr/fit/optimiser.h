@@ -18,8 +18,6 @@ namespace esvr {
 
 struct OptimiserOptions {
   Kernel kernel;
-  Loss loss = Loss::kSquared;
-  double beta = 0.2;
   std::uint64_t seed = 1;
   Device device;
   std::optional<std::size_t> maxDeviceBytes;  ///< FitOptions::maxDeviceBytes

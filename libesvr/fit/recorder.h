@@ -16,7 +16,7 @@ inline constexpr double kPerfectPsnr = 999.0;
 
 class Recorder {
  public:
-  Recorder(const FitTarget& target, const FitOptions& options)
+  Recorder(const FitTarget& target, const CommonFitOptions& options)
       : target_(target), options_(options) {}
 
   [[nodiscard]] double seconds() const;
@@ -24,7 +24,7 @@ class Recorder {
 
   /// Appends a point to the curve.
   const TimedCurvePoint& record(const FitErrors& errors, std::size_t ellipsoids,
-                           std::uint32_t iteration);
+                                std::uint32_t iteration);
   /// The same, measured exactly.
   const TimedCurvePoint& record(Optimiser& optimiser, std::uint32_t iteration);
 
@@ -36,7 +36,7 @@ class Recorder {
  private:
   using Clock = std::chrono::steady_clock;
   const FitTarget& target_;
-  const FitOptions& options_;
+  const CommonFitOptions& options_;
   Clock::time_point start_ = Clock::now();
   double lastReport_ = -1.0;
   std::vector<TimedCurvePoint> curve_;

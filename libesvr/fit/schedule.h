@@ -9,7 +9,7 @@
 
 namespace esvr {
 
-/// One stretch of a run: from `from` to `to` ellipsoids over `iterations`.
+/// A run: from `from` to `to` ellipsoids over `iterations`.
 struct Schedule {
   std::size_t from = 0, to = 0;
   std::uint32_t iterations = 0;

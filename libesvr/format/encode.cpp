@@ -218,4 +218,8 @@ std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
   return out.assemble();
 }
 
+std::uint64_t bytesAdded(const StoredGrid& grid) {
+  return encodeEsvr({{}, {grid}}).size() - encodeEsvr({}).size();
+}
+
 }  // namespace esvr

@@ -10,7 +10,7 @@
 
 #include "codec/cell_tree.h"
 
-namespace esvr::format {
+namespace esvr::codec {
 namespace {
 
 TEST(RangeCoder, GivesBackDecisionsOfAnyProbability) {
@@ -106,4 +106,4 @@ TEST(CellTree, RefusesASplitOfMoreThanThereAre) {
 }
 
 }  // namespace
-}  // namespace esvr::format
+}  // namespace esvr::codec

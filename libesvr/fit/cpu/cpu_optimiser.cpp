@@ -45,7 +45,7 @@ std::vector<Ellipsoid> CpuOptimiser::newSeeds(std::size_t count) {
   const AddSeconds timer(secondsSeeding_);
   refreshResiduals();
   SeedOptions options;
-  options.draw = {count, pass_.targetBricks(), signsOf(target_),
+  options.draw = {count, target_.bricks.size(), signsOf(target_),
                   options_.seed ^ (++samplings_ << 32)};
   options.window = seedWindow(target_, std::max(count, ellipsoids_.size()), tuning_);
   options.unitVariance = unitVariance_;
@@ -77,8 +77,6 @@ std::vector<std::size_t> CpuOptimiser::leastUseful(std::size_t count) const {
 }
 
 void CpuOptimiser::relocate(std::size_t count) {
-  // What a removal costs is counted in squares, whatever loss is descended.
-  if (options_.loss == Loss::kPaper) pass_.gradients(ellipsoids_, gradients_);
   const auto chosen = leastUseful(count);
   if (chosen.empty()) return;
   const auto seeds = newSeeds(chosen.size());
@@ -88,27 +86,11 @@ void CpuOptimiser::relocate(std::size_t count) {
   }
 }
 
-double CpuOptimiser::takePaperGradients() {
-  pass_.residuals(ellipsoids_, residuals_);
-  const PaperLossInput input{pass_.index(),     residuals_,    target_.values,
-                             target_.boxVoxels, options_.beta, target_.highest - target_.lowest};
-  paperLoss_.evaluate(input, lossByValue_);
-  pass_.gradientsOf(ellipsoids_, lossByValue_, gradients_);
-  double squares = 0.0;
-  for (const float r : residuals_) squares += double(r) * double(r);
-  return squares;
-}
-
-double CpuOptimiser::takeGradients() {
-  if (options_.loss == Loss::kPaper) return takePaperGradients();
-  return pass_.gradients(ellipsoids_, gradients_);
-}
-
 double CpuOptimiser::iterateOnce(double factor) {
   if (iterationsSinceRebuild_ < 0 || iterationsSinceRebuild_ >= tuning_.rebuildEvery)
     rebuildLists();
   ++iterationsSinceRebuild_;
-  const double loss = takeGradients();
+  const double loss = pass_.gradients(ellipsoids_, gradients_);
   if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
   adamStep(ellipsoids_, states_, gradients_, tuning_.steps.scaled(factor), tuning_.adam, limits_);
   return loss;

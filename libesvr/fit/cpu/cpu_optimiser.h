@@ -9,7 +9,6 @@
 #include "fit/cpu/cpu_pass.h"
 #include "fit/cpu/seed.h"
 #include "fit/optimiser.h"
-#include "fit/paper/paper_loss.h"
 #include "fit/tuning.h"
 
 namespace esvr {
@@ -41,21 +40,17 @@ class CpuOptimiser final : public Optimiser {
   void rebuildLists();
   void refreshResiduals();
   double iterateOnce(double factor);
-  double takeGradients();
-  double takePaperGradients();
 
   const FitTarget& target_;
   OptimiserOptions options_;
   Tuning tuning_;
   CpuPass pass_;
-  PaperLoss paperLoss_;
   double unitVariance_;
   EllipsoidLimits limits_;
   std::vector<Ellipsoid> ellipsoids_;
   std::vector<AdamState> states_;
   std::vector<EllipsoidGradient> gradients_;
   std::vector<float> residuals_;
-  std::vector<float> lossByValue_;
   double secondsSeeding_ = 0.0;
   std::uint64_t samplings_ = 0;      ///< events so far: each draws from its own random stream
   int iterationsSinceRebuild_ = -1;  ///< -1: lists are stale

@@ -22,11 +22,11 @@ void forEachEllipsoid(std::size_t count, Visit&& visit) {
 
 CpuPaperOptimiser::CpuPaperOptimiser(const FitTarget& target, const PaperOptions& options)
     : options_(options) {
-  const auto kernel = kernelConstants<double>(kernelOf(options.kind));
-  const Space space = spaceOf(target);
-  for (auto& volume : cutSubvolumes(target, space, options.subvolumeSide)) {
-    CpuPass engine(volume->target, kernel);
-    parts_.push_back({std::move(volume), std::move(engine)});
+  resizeKernels(1);
+  setKernel(0, kernelConstants<double>(kernelOf(options.kind)));
+  for (auto& volume : cutSubvolumes(target, spaceOf(target), options.subvolumeSide)) {
+    CpuPaperPass pass(volume->target, kernels_);
+    parts_.push_back({std::move(volume), std::move(pass)});
   }
 }
 
@@ -35,26 +35,30 @@ void CpuPaperOptimiser::put(const Population& population) {
   for (Part& part : parts_) part.motionLeft = -1.0;
 }
 
+void CpuPaperOptimiser::resizeKernels(std::size_t count) {
+  kernels_.all.resize(count);
+  kernels_.radii.resize(count);
+}
+
+void CpuPaperOptimiser::setKernel(std::size_t i, const KernelConstants<double>& kernel) {
+  kernels_.all[i] = narrowed(kernel);
+  kernels_.radii[i] = supportRadius(kernel);
+}
+
 void CpuPaperOptimiser::formEllipsoids() {
   const std::size_t n = population_.size();
   ellipsoids_.resize(n);
   gradients_.resize(n);
-  if (options_.kind.learnK) {
-    kernels_.constants.resize(n);
-    kernels_.radii.resize(n);
-  }
+  if (options_.kind.learnK) resizeKernels(n);
   forEachEllipsoid(n, [&](std::size_t i) {
     ellipsoids_[i] = ellipsoidOf(population_.ellipsoids[i], options_.kind);
-    if (!options_.kind.learnK) return;
-    const auto k = kernelConstants<double>(kernelOf(options_.kind), population_.ellipsoids[i].k);
-    kernels_.constants[i] = narrowed(k);
-    kernels_.radii[i] = supportRadius(k);
+    if (options_.kind.learnK)
+      setKernel(i, kernelConstants<double>(kernelOf(options_.kind), population_.ellipsoids[i].k));
   });
 }
 
 void CpuPaperOptimiser::rebuildLists(Part& part, double slack) {
-  part.engine.useKernels(options_.kind.learnK ? &kernels_ : nullptr);
-  part.engine.rebuild(ellipsoids_, slack);
+  part.pass.rebuild(ellipsoids_, slack);
   part.motionLeft = slack;
 }
 
@@ -64,12 +68,12 @@ PaperVector CpuPaperOptimiser::gradientOf(std::size_t i) const {
 
 double CpuPaperOptimiser::takeGradients(Part& part) {
   const FitTarget& target = part.volume->target;
-  part.engine.residuals(ellipsoids_, residuals_);
+  part.pass.residuals(ellipsoids_, residuals_);
   const double loss =
-      loss_.evaluate({part.engine.index(), residuals_, target.values, target.boxVoxels,
-                      options_.beta, target.highest - target.lowest, target.within},
+      loss_.evaluate({part.pass.index(), residuals_, target.values, target.boxVoxels, options_.beta,
+                      target.highest - target.lowest, target.within},
                      lossByValue_);
-  part.engine.gradientsOf(ellipsoids_, lossByValue_, gradients_);
+  part.pass.gradients(ellipsoids_, lossByValue_, gradients_);
   return loss;
 }
 
@@ -86,7 +90,7 @@ void CpuPaperOptimiser::iterate(std::size_t subvolume, const PaperStep& step) {
   formEllipsoids();
   if (part.motionLeft < 0.0) rebuildLists(part, kListSlack);
   takeGradients(part);
-  const auto& begin = part.engine.pairs().ellipsoidBegin;
+  const auto& begin = part.pass.pairs().ellipsoidBegin;
   forEachEllipsoid(population_.size(), [&](std::size_t i) {
     takeStep(population_.ellipsoids[i], population_.states[i], gradientOf(i),
              begin[i + 1] > begin[i], step);
@@ -103,9 +107,9 @@ FitErrors CpuPaperOptimiser::measure() {
   pairCount_ = 0;
   for (Part& part : parts_) {
     rebuildLists(part, kRoundingSlack);
-    pairCount_ += part.engine.pairs().pairCount();
-    part.engine.residuals(ellipsoids_, residuals_);
-    errors.add(errorsOf(part.volume->target, {part.engine.index(), residuals_}));
+    pairCount_ += part.pass.pairs().pairCount();
+    part.pass.residuals(ellipsoids_, residuals_);
+    errors.add(errorsOf(part.volume->target, {part.pass.index(), residuals_}));
   }
   return errors;
 }

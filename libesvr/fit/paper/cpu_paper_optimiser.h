@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "fit/cpu/cpu_pass.h"
+#include "fit/paper/cpu_paper_pass.h"
 #include "fit/paper/paper_loss.h"
 #include "fit/paper/paper_optimiser.h"
 
@@ -26,20 +26,22 @@ class CpuPaperOptimiser final : public PaperOptimiser {
  private:
   struct Part {
     std::unique_ptr<Subvolume> volume;
-    CpuPass engine;
+    CpuPaperPass pass;
     double motionLeft = -1.0;  ///< voxels that supports may still move by; below 0: lists are stale
   };
 
+  void resizeKernels(std::size_t count);
+  void setKernel(std::size_t i, const KernelConstants<double>& kernel);
   void formEllipsoids();
   void rebuildLists(Part& part, double slack);
   double takeGradients(Part& part);
   [[nodiscard]] PaperVector gradientOf(std::size_t ellipsoid) const;
 
   PaperOptions options_;
+  PopulationKernels kernels_;
   std::vector<Part> parts_;
   Population population_;
   std::vector<Ellipsoid> ellipsoids_;  ///< the same in the form that passes take
-  OwnKernels kernels_;
   std::vector<EllipsoidGradient> gradients_;
   std::vector<float> residuals_, lossByValue_;
   PaperLoss loss_;

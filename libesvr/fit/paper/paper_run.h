@@ -12,7 +12,7 @@ namespace esvr::paper {
 struct PaperRun {
   const FitTarget& target;
   const PaperMethod& method;
-  const FitOptions& options;  ///< seed, psnr and seconds, at which it ends too
+  const CommonFitOptions& options;  ///< seed, and psnr and seconds, at which it ends too
 };
 
 [[nodiscard]] KernelKind kindOf(const PaperMethod& method);

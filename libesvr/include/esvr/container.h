@@ -121,6 +121,10 @@ struct PartOfFile {
 /// \throws BadInput  as readEsvr
 [[nodiscard]] PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part);
 
+/// Bytes that a grid adds to a file: its sections, their alignment and its rows of the section table.
+/// \throws RuntimeFailure  as encodeEsvr
+[[nodiscard]] std::uint64_t bytesAdded(const StoredGrid& grid);
+
 /// The same from and to memory. The same content gives the same bytes. A chunk's ellipsoids are
 /// stored in Morton order of their centers: what comes back is that order, bit for bit the same
 /// ellipsoids.

@@ -17,6 +17,9 @@
 #include <optional>
 #include <vector>
 
+#include "esvr/fit.h"
+#include "esvr/sparse_volume.h"
+
 namespace esvr {
 
 /// What pruning ranks ellipsoids by. Omega are the voxels of the volume where |I| phi is at least a
@@ -42,9 +45,10 @@ struct PaperRates {
   double k = 1e-2;
 };
 
-/// Defaults: the paper's for small and medium volumes.
+/// The defaults are the paper's for small and medium volumes.
 struct PaperMethod {
   bool gaussian = false;         ///< Gaussians of 3 sigma in the place of ellipsoids
+  double beta = 0.2;             ///< share of L1 in the loss; the rest is D-SSIM (eq. 7)
   double k = 5.0;                ///< sharpness of the ellipsoids
   bool learnK = false;           ///< k of each ellipsoid is learned, beginning there
   std::size_t points = 100'000;  ///< at the start, on voxels that differ from the background
@@ -95,5 +99,20 @@ struct PaperRecord {
   double firstGradient = 0.0;  ///< median of what gradientThreshold was first compared with
   std::vector<PruneRecord> prunes;
 };
+
+/// The options of a fit by the paper's method. `count` is the number that the last pruning pass
+/// leaves; without pruning, the number up to which ellipsoids are added.
+struct PaperFitOptions : CommonFitOptions {
+  PaperMethod method;
+};
+
+struct PaperFitResult {
+  FitResult fit;
+  PaperRecord record;
+};
+
+/// Fits by the paper's method, on the CPU or a GPU. Deterministic as fit() is.
+/// \throws UsageError  a method that makes no sense; else as fit
+[[nodiscard]] PaperFitResult fitByPaper(const SparseVolume& volume, const PaperFitOptions& options);
 
 }  // namespace esvr
