@@ -284,7 +284,7 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   cli::Stopwatch watch;
   EsvrFile file;
   file.metadata = scene_.metadata;
-  const std::uint64_t head = encodeEsvr(file).size();
+  const std::uint64_t head = bytesBesideGrids(file.metadata);
   if (wish.bytes && *wish.bytes <= head)
     throw UsageError("--fit " + word + " has no room for a grid");
   Conversion conversion = convert(wish, head);

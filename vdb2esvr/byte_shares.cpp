@@ -25,7 +25,7 @@ ByteShares::ByteShares(const Options& options, const VdbSummary& input,
     : left_(sizeOf(options, input)) {
   for (const auto& grid : grids) voxelsLeft_ += weightOf(grid);
   if (!left_) return;
-  const std::uint64_t fixed = encodeEsvr({input.metadata, {}}).size();
+  const std::uint64_t fixed = bytesBesideGrids(input.metadata);
   if (fixed >= *left_)
     throw UsageError("the file takes " + std::to_string(fixed) +
                      " bytes without a grid; there are " + std::to_string(*left_));

@@ -280,26 +280,55 @@ Json totalSeconds(const RunRecord& record) {
   return seconds;
 }
 
+const char* nameOf(ErrorKind kind) {
+  switch (kind) {
+    case ErrorKind::kUsage:
+      return "usage";
+    case ErrorKind::kBadInput:
+      return "bad input";
+    case ErrorKind::kTargetMissed:
+      return "target missed";
+    case ErrorKind::kDevice:
+      return "device";
+    case ErrorKind::kRuntime:
+      break;
+  }
+  return "failure";
+}
+
+/// What every report begins with, whether the run succeeded or not.
+Json head(const Options& options) {
+  return {{"schema", kSchema},      {"schema_version", kSchemaVersion},
+          {"program", kProgram},    {"command_line", options.commandLine},
+          {"versions", versions()}, {"asked", asked(options)}};
+}
+
 }  // namespace
 
 Json makeReport(const Options& options, const RunRecord& record) {
   const std::uint64_t bytesIn = record.input.fileBytes, bytesOut = record.output.fileBytes;
-  return {{"schema", kSchema},
-          {"schema_version", kSchemaVersion},
-          {"program", kProgram},
-          {"command_line", options.commandLine},
-          {"versions", versions()},
-          {"asked", asked(options)},
-          {"input",
-           {{"path", options.input.string()}, {"format", record.input.format}, {"bytes", bytesIn}}},
-          {"output", {{"path", options.output.string()}, {"bytes", bytesOut}}},
-          {"ratio", double(bytesIn) / double(bytesOut)},
-          {"grids", gridsOf(record)},
-          {"skipped", skippedOf(record)},
-          {"seconds", totalSeconds(record)},
-          {"peak_memory_bytes", cli::peakMemory()},
-          {"interrupted", record.interrupted},
-          {"exit_code", exitCodeOf(record, options.psnr)}};
+  Json report = head(options);
+  report.update(
+      {{"input",
+        {{"path", options.input.string()}, {"format", record.input.format}, {"bytes", bytesIn}}},
+       {"output", {{"path", options.output.string()}, {"bytes", bytesOut}}},
+       {"ratio", double(bytesIn) / double(bytesOut)},
+       {"grids", gridsOf(record)},
+       {"skipped", skippedOf(record)},
+       {"seconds", totalSeconds(record)},
+       {"peak_memory_bytes", cli::peakMemory()},
+       {"interrupted", record.interrupted},
+       {"error", nullptr},
+       {"exit_code", exitCodeOf(record, options.psnr)}});
+  return report;
+}
+
+Json makeFailureReport(const Options& options, const Error& error) {
+  Json report = head(options);
+  report.update({{"input", {{"path", options.input.string()}}},
+                 {"error", {{"kind", nameOf(error.kind())}, {"message", error.what()}}},
+                 {"exit_code", error.exitCode()}});
+  return report;
 }
 
 }  // namespace esvr::vdb2esvr

@@ -60,9 +60,9 @@ void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
 }
 
 /// Fits one grid after the other until all are done or the run is interrupted.
-class Conversion {
+class FileConversion {
  public:
-  Conversion(const Options& options, const CancelToken& cancel, const cli::Log& log)
+  FileConversion(const Options& options, const CancelToken& cancel, const cli::Log& log)
       : options_(options), log_(log) {
     options_.convert.fit.cancel = &cancel;
     options_.convert.fit.device = chooseDevice(options, log);
@@ -141,25 +141,39 @@ void throwWhatIsAmiss(const Options& options, const RunRecord& record) {
                        " is written");
 }
 
-}  // namespace
-
-int run(const Options& options) {
+RunRecord convertFile(const Options& options, const cli::Interrupts& interrupts,
+                      const cli::Log& log) {
   cli::Stopwatch watch;
-  const cli::Log log(kProgram, options.verbosity);
-  const cli::ThreadLimit threads(options.threads);
-  const cli::Interrupts interrupts;
-  checkFiles(options);
-
   RunRecord record;
   record.input = inspectVdb(options.input);
   GridChoice choice = chooseGrids(options.input, record.input, options.grids);
   tellSkipped(choice.skipped, log);
   record.skipped = std::move(choice.skipped);
-  Conversion(options, interrupts.token(), log).run(choice.fitted, record);
+  FileConversion(options, interrupts.token(), log).run(choice.fitted, record);
   for (const auto& grid : record.grids) tellGrid(grid, log);
   write(options, record);
   record.secondsTotal = watch.lap();
+  return record;
+}
 
+/// A failure has a report too.
+RunRecord convertOrReport(const Options& options, const cli::Interrupts& interrupts,
+                          const cli::Log& log) try {
+  return convertFile(options, interrupts, log);
+} catch (const Error& error) {
+  if (!options.report.empty())
+    cli::writeJson({options.report, options.overwrite}, makeFailureReport(options, error));
+  throw;
+}
+
+}  // namespace
+
+int run(const Options& options) {
+  const cli::Log log(kProgram, options.verbosity);
+  const cli::ThreadLimit threads(options.threads);
+  const cli::Interrupts interrupts;
+  checkFiles(options);
+  const RunRecord record = convertOrReport(options, interrupts, log);
   tellResult(options, record);
   throwWhatIsAmiss(options, record);
   return 0;

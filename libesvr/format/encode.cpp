@@ -218,8 +218,12 @@ std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
   return out.assemble();
 }
 
+std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata) {
+  return alignUp(encodeEsvr({metadata, {}}).size());
+}
+
 std::uint64_t bytesAdded(const StoredGrid& grid) {
-  return encodeEsvr({{}, {grid}}).size() - encodeEsvr({}).size();
+  return alignUp(encodeEsvr({{}, {grid}}).size()) - encodeEsvr({}).size();
 }
 
 }  // namespace esvr

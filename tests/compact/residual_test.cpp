@@ -92,40 +92,5 @@ TEST(WithResidual, BelongsToAllOfTheEllipsoids) {
 }
 
 /// What is smooth is worth its ellipsoids, noise is not.
-TEST(FitWithin, SlowTakesEllipsoidsWhereTheyPay) {
-  FitOptions options;
-  options.iterations = 200;
-  options.kappa = 0.0f;
-  const GridDescriptor descriptor;
-  const auto bytesOf = [](const StoredGrid& grid) {
-    return encodeEsvr({{}, {grid}}).size() - encodeEsvr({}).size();
-  };
-  test::Random random(5);
-  std::array<std::array<double, 4>, 16> blobs;  // center, width
-  for (auto& [x, y, z, width] : blobs)
-    x = random(5, 43), y = random(5, 43), z = random(5, 43), width = random(3, 6);
-  const SparseVolume smooth = test::volumeOf({}, 6, 0.0f, [&](Coord v) {
-    double sum = 0.0;
-    for (const auto& [x, y, z, width] : blobs)
-      sum += std::exp(-((v.x - x) * (v.x - x) + (v.y - y) * (v.y - y) + (v.z - z) * (v.z - z)) /
-                      (2.0 * width * width));
-    return float(sum);
-  });
-  const SparseVolume noise =
-      test::volumeOf({}, 2, 0.0f, [&](Coord) { return float(random(0.5, 1.0)); });
-  for (const SparseVolume* volume : {&smooth, &noise}) {
-    const StoredGrid voxels =
-        makeStoredVoxels(descriptor, *volume, boundedLayer(*volume, 0.1, Activity::kByValue));
-    const BoundedFit fitted =
-        fitWithin({descriptor, *volume, options, Activity::kByValue}, 0.1, bytesOf(voxels));
-    EXPECT_EQ(fitted.rated.has_value(), volume == &smooth)
-        << fitted.bytes << " bytes against " << bytesOf(voxels);
-    if (!fitted.rated) continue;
-    EXPECT_EQ(bytesOf(fitted.rated->grid), fitted.bytes);
-    EXPECT_LT(fitted.bytes, bytesOf(voxels));
-    EXPECT_LE(largestDifference(*volume, decodeGrid(fitted.rated->grid)), 0.1);
-  }
-}
-
 }  // namespace
 }  // namespace esvr

@@ -159,11 +159,12 @@ TEST(Fit, OfAFilledBlockIsFinite) {
 TEST(Fit, StopsWhereThePsnrIsReached) {
   const SparseVolume volume = test::tubeVolume();
   FitOptions options = quick();
-  options.count.reset();
-  options.psnr = 32.0;
+  const auto whole = fit(volume, options).curve.back().iteration;
+  options.psnr = 20.0;
   const FitResult result = fit(volume, options);
   EXPECT_EQ(result.end, FitEnd::kPsnrReached);
-  EXPECT_GE(compareVolumes(volume, revoxelise(result.field, {})).psnrBox, 32.0);
+  EXPECT_LT(result.curve.back().iteration, whole);
+  EXPECT_GE(compareVolumes(volume, revoxelise(result.field, {})).psnrBox, 20.0);
 }
 
 TEST(Fit, SaysSoWhereThePsnrIsOutOfReach) {
@@ -172,16 +173,6 @@ TEST(Fit, SaysSoWhereThePsnrIsOutOfReach) {
   const FitResult result = fit(test::tubeVolume(), options);
   EXPECT_EQ(result.end, FitEnd::kPsnrMissed);
   EXPECT_LE(result.field.ellipsoidCount(), 3u);
-}
-
-TEST(Fit, GivesItsLargestNumberAWholeRunBeforeItSaysSo) {
-  FitOptions options = quick(3);
-  options.iterations.reset();
-  const auto whole = fit(test::tubeVolume(), options).curve.back().iteration;
-  options.psnr = 90.0;
-  const FitResult result = fit(test::tubeVolume(), options);
-  EXPECT_EQ(result.end, FitEnd::kPsnrMissed);
-  EXPECT_GT(result.curve.back().iteration, whole) << "and the short attempt before it";
 }
 
 TEST(Fit, EndsInTime) {
@@ -252,20 +243,6 @@ TEST(Fit, FollowsTheBandOfALevelSetAndNothingBeyond) {
   EXPECT_GT(banded.psnrActive, plain.psnrActive + 2.0);
 }
 
-TEST(Fit, DescendsThePapersLossToo) {
-  const SparseVolume volume = test::tubeVolume();
-  FitOptions options = quick();
-  options.loss = Loss::kPaper;
-  const FitResult result = fit(volume, options);
-  EXPECT_GT(result.curve.back().psnrBox, result.curve.front().psnrBox + 5.0);
-  CompareOptions compare;
-  compare.ssim = true;
-  const auto fitted = compareVolumes(volume, revoxelise(result.field, {}), compare);
-  options.iterations = 10;
-  const auto early = compareVolumes(volume, revoxelise(fit(volume, options).field, {}), compare);
-  EXPECT_GT(*fitted.ssim, *early.ssim);
-}
-
 TEST(Fit, SplitsAWideGridIntoChunks) {
   std::vector<BrickInput> bricks;
   for (const int x : {0, 40'000}) {
@@ -286,9 +263,6 @@ TEST(Fit, RefusesOptionsThatMakeNoSense) {
   EXPECT_THROW((void)fit(volume, options), UsageError);
   options = quick();
   options.seconds = -1.0;
-  EXPECT_THROW((void)fit(volume, options), UsageError);
-  options = quick();
-  options.beta = 2.0;
   EXPECT_THROW((void)fit(volume, options), UsageError);
   EXPECT_THROW((void)fit(SparseVolume{}, quick()), BadInput);
 }

@@ -121,9 +121,13 @@ struct PartOfFile {
 /// \throws BadInput  as readEsvr
 [[nodiscard]] PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part);
 
-/// Bytes that a grid adds to a file: its sections, their alignment and its rows of the section table.
+/// Bytes that a grid adds to a file at most: its sections, the padding before and behind them, and
+/// its rows of the section table. A file takes no more than bytesBesideGrids() and the sum of these.
 /// \throws RuntimeFailure  as encodeEsvr
 [[nodiscard]] std::uint64_t bytesAdded(const StoredGrid& grid);
+
+/// Bytes of a file without grids, with the padding before the first.
+[[nodiscard]] std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata);
 
 /// The same from and to memory. The same content gives the same bytes. A chunk's ellipsoids are
 /// stored in Morton order of their centers: what comes back is that order, bit for bit the same

@@ -11,7 +11,7 @@
 #include "../volumes.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
-#include "esvr/fit.h"
+#include "esvr/paper_method.h"
 #include "fit/paper/initial_points.h"
 #include "fit/paper/subvolumes.h"
 #include "on_device.h"
@@ -112,25 +112,24 @@ class PaperRunOn : public test::OnDevice {
     method.prunes = {{24, 0.3}};
     return method;
   }
-  [[nodiscard]] FitResult run(const PaperMethod& method, Coord shift = {},
-                              FitOptions options = {}) const {
-    options.paper = method;
+  [[nodiscard]] PaperFitResult run(const PaperMethod& method, Coord shift = {},
+                                   PaperFitOptions options = {}) const {
+    options.method = method;
     options.device = device_;
-    return fit(test::tubeVolume(shift), options);
+    return fitByPaper(test::tubeVolume(shift), options);
   }
 };
 
 TEST_P(PaperRunOn, LowersTheErrorAndSaysWhatItDid) {
-  const FitResult result = run(shortMethod());
-  ASSERT_TRUE(result.paper);
+  const auto [result, record] = run(shortMethod());
   EXPECT_EQ(result.end, FitEnd::kScheduleDone);
-  EXPECT_EQ(result.paper->points, 300u);
-  EXPECT_EQ(result.paper->iterations, 60u * result.paper->subvolumes);
-  EXPECT_GT(result.paper->cloned + result.paper->split, 0u);
-  EXPECT_GT(result.paper->firstGradient, 0.0);
-  ASSERT_EQ(result.paper->prunes.size(), 1u);
-  const PruneRecord& pass = result.paper->prunes.front();
-  EXPECT_EQ(pass.before, 300 + result.paper->cloned + result.paper->split);
+  EXPECT_EQ(record.points, 300u);
+  EXPECT_EQ(record.iterations, 60u * record.subvolumes);
+  EXPECT_GT(record.cloned + record.split, 0u);
+  EXPECT_GT(record.firstGradient, 0.0);
+  ASSERT_EQ(record.prunes.size(), 1u);
+  const PruneRecord& pass = record.prunes.front();
+  EXPECT_EQ(pass.before, 300 + record.cloned + record.split);
   EXPECT_NEAR(double(pass.after), 0.7 * double(pass.before), 0.5);
   EXPECT_LT(pass.psnrBoxAfter, pass.psnrBoxBefore);
   EXPECT_GT(result.curve.back().psnrBox, pass.psnrBoxAfter + 1.0);
@@ -139,25 +138,25 @@ TEST_P(PaperRunOn, LowersTheErrorAndSaysWhatItDid) {
 }
 
 TEST_P(PaperRunOn, LeavesTheCountThatIsAsked) {
-  FitOptions options;
+  PaperFitOptions options;
   options.count = 120;
-  EXPECT_EQ(run(shortMethod(), {}, options).paper->prunes.back().after, 120u);
+  EXPECT_EQ(run(shortMethod(), {}, options).record.prunes.back().after, 120u);
 }
 
 TEST_P(PaperRunOn, WithoutPruningAddsUpToTheCount) {
-  FitOptions options;
+  PaperFitOptions options;
   options.count = 400;
   PaperMethod method = shortMethod();
   method.prunes.clear();
   method.gradientThreshold = 0.0;
-  EXPECT_EQ(run(method, {}, options).curve.end()[-2].ellipsoids, 400u);
+  EXPECT_EQ(run(method, {}, options).fit.curve.end()[-2].ellipsoids, 400u);
 }
 
 TEST_P(PaperRunOn, WithoutDensifyingOnlyMovesThePoints) {
   PaperMethod method = shortMethod();
   method.densify = false;
   method.prunes.clear();
-  const FitResult result = run(method);
+  const FitResult result = run(method).fit;
   EXPECT_EQ(result.curve.end()[-2].ellipsoids, 300u);
   EXPECT_GT(result.curve.back().psnrBox, result.curve.front().psnrBox);
 }
@@ -165,7 +164,7 @@ TEST_P(PaperRunOn, WithoutDensifyingOnlyMovesThePoints) {
 TEST_P(PaperRunOn, LearnsKOfEachEllipsoid) {
   PaperMethod method = shortMethod();
   method.learnK = true;
-  const FitResult result = run(method);
+  const FitResult result = run(method).fit;
   std::set<float> values;
   for (const Chunk& chunk : result.field.chunks) {
     ASSERT_EQ(chunk.ellipsoids.kappa.size(), chunk.ellipsoids.size());
@@ -178,53 +177,60 @@ TEST_P(PaperRunOn, FitsGaussiansWithTheSameMethod) {
   PaperMethod method = shortMethod();
   method.gaussian = true;
   method.countHits = true;
-  const FitResult gaussians = run(method);
+  const auto [gaussians, gaussianRecord] = run(method);
   method.gaussian = false;
-  const FitResult ellipsoids = run(method);
-  EXPECT_GT(gaussians.curve.back().psnrBox, gaussians.paper->prunes.front().psnrBoxAfter);
+  const auto [ellipsoids, ellipsoidRecord] = run(method);
+  EXPECT_GT(gaussians.curve.back().psnrBox, gaussianRecord.prunes.front().psnrBoxAfter);
   EXPECT_LT(gaussians.field.kernel.kappa, -20.0f);
   // Supports of 3 sigma against 1.42 scales: more of them meet a voxel.
   EXPECT_GT(averageHits(gaussians.field), 1.3 * averageHits(ellipsoids.field));
-  EXPECT_GT(ellipsoids.paper->prunes.front().hitsBefore, 1.0);
+  EXPECT_GT(ellipsoidRecord.prunes.front().hitsBefore, 1.0);
 }
 
 TEST_P(PaperRunOn, GivesTheSameBitsInThreeRunsAndInAFarPlace) {
   PaperMethod method = shortMethod();
   method.epochs = 20;
   method.prunes = {{18, 0.3}};
-  const Field first = run(method).field;
-  for (int n = 0; n < 2; ++n) EXPECT_TRUE(test::sameBits(run(method).field, first));
-  EXPECT_TRUE(test::sameBits(run(method, {1 << 20, -(1 << 20), 1 << 20}).field, first));
+  const Field first = run(method).fit.field;
+  for (int n = 0; n < 2; ++n) EXPECT_TRUE(test::sameBits(run(method).fit.field, first));
+  EXPECT_TRUE(test::sameBits(run(method, {1 << 20, -(1 << 20), 1 << 20}).fit.field, first));
 }
 
 TEST_P(PaperRunOn, EndsWhenItsPsnrIsReachedOrItIsCancelled) {
-  FitOptions options;
+  PaperFitOptions options;
   options.psnr = 5.0;
-  EXPECT_EQ(run(shortMethod(), {}, options).end, FitEnd::kPsnrReached);
+  EXPECT_EQ(run(shortMethod(), {}, options).fit.end, FitEnd::kPsnrReached);
   CancelToken cancel;
   cancel.cancel();
   options.psnr = std::nullopt;
   options.cancel = &cancel;
-  EXPECT_EQ(run(shortMethod(), {}, options).end, FitEnd::kCancelled);
+  EXPECT_EQ(run(shortMethod(), {}, options).fit.end, FitEnd::kCancelled);
 }
 
 ESVR_ON_DEVICES(PaperRunOn);
 
-TEST(PaperOptionsOfAFit, AreRefusedWhereTheyMakeNoSense) {
-  const auto refused = [](const std::function<void(FitOptions&)>& change) {
-    FitOptions options;
-    options.paper = PaperMethod{};
+TEST(PaperFitOptionsOfAFit, AreRefusedWhereTheyMakeNoSense) {
+  const auto refused = [](const std::function<void(PaperFitOptions&)>& change) {
+    PaperFitOptions options;
     change(options);
-    EXPECT_THROW((void)fit(test::tubeVolume(), options), UsageError);
+    EXPECT_THROW((void)fitByPaper(test::tubeVolume(), options), UsageError);
   };
-  refused([](FitOptions& o) { o.kappa = 2.0f; });
-  refused([](FitOptions& o) { o.iterations = 10; });
-  refused([](FitOptions& o) { o.narrowBand = true; });
-  refused([](FitOptions& o) { o.paper->k = 0.0; });
-  refused([](FitOptions& o) { o.paper->points = 0; });
-  refused([](FitOptions& o) { o.paper->densifyEvery = 0; });
-  refused([](FitOptions& o) { o.paper->prunes = {{10, 1.0}}; });
-  refused([](FitOptions& o) { o.paper->prunes = {{10, 0.5}, {10, 0.5}}; });
+  refused([](PaperFitOptions& o) { o.count = 0; });
+  refused([](PaperFitOptions& o) { o.seconds = 0.0; });
+  refused([](PaperFitOptions& o) { o.method.beta = 2.0; });
+  refused([](PaperFitOptions& o) { o.method.k = 0.0; });
+  refused([](PaperFitOptions& o) { o.method.points = 0; });
+  refused([](PaperFitOptions& o) { o.method.densifyEvery = 0; });
+  refused([](PaperFitOptions& o) { o.method.prunes = {{10, 1.0}}; });
+  refused([](PaperFitOptions& o) { o.method.prunes = {{10, 0.5}, {10, 0.5}}; });
+}
+
+TEST(FitByPaper, OfAVolumeThatIsAllBackgroundIsEmpty) {
+  BrickInput brick;
+  brick.values.fill(0.5f);
+  brick.active.setAll();
+  const SparseVolume volume = makeVolume({brick}, 0.5f);
+  EXPECT_EQ(fitByPaper(volume, {}).fit.field.ellipsoidCount(), 0u);
 }
 
 }  // namespace
