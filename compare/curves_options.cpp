@@ -14,7 +14,7 @@ using cli::po::bool_switch;
 using cli::po::value;
 using Words = std::vector<std::string>;
 
-constexpr int kMostPixels = 4096;
+constexpr int kMaxPixels = 4096;
 
 cli::ProgramText programText() {
   return {
@@ -56,7 +56,7 @@ cli::CommandLine makeCommandLine() {
 void readImages(const Arguments& a, TableOptions& options) {
   const auto side = a.find<int>("fps");
   if (!side) return;
-  cli::requireRange("fps", *side, 1, kMostPixels);
+  cli::requireRange("fps", *side, 1, kMaxPixels);
   options.images.views = 3;  // of which the median counts
   options.images.resolution = {*side, *side};
   options.images.transfers = {

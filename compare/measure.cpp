@@ -15,7 +15,6 @@
 #include "esvr/fit.h"
 #include "esvr/grid_coding.h"
 #include "esvr/grid_names.h"
-#include "esvr/rate_control.h"
 
 namespace esvr::compare {
 namespace {
@@ -69,7 +68,7 @@ std::vector<SearchStep> searchOf(const Match& match) {
   return steps;
 }
 
-EncodedGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::string& name) {
+StoredGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::string& name) {
   std::vector<std::string> names;
   for (const auto& grid : file.grids) names.push_back(grid.descriptor.name);
   const std::size_t place = names.size() == 1 ? 0 : findGrid(names, name, path);
@@ -100,21 +99,6 @@ Timing once(double seconds) { return {seconds, seconds, seconds, 1}; }
 std::string wordOf(const FitWish& wish) {
   if (wish.paper) return "paper";
   return wish.bytes ? std::to_string(*wish.bytes) : "default";
-}
-
-EncodedGrid fitSized(const RateInput& input, std::uint64_t bytes, TableRow& row) {
-  RatedGrid rated = fitToSize(input, bytes);
-  row.curve = std::move(rated.fit.curve);
-  return std::move(rated.grid);
-}
-
-/// With the defaults, or as the paper does: in float32.
-EncodedGrid fitPlain(const RateInput& input, TableRow& row) {
-  FitResult fit = esvr::fit(input.source, input.options);
-  row.curve = std::move(fit.curve);
-  EncodedGrid grid = encodeGrid(input.descriptor, input.source, std::move(fit.field));
-  if (input.options.paper) return grid;
-  return compactGrid(grid, input.source, {.box = input.options.box}).grid;
 }
 
 std::uint64_t bytesOf(const GridFile& file, const std::filesystem::path& path, std::size_t grid) {
@@ -251,7 +235,7 @@ void RowMaker::measureEsvr(const std::filesystem::path& path, Drawing drawing, T
   if (scene_.gallery) drawEsvr(gridOf(readEsvr(path), path, scene_.gridName), volume, drawing, row);
 }
 
-void RowMaker::drawEsvr(const EncodedGrid& grid, const SparseVolume& voxels, Drawing drawing,
+void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Drawing drawing,
                         TableRow& row) const {
   const Device& device = scene_.gallery->device();
   if (drawing == Drawing::kBricks || !saysAll(grid))
@@ -274,31 +258,26 @@ TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing)
   const std::size_t place = placeOf(file, scene_.gridName);
   row.bytes = bytesOf(file, path, place);
   row.command = command(shellWord(path.string()) + " --rows none");
-  const auto& curve = file.esvr()->grids[place].curve;
-  row.curve = curve;
-  if (!curve.empty()) {
-    row.encode = once(curve.back().seconds);
-    row.note = "seconds to encode: the fit's, from the file";
-  }
   measureEsvr(path, drawing, row);
   return row;
 }
 
-RateInput RowMaker::rateInput(const FitWish& wish) const {
-  RateInput input{scene_.reference.descriptor, scene_.reference.volume, {}};
-  input.options.box = scene_.box;
-  input.options.cancel = &scene_.cancel;
-  input.options.device = selectDevice(scene_.options.device);
-  input.options.narrowBand = isNarrowBand(input.descriptor, input.source);
-  if (wish.paper) input.options.paper.emplace();
-  return input;
+Conversion RowMaker::convert(const FitWish& wish, std::uint64_t head) const {
+  ConvertOptions options;
+  options.fit.box = scene_.box;
+  options.fit.cancel = &scene_.cancel;
+  options.fit.device = selectDevice(scene_.options.device);
+  const ConvertInput input{scene_.reference.descriptor, scene_.reference.volume};
+  if (wish.paper)
+    return convertByPaper(input, {options.fit, {}}, {.form = Storage::kFloat32}).conversion;
+  if (wish.bytes) options.goal = SizeGoal{*wish.bytes - head};
+  return convertVolume(input, options);
 }
 
 TableRow RowMaker::fitted(const FitWish& wish) {
   const std::string word = wordOf(wish);
   TableRow row{.name = "ESVR fitted, " + word, .group = "ESVR", .fittedHere = true};
   row.command = command("--rows none --fit " + word);
-  const RateInput input = rateInput(wish);
   const auto path = scene_.folder / "fitted.esvr";
 
   const cli::MemoryMeter encoding;
@@ -308,14 +287,15 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   const std::uint64_t head = encodeEsvr(file).size();
   if (wish.bytes && *wish.bytes <= head)
     throw UsageError("--fit " + word + " has no room for a grid");
-  file.grids.push_back(wish.bytes ? fitSized(input, *wish.bytes - head, row)
-                                  : fitPlain(input, row));
+  Conversion conversion = convert(wish, head);
+  row.curve = std::move(conversion.fit.curve);
+  file.grids.push_back(std::move(conversion.grid));
   row.bytes = writeEsvr(path, file, {.overwrite = true});
   row.encode = once(watch.lap());
   if (scene_.cancel.cancelled()) throw Cancelled();
-  row.note = "one fit, on " + deviceName(input.options.device);
+  row.note = "one fit, on " + deviceName(selectDevice(scene_.options.device));
   const auto memory = encoding.peakRise();
-  measureEsvr(path, Drawing::kPrimitives, row);
+  measureEsvr(path, Drawing::kEllipsoids, row);
   row.memory = std::max(row.memory, memory);
   return row;
 }

@@ -8,8 +8,8 @@
 #include "compare/table_options.h"
 #include "compare/table_record.h"
 #include "esvr/baseline.h"
+#include "esvr/convert.h"
 #include "esvr/device.h"
-#include "esvr/rate_control.h"
 
 namespace esvr::compare {
 
@@ -28,7 +28,7 @@ struct TableScene {
 
 /// How an .esvr is drawn, in esvr-render's words.
 enum class Drawing {
-  kPrimitives,  ///< its ellipsoids, where they say all: not of a narrow band or a stored mask
+  kEllipsoids,  ///< its ellipsoids, where they say all: not of a narrow band or a stored mask
   kBricks       ///< the voxels that it decodes to
 };
 
@@ -49,7 +49,7 @@ class RowMaker {
   TableRow psnrMatched(const BaselineSetting& like, double psnr);
   TableRow external(const External& external);
   /// \throws BadInput  a candidate that cannot be compared: no such grid, nothing in common
-  TableRow candidate(const std::filesystem::path& path, Drawing drawing = Drawing::kPrimitives);
+  TableRow candidate(const std::filesystem::path& path, Drawing drawing = Drawing::kEllipsoids);
   /// Ellipsoids fitted here.
   TableRow fitted(const FitWish& wish);
 
@@ -57,13 +57,14 @@ class RowMaker {
   void measure(const BaselineSetting& setting, TableRow& row);
   TableRow matched(const BaselineSetting& like, const std::string& group,
                    const std::function<Match()>& search);
-  [[nodiscard]] RateInput rateInput(const FitWish& wish) const;
+  /// \param head  bytes of a file without grids
+  [[nodiscard]] Conversion convert(const FitWish& wish, std::uint64_t head) const;
   void measureEsvr(const std::filesystem::path& path, Drawing drawing, TableRow& row);
   [[nodiscard]] VolumeMetrics compare(const SparseVolume& volume) const;
   /// Figures of the voxels and, where pictures were asked for, of what they look like.
   void measureVoxels(const SparseVolume& volume, NanoValues values, TableRow& row) const;
   void measurePictures(Renderer& renderer, const OwnView& own, TableRow& row) const;
-  void drawEsvr(const EncodedGrid& grid, const SparseVolume& voxels, Drawing drawing,
+  void drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Drawing drawing,
                 TableRow& row) const;
   [[nodiscard]] std::string command(const std::string& arguments) const;
 

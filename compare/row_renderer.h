@@ -15,6 +15,6 @@ namespace esvr::compare {
 
 /// True where a grid's ellipsoids say all: not of a narrow band, of which they say nothing beyond
 /// it, nor where voxels, a residual or a mask are stored.
-[[nodiscard]] bool saysAll(const EncodedGrid& grid);
+[[nodiscard]] bool saysAll(const StoredGrid& grid);
 
 }  // namespace esvr::compare

@@ -15,7 +15,7 @@ using cli::po::bool_switch;
 using cli::po::value;
 using Words = std::vector<std::string>;
 
-constexpr int kMostRuns = 1000;
+constexpr int kMaxRuns = 1000;
 
 cli::ProgramText programText() {
   return {
@@ -125,8 +125,8 @@ NamedTransfer builtInTransfer(const std::string& text) {
 }
 
 void readImages(const Arguments& a, TableOptions& options) {
-  constexpr int kMostViews = 360, kMostPixels = 4096;
-  constexpr double kLeastStep = 1e-3, kMostStep = 1e3;
+  constexpr int kMaxViews = 360, kMaxPixels = 4096;
+  constexpr double kMinStep = 1e-3, kMaxStep = 1e3;
   GalleryOptions& images = options.images;
   for (const auto& text : a.find<Words>("colors").value_or(Words{}))
     images.transfers.push_back(builtInTransfer(text));
@@ -139,12 +139,12 @@ void readImages(const Arguments& a, TableOptions& options) {
     return;
   }
   images.views = a.get<int>("images");
-  cli::requireRange("images", images.views, 1, kMostViews);
+  cli::requireRange("images", images.views, 1, kMaxViews);
   const int side = a.get<int>("image-size");
-  cli::requireRange("image-size", side, 1, kMostPixels);
+  cli::requireRange("image-size", side, 1, kMaxPixels);
   images.resolution = {side, side};
   images.step = a.get<double>("image-step");
-  cli::requireRange("image-step", images.step, kLeastStep, kMostStep);
+  cli::requireRange("image-step", images.step, kMinStep, kMaxStep);
   if (images.transfers.empty()) images.transfers.push_back(builtInTransfer("viridis:linear"));
 }
 
@@ -161,7 +161,7 @@ std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv)
   for (const auto& text : a.find<Words>("external").value_or(Words{}))
     options.externals.push_back(parseExternal(text));
   options.runs = a.get<int>("runs");
-  cli::requireRange("runs", options.runs, 1, kMostRuns);
+  cli::requireRange("runs", options.runs, 1, kMaxRuns);
   readImages(a, options);
   options.files = reportFiles(a);
   options.commandLine = commandLine(argc, argv);

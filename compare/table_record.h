@@ -40,7 +40,7 @@ struct TableRow {
   std::optional<double> fps{};
   std::optional<ImageFigures> images{};
   Shown shown{};                    ///< of `images`
-  std::vector<CurvePoint> curve{};  ///< of a fit
+  std::vector<TimedCurvePoint> curve{};  ///< of a fit
   bool fittedHere = false;          ///< so that `encode` is from voxels to file
   std::string note{};               ///< why there are no figures, or what to know of them
   std::vector<SearchStep> search{};

@@ -31,11 +31,11 @@ EsvrFile read(const Options& options, const cli::Log& log) {
   return std::move(part.file);
 }
 
-VolumeGrid decoded(const EncodedGrid& grid, const Options& options) {
+VolumeGrid decoded(const StoredGrid& grid, const Options& options) {
   VolumeGrid result;
   result.descriptor = grid.descriptor;
-  result.volume = options.maxPrimitives
-                      ? decodeGrid(heaviest(grid, *options.maxPrimitives), options.decode)
+  result.volume = options.maxEllipsoids
+                      ? decodeGrid(heaviest(grid, *options.maxEllipsoids), options.decode)
                       : decodeGrid(grid, options.decode);
   return result;
 }

@@ -19,8 +19,8 @@ std::string textOf(const Box& box) {
   return box.empty() ? "empty" : toString(box.min) + " to " + toString(box.max);
 }
 
-std::string bytesAPrimitive(std::uint64_t bytes, std::size_t primitives) {
-  return primitives == 0 ? "-" : cli::shortNumber(double(bytes) / double(primitives));
+std::string bytesPerEllipsoid(std::uint64_t bytes, std::size_t ellipsoids) {
+  return ellipsoids == 0 ? "-" : cli::shortNumber(double(bytes) / double(ellipsoids));
 }
 
 struct Listing {
@@ -33,13 +33,13 @@ void printGrids(const Listing& listing) {
   cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "kernel, kappa",
                     "active by", "bytes", "bytes each"});
   for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
-    const EncodedGrid& grid = listing.file.grids[g];
+    const StoredGrid& grid = listing.file.grids[g];
     const std::uint64_t bytes = cli::storedBytes(listing.summary, g);
-    const std::size_t primitives = grid.field.primitiveCount();
+    const std::size_t ellipsoids = grid.field.ellipsoidCount();
     table.add({listing.names[g], cli::nameOf(grid.descriptor.gridClass),
                cli::nameOf(grid.descriptor.valueType), std::to_string(grid.activeVoxels),
-               std::to_string(primitives), textOf(grid.field.kernel), cli::nameOf(grid.topology),
-               std::to_string(bytes), bytesAPrimitive(bytes, primitives)});
+               std::to_string(ellipsoids), textOf(grid.field.kernel), cli::nameOf(grid.topology),
+               std::to_string(bytes), bytesPerEllipsoid(bytes, ellipsoids)});
   }
   table.print(std::cout);
 }
@@ -53,22 +53,22 @@ void printSections(const Listing& listing) {
 }
 
 void addStream(cli::Table& table, const std::string& grid, const char* stream, std::uint64_t bytes,
-               std::size_t primitives) {
-  table.add({grid, stream, std::to_string(bytes), bytesAPrimitive(bytes, primitives)});
+               std::size_t ellipsoids) {
+  table.add({grid, stream, std::to_string(bytes), bytesPerEllipsoid(bytes, ellipsoids)});
 }
 
 /// What the quantised ellipsoids are made of.
 void printStreams(const Listing& listing) {
   cli::Table table({"grid", "stream", "bytes", "bytes each"});
   for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
-    const EncodedGrid& grid = listing.file.grids[g];
+    const StoredGrid& grid = listing.file.grids[g];
     if (grid.quantised.empty()) continue;
     const StreamBytes bytes = streamBytes(grid);
-    const std::size_t primitives = grid.field.primitiveCount();
-    addStream(table, listing.names[g], "positions", bytes.positions, primitives);
-    addStream(table, listing.names[g], "scales", bytes.scales, primitives);
-    addStream(table, listing.names[g], "rotations", bytes.rotations, primitives);
-    addStream(table, listing.names[g], "intensities", bytes.intensities, primitives);
+    const std::size_t ellipsoids = grid.field.ellipsoidCount();
+    addStream(table, listing.names[g], "positions", bytes.positions, ellipsoids);
+    addStream(table, listing.names[g], "scales", bytes.scales, ellipsoids);
+    addStream(table, listing.names[g], "rotations", bytes.rotations, ellipsoids);
+    addStream(table, listing.names[g], "intensities", bytes.intensities, ellipsoids);
   }
   table.print(std::cout);
 }
@@ -100,7 +100,7 @@ void printMetadata(const std::string& title, const std::vector<MetaItem>& items)
 void printDetails(const Listing& listing) {
   printMetadata("file metadata", listing.file.metadata);
   for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
-    const EncodedGrid& grid = listing.file.grids[g];
+    const StoredGrid& grid = listing.file.grids[g];
     const std::string name = cli::printable(listing.names[g]);
     std::cout << name << ": " << cli::printable(grid.descriptor.transform.mapType)
               << ", background " << cli::shortNumber(grid.descriptor.background) << ", values "

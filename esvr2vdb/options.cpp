@@ -54,7 +54,7 @@ cli::CommandLine commandLine() {
      "active where the value differs from the background by more (default: as stored)")
     ("lod", value<std::int64_t>()->value_name("N"),
      "the N heaviest layers of ellipsoids only (--list -v tells how far off each is)")
-    ("max-primitives", value<std::int64_t>()->value_name("N"),
+    ("max-ellipsoids", value<std::int64_t>()->value_name("N"),
      "the N heaviest ellipsoids of each grid only")
     ("bbox", value<std::string>()->value_name("BOX"),
      "x0,y0,z0,x1,y1,z1: these voxels only; what cannot reach them is not read")
@@ -75,7 +75,7 @@ Job jobOf(const Arguments& a) {
   if (list && check) throw UsageError("--list and --check are two jobs; ask for one");
   if (!list && !check) return Job::kConvert;
   for (const char* option :
-       {"output", "grid", "threshold", "lod", "max-primitives", "bbox", "reference", "box"})
+       {"output", "grid", "threshold", "lod", "max-ellipsoids", "bbox", "reference", "box"})
     if (a.has(option))
       throw UsageError(std::string(list ? "--list" : "--check") + " takes IN.esvr only, no " +
                        option);
@@ -102,7 +102,7 @@ std::optional<std::size_t> countOf(const Arguments& a, const char* option) {
 
 void readPart(const Arguments& a, Options& options) {
   options.part.layers = countOf(a, "lod");
-  options.part.ellipsoids = options.maxPrimitives = countOf(a, "max-primitives");
+  options.part.ellipsoids = options.maxEllipsoids = countOf(a, "max-ellipsoids");
   if (const auto box = a.find<std::string>("bbox"))
     options.part.box = options.decode.box = cli::parseBox(*box, "bbox");
 }

@@ -24,7 +24,7 @@ struct Options {
   std::vector<std::string> grids;  ///< empty: all
   DecodeOptions decode;
   ReadPart part;                             ///< of the file
-  std::optional<std::size_t> maxPrimitives;  ///< of each grid
+  std::optional<std::size_t> maxEllipsoids;  ///< of each grid
   WriteOptions write;
   std::optional<std::filesystem::path> reference;
   std::optional<Box> box;  ///< of the reference's PSNR

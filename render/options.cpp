@@ -17,8 +17,8 @@ using cli::po::value;
 constexpr int kMaxSide = 16384;    // pixels
 constexpr int kMaxFrames = 9999;   // four digits in a frame's name
 constexpr double kMinStep = 1e-3;  // voxels
-constexpr int kMostBins = 16;
-constexpr double kLeastVram = 0.001, kMostVram = 1e4;  // GB
+constexpr int kMaxBins = 16;
+constexpr double kMinVram = 0.001, kMaxVram = 1e4;  // GB
 
 cli::ProgramText programText() {
   return {.name = kProgram,
@@ -119,11 +119,11 @@ cli::CommandLine commandLine() {
      "GPU memory to use: less draws large pictures in bands (default: what is free)")
     ("bins", value<int>()->value_name("N"),
      "parts of the depth, 1 to 16, that a GPU draws at once (default: by the first picture's lists)")
-    ("method", value<std::string>()->value_name("M")->default_value("primitives"),
-     "of an .esvr: primitives; bricks, which draws its voxels, decoded once; or auto, whichever is "
+    ("method", value<std::string>()->value_name("M")->default_value("ellipsoids"),
+     "of an .esvr: ellipsoids; bricks, which draws its voxels, decoded once; or auto, whichever is "
      "faster for the first picture and fits")
     ("between", value<std::string>()->value_name("B")->default_value("voxels"),
-     "what primitives show between voxels: voxels, their trilinear interpolation; or sum, the sum "
+     "what ellipsoids show between voxels: voxels, their trilinear interpolation; or sum, the sum "
      "of ellipsoids itself, faster where a pixel holds many voxels")
     ("values", value<std::string>()->value_name("T"),
      "march voxels in a NanoVDB grid of float, fp4, fp8, fp16 or fpn")
@@ -296,11 +296,11 @@ std::optional<NanoValues> valuesOf(const Arguments& a) {
 RendererLimits limitsOf(const Arguments& a) {
   RendererLimits limits;
   if (const auto bins = a.find<int>("bins")) {
-    cli::requireRange("bins", *bins, 1, kMostBins);
+    cli::requireRange("bins", *bins, 1, kMaxBins);
     limits.depthParts = *bins;
   }
   if (const auto gigabytes = a.find<double>("max-vram")) {
-    cli::requireRange("max-vram", *gigabytes, kLeastVram, kMostVram);
+    cli::requireRange("max-vram", *gigabytes, kMinVram, kMaxVram);
     limits.maxBytes = std::uint64_t(*gigabytes * 1e9);
   }
   return limits;
@@ -360,7 +360,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.values = valuesOf(a);
   options.method = cli::choose<Method>(
       "method", a.get<std::string>("method"),
-      {{"primitives", Method::kPrimitives}, {"bricks", Method::kBricks}, {"auto", Method::kAuto}});
+      {{"ellipsoids", Method::kEllipsoids}, {"bricks", Method::kBricks}, {"auto", Method::kAuto}});
   options.between = cli::choose<Between>("between", a.get<std::string>("between"),
                                          {{"voxels", Between::kVoxels}, {"sum", Between::kSum}});
   readMeasuring(a, options);

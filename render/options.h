@@ -44,7 +44,7 @@ struct Options {
   std::filesystem::path saveTransfer;
   std::string device = "auto";
   RendererLimits limits;
-  Method method = Method::kPrimitives;
+  Method method = Method::kEllipsoids;
   std::optional<NanoValues> values;  ///< of the NanoVDB grid that voxels are marched in
   std::filesystem::path reference;   ///< empty: none
   std::filesystem::path sheet;       ///< empty: none

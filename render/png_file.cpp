@@ -16,8 +16,8 @@ using Bytes = std::vector<std::byte>;
 
 /// Most significant byte first, as PNG has it.
 void append(double v, int bits, std::vector<png_byte>& to) {
-  const double most = double((1 << bits) - 1);
-  const auto level = unsigned(std::lround(std::clamp(v, 0.0, 1.0) * most));
+  const double maxLevel = double((1 << bits) - 1);
+  const auto level = unsigned(std::lround(std::clamp(v, 0.0, 1.0) * maxLevel));
   if (bits > 8) to.push_back(png_byte(level >> 8));
   to.push_back(png_byte(level & 0xffu));
 }

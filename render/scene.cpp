@@ -22,7 +22,7 @@ std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
 /// A grid that holds its voxels is drawn from them: they are what it stands for.
 Scene encoded(const std::filesystem::path& path, const std::optional<std::string>& wanted) {
   EsvrFile file = readEsvr(path);
-  EncodedGrid& grid = file.grids[placeOf(file, path, wanted)];
+  StoredGrid& grid = file.grids[placeOf(file, path, wanted)];
   Scene scene;
   scene.grid = grid.descriptor.name;
   scene.box = grid.activeBox;
@@ -89,14 +89,14 @@ SceneRenderer::SceneRenderer(const Scene& scene, const DrawSettings& s,
   if (const auto* field = std::get_if<Field>(&scene.content))
     drawField(*field, scene, s, sample);
   else
-    drawVoxels(std::get<VolumeGrid>(scene.content), s);
+    sampleVoxels(std::get<VolumeGrid>(scene.content), s);
 }
 
 void SceneRenderer::drawField(const Field& field, const Scene& scene, const DrawSettings& s,
                               const RenderOptions& sample) {
   if (s.method != Method::kBricks)
     renderer_ = makeFieldRenderer(field, s.device, s.limits, voxelRule(*scene.encoded));
-  if (s.method == Method::kPrimitives) return;
+  if (s.method == Method::kEllipsoids) return;
   decoded_ = decodeGrid(*scene.encoded);
   if (s.method == Method::kBricks) {
     renderer_ = makeVolumeRenderer(decoded_, s.device, s.limits);
@@ -106,7 +106,7 @@ void SceneRenderer::drawField(const Field& field, const Scene& scene, const Draw
   if (bricks && timeOf(*bricks, sample) < timeOf(*renderer_, sample)) renderer_ = std::move(bricks);
 }
 
-void SceneRenderer::drawVoxels(const VolumeGrid& grid, const DrawSettings& s) {
+void SceneRenderer::sampleVoxels(const VolumeGrid& grid, const DrawSettings& s) {
   if (s.device.kind == DeviceKind::kCpu && !s.values) {
     renderer_ = makeVolumeRenderer(grid.volume, s.device, s.limits);
     return;

@@ -17,7 +17,7 @@ struct Scene {
   Box box;           ///< of the active voxels
   ValueRange data;   ///< over the active voxels
   float background = 0.0f;
-  std::optional<EncodedGrid> encoded{};  ///< what a field was read from
+  std::optional<StoredGrid> encoded{};  ///< what a field was read from
 };
 
 /// \param grid  nothing: the first that can be drawn
@@ -26,11 +26,11 @@ struct Scene {
                               const std::optional<std::string>& grid);
 
 /// Where and how to draw.
-enum class Method { kPrimitives, kBricks, kAuto };
+enum class Method { kEllipsoids, kBricks, kAuto };
 
 struct DrawSettings {
   Device device;
-  Method method = Method::kPrimitives;  ///< of a field
+  Method method = Method::kEllipsoids;  ///< of a field
   RendererLimits limits;
   std::optional<NanoValues> values;  ///< march voxels as a NanoVDB grid of these
 };
@@ -49,7 +49,7 @@ class SceneRenderer {
  private:
   void drawField(const Field& field, const Scene& scene, const DrawSettings& settings,
                  const RenderOptions& sample);
-  void drawVoxels(const VolumeGrid& grid, const DrawSettings& settings);
+  void sampleVoxels(const VolumeGrid& grid, const DrawSettings& settings);
 
   SparseVolume decoded_;
   NanoVolume nano_;

@@ -37,11 +37,10 @@ std::optional<std::uint64_t> ByteShares::of(const GridSummary& grid) const {
   return std::uint64_t(double(*left_) * weightOf(grid) / voxelsLeft_);
 }
 
-void ByteShares::take(const GridSummary& grid, const EncodedGrid& stored) {
+void ByteShares::take(const GridSummary& grid, const StoredGrid& stored) {
   voxelsLeft_ -= weightOf(grid);
   if (!left_) return;
-  const std::uint64_t taken = encodeEsvr({{}, {stored}}).size() - encodeEsvr({}).size();
-  *left_ -= std::min(*left_, taken);
+  *left_ -= std::min(*left_, bytesAdded(stored));
 }
 
 }  // namespace esvr::vdb2esvr

@@ -21,7 +21,7 @@ class ByteShares {
   [[nodiscard]] std::optional<std::uint64_t> of(const GridSummary& grid) const;
 
   /// A grid has been encoded.
-  void take(const GridSummary& grid, const EncodedGrid& stored);
+  void take(const GridSummary& grid, const StoredGrid& stored);
 
  private:
   std::optional<std::uint64_t> left_;

@@ -1,15 +1,12 @@
 #pragma once
-/// One grid's way from voxels to what the file holds.
+/// One grid on its way from the input to what the file holds, with all that is told of it.
 
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "esvr/container.h"
-#include "esvr/fit.h"
+#include "esvr/convert.h"
 #include "esvr/metrics.h"
-#include "esvr/quantised.h"
 #include "vdb2esvr/options.h"
 
 namespace esvr::vdb2esvr {
@@ -20,42 +17,23 @@ struct PhaseSeconds {
   [[nodiscard]] double total() const { return read + seed + optimise + encode + measure; }
 };
 
-/// What quantising the ellipsoids did.
-struct CompactRecord {
-  double loss = 0.0;  ///< dB over the box, against float32
-  QuantiserSteps steps;
-  StreamBytes bytes;
-};
-
-/// What a bound on the error took.
-struct BoundRecord {
-  std::uint64_t voxelBytes = 0;      ///< of the grid with its voxels alone
-  std::uint64_t ellipsoidBytes = 0;  ///< of the smallest with ellipsoids that was tried; 0: none
-};
-
 struct ConvertedGrid {
   std::string uniqueName;  ///< in the input
-  EncodedGrid stored;      ///< as a reader of the file will get it
-  VolumeMetrics metrics;   ///< of the voxels that it gives back
+  Conversion conversion;
+  VolumeMetrics metrics;   ///< of the voxels that the stored grid gives back
   std::size_t bricks = 0;  ///< of the source
   std::uint64_t nonFiniteReplaced = 0;
-  FitEnd end = FitEnd::kScheduleDone;
-  bool kappaLearned = false;
-  std::string device;           ///< that fitted it
-  std::size_t deviceBytes = 0;  ///< FitResult::deviceBytes
-  std::uint64_t pairs = 0;
-  bool signedIntensities = false;
+  std::string device;                       ///< that fitted it
   std::optional<double> hits;               ///< averageHits, where it was asked for
   std::optional<std::uint64_t> voxelPairs;  ///< countHits in the source's bricks, likewise
-  std::optional<PaperRecord> paper;         ///< FitResult::paper
-  std::vector<CurvePoint> curve;            ///< of the fit, whether the file has it or not
-  std::optional<BoundRecord> bound;
-  std::optional<CompactRecord> compact;  ///< nothing where float32 is stored
+  std::optional<PaperRecord> paper;         ///< where the paper's method was asked for
   PhaseSeconds seconds;
+
+  [[nodiscard]] const StoredGrid& stored() const { return conversion.grid; }
 };
 
-/// Reads, fits, encodes and measures a grid. The fit's progress and cancellation are those of
-/// `options.fit`.
+/// Reads, converts and measures a grid. The fit's progress and cancellation are those of
+/// `options.convert.fit`.
 /// \param bytes  that the grid may add to the file, where a size was asked for
 [[nodiscard]] ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
                                         std::optional<std::uint64_t> bytes);

@@ -18,14 +18,14 @@ using cli::requireRange;
 using cli::po::bool_switch;
 using cli::po::value;
 
-constexpr std::int64_t kMostPrimitives = std::numeric_limits<std::uint32_t>::max();
-constexpr std::int64_t kMostIterations = 10'000'000;
+constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max();
+constexpr std::int64_t kMaxIterations = 10'000'000;
 constexpr double kHighestPsnr = 300.0;  // dB; float32 ends at about 150
 constexpr double kLongestRun = 1e9;     // seconds
 constexpr double kLargestRatio = 1e9;
-constexpr double kMostLoss = 20.0;                    // dB
-constexpr double kLeastVram = 1e-3, kMostVram = 1e6;  // GB
-constexpr float kLargestKappa = 1e4f;                 // kernel.h
+constexpr double kMaxLoss = 20.0;                  // dB
+constexpr double kMinVram = 1e-3, kMaxVram = 1e6;  // GB
+constexpr float kLargestKappa = 1e4f;              // kernel.h
 
 cli::ProgramText programText() {
   return {
@@ -37,17 +37,16 @@ cli::ProgramText programText() {
       .usage = "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]",
       .notes =
           "Without -g all float and double grids are fitted, the others are listed and skipped.\n"
-          "--size and --ratio choose the number of ellipsoids and of bits, for the best file that\n"
-          "is not larger (at most 2 % smaller); --psnr alone looks for the smallest that reaches "
-          "it.\n"
-          "Several grids share the bytes by their active voxels.\n"
-          "--count, --psnr and --seconds combine: the run ends at the first that is met.\n"
-          "An ordinary run prints a table on stdout: PSNR and the largest error are those of\n"
-          "the voxels that the written file gives back.\n"
+          "--size and --ratio choose the number of ellipsoids and of bits, for the best file\n"
+          "that is not larger (and at most 2 % smaller). Several grids share the bytes by their\n"
+          "active voxels. --psnr looks for the smallest file that reaches it; --count bounds the\n"
+          "number of ellipsoids then, and with --seconds there is one fit, which ends as soon as\n"
+          "it reaches the PSNR.\n"
+          "The program prints a table on stdout. PSNR and the largest error are those of the\n"
+          "voxels that the written file gives back.\n"
           "\n"
-          "Ctrl-C ends the fit; what was reached is written or not, as --on-cancel says, and the\n"
-          "exit code is 1. A second Ctrl-C ends the program at once. OUT.esvr is never half a "
-          "file.\n"
+          "Ctrl-C ends the fit. --on-cancel says whether the best so far is written; the exit\n"
+          "code is 1. A second Ctrl-C ends the program at once. OUT.esvr is never half a file.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted, 2 wrong options, 3 input that cannot be\n"
           "used, 4 --psnr not reached (the file is written), 5 device or memory.",
@@ -61,40 +60,42 @@ cli::ProgramText programText() {
 }
 
 void addFitOptions(cli::po::options_description& options) {
-  const double beta = FitOptions{}.beta;
+  const double defaultLoss = CompactOptions::kDefaultLoss;
   // clang-format off
   options.add_options()
-    ("count", value<std::int64_t>()->value_name("N"), "ellipsoids; with --psnr: at most so many")
+    ("count", value<std::int64_t>()->value_name("N"),
+     "number of ellipsoids; with --psnr, at most so many")
     ("size", value<std::string>()->value_name("BYTES"),
-     "the best file of at most so many bytes: 50000, 50KB, 2.6MB")
-    ("ratio", value<double>()->value_name("R"), "the same, IN's size over R")
-    ("psnr", value<double>()->value_name("DB"), "reach this PSNR over the box, in few bytes")
-    ("lossless", bool_switch(), "voxels and active mask bit for bit, no ellipsoids")
+     "write the best file of at most so many bytes: 50000, 50KB, 2.6MB")
+    ("ratio", value<double>()->value_name("R"),
+     "write the best file of at most the size of IN.vdb over R")
+    ("psnr", value<double>()->value_name("DB"),
+     "write the smallest file that reaches this PSNR over the box")
+    ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
     ("max-error", value<std::string>()->value_name("E"),
-     "every voxel within E of the source, or E% of its range: voxels alone or ellipsoids with a "
-     "residual, whichever is smaller")
-    ("voxels-only", bool_switch(), "with --max-error: voxels alone, without trying ellipsoids")
+     "keep every voxel within E of the source, or within E% of its range: as voxels, or as "
+     "ellipsoids with a residual where these are smaller")
+    ("voxels-only", bool_switch(), "with --max-error, do not try ellipsoids")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
-     "threshold (voxels are active by their values) or exact (the source's mask is stored)")
-    ("seconds", value<double>()->value_name("S"), "the best within this time, each grid")
-    ("iterations", value<std::int64_t>()->value_name("N"), "length of the fit's schedule")
+     "threshold: voxels are active by their values; exact: store the source's active mask")
+    ("seconds", value<double>()->value_name("S"), "end the fit of each grid after this time")
+    ("iterations", value<std::int64_t>()->value_name("N"), "number of iterations of a fit")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
-     "draft, standard or high: what is not given otherwise; paper: the paper's method")
+     "draft, standard or high: sets the count and the iterations that are not given")
     ("kappa", value<float>()->value_name("K"),
-     "edge of the ellipsoids (default: fitted with the rest, for squared errors)")
-    ("loss", value<std::string>()->value_name("L")->default_value("squared"),
-     "squared (what PSNR asks for) or paper (L1 + D-SSIM)")
-    ("beta", value<double>()->value_name("B")->default_value(beta, cli::shortNumber(beta)),
-     "share of L1 in the paper's loss, 0 to 1")
+     "edge of the kernel (default: it is fitted with the ellipsoids)")
     ("box", value<std::string>()->value_name("BOX"),
-     "x0,y0,z0,x1,y1,z1 of the PSNR (default: the active voxels' bounding box)")
+     "box of voxels x0,y0,z0,x1,y1,z1 over which PSNR is taken (default: the bounding box of the "
+     "active voxels)")
     ("seed", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(FitOptions{}.seed)),
-     "of the random choices; the same seed gives the same ellipsoids")
+     "seed of the random choices; the same seed gives the same file")
     ("storage", value<std::string>()->value_name("S")->default_value("compact"),
      "compact (quantised, about 9 bytes an ellipsoid) or float32 (about 34)")
     ("storage-loss",
-     value<double>()->value_name("DB")->default_value(CompactOptions::kDefaultLoss),
-     "PSNR that --storage compact may cost; with --psnr: whatever that leaves")
+     value<double>()->value_name("DB")->default_value(defaultLoss, cli::shortNumber(defaultLoss)),
+     "PSNR that --storage compact may cost; --size and --psnr choose it themselves")
+    ("paper", value<std::vector<std::string>>()->value_name("KEY=VALUE,...")->composing(),
+     "fit by the paper's method, for comparison; --help paper lists the keys")
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
      "auto (a GPU where there is one), cpu, cuda or cuda:N")
     ("max-vram", value<double>()->value_name("GB"), "GPU memory to use (default: what is free)");
@@ -107,11 +108,11 @@ void addFileOptions(cli::po::options_description& options) {
     ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
      "fit this grid only; may be repeated; 'density[1]' is the second of that name")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
-     "refuse grids with NaN or infinite voxels, or take them as zero")
+     "refuse grids with NaN or infinite voxels, or read these as zero")
     ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
      "keep or discard the best so far when interrupted")
     ("report", value<std::string>()->value_name("FILE"),
-     "write a JSON report to FILE.json, '-' for stdout")
+     "write a JSON report to FILE.json; '-' is stdout")
     ("hits", bool_switch(), "report how many ellipsoids a voxel meets on average")
     ("force,f", bool_switch(), "replace OUT.esvr and the report if they exist");
   // clang-format on
@@ -123,7 +124,7 @@ cli::CommandLine commandLine() {
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
   addFitOptions(line.options());
-  line.options().add(paperOptions());
+  line.helpTopic("paper", paperHelp());
   return line;
 }
 
@@ -139,20 +140,13 @@ std::optional<To> bounded(const Arguments& arguments, const std::string& option,
 
 FitOptions fitOptions(const Arguments& a) {
   FitOptions fit;
-  fit.count = bounded<std::size_t>(a, "count", std::int64_t{1}, kMostPrimitives);
-  fit.psnr = bounded<double>(a, "psnr", 0.0, kHighestPsnr);
+  fit.count = bounded<std::size_t>(a, "count", std::int64_t{1}, kMaxEllipsoids);
   fit.seconds = bounded<double>(a, "seconds", 1e-3, kLongestRun);
-  fit.iterations = bounded<std::uint32_t>(a, "iterations", std::int64_t{1}, kMostIterations);
-  fit.paper = paperMethod(a);
-  fit.preset = cli::choose<Preset>("preset", a.get<std::string>("preset"),
-                                   {{"draft", Preset::kDraft},
-                                    {"standard", Preset::kStandard},
-                                    {"high", Preset::kHigh},
-                                    {"paper", Preset::kStandard}});
-  fit.loss = cli::choose<Loss>("loss", a.get<std::string>("loss"),
-                               {{"squared", Loss::kSquared}, {"paper", Loss::kPaper}});
-  fit.beta = *bounded<double>(a, "beta", 0.0, 1.0);
-  if (const auto gigabytes = bounded<double>(a, "max-vram", kLeastVram, kMostVram))
+  fit.iterations = bounded<std::uint32_t>(a, "iterations", std::int64_t{1}, kMaxIterations);
+  fit.preset = cli::choose<Preset>(
+      "preset", a.get<std::string>("preset"),
+      {{"draft", Preset::kDraft}, {"standard", Preset::kStandard}, {"high", Preset::kHigh}});
+  if (const auto gigabytes = bounded<double>(a, "max-vram", kMinVram, kMaxVram))
     fit.maxDeviceBytes = std::size_t(*gigabytes * 1e9);
   fit.kappa = bounded<float>(a, "kappa", -kLargestKappa, kLargestKappa);
   if (const auto box = a.find<std::string>("box")) fit.box = cli::parseBox(*box);
@@ -166,43 +160,45 @@ Storage storage(const Arguments& a) {
                               {{"compact", Storage::kCompact}, {"float32", Storage::kFloat32}});
 }
 
-/// As the paper stores them, unless asked otherwise. \throws UsageError  k of each and compact
-Storage storageOfPaper(const Arguments& a, const PaperMethod& method) {
-  if (a.values["storage"].defaulted()) return Storage::kFloat32;
-  const Storage asked = storage(a);
-  if (method.learnK && asked == Storage::kCompact)
-    throw UsageError("--sharpness learned needs --storage float32: the compact form has one edge");
-  return asked;
-}
-
-/// "0.01", or "1%" of the range of values.
-void readBound(const std::string& text, VoxelDemand& demand) {
-  const cli::ErrorBound bound = cli::parseErrorBound("max-error", text);
-  demand.bound = bound.amount;
-  demand.relative = bound.relative;
-}
-
-void readVoxels(const Arguments& a, Options& options) {
-  const bool exact = a.get<bool>("lossless");
-  const auto bound = a.find<std::string>("max-error");
-  const bool alone = a.get<bool>("voxels-only");
-  if (alone && !bound) throw UsageError("--voxels-only says how --max-error is met; give that too");
-  if (!exact && !bound) return;
-  if (exact && bound) throw UsageError("--lossless leaves no error: it takes no --max-error");
-  const std::string given = exact ? "--lossless" : "--max-error";
-  for (const char* option : {"count", "psnr", "seconds", "size", "ratio"})
-    if (a.has(option))
-      throw UsageError(given + " chooses itself what to store; it takes no --" + option);
-  VoxelDemand demand;
-  demand.exact = exact;
-  demand.alone = alone;
-  if (bound) readBound(*bound, demand);
-  options.voxels = demand;
-}
-
 Activity activity(const Arguments& a) {
   return cli::choose<Activity>("topology", a.get<std::string>("topology"),
                                {{"threshold", Activity::kByValue}, {"exact", Activity::kExact}});
+}
+
+StorageOptions storageOptions(const Arguments& a) {
+  return {.form = storage(a),
+          .loss = *bounded<double>(a, "storage-loss", 0.0, kMaxLoss),
+          .activity = activity(a)};
+}
+
+/// \throws UsageError  one of the options was given although `given` leaves it no meaning
+void refuseWith(const Arguments& a, const std::string& given,
+                std::initializer_list<const char*> options) {
+  for (const char* option : options)
+    if (a.has(option) && !a.values[option].defaulted())
+      throw UsageError("--" + given + " does not go together with --" + option);
+}
+
+Goal losslessGoal(const Arguments& a) {
+  refuseWith(a, "lossless", {"max-error", "count", "psnr", "seconds", "size", "ratio", "paper"});
+  return LosslessGoal{};
+}
+
+Goal boundGoal(const Arguments& a) {
+  refuseWith(a, "max-error", {"count", "psnr", "seconds", "size", "ratio", "paper"});
+  const cli::ErrorBound bound = cli::parseErrorBound("max-error", a.get<std::string>("max-error"));
+  return BoundGoal{bound.amount, bound.relative, a.get<bool>("voxels-only")};
+}
+
+/// The goal of each grid, where no size was asked for.
+Goal goalOf(const Arguments& a, const Options& options) {
+  if (a.get<bool>("voxels-only") && !a.has("max-error"))
+    throw UsageError("--voxels-only says how --max-error is met; give that too");
+  if (a.get<bool>("lossless")) return losslessGoal(a);
+  if (a.has("max-error")) return boundGoal(a);
+  if (options.psnr && !options.convert.fit.seconds && !options.paper)
+    return PsnrGoal{*options.psnr};
+  return FitGoal{};
 }
 
 void readSize(const Arguments& a, Options& options) {
@@ -210,14 +206,24 @@ void readSize(const Arguments& a, Options& options) {
     options.size = cli::parseByteSize("size", *size);
   options.ratio = bounded<double>(a, "ratio", 1.0, kLargestRatio);
   if (!options.size && !options.ratio) return;
-  const std::string given = options.size ? "--size" : "--ratio";
-  if (options.fit.paper) throw UsageError("--preset paper has no " + given + ": use --count");
+  const std::string given = options.size ? "size" : "ratio";
   if (options.size && options.ratio) throw UsageError("--size and --ratio are two sizes; give one");
-  for (const char* option : {"count", "psnr", "seconds"})
-    if (a.has(option))
-      throw UsageError(given + " chooses the number of ellipsoids itself; it takes no --" + option);
-  if (options.storage != Storage::kCompact)
-    throw UsageError(given + " needs --storage compact, where bits can be chosen");
+  refuseWith(a, given, {"count", "psnr", "seconds", "paper"});
+  if (options.convert.storage.form != Storage::kCompact)
+    throw UsageError("--" + given + " needs --storage compact, where bits can be chosen");
+}
+
+/// The paper stores float32; --storage says otherwise.
+void readPaper(const Arguments& a, Options& options) {
+  const auto given = a.find<std::vector<std::string>>("paper");
+  if (!given) return;
+  refuseWith(a, "paper", {"kappa", "iterations", "preset"});
+  options.paper = readPaperMethod(*given);
+  options.paper->countHits = a.get<bool>("hits");
+  StorageOptions& storage = options.convert.storage;
+  if (a.values["storage"].defaulted()) storage.form = Storage::kFloat32;
+  if (options.paper->learnK && storage.form == Storage::kCompact)
+    throw UsageError("--paper k=learned needs --storage float32: the compact form has one edge");
 }
 
 NonFinite nonFinite(const Arguments& a) {
@@ -232,11 +238,6 @@ OnCancel onCancel(const Arguments& a) {
 
 }  // namespace
 
-bool searchesForPsnr(const Options& options) {
-  return options.fit.psnr && !options.fit.count && !options.fit.seconds && !options.fit.paper &&
-         options.storage == Storage::kCompact;
-}
-
 std::optional<Options> parseOptions(int argc, const char* const* argv) {
   const auto arguments = commandLine().parse(argc, argv);
   if (!arguments) return std::nullopt;
@@ -245,12 +246,13 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.input = a.get<std::string>("input");
   options.output = a.get<std::string>("output");
   options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
-  options.fit = fitOptions(a);
-  options.storage = options.fit.paper ? storageOfPaper(a, *options.fit.paper) : storage(a);
-  options.storageLoss = *bounded<double>(a, "storage-loss", 0.0, kMostLoss);
-  options.activity = activity(a);
-  readVoxels(a, options);
+  options.psnr = bounded<double>(a, "psnr", 0.0, kHighestPsnr);
+  options.convert.fit = fitOptions(a);
+  options.convert.fit.psnr = options.psnr;
+  options.convert.storage = storageOptions(a);
+  readPaper(a, options);
   readSize(a, options);
+  options.convert.goal = goalOf(a, options);
   options.read.nonFinite = nonFinite(a);
   options.device = a.get<std::string>("device");
   options.onCancel = onCancel(a);

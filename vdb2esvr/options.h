@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "cli/log.h"
-#include "esvr/compact.h"
-#include "esvr/fit.h"
+#include "esvr/convert.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::vdb2esvr {
@@ -18,27 +17,14 @@ inline constexpr const char* kProgram = "vdb2esvr";
 /// What becomes of an interrupted run's best so far.
 enum class OnCancel { kKeep, kDiscard };
 
-/// How the file holds the ellipsoids' attributes.
-enum class Storage { kCompact, kFloat32 };
-
-/// Voxels that must come back exactly or within a bound.
-struct VoxelDemand {
-  bool exact = false;
-  double bound = 0.0;     ///< in the grid's values, or a share of their range
-  bool relative = false;  ///< `bound` is a share
-  bool alone = false;     ///< without trying ellipsoids and a residual
-};
-
 struct Options {
   std::filesystem::path input, output;
-  std::vector<std::string> grids;  ///< empty: all that can be fitted
-  FitOptions fit;
+  std::vector<std::string> grids;     ///< empty: all that can be fitted
+  ConvertOptions convert;             ///< the goal of every grid, where no size was asked for
+  std::optional<double> psnr;         ///< dB over the box that every grid was asked to reach
   std::optional<std::uint64_t> size;  ///< bytes of the file
-  std::optional<double> ratio;        ///< bytes of the input for each of the file
-  std::optional<VoxelDemand> voxels;  ///< instead of ellipsoids
-  Activity activity = Activity::kByValue;
-  Storage storage = Storage::kCompact;
-  double storageLoss = CompactOptions::kDefaultLoss;  ///< dB that kCompact may cost
+  std::optional<double> ratio;        ///< bytes of the input for each byte of the file
+  std::optional<PaperMethod> paper;   ///< in the place of our method
   ReadOptions read;
   std::string device = "auto";
   OnCancel onCancel = OnCancel::kKeep;
@@ -49,9 +35,6 @@ struct Options {
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;
 };
-
-/// Whether --psnr looks for the smallest file: not where a number or a time bounds it.
-[[nodiscard]] bool searchesForPsnr(const Options& options);
 
 /// \return nothing where --help or --version was printed
 /// \throws UsageError

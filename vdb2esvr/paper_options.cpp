@@ -1,180 +1,220 @@
 #include "vdb2esvr/paper_options.h"
 
-#include <cstdlib>
+#include <functional>
 #include <limits>
+#include <map>
+#include <sstream>
+#include <string_view>
 
 #include "cli/choice.h"
-#include "cli/number_list.h"
+#include "cli/number.h"
 #include "cli/table.h"
+#include "esvr/error.h"
 
 namespace esvr::vdb2esvr {
 namespace {
 
-using cli::Arguments;
-using cli::po::bool_switch;
-using cli::po::value;
+constexpr std::int64_t kMaxEpochs = 10'000'000, kMaxSide = 1 << 20;
+constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max();
+constexpr double kMinK = 0.5, kMaxK = 1e4, kMaxNumber = 1e30;
+constexpr const char* kDefault = "default";
 
-constexpr const char* kGroup = "With --preset paper (the paper's method, for comparison with it)";
-constexpr std::int64_t kMostEpochs = 10'000'000, kMostSide = 1 << 20;
-constexpr std::int64_t kMostPrimitives = std::numeric_limits<std::uint32_t>::max();
-constexpr double kSmallestK = 0.5, kLargestK = 1e4;
+/// One setting as it was given.
+struct Setting {
+  std::string key, value;
 
-/// A whole number within [low, high], or nothing.
-std::optional<std::int64_t> whole(const Arguments& a, const std::string& option, std::int64_t low,
-                                  std::int64_t high) {
-  const auto given = a.find<std::int64_t>(option);
-  if (given) cli::requireRange(option, *given, low, high);
-  return given;
-}
-
-void readPrimitive(const Arguments& a, PaperMethod& method) {
-  method.gaussian = cli::choose<bool>("primitive", a.get<std::string>("primitive"),
-                                      {{"ellipsoid", false}, {"gaussian", true}});
-  const auto k = a.find<std::string>("sharpness");
-  if (!k) return;
-  if (method.gaussian) throw UsageError("Gaussians have no --sharpness");
-  method.learnK = *k == "learned";
-  if (method.learnK) return;
-  char* end = nullptr;
-  method.k = std::strtod(k->c_str(), &end);
-  if (end == k->c_str() || *end != '\0')
-    throw UsageError("--sharpness must be a number or 'learned', not '" + *k + "'");
-  cli::requireRange("sharpness", method.k, kSmallestK, kLargestK);
-}
-
-void readDensify(const Arguments& a, PaperMethod& method) {
-  method.densify = !a.get<bool>("no-densify");
-  if (const auto threshold = a.find<double>("densify-threshold")) {
-    cli::requireRange("densify-threshold", *threshold, 0.0, std::numeric_limits<double>::max());
-    method.gradientThreshold = *threshold;
+  [[noreturn]] void refuse(const std::string& wanted) const {
+    throw UsageError("--paper: " + key + " must be " + wanted + ", not '" + value + "'");
   }
-  if (const auto percent = a.find<double>("percent-dense")) {
-    cli::requireRange("percent-dense", *percent, 1e-9, 1.0);
-    method.percentDense = *percent;
+  [[nodiscard]] double number(double low, double high) const {
+    const auto given = cli::parseNumber(value);
+    if (!given || *given < low || *given > high)
+      refuse("a number from " + cli::shortNumber(low) + " to " + cli::shortNumber(high));
+    return *given;
   }
-  if (const auto n = whole(a, "densify-from", 1, kMostEpochs))
-    method.densifyFrom = std::uint32_t(*n);
-  if (const auto n = whole(a, "densify-until", 1, kMostEpochs))
-    method.densifyUntil = std::uint32_t(*n);
-  if (const auto n = whole(a, "densify-every", 1, kMostEpochs))
-    method.densifyEvery = std::uint32_t(*n);
+  [[nodiscard]] std::int64_t whole(std::int64_t high) const {
+    const auto given = cli::parseWhole(value);
+    if (!given || *given < 1 || *given > high)
+      refuse("a whole number from 1 to " + std::to_string(high));
+    return *given;
+  }
+  [[nodiscard]] std::uint32_t epochs() const { return std::uint32_t(whole(kMaxEpochs)); }
+};
+
+/// Four rates with colons between: position, scale, rotation, intensity.
+void readRates(const Setting& setting, PaperMethod& method) {
+  PaperRates& rates = method.rates;
+  std::string_view left = setting.value;
+  for (double* rate : {&rates.position, &rates.scale, &rates.rotation, &rates.intensity}) {
+    const std::size_t colon = left.find(':');
+    const auto number = cli::parseNumber(left.substr(0, colon));
+    const bool last = rate == &rates.intensity;
+    if (!number || *number < 0.0 || (colon == std::string_view::npos) != last)
+      setting.refuse("four rates from 0 on, as in 2e-4:5e-3:1e-3:1e-2");
+    *rate = *number;
+    left.remove_prefix(last ? left.size() : colon + 1);
+  }
 }
 
-/// Position, scale, rotation and intensity.
-void readRates(const Arguments& a, PaperRates& rates) {
-  const auto given = a.find<std::string>("rates");
-  if (!given) return;
-  const auto numbers = cli::parseNumbers("rates", *given, 4);
-  for (const double rate : numbers)
-    cli::requireRange("rates", rate, 0.0, std::numeric_limits<double>::max());
-  rates.position = numbers[0];
-  rates.scale = numbers[1];
-  rates.rotation = numbers[2];
-  rates.intensity = numbers[3];
+void readK(const Setting& setting, PaperMethod& method) {
+  method.learnK = setting.value == "learned";
+  if (!method.learnK) method.k = setting.number(kMinK, kMaxK);
 }
 
-void readPrune(const Arguments& a, PaperMethod& method) {
-  const auto passes = a.get<std::string>("prune-passes");
-  if (passes == "3")
+void readPasses(const Setting& setting, PaperMethod& method) {
+  if (setting.value == "3")
     method = withThreePasses(method);
-  else if (passes == "0")
+  else if (setting.value == "0")
     method.prunes.clear();
-  else if (passes != "1")
-    throw UsageError("--prune-passes must be 0, 1 or 3, not '" + passes + "'");
-  method.score = cli::choose<PruneScore>("prune-score", a.get<std::string>("prune-score"),
-                                         {{"full", PruneScore::kFull},
-                                          {"no-fa", PruneScore::kWithoutFa},
-                                          {"only-fa", PruneScore::kOnlyFa},
-                                          {"contribution", PruneScore::kContribution}});
-  if (const auto share = a.find<double>("prune-share")) {
-    cli::requireRange("prune-share", *share, 0.0, 0.999999);
-    for (PrunePass& pass : method.prunes) pass.share = *share;
-  }
+  else if (setting.value != "1")
+    setting.refuse("0, 1 or 3");
 }
 
-PaperMethod readMethod(const Arguments& a) {
-  PaperMethod method;
-  readPrimitive(a, method);
-  readPrune(a, method);
-  if (const auto epochs = whole(a, "epochs", 1, kMostEpochs))
-    method = scaledTo(method, std::uint32_t(*epochs));
-  readDensify(a, method);
-  readRates(a, method.rates);
-  if (const auto n = whole(a, "points", 1, kMostPrimitives)) method.points = std::size_t(*n);
-  if (const auto n = whole(a, "most", 1, kMostPrimitives)) method.most = std::size_t(*n);
-  if (const auto n = whole(a, "subvolume", 1, kMostSide)) method.subvolume = int(*n);
-  method.countHits = a.get<bool>("hits");
-  return method;
-}
-
-/// --preset paper's options that were given, in words.
-std::string givenWithout(const Arguments& a) {
-  const auto group = paperOptions();
-  for (const auto& option : group.options()) {
-    const auto& given = a.values[option->long_name()];
-    if (!given.empty() && !given.defaulted()) return option->long_name();
-  }
-  return {};
+/// One of the words. \throws UsageError  another
+template <class T>
+T wordOf(const Setting& setting, std::initializer_list<cli::Choice<T>> choices) {
+  return cli::choose<T>("paper " + setting.key, setting.value, choices);
 }
 
 std::string ratesText(const PaperRates& rates) {
   std::string text;
   for (const double rate : {rates.position, rates.scale, rates.rotation, rates.intensity})
-    text += (text.empty() ? "" : ",") + cli::shortNumber(rate);
+    text += (text.empty() ? "" : ":") + cli::shortNumber(rate);
   return text;
+}
+
+struct Key {
+  const char* name;
+  std::string value;  ///< its default, as it would be given; empty: it follows from the volume
+  const char* help;
+  std::function<void(const Setting&, PaperMethod&)> read;
+};
+
+/// The keys in the order in which they are applied: the schedules come before what changes a part
+/// of them.
+std::vector<Key> keys() {
+  const PaperMethod m;
+  const auto text = [](auto number) { return cli::shortNumber(double(number)); };
+  return {
+      {"prunes", "1", "pruning passes: 0, 1, or 3 (the paper's schedule for BigBrain)", readPasses},
+      {"epochs", std::to_string(m.epochs),
+       "rounds through all subvolumes; what is counted in epochs is scaled with it",
+       [](const Setting& s, PaperMethod& p) { p = scaledTo(p, s.epochs()); }},
+      {"kernel", "ellipsoid", "ellipsoid, or gaussian (Gaussians that end at 3 sigma)",
+       [](const Setting& s, PaperMethod& p) {
+         p.gaussian = wordOf<bool>(s, {{"ellipsoid", false}, {"gaussian", true}});
+       }},
+      {"k", text(m.k), "sharpness of the ellipsoids, or 'learned' for each one", readK},
+      {"beta", text(m.beta), "share of L1 in the loss; the rest is D-SSIM",
+       [](const Setting& s, PaperMethod& p) { p.beta = s.number(0.0, 1.0); }},
+      {"points", std::to_string(m.points), "ellipsoids at the start",
+       [](const Setting& s, PaperMethod& p) { p.points = std::size_t(s.whole(kMaxEllipsoids)); }},
+      {"max", std::to_string(m.maxEllipsoids), "ellipsoids at which cloning and splitting end",
+       [](const Setting& s, PaperMethod& p) {
+         p.maxEllipsoids = std::size_t(s.whole(kMaxEllipsoids));
+       }},
+      {"subvolume", "",
+       "side in voxels of the cubes that are fitted in turn (default: half the\n"
+       "longest axis, or the shortest axis where that is less)",
+       [](const Setting& s, PaperMethod& p) { p.subvolume = int(s.whole(kMaxSide)); }},
+      {"rates", ratesText(m.rates),
+       "first learning rates of position, scale, rotation and intensity; all end\nat a tenth",
+       readRates},
+      {"densify", "on", "on, or off: ellipsoids are neither cloned nor split",
+       [](const Setting& s, PaperMethod& p) {
+         p.densify = wordOf<bool>(s, {{"on", true}, {"off", false}});
+       }},
+      {"densify-from", std::to_string(m.densifyFrom), "epoch after which they are",
+       [](const Setting& s, PaperMethod& p) { p.densifyFrom = s.epochs(); }},
+      {"densify-until", std::to_string(m.densifyUntil), "last epoch after which they are",
+       [](const Setting& s, PaperMethod& p) { p.densifyUntil = s.epochs(); }},
+      {"densify-every", std::to_string(m.densifyEvery), "epochs from one time to the next",
+       [](const Setting& s, PaperMethod& p) { p.densifyEvery = s.epochs(); }},
+      {"densify-threshold", text(m.gradientThreshold),
+       "length of the gradient by position from which they are",
+       [](const Setting& s, PaperMethod& p) { p.gradientThreshold = s.number(0.0, kMaxNumber); }},
+      {"percent-dense", text(m.percentDense),
+       "share of half the longest axis: larger scales are split, smaller cloned",
+       [](const Setting& s, PaperMethod& p) { p.percentDense = s.number(1e-9, 1.0); }},
+      {"prune-score", "full",
+       "full (coverage * intensity * FA), no-fa, only-fa, or contribution (as\nLightGaussian)",
+       [](const Setting& s, PaperMethod& p) {
+         p.score = wordOf<PruneScore>(s, {{"full", PruneScore::kFull},
+                                          {"no-fa", PruneScore::kWithoutFa},
+                                          {"only-fa", PruneScore::kOnlyFa},
+                                          {"contribution", PruneScore::kContribution}});
+       }},
+      {"prune-share", text(m.prunes.front().share), "share of the ellipsoids that a pass removes",
+       [](const Setting& s, PaperMethod& p) {
+         for (PrunePass& pass : p.prunes) pass.share = s.number(0.0, 0.999999);
+       }},
+  };
+}
+
+/// Takes the next KEY=VALUE from a list.
+Setting takeSetting(std::string_view& list) {
+  const std::size_t comma = list.find(',');
+  const std::string_view item = list.substr(0, comma);
+  list.remove_prefix(comma == std::string_view::npos ? list.size() : comma + 1);
+  const std::size_t sign = item.find('=');
+  if (sign == std::string_view::npos)
+    throw UsageError("--paper takes KEY=VALUE[,KEY=VALUE...] or default, not '" +
+                     std::string(item) + "'; see --help paper");
+  return {std::string(item.substr(0, sign)), std::string(item.substr(sign + 1))};
+}
+
+std::map<std::string, Setting> settingsIn(const std::vector<std::string>& given) {
+  std::map<std::string, Setting> settings;
+  for (const std::string& text : given) {
+    if (text == kDefault) continue;
+    std::string_view left = text;
+    do {
+      const Setting setting = takeSetting(left);
+      if (!settings.emplace(setting.key, setting).second)
+        throw UsageError("--paper: " + setting.key + " is given twice");
+    } while (!left.empty());
+  }
+  return settings;
+}
+
+/// A description of several lines, each of them indented.
+std::string indented(const std::string& text) {
+  std::string result;
+  for (const char c : text)
+    result += c == '\n' ? std::string("\n") + std::string(6, ' ') : std::string(1, c);
+  return result;
 }
 
 }  // namespace
 
-cli::po::options_description paperOptions() {
-  const PaperMethod m;
-  cli::po::options_description group(kGroup);
-  // clang-format off
-  group.add_options()
-    ("epochs", value<std::int64_t>()->value_name("N"),
-     ("rounds through all subvolumes (default: " + std::to_string(m.epochs) +
-      "); what follows in epochs is scaled with it").c_str())
-    ("points", value<std::int64_t>()->value_name("N"),
-     ("ellipsoids at the start (default: " + std::to_string(m.points) + ")").c_str())
-    ("subvolume", value<std::int64_t>()->value_name("VOXELS"),
-     "side of the cubes fitted in turn (default: half the longest axis, or the shortest)")
-    ("primitive", value<std::string>()->value_name("P")->default_value("ellipsoid"),
-     "ellipsoid, or gaussian (3 sigma)")
-    ("sharpness", value<std::string>()->value_name("K"),
-     ("k of the ellipsoids, or 'learned' for each (default: " + cli::shortNumber(m.k) +
-      ")").c_str())
-    ("rates", value<std::string>()->value_name("P,S,R,I"),
-     ("first learning rates of position, scale, rotation, intensity (default: " +
-      ratesText(m.rates) + "), which end at a tenth").c_str())
-    ("no-densify", bool_switch(), "neither clone nor split")
-    ("densify-threshold", value<double>()->value_name("G"),
-     ("gradient by position from which they do (default: " +
-      cli::shortNumber(m.gradientThreshold) + ")").c_str())
-    ("percent-dense", value<double>()->value_name("S"),
-     ("larger scales are split, smaller cloned, of half the longest axis (default: " +
-      cli::shortNumber(m.percentDense) + ")").c_str())
-    ("densify-from", value<std::int64_t>()->value_name("EPOCH"), "after a warm-up of so many")
-    ("densify-until", value<std::int64_t>()->value_name("EPOCH"), "the last time")
-    ("densify-every", value<std::int64_t>()->value_name("EPOCHS"), "interval")
-    ("most", value<std::int64_t>()->value_name("N"), "ellipsoids at which cloning and splitting end")
-    ("prune-passes", value<std::string>()->value_name("N")->default_value("1"),
-     "0, 1, or 3 (the paper's schedule for BigBrain); --count is what the last one leaves")
-    ("prune-score", value<std::string>()->value_name("S")->default_value("full"),
-     "full (coverage * intensity * FA), no-fa, only-fa, contribution (as LightGaussian)")
-    ("prune-share", value<double>()->value_name("S"), "of the ellipsoids, removed by each pass");
-  // clang-format on
-  return group;
+std::string paperHelp() {
+  std::ostringstream out;
+  out << "--paper KEY=VALUE[,KEY=VALUE...] fits by the paper's method, for comparison with it, in\n"
+         "the place of ours. '--paper default' changes no setting. --count is the number of\n"
+         "ellipsoids that the last pruning pass leaves. The file stores float32 unless --storage\n"
+         "is given.\n\nKeys:\n";
+  for (const Key& key : keys()) {
+    out << "  " << key.name;
+    if (!key.value.empty()) out << " (=" << key.value << ")";
+    out << "\n      " << indented(key.help) << '\n';
+  }
+  return out.str();
 }
 
-std::optional<PaperMethod> paperMethod(const Arguments& a) {
-  if (a.get<std::string>("preset") == "paper") {
-    if (!a.values["loss"].defaulted() && a.get<std::string>("loss") != "paper")
-      throw UsageError("--preset paper has the paper's loss; give --beta 1 for L1 alone");
-    return readMethod(a);
+PaperMethod readPaperMethod(const std::vector<std::string>& given) {
+  auto settings = settingsIn(given);
+  PaperMethod method;
+  for (const Key& key : keys()) {
+    const auto setting = settings.find(key.name);
+    if (setting == settings.end()) continue;
+    key.read(setting->second, method);
+    settings.erase(setting);
   }
-  if (const std::string option = givenWithout(a); !option.empty())
-    throw UsageError("--" + option + " goes with --preset paper only");
-  return std::nullopt;
+  if (!settings.empty())
+    throw UsageError("--paper has no key '" + settings.begin()->first + "'; see --help paper");
+  if (method.gaussian && (method.learnK || method.k != PaperMethod{}.k))
+    throw UsageError("--paper: Gaussians have no k");
+  return method;
 }
 
 }  // namespace esvr::vdb2esvr

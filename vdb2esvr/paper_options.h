@@ -1,18 +1,18 @@
 #pragma once
-/// Options of --preset paper.
+/// The option --paper: the paper's method in the place of ours, and its settings as KEY=VALUE.
 
-#include <optional>
+#include <string>
+#include <vector>
 
-#include "cli/command_line.h"
 #include "esvr/paper_method.h"
 
 namespace esvr::vdb2esvr {
 
-/// A group of its own in --help.
-[[nodiscard]] cli::po::options_description paperOptions();
+/// The text of `--help paper`: every key with its default.
+[[nodiscard]] std::string paperHelp();
 
-/// \return nothing without --preset paper
-/// \throws UsageError  an option of the paper's method without it, or one that makes no sense
-[[nodiscard]] std::optional<PaperMethod> paperMethod(const cli::Arguments& arguments);
+/// \param given  values of --paper, each a list KEY=VALUE[,KEY=VALUE...], or "default"
+/// \throws UsageError  a key that is not there, twice or with a value that makes no sense
+[[nodiscard]] PaperMethod readPaperMethod(const std::vector<std::string>& given);
 
 }  // namespace esvr::vdb2esvr

@@ -41,7 +41,7 @@ Json densifyOf(const PaperRecord& record) {
           {"threshold", m.gradientThreshold},
           {"first_median_gradient", record.firstGradient},
           {"percent_dense", m.percentDense},
-          {"most", m.most},
+          {"max", m.maxEllipsoids},
           {"cloned", record.cloned},
           {"split", record.split}};
 }
@@ -62,8 +62,9 @@ Json prunesOf(const PaperRecord& record) {
 
 Json paperJson(const PaperRecord& record) {
   const PaperMethod& m = record.method;
-  return {{"primitive", m.gaussian ? "gaussian" : "ellipsoid"},
+  return {{"kernel", m.gaussian ? "gaussian" : "ellipsoid"},
           {"k", m.gaussian ? Json(nullptr) : (m.learnK ? Json("learned") : Json(m.k))},
+          {"beta", m.beta},
           {"points", record.points},
           {"epochs", m.epochs},
           {"iterations", record.iterations},

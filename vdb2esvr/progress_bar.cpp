@@ -42,7 +42,7 @@ std::string progressLine(const std::string& grid, const FitProgress& progress, s
   const double fraction = std::clamp(progress.fraction, 0.0, 1.0);
   char numbers[96];
   std::snprintf(numbers, sizeof numbers, "  %.2f dB  %llu ellipsoids  ", progress.point.psnrBox,
-                static_cast<unsigned long long>(progress.point.primitives));
+                static_cast<unsigned long long>(progress.point.ellipsoids));
   std::string line = cli::printable(grid) + "  " + std::to_string(std::lround(100.0 * fraction)) +
                      " % " + bar(fraction) + numbers + clock(progress.secondsLeft) + " left";
   line.resize(std::min(line.size(), width));

@@ -62,35 +62,44 @@ Json versions() {
           {"cuda", cudaVersions()}};
 }
 
+/// The bound on the error that was asked for, as JSON has it.
+Json maxErrorOf(const Goal& goal) {
+  const auto* within = std::get_if<BoundGoal>(&goal);
+  return within ? Json(within->bound) : Json(nullptr);
+}
+
+bool isShare(const Goal& goal) {
+  const auto* within = std::get_if<BoundGoal>(&goal);
+  return within && within->relative;
+}
+
 Json asked(const Options& options) {
-  const FitOptions& fit = options.fit;
-  const bool paperLoss = fit.paper || fit.loss == Loss::kPaper;
+  const FitOptions& fit = options.convert.fit;
+  const StorageOptions& storage = options.convert.storage;
   return {{"count", orNull(fit.count)},
-          {"psnr", orNull(fit.psnr)},
+          {"psnr", orNull(options.psnr)},
           {"size", orNull(options.size)},
           {"ratio", orNull(options.ratio)},
-          {"lossless", options.voxels && options.voxels->exact},
-          {"max_error",
-           options.voxels && !options.voxels->exact ? Json(options.voxels->bound) : Json(nullptr)},
-          {"max_error_is_share", options.voxels && options.voxels->relative},
+          {"lossless", std::holds_alternative<LosslessGoal>(options.convert.goal)},
+          {"max_error", maxErrorOf(options.convert.goal)},
+          {"max_error_is_share", isShare(options.convert.goal)},
           {"seconds", orNull(fit.seconds)},
           {"iterations", orNull(fit.iterations)},
-          {"preset", fit.paper ? "paper" : nameOf(fit.preset)},
-          {"loss", paperLoss ? "paper" : "squared"},
-          {"beta", paperLoss ? Json(fit.beta) : Json(nullptr)},
+          {"method", options.paper ? "paper" : "default"},
+          {"preset", nameOf(fit.preset)},
           {"kappa", orNull(fit.kappa)},
           {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
-          {"storage", options.storage == Storage::kCompact ? "compact" : "float32"},
-          {"storage_loss", options.storageLoss},
-          {"topology", options.activity == Activity::kExact ? "exact" : "threshold"},
+          {"storage", storage.form == Storage::kCompact ? "compact" : "float32"},
+          {"storage_loss", storage.loss},
+          {"topology", storage.activity == Activity::kExact ? "exact" : "threshold"},
           {"seed", fit.seed},
           {"threads", options.threads > 0 ? Json(options.threads) : Json(nullptr)},
           {"device", options.device},
-          {"max_vram", orNull(options.fit.maxDeviceBytes)}};
+          {"max_vram", orNull(fit.maxDeviceBytes)}};
 }
 
 Json sourceOf(const ConvertedGrid& grid) {
-  const EncodedGrid& stored = grid.stored;
+  const StoredGrid& stored = grid.stored();
   return {{"class", cli::nameOf(stored.descriptor.gridClass)},
           {"value_type", cli::nameOf(stored.descriptor.valueType)},
           {"background", stored.descriptor.background},
@@ -106,33 +115,35 @@ Json kernelOf(const Kernel& kernel) {
   return {{"form", cli::nameOf(kernel.form)}, {"kappa", kernel.kappa}, {"epsilon", kernel.epsilon}};
 }
 
-Json topologyOf(const EncodedGrid& grid) {
+Json topologyOf(const StoredGrid& grid) {
   return {{"kind", cli::nameOf(grid.topology)},
           {"threshold", grid.activeThreshold},
           {"bricks", grid.leaves.size()}};
 }
 
 Json fitOf(const ConvertedGrid& grid) {
-  return {{"end", nameOf(grid.end)},
+  const FitResult& fit = grid.conversion.fit;
+  return {{"end", nameOf(fit.end)},
           {"device", grid.device},
-          {"device_bytes", grid.deviceBytes},
-          {"kappa_learned", grid.kappaLearned},
-          {"pairs", grid.pairs},
+          {"device_bytes", fit.deviceBytes},
+          {"kappa_learned", fit.kappaLearned},
+          {"pairs", fit.pairs},
           {"hits", orNull(grid.hits)},
           {"voxel_pairs", orNull(grid.voxelPairs)}};
 }
 
 Json boundOf(const ConvertedGrid& grid) {
-  if (!grid.bound) return nullptr;
-  const std::uint64_t tried = grid.bound->ellipsoidBytes;
-  return {{"stored", grid.stored.voxels ? "voxels" : "ellipsoids and residual"},
-          {"voxel_bytes", grid.bound->voxelBytes},
+  if (!grid.conversion.bound) return nullptr;
+  const std::uint64_t tried = grid.conversion.bound->ellipsoidBytes;
+  return {{"stored", grid.stored().voxels ? "voxels" : "ellipsoids and residual"},
+          {"voxel_bytes", grid.conversion.bound->voxelBytes},
           {"ellipsoid_bytes", tried > 0 ? Json(tried) : Json(nullptr)}};
 }
 
 Json compactOf(const ConvertedGrid& grid) {
-  if (!grid.compact) return nullptr;
-  const auto& [loss, steps, bytes] = *grid.compact;
+  if (!grid.conversion.compact) return nullptr;
+  const auto& [loss, steps] = *grid.conversion.compact;
+  const StreamBytes bytes = streamBytes(grid.stored());
   return {{"loss_db", loss},
           {"steps",
            {{"positions", steps.position},
@@ -147,14 +158,14 @@ Json compactOf(const ConvertedGrid& grid) {
 }
 
 /// What a reader gets of the first layers.
-Json layersOf(const EncodedGrid& grid) {
+Json layersOf(const StoredGrid& grid) {
   Json layers = Json::array();
   const auto sizes = layerSizes(grid);
   LayerSize sum;
   for (std::size_t k = 0; k < grid.layerErrors.size(); ++k) {
     sum.ellipsoids += sizes[k].ellipsoids;
     sum.bytes += sizes[k].bytes;
-    layers.push_back({{"primitives", sum.ellipsoids},
+    layers.push_back({{"ellipsoids", sum.ellipsoids},
                       {"bytes", sum.bytes},
                       {"psnr_box", grid.layerErrors[k].psnrBox},
                       {"max_error", grid.layerErrors[k].maxError}});
@@ -204,12 +215,12 @@ Json leftOutOf(const RunRecord& record, std::size_t grid) {
   return notes;
 }
 
-Json curveOf(const std::vector<CurvePoint>& curve) {
+Json curveOf(const std::vector<TimedCurvePoint>& curve) {
   Json points = Json::array();
   for (const auto& p : curve)
     points.push_back({{"seconds", p.seconds},
                       {"iteration", p.iteration},
-                      {"primitives", p.primitives},
+                      {"ellipsoids", p.ellipsoids},
                       {"psnr_box", p.psnrBox},
                       {"psnr_active", p.psnrActive},
                       {"max_error", p.maxError}});
@@ -220,20 +231,20 @@ Json gridOf(const RunRecord& record, std::size_t g) {
   const ConvertedGrid& grid = record.grids[g];
   return {{"name", grid.uniqueName},
           {"source", sourceOf(grid)},
-          {"primitives", grid.stored.field.primitiveCount()},
+          {"ellipsoids", grid.stored().field.ellipsoidCount()},
           {"bytes", cli::storedBytes(record.output, g)},
           {"sections", sectionsOf(record.output, g)},
-          {"kernel", kernelOf(grid.stored.field.kernel)},
-          {"topology", topologyOf(grid.stored)},
+          {"kernel", kernelOf(grid.stored().field.kernel)},
+          {"topology", topologyOf(grid.stored())},
           {"fit", fitOf(grid)},
           {"paper", grid.paper ? paperJson(*grid.paper) : Json(nullptr)},
           {"compact", compactOf(grid)},
           {"bound", boundOf(grid)},
-          {"layers", layersOf(grid.stored)},
+          {"layers", layersOf(grid.stored())},
           {"metrics", metricsOf(grid.metrics)},
           {"seconds", secondsOf(grid.seconds)},
           {"left_out", leftOutOf(record, g)},
-          {"curve", curveOf(grid.curve)}};
+          {"curve", curveOf(grid.conversion.fit.curve)}};
 }
 
 Json gridsOf(const RunRecord& record) {
@@ -288,7 +299,7 @@ Json makeReport(const Options& options, const RunRecord& record) {
           {"seconds", totalSeconds(record)},
           {"peak_memory_bytes", cli::peakMemory()},
           {"interrupted", record.interrupted},
-          {"exit_code", exitCodeOf(record, options.fit.psnr)}};
+          {"exit_code", exitCodeOf(record, options.psnr)}};
 }
 
 }  // namespace esvr::vdb2esvr

@@ -54,8 +54,8 @@ void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
     log.warning("grid \"" + grid.uniqueName + "\": " + std::to_string(grid.nonFiniteReplaced) +
                 " NaN or infinite voxels taken as zero");
   log.detail("grid \"" + grid.uniqueName + "\": kappa " +
-             cli::shortNumber(grid.stored.field.kernel.kappa) + ", threshold " +
-             cli::shortNumber(grid.stored.activeThreshold) + ", overlap of active voxels " +
+             cli::shortNumber(grid.stored().field.kernel.kappa) + ", threshold " +
+             cli::shortNumber(grid.stored().activeThreshold) + ", overlap of active voxels " +
              cli::shortNumber(grid.metrics.iou));
 }
 
@@ -64,8 +64,8 @@ class Conversion {
  public:
   Conversion(const Options& options, const CancelToken& cancel, const cli::Log& log)
       : options_(options), log_(log) {
-    options_.fit.cancel = &cancel;
-    options_.fit.device = chooseDevice(options, log);
+    options_.convert.fit.cancel = &cancel;
+    options_.convert.fit.device = chooseDevice(options, log);
   }
 
   void run(const std::vector<GridSummary>& grids, RunRecord& record) {
@@ -80,14 +80,14 @@ class Conversion {
   }
 
  private:
-  [[nodiscard]] bool cancelled() const { return options_.fit.cancel->cancelled(); }
+  [[nodiscard]] bool cancelled() const { return options_.convert.fit.cancel->cancelled(); }
 
   /// \return false where the run was interrupted before the fit had anything
   bool convert(const GridSummary& grid, ByteShares& shares, RunRecord& record) try {
     const ProgressBar bar(grid.uniqueName, options_.verbosity != cli::Verbosity::kQuiet);
-    options_.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
+    options_.convert.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
     record.grids.push_back(convertWhereItFits(grid.uniqueName, shares.of(grid)));
-    shares.take(grid, record.grids.back().stored);
+    shares.take(grid, record.grids.back().stored());
     return true;
   } catch (const Cancelled&) {
     return false;
@@ -95,13 +95,13 @@ class Conversion {
 
   /// A GPU that "auto" took may prove too small: the CPU then does what is left.
   ConvertedGrid convertWhereItFits(const std::string& name, std::optional<std::uint64_t> bytes) {
-    if (options_.device != kAuto || options_.fit.device.kind == DeviceKind::kCpu)
+    if (options_.device != kAuto || options_.convert.fit.device.kind == DeviceKind::kCpu)
       return convertGrid(options_, name, bytes);
     try {
       return convertGrid(options_, name, bytes);
     } catch (const DeviceError& error) {
       log_.warning(std::string(error.what()) + "; going on with the CPU");
-      options_.fit.device = {};
+      options_.convert.fit.device = {};
       return convertGrid(options_, name, bytes);
     }
   }
@@ -114,7 +114,7 @@ void write(const Options& options, RunRecord& record) {
   cli::Stopwatch watch;
   EsvrFile file;
   file.metadata = record.input.metadata;
-  for (const auto& grid : record.grids) file.grids.push_back(grid.stored);
+  for (const auto& grid : record.grids) file.grids.push_back(grid.stored());
   writeEsvr(options.output, file, {.overwrite = options.overwrite});
   record.output = inspectEsvr(options.output);
   record.secondsWrite = watch.lap();
@@ -134,11 +134,11 @@ void throwWhatIsAmiss(const Options& options, const RunRecord& record) {
     for (const auto& name : record.notFitted) text += ", without grid \"" + name + "\"";
     throw RuntimeFailure(text);
   }
-  if (const ConvertedGrid* grid = firstBelow(record, options.fit.psnr))
+  if (const ConvertedGrid* grid = firstBelow(record, options.psnr))
     throw TargetMissed("grid \"" + grid->uniqueName + "\" reached " +
                        cli::decibels(grid->metrics.psnrBox) + " dB of the " +
-                       cli::decibels(*options.fit.psnr) + " dB asked for; " +
-                       options.output.string() + " is written");
+                       cli::decibels(*options.psnr) + " dB asked for; " + options.output.string() +
+                       " is written");
 }
 
 }  // namespace

@@ -5,43 +5,43 @@ namespace {
 
 constexpr std::uint64_t kFloatBytes = sizeof(float);
 constexpr std::uint64_t kRotationBytes = 4 * kFloatBytes;
-constexpr std::uint64_t kBitsAByte = 8;
+constexpr std::uint64_t kBitsPerByte = 8;
 constexpr std::uint64_t kMaskBytes = sizeof(BrickMask);
 
 }  // namespace
 
 std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   const ConvertedGrid& grid = record.grids[g];
-  const std::uint64_t primitives = grid.stored.field.primitiveCount();
+  const std::uint64_t ellipsoids = grid.stored().field.ellipsoidCount();
   const auto lacks = [&](const char* kind) { return !hasSection(record.output, g, kind); };
 
-  if (grid.stored.voxels && grid.bound && grid.bound->ellipsoidBytes > 0)
+  if (grid.stored().voxels && grid.conversion.bound && grid.conversion.bound->ellipsoidBytes > 0)
     return {{"ellipsoids", "voxels alone keep the bound in fewer bytes",
-             grid.bound->ellipsoidBytes - grid.bound->voxelBytes}};
-  if (grid.stored.voxels)
+             grid.conversion.bound->ellipsoidBytes - grid.conversion.bound->voxelBytes}};
+  if (grid.stored().voxels)
     return {{"ellipsoids", "every voxel was asked for, exactly or within a bound"}};
 
   std::vector<LeftOut> notes;
-  const bool compact = grid.compact.has_value();
-  if (!grid.signedIntensities)
+  const bool compact = grid.conversion.compact.has_value();
+  if (!grid.conversion.fit.signedIntensities)
     notes.push_back({"signs", "no ellipsoid needed an intensity below 0",
-                     compact ? primitives / kBitsAByte : 0});
+                     compact ? ellipsoids / kBitsPerByte : 0});
   if (!compact && lacks("rotations"))
     notes.push_back(
-        {"rotations", "every ellipsoid lies along the axes", primitives * kRotationBytes});
+        {"rotations", "every ellipsoid lies along the axes", ellipsoids * kRotationBytes});
   if (lacks("kappas"))
     notes.push_back(
-        {"an edge for each ellipsoid", "one kappa serves the scene", primitives * kFloatBytes});
+        {"an edge for each ellipsoid", "one kappa serves the scene", ellipsoids * kFloatBytes});
   if (lacks("chunks")) notes.push_back({"chunk table", "the grid fits in one chunk"});
-  if (grid.stored.topology != TopologyKind::kMask)
+  if (grid.stored().topology != TopologyKind::kMask)
     notes.push_back({"voxel masks",
                      lacks("leaves") ? "a threshold finds the active voxels"
                                      : "the rule of activity finds them in the stored bricks",
                      grid.bricks * kMaskBytes});
-  if (lacks("curve") && !grid.curve.empty())
+  if (lacks("curve") && !grid.conversion.fit.curve.empty())
     notes.push_back({"curve", "a size or a PSNR was asked for; the report has it",
-                     grid.curve.size() * sizeof(CurvePoint)});
-  if (!grid.stored.residual)
+                     grid.conversion.fit.curve.size() * sizeof(TimedCurvePoint)});
+  if (!grid.stored().residual)
     notes.push_back({"residual", "no bound on the largest error was asked for"});
   return notes;
 }

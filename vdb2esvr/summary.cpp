@@ -12,7 +12,7 @@ void printSummary(const Options& options, const RunRecord& record, std::ostream&
   cli::Table table({"grid", "ellipsoids", "bytes", "PSNR box", "active", "max error", "seconds"});
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
     const ConvertedGrid& grid = record.grids[g];
-    table.add({grid.uniqueName, std::to_string(grid.stored.field.primitiveCount()),
+    table.add({grid.uniqueName, std::to_string(grid.stored().field.ellipsoidCount()),
                std::to_string(cli::storedBytes(record.output, g)),
                cli::decibels(grid.metrics.psnrBox), cli::decibels(grid.metrics.psnrActive),
                cli::shortNumber(grid.metrics.maxError), cli::seconds(grid.seconds.total())});

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kNotNeeded = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNearEnough = 0.98;  // of the bytes asked for
-constexpr int kMostBisections = 24;   // a million distinct values, and some
+constexpr int kMaxBisections = 24;    // a million distinct values, and some
 
 /// FpN's tolerances that a size is tried with, as shares of the peak, from coarse to fine in steps
 /// of about sqrt(2).
@@ -25,7 +25,7 @@ constexpr std::array kTolerances{0.5,    0.35,   0.25,   0.17, 0.12,  0.085, 0.0
 constexpr int kPatience = 3;  // tolerances in a row that are worse end the search
 
 constexpr int kAccuracySteps = 40;  // powers of two below the peak
-constexpr int kMostPlanes = 32;
+constexpr int kMaxPlanes = 32;
 
 /// Tries settings and keeps what came of them.
 class Search {
@@ -80,7 +80,7 @@ bool matchThreshold(Search& search, BaselineSetting setting, std::span<const flo
   }
   std::size_t low = 0, high = thresholds.size();  // the last would leave no voxel
   std::optional<double> found;
-  for (int i = 0; i < kMostBisections && low + 1 < high; ++i) {
+  for (int i = 0; i < kMaxBisections && low + 1 < high; ++i) {
     const std::size_t middle = low + (high - low) / 2;
     setting.threshold = thresholds[middle - 1];
     const std::uint64_t size = search.tryBytes(setting);
@@ -115,7 +115,7 @@ void matchToleranceAndThreshold(Search& search, const BaselineSetting& like,
 std::vector<BaselineSetting> ladder(ZfpMode mode, double peak) {
   std::vector<BaselineSetting> settings;
   if (mode == ZfpMode::kPrecision) {
-    for (int planes = 1; planes <= kMostPlanes; ++planes)
+    for (int planes = 1; planes <= kMaxPlanes; ++planes)
       settings.push_back({.how = ZfpSetting{mode, double(planes)}});
     return settings;
   }

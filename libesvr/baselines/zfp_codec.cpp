@@ -23,7 +23,7 @@ using Field = std::unique_ptr<zfp_field, FreeField>;
 using Stream = std::unique_ptr<zfp_stream, CloseStream>;
 using Bits = std::unique_ptr<bitstream, CloseBits>;
 
-constexpr unsigned kMostPlanes = 32;  // of float
+constexpr unsigned kMaxPlanes = 32;  // of float
 
 Field fieldOf(baselines::DenseBox& dense) {
   const auto [nx, ny, nz] = dense.side();
@@ -36,9 +36,9 @@ void apply(const ZfpSetting& setting, zfp_stream* stream) {
     return;
   }
   const auto planes = unsigned(setting.amount);
-  if (double(planes) != setting.amount || planes < 1 || planes > kMostPlanes)
+  if (double(planes) != setting.amount || planes < 1 || planes > kMaxPlanes)
     throw UsageError("zfp: precision must be a whole number from 1 to " +
-                     std::to_string(kMostPlanes));
+                     std::to_string(kMaxPlanes));
   zfp_stream_set_precision(stream, planes);
 }
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdlib>
 
+#include "cli/number.h"
 #include "esvr/error.h"
 
 namespace esvr::cli {
@@ -16,7 +16,7 @@ struct Unit {
 };
 constexpr Unit kUnits[] = {{"", 1.0},   {"b", 1.0},      {"kb", 1e3},     {"mb", 1e6},
                            {"gb", 1e9}, {"kib", 0x1p10}, {"mib", 0x1p20}, {"gib", 0x1p30}};
-constexpr double kMost = 1e15;
+constexpr double kMaxBytes = 1e15;
 
 std::string lowered(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
@@ -31,15 +31,14 @@ std::uint64_t parseByteSize(const std::string& option, const std::string& text) 
     return UsageError("--" + option + " must be a size such as 50000, 50KB or 2.6MB, not '" + text +
                       "'");
   };
-  if (text.empty() || !std::isdigit(static_cast<unsigned char>(text.front()))) throw refuse();
-  char* end = nullptr;
-  const double number = std::strtod(text.c_str(), &end);
-  const std::string name = lowered(end);
+  const auto number = parseLeadingNumber(text);
+  if (!number) throw refuse();
+  const std::string name = lowered(std::string(number->rest));
   const auto unit = std::find_if(std::begin(kUnits), std::end(kUnits),
                                  [&](const Unit& u) { return name == u.name; });
   if (unit == std::end(kUnits)) throw refuse();
-  const double bytes = std::floor(number * unit->bytes);
-  if (!(bytes >= 1.0 && bytes <= kMost)) throw refuse();
+  const double bytes = std::floor(number->value * unit->bytes);
+  if (!(bytes >= 1.0 && bytes <= kMaxBytes)) throw refuse();
   return std::uint64_t(bytes);
 }
 

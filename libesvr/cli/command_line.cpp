@@ -74,6 +74,20 @@ std::string CommandLine::helpText() const {
   return help;
 }
 
+void CommandLine::helpTopic(const std::string& name, const std::string& text) {
+  helpTopics_[name] = text;
+}
+
+/// The topic that stands behind --help; else all there is.
+std::string CommandLine::helpAskedFor(const po::variables_map& values) const {
+  for (const Argument& argument : arguments_) {
+    if (values.count(argument.name) == 0) continue;
+    const auto topic = helpTopics_.find(values[argument.name].as<std::string>());
+    if (topic != helpTopics_.end()) return topic->second;
+  }
+  return helpText();
+}
+
 po::variables_map CommandLine::parseValues(int argc, const char* const* argv) const {
   po::options_description all, hidden;
   po::positional_options_description places;
@@ -103,7 +117,7 @@ void CommandLine::requireArguments(const po::variables_map& values) const {
 std::optional<Arguments> CommandLine::parse(int argc, const char* const* argv) const try {
   po::variables_map values = parseValues(argc, argv);
   if (values["help"].as<bool>()) {
-    std::cout << helpText();
+    std::cout << helpAskedFor(values);
     return std::nullopt;
   }
   if (values["version"].as<bool>()) {

@@ -11,6 +11,7 @@
 #include <boost/program_options/positional_options.hpp>
 #include <boost/program_options/value_semantic.hpp>
 #include <boost/program_options/variables_map.hpp>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -64,6 +65,9 @@ class CommandLine {
   /// All arguments behind those; the value is a std::vector<std::string>.
   void repeatedArgument(const std::string& name);
 
+  /// Adds a text that `--help NAME` prints in the place of the whole help.
+  void helpTopic(const std::string& name, const std::string& text);
+
   /// \return nothing where --help or --version was printed to stdout
   /// \throws UsageError  what was given makes no sense
   [[nodiscard]] std::optional<Arguments> parse(int argc, const char* const* argv) const;
@@ -77,10 +81,12 @@ class CommandLine {
   };
   [[nodiscard]] po::variables_map parseValues(int argc, const char* const* argv) const;
   void requireArguments(const po::variables_map& values) const;
+  [[nodiscard]] std::string helpAskedFor(const po::variables_map& values) const;
 
   ProgramText text_;
   po::options_description own_, common_;
   std::vector<Argument> arguments_;
+  std::map<std::string, std::string> helpTopics_;
   std::string rest_;  ///< the repeated argument, or a name that nothing asks for
 };
 

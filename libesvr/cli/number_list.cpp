@@ -1,8 +1,6 @@
 #include "cli/number_list.h"
 
-#include <charconv>
-#include <cmath>
-
+#include "cli/number.h"
 #include "esvr/error.h"
 
 namespace esvr::cli {
@@ -13,16 +11,18 @@ std::vector<double> parseNumbers(const std::string& option, const std::string& t
     throw UsageError("--" + option + " must be " + std::to_string(count) +
                      " numbers with commas between, not '" + text + "'");
   };
-  std::vector<double> numbers(count);
-  const char* at = text.data();
-  const char* const end = at + text.size();
+  std::vector<double> numbers;
+  std::string_view left = text;
   for (std::size_t i = 0; i < count; ++i) {
-    if (i > 0 && (at == end || *at++ != ',')) refuse();
-    const auto [next, error] = std::from_chars(at, end, numbers[i]);
-    if (error != std::errc{} || !std::isfinite(numbers[i])) refuse();
-    at = next;
+    const auto number = parseLeadingNumber(left);
+    if (!number) refuse();
+    numbers.push_back(number->value);
+    left = number->rest;
+    if (i + 1 == count) break;
+    if (!left.starts_with(',')) refuse();
+    left.remove_prefix(1);
   }
-  if (at != end) refuse();
+  if (!left.empty()) refuse();
   return numbers;
 }
 

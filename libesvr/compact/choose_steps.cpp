@@ -8,7 +8,7 @@
 namespace esvr {
 namespace {
 
-constexpr int kFirstTrials = 3, kMostTrials = 10;
+constexpr int kFirstTrials = 3, kMaxTrials = 10;
 constexpr double kNear = 1.6;          // a factor of the steps: slopes are alike within
 constexpr double kParameters = 10.0;   // of an ellipsoid
 constexpr double kEnough = 0.93;       // of the budget: the next scaling would gain little
@@ -18,9 +18,9 @@ constexpr double kSizeNarrow = 1.01;
 constexpr double kFullEnough = 0.994;     // of the bytes
 constexpr double kFull = 0.985;           // of the bytes: less was not asked for
 constexpr double kProbe = 1.41421356237;  // half a bit
-constexpr double kMostChange = 2.0;       // of one stream's step against the others
-constexpr double kLeastAdded = 0.02;      // of the budget: below, scale boldly
-constexpr double kLeastGuess = 0.02;      // of the error allowed
+constexpr double kMaxChange = 2.0;        // of one stream's step against the others
+constexpr double kMinAdded = 0.02;        // of the budget: below, scale boldly
+constexpr double kMinGuess = 0.02;        // of the error allowed
 constexpr double kLeft = 0.75;            // of the error of rounding, by solving for intensities
 constexpr double kFirstLoss = 0.2;        // of the error: usual where bytes are short
 constexpr double kFine = 0.1;             // of the first guess: adds a hundredth of the budget
@@ -66,7 +66,7 @@ class ErrorGoal : public Goal {
     return met(a) ? a.bytes < b.bytes : a.error < b.error;
   }
   [[nodiscard]] double correction(const Trial& trial, const Trial&) const override {
-    const double added = std::max(trial.error - base_, kLeastAdded * budget());
+    const double added = std::max(trial.error - base_, kMinAdded * budget());
     return std::clamp(std::sqrt(kAim * budget() / added), 0.25, 4.0);
   }
 
@@ -137,7 +137,7 @@ Trial scaleTo(TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps) 
   Trial best = maker.make(steps);
   Trial last = best, before = best;
   double high = HUGE_VAL, low = 0.0, factor = 1.0;  // factors known to lie beyond and short of it
-  for (int n = 1; n < kMostTrials; ++n) {
+  for (int n = 1; n < kMaxTrials; ++n) {
     if (goal.met(best) && (goal.nearlyMissed(best) || high < goal.narrow() * low)) break;
     (goal.met(last) == goal.metByFinerSteps() ? low : high) = factor;
     factor *= goal.correction(last, before);
@@ -184,8 +184,8 @@ double meanSlope(const Probes& probes) {
 /// Factor of a stream's step that makes its slope the mean one: a stream's cost grows with the
 /// square of its step.
 double changeOf(const Probe& probe, double mean) {
-  const double change = probe.slope() > 0.0 ? std::sqrt(mean / probe.slope()) : kMostChange;
-  return std::clamp(change, 1.0 / kMostChange, kMostChange);
+  const double change = probe.slope() > 0.0 ? std::sqrt(mean / probe.slope()) : kMaxChange;
+  return std::clamp(change, 1.0 / kMaxChange, kMaxChange);
 }
 
 /// What a saved byte costs must be the same in every stream.
@@ -219,7 +219,7 @@ Trial search(TrialMaker& maker, const Goal& goal, const QuantiserSteps& guess) {
 }  // namespace
 
 Trial chooseStepsWithin(TrialMaker& maker, double allowed) {
-  const double left = std::max(allowed - maker.leastError(), kLeastGuess * allowed);
+  const double left = std::max(allowed - maker.leastError(), kMinGuess * allowed);
   const QuantiserSteps guess = stepsThatAdd(left, maker.count());
   if (maker.leastError() >= allowed) return maker.make(scaled(guess, kFine));
   return search(maker, ErrorGoal(allowed, maker.leastError()), guess);

@@ -26,7 +26,7 @@ Trial choose(TrialMaker& maker, const CompactOptions& options) {
 }
 
 /// Near float32's own precision a GPU's sums and a reader's differ by more than the margin.
-bool missedByReader(const EncodedGrid& grid, const SparseVolume& source,
+bool missedByReader(const StoredGrid& grid, const SparseVolume& source,
                     const CompactOptions& options) {
   if (!options.psnr || *options.psnr < kAlike || options.device.kind == DeviceKind::kCpu)
     return false;
@@ -35,7 +35,7 @@ bool missedByReader(const EncodedGrid& grid, const SparseVolume& source,
   return metrics.psnrBox < *options.psnr;
 }
 
-void requireOneKappa(const EncodedGrid& grid) {
+void requireOneKappa(const StoredGrid& grid) {
   for (const auto& chunk : grid.field.chunks)
     if (!chunk.ellipsoids.kappa.empty())
       throw RuntimeFailure("cannot quantise grid '" + grid.descriptor.name +
@@ -44,11 +44,11 @@ void requireOneKappa(const EncodedGrid& grid) {
 
 }  // namespace
 
-CompactResult compactGrid(const EncodedGrid& grid, const SparseVolume& source,
+CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                           const CompactOptions& options) {
   requireOneKappa(grid);
   CompactResult result{grid, {}, 0.0, 0};
-  if (grid.field.primitiveCount() == 0) return result;
+  if (grid.field.ellipsoidCount() == 0) return result;
   const Box box = options.box.value_or(activeBox(source));
   TrialMaker maker(grid, {source, box, options.device});
   Trial chosen = choose(maker, options);

@@ -53,7 +53,7 @@ void keep(const std::vector<std::size_t>& places, Ellipsoids& e) {
 
 }  // namespace
 
-EncodedGrid firstLayers(EncodedGrid grid, std::size_t layers) {
+StoredGrid firstLayers(StoredGrid grid, std::size_t layers) {
   const std::size_t all = layerCount(grid);
   for (std::size_t c = 0; c < grid.quantised.size(); ++c) {
     QuantisedEllipsoids& q = grid.quantised[c];
@@ -66,8 +66,8 @@ EncodedGrid firstLayers(EncodedGrid grid, std::size_t layers) {
   return grid;
 }
 
-EncodedGrid heaviest(EncodedGrid grid, std::size_t count) {
-  if (grid.field.primitiveCount() <= count) return grid;
+StoredGrid heaviest(StoredGrid grid, std::size_t count) {
+  if (grid.field.ellipsoidCount() <= count) return grid;
   auto kept = weigh(grid.field);
   kept.resize(count);
   std::vector<std::vector<std::size_t>> places(grid.field.chunks.size());

@@ -6,7 +6,7 @@
 
 namespace esvr {
 
-std::vector<LayerError> measureLayers(const EncodedGrid& grid, const SparseVolume& source,
+std::vector<LayerError> measureLayers(const StoredGrid& grid, const SparseVolume& source,
                                       const Box& box) {
   std::vector<LayerError> errors;
   const std::size_t layers = layerCount(grid);

@@ -11,7 +11,7 @@ namespace esvr {
 
 /// For each prefix of the layers, the voxels that a reader gets of it against the source; nothing
 /// where there is but one layer. \param box  of the PSNR
-[[nodiscard]] std::vector<LayerError> measureLayers(const EncodedGrid& grid,
+[[nodiscard]] std::vector<LayerError> measureLayers(const StoredGrid& grid,
                                                     const SparseVolume& source, const Box& box);
 
 }  // namespace esvr

@@ -18,8 +18,8 @@ namespace {
 
 // What evaluateBricks may be off by, of the sum of |I| (field.h); two machines twice that.
 constexpr double kOff = 2.0 * 4e-6, kOffStretched = 2.0 * 2e-4;
-constexpr double kStretched = 4.6;         // logarithm of an aspect of 100
-constexpr double kMostMargin = 1.0 / 6.0;  // of the bound
+constexpr double kStretched = 4.6;        // logarithm of an aspect of 100
+constexpr double kMaxMargin = 1.0 / 6.0;  // of the bound
 
 // By value, a voxel within half the bound of the background becomes it.
 constexpr double kThreshold = 0.5;
@@ -58,7 +58,7 @@ std::vector<Coord> cornersOf(const SparseVolume& volume) {
 }
 
 /// All bricks that may hold an active voxel, of the source or of the sum.
-std::vector<Coord> bricksOfEither(const EncodedGrid& grid, const SparseVolume& source) {
+std::vector<Coord> bricksOfEither(const StoredGrid& grid, const SparseVolume& source) {
   if (grid.topology != TopologyKind::kThreshold) return grid.leaves;
   const auto own = cornersOf(source), reached = reachedBricks(grid.field);
   std::vector<Coord> all;
@@ -70,7 +70,7 @@ std::vector<Coord> bricksOfEither(const EncodedGrid& grid, const SparseVolume& s
 class Bounded {
  public:
   /// \param margin  the largest of a brick
-  Bounded(const EncodedGrid& grid, double bound, double margin)
+  Bounded(const StoredGrid& grid, double bound, double margin)
       : bound_(bound),
         background_(grid.field.background),
         byValue_(grid.topology == TopologyKind::kThreshold),
@@ -139,7 +139,7 @@ VoxelLayer layerOf(const std::vector<BrickCodes>& bricks, double divisor) {
 }
 
 /// The sum in bricks, every voxel active.
-SparseVolume sumIn(const EncodedGrid& grid, std::span<const Coord> corners) {
+SparseVolume sumIn(const StoredGrid& grid, std::span<const Coord> corners) {
   return revoxelise(grid.field, {.threshold = -std::numeric_limits<float>::max(),
                                  .range = format::ruleOf(grid).range,
                                  .bricks = corners,
@@ -148,13 +148,12 @@ SparseVolume sumIn(const EncodedGrid& grid, std::span<const Coord> corners) {
 
 }  // namespace
 
-std::optional<EncodedGrid> withResidual(EncodedGrid grid, const SparseVolume& source,
-                                        double bound) {
+std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& source, double bound) {
   if (grid.topology == TopologyKind::kLeaves) return std::nullopt;
   const auto corners = bricksOfEither(grid, source);
   const auto margins = marginsOf(grid.field, corners);
   const double margin = margins.empty() ? 0.0 : *std::max_element(margins.begin(), margins.end());
-  if (margin > kMostMargin * bound) return std::nullopt;
+  if (margin > kMaxMargin * bound) return std::nullopt;
   const Bounded bounded(grid, bound, margin);
   const SparseVolume sum = sumIn(grid, corners);
   const std::vector<float> nothing(kBrickVoxels, source.background);

@@ -22,7 +22,7 @@ constexpr int kFirstIterations = 8, kIterations = 3;
 /// One of so many cubes of bricks is a sample, where there are bricks enough to tell.
 constexpr std::int32_t kSampled = 4;
 constexpr int kCubeLog2 = 2;  // of its side, in bricks
-constexpr std::size_t kLeastSampled = 1024;
+constexpr std::size_t kMinSampled = 1024;
 
 std::vector<std::vector<double>> byChunk(const Field& field, const std::vector<double>& all) {
   std::vector<std::vector<double>> result;
@@ -62,7 +62,7 @@ void solveIntensities(IntensityProblem& problem, Trial& trial) {
 
 /// Empty where there are too few.
 std::vector<Coord> sampleOf(std::vector<Coord> corners) {
-  if (corners.size() < kLeastSampled) return {};
+  if (corners.size() < kMinSampled) return {};
   std::erase_if(corners, [](Coord corner) {
     const Coord brick = brickOf(corner);
     const std::int32_t cube =
@@ -97,7 +97,7 @@ std::vector<float> ofFirstLayers(const Trial& trial, std::size_t layers) {
 
 }  // namespace
 
-TrialMaker::TrialMaker(const EncodedGrid& grid, const TrialTarget& target)
+TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
     : target_{target.source,
               {format::ruleOf(grid), grid.activeThreshold},
               target.box,

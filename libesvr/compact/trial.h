@@ -32,7 +32,7 @@ struct TrialTarget {
 class TrialMaker {
  public:
   /// Grid and source must outlive the maker. \throws DeviceError  the GPU cannot be used
-  TrialMaker(const EncodedGrid& grid, const TrialTarget& target);
+  TrialMaker(const StoredGrid& grid, const TrialTarget& target);
 
   /// Sum of squares over the box of a PSNR.
   [[nodiscard]] double squaresOf(double psnr) const;
@@ -45,7 +45,7 @@ class TrialMaker {
   [[nodiscard]] double error() const { return error_; }
   /// The same with the intensities that serve its shapes best: what finer steps come near to.
   [[nodiscard]] double leastError() const { return leastError_; }
-  [[nodiscard]] std::size_t count() const { return field_.primitiveCount(); }
+  [[nodiscard]] std::size_t count() const { return field_.ellipsoidCount(); }
 
   /// Rounds the shapes, fits the intensities to what became of them, and rounds these.
   [[nodiscard]] Trial make(const QuantiserSteps& steps);

@@ -25,12 +25,12 @@ bool allOfSize(const std::array<std::vector<float>, N>& arrays, std::size_t n) {
 
 }  // namespace
 
-void Ellipsoids::resize(std::size_t n, bool perPrimitiveKappa) {
+void Ellipsoids::resize(std::size_t n, bool perEllipsoidKappa) {
   for (auto& v : center) v.resize(n);
   for (auto& v : logScale) v.resize(n);
   for (auto& v : rotation) v.resize(n);
   intensity.resize(n);
-  kappa.resize(perPrimitiveKappa ? n : 0);
+  kappa.resize(perEllipsoidKappa ? n : 0);
 }
 
 void checkInvariants(const Ellipsoids& e) {
@@ -52,7 +52,7 @@ bool wellFormed(const Ellipsoids& e) {
   return true;
 }
 
-std::size_t Field::primitiveCount() const {
+std::size_t Field::ellipsoidCount() const {
   std::size_t n = 0;
   for (const auto& chunk : chunks) n += chunk.ellipsoids.size();
   return n;

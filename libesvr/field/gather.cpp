@@ -11,7 +11,7 @@ std::array<double, 3> centerOf(const Ellipsoids& e, std::size_t i) {
   return {e.center[0][i], e.center[1][i], e.center[2][i]};
 }
 
-bool perPrimitiveKappa(const Field& field) {
+bool perEllipsoidKappa(const Field& field) {
   for (const auto& chunk : field.chunks)
     if (!chunk.ellipsoids.kappa.empty()) return true;
   return false;
@@ -29,7 +29,7 @@ void forEachEllipsoid(const Field& field, Visit&& visit) {
 GatheredField gather(const Field& field) {
   GatheredField g;
   for (const auto& chunk : field.chunks) g.origins.push_back(chunk.origin);
-  const bool several = perPrimitiveKappa(field);
+  const bool several = perEllipsoidKappa(field);
   if (!several) g.kernels.push_back(kernelConstants<float>(field.kernel));
   forEachEllipsoid(field, [&](std::uint32_t c, const Chunk& chunk, std::size_t i) {
     const Ellipsoids& e = chunk.ellipsoids;

@@ -6,7 +6,7 @@
 
 #include "esvr/coord.h"
 #include "esvr/sparse_volume.h"
-#include "field/window_kernels.h"
+#include "field/ssim_kernels.h"
 
 namespace esvr {
 
@@ -66,7 +66,7 @@ class SsimWindow {
   void alongY(const Box& voxels);
   void alongZ(const Box& voxels, BrickSums& out) const;
 
-  const WindowKernels& kernels_ = windowKernels();
+  const SsimKernels& kernels_ = ssimKernels();
   std::array<double, kSsimTaps> weights_;
   HaloValues products_{};
   std::array<double, kBrickSide * kHaloSide * kHaloSide> sumsX_{};

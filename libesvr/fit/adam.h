@@ -1,12 +1,12 @@
 #pragma once
-/// Adam (Kingma and Ba 2015) on primitives, in each one's own frame.
+/// Adam (Kingma and Ba 2015) on ellipsoids, in each one's own frame.
 
 #include <array>
 #include <span>
 #include <vector>
 
 #include "esvr/kernel.h"
-#include "fit/primitive.h"
+#include "fit/ellipsoid.h"
 
 namespace esvr {
 
@@ -25,28 +25,28 @@ struct AdamOptions {
   double beta2 = 0.95;  ///< short: the loss has no noise to average out
 };
 
-/// First and second moments of one primitive's gradient.
+/// First and second moments of one ellipsoid's gradient.
 struct AdamState {
   std::array<float, kParameters> m{}, v{};
-  std::uint32_t steps = 0;  ///< since the primitive was placed
+  std::uint32_t steps = 0;  ///< since the ellipsoid was placed
 };
 
 /// What a step may lead to.
-struct PrimitiveLimits {
+struct EllipsoidLimits {
   double smallestScale, largestScale;        ///< voxels
   double lowestIntensity, highestIntensity;  ///< in units of the target
 };
 
-/// What a pass tells of one primitive.
-struct PrimitiveGradient {
+/// What a pass tells of one ellipsoid.
+struct EllipsoidGradient {
   ParameterVector byParameter;  ///< of half the sum of squared residuals, or of the given loss
   double phi2;                  ///< sum over voxels of phi^2: the curvature by intensity
   double byKappa;               ///< the kernel's edge, the scales held
 };
 
-/// One step of every primitive.
-void adamStep(std::span<Primitive> primitives, std::span<AdamState> states,
-              std::span<const PrimitiveGradient> gradients, const StepSizes& sizes,
-              const AdamOptions& options, const PrimitiveLimits& limits);
+/// One step of every ellipsoid.
+void adamStep(std::span<Ellipsoid> ellipsoids, std::span<AdamState> states,
+              std::span<const EllipsoidGradient> gradients, const StepSizes& sizes,
+              const AdamOptions& options, const EllipsoidLimits& limits);
 
 }  // namespace esvr

@@ -1,16 +1,16 @@
 #pragma once
-/// Adam's step of one primitive, for host and device.
+/// Adam's step of one ellipsoid, for host and device.
 
 #include <algorithm>
 #include <cmath>
 
 #include "fit/adam.h"
-#include "fit/primitive_math.h"
+#include "fit/ellipsoid_math.h"
 
 namespace esvr {
 
 /// What every parameter's direction, which is about 1 at most, is multiplied by.
-ESVR_HD inline ParameterVector largestStep(const Primitive& p, const StepSizes& s) {
+ESVR_HD inline ParameterVector largestStep(const Ellipsoid& p, const StepSizes& s) {
   // Intensities near zero still move: in units of the target, whose largest magnitude is 1.
   constexpr double kIntensityFloor = 0.01;
   const double magnitude = std::abs(p.intensity);
@@ -23,7 +23,7 @@ ESVR_HD inline ParameterVector largestStep(const Primitive& p, const StepSizes& 
 ESVR_HD inline ParameterVector adamDirection(AdamState& state, const ParameterVector& gradient,
                                              const AdamOptions& o, const ParameterVector& largest) {
   // Gradients are of any size, but the squares of those below it vanish in float32: without it a
-  // quotient of nothing by less would move a primitive out of sight.
+  // quotient of nothing by less would move an ellipsoid out of sight.
   constexpr double kEpsilon = 1e-18;
   ++state.steps;
   const double c1 = 1.0 / (1.0 - std::pow(o.beta1, double(state.steps)));
@@ -39,8 +39,8 @@ ESVR_HD inline ParameterVector adamDirection(AdamState& state, const ParameterVe
 }
 
 /// Takes a step and keeps to the limits.
-ESVR_HD inline void moveWithin(Primitive& p, const ParameterVector& step,
-                               const PrimitiveLimits& limits) {
+ESVR_HD inline void moveWithin(Ellipsoid& p, const ParameterVector& step,
+                               const EllipsoidLimits& limits) {
   applyStep(p, step);
   p.intensity = std::clamp(p.intensity, limits.lowestIntensity, limits.highestIntensity);
   clampScales(p, limits.smallestScale, limits.largestScale);

@@ -8,7 +8,7 @@
 namespace esvr {
 namespace {
 
-void append(Ellipsoids& e, const Primitive& p, Coord frame, double scale) {
+void append(Ellipsoids& e, const Ellipsoid& p, Coord frame, double scale) {
   const auto center = inFrame(p.center, frame);
   const PrincipalAxes axes = principalAxes(p.L);
   for (std::size_t a = 0; a < 3; ++a) {
@@ -21,19 +21,19 @@ void append(Ellipsoids& e, const Primitive& p, Coord frame, double scale) {
 
 }  // namespace
 
-Field exportField(std::span<const Primitive> primitives, const ExportFrame& frame) {
+Field exportField(std::span<const Ellipsoid> ellipsoids, const ExportFrame& frame) {
   std::map<Coord, Ellipsoids> byChunk;
-  for (std::size_t i = 0; i < primitives.size(); ++i) {
-    const Coord chunk = frameOf(primitives[i].center);
-    Ellipsoids& ellipsoids = byChunk[chunk];
-    append(ellipsoids, primitives[i], chunk, frame.scale);
-    if (!frame.kappas.empty()) ellipsoids.kappa.push_back(float(frame.kappas[i]));
+  for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
+    const Coord chunk = frameOf(ellipsoids[i].center);
+    Ellipsoids& stored = byChunk[chunk];
+    append(stored, ellipsoids[i], chunk, frame.scale);
+    if (!frame.kappas.empty()) stored.kappa.push_back(float(frame.kappas[i]));
   }
   Field field;
   field.background = frame.background;
   field.kernel = frame.kernel;
-  for (auto& [chunk, ellipsoids] : byChunk)
-    field.chunks.push_back({frame.origin + chunk, std::move(ellipsoids)});
+  for (auto& [chunk, stored] : byChunk)
+    field.chunks.push_back({frame.origin + chunk, std::move(stored)});
   return field;
 }
 

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "esvr/ellipsoids.h"
-#include "fit/primitive.h"
+#include "fit/ellipsoid.h"
 
 namespace esvr {
 
@@ -13,10 +13,10 @@ struct ExportFrame {
   double scale = 1.0;  ///< FitTarget::scale
   float background = 0.0f;
   Kernel kernel;
-  std::span<const double> kappas{};  ///< of the primitives, where they differ
+  std::span<const double> kappas{};  ///< of the ellipsoids, where they differ
 };
 
 /// Principal axes, log scales and intensities in the grid's units; chunks of kChunkExtent.
-[[nodiscard]] Field exportField(std::span<const Primitive> primitives, const ExportFrame& frame);
+[[nodiscard]] Field exportField(std::span<const Ellipsoid> ellipsoids, const ExportFrame& frame);
 
 }  // namespace esvr

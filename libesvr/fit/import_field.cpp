@@ -2,9 +2,9 @@
 
 namespace esvr {
 
-std::vector<Primitive> importField(const Field& field, Coord origin, double scale) {
-  std::vector<Primitive> all;
-  all.reserve(field.primitiveCount());
+std::vector<Ellipsoid> importField(const Field& field, Coord origin, double scale) {
+  std::vector<Ellipsoid> all;
+  all.reserve(field.ellipsoidCount());
   for (const auto& chunk : field.chunks) {
     const Ellipsoids& e = chunk.ellipsoids;
     const Coord frame = chunk.origin - origin;

@@ -4,12 +4,12 @@
 #include <vector>
 
 #include "esvr/ellipsoids.h"
-#include "fit/primitive.h"
+#include "fit/ellipsoid.h"
 
 namespace esvr {
 
 /// The ellipsoids of all chunks, one behind the other. \param origin  of the volume, index
 /// coordinates \param scale  FitTarget::scale
-[[nodiscard]] std::vector<Primitive> importField(const Field& field, Coord origin, double scale);
+[[nodiscard]] std::vector<Ellipsoid> importField(const Field& field, Coord origin, double scale);
 
 }  // namespace esvr

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "fit/cpu_intensity_passes.h"
+#include "fit/cpu/cpu_intensity_passes.h"
 #include "fit/cuda/make_cuda_intensity_passes.h"
 
 namespace esvr {

@@ -1,5 +1,5 @@
 #pragma once
-/// Descends on the kernel's edge, which all primitives share.
+/// Descends on the kernel's edge, which all ellipsoids share.
 
 #include "esvr/kernel.h"
 

@@ -1,4 +1,4 @@
-#include "fit/cpu_optimiser.h"
+#include "fit/cpu/cpu_optimiser.h"
 #include "fit/cuda/make_cuda_optimiser.h"
 #include "fit/optimiser.h"
 

@@ -10,7 +10,7 @@
 
 #include "esvr/device.h"
 #include "esvr/fit.h"
-#include "fit/primitive.h"
+#include "fit/ellipsoid.h"
 #include "fit/target.h"
 #include "fit/tuning.h"
 
@@ -18,8 +18,6 @@ namespace esvr {
 
 struct OptimiserOptions {
   Kernel kernel;
-  Loss loss = Loss::kSquared;
-  double beta = 0.2;
   std::uint64_t seed = 1;
   Device device;
   std::optional<std::size_t> maxDeviceBytes;  ///< FitOptions::maxDeviceBytes
@@ -45,10 +43,10 @@ class Optimiser {
  public:
   virtual ~Optimiser() = default;
 
-  /// Adds primitives where the error is, until there are `count`, or no error is left to mend.
+  /// Adds ellipsoids where the error is, until there are `count`, or no error is left to mend.
   virtual void growTo(std::size_t count) = 0;
 
-  /// Moves `count` primitives whose removal costs least to where the error is.
+  /// Moves `count` ellipsoids whose removal costs least to where the error is.
   virtual void relocate(std::size_t count) = 0;
 
   /// Gradients and a step of factor times the tuned sizes, for each of the factors.
@@ -64,22 +62,22 @@ class Optimiser {
   /// The kernel as it is now.
   [[nodiscard]] virtual const Kernel& kernel() const = 0;
 
-  /// Sum over the primitives of dL/dkappa at the last gradients, half widths held; 0 before any.
+  /// Sum over the ellipsoids of dL/dkappa at the last gradients, half widths held; 0 before any.
   [[nodiscard]] virtual double kappaSlope() = 0;
 
-  /// Gives all primitives another edge; scales change so that their half widths stay.
+  /// Gives all ellipsoids another edge; scales change so that their half widths stay.
   virtual void setKappa(float kappa) = 0;
 
-  /// Drops primitives that no voxel sees. They cost bytes and change nothing.
+  /// Drops ellipsoids that no voxel sees. They cost bytes and change nothing.
   virtual void dropUnseen() = 0;
 
-  [[nodiscard]] virtual std::size_t primitiveCount() const = 0;
-  [[nodiscard]] virtual std::vector<Primitive> primitives() const = 0;
+  [[nodiscard]] virtual std::size_t ellipsoidCount() const = 0;
+  [[nodiscard]] virtual std::vector<Ellipsoid> ellipsoids() const = 0;
   /// Of the lists last built.
   [[nodiscard]] virtual std::uint64_t pairCount() const = 0;
   /// The most that has been held so far; 0 on the CPU.
   [[nodiscard]] virtual std::size_t deviceBytes() const = 0;
-  /// Spent so far on finding where primitives are missing and shaping them.
+  /// Spent so far on finding where ellipsoids are missing and shaping them.
   [[nodiscard]] virtual double secondsSeeding() const = 0;
 };
 

@@ -1,13 +1,13 @@
 #pragma once
-/// From a pair's moments to the gradient by a primitive's parameters: the chain rule, once.
+/// From a pair's moments to the gradient by an ellipsoid's parameters: the chain rule, once.
 
 #include "field/brick_kernels.h"
 #include "fit/adam.h"
-#include "fit/primitive.h"
+#include "fit/ellipsoid.h"
 
 namespace esvr {
 
-/// Moments of a primitive's pairs, summed in float64 in the pairs' order.
+/// Moments of an ellipsoid's pairs, summed in float64 in the pairs' order.
 struct PairSums {
   double w0x, w0z, w0xx, w0xz, w0zz, w1, w1x, w1z, w2, rPhi, phi2, rEdge;
 
@@ -40,8 +40,8 @@ struct PairSums {
           2 * c * second(1, 2), s.rPhi};
 }
 
-/// All that a pass tells of a primitive. \param slope  KernelConstants::slope of its kernel
-[[nodiscard]] ESVR_HD inline PrimitiveGradient primitiveGradient(const LineForm& f,
+/// All that a pass tells of an ellipsoid. \param slope  KernelConstants::slope of its kernel
+[[nodiscard]] ESVR_HD inline EllipsoidGradient ellipsoidGradient(const LineForm& f,
                                                                  const PairSums& s, double slope) {
   return {parameterGradient(f, s), s.phi2, double(f.intensity) * slope * s.rEdge};
 }
@@ -49,13 +49,13 @@ struct PairSums {
 /// dL/dkappa where half widths stay: what a wider or narrower kernel would do is the scales'
 /// affair, which shrink by d ln m / 2 as kappa grows, the direction of the three diagonal
 /// parameters. \param logMByKappa  KernelWidth's
-[[nodiscard]] ESVR_HD inline double edgeGradient(const PrimitiveGradient& gradient,
+[[nodiscard]] ESVR_HD inline double edgeGradient(const EllipsoidGradient& gradient,
                                                  double logMByKappa) {
   const ParameterVector& g = gradient.byParameter;
   return gradient.byKappa - 0.5 * logMByKappa * (g[3] + g[4] + g[5]);
 }
 
-/// How much the sum of squares would grow if the primitive vanished:
+/// How much the sum of squares would grow if the ellipsoid vanished:
 /// sum (r - I phi)^2 - r^2 = I^2 sum phi^2 - 2 I sum r phi.
 [[nodiscard]] ESVR_HD inline double removalError(double intensity, double phi2, double rPhi) {
   return intensity * (intensity * phi2 - 2.0 * rPhi);

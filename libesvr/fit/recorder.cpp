@@ -13,16 +13,16 @@ double Recorder::seconds() const {
   return std::chrono::duration<double>(Clock::now() - start_).count();
 }
 
-const CurvePoint& Recorder::record(Optimiser& optimiser, std::uint32_t iteration) {
-  return record(optimiser.measure(), optimiser.primitiveCount(), iteration);
+const TimedCurvePoint& Recorder::record(Optimiser& optimiser, std::uint32_t iteration) {
+  return record(optimiser.measure(), optimiser.ellipsoidCount(), iteration);
 }
 
-const CurvePoint& Recorder::record(const FitErrors& errors, std::size_t primitives,
+const TimedCurvePoint& Recorder::record(const FitErrors& errors, std::size_t ellipsoids,
                                    std::uint32_t iteration) {
-  CurvePoint point;
+  TimedCurvePoint point;
   point.seconds = seconds();
   point.iteration = iteration;
-  point.primitives = primitives;
+  point.ellipsoids = ellipsoids;
   point.psnrBox = psnrOf(errors.squaredSumBox, target_.boxVoxels, target_.peak);
   point.psnrActive = psnrOf(errors.squaredSumActive, double(target_.activeVoxels), target_.peak);
   point.maxError = errors.largest / target_.scale;
@@ -30,7 +30,7 @@ const CurvePoint& Recorder::record(const FitErrors& errors, std::size_t primitiv
   return curve_.back();
 }
 
-void Recorder::report(const CurvePoint& now, double fraction) {
+void Recorder::report(const TimedCurvePoint& now, double fraction) {
   constexpr double kInterval = 0.25;  // seconds
   if (!options_.progress || now.seconds - lastReport_ < kInterval) return;
   lastReport_ = now.seconds;

@@ -16,30 +16,30 @@ inline constexpr double kPerfectPsnr = 999.0;
 
 class Recorder {
  public:
-  Recorder(const FitTarget& target, const FitOptions& options)
+  Recorder(const FitTarget& target, const CommonFitOptions& options)
       : target_(target), options_(options) {}
 
   [[nodiscard]] double seconds() const;
   [[nodiscard]] bool cancelled() const { return options_.cancel && options_.cancel->cancelled(); }
 
   /// Appends a point to the curve.
-  const CurvePoint& record(const FitErrors& errors, std::size_t primitives,
-                           std::uint32_t iteration);
+  const TimedCurvePoint& record(const FitErrors& errors, std::size_t ellipsoids,
+                                std::uint32_t iteration);
   /// The same, measured exactly.
-  const CurvePoint& record(Optimiser& optimiser, std::uint32_t iteration);
+  const TimedCurvePoint& record(Optimiser& optimiser, std::uint32_t iteration);
 
   /// Reports progress if the last report is long enough ago.
-  void report(const CurvePoint& now, double fraction);
+  void report(const TimedCurvePoint& now, double fraction);
 
-  [[nodiscard]] const std::vector<CurvePoint>& curve() const { return curve_; }
+  [[nodiscard]] const std::vector<TimedCurvePoint>& curve() const { return curve_; }
 
  private:
   using Clock = std::chrono::steady_clock;
   const FitTarget& target_;
-  const FitOptions& options_;
+  const CommonFitOptions& options_;
   Clock::time_point start_ = Clock::now();
   double lastReport_ = -1.0;
-  std::vector<CurvePoint> curve_;
+  std::vector<TimedCurvePoint> curve_;
 };
 
 }  // namespace esvr

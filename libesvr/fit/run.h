@@ -11,11 +11,9 @@ namespace esvr {
 
 /// What a run is to reach, every choice made.
 struct RunPlan {
-  std::size_t count = 0;         ///< with psnr: the first attempt
-  std::size_t largestCount = 0;  ///< with psnr: growth ends here
-  std::uint32_t iterations = 0;
-  std::uint32_t firstIteration = 0;  ///< done before, as the curve counts them
-  std::optional<double> psnr;        ///< dB over the box
+  std::size_t count = 0;         ///< ellipsoids at the end of growth
+  std::uint32_t iterations = 0;  ///< length of the schedule
+  std::optional<double> psnr;    ///< dB over the box: the run ends as soon as it is reached
   std::optional<double>
       seconds;              ///< since the recorder's start; replaces `iterations` as the clock
   bool learnKappa = false;  ///< else the kernel stays as it is
@@ -23,7 +21,7 @@ struct RunPlan {
 
 struct RunEnd {
   FitEnd end;
-  std::uint32_t iterations;
+  std::uint32_t iterations;  ///< that were done
 };
 
 RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,

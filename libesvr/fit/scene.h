@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "fit/adam.h"
-#include "fit/draw_options.h"
+#include "fit/sampling_options.h"
 #include "fit/target.h"
 #include "fit/tuning.h"
 
@@ -21,18 +21,18 @@ namespace esvr {
   return {.positive = target.highest > 0.0, .negative = target.lowest < 0.0};
 }
 
-[[nodiscard]] inline PrimitiveLimits limitsOf(const FitTarget& target, const Tuning& tuning) {
+[[nodiscard]] inline EllipsoidLimits limitsOf(const FitTarget& target, const Tuning& tuning) {
   return {tuning.smallestScale, tuning.largestScale, tuning.intensityHeadroom * target.lowest,
           tuning.intensityHeadroom * target.highest};
 }
 
-/// Half width of a seed's neighbourhood: a share of the distance of neighbours if the primitives
+/// Half width of a seed's neighbourhood: a share of the distance of neighbours if the ellipsoids
 /// were spread evenly over the active voxels.
-[[nodiscard]] inline int seedWindow(const FitTarget& target, std::size_t primitives,
+[[nodiscard]] inline int seedWindow(const FitTarget& target, std::size_t ellipsoids,
                                     const Tuning& tuning) {
   constexpr int kSmallest = 2, kLargest = 6;  // voxels
   const double distance =
-      std::cbrt(double(target.activeVoxels) / double(std::max<std::size_t>(primitives, 1)));
+      std::cbrt(double(target.activeVoxels) / double(std::max<std::size_t>(ellipsoids, 1)));
   return std::clamp(int(std::lround(tuning.seedWindow * distance)), kSmallest, kLargest);
 }
 

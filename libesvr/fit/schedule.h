@@ -9,13 +9,13 @@
 
 namespace esvr {
 
-/// One stretch of a run: from `from` to `to` primitives over `iterations`.
+/// A run: from `from` to `to` ellipsoids over `iterations`.
 struct Schedule {
   std::size_t from = 0, to = 0;
   std::uint32_t iterations = 0;
   const Tuning& tuning;
 
-  /// Primitives wanted at a fraction of the run: linear from `from` to `to` until growUntil.
+  /// Ellipsoids wanted at a fraction of the run: linear from `from` to `to` until growUntil.
   [[nodiscard]] std::size_t countAt(double fraction) const {
     const double share = std::min(1.0, fraction / tuning.growUntil);
     return from + std::size_t(std::llround(share * double(to - from)));
@@ -31,9 +31,9 @@ struct Schedule {
     const auto share = std::uint32_t(tuning.eventEvery * iterations);
     return std::max(share, std::uint32_t(tuning.eventSpacing));
   }
-  [[nodiscard]] std::size_t relocationsAt(double fraction, std::size_t primitives) const {
+  [[nodiscard]] std::size_t relocationsAt(double fraction, std::size_t ellipsoids) const {
     if (fraction >= tuning.relocateUntil) return 0;
-    return std::size_t(tuning.relocateShare * double(primitives));
+    return std::size_t(tuning.relocateShare * double(ellipsoids));
   }
 };
 

@@ -5,7 +5,7 @@
 
 #include "esvr/coord.h"
 #include "fit/eigen.h"
-#include "fit/primitive.h"
+#include "fit/ellipsoid.h"
 
 namespace esvr {
 
@@ -40,12 +40,12 @@ struct SeedShape {
 /// Height of a seed where the residual is r. Where little is left to mend but in a few places, many
 /// draws fall close together, and all of them would fill the same gap: they share it.
 ESVR_HD inline double seedHeight(double r, const SeedMoments& m, const SeedShape& shape) {
-  const double drawsAround = m.energy / shape.share;
-  return -r * shape.intensity / (drawsAround > 1.0 ? drawsAround : 1.0);
+  const double countsAround = m.energy / shape.share;
+  return -r * shape.intensity / (countsAround > 1.0 ? countsAround : 1.0);
 }
 
 /// An ellipsoid of the moments' place and spread. \param r  the residual at the voxel
-ESVR_HD inline Primitive seedFromMoments(Coord voxel, double r, const SeedMoments& m,
+ESVR_HD inline Ellipsoid seedFromMoments(Coord voxel, double r, const SeedMoments& m,
                                          const SeedShape& shape) {
   constexpr double kSmallestVariance = 0.25;  // voxels^2: a seed of one voxel still has a shape
   const Eigen::Vector3d mean(m.x / m.mass, m.y / m.mass, m.z / m.mass);
@@ -59,7 +59,7 @@ ESVR_HD inline Primitive seedFromMoments(Coord voxel, double r, const SeedMoment
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
   axes.computeDirect(covariance);
 
-  Primitive p;
+  Ellipsoid p;
   p.center = {voxel.x + mean[0], voxel.y + mean[1], voxel.z + mean[2]};
   for (int i = 0; i < 3; ++i) {
     const double variance = axes.eigenvalues()[i];

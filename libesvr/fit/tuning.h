@@ -16,10 +16,10 @@ struct Tuning {
   double firstShare = 0.2;      ///< of the count, seeded at the start
   double growUntil = 0.3;       ///< fraction of the run by which the rest has been added
   double relocateUntil = 0.7;   ///< fraction of the run
-  double relocateShare = 0.05;  ///< of the primitives, moved by each event
+  double relocateShare = 0.05;  ///< of the ellipsoids, moved by each event
   double eventEvery = 0.01;     ///< of the run
-  int eventSpacing = 15;        ///< iterations between events at least: new primitives must settle
-  int graceSteps = 14;          ///< a primitive younger than this is not relocated
+  int eventSpacing = 15;        ///< iterations between events at least: new ellipsoids must settle
+  int graceSteps = 14;          ///< an ellipsoid younger than this is not relocated
   float firstKappa = 0.5f;      ///< where its descent begins
   double kappaStep = 0.1;       ///< largest change of kappa by an event
   double seedIntensity = 1.0;   ///< of the residual at a seed

@@ -22,9 +22,9 @@ void noteSkipped(const SectionTable& table, std::vector<std::string>& notes) {
                       " bytes");
 }
 
-void noteGrid(const EncodedGrid& grid, std::vector<std::string>& notes) {
+void noteGrid(const StoredGrid& grid, std::vector<std::string>& notes) {
   const std::string name = "grid '" + grid.descriptor.name + "'";
-  if (grid.field.primitiveCount() == 0)
+  if (grid.field.ellipsoidCount() == 0)
     notes.push_back(name +
                     (grid.voxels ? " holds voxels and no ellipsoids" : " has no ellipsoids"));
   if (float(grid.descriptor.background) != grid.field.background)

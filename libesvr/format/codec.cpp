@@ -28,7 +28,7 @@ constexpr std::size_t kBufferBytes = std::size_t{1} << 30;
 constexpr std::uint64_t kMaxBloscRatio = 16384;
 
 /// Compression that saves less is not worth a decoder.
-constexpr std::uint64_t kLeastSaving = 64;
+constexpr std::uint64_t kMinSaving = 64;
 
 constexpr int kThreads = 1;  // Blosc's pool of threads would be global
 
@@ -106,7 +106,7 @@ std::vector<std::byte> decompress(std::span<const std::byte> stored, std::uint64
 Packed pack(std::vector<std::byte> raw, std::size_t typeSize) {
   const std::uint64_t rawBytes = raw.size();
   auto packed = compressSmallest(raw, typeSize);
-  const bool pays = packed.size() + kLeastSaving <= rawBytes;
+  const bool pays = packed.size() + kMinSaving <= rawBytes;
   if (pays && plausibleSizes(Codec::kBlosc, packed.size(), rawBytes))
     return {Codec::kBlosc, std::move(packed), rawBytes};
   return {Codec::kRaw, std::move(raw), rawBytes};

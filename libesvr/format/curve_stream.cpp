@@ -11,11 +11,11 @@
 namespace esvr::format {
 namespace {
 
-constexpr std::size_t kPointBytes = 5 * sizeof(std::uint64_t) + sizeof(std::uint32_t);
+constexpr std::size_t kPointBytes = 4 * sizeof(std::uint64_t) + sizeof(std::uint32_t);
 
 /// A PSNR is infinite where the error is zero.
 bool valid(const CurvePoint& p) {
-  return std::isfinite(p.seconds) && std::isfinite(p.maxError) && !std::isnan(p.psnrBox) &&
+  return std::isfinite(p.maxError) && !std::isnan(p.psnrBox) &&
          !std::isnan(p.psnrActive);
 }
 constexpr const char* kInvalid = "a point of the curve is not a number";
@@ -23,8 +23,7 @@ constexpr const char* kInvalid = "a point of the curve is not a number";
 /// Calls `visit` with each of a point's members in the file's order.
 template <class Visit>
 void forEachMember(Visit visit) {
-  visit(&CurvePoint::seconds);
-  visit(&CurvePoint::primitives);
+  visit(&CurvePoint::ellipsoids);
   visit(&CurvePoint::psnrBox);
   visit(&CurvePoint::psnrActive);
   visit(&CurvePoint::maxError);

@@ -45,9 +45,9 @@ class GridDecoder {
   GridDecoder(SectionReader& sections, std::uint32_t grid, const ReadPart* part)
       : sections_(sections), g_(grid), part_(part) {}
 
-  EncodedGrid decode() {
+  StoredGrid decode() {
     GridRecord record = readRecord();
-    EncodedGrid grid = std::move(record.grid);
+    StoredGrid grid = std::move(record.grid);
     if (record.chunkCount > 1) record.chunks = readChunkTable(record.chunkCount);
     readChunks(record.chunks, grid);
     if (grid.topology == TopologyKind::kLeaves) readLeaves(grid);
@@ -113,7 +113,7 @@ class GridDecoder {
     return !part_ || !part_->box || meet(box, *part_->box);
   }
 
-  void readChunks(const std::vector<ChunkRecord>& records, EncodedGrid& grid) {
+  void readChunks(const std::vector<ChunkRecord>& records, StoredGrid& grid) {
     if (anyQuantised(records.size())) grid.quantised.resize(records.size());
     std::vector<OpenChunk> open;
     for (std::uint32_t c = 0; c < records.size(); ++c) open.push_back(openChunk(c, records[c]));
@@ -137,14 +137,14 @@ class GridDecoder {
   /// How many layers to read of each chunk.
   [[nodiscard]] std::size_t layersWanted(const std::vector<ChunkRecord>& records,
                                          const std::vector<OpenChunk>& open) const {
-    const std::size_t most = part_ && part_->layers ? *part_->layers : kAllLayers;
-    if (!part_ || !part_->ellipsoids) return most;
+    const std::size_t maxLayers = part_ && part_->layers ? *part_->layers : kAllLayers;
+    if (!part_ || !part_->ellipsoids) return maxLayers;
     std::vector<std::uint64_t> sizes;
     for (std::size_t c = 0; c < open.size(); ++c) addLayerSizes(records[c], open[c], sizes);
     std::uint64_t sum = 0;
     for (std::size_t layer = 0; layer < sizes.size(); ++layer)
-      if ((sum += sizes[layer]) >= *part_->ellipsoids) return std::min(most, layer + 1);
-    return most;
+      if ((sum += sizes[layer]) >= *part_->ellipsoids) return std::min(maxLayers, layer + 1);
+    return maxLayers;
   }
 
   void addLayerSizes(const ChunkRecord& record, const OpenChunk& open,
@@ -160,7 +160,7 @@ class GridDecoder {
   }
 
   Chunk readLayered(std::uint32_t c, const ChunkRecord& record, const OpenChunk& open,
-                    EncodedGrid& grid) {
+                    StoredGrid& grid) {
     const auto& blocks = open.directory.blocks;
     std::vector<std::size_t> chosen;
     for (std::size_t b = 0; b < blocks.size(); ++b)
@@ -178,7 +178,7 @@ class GridDecoder {
     return chunk;
   }
 
-  Chunk readChunk(std::uint32_t c, const ChunkRecord& record, EncodedGrid& grid) {
+  Chunk readChunk(std::uint32_t c, const ChunkRecord& record, StoredGrid& grid) {
     Chunk chunk{record.origin, {}};
     if (record.count == 0 || !wanted(record.box)) return chunk;
     if (grid.quantised.empty())
@@ -211,29 +211,27 @@ class GridDecoder {
     return dequantise(quantised);
   }
 
-  void readLeaves(EncodedGrid& grid) {
+  void readLeaves(StoredGrid& grid) {
     const auto section = id(SectionKind::kLeaves);
     if (sections_.has(section))
       grid.leaves = getLeaves(sections_.get(section), sections_.place(section));
   }
 
-  void readMask(EncodedGrid& grid) {
+  void readMask(StoredGrid& grid) {
     const auto section = id(SectionKind::kMask);
     Mask mask = getMask(sections_.get(section), sections_.place(section));
     grid.leaves = std::move(mask.leaves);
     grid.mask = std::move(mask.active);
   }
 
-  void readVoxels(EncodedGrid& grid) {
-    const auto section = id(SectionKind::kVoxels), old = id(SectionKind::kOldVoxels);
+  void readVoxels(StoredGrid& grid) {
+    const auto section = id(SectionKind::kVoxels);
     if (sections_.has(section))
       grid.voxels = getVoxels(sections_.get(section), sections_.place(section));
-    else if (sections_.has(old))
-      grid.voxels = getOldVoxels(sections_.get(old), sections_.place(old));
   }
 
   /// Of all layers: some of them alone have none.
-  void readResidual(EncodedGrid& grid) {
+  void readResidual(StoredGrid& grid) {
     const auto section = id(SectionKind::kResidual);
     if (!sections_.has(section) || layers_ != kAllLayers) return;
     grid.residual = getVoxels(sections_.get(section), sections_.place(section));
@@ -241,7 +239,7 @@ class GridDecoder {
   }
 
   /// Those of the layers that were read; of a box nothing is known.
-  void readLayerErrors(EncodedGrid& grid) {
+  void readLayerErrors(StoredGrid& grid) {
     const auto section = id(SectionKind::kLayerErrors);
     if (!sections_.has(section) || (part_ && part_->box)) return;
     grid.layerErrors =
@@ -249,7 +247,7 @@ class GridDecoder {
     grid.layerErrors.resize(layerCount(grid));
   }
 
-  void readCurve(EncodedGrid& grid) {
+  void readCurve(StoredGrid& grid) {
     const auto section = id(SectionKind::kCurve);
     if (sections_.has(section) && !part_)
       grid.curve = getCurve(sections_.get(section), sections_.place(section));

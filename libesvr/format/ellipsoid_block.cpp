@@ -6,11 +6,11 @@
 #include <bit>
 #include <type_traits>
 
-#include "core/lattice_bits.h"
-#include "core/morton.h"
+#include "codec/cell_tree.h"
+#include "codec/lattice_bits.h"
+#include "codec/morton.h"
+#include "codec/symbol_coder.h"
 #include "esvr/error.h"
-#include "format/cell_tree.h"
-#include "format/symbol_coder.h"
 
 namespace esvr::format {
 namespace {
@@ -36,7 +36,7 @@ class BlockCoder {
 
   void code(Run run) {
     auto keys = keysOf(run);
-    CellTree<Side>(sides_[0]).code(keys, 3 * q_.lattice.cellBits);
+    codec::CellTree<Side>(sides_[0]).code(keys, 3 * q_.lattice.cellBits);
     for (std::size_t k = 0; k < run.count; ++k) {
       const std::size_t i = run.first + k;
       const CoarseScales s = codeCoarseScales(i);
@@ -49,7 +49,7 @@ class BlockCoder {
   }
 
  private:
-  static constexpr bool kReads = std::is_same_v<Side, Reader>;
+  static constexpr bool kReads = std::is_same_v<Side, codec::Reader>;
 
   std::vector<std::uint64_t> keysOf(Run run) const {
     std::vector<std::uint64_t> keys(run.count);
@@ -65,7 +65,7 @@ class BlockCoder {
     return key;
   }
 
-  std::uint32_t codeCoarse(NumberModel& model, std::uint32_t value) {
+  std::uint32_t codeCoarse(codec::NumberModel& model, std::uint32_t value) {
     const std::uint32_t coarse = model.code(sides_[1], value);
     require(coarse <= Lattice::kMaxCoarseScale, "a scale");
     return coarse;
@@ -142,12 +142,12 @@ class BlockCoder {
   std::array<Side, kStreams>& sides_;
   QuantisedEllipsoids& q_;
   Previous previous_;
-  std::array<NumberModel, kContexts> low_, middle_, high_;
-  std::array<std::array<BitModel, kContexts>, 3> rest_;
-  std::array<std::array<BitModel, std::size_t{1} << kRotationModelled>, 3> rotation_;
-  BitModel sign_;
-  std::array<NumberModel, kWidths> magnitude_;
-  std::array<TreeModel<4>, kWidths> precision_;
+  std::array<codec::NumberModel, kContexts> low_, middle_, high_;
+  std::array<std::array<codec::BitModel, kContexts>, 3> rest_;
+  std::array<std::array<codec::BitModel, std::size_t{1} << kRotationModelled>, 3> rotation_;
+  codec::BitModel sign_;
+  std::array<codec::NumberModel, kWidths> magnitude_;
+  std::array<codec::TreeModel<4>, kWidths> precision_;
 };
 
 }  // namespace
@@ -169,19 +169,19 @@ std::vector<Run> blockRuns(std::size_t count, std::span<const std::size_t> layer
 }
 
 void padForEllipsoids(ByteWriter& out, std::size_t count) {
-  out.padTo(std::max(out.size(), (count + kMostEllipsoidsAByte - 1) / kMostEllipsoidsAByte));
+  out.padTo(std::max(out.size(), (count + kMaxEllipsoidsPerByte - 1) / kMaxEllipsoidsPerByte));
 }
 
 void checkCount(const ByteReader& in, std::uint64_t stored, std::uint64_t count,
                 std::uint64_t bytes) {
-  if (stored != count || count / kMostEllipsoidsAByte > bytes)
+  if (stored != count || count / kMaxEllipsoidsPerByte > bytes)
     in.fail(std::to_string(bytes) + " bytes of content with " + std::to_string(stored) +
             " ellipsoids for " + std::to_string(count));
 }
 
 BlockStreams encodeBlock(QuantisedEllipsoids& q, Run run) {
-  std::array<Writer, kStreams> writers;
-  BlockCoder<Writer>(writers, q).code(run);
+  std::array<codec::Writer, kStreams> writers;
+  BlockCoder<codec::Writer>(writers, q).code(run);
   BlockStreams streams;
   for (std::size_t s = 0; s < kStreams; ++s) streams[s] = writers[s].coder.finish();
   return streams;
@@ -197,10 +197,11 @@ std::vector<BlockStreams> encodeBlocks(QuantisedEllipsoids q) {
 }
 
 void decodeBlock(const BlockBytes& streams, Run run, QuantisedEllipsoids& q) {
-  std::array<Reader, kStreams> readers{
-      Reader{RangeDecoder(streams[0])}, Reader{RangeDecoder(streams[1])},
-      Reader{RangeDecoder(streams[2])}, Reader{RangeDecoder(streams[3])}};
-  BlockCoder<Reader>(readers, q).code(run);
+  std::array<codec::Reader, kStreams> readers{codec::Reader{codec::RangeDecoder(streams[0])},
+                                              codec::Reader{codec::RangeDecoder(streams[1])},
+                                              codec::Reader{codec::RangeDecoder(streams[2])},
+                                              codec::Reader{codec::RangeDecoder(streams[3])}};
+  BlockCoder<codec::Reader>(readers, q).code(run);
 }
 
 }  // namespace esvr::format

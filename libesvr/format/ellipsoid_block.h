@@ -31,7 +31,7 @@ using BlockBytes = std::array<std::span<const std::byte>, kStreams>;
 
 /// Alike ellipsoids cost next to nothing, and a reader must know how many a byte can hold before it
 /// allocates: writers add zeros where there would be more.
-inline constexpr std::uint64_t kMostEllipsoidsAByte = 64;
+inline constexpr std::uint64_t kMaxEllipsoidsPerByte = 64;
 void padForEllipsoids(ByteWriter& out, std::size_t count);
 
 /// Refuses a section of `bytes` that says it has `stored` ellipsoids where its chunk has `count`,

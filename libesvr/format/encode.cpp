@@ -59,7 +59,6 @@ class Sections {
 
  private:
   void addPacked(const SectionId& id, std::uint16_t flags, Packed packed) {
-    table_.versionMinor = std::max(table_.versionMinor, minorOf(id.kind));
     SectionEntry entry{id, packed.codec, flags, 0, 0, 0, 0};
     entry.rawBytes = packed.rawBytes;
     entry.storedBytes = packed.bytes.size();
@@ -77,16 +76,16 @@ constexpr std::size_t kByteSize = 1, kFloatSize = sizeof(float), kDoubleSize = s
 
 /// A grid as it is written: its chunks in file order, with their records.
 struct SortedGrid {
-  const EncodedGrid& grid;
+  const StoredGrid& grid;
   std::vector<Chunk> chunks;
   std::vector<ChunkRecord> records;
 };
 
-[[noreturn]] void refuse(const EncodedGrid& grid, const std::string& what) {
+[[noreturn]] void refuse(const StoredGrid& grid, const std::string& what) {
   throw RuntimeFailure("cannot store grid '" + grid.descriptor.name + "': " + what);
 }
 
-void checkLayers(const EncodedGrid& grid) {
+void checkLayers(const StoredGrid& grid) {
   for (const auto& q : grid.quantised) {
     const auto& ends = q.layerEnds;
     if (ends.empty()) continue;
@@ -98,7 +97,7 @@ void checkLayers(const EncodedGrid& grid) {
     refuse(grid, "it has not one error for each layer");
 }
 
-void checkGrid(const EncodedGrid& grid) {
+void checkGrid(const StoredGrid& grid) {
   if (const auto fault = faultOf(grid)) refuse(grid, fault->text);
   if (grid.topology == TopologyKind::kThreshold && !grid.leaves.empty())
     refuse(grid, "it has leaves, but a topology without");
@@ -118,7 +117,7 @@ void checkGrid(const EncodedGrid& grid) {
   }
 }
 
-SortedGrid sorted(const EncodedGrid& grid) {
+SortedGrid sorted(const StoredGrid& grid) {
   SortedGrid result{grid, {}, {}};
   for (const auto& chunk : grid.field.chunks) {
     result.chunks.push_back({chunk.origin, grid.quantised.empty() ? inMortonOrder(chunk.ellipsoids)
@@ -180,7 +179,7 @@ void addQuantised(Sections& out, std::uint32_t g, std::uint32_t c, const SortedG
         putLayered(q, grid.records[c].box, blockBoxes(grid.chunks[c], q, grid.grid.field.kernel)));
 }
 
-void addExtras(Sections& out, std::uint32_t g, const EncodedGrid& grid) {
+void addExtras(Sections& out, std::uint32_t g, const StoredGrid& grid) {
   if (grid.topology == TopologyKind::kMask)
     out.addRaw({SectionKind::kMask, g}, kRequired, putMask(grid.leaves, grid.mask));
   else if (!grid.leaves.empty())
@@ -217,6 +216,10 @@ std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
     addExtras(out, g, grids[g].grid);
   }
   return out.assemble();
+}
+
+std::uint64_t bytesAdded(const StoredGrid& grid) {
+  return encodeEsvr({{}, {grid}}).size() - encodeEsvr({}).size();
 }
 
 }  // namespace esvr

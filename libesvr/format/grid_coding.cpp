@@ -37,19 +37,19 @@ std::vector<Coord> brickCorners(const SparseVolume& volume) {
 }
 
 /// What no value of the source lies beyond, active or not.
-ValueRange rangeOf(const EncodedGrid& grid) {
+ValueRange rangeOf(const StoredGrid& grid) {
   const float background = grid.field.background;
   return {std::min(grid.valueMin, background), std::max(grid.valueMax, background)};
 }
 
-void storeMask(const SparseVolume& source, EncodedGrid& grid) {
+void storeMask(const SparseVolume& source, StoredGrid& grid) {
   grid.topology = TopologyKind::kMask;
   grid.leaves = brickCorners(source);
   grid.mask = source.active;
   grid.activeThreshold = kAlwaysActive;
 }
 
-void chooseTopology(const SparseVolume& source, EncodedGrid& grid) {
+void chooseTopology(const SparseVolume& source, StoredGrid& grid) {
   const auto fitsBest = [&](std::span<const Coord> bricks) {
     return format::chooseThreshold(source, grid.field, ruleOf(grid), bricks);
   };
@@ -65,7 +65,7 @@ void chooseTopology(const SparseVolume& source, EncodedGrid& grid) {
 
 namespace format {
 
-ActivityRule ruleOf(const EncodedGrid& grid) {
+ActivityRule ruleOf(const StoredGrid& grid) {
   const float background = grid.field.background;
   ActivityRule rule{.background = background};
   if (grid.withinRange) rule.range = rangeOf(grid);
@@ -84,9 +84,9 @@ bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) 
 namespace {
 
 /// All that is known of a grid without its values.
-EncodedGrid describe(const GridDescriptor& descriptor, const SparseVolume& source) {
+StoredGrid describe(const GridDescriptor& descriptor, const SparseVolume& source) {
   const ValueRange range = activeRange(source);
-  EncodedGrid grid;
+  StoredGrid grid;
   grid.descriptor = descriptor;
   grid.activeBox = activeBox(source);
   grid.activeVoxels = activeVoxelCount(source);
@@ -97,17 +97,17 @@ EncodedGrid describe(const GridDescriptor& descriptor, const SparseVolume& sourc
 
 }  // namespace
 
-EncodedGrid encodeVoxels(const GridDescriptor& descriptor, const SparseVolume& source,
-                         VoxelLayer layer) {
-  EncodedGrid grid = describe(descriptor, source);
+StoredGrid makeStoredVoxels(const GridDescriptor& descriptor, const SparseVolume& source,
+                            VoxelLayer layer) {
+  StoredGrid grid = describe(descriptor, source);
   grid.field.background = source.background;
   grid.voxels = std::move(layer);
   return grid;
 }
 
-EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source, Field field,
-                       Activity activity) {
-  EncodedGrid grid = describe(descriptor, source);
+StoredGrid makeStoredGrid(const GridDescriptor& descriptor, const SparseVolume& source, Field field,
+                          Activity activity) {
+  StoredGrid grid = describe(descriptor, source);
   grid.field = std::move(field);
   if (isNarrowBand(descriptor, source)) {
     grid.topology = TopologyKind::kLeaves;
@@ -129,7 +129,7 @@ bool meets(const Box& box, Coord corner) {
 }
 
 /// Where the field is to be evaluated; nothing where it is wherever supports reach.
-std::optional<std::vector<Coord>> bricksWanted(const EncodedGrid& grid,
+std::optional<std::vector<Coord>> bricksWanted(const StoredGrid& grid,
                                                const DecodeOptions& options) {
   const bool stored = grid.topology != TopologyKind::kThreshold;
   if (!stored && !options.box) return std::nullopt;
@@ -179,7 +179,7 @@ SparseVolume settled(const SparseVolume& volume, const ActivityRule& rule, float
   return makeVolume(std::move(bricks), volume.background);
 }
 
-SparseVolume evaluatedWithResidual(const EncodedGrid& grid, const DecodeOptions& options) {
+SparseVolume evaluatedWithResidual(const StoredGrid& grid, const DecodeOptions& options) {
   const ActivityRule rule = ruleOf(grid);
   auto bricks = bricksWanted(grid, options).value_or(reachedBricks(grid.field));
   bricks = withResidualBricks(*grid.residual, std::move(bricks), options);
@@ -191,7 +191,7 @@ SparseVolume evaluatedWithResidual(const EncodedGrid& grid, const DecodeOptions&
   return settled(volume, rule, options.threshold.value_or(grid.activeThreshold));
 }
 
-SparseVolume evaluated(const EncodedGrid& grid, const DecodeOptions& options) {
+SparseVolume evaluated(const StoredGrid& grid, const DecodeOptions& options) {
   if (grid.residual) return evaluatedWithResidual(grid, options);
   const ActivityRule rule = ruleOf(grid);
   const auto bricks = bricksWanted(grid, options);
@@ -204,7 +204,7 @@ SparseVolume evaluated(const EncodedGrid& grid, const DecodeOptions& options) {
 }
 
 /// Voxels that the mask has not become inactive.
-void applyMask(const EncodedGrid& grid, SparseVolume& volume) {
+void applyMask(const StoredGrid& grid, SparseVolume& volume) {
   const ActivityRule rule = ruleOf(grid);
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
     const auto leaf =
@@ -235,12 +235,12 @@ void clip(const Box& box, const ActivityRule& rule, SparseVolume& volume) {
 
 }  // namespace
 
-RevoxeliseOptions voxelRule(const EncodedGrid& grid) {
+RevoxeliseOptions voxelRule(const StoredGrid& grid) {
   const ActivityRule rule = ruleOf(grid);
   return {.threshold = grid.activeThreshold, .range = rule.range, .narrowBand = rule.narrowBand};
 }
 
-SparseVolume decodeGrid(const EncodedGrid& grid, const DecodeOptions& options) {
+SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
   if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
   if (options.threshold && (grid.voxels || grid.topology == TopologyKind::kMask))

@@ -68,7 +68,7 @@ GridDescriptor getDescriptor(ByteReader& in) {
   return d;
 }
 
-void putVoxelFacts(ByteWriter& out, const EncodedGrid& grid) {
+void putVoxelFacts(ByteWriter& out, const StoredGrid& grid) {
   putEnum(out, grid.topology);
   putEnum(out, grid.withinRange);
   out.put(grid.activeThreshold);
@@ -77,7 +77,7 @@ void putVoxelFacts(ByteWriter& out, const EncodedGrid& grid) {
   out.put(grid.valueMin);
   out.put(grid.valueMax);
 }
-void getVoxelFacts(ByteReader& in, EncodedGrid& grid) {
+void getVoxelFacts(ByteReader& in, StoredGrid& grid) {
   grid.topology = in.getEnum(TopologyKind::kMask, "topology");
   grid.withinRange = getBool(in, "mark of a range of values");
   grid.activeThreshold = in.get<float>();
@@ -137,7 +137,7 @@ ChunkRecord getChunk(ByteReader& in) {
   return chunk;
 }
 
-void putGrid(ByteWriter& out, const EncodedGrid& grid, const std::vector<ChunkRecord>& chunks) {
+void putGrid(ByteWriter& out, const StoredGrid& grid, const std::vector<ChunkRecord>& chunks) {
   putDescriptor(out, grid.descriptor);
   putVoxelFacts(out, grid);
   out.put(grid.field.background);

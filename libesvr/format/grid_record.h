@@ -19,7 +19,7 @@ struct ChunkRecord {
 
 /// A grid without leaves, curve and ellipsoids.
 struct GridRecord {
-  EncodedGrid grid;  ///< its field has no chunks yet
+  StoredGrid grid;  ///< its field has no chunks yet
   std::uint32_t chunkCount = 0;
   std::vector<ChunkRecord> chunks;  ///< the one chunk; none where there is a chunk table
 };
@@ -30,7 +30,7 @@ void putMetadata(ByteWriter& out, const std::vector<MetaItem>& items);
 void putChunk(ByteWriter& out, const ChunkRecord& chunk);
 [[nodiscard]] ChunkRecord getChunk(ByteReader& in);
 
-void putGrid(ByteWriter& out, const EncodedGrid& grid, const std::vector<ChunkRecord>& chunks);
+void putGrid(ByteWriter& out, const StoredGrid& grid, const std::vector<ChunkRecord>& chunks);
 [[nodiscard]] GridRecord getGrid(ByteReader& in);
 
 }  // namespace esvr::format

@@ -6,6 +6,6 @@
 
 namespace esvr::format {
 
-[[nodiscard]] ActivityRule ruleOf(const EncodedGrid& grid);
+[[nodiscard]] ActivityRule ruleOf(const StoredGrid& grid);
 
 }  // namespace esvr::format

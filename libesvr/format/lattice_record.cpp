@@ -5,12 +5,12 @@
 namespace esvr::format {
 namespace {
 
-constexpr int kMostOffset = 1 << 20;  // of bit counts, in 1/256 bit: keeps sums in 32 bits
-constexpr int kMostSlope = 1 << 12;
+constexpr int kMaxOffset = 1 << 20;  // of bit counts, in 1/256 bit: keeps sums in 32 bits
+constexpr int kMaxSlope = 1 << 12;
 
-int getWithin(ByteReader& in, int most, const char* what) {
+int getWithin(ByteReader& in, int limit, const char* what) {
   const auto n = in.get<std::int32_t>();
-  if (n < -most || n > most) in.fail(std::string(what) + " of the lattice is out of range");
+  if (n < -limit || n > limit) in.fail(std::string(what) + " of the lattice is out of range");
   return n;
 }
 
@@ -47,12 +47,12 @@ Lattice getLattice(ByteReader& in) {
   l.scaleStep = getStep(in, "the step of scales");
   l.lowestScale = in.get<std::int32_t>();
   l.intensityStep = getStep(in, "the step of intensities");
-  l.positionBase = getWithin(in, kMostOffset, "the base of positions");
-  l.positionSlope = getWithin(in, kMostSlope, "the slope of positions");
-  l.scaleOffset = getWithin(in, kMostOffset, "the offset of scales");
-  l.intensityBase = getWithin(in, kMostOffset, "the base of intensities");
-  l.intensitySlope = getWithin(in, kMostSlope, "the slope of intensities");
-  l.rotationOffset = getWithin(in, kMostOffset, "the offset of rotations");
+  l.positionBase = getWithin(in, kMaxOffset, "the base of positions");
+  l.positionSlope = getWithin(in, kMaxSlope, "the slope of positions");
+  l.scaleOffset = getWithin(in, kMaxOffset, "the offset of scales");
+  l.intensityBase = getWithin(in, kMaxOffset, "the base of intensities");
+  l.intensitySlope = getWithin(in, kMaxSlope, "the slope of intensities");
+  l.rotationOffset = getWithin(in, kMaxOffset, "the offset of rotations");
   l.cellBits = in.get<std::uint8_t>();
   if (l.cellBits > Lattice::kMaxCellBits) in.fail("the lattice has too many cells");
   l.signedIntensity = in.getEnum(std::uint8_t{1}, "mark of signs") != 0;

@@ -12,7 +12,7 @@
 namespace esvr::format {
 namespace {
 
-constexpr std::size_t kMostLayers = 255;
+constexpr std::size_t kMaxLayers = 255;
 constexpr std::uint64_t kBoxBytes = 6;
 constexpr std::uint64_t kBlockEntryBytes =
     kBoxBytes + kStreams * sizeof(std::uint32_t) + sizeof(std::uint64_t);
@@ -161,7 +161,7 @@ std::uint64_t BlockEntry::size() const {
 
 std::vector<std::byte> putLayered(const QuantisedEllipsoids& q, const Box& chunk,
                                   std::span<const Box> boxes) {
-  if (q.layerEnds.size() > kMostLayers) throw RuntimeFailure("too many importance layers");
+  if (q.layerEnds.size() > kMaxLayers) throw RuntimeFailure("too many importance layers");
   const auto blocks = encodeBlocks(q);
   const auto directory = putDirectory(q, chunk, boxes, blocks);
   ByteWriter out;

@@ -29,20 +29,20 @@ void addLayers(const QuantisedEllipsoids& q, std::vector<LayerSize>& sizes) {
 
 }  // namespace
 
-std::size_t layerCount(const EncodedGrid& grid) {
-  if (grid.quantised.empty()) return std::min<std::size_t>(grid.field.primitiveCount(), 1);
+std::size_t layerCount(const StoredGrid& grid) {
+  if (grid.quantised.empty()) return std::min<std::size_t>(grid.field.ellipsoidCount(), 1);
   std::size_t layers = 0;
   for (const auto& chunk : grid.quantised) layers = std::max(layers, layersOf(chunk));
   return layers;
 }
 
-std::vector<LayerSize> layerSizes(const EncodedGrid& grid) {
+std::vector<LayerSize> layerSizes(const StoredGrid& grid) {
   std::vector<LayerSize> sizes(grid.quantised.empty() ? 0 : layerCount(grid));
   for (const auto& chunk : grid.quantised) addLayers(chunk, sizes);
   return sizes;
 }
 
-StreamBytes streamBytes(const EncodedGrid& grid) {
+StreamBytes streamBytes(const StoredGrid& grid) {
   StreamBytes bytes;
   for (const auto& chunk : grid.quantised) {
     for (const auto& block : format::encodeBlocks(chunk)) {

@@ -24,7 +24,6 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kIntensities, "intensities"},
     {SectionKind::kKappas, "kappas"},
     {SectionKind::kEllipsoids, "ellipsoids"},
-    {SectionKind::kOldVoxels, "voxels of 1.1"},
     {SectionKind::kLayered, "layered ellipsoids"},
     {SectionKind::kMask, "mask"},
     {SectionKind::kVoxels, "voxels"},
@@ -53,21 +52,5 @@ std::string nameOf(SectionKind kind) { return nameIn(kKinds, kind); }
 std::string nameOf(Codec codec) { return nameIn(kCodecs, codec); }
 bool known(SectionKind kind) { return find(kKinds, kind) != nullptr; }
 bool known(Codec codec) { return find(kCodecs, codec) != nullptr; }
-
-std::uint16_t minorOf(SectionKind kind) {
-  switch (kind) {
-    case SectionKind::kEllipsoids:
-    case SectionKind::kOldVoxels:
-      return 1;
-    case SectionKind::kLayerErrors:
-    case SectionKind::kLayered:
-    case SectionKind::kMask:
-    case SectionKind::kVoxels:
-    case SectionKind::kResidual:
-      return 2;
-    default:
-      return kFirstMinor;
-  }
-}
 
 }  // namespace esvr::format

@@ -15,8 +15,7 @@ namespace esvr::format {
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
 
 inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
-inline constexpr std::uint16_t kVersionMinor = 2;  ///< the highest that is read and written
-inline constexpr std::uint16_t kFirstMinor = 0;    ///< what needs no later one is written as this
+inline constexpr std::uint16_t kVersionMinor = 0;
 
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
@@ -31,15 +30,14 @@ enum class SectionKind : std::uint32_t {
   kGrid = 2,
   kChunks = 3,
   kLeaves = 4,
-  kCurve = 5,
   kLayerErrors = 6,
+  kCurve = 7,
   kCenters = 16,
   kScales = 17,
   kRotations = 18,
   kIntensities = 19,
   kKappas = 20,
   kEllipsoids = 32,
-  kOldVoxels = 33,
   kLayered = 34,
   kMask = 35,
   kVoxels = 36,
@@ -56,16 +54,12 @@ inline constexpr std::uint16_t kRequired = 1;  ///< a reader that does not know 
 
 /// Sizes of records in their sections.
 inline constexpr std::uint64_t kChunkRecordBytes = 44;
-inline constexpr std::uint64_t kCurveRecordBytes = 44;
 
 /// "centers"; "unknown 0x2a".
 [[nodiscard]] std::string nameOf(SectionKind kind);
 [[nodiscard]] std::string nameOf(Codec codec);
 [[nodiscard]] bool known(SectionKind kind);
 [[nodiscard]] bool known(Codec codec);
-
-/// The minor version that brought a kind: a file is of the highest of its sections'.
-[[nodiscard]] std::uint16_t minorOf(SectionKind kind);
 
 constexpr std::uint64_t alignUp(std::uint64_t offset) {
   return (offset + kAlignment - 1) / kAlignment * kAlignment;

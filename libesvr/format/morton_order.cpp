@@ -5,7 +5,7 @@
 #include <numeric>
 #include <vector>
 
-#include "core/morton.h"
+#include "codec/morton.h"
 
 namespace esvr::format {
 namespace {

@@ -31,7 +31,7 @@ struct SectionEntry {
 };
 
 struct SectionTable {
-  std::uint16_t versionMajor = kVersionMajor, versionMinor = kFirstMinor;
+  std::uint16_t versionMajor = kVersionMajor, versionMinor = kVersionMinor;
   std::uint64_t fileBytes = 0;
   std::uint64_t tableOffset = kHeaderBytes;
   std::vector<SectionEntry> entries;

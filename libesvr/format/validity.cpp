@@ -36,7 +36,7 @@ std::optional<Fault> nonFinite(SectionKind section, const char* what,
 
 }  // namespace
 
-std::optional<Fault> faultOf(const EncodedGrid& grid) {
+std::optional<Fault> faultOf(const StoredGrid& grid) {
   const auto fault = [](const char* text) { return Fault{SectionKind::kGrid, text}; };
   if (!allFinite({grid.descriptor.background, grid.field.background}))
     return fault("the background is not finite");
@@ -49,7 +49,7 @@ std::optional<Fault> faultOf(const EncodedGrid& grid) {
   return std::nullopt;
 }
 
-std::optional<Fault> residualFaultOf(const EncodedGrid& grid) {
+std::optional<Fault> residualFaultOf(const StoredGrid& grid) {
   const auto fault = [](const char* text) { return Fault{SectionKind::kResidual, text}; };
   if (!grid.residual) return std::nullopt;
   if (grid.voxels) return fault("a residual to voxels that are stored themselves");

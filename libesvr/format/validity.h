@@ -16,10 +16,10 @@ struct Fault {
 };
 
 /// All but leaves, curve and chunks: finite numbers, a kernel that can be evaluated, ranges.
-[[nodiscard]] std::optional<Fault> faultOf(const EncodedGrid& grid);
+[[nodiscard]] std::optional<Fault> faultOf(const StoredGrid& grid);
 
 /// Finite parameters, quaternions of unit length.
-[[nodiscard]] std::optional<Fault> residualFaultOf(const EncodedGrid& grid);
+[[nodiscard]] std::optional<Fault> residualFaultOf(const StoredGrid& grid);
 [[nodiscard]] std::optional<Fault> faultOf(const Ellipsoids& ellipsoids);
 
 }  // namespace esvr::format

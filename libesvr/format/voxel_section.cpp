@@ -6,20 +6,19 @@
 #include <numeric>
 #include <utility>
 
-#include "core/morton.h"
+#include "codec/cell_tree.h"
+#include "codec/morton.h"
+#include "codec/voxel_model.h"
 #include "esvr/error.h"
 #include "format/byte_reader.h"
 #include "format/byte_writer.h"
-#include "format/cell_tree.h"
-#include "format/old_voxel_coder.h"
-#include "format/voxel_model.h"
 
 namespace esvr::format {
 namespace {
 
 /// A reader must know how many bricks a byte can hold before it allocates: the writer adds zeros
 /// where there would be more.
-constexpr std::uint64_t kMostBricksAByte = 4;
+constexpr std::uint64_t kMaxBricksPerByte = 4;
 constexpr int kMaxBrickBits = 21;
 
 std::uint64_t keyOf(Coord brick) {
@@ -97,22 +96,22 @@ void setBricks(std::span<const std::uint64_t> keys, const ByteReader& in, VoxelL
       in.fail("a brick of voxels lies outside the index space");
 }
 
-void putModel(ByteWriter& out, const VoxelModel& model) {
+void putModel(ByteWriter& out, const codec::VoxelModel& model) {
   out.put(model.vacantCode);
   for (const auto mirror : model.mirror) out.put(mirror);
   out.put(std::uint8_t(model.common.size()));
   out.putAll(model.common);
 }
 
-VoxelModel getModel(ByteReader& in) {
-  VoxelModel model;
+codec::VoxelModel getModel(ByteReader& in) {
+  codec::VoxelModel model;
   model.vacantCode = in.get<std::int32_t>();
   for (auto& mirror : model.mirror) {
     mirror = in.get<std::int32_t>();
-    if (mirror < VoxelModel::kNoMirror) in.fail("a mirror of voxels");
+    if (mirror < codec::VoxelModel::kNoMirror) in.fail("a mirror of voxels");
   }
   model.common.resize(in.get<std::uint8_t>());
-  if (model.common.size() > VoxelModel::kMostCommon) in.fail("too many common voxels");
+  if (model.common.size() > codec::VoxelModel::kMaxCommon) in.fail("too many common voxels");
   for (auto& code : model.common) code = in.get<std::int32_t>();
   return model;
 }
@@ -124,7 +123,7 @@ struct BrickCount {
 
 BrickCount getBrickCount(ByteReader& in, std::uint64_t bytes) {
   BrickCount count{in.get<std::uint64_t>(), 0};
-  if (count.bricks / kMostBricksAByte > bytes)
+  if (count.bricks / kMaxBricksPerByte > bytes)
     in.fail(std::to_string(bytes) + " bytes of content for " + std::to_string(count.bricks) +
             " bricks");
   count.bits = in.get<std::uint8_t>();
@@ -132,30 +131,29 @@ BrickCount getBrickCount(ByteReader& in, std::uint64_t bytes) {
   return count;
 }
 
-std::vector<std::byte> encodeStream(const VoxelLayer& layer, const VoxelModel& model, int bits) {
+std::vector<std::byte> encodeStream(const VoxelLayer& layer, const codec::VoxelModel& model,
+                                    int bits) {
   const auto order = codingOrder(layer.bricks);
   std::vector<std::uint64_t> keys;
   for (const auto b : order) keys.push_back(keyOf(layer.bricks[b]));
-  Writer writer;
-  CellTree<Writer>(writer).code(keys, 3 * bits);
+  codec::Writer writer;
+  codec::CellTree<codec::Writer>(writer).code(keys, 3 * bits);
   VoxelLayer written = layer;
-  codeVoxels(writer, order, model, written);
+  codec::codeVoxels(writer, order, model, written);
   return writer.coder.finish();
 }
 
-/// \param codeBricks  takes the stream, the bricks' order and the layer
-template <class CodeBricks>
-void decodeStream(ByteReader& in, const BrickCount& count, VoxelLayer& layer,
-                  const CodeBricks& codeBricks) {
-  Reader reader{RangeDecoder(in.getBytes(in.left()))};
+void decodeStream(ByteReader& in, const BrickCount& count, const codec::VoxelModel& model,
+                  VoxelLayer& layer) {
+  codec::Reader reader{codec::RangeDecoder(in.getBytes(in.left()))};
   std::vector<std::uint64_t> keys(count.bricks);
   try {
-    CellTree<Reader>(reader).code(keys, 3 * count.bits);
+    codec::CellTree<codec::Reader>(reader).code(keys, 3 * count.bits);
     setBricks(keys, in, layer);
     layer.codes.resize(count.bricks * kBrickVoxels);
     layer.active.resize(count.bricks);
     layer.vacant.resize(count.bricks);
-    codeBricks(reader, codingOrder(layer.bricks), layer);
+    codec::codeVoxels(reader, codingOrder(layer.bricks), model, layer);
   } catch (const BadInput& error) {
     in.fail(error.what());
   }
@@ -173,10 +171,10 @@ void checkValues(const VoxelLayer& layer, const ByteReader& in) {
 
 std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   const int bits = bitsOf(layer.bricks);
-  VoxelModel model = chooseModel(layer);
+  codec::VoxelModel model = codec::chooseModel(layer);
   auto stream = encodeStream(layer, model, bits);
-  if (hasMirror(model)) {
-    const VoxelModel plain = withoutMirrors(model);
+  if (codec::hasMirror(model)) {
+    const codec::VoxelModel plain = codec::withoutMirrors(model);
     auto other = encodeStream(layer, plain, bits);
     if (other.size() < stream.size()) stream = std::move(other), model = plain;
   }
@@ -187,7 +185,7 @@ std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   putModel(out, model);
   out.putAll(stream);
   out.padTo(std::max<std::uint64_t>(
-      out.size(), (layer.bricks.size() + kMostBricksAByte - 1) / kMostBricksAByte));
+      out.size(), (layer.bricks.size() + kMaxBricksPerByte - 1) / kMaxBricksPerByte));
   return out.take();
 }
 
@@ -195,22 +193,8 @@ VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& wher
   ByteReader in(content, where);
   VoxelLayer layer = getHeader(in);
   const BrickCount count = getBrickCount(in, content.size());
-  const VoxelModel model = getModel(in);
-  decodeStream(in, count, layer, [&](Reader& reader, const auto& order, VoxelLayer& into) {
-    codeVoxels(reader, order, model, into);
-  });
-  checkValues(layer, in);
-  return layer;
-}
-
-VoxelLayer getOldVoxels(std::span<const std::byte> content, const std::string& where) {
-  ByteReader in(content, where);
-  VoxelLayer layer = getHeader(in);
-  const BrickCount count = getBrickCount(in, content.size());
-  const auto vacantCode = in.get<std::int32_t>();
-  decodeStream(in, count, layer, [&](Reader& reader, const auto& order, VoxelLayer& into) {
-    readOldVoxels(reader, order, vacantCode, into);
-  });
+  const codec::VoxelModel model = getModel(in);
+  decodeStream(in, count, model, layer);
   checkValues(layer, in);
   return layer;
 }

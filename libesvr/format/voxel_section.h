@@ -12,9 +12,6 @@ namespace esvr::format {
 
 [[nodiscard]] std::vector<std::byte> putVoxels(const VoxelLayer& layer);
 
-/// As format 1.1 wrote them. \throws BadInput  as getVoxels
-[[nodiscard]] VoxelLayer getOldVoxels(std::span<const std::byte> content, const std::string& where);
-
 /// \throws BadInput  damaged; begins with `where`
 [[nodiscard]] VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where);
 

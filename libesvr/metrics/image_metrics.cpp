@@ -140,10 +140,11 @@ double squaresOfRow(const Plane& a, const Plane& b, int y) {
 }
 
 double largestDifference(const Plane& a, const Plane& b) {
-  double most = 0.0;
+  double largest = 0.0;
   for (int y = 0; y < a.height; ++y)
-    for (int x = 0; x < a.width; ++x) most = std::max(most, std::abs(a.row(y)[x] - b.row(y)[x]));
-  return most;
+    for (int x = 0; x < a.width; ++x)
+      largest = std::max(largest, std::abs(a.row(y)[x] - b.row(y)[x]));
+  return largest;
 }
 
 }  // namespace
@@ -169,10 +170,10 @@ Image errorMap(const Image& reference, const Image& candidate, double gain) {
   checkSizes(reference, candidate);
   Image map{reference.width, reference.height, std::vector<float>(reference.rgba.size(), 1.0f)};
   for (std::size_t i = 0; i < map.rgba.size(); i += kChannels) {
-    double most = 0.0;
+    double largest = 0.0;
     for (int c = 0; c < kColors; ++c)
-      most = std::max(most, std::abs(double(reference.rgba[i + c]) - candidate.rgba[i + c]));
-    for (int c = 0; c < kColors; ++c) map.rgba[i + c] = float(std::min(1.0, most * gain));
+      largest = std::max(largest, std::abs(double(reference.rgba[i + c]) - candidate.rgba[i + c]));
+    for (int c = 0; c < kColors; ++c) map.rgba[i + c] = float(std::min(1.0, largest * gain));
   }
   return map;
 }

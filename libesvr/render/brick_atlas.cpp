@@ -11,7 +11,7 @@
 namespace esvr {
 namespace {
 
-constexpr double kMostBlocks = double(1 << 28);  // 1 GB
+constexpr double kMaxBlocks = double(1 << 28);  // 1 GB
 
 Coord above(int corner) { return {corner >> 2, (corner >> 1) & 1, corner & 1}; }
 
@@ -88,8 +88,7 @@ std::size_t offsetIn(Coord size, Coord at) {
 void index(BrickAtlas& atlas) {
   const Coord bricks{kBlockBricks, kBlockBricks, kBlockBricks};
   const double blocks = double(atlas.blocks.x) * atlas.blocks.y * atlas.blocks.z;
-  if (blocks > kMostBlocks)
-    throw UsageError("the voxels lie too far apart to be drawn from bricks");
+  if (blocks > kMaxBlocks) throw UsageError("the voxels lie too far apart to be drawn from bricks");
   atlas.blockOf.assign(std::size_t(blocks), kNoCells);
   for (std::uint32_t i = 0; i < atlas.bricks.size(); ++i) {
     const Coord block = blockOf(atlas.bricks[i]);

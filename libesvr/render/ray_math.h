@@ -23,7 +23,7 @@ struct RayKernel {
 };
 
 /// An ellipsoid for the rays of any pixel. `dx` and `dy` are the pixel's place relative to
-/// PrimitiveView's, in pixels.
+/// EllipsoidView's, in pixels.
 struct RayForm {
   float along[3], alongX[3], alongY[3];     ///< v = along + dx alongX + dy alongY
   float beside[3], besideX[3], besideY[3];  ///< o x v likewise

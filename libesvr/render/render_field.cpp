@@ -11,12 +11,12 @@ using Lists = std::vector<std::vector<std::uint32_t>>;
 
 int tilesAlong(int pixels) { return (pixels + kTileSide - 1) / kTileSide; }
 
-/// For each tile of a row of tiles, the primitives whose bounds overlap it, in their order. A row
+/// For each tile of a row of tiles, the ellipsoids whose bounds overlap it, in their order. A row
 /// at a time, so that lists never hold more than a row's.
-Lists primitivesOfTiles(const VisiblePrimitives& primitives, int firstRow, int tiles) {
+Lists ellipsoidsOfTiles(const VisibleEllipsoids& ellipsoids, int firstRow, int tiles) {
   Lists lists(static_cast<std::size_t>(tiles));
-  for (std::uint32_t p = 0; p < primitives.bounds.size(); ++p) {
-    const ScreenBounds& b = primitives.bounds[p];
+  for (std::uint32_t p = 0; p < ellipsoids.bounds.size(); ++p) {
+    const ScreenBounds& b = ellipsoids.bounds[p];
     if (b.lastRow < firstRow || b.firstRow >= firstRow + kTileSide) continue;
     for (int t = b.firstColumn / kTileSide; t <= b.lastColumn / kTileSide; ++t)
       lists[t].push_back(p);
@@ -26,7 +26,7 @@ Lists primitivesOfTiles(const VisiblePrimitives& primitives, int firstRow, int t
 
 void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
   const int tiles = tilesAlong(scene.options.resolution.width);
-  const Lists lists = primitivesOfTiles(scene.primitives, firstRow, tiles);
+  const Lists lists = ellipsoidsOfTiles(scene.ellipsoids, firstRow, tiles);
   tbb::parallel_for(0, tiles, [&](int t) {
     if (lists[t].empty()) return;
     const auto tile = makeTile(scene, {t * kTileSide, firstRow});
@@ -40,12 +40,12 @@ void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
 Image renderField(const Field& field, const RenderOptions& options,
                   const RevoxeliseOptions& voxels) {
   Picture picture(options);
-  const auto primitives =
-      visiblePrimitives(field, picture.view, options.resolution, options.between);
+  const auto ellipsoids =
+      visibleEllipsoids(field, picture.view, options.resolution, options.between);
   const auto origins = chunkOrigins(field);
   const TileScene scene{options,
                         picture.view,
-                        primitives,
+                        ellipsoids,
                         origins,
                         sampleRule(options, picture.table.view(), field.background),
                         voxelValue(field.background, voxels)};

@@ -10,7 +10,7 @@
 namespace esvr {
 namespace {
 
-constexpr int kMostDepthParts = 16;
+constexpr int kMaxDepthParts = 16;
 
 /// Draws with a function of render.h.
 template <class Draw>
@@ -43,8 +43,8 @@ std::unique_ptr<Renderer> makeCpuRenderer(Draw draw) {
 std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& device,
                                             const RendererLimits& limits,
                                             const RevoxeliseOptions& voxels) {
-  if (limits.depthParts < 0 || limits.depthParts > kMostDepthParts)
-    throw UsageError("parts of the depth must be from 1 to " + std::to_string(kMostDepthParts) +
+  if (limits.depthParts < 0 || limits.depthParts > kMaxDepthParts)
+    throw UsageError("parts of the depth must be from 1 to " + std::to_string(kMaxDepthParts) +
                      ", or 0 to have them chosen");
   if (device.kind == DeviceKind::kCuda)
     return cuda::makeCudaFieldRenderer(field, device, limits, voxels);

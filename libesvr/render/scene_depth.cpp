@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "render/primitive_view.h"
+#include "render/ellipsoid_view.h"
 
 namespace esvr {
 namespace {

@@ -4,8 +4,8 @@
 #include <optional>
 
 #include "esvr/render.h"
-#include "render/primitive_math.h"
 #include "render/ray_box.h"
+#include "render/seen_ellipsoid.h"
 
 namespace esvr {
 

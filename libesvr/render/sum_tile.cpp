@@ -39,19 +39,19 @@ SumTile::SumTile(const TileScene& scene, TilePlace place)
 }
 
 void SumTile::drawBin(std::int64_t bin, std::span<const Entry> active) {
-  for (const Entry& entry : active) addPrimitive(bin, entry.primitive);
+  for (const Entry& entry : active) addEllipsoid(bin, entry.ellipsoid);
   for (int pixel = 0; pixel < kPixels; ++pixel)
     if (touched_[pixel] != 0) compositeRay(pixel, double(bin) * kBinSamples);
 }
 
-SumTile::PlacedPrimitive SumTile::placed(const PrimitiveView& p, std::int64_t bin) const {
+SumTile::PlacedEllipsoid SumTile::placed(const EllipsoidView& p, std::int64_t bin) const {
   return {p, float(place_.column - p.column), float(place_.row - p.row),
           float(p.depth * middleUnit_ - double(bin) * kBinSamples)};
 }
 
-void SumTile::addPrimitive(std::int64_t bin, std::uint32_t primitive) {
-  const ScreenBounds& b = scene_.primitives.bounds[primitive];
-  const PlacedPrimitive p = placed(scene_.primitives.views[primitive], bin);
+void SumTile::addEllipsoid(std::int64_t bin, std::uint32_t ellipsoid) {
+  const ScreenBounds& b = scene_.ellipsoids.bounds[ellipsoid];
+  const PlacedEllipsoid p = placed(scene_.ellipsoids.views[ellipsoid], bin);
   const int lastRow = std::min(b.lastRow - place_.row, rows_ - 1);
   const int lastColumn = std::min(b.lastColumn - place_.column, columns_ - 1);
   for (int row = std::max(0, b.firstRow - place_.row); row <= lastRow; ++row)
@@ -59,7 +59,7 @@ void SumTile::addPrimitive(std::int64_t bin, std::uint32_t primitive) {
       if (alive(row * kTileSide + column)) addToRay(p, column, row);
 }
 
-void SumTile::addToRay(const PlacedPrimitive& p, int column, int row) {
+void SumTile::addToRay(const PlacedEllipsoid& p, int column, int row) {
   const int pixel = row * kTileSide + column;
   const RayForm& form = p.view.form;
   const RaySpan span = spanOn(form, p.column + float(column), p.row + float(row), scales_[pixel],

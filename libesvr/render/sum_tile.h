@@ -11,14 +11,14 @@ class SumTile final : public Tile {
 
  private:
   void drawBin(std::int64_t bin, std::span<const Entry> active) override;
-  void addPrimitive(std::int64_t bin, std::uint32_t primitive);
-  /// A primitive and where it lies from the tile's first pixel and a bin's first sample.
-  struct PlacedPrimitive {
-    const PrimitiveView& view;
+  void addEllipsoid(std::int64_t bin, std::uint32_t ellipsoid);
+  /// An ellipsoid and where it lies from the tile's first pixel and a bin's first sample.
+  struct PlacedEllipsoid {
+    const EllipsoidView& view;
     float column, row, middleAhead;
   };
-  [[nodiscard]] PlacedPrimitive placed(const PrimitiveView& p, std::int64_t bin) const;
-  void addToRay(const PlacedPrimitive& p, int column, int row);
+  [[nodiscard]] PlacedEllipsoid placed(const EllipsoidView& p, std::int64_t bin) const;
+  void addToRay(const PlacedEllipsoid& p, int column, int row);
   void compositeRay(int pixel, double firstSample);
 
   double middleUnit_;  ///< samples for each unit along forward, on the ray of the tile's middle

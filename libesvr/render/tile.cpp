@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "render/lattice_tile.h"
 #include "render/sum_tile.h"
+#include "render/window_tile.h"
 
 namespace esvr {
 
@@ -21,25 +21,25 @@ Tile::Tile(const TileScene& scene, TilePlace place)
           scene.view.ray(place.column + column, place.row + row), clip, scene.options.step);
 }
 
-std::vector<Tile::Entry> Tile::entries(std::span<const std::uint32_t> primitives) const {
+std::vector<Tile::Entry> Tile::entries(std::span<const std::uint32_t> ellipsoids) const {
   const UnitRange unit = unitRange(scene_.view, place_.column, place_.column + columns_ - 1,
                                    place_.row, place_.row + rows_ - 1);
   std::vector<Entry> all;
-  all.reserve(primitives.size());
-  for (const std::uint32_t p : primitives)
-    all.push_back({binsOf(scene_.primitives.bounds[p], unit, scene_.options.step), p});
+  all.reserve(ellipsoids.size());
+  for (const std::uint32_t p : ellipsoids)
+    all.push_back({binsOf(scene_.ellipsoids.bounds[p], unit, scene_.options.step), p});
   std::stable_sort(all.begin(), all.end(),
                    [](const Entry& a, const Entry& b) { return a.bins.first < b.bins.first; });
   return all;
 }
 
-void Tile::draw(std::span<const std::uint32_t> primitives) {
-  const auto all = entries(primitives);
+void Tile::draw(std::span<const std::uint32_t> ellipsoids) {
+  const auto all = entries(ellipsoids);
   std::vector<Entry> active;
   auto next = all.begin();
   for (std::int64_t bin = 0; next != all.end() || !active.empty(); ++bin) {
     if (active.empty())
-      bin = std::max(bin, next->bins.first);  // bins without primitives cost nothing
+      bin = std::max(bin, next->bins.first);  // bins without ellipsoids cost nothing
     for (; next != all.end() && next->bins.first <= bin; ++next) active.push_back(*next);
     drawBin(bin, active);
     if (!anyAlive()) return;
@@ -67,7 +67,7 @@ void Tile::copyTo(Picture& picture) const {
 }
 
 std::unique_ptr<Tile> makeTile(const TileScene& scene, TilePlace place) {
-  if (scene.options.between == Between::kVoxels) return std::make_unique<LatticeTile>(scene, place);
+  if (scene.options.between == Between::kVoxels) return std::make_unique<WindowTile>(scene, place);
   return std::make_unique<SumTile>(scene, place);
 }
 

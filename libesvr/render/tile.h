@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "render/ellipsoid_view.h"
 #include "render/picture.h"
-#include "render/primitive_view.h"
 #include "render/ray_box.h"
 #include "render/voxel_value.h"
 
@@ -22,7 +22,7 @@ struct TilePlace {
 struct TileScene {
   const RenderOptions& options;
   const View& view;
-  const VisiblePrimitives& primitives;
+  const VisibleEllipsoids& ellipsoids;
   const std::vector<Vec3>& origins;  ///< of the chunks
   SampleRule rule;
   VoxelValue voxelValue;
@@ -35,17 +35,17 @@ class Tile {
   Tile& operator=(const Tile&) = delete;
   virtual ~Tile() = default;
 
-  /// \param primitives  whose bounds overlap the tile, in increasing order
-  void draw(std::span<const std::uint32_t> primitives);
+  /// \param ellipsoids  whose bounds overlap the tile, in increasing order
+  void draw(std::span<const std::uint32_t> ellipsoids);
   void copyTo(Picture& picture) const;
 
  protected:
   static constexpr int kPixels = kTileSide * kTileSide;
 
-  /// A primitive and the bins that it may touch.
+  /// An ellipsoid and the bins that it may touch.
   struct Entry {
     BinRange bins;
-    std::uint32_t primitive;
+    std::uint32_t ellipsoid;
   };
   virtual void drawBin(std::int64_t bin, std::span<const Entry> active) = 0;
 
@@ -57,7 +57,7 @@ class Tile {
   int columns_, rows_;  ///< pixels within the picture
 
  private:
-  [[nodiscard]] std::vector<Entry> entries(std::span<const std::uint32_t> primitives) const;
+  [[nodiscard]] std::vector<Entry> entries(std::span<const std::uint32_t> ellipsoids) const;
   [[nodiscard]] bool anyAlive() const;
 
   std::vector<SampleRange> clips_;

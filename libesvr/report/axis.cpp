@@ -9,7 +9,7 @@ namespace esvr::report {
 namespace {
 
 constexpr double kRoom = 0.04;  // beyond the outermost values, of the axis
-constexpr double kMostTicks = 8.0;
+constexpr double kMaxTicks = 8.0;
 
 std::string labelOf(double value) {
   constexpr double kPlainFrom = 1e-3, kPlainTo = 1e6;
@@ -58,7 +58,7 @@ bool Axis::holds(double value) const {
 double Axis::place(double value) const { return (scaled(value) - low_) / (high_ - low_); }
 
 std::vector<double> Axis::linearTicks() const {
-  const double step = roundUp((high_ - low_) / kMostTicks);
+  const double step = roundUp((high_ - low_) / kMaxTicks);
   std::vector<double> values;
   for (double n = std::ceil(low_ / step); n * step <= high_; ++n) values.push_back(n * step);
   return values;

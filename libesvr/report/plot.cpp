@@ -128,7 +128,7 @@ class Painter {
   }
 
   void drawSeries(std::size_t i) {
-    constexpr std::size_t kMostMarkers = 40;  // more would hide the line
+    constexpr std::size_t kMaxMarkers = 40;  // more would hide the line
     const auto& points = plot_.series[i].points;
     color(colorOf(i));
     cairo_set_line_width(cr_.get(), kLine);
@@ -136,7 +136,7 @@ class Painter {
     for (const Point& point : points)
       if (shows(point)) cairo_line_to(cr_.get(), pixelX(point.x), pixelY(point.y));
     cairo_stroke(cr_.get());
-    if (points.size() > kMostMarkers) return;
+    if (points.size() > kMaxMarkers) return;
     for (const Point& point : points)
       if (shows(point)) marker(pixelX(point.x), pixelY(point.y));
   }

@@ -1,5 +1,5 @@
 #pragma once
-/// The five synthetic volumes on which the paper compares kinds of primitives (appendix, 'Primitive
+/// The five synthetic volumes on which the paper compares kinds of ellipsoids (appendix, 'Ellipsoid
 /// Type Comparison'). It shows slices and gives no formulas: these have the same character.
 
 #include "esvr/sparse_volume.h"

@@ -22,11 +22,11 @@ int main() {
 
   // The curve says how the error fell with time: the first thing to look at when a fit is not as
   // good as hoped.
-  for (const esvr::CurvePoint& point : result.curve)
+  for (const esvr::TimedCurvePoint& point : result.curve)
     std::printf("iteration %4u, %zu ellipsoids, %.2f dB\n", point.iteration,
-                std::size_t(point.primitives), point.psnrBox);
+                std::size_t(point.ellipsoids), point.psnrBox);
 
-  check(result.field.primitiveCount() <= 40, "no more ellipsoids than were asked for");
+  check(result.field.ellipsoidCount() <= 40, "no more ellipsoids than were asked for");
   check(result.curve.back().psnrBox > 30.0, "40 ellipsoids make a ring at more than 30 dB");
 
   // The same input gives the same ellipsoids, bit for bit, on any number of threads.

@@ -26,10 +26,10 @@ int main() {
   descriptor.gridClass = esvr::GridClass::kFogVolume;
   descriptor.transform = esvr::uniformTransform(0.1);
 
-  // encodeGrid adds what is needed to find the active voxels again.
+  // makeStoredGrid adds what is needed to find the active voxels again.
   esvr::EsvrFile file;
   file.metadata.push_back(esvr::stringItem("creator", "lesson 3"));
-  file.grids.push_back(esvr::encodeGrid(descriptor, ring, esvr::fit(ring, options).field));
+  file.grids.push_back(esvr::makeStoredGrid(descriptor, ring, esvr::fit(ring, options).field));
 
   const std::filesystem::path path = "lesson_03.esvr";
   const auto bytes = esvr::writeEsvr(path, file, {.overwrite = true});
@@ -48,7 +48,7 @@ int main() {
   const esvr::EsvrFile read = esvr::readEsvr(path);
   check(read.grids.size() == 1, "one grid comes back");
   check(read.grids[0].descriptor == descriptor, "it is what it was");
-  check(read.grids[0].field.primitiveCount() == file.grids[0].field.primitiveCount(),
+  check(read.grids[0].field.ellipsoidCount() == file.grids[0].field.ellipsoidCount(),
         "with all its ellipsoids");
   std::filesystem::remove(path);
 }

@@ -17,7 +17,7 @@ esvr::VolumeMetrics qualityOf(const esvr::SparseVolume& ring, std::size_t count)
   esvr::FitOptions options;
   options.count = count;
   options.preset = esvr::Preset::kDraft;
-  const esvr::EncodedGrid encoded = esvr::encodeGrid({}, ring, esvr::fit(ring, options).field);
+  const esvr::StoredGrid encoded = esvr::makeStoredGrid({}, ring, esvr::fit(ring, options).field);
   const esvr::SparseVolume back = esvr::decodeGrid(encoded);
 
   // PSNR over a box counts its empty space, which flatters sparse volumes; over active voxels it

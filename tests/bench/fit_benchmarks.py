@@ -48,7 +48,7 @@ DENSE_RESOLUTION = 384
 DENSE_COUNTS = ["20000", "100000"]
 GPU_STORAGES = ["float32", "compact"]
 TREE_RESOLUTIONS = [64, 96, 128, 192, 256, 384, 512, 768]
-VOXELS_PER_PRIMITIVE = 35  # as the standard preset has it
+VOXELS_PER_ELLIPSOID = 35  # as the standard preset has it
 SCALING_ITERATIONS = 100
 
 
@@ -118,7 +118,7 @@ def gpu_row(row):
     grid = row["grid"]
     seconds = grid["seconds"]
     return (f"| {row['file']} | `{' '.join(row['options'][:2])}` | {row['storage']} | "
-            f"{grid['primitives']} | {grid['metrics']['psnr_box']:.2f} | "
+            f"{grid['ellipsoids']} | {grid['metrics']['psnr_box']:.2f} | "
             f"{grid['kernel']['kappa']:.2f} | "
             f"{seconds['optimise'] + seconds['seed']:.2f} | {seconds['encode']:.2f} | "
             f"{row['process']['seconds']:.2f} | {grid['fit']['device_bytes'] / 1e6:.0f} | "
@@ -155,7 +155,7 @@ def scaling(arguments):
         run([arguments.bin / "samples/esvr-sample", "tree", source, "--resolution", resolution,
              "--force"])
         tree = source_of(arguments.bin, source)
-        count = max(1, tree["active_voxels"] // VOXELS_PER_PRIMITIVE)
+        count = max(1, tree["active_voxels"] // VOXELS_PER_ELLIPSOID)
         report = convert(arguments.bin, source, source.with_suffix(".esvr"),
                          ["--count", count, "--iterations", SCALING_ITERATIONS, "--kappa", 2])
         seconds = report["seconds"]["optimise"] / SCALING_ITERATIONS
@@ -167,7 +167,7 @@ def scaling(arguments):
 
 
 def source_of(programs, source):
-    """What a grid holds, as the report of a fit of one primitive has it."""
+    """What a grid holds, as the report of a fit of one ellipsoid has it."""
     report = convert(programs, source, source.with_suffix(".esvr"),
                      ["--count", 1, "--iterations", 1, "--kappa", 2])
     return report["grids"][0]["source"]

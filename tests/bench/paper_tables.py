@@ -20,9 +20,9 @@ from fit_benchmarks import convert, run
 
 SYNTHETIC = ["8area", "empty-sphere", "synth-tube", "synth-wiggle", "diffuse-scalar"]
 CURVES = ["aneurism", "smoke1"]
-CURVE_MOST = 150_000  # primitives before pruning; smoke would else grow to a million
+CURVE_MOST = 150_000  # ellipsoids before pruning; smoke would else grow to a million
 PAPER_EPOCHS = 2800  # of PaperMethod
-# Primitives in thousands, PSNR, average hits; before and after pruning (tables 'Primitive type').
+# Ellipsoids in thousands, PSNR, average hits; before and after pruning (tables 'Ellipsoid type').
 PAPER_TYPES = {
     "aneurism": {"ellipsoid": [(93, 51.20, 20.10), (31, 50.70, 9.05)],
                  "gaussian": [(95, 44.97, 34.73), (32, 48.16, 19.96)]},
@@ -37,7 +37,7 @@ PAPER_TYPES = {
     "diffuse-scalar": {"ellipsoid": [(105, 48.90, 5.71), (29, 48.18, 5.01)],
                        "gaussian": [(106, 52.28, 13.79), (31, 53.84, 8.25)]},
 }
-# PSNR and primitives in thousands on Aneurysm (tables 'Pruning score' and 'k').
+# PSNR and ellipsoids in thousands on Aneurysm (tables 'Pruning score' and 'k').
 PAPER_SCORES = {"none": (44.91, 32.4), "no-fa": (49.41, 32.3), "only-fa": (50.23, 31.8),
                 "full": (50.76, 32.3)}
 PAPER_K = {"5": (50.96, 33.2), "3": (48.73, 32.7), "learned": (49.76, 33.8)}
@@ -71,7 +71,7 @@ def paper(arguments, name, *options):
 def variants(arguments, name):
     """What is run on a volume: key and options."""
     yield "ellipsoid", paper(arguments, name)
-    yield "gaussian", paper(arguments, name, "--primitive", "gaussian")
+    yield "gaussian", paper(arguments, name, "--ellipsoid", "gaussian")
     if name not in arguments.ablate:
         return
     for score in ["no-fa", "only-fa", "contribution"]:
@@ -87,7 +87,7 @@ def measure(arguments, job):
     report = convert(arguments.bin, source, out, [*options, *box],
                      ("--device", arguments.device, *threads))
     grid = report["grids"][0]
-    print(f"{name}, {key}: {grid['primitives']} ellipsoids, {grid['metrics']['psnr_box']:.2f} dB, "
+    print(f"{name}, {key}: {grid['ellipsoids']} ellipsoids, {grid['metrics']['psnr_box']:.2f} dB, "
           f"{grid['seconds']['optimise']:.1f} s", flush=True)
     return {"volume": name, "run": key, "grid": grid, "process": report["process"]}
 
@@ -104,7 +104,7 @@ def all_of(arguments, jobs, rows):
 def pruned(rows, name):
     """How many ellipsoids the run with everything on has left."""
     row = next(r for r in rows if r["volume"] == name and r["run"] == "ellipsoid")
-    return row["grid"]["primitives"]
+    return row["grid"]["ellipsoids"]
 
 
 def second_jobs(arguments, found, rows):
@@ -143,7 +143,7 @@ def measure_curves(arguments):
         rows.append(measure(arguments, (name, "curve paper", source, box,
                                         ["--preset", "paper", "--epochs",
                                          arguments.curve_epochs, "--most", CURVE_MOST])))
-        count = rows[-1]["grid"]["primitives"]
+        count = rows[-1]["grid"]["ellipsoids"]
         rows.append(measure(arguments, (name, "curve default", source, box,
                                         ["--count", count, "--storage", "float32"])))
         save(arguments, "paper_curves.json", rows)
@@ -157,8 +157,8 @@ def load(arguments, name):
     return json.loads((arguments.out / name).read_text())
 
 
-def cell(primitives, psnr, hits=None):
-    text = f"{primitives / 1000:.1f}k, {psnr:.2f}"
+def cell(ellipsoids, psnr, hits=None):
+    text = f"{ellipsoids / 1000:.1f}k, {psnr:.2f}"
     return text if hits is None else text + f", {hits:.1f}"
 
 
@@ -171,12 +171,12 @@ def type_rows(rows):
                 continue
             before = grid["paper"]["prunes"][0]
             cells = [cell(before["before"], before["psnr_box_before"], before["hits_before"]),
-                     cell(grid["primitives"], grid["metrics"]["psnr_box"], grid["fit"]["hits"])]
+                     cell(grid["ellipsoids"], grid["metrics"]["psnr_box"], grid["fit"]["hits"])]
             cells += [cell(1000 * n, psnr, hits) for n, psnr, hits in theirs[kind]]
             yield f"| {name} | {kind} | " + " | ".join(cells) + " |"
         if default := by_key.get((name, "default")):
             yield (f"| {name} | default fit | | "
-                   + cell(default["primitives"], default["metrics"]["psnr_box"],
+                   + cell(default["ellipsoids"], default["metrics"]["psnr_box"],
                           default["fit"]["hits"]) + " | | |")
 
 
@@ -193,7 +193,7 @@ def ablation_rows(rows, prefix, theirs, first):
             if name == "aneurism" and key in theirs:
                 paper_cell = cell(1000 * theirs[key][1], theirs[key][0])
             yield (f"| {name} | {key} | "
-                   + cell(grid["primitives"], grid["metrics"]["psnr_box"], grid["fit"]["hits"])
+                   + cell(grid["ellipsoids"], grid["metrics"]["psnr_box"], grid["fit"]["hits"])
                    + f" | {paper_cell} |")
 
 
@@ -201,7 +201,7 @@ def print_tables(arguments):
     measured = load(arguments, "paper_tables.json")
     rows = measured["rows"]
     print(f"\n{measured['epochs']} epochs; ellipsoids, PSNR over the box in dB, average hits\n")
-    print("| volume | primitive | before pruning | after | the paper: before | after |")
+    print("| volume | ellipsoid | before pruning | after | the paper: before | after |")
     print("|---|---|---|---|---|---|")
     print("\n".join(type_rows(rows)))
     for title, prefix, theirs, first in [("pruning score", "score ", PAPER_SCORES, "full"),
@@ -223,7 +223,7 @@ def draw(arguments):
         curve = [p for p in row["grid"]["curve"] if p["seconds"] > 0]
         pyplot.plot([p["seconds"] for p in curve], [p["psnr_box"] for p in curve],
                     "--" if of_paper else "-", color=f"C{CURVES.index(row['volume'])}",
-                    label=f"{row['volume']}, {row['grid']['primitives']} ellipsoids, "
+                    label=f"{row['volume']}, {row['grid']['ellipsoids']} ellipsoids, "
                           + ("the paper's method" if of_paper else "default"))
     pyplot.xscale("log")
     pyplot.xlabel("seconds since the fit began")

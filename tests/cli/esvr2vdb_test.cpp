@@ -103,7 +103,7 @@ TEST_F(Esvr2Vdb, writesAPartOfTheVoxelsWithoutReadingTheRest) {
 }
 
 TEST_F(Esvr2Vdb, writesTheHeaviestEllipsoidsOnly) {
-  const auto run = esvr2vdb({in(), out(), "-g", "density", "--max-primitives", "1"});
+  const auto run = esvr2vdb({in(), out(), "-g", "density", "--max-ellipsoids", "1"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const auto few = inspectVdb(out()).grids[0].activeVoxels;
   ASSERT_EQ(esvr2vdb({in(), out(), "-g", "density", "--lod", "1", "-f"}).exitCode, 0);
@@ -193,7 +193,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Refusal{{"IN", "OUT", "--box", "0,0,0,1,1,1"}, 2, "--reference"},
                     Refusal{{"IN", "OUT", "--list"}, 2, "--list"},
                     Refusal{{"IN", "OUT", "--lod", "0"}, 2, "--lod"},
-                    Refusal{{"IN", "OUT", "--max-primitives", "-1"}, 2, "--max-primitives"},
+                    Refusal{{"IN", "OUT", "--max-ellipsoids", "-1"}, 2, "--max-ellipsoids"},
                     Refusal{{"IN", "OUT", "--bbox", "1,2,3"}, 2, "bbox"},
                     Refusal{{"--check", "IN", "--lod", "1"}, 2, "--check"},
                     Refusal{{"--list", "--check", "IN"}, 2, "two jobs"},

@@ -84,7 +84,7 @@ class EsvrRender : public testing::Test {
     Field field = randomField({.count = 12, .extent = 30.0, .smallest = 4.0, .aspect = 2.0});
     for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
     const SparseVolume volume = revoxelise(field, {});
-    writeEsvr(folder_ / "in.esvr", {{}, {encodeGrid(density(), volume, field)}});
+    writeEsvr(folder_ / "in.esvr", {{}, {makeStoredGrid(density(), volume, field)}});
     const VolumeGrid grid{density(), volume, 0};
     writeGrids(folder_ / "in.vdb", {}, std::span(&grid, 1));
   }
@@ -150,7 +150,7 @@ TEST_F(EsvrRender, TheSumIsShownBetweenVoxelsWhereAskedFor) {
 TEST_F(EsvrRender, AFileThatHoldsItsVoxelsIsDrawnFromThem) {
   const VolumeGrid grid = readGrid(folder_ / "in.vdb", "density");
   const VoxelLayer layer = exactLayer(grid.volume);
-  writeEsvr(folder_ / "voxels.esvr", {{}, {encodeVoxels(grid.descriptor, grid.volume, layer)}});
+  writeEsvr(folder_ / "voxels.esvr", {{}, {makeStoredVoxels(grid.descriptor, grid.volume, layer)}});
   EXPECT_EQ(picture("voxels.esvr").rgba, picture("in.vdb").rgba);
 }
 

@@ -195,7 +195,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"--preset", "paper", "--loss", "squared"}, 2, "--beta 1"},
         Refusal{{"--preset", "paper", "--sharpness", "soft"}, 2, "soft"},
         Refusal{{"--preset", "paper", "--sharpness", "learned", "--storage", "compact"}, 2, "edge"},
-        Refusal{{"--preset", "paper", "--primitive", "gaussian", "--sharpness", "3"}, 2, "Gauss"},
+        Refusal{{"--preset", "paper", "--ellipsoid", "gaussian", "--sharpness", "3"}, 2, "Gauss"},
         Refusal{{"--preset", "paper", "--prune-passes", "2"}, 2, "--prune-passes"},
         Refusal{{"--device", "tpu"}, 2, "tpu"}, Refusal{{"--device", "cuda:4096"}, 5, "cuda:4096"},
         Refusal{{"--report", "report.txt"}, 2, ".json"},
@@ -237,8 +237,8 @@ TEST_F(Vdb2Esvr, keepsEveryVoxelWithinTheBound) {
 TEST_F(Vdb2Esvr, storesTheMaskWhereAsked) {
   ASSERT_EQ(quickFit(in(), out(), {"--topology", "exact"}).exitCode, 0);
   const SparseVolume source = readGrid(in(), "density").volume;
-  const EncodedGrid grid = readEsvr(out()).grids[0];
-  EXPECT_GT(grid.field.primitiveCount(), 0u);
+  const StoredGrid grid = readEsvr(out()).grids[0];
+  EXPECT_GT(grid.field.ellipsoidCount(), 0u);
   const SparseVolume back = decodeGrid(grid);
   EXPECT_EQ(back.bricks, source.bricks);
   EXPECT_EQ(back.active, source.active);
@@ -331,14 +331,14 @@ TEST_F(Vdb2Esvr, reportsWhatDocsReportSaysAndNothingElse) {
                                   "seconds", "peak_memory_bytes", "interrupted", "exit_code"));
   const Json& grid = report["grids"][0];
   EXPECT_THAT(keysOf(grid), testing::UnorderedElementsAre(
-                                "name", "source", "primitives", "bytes", "sections", "kernel",
+                                "name", "source", "ellipsoids", "bytes", "sections", "kernel",
                                 "topology", "fit", "paper", "compact", "layers", "bound", "metrics",
                                 "seconds", "left_out", "curve"));
   EXPECT_TRUE(grid["paper"].is_null());
   EXPECT_EQ(report["schema"], "esvr-report");
   EXPECT_EQ(report["exit_code"], 0);
   EXPECT_EQ(report["output"]["bytes"], std::filesystem::file_size(out()));
-  EXPECT_EQ(grid["primitives"], readEsvr(out()).grids[0].field.primitiveCount());
+  EXPECT_EQ(grid["ellipsoids"], readEsvr(out()).grids[0].field.ellipsoidCount());
   EXPECT_EQ(grid["source"]["active_voxels"], softBall({}).size());
   EXPECT_EQ(grid["curve"].size(), readEsvr(out()).grids[0].curve.size());
 }
@@ -369,7 +369,7 @@ TEST_F(Vdb2Esvr, takesEllipsoidsForABoundWhereTheyAreSmaller) {
   const auto run = vdb2esvr({in(), out(), "--max-error", "5%", "--kappa", "0", "--report", report});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const Json bound = Json::parse(test::readText(report))["grids"][0]["bound"];
-  const EncodedGrid grid = readEsvr(out()).grids[0];
+  const StoredGrid grid = readEsvr(out()).grids[0];
   EXPECT_EQ(bound["stored"], grid.voxels ? "voxels" : "ellipsoids and residual");
   if (!bound["ellipsoid_bytes"].is_null()) {
     EXPECT_EQ(bound["ellipsoid_bytes"] < bound["voxel_bytes"], grid.residual.has_value());

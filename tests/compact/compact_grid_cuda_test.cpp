@@ -32,14 +32,14 @@ class CompactGridOnGpu : public testing::TestWithParam<bool> {
     options.narrowBand = band;
     GridDescriptor descriptor;
     if (band) descriptor.gridClass = GridClass::kLevelSet;
-    grid_ = encodeGrid(descriptor, source_, fit(source_, options).field);
+    grid_ = makeStoredGrid(descriptor, source_, fit(source_, options).field);
   }
-  [[nodiscard]] double psnrOf(const EncodedGrid& grid) const {
+  [[nodiscard]] double psnrOf(const StoredGrid& grid) const {
     return compareVolumes(source_, decodeGrid(grid)).psnrBox;
   }
   Device device_;
   SparseVolume source_;
-  EncodedGrid grid_;
+  StoredGrid grid_;
 };
 
 TEST_P(CompactGridOnGpu, CostsNoMoreThanWasAllowed) {
@@ -81,7 +81,7 @@ TEST_P(CompactGridOnGpu, HoldsNearFloat32sOwnPrecision) {
       test::randomField({.count = 300, .extent = 30.0, .smallest = 1.5, .aspect = 2.0, .seed = 9});
   test::Random random(17);
   for (float& i : field.chunks[0].ellipsoids.intensity) i = float(random(0.2, 1.0));
-  const EncodedGrid grid = encodeGrid({}, source, std::move(field));
+  const StoredGrid grid = makeStoredGrid({}, source, std::move(field));
   const auto compact = compactGrid(grid, source, {.psnr = 105.0, .device = device_});
   EXPECT_GE(compareVolumes(source, decodeGrid(compact.grid)).psnrBox, 105.0);
 }

@@ -19,7 +19,7 @@ namespace {
 
 struct Example {
   SparseVolume source;
-  EncodedGrid grid;
+  StoredGrid grid;
 };
 
 Example fitted(const SparseVolume& volume, bool narrowBand = false) {
@@ -30,16 +30,16 @@ Example fitted(const SparseVolume& volume, bool narrowBand = false) {
   options.narrowBand = narrowBand;
   GridDescriptor descriptor;
   if (narrowBand) descriptor.gridClass = GridClass::kLevelSet;
-  return {volume, encodeGrid(descriptor, volume, fit(volume, options).field)};
+  return {volume, makeStoredGrid(descriptor, volume, fit(volume, options).field)};
 }
 const Example& tube() {
   static const Example example = fitted(test::tubeVolume());
   return example;
 }
 
-std::vector<std::byte> bytesOf(const EncodedGrid& grid) { return encodeEsvr({{}, {grid}}); }
+std::vector<std::byte> bytesOf(const StoredGrid& grid) { return encodeEsvr({{}, {grid}}); }
 
-double psnrOf(const Example& example, const EncodedGrid& grid) {
+double psnrOf(const Example& example, const StoredGrid& grid) {
   const auto back = decodeEsvr(bytesOf(grid), "memory").grids[0];
   return compareVolumes(example.source, decodeGrid(back)).psnrBox;
 }
@@ -111,13 +111,13 @@ TEST(CompactGrid, GivesTheSameBytesOnOneThread) {
 }
 
 TEST(CompactGrid, OfNoEllipsoidsIsTheSame) {
-  EncodedGrid empty = tube().grid;
+  StoredGrid empty = tube().grid;
   for (auto& chunk : empty.field.chunks) chunk.ellipsoids = {};
   EXPECT_TRUE(compactGrid(empty, tube().source).grid.quantised.empty());
 }
 
 TEST(CompactGrid, RefusesKappasOfEachEllipsoid) {
-  EncodedGrid grid = tube().grid;
+  StoredGrid grid = tube().grid;
   Ellipsoids& e = grid.field.chunks[0].ellipsoids;
   e.kappa.assign(e.size(), 2.0f);
   EXPECT_THROW((void)compactGrid(grid, tube().source), RuntimeFailure);

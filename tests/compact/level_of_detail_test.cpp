@@ -15,8 +15,8 @@ namespace esvr {
 namespace {
 
 /// n ellipsoids whose intensities span many octaves, quantised in layers.
-EncodedGrid layered(std::size_t n) {
-  EncodedGrid grid;
+StoredGrid layered(std::size_t n) {
+  StoredGrid grid;
   grid.field = test::randomField({.count = n, .extent = 50.0, .smallest = 1.0, .seed = 4});
   Ellipsoids& e = grid.field.chunks[0].ellipsoids;
   test::Random random(6);
@@ -33,7 +33,7 @@ EncodedGrid layered(std::size_t n) {
 
 TEST(Layers, AreThereFromSomeEllipsoidsOn) {
   EXPECT_EQ(layerCount(layered(2000)), 1u);
-  const EncodedGrid grid = layered(4000);
+  const StoredGrid grid = layered(4000);
   ASSERT_GE(layerCount(grid), 3u);
   // an eighth at least in the first, and about a half in the last
   EXPECT_GE(layerSizes(grid).front().ellipsoids, 500u);
@@ -41,10 +41,10 @@ TEST(Layers, AreThereFromSomeEllipsoidsOn) {
 }
 
 TEST(FirstLayers, AreThePrefixOfTheEllipsoids) {
-  const EncodedGrid grid = layered(4000);
-  const EncodedGrid two = firstLayers(grid, 2);
+  const StoredGrid grid = layered(4000);
+  const StoredGrid two = firstLayers(grid, 2);
   const std::size_t n = grid.quantised[0].layerEnds[1];
-  ASSERT_EQ(two.field.primitiveCount(), n);
+  ASSERT_EQ(two.field.ellipsoidCount(), n);
   const Ellipsoids &all = grid.field.chunks[0].ellipsoids, &few = two.field.chunks[0].ellipsoids;
   EXPECT_TRUE(std::equal(few.intensity.begin(), few.intensity.end(), all.intensity.begin()));
   EXPECT_EQ(layerCount(two), 2u);
@@ -58,8 +58,8 @@ double weightOf(const Ellipsoids& e, std::size_t i) {
 }
 
 TEST(Heaviest, AreSoManyAndNoOtherIsHeavier) {
-  const EncodedGrid grid = layered(3000);
-  const EncodedGrid few = heaviest(grid, 700);
+  const StoredGrid grid = layered(3000);
+  const StoredGrid few = heaviest(grid, 700);
   const Ellipsoids &all = grid.field.chunks[0].ellipsoids, &kept = few.field.chunks[0].ellipsoids;
   ASSERT_EQ(kept.size(), 700u);
   EXPECT_TRUE(few.quantised.empty());
@@ -71,7 +71,7 @@ TEST(Heaviest, AreSoManyAndNoOtherIsHeavier) {
 }
 
 TEST(Heaviest, OfAsManyAsThereAreIsTheGrid) {
-  const EncodedGrid grid = layered(300);
+  const StoredGrid grid = layered(300);
   EXPECT_EQ(heaviest(grid, 300).quantised, grid.quantised);
 }
 

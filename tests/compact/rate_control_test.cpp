@@ -21,10 +21,10 @@ RateInput inputOf(const SparseVolume& volume) {
   return {descriptor, volume, options};
 }
 
-std::uint64_t bytesIn(const EncodedGrid& grid) {
+std::uint64_t bytesIn(const StoredGrid& grid) {
   return encodeEsvr({{}, {grid}}).size() - encodeEsvr({}).size();
 }
-double psnrOf(const SparseVolume& volume, const EncodedGrid& grid) {
+double psnrOf(const SparseVolume& volume, const StoredGrid& grid) {
   return compareVolumes(volume, decodeGrid(grid)).psnrBox;
 }
 

@@ -25,9 +25,9 @@ Field roughFit(const SparseVolume& volume) {
   return fit(volume, options).field;
 }
 
-EncodedGrid throughTheFile(const EncodedGrid& grid) {
+StoredGrid throughTheFile(const StoredGrid& grid) {
   const auto bytes = encodeEsvr({{}, {grid}});
-  EncodedGrid back = decodeEsvr(bytes, "memory").grids[0];
+  StoredGrid back = decodeEsvr(bytes, "memory").grids[0];
   EXPECT_EQ(encodeEsvr({{}, {back}}), bytes);
   return back;
 }
@@ -37,7 +37,7 @@ TEST(WithResidual, KeepsEveryVoxelWithinTheBound) {
   const Field field = roughFit(tube);
   for (const auto activity : {Activity::kByValue, Activity::kExact})
     for (const double bound : {0.3, 0.05, 0.01}) {
-      const auto grid = withResidual(encodeGrid({}, tube, field, activity), tube, bound);
+      const auto grid = withResidual(makeStoredGrid({}, tube, field, activity), tube, bound);
       ASSERT_TRUE(grid);
       const SparseVolume back = decodeGrid(throughTheFile(*grid));
       EXPECT_LE(largestDifference(tube, back), bound);
@@ -50,7 +50,7 @@ TEST(WithResidual, KeepsEveryVoxelWithinTheBound) {
 
 TEST(WithResidual, IsSmallerTheMoreErrorIsAllowed) {
   const SparseVolume tube = test::tubeVolume();
-  const EncodedGrid grid = encodeGrid({}, tube, roughFit(tube));
+  const StoredGrid grid = makeStoredGrid({}, tube, roughFit(tube));
   const auto bytes = [&](double bound) {
     return encodeEsvr({{}, {*withResidual(grid, tube, bound)}}).size();
   };
@@ -62,7 +62,7 @@ TEST(WithResidual, IsSmallerTheMoreErrorIsAllowed) {
 TEST(WithResidual, HoldsForASumThatRoundsDifferently) {
   const SparseVolume tube = test::tubeVolume();
   const double bound = 0.01;
-  EncodedGrid grid = *withResidual(encodeGrid({}, tube, roughFit(tube)), tube, bound);
+  StoredGrid grid = *withResidual(makeStoredGrid({}, tube, roughFit(tube)), tube, bound);
   test::Random random(3);
   for (float& intensity : grid.field.chunks[0].ellipsoids.intensity)
     intensity *= float(1.0 + random(-4e-6, 4e-6));
@@ -71,7 +71,7 @@ TEST(WithResidual, HoldsForASumThatRoundsDifferently) {
 
 TEST(WithResidual, IsNotThereWhereRoundingTakesTheBound) {
   const SparseVolume tube = test::tubeVolume();
-  EXPECT_FALSE(withResidual(encodeGrid({}, tube, roughFit(tube)), tube, 1e-5));
+  EXPECT_FALSE(withResidual(makeStoredGrid({}, tube, roughFit(tube)), tube, 1e-5));
 }
 
 TEST(WithResidual, CountsOnABackgroundOtherThanZero) {
@@ -79,14 +79,14 @@ TEST(WithResidual, CountsOnABackgroundOtherThanZero) {
   tube.background = 2.0f;
   for (float& v : tube.values) v += 2.0f;
   const double bound = 0.02;
-  const auto grid = withResidual(encodeGrid({}, tube, roughFit(tube)), tube, bound);
+  const auto grid = withResidual(makeStoredGrid({}, tube, roughFit(tube)), tube, bound);
   ASSERT_TRUE(grid);
   EXPECT_LE(largestDifference(tube, decodeGrid(throughTheFile(*grid))), bound);
 }
 
 TEST(WithResidual, BelongsToAllOfTheEllipsoids) {
   const SparseVolume tube = test::tubeVolume();
-  const auto grid = withResidual(encodeGrid({}, tube, roughFit(tube)), tube, 0.05);
+  const auto grid = withResidual(makeStoredGrid({}, tube, roughFit(tube)), tube, 0.05);
   EXPECT_TRUE(heaviest(*grid, 1000).residual);
   EXPECT_FALSE(heaviest(*grid, 3).residual);
 }
@@ -97,7 +97,7 @@ TEST(FitWithin, SlowTakesEllipsoidsWhereTheyPay) {
   options.iterations = 200;
   options.kappa = 0.0f;
   const GridDescriptor descriptor;
-  const auto bytesOf = [](const EncodedGrid& grid) {
+  const auto bytesOf = [](const StoredGrid& grid) {
     return encodeEsvr({{}, {grid}}).size() - encodeEsvr({}).size();
   };
   test::Random random(5);
@@ -114,8 +114,8 @@ TEST(FitWithin, SlowTakesEllipsoidsWhereTheyPay) {
   const SparseVolume noise =
       test::volumeOf({}, 2, 0.0f, [&](Coord) { return float(random(0.5, 1.0)); });
   for (const SparseVolume* volume : {&smooth, &noise}) {
-    const EncodedGrid voxels =
-        encodeVoxels(descriptor, *volume, boundedLayer(*volume, 0.1, Activity::kByValue));
+    const StoredGrid voxels =
+        makeStoredVoxels(descriptor, *volume, boundedLayer(*volume, 0.1, Activity::kByValue));
     const BoundedFit fitted =
         fitWithin({descriptor, *volume, options, Activity::kByValue}, 0.1, bytesOf(voxels));
     EXPECT_EQ(fitted.rated.has_value(), volume == &smooth)

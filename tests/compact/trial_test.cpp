@@ -16,26 +16,26 @@
 namespace esvr {
 namespace {
 
-EncodedGrid storedOf(EncodedGrid grid, const Trial& trial) {
+StoredGrid storedOf(StoredGrid grid, const Trial& trial) {
   grid.field = trial.field;
   grid.quantised = trial.quantised;
   return grid;
 }
 
-VolumeMetrics metricsOf(const SparseVolume& source, const EncodedGrid& grid) {
+VolumeMetrics metricsOf(const SparseVolume& source, const StoredGrid& grid) {
   return compareVolumes(source, decodeGrid(grid), {.box = {}, .peak = {}, .ssim = false});
 }
 
 struct Fitted {
   SparseVolume source = test::tubeVolume();
-  EncodedGrid grid;
+  StoredGrid grid;
 
   Fitted() {
     FitOptions options;
     options.count = 100;
     options.iterations = 150;
     options.kappa = 2.0f;
-    grid = encodeGrid({}, source, fit(source, options).field);
+    grid = makeStoredGrid({}, source, fit(source, options).field);
   }
 };
 
@@ -66,10 +66,10 @@ TEST(Trial, KnowsTheErrorsOfItsLayers) {
   Field field = test::randomField({.count = 2500, .extent = 30.0, .smallest = 0.7, .seed = 5});
   test::Random random(6);
   for (float& i : field.chunks[0].ellipsoids.intensity) i = float(std::exp(random(-6.0, -1.0)));
-  const EncodedGrid grid = encodeGrid({}, source, field);
+  const StoredGrid grid = makeStoredGrid({}, source, field);
   TrialMaker maker(grid, {source, activeBox(source), {}});
   const Trial trial = maker.make({0.1, 0.1, 0.1, 0.1});
-  const EncodedGrid stored = storedOf(grid, trial);
+  const StoredGrid stored = storedOf(grid, trial);
   const auto errors = maker.layerErrors(trial);
   ASSERT_GE(errors.size(), 2u);
   ASSERT_EQ(errors.size(), layerCount(stored));

@@ -11,9 +11,9 @@ namespace esvr {
 namespace {
 
 /// n unit spheres of intensity 1 at the origin.
-Ellipsoids unitSpheres(std::size_t n, bool perPrimitiveKappa = false) {
+Ellipsoids unitSpheres(std::size_t n, bool perEllipsoidKappa = false) {
   Ellipsoids e;
-  e.resize(n, perPrimitiveKappa);
+  e.resize(n, perEllipsoidKappa);
   e.intensity.assign(n, 1.0f);
   e.rotation[0].assign(n, 1.0f);
   return e;
@@ -84,9 +84,9 @@ TEST(WellFormed, ToleratesRoundingOfAQuaternionButNoMore) {
 
 TEST(Field, CountsTheEllipsoidsOfAllItsChunks) {
   Field field;
-  EXPECT_EQ(field.primitiveCount(), 0u);
+  EXPECT_EQ(field.ellipsoidCount(), 0u);
   field.chunks = {{{0, 0, 0}, unitSpheres(3)}, {{4096, 0, 0}, {}}, {{8192, 0, 0}, unitSpheres(2)}};
-  EXPECT_EQ(field.primitiveCount(), 5u);
+  EXPECT_EQ(field.ellipsoidCount(), 5u);
 }
 
 TEST(Chunk, CentersAreExactToTwoToTheMinusTwelfthOfAVoxel) {

@@ -1,4 +1,4 @@
-// Plan: evaluateBricks (float32, SIMD, lists) against evaluateReference (float64, every primitive
+// Plan: evaluateBricks (float32, SIMD, lists) against evaluateReference (float64, every ellipsoid
 // at every voxel) over kernels from the Gaussian limit to a hard edge, over needles and pancakes,
 // far origins and supports that cross bricks; outside reachedBricks the reference must be zero; the
 // result must not depend on the number of threads, on where the field lies, nor on other bricks
@@ -93,7 +93,7 @@ TEST(Evaluate, DoesNotDependOnTheOtherBricks) {
   EXPECT_TRUE(std::equal(one.begin(), one.end(), many.begin()));
 }
 
-TEST(Evaluate, UsesEachPrimitivesOwnKappaWhereGiven) {
+TEST(Evaluate, UsesEachEllipsoidsOwnKappaWhereGiven) {
   Field field = test::randomField({.count = 20, .extent = 16});
   auto& e = field.chunks[0].ellipsoids;
   for (std::size_t i = 0; i < e.size(); ++i) e.kappa.push_back(float(i) - 8.0f);

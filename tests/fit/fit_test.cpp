@@ -37,7 +37,7 @@ TEST(Fit, ReachesHighQualityOnAFieldOfEllipsoids) {
   options.iterations = 400;
   const FitResult result = fit(volume, options);
   EXPECT_GT(psnrOfFit(volume, result, 1.0), 50.0);
-  EXPECT_LE(result.field.primitiveCount(), 200u);
+  EXPECT_LE(result.field.ellipsoidCount(), 200u);
 }
 
 TEST(Fit, CurveAgreesWithTheMetricsOfItsField) {
@@ -136,16 +136,16 @@ TEST(Fit, OfAConstantEqualToTheBackgroundIsEmptyAndExact) {
   SparseVolume volume = test::volumeOf({}, 1, 0.0f, [](Coord) { return 1.0f; });
   std::fill(volume.values.begin(), volume.values.end(), 0.0f);
   const FitResult result = fit(volume, quick());
-  EXPECT_EQ(result.field.primitiveCount(), 0u);
+  EXPECT_EQ(result.field.ellipsoidCount(), 0u);
   EXPECT_EQ(revoxelise(result.field, {}).brickCount(), 0u);
 }
 
-TEST(Fit, OfOneVoxelIsOnePrimitive) {
+TEST(Fit, OfOneVoxelIsOneEllipsoid) {
   const SparseVolume volume = test::volumeOf({}, 1, 0.0f, [](Coord v) {
     return v == Coord{3, 4, 5} ? 2.0f : 0.0f;
   });
   const FitResult result = fit(volume, quick());
-  EXPECT_EQ(result.field.primitiveCount(), 1u);
+  EXPECT_EQ(result.field.ellipsoidCount(), 1u);
   EXPECT_NEAR(evaluateReference(result.field, {3, 4, 5}), 2.0, 0.02);
 }
 
@@ -171,7 +171,7 @@ TEST(Fit, SaysSoWhereThePsnrIsOutOfReach) {
   options.psnr = 90.0;
   const FitResult result = fit(test::tubeVolume(), options);
   EXPECT_EQ(result.end, FitEnd::kPsnrMissed);
-  EXPECT_LE(result.field.primitiveCount(), 3u);
+  EXPECT_LE(result.field.ellipsoidCount(), 3u);
 }
 
 TEST(Fit, GivesItsLargestNumberAWholeRunBeforeItSaysSo) {
@@ -204,7 +204,7 @@ TEST(Fit, ReturnsTheBestSoFarWhenCancelled) {
   };
   const FitResult result = fit(test::tubeVolume(), options);
   EXPECT_EQ(result.end, FitEnd::kCancelled);
-  EXPECT_GT(result.field.primitiveCount(), 0u);
+  EXPECT_GT(result.field.ellipsoidCount(), 0u);
 }
 
 TEST(Fit, ThrowsWhenCancelledBeforeItHasAnything) {

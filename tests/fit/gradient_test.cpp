@@ -1,4 +1,4 @@
-// Plan: the engine's gradients of 1/2 sum r^2, by every parameter of every primitive, against
+// Plan: the engine's gradients of 1/2 sum r^2, by every parameter of every ellipsoid, against
 // central differences of a float64 loss summed over all voxels of a dense box, for kernels from the
 // Gaussian limit to a hard edge; gradientsOf against gradients with r handed in; and the adjoint
 // identity <g, dV> = <dL, dtheta> for a random g.
@@ -7,22 +7,22 @@
 
 #include <cmath>
 
-#include "fit/engine.h"
+#include "fit/cpu/cpu_pass.h"
+#include "fit/ellipsoid_math.h"
 #include "fit/parameter_gradient.h"
-#include "fit/primitive_math.h"
-#include "random_primitives.h"
+#include "random_ellipsoids.h"
 
 namespace esvr {
 namespace {
 
 using test::denseVolume;
 using test::kSide;
-using test::randomPrimitives;
+using test::randomEllipsoids;
 
-double valueAt(const std::vector<Primitive>& primitives, const KernelConstants<double>& k,
+double valueAt(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<double>& k,
                Coord v) {
   double value = 0.0;
-  for (const Primitive& p : primitives) {
+  for (const Ellipsoid& p : ellipsoids) {
     const double d[3] = {v.x - p.center[0], v.y - p.center[1], v.z - p.center[2]};
     double m = 0.0;
     for (int r = 0; r < 3; ++r) {
@@ -35,14 +35,14 @@ double valueAt(const std::vector<Primitive>& primitives, const KernelConstants<d
 }
 
 /// 1/2 sum r^2 in float64 over a box that holds every support.
-double referenceLoss(const std::vector<Primitive>& primitives, const KernelConstants<double>& k,
+double referenceLoss(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<double>& k,
                      const SparseVolume& volume, const FitTarget& target, int margin) {
   double loss = 0.0;
   for (int x = -margin; x < kSide + margin; ++x)
     for (int y = -margin; y < kSide + margin; ++y)
       for (int z = -margin; z < kSide + margin; ++z) {
         const double t = double(esvr::valueAt(volume, {x, y, z})) * target.scale;
-        const double r = valueAt(primitives, k, {x, y, z}) - t;
+        const double r = valueAt(ellipsoids, k, {x, y, z}) - t;
         loss += 0.5 * r * r;
       }
   return loss;
@@ -57,19 +57,19 @@ TEST_P(GradientKappa, SlowAgreesWithCentralDifferences) {
   const SparseVolume volume = denseVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
   const auto k = kernelConstants<double>({.kappa = GetParam()});
-  const auto primitives = randomPrimitives(3, 1.5, 2.0);
-  FitEngine engine(target, k);
-  engine.rebuild(primitives, 0.1);
-  std::vector<PrimitiveGradient> gradients(primitives.size());
-  const double loss = engine.gradients(primitives, gradients);
-  EXPECT_NEAR(0.5 * loss, referenceLoss(primitives, k, volume, target, 14), 1e-5 * loss);
+  const auto ellipsoids = randomEllipsoids(3, 1.5, 2.0);
+  CpuPass engine(target, k);
+  engine.rebuild(ellipsoids, 0.1);
+  std::vector<EllipsoidGradient> gradients(ellipsoids.size());
+  const double loss = engine.gradients(ellipsoids, gradients);
+  EXPECT_NEAR(0.5 * loss, referenceLoss(ellipsoids, k, volume, target, 14), 1e-5 * loss);
 
   constexpr double kStep = 1e-6;
-  for (std::size_t i = 0; i < primitives.size(); ++i) {
+  for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
     double error2 = 0.0, norm2 = 0.0;
     for (int parameter = 0; parameter < kParameters; ++parameter) {
       const auto lossAt = [&](double step) {
-        auto moved = primitives;
+        auto moved = ellipsoids;
         ParameterVector s{};
         s[parameter] = step;
         applyStep(moved[i], s);
@@ -79,7 +79,7 @@ TEST_P(GradientKappa, SlowAgreesWithCentralDifferences) {
       error2 += std::pow(difference - gradients[i].byParameter[parameter], 2);
       norm2 += difference * difference;
     }
-    EXPECT_LT(std::sqrt(error2), 3e-4 * std::sqrt(norm2)) << "primitive " << i;
+    EXPECT_LT(std::sqrt(error2), 3e-4 * std::sqrt(norm2)) << "ellipsoid " << i;
   }
 }
 // By kappa with half widths held: scales follow, as a run's steps of kappa have them.
@@ -88,22 +88,22 @@ TEST_P(GradientKappa, AgreesWithCentralDifferencesByKappa) {
   const FitTarget target = makeTarget(volume, std::nullopt);
   const Kernel kernel{.kappa = GetParam()};
   const auto k = kernelConstants<double>(kernel);
-  const auto primitives = randomPrimitives(3, 1.5, 2.0);
-  FitEngine engine(target, k);
-  engine.rebuild(primitives, 0.1);
-  std::vector<PrimitiveGradient> gradients(primitives.size());
-  engine.gradients(primitives, gradients);
+  const auto ellipsoids = randomEllipsoids(3, 1.5, 2.0);
+  CpuPass engine(target, k);
+  engine.rebuild(ellipsoids, 0.1);
+  std::vector<EllipsoidGradient> gradients(ellipsoids.size());
+  engine.gradients(ellipsoids, gradients);
 
   constexpr double kStep = 1e-6;
   const auto lossAt = [&](double step) {
     const auto moved = kernelConstants<double>(kernel, double(kernel.kappa) + step);
-    auto scaled = primitives;
-    for (Primitive& p : scaled) shrinkBy(p, std::sqrt(kernelWidth(moved).m / kernelWidth(k).m));
+    auto scaled = ellipsoids;
+    for (Ellipsoid& p : scaled) shrinkBy(p, std::sqrt(kernelWidth(moved).m / kernelWidth(k).m));
     return referenceLoss(scaled, moved, volume, target, 14);
   };
   const double difference = (lossAt(kStep) - lossAt(-kStep)) / (2 * kStep);
   double slope = 0.0, terms = 0.0;
-  for (const PrimitiveGradient& g : gradients) {
+  for (const EllipsoidGradient& g : gradients) {
     slope += edgeGradient(g, kernelWidth(k).logMByKappa);
     for (int j = 3; j < 6; ++j) terms += std::abs(g.byParameter[j]);
   }

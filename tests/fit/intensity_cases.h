@@ -38,7 +38,7 @@ TEST_P(Intensities, ThatMadeTheVolumeAreFound) {
   const Field truth = someField();
   const SparseVolume volume = revoxelise(truth, {});
   auto problem = problemOf(truth, targetOf(volume));
-  std::vector<float> guess(truth.primitiveCount(), 0.1f);
+  std::vector<float> guess(truth.ellipsoidCount(), 0.1f);
   guess[3] = -0.1f;  // signs are allowed then
   EXPECT_GT(problem.error(guess).squares, 1.0);
   // 12 unknowns: exact after 12 steps but for rounding in float32 brick sums
@@ -67,7 +67,7 @@ inline Row solved(std::vector<Row> A, Row b) {
 
 /// Every ellipsoid alone, with an intensity of 1.
 inline std::vector<Field> kernelsOf(const Field& field) {
-  std::vector<Field> kernels(field.primitiveCount(), field);
+  std::vector<Field> kernels(field.ellipsoidCount(), field);
   for (std::size_t i = 0; i < kernels.size(); ++i) {
     auto& intensity = kernels[i].chunks[0].ellipsoids.intensity;
     std::fill(intensity.begin(), intensity.end(), 0.0f);
@@ -80,7 +80,7 @@ TEST_P(Intensities, AgreeWithDenseNormalEquations) {
   const Field field = someField();
   const SparseVolume volume = tubeVolume();
   auto problem = problemOf(field, targetOf(volume));
-  std::vector<float> solution(field.primitiveCount(), -0.01f);
+  std::vector<float> solution(field.ellipsoidCount(), -0.01f);
   (void)problem.solve(solution, 60);
 
   const auto kernels = kernelsOf(field);
@@ -133,7 +133,7 @@ TEST_P(Intensities, KeepTheirSignWhereThereIsOne) {
   const Field field = someField();
   const SparseVolume volume = tubeVolume();
   auto problem = problemOf(field, targetOf(volume));
-  std::vector<float> intensities(field.primitiveCount(), 0.2f);
+  std::vector<float> intensities(field.ellipsoidCount(), 0.2f);
   const double before = problem.error(intensities).squares;
   EXPECT_LE(problem.solve(intensities, 20), before);
   for (const float i : intensities) EXPECT_GE(i, 0.0f);
@@ -149,7 +149,7 @@ TEST_P(Intensities, LeaveExactVoxelsAlone) {
   passes->setShapes(field);
   IntensityGradient gradient;
   (void)passes->gradient(intensitiesOf(field), gradient);
-  const std::vector<double> direction(field.primitiveCount(), 1.0);
+  const std::vector<double> direction(field.ellipsoidCount(), 1.0);
   std::vector<double> some, all;
   passes->applyNormal(direction, some);
   target.stored.threshold = -1.0f;
@@ -173,7 +173,7 @@ TEST_P(Intensities, DoNotDependOnTheFieldBefore) {
   const IntensityTarget target = targetOf(volume);
   auto fresh = problemOf(field, target);
   auto used = problemOf(other, target);
-  std::vector<float> a(field.primitiveCount(), 0.2f), b = a, c(other.primitiveCount(), 0.1f);
+  std::vector<float> a(field.ellipsoidCount(), 0.2f), b = a, c(other.ellipsoidCount(), 0.1f);
   (void)used.solve(c, 3);
   used.setShapes(field);
   EXPECT_EQ(fresh.solve(a, 10), used.solve(b, 10));

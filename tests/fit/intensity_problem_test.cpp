@@ -18,7 +18,7 @@ TEST(IntensityProblem, GivesTheSameBitsOnOneThread) {
   const Field field = test::someField();
   const SparseVolume volume = test::tubeVolume();
   const IntensityTarget target = test::targetOf(volume);
-  std::vector<float> many(field.primitiveCount(), 0.2f), one = many;
+  std::vector<float> many(field.ellipsoidCount(), 0.2f), one = many;
   IntensityProblem problem(target);
   problem.setShapes(field);
   (void)problem.solve(many, 10);

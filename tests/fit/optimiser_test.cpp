@@ -1,5 +1,5 @@
 // Plan: the moves of a run on every device: growth reaches its count and seeds where the error is;
-// relocation moves the least useful and no others; unseen primitives go; without error nothing is
+// relocation moves the least useful and no others; unseen ellipsoids go; without error nothing is
 // seeded; a whole fit is the same bits in three runs and in a far place. Without a GPU its tests
 // skip.
 
@@ -44,7 +44,7 @@ class OptimiserOn : public testing::TestWithParam<const char*> {
 TEST_P(OptimiserOn, GrowsToTheCountAndLowersTheLoss) {
   const auto optimiser = make();
   optimiser->growTo(50);
-  EXPECT_EQ(optimiser->primitiveCount(), 50u);
+  EXPECT_EQ(optimiser->ellipsoidCount(), 50u);
   const double first = optimiser->iterate(std::array{1.0});
   for (int i = 0; i < 60; ++i) optimiser->iterate(std::array{0.5});
   EXPECT_LT(optimiser->measure().squaredSum, 0.2 * first);
@@ -63,9 +63,9 @@ TEST_P(OptimiserOn, RelocatesTheLeastUsefulAndKeepsTheCount) {
   const auto optimiser = make();
   optimiser->growTo(50);
   for (int i = 0; i < 30; ++i) optimiser->iterate(std::array{0.5});
-  const auto before = optimiser->primitives();
+  const auto before = optimiser->ellipsoids();
   optimiser->relocate(5);
-  const auto after = optimiser->primitives();
+  const auto after = optimiser->ellipsoids();
   ASSERT_EQ(after.size(), 50u);
   int moved = 0;
   for (std::size_t i = 0; i < 50; ++i) moved += before[i].center != after[i].center;
@@ -80,19 +80,19 @@ TEST_P(OptimiserOn, DropsWhatNoVoxelSees) {
   optimiser->growTo(50);
   for (int i = 0; i < 5; ++i) optimiser->iterate(std::array{1.0});
   optimiser->dropUnseen();
-  EXPECT_LT(optimiser->primitiveCount(), 50u);
+  EXPECT_LT(optimiser->ellipsoidCount(), 50u);
   EXPECT_TRUE(std::isfinite(optimiser->measure().squaredSum));
 }
 
 TEST_P(OptimiserOn, AnotherEdgeKeepsTheHalfWidths) {
   const auto optimiser = make();
   optimiser->growTo(20);
-  const auto before = optimiser->primitives();
+  const auto before = optimiser->ellipsoids();
   const double m = kernelWidth(kernelConstants<double>(optimiser->kernel())).m;
   optimiser->setKappa(4.0f);
   EXPECT_EQ(optimiser->kernel().kappa, 4.0f);
   const double moved = kernelWidth(kernelConstants<double>(optimiser->kernel())).m;
-  const auto after = optimiser->primitives();
+  const auto after = optimiser->ellipsoids();
   for (std::size_t i = 0; i < before.size(); ++i)
     for (int k = 0; k < 9; ++k)  // a product of two rounded numbers, a square root among them
       EXPECT_NEAR(after[i].L[k] / std::sqrt(moved), before[i].L[k] / std::sqrt(m),
@@ -121,7 +121,7 @@ TEST_P(OptimiserOn, SeedsNothingWhereThereIsNothingToMend) {
   std::fill(target_.values.begin(), target_.values.end(), 0.0f);
   const auto optimiser = make();
   optimiser->growTo(50);
-  EXPECT_EQ(optimiser->primitiveCount(), 0u);
+  EXPECT_EQ(optimiser->ellipsoidCount(), 0u);
   EXPECT_EQ(optimiser->iterate(std::array{1.0}), 0.0);
 }
 

@@ -2,7 +2,7 @@
 // place, spread and height from the residual around it; the kernel's variance has its closed form
 // in the Gaussian limit.
 
-#include "fit/seed.h"
+#include "fit/cpu/seed.h"
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ TEST(DrawVoxels, FollowsTheEnergyBrickByBrick) {
   Bricks b({{0, 0, 0}, {1, 0, 0}});
   for (std::size_t v = 0; v < kBrickVoxels; ++v)
     b.values[v] = -1.0f, b.values[kBrickVoxels + v] = -2.0f;
-  const auto voxels = drawVoxels(b.field(), {.count = 100, .targetBricks = 2}).voxels;
+  const auto voxels = sampleVoxels(b.field(), {.count = 100, .targetBricks = 2}).voxels;
   ASSERT_EQ(voxels.size(), 100u);
   const auto inSecond =
       std::count_if(voxels.begin(), voxels.end(), [](Coord v) { return v.x >= 8; });
@@ -35,25 +35,25 @@ TEST(DrawVoxels, LeavesAloneWhatItsSignCannotMend) {
   Bricks b({{0, 0, 0}});
   b.values[10] = 5.0f;   // V too high
   b.values[20] = -1.0f;  // V too low
-  for (const Coord v : drawVoxels(b.field(), {.count = 50, .targetBricks = 1}).voxels)
+  for (const Coord v : sampleVoxels(b.field(), {.count = 50, .targetBricks = 1}).voxels)
     EXPECT_EQ(v, voxelLocal(20));
-  DrawOptions negative{
+  SamplingOptions negative{
       .count = 50, .targetBricks = 1, .signs = {.positive = false, .negative = true}};
-  for (const Coord v : drawVoxels(b.field(), negative).voxels) EXPECT_EQ(v, voxelLocal(10));
+  for (const Coord v : sampleVoxels(b.field(), negative).voxels) EXPECT_EQ(v, voxelLocal(10));
 }
 
 TEST(DrawVoxels, AVoxelOfManySharesIsDrawnOnce) {
   Bricks b({{0, 0, 0}});
   b.values[30] = -10.0f;
   b.values[40] = -0.1f;
-  const auto [voxels, share] = drawVoxels(b.field(), {.count = 1000, .targetBricks = 1});
+  const auto [voxels, share] = sampleVoxels(b.field(), {.count = 1000, .targetBricks = 1});
   EXPECT_EQ(voxels, (std::vector<Coord>{voxelLocal(30)}));
   EXPECT_NEAR(share, 100.01 / 1000, 1e-6);
 }
 
 TEST(DrawVoxels, FindsNothingWhereThereIsNoError) {
   const Bricks b({{0, 0, 0}});
-  EXPECT_TRUE(drawVoxels(b.field(), {.count = 5, .targetBricks = 1}).voxels.empty());
+  EXPECT_TRUE(sampleVoxels(b.field(), {.count = 5, .targetBricks = 1}).voxels.empty());
 }
 
 TEST(Seed, TakesPlaceAndHeightFromTheResidual) {

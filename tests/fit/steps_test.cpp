@@ -15,9 +15,9 @@ namespace {
 
 TEST(Adam, FirstStepHasTheTunedSizeWhateverTheGradient) {
   for (const double size : {1e-25, 1.0, 1e25}) {
-    std::vector<Primitive> p{{{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1.0}};
+    std::vector<Ellipsoid> p{{{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1.0}};
     std::vector<AdamState> state(1);
-    std::vector<PrimitiveGradient> g(1);
+    std::vector<EllipsoidGradient> g(1);
     g[0].byParameter.fill(0.0);
     g[0].byParameter[0] = size;
     adamStep(p, state, g, {0.1, 0.1, 0.1}, {}, {0.25, 64.0, -2.0, 2.0});
@@ -31,9 +31,9 @@ TEST(Adam, FirstStepHasTheTunedSizeWhateverTheGradient) {
 }
 
 TEST(Adam, KeepsIntensitiesInRange) {
-  std::vector<Primitive> p{{{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 0.001}};
+  std::vector<Ellipsoid> p{{{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 0.001}};
   std::vector<AdamState> state(1);
-  std::vector<PrimitiveGradient> g(1);
+  std::vector<EllipsoidGradient> g(1);
   g[0].byParameter.fill(0.0);
   g[0].byParameter[9] = 1.0;
   for (int i = 0; i < 50; ++i) adamStep(p, state, g, {}, {}, {0.25, 64.0, 0.0, 1.5});
@@ -42,9 +42,9 @@ TEST(Adam, KeepsIntensitiesInRange) {
 
 /// A hundred steps down the bowl |center - (1, 2, 3)|^2 / 2, its gradient scaled.
 std::array<double, 3> descend(double scale) {
-  std::vector<Primitive> p{{{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1.0}};
+  std::vector<Ellipsoid> p{{{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1.0}};
   std::vector<AdamState> state(1);
-  std::vector<PrimitiveGradient> g(1);
+  std::vector<EllipsoidGradient> g(1);
   for (int i = 0; i < 100; ++i) {
     g[0].byParameter.fill(0.0);
     for (std::size_t a = 0; a < 3; ++a)
@@ -65,9 +65,9 @@ TEST(Adam, TakesTheSameWayHoweverTheLossIsScaled) {
 
 TEST(Adam, LeavesALimitWhenTheGradientPointsBackInside) {
   constexpr double kSmallest = 0.25;
-  std::vector<Primitive> p{{{0, 0, 0}, {4, 0, 0, 0, 4, 0, 0, 0, 4}, 1.0}};
+  std::vector<Ellipsoid> p{{{0, 0, 0}, {4, 0, 0, 0, 4, 0, 0, 0, 4}, 1.0}};
   std::vector<AdamState> state(1);
-  std::vector<PrimitiveGradient> g(1);
+  std::vector<EllipsoidGradient> g(1);
   g[0].byParameter.fill(0.0);
   const auto push = [&](double gradient, int steps) {
     for (int k = 3; k < 6; ++k) g[0].byParameter[std::size_t(k)] = gradient;
@@ -80,9 +80,9 @@ TEST(Adam, LeavesALimitWhenTheGradientPointsBackInside) {
 
 TEST(Adam, SlowKeepsAShapeValidOverAHundredThousandSteps) {
   test::Random random(11);
-  std::vector<Primitive> p{{{0, 0, 0}, {1, 0, 0, 0, 0.5, 0, 0, 0, 2}, 1.0}};
+  std::vector<Ellipsoid> p{{{0, 0, 0}, {1, 0, 0, 0, 0.5, 0, 0, 0, 2}, 1.0}};
   std::vector<AdamState> state(1);
-  std::vector<PrimitiveGradient> g(1);
+  std::vector<EllipsoidGradient> g(1);
   for (int i = 0; i < 100'000; ++i) {
     for (double& value : g[0].byParameter) value = random(-1.0, 1.0);
     adamStep(p, state, g, {}, {}, {0.25, 16.0, 0.0, 1.5});

@@ -70,7 +70,7 @@ TEST_F(ContainerFile, AFullDiskLeavesNothing) {
 }
 
 TEST_F(ContainerFile, WhatCannotBeStoredIsNamedAndLeavesNothing) {
-  EncodedGrid grid = test::fogGrid(4);
+  StoredGrid grid = test::fogGrid(4);
   grid.field.chunks[0].ellipsoids.intensity[2] = std::numeric_limits<float>::infinity();
   EXPECT_THAT([&] { writeEsvr(path(), test::fileOf(grid)); },
               ThrowsMessage<RuntimeFailure>(
@@ -136,7 +136,7 @@ TEST_F(ContainerFile, CheckHasNothingToSayOfAGoodFile) {
 }
 
 TEST_F(ContainerFile, CheckNotesWhatAReaderPassesOver) {
-  EncodedGrid odd = test::emptyGrid();
+  StoredGrid odd = test::emptyGrid();
   odd.field.background = 2.0f;
   test::CraftedFile crafted(encodeEsvr(test::fileOf(odd)));
   crafted.versionMinor = 7;

@@ -49,7 +49,7 @@ class CraftedFile {
   /// What assemble() wrote last.
   [[nodiscard]] const format::SectionTable& table() const { return table_; }
 
-  std::uint16_t versionMajor = format::kVersionMajor, versionMinor = format::kFirstMinor;
+  std::uint16_t versionMajor = format::kVersionMajor, versionMinor = format::kVersionMinor;
 
  private:
   format::SectionTable table_;

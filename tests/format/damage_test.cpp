@@ -55,7 +55,7 @@ TEST(Damage, BytesAfterTheEndAreRefused) {
 /// One to eight of: a byte changed, a run cut out, a run doubled elsewhere, a run reversed.
 class Mutator {
  public:
-  explicit Mutator(std::uint32_t seed) : engine_(seed) {}
+  explicit Mutator(std::uint32_t seed) : pass_(seed) {}
 
   Bytes mutated(Bytes bytes) {
     for (std::size_t n = 1 + below(8); n > 0; --n) mutate(bytes);
@@ -63,7 +63,7 @@ class Mutator {
   }
 
  private:
-  std::size_t below(std::size_t n) { return std::size_t(engine_()) % n; }
+  std::size_t below(std::size_t n) { return std::size_t(pass_()) % n; }
 
   void mutate(Bytes& bytes) {
     const std::size_t length = 1 + below(std::min<std::size_t>(16, bytes.size() / 2));
@@ -86,7 +86,7 @@ class Mutator {
     }
   }
 
-  std::mt19937 engine_;
+  std::mt19937 pass_;
 };
 
 TEST(Damage, TenThousandMutationsAreRefusedOrChangeNothing) {

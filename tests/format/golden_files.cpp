@@ -13,8 +13,8 @@ namespace {
 constexpr auto kKindOfNoVersion = format::SectionKind(0x7e57);
 
 /// Every number typed here, none computed.
-EncodedGrid oneEllipsoid() {
-  EncodedGrid grid = emptyGrid();
+StoredGrid oneEllipsoid() {
+  StoredGrid grid = emptyGrid();
   grid.descriptor.name = "density";
   Ellipsoids e;
   e.resize(1);
@@ -27,7 +27,7 @@ EncodedGrid oneEllipsoid() {
 }
 
 /// A ramp of a few values in two bricks, with an inactive voxel that is not the background.
-EncodedGrid fewValues() {
+StoredGrid fewValues() {
   std::vector<BrickInput> bricks(2);
   for (std::size_t b = 0; b < bricks.size(); ++b) {
     bricks[b].corner = {-8, 16, std::int32_t(b) * kBrickSide};
@@ -38,7 +38,7 @@ EncodedGrid fewValues() {
     }
   }
   const SparseVolume volume = makeVolume(bricks, 0.125f);
-  return encodeVoxels({}, volume, exactLayer(volume));
+  return makeStoredVoxels({}, volume, exactLayer(volume));
 }
 
 /// A palette of values above 0 as floats, whose order is that of their bits.
@@ -51,7 +51,7 @@ VoxelLayer asFloats(VoxelLayer layer) {
 }
 
 /// 16 x 8 x 8 floats that are alike under a mirror along x, many of them 0.5.
-EncodedGrid mirroredValues() {
+StoredGrid mirroredValues() {
   std::vector<BrickInput> bricks(2);
   for (std::size_t b = 0; b < bricks.size(); ++b) {
     bricks[b].corner = {std::int32_t(b) * kBrickSide, -8, 8};
@@ -65,12 +65,12 @@ EncodedGrid mirroredValues() {
     }
   }
   const SparseVolume volume = makeVolume(bricks, 0.0f);
-  return encodeVoxels({}, volume, asFloats(exactLayer(volume)));
+  return makeStoredVoxels({}, volume, asFloats(exactLayer(volume)));
 }
 
 /// An ellipsoid with the mask of the voxels above.
-EncodedGrid masked() {
-  EncodedGrid grid = oneEllipsoid();
+StoredGrid masked() {
+  StoredGrid grid = oneEllipsoid();
   const SparseVolume volume = volumeOf(*fewValues().voxels);
   grid.topology = TopologyKind::kMask;
   for (std::size_t b = 0; b < volume.brickCount(); ++b)
@@ -80,8 +80,8 @@ EncodedGrid masked() {
 }
 
 /// An ellipsoid with three corrections in a brick.
-EncodedGrid corrected() {
-  EncodedGrid grid = oneEllipsoid();
+StoredGrid corrected() {
+  StoredGrid grid = oneEllipsoid();
   VoxelLayer& residual = grid.residual.emplace();
   residual.form = VoxelForm::kLattice;
   residual.divisor = 64.0;

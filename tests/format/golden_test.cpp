@@ -69,7 +69,7 @@ TEST(GoldenFiles, OneEllipsoidDecodesToTheNumbersTyped) {
   EXPECT_EQ(grid.descriptor.name, "density");
   EXPECT_EQ(grid.field.background, 1.0f);
   EXPECT_EQ(grid.field.kernel, Kernel{});
-  ASSERT_EQ(grid.field.primitiveCount(), 1u);
+  ASSERT_EQ(grid.field.ellipsoidCount(), 1u);
   const auto& chunk = grid.field.chunks[0];
   EXPECT_EQ(chunk.origin, (Coord{10, -20, 30}));
   EXPECT_EQ(chunk.ellipsoids.center[2][0], 1000.0f);

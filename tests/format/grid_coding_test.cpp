@@ -81,14 +81,14 @@ void expectSame(const SparseVolume& a, const SparseVolume& b) {
   EXPECT_EQ(a.active, b.active);
 }
 
-VolumeMetrics decodedAt(const EncodedGrid& grid, const SparseVolume& source, float threshold) {
+VolumeMetrics decodedAt(const StoredGrid& grid, const SparseVolume& source, float threshold) {
   return compareVolumes(source, decodeGrid(grid, {.threshold = threshold}));
 }
 
 TEST(GridCoding, FactsOfTheSourceAreStored) {
   const Field field = positiveField(1, {-100, 8, 64});
   const SparseVolume source = revoxelise(field, {.threshold = 0.05f});
-  const EncodedGrid grid = encodeGrid(kFog, source, field);
+  const StoredGrid grid = makeStoredGrid(kFog, source, field);
   const ValueRange range = activeRange(source);
   EXPECT_EQ(grid.descriptor, kFog);
   EXPECT_EQ(grid.activeBox, activeBox(source));
@@ -105,14 +105,14 @@ TEST(GridCoding, AFieldThatFitsGivesItsSourceBack) {
   for (const float threshold : {0.0f, 0.0625f, 0.5f}) {
     const Field field = positiveField(2);
     const SparseVolume source = revoxelise(field, {.threshold = threshold});
-    expectSame(source, decodeGrid(encodeGrid(kFog, source, field)));
+    expectSame(source, decodeGrid(makeStoredGrid(kFog, source, field)));
   }
 }
 
 TEST(GridCoding, TheThresholdOverlapsAsWellAsTheBestOfManyThatCostNoError) {
   const Field truth = positiveField(3);
   const SparseVolume source = revoxelise(truth, {.threshold = 0.2f});
-  const EncodedGrid grid = encodeGrid(kFog, source, perturbed(truth));
+  const StoredGrid grid = makeStoredGrid(kFog, source, perturbed(truth));
   const double mseOfAll = decodedAt(grid, source, 0.0f).mseBox;
 
   double bestIou = 0.0;
@@ -136,7 +136,7 @@ TEST(GridCoding, TheThresholdIsTheSameElsewhereAndScalesWithTheValues) {
   for (float& i : faint.chunks[0].ellipsoids.intensity) i *= scale;
 
   const auto thresholdOf = [](const Field& field, float cut) {
-    return encodeGrid(kFog, revoxelise(field, {.threshold = cut}), perturbed(field))
+    return makeStoredGrid(kFog, revoxelise(field, {.threshold = cut}), perturbed(field))
         .activeThreshold;
   };
   const float threshold = thresholdOf(here, 0.1f);
@@ -151,15 +151,15 @@ TEST(GridCoding, NegativeValuesComeBackOnlyWhereTheSourceHadThem) {
   const SparseVolume withNegative = revoxelise(field, {});
   const SparseVolume without = revoxelise(field, {.range = ValueRange{0.0f, 1e6f}});
   ASSERT_LT(activeRange(withNegative).min, 0.0f);
-  EXPECT_LT(activeRange(decodeGrid(encodeGrid(kFog, withNegative, field))).min, 0.0f);
-  EXPECT_GE(activeRange(decodeGrid(encodeGrid(kFog, without, field))).min, 0.0f);
+  EXPECT_LT(activeRange(decodeGrid(makeStoredGrid(kFog, withNegative, field))).min, 0.0f);
+  EXPECT_GE(activeRange(decodeGrid(makeStoredGrid(kFog, without, field))).min, 0.0f);
 }
 
 TEST(GridCoding, NoValueComesBackBeyondThoseOfTheSource) {
   const Field field = positiveField(5);
   const ValueRange half{0.0f, activeRange(revoxelise(field, {})).max / 2.0f};
   const SparseVolume source = revoxelise(field, {.range = half});
-  const EncodedGrid grid = encodeGrid(kFog, source, field);
+  const StoredGrid grid = makeStoredGrid(kFog, source, field);
   expectSame(source, decodeGrid(grid));
   EXPECT_EQ(activeRange(decodeGrid(grid)).max, half.max);
 }
@@ -170,7 +170,7 @@ TEST(GridCoding, TheBackgroundIsNeverCutOff) {
   for (float& i : field.chunks[0].ellipsoids.intensity) i += 5.0f;
   const SparseVolume source = revoxelise(field, {.threshold = 5.0f});
   ASSERT_GT(activeRange(source).min, -5.0f);
-  const SparseVolume all = decodeGrid(encodeGrid(kFog, source, field), {.threshold = 0.0f});
+  const SparseVolume all = decodeGrid(makeStoredGrid(kFog, source, field), {.threshold = 0.0f});
   EXPECT_LT(activeRange(all).min, -4.9f);
 }
 
@@ -181,7 +181,7 @@ TEST(GridCoding, ALevelSetGivesItsBandAndItsInsideBack) {
   ASSERT_EQ(valueAt(source, {31, 20, 20}), 3.0f);
   EXPECT_TRUE(isNarrowBand(kLevelSet, source));
   EXPECT_FALSE(isNarrowBand(kFog, source));
-  const EncodedGrid grid = encodeGrid(kLevelSet, source, field);
+  const StoredGrid grid = makeStoredGrid(kLevelSet, source, field);
   EXPECT_EQ(grid.topology, TopologyKind::kLeaves);
   EXPECT_EQ(grid.leaves.size(), source.brickCount());
 
@@ -197,7 +197,7 @@ TEST(GridCoding, ALevelSetStaysWithinTheBricksOfItsSource) {
   source.bricks.pop_back();
   source.active.pop_back();
   source.values.resize(source.values.size() - kBrickVoxels);
-  EXPECT_EQ(decodeGrid(encodeGrid(kLevelSet, source, field)).bricks, source.bricks);
+  EXPECT_EQ(decodeGrid(makeStoredGrid(kLevelSet, source, field)).bricks, source.bricks);
 }
 
 TEST(GridCoding, ADistanceFieldThatIsActiveBeyondItsBandIsNotCutToIt) {
@@ -205,7 +205,7 @@ TEST(GridCoding, ADistanceFieldThatIsActiveBeyondItsBandIsNotCutToIt) {
   const SparseVolume source = revoxelise(field, {});
   ASSERT_LT(activeRange(source).min, -3.0f);
   EXPECT_FALSE(isNarrowBand(kLevelSet, source));
-  const EncodedGrid grid = encodeGrid(kLevelSet, source, field);
+  const StoredGrid grid = makeStoredGrid(kLevelSet, source, field);
   EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
   expectSame(source, decodeGrid(grid));
 }
@@ -215,7 +215,7 @@ TEST(GridCoding, ValuesThatEqualTheBackgroundKeepTheirBricks) {
     Field nothing;
     nothing.background = value;
     const SparseVolume source = oneBrick(value, firstVoxels(3), value);
-    const EncodedGrid grid = encodeGrid(kFog, source, nothing);
+    const StoredGrid grid = makeStoredGrid(kFog, source, nothing);
     const EsvrFile stored = decodeEsvr(encodeEsvr({{}, {grid}}), "memory");
     const SparseVolume decoded = decodeGrid(stored.grids[0]);
     EXPECT_EQ(decoded.origin, source.origin);
@@ -229,7 +229,7 @@ TEST(GridCoding, TheMaskComesBackBitForBitWhereItIsStored) {
   SparseVolume source = revoxelise(field, {.threshold = 0.01f});
   // holes that no threshold finds, and a voxel that no ellipsoid reaches
   for (auto& mask : source.active) mask.words[3] &= 0x5555555555555555;
-  const EncodedGrid grid = encodeGrid(kFog, source, field, Activity::kExact);
+  const StoredGrid grid = makeStoredGrid(kFog, source, field, Activity::kExact);
   EXPECT_EQ(grid.topology, TopologyKind::kMask);
   const auto bytes = encodeEsvr({{}, {grid}});
   const EsvrFile stored = decodeEsvr(bytes, "memory");
@@ -243,7 +243,8 @@ TEST(GridCoding, TheMaskComesBackBitForBitWhereItIsStored) {
 TEST(GridCoding, ALevelSetsMaskComesBackWithItsInside) {
   const Field field = ball();
   const SparseVolume source = revoxelise(field, {.threshold = 0.25f, .narrowBand = true});
-  const SparseVolume decoded = decodeGrid(encodeGrid(kLevelSet, source, field, Activity::kExact));
+  const SparseVolume decoded =
+      decodeGrid(makeStoredGrid(kLevelSet, source, field, Activity::kExact));
   expectSame(source, decoded);
 }
 
@@ -253,7 +254,7 @@ TEST(GridCoding, ABoxLeavesTheVoxelsOutsideInactive) {
   const Box all = activeBox(source);
   const Box box{all.min, {all.max.x, (all.min.y + all.max.y) / 2, all.max.z}};
   for (const auto activity : {Activity::kByValue, Activity::kExact}) {
-    const EncodedGrid grid = encodeGrid(kFog, source, field, activity);
+    const StoredGrid grid = makeStoredGrid(kFog, source, field, activity);
     const SparseVolume whole = decodeGrid(grid), part = decodeGrid(grid, {.box = box});
     EXPECT_LT(activeVoxelCount(part), activeVoxelCount(whole));
     for (Coord v = all.min; v.y <= all.max.y; ++v.y)
@@ -263,7 +264,7 @@ TEST(GridCoding, ABoxLeavesTheVoxelsOutsideInactive) {
 
 TEST(GridCoding, TheRuleOfTheVoxelsIsWhatDecodingGoesBy) {
   const auto expectDecoded = [](const GridDescriptor& descriptor, const Field& field) {
-    const EncodedGrid grid = encodeGrid(descriptor, revoxelise(field, {}), perturbed(field));
+    const StoredGrid grid = makeStoredGrid(descriptor, revoxelise(field, {}), perturbed(field));
     EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
     const SparseVolume decoded = decodeGrid(grid), byRule = revoxelise(grid.field, voxelRule(grid));
     EXPECT_EQ(byRule.bricks, decoded.bricks);
@@ -272,26 +273,26 @@ TEST(GridCoding, TheRuleOfTheVoxelsIsWhatDecodingGoesBy) {
   };
   for (std::uint64_t seed = 1; seed <= 3; ++seed) expectDecoded(kFog, positiveField(seed));
   expectDecoded(kFog, test::randomField({.count = 20, .extent = 30.0}));
-  const EncodedGrid band =
-      encodeGrid(kLevelSet, revoxelise(ball(), {.threshold = 0.01f, .narrowBand = true}), ball());
+  const StoredGrid band = makeStoredGrid(
+      kLevelSet, revoxelise(ball(), {.threshold = 0.01f, .narrowBand = true}), ball());
   EXPECT_TRUE(voxelRule(band).narrowBand);
 }
 
 TEST(GridCoding, AGivenThresholdReplacesTheStoredOne) {
   const Field field = positiveField(5);
-  const EncodedGrid grid = encodeGrid(kFog, revoxelise(field, {.threshold = 0.01f}), field);
+  const StoredGrid grid = makeStoredGrid(kFog, revoxelise(field, {.threshold = 0.01f}), field);
   expectSame(decodeGrid(grid, {.threshold = 0.5f}), revoxelise(field, {.threshold = 0.5f}));
 }
 
 TEST(GridCoding, ThresholdsThatMakeNoSenseAreRefused) {
-  const EncodedGrid grid;
+  const StoredGrid grid;
   for (const float t :
        {-1.0f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()})
     EXPECT_THROW(static_cast<void>(decodeGrid(grid, {.threshold = t})), UsageError);
 }
 
 TEST(GridCoding, ASourceWithoutActiveVoxelsIsRefused) {
-  EXPECT_THROW(static_cast<void>(encodeGrid(kFog, SparseVolume{}, Field{})), BadInput);
+  EXPECT_THROW(static_cast<void>(makeStoredGrid(kFog, SparseVolume{}, Field{})), BadInput);
 }
 
 }  // namespace

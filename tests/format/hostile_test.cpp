@@ -42,12 +42,12 @@ constexpr std::size_t kNameLength = 0, kClass = 4, kValueType = 5, kBackground =
 }  // namespace at
 
 /// One chunk of four ellipsoids with all attributes, leaves, a curve.
-EncodedGrid plainGrid() {
-  EncodedGrid grid = test::emptyGrid();
+StoredGrid plainGrid() {
+  StoredGrid grid = test::emptyGrid();
   grid.topology = TopologyKind::kLeaves;
   grid.leaves = {{0, 0, 0}, {0, 0, 8}, {8, 0, 0}};
   grid.field.chunks = {{{}, test::sampleEllipsoids(4, 1, {.kappas = true})}};
-  grid.curve = {{0.5, 10, 4, 31.25, 20.5, 0.25}};
+  grid.curve = {{10, 4, 31.25, 20.5, 0.25}};
   return grid;
 }
 std::vector<std::byte> plainFile() { return encodeEsvr(test::fileOf(plainGrid())); }
@@ -203,7 +203,7 @@ const ContentLie kContentLies[] = {
     {"RotationNan", poke(K::kRotations, 8, kNan), "the rotation of ellipsoid 2"},
     {"RotationLong", poke(K::kRotations, 0, 2.0f), "not of unit length"},
     {"IntensityNan", poke(K::kIntensities, 12, kNan), "the intensity of ellipsoid 3"},
-    {"PrimitiveKappaNan", poke(K::kKappas, 0, kNan), "the kappa of ellipsoid 0"},
+    {"EllipsoidKappaNan", poke(K::kKappas, 0, kNan), "the kappa of ellipsoid 0"},
     {"KappasTooFew", resized(K::kKappas, -4), "12 bytes of content for 4"},
     {"RotationsTooMany", resized(K::kRotations, 16), "bytes of content for 4"},
     {"LeavesOutOfOrder", poke(K::kLeaves, 8, 0), "leaf 2 is out of order"},
@@ -289,7 +289,7 @@ TEST(HostileFile, AKilobyteCannotAskForAGigabyte) {
 
 /// Zeros compress best of all: the most that a small file can hold in earnest.
 TEST(HostileFile, TheMostThatAKilobyteCanHoldIsBounded) {
-  EncodedGrid grid = test::emptyGrid();
+  StoredGrid grid = test::emptyGrid();
   grid.descriptor.metadata = {{"zeros", "string", std::vector<std::byte>(4 * kMegabyte)}};
   const auto bytes = encodeEsvr(test::fileOf(grid));
   const test::AllocationMeter meter;

@@ -50,7 +50,7 @@ TEST(LayeredFile, IsOfVersionOneTwo) {
 }
 
 TEST(LayeredFile, HasTheHeavierEllipsoidsInTheFirstLayers) {
-  const EncodedGrid grid = test::layeredGrid(500);
+  const StoredGrid grid = test::layeredGrid(500);
   const QuantisedEllipsoids& q = grid.quantised[1];
   std::size_t first = 0;
   int before = Lattice::kMaxPrecision + 1;
@@ -67,14 +67,14 @@ TEST(LayeredFile, HasTheHeavierEllipsoidsInTheFirstLayers) {
 /// 20000 ellipsoids are the aim of layers; these are spread evenly and all alike, so that what
 /// layers cost is not hidden by what they save.
 TEST(LayeredFile, CostsLittleMoreThanOneWithoutLayers) {
-  EncodedGrid one = test::quantisedGrid(20000), layered = test::layeredGrid(20000);
+  StoredGrid one = test::quantisedGrid(20000), layered = test::layeredGrid(20000);
   layered.layerErrors.clear();
   const double without = double(encodeEsvr(test::fileOf(one)).size());
   EXPECT_LT(double(encodeEsvr(test::fileOf(layered)).size()), 1.02 * without);
 }
 
 TEST(LayeredFile, SaysWhatEachLayerAdds) {
-  const EncodedGrid grid = test::layeredGrid(300);
+  const StoredGrid grid = test::layeredGrid(300);
   const auto sizes = layerSizes(grid);
   ASSERT_EQ(sizes.size(), layerCount(grid));
   std::uint64_t ellipsoids = 0, bytes = 0;
@@ -108,7 +108,7 @@ class PartOfAFile : public testing::Test {
 
   [[nodiscard]] std::uint64_t size() const { return std::filesystem::file_size(path_); }
 
-  EncodedGrid grid_ = test::layeredGrid(9000);
+  StoredGrid grid_ = test::layeredGrid(9000);
   std::filesystem::path path_;
 };
 
@@ -134,7 +134,7 @@ TEST_F(PartOfAFile, OfSoManyEllipsoidsHasWholeLayersOfThem) {
   const auto sizes = layerSizes(grid_);
   const auto two = sizes[0].ellipsoids + sizes[1].ellipsoids;
   const auto countOf = [&](std::size_t n) {
-    return readEsvrPart(path_, {.ellipsoids = n}).file.grids[0].field.primitiveCount();
+    return readEsvrPart(path_, {.ellipsoids = n}).file.grids[0].field.ellipsoidCount();
   };
   EXPECT_EQ(countOf(1), sizes[0].ellipsoids);
   EXPECT_EQ(countOf(sizes[0].ellipsoids), sizes[0].ellipsoids);
@@ -158,7 +158,7 @@ TEST_F(PartOfAFile, OfABoxGivesTheSameValuesThere) {
 TEST_F(PartOfAFile, OfABoxWithoutEllipsoidsHasNone) {
   const Box box{{100000, 0, 0}, {100009, 9, 9}};
   const PartOfFile part = readEsvrPart(path_, {.box = box});
-  EXPECT_EQ(part.file.grids[0].field.primitiveCount(), 0u);
+  EXPECT_EQ(part.file.grids[0].field.ellipsoidCount(), 0u);
   EXPECT_LT(part.bytesRead, 2048u);
 }
 

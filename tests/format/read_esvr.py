@@ -15,7 +15,7 @@ MASK = (1 << 64) - 1
 PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 9650029242287828579,
           2870177450012600261)
 NONE = 0xFFFFFFFF
-KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 5: "curve", 16: "centers",
+KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 7: "curve", 16: "centers",
          17: "scales", 18: "rotations", 19: "intensities", 20: "kappas", 32: "ellipsoids",
          33: "voxels of 1.1", 6: "layer errors", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
          37: "residual"}
@@ -444,7 +444,7 @@ def read(path):
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
     assert magic == bytes.fromhex("89 45 53 56 52 0D 0A 0A"), "magic"
-    assert (major, size) == (1, len(data)) and minor in (0, 1, 2), "version or size"
+    assert (major, minor, size) == (1, 0, len(data)), "version or size"
     assert table % 8 == 0 and header_sum == xxh64(data[:40]), "header checksum"
     assert table_sum == xxh64(data[table:table + 56 * count]), "table checksum"
 

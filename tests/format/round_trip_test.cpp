@@ -53,7 +53,7 @@ TEST(RoundTrip, AnyFiniteFloat) {
     e.intensity[i] = e.kappa[i] = extremes[i];
     e.center[0][i] = extremes[(i + 3) % n];
   }
-  EncodedGrid grid = test::emptyGrid();
+  StoredGrid grid = test::emptyGrid();
   grid.field.chunks = {{{}, e}};
   const EsvrFile once = roundTrip(test::fileOf(grid));
   EXPECT_EQ(difference(roundTrip(once), once), "");
@@ -73,14 +73,14 @@ TEST(RoundTrip, AnyFiniteFloat) {
 }
 
 TEST(RoundTrip, NegativeZeroInARotationIsNotTheIdentity) {
-  EncodedGrid grid = test::levelSetGrid(3);
+  StoredGrid grid = test::levelSetGrid(3);
   grid.field.chunks[0].ellipsoids.rotation[2][1] = -0.0f;
   const EsvrFile file = test::fileOf(grid);
   EXPECT_EQ(difference(roundTrip(file), file), "");
 }
 
 TEST(RoundTrip, StringsAreBytes) {
-  EncodedGrid grid = test::fogGrid(2);
+  StoredGrid grid = test::fogGrid(2);
   grid.descriptor.name = std::string(
       "nul \0 and Gr\xc3\xb6\xc3\x9f"
       "e",
@@ -101,7 +101,7 @@ TEST(RoundTrip, HugeMetadata) {
 }
 
 TEST(RoundTrip, EqualEllipsoidsCompressToTheirBoundAndComeBack) {
-  EncodedGrid grid = test::emptyGrid();
+  StoredGrid grid = test::emptyGrid();
   Ellipsoids e;
   e.resize(200'000);
   std::fill(e.rotation[0].begin(), e.rotation[0].end(), 1.0f);
@@ -111,14 +111,14 @@ TEST(RoundTrip, EqualEllipsoidsCompressToTheirBoundAndComeBack) {
 }
 
 TEST(RoundTrip, APerfectFitHasAnInfinitePsnr) {
-  EncodedGrid grid = test::fogGrid(2);
+  StoredGrid grid = test::fogGrid(2);
   grid.curve[1].psnrBox = std::numeric_limits<double>::infinity();
   const EsvrFile file = test::fileOf(grid);
   EXPECT_EQ(difference(roundTrip(file), file), "");
 }
 
 TEST(RoundTrip, TheOrderInTheFileDoesNotDependOnTheOrderGiven) {
-  EncodedGrid grid = test::chunkedGrid(100);
+  StoredGrid grid = test::chunkedGrid(100);
   const auto bytes = encodeEsvr(test::fileOf(grid));
   for (std::size_t i = 0; i < 50; ++i) {
     swapEllipsoids(grid.field.chunks[0].ellipsoids, i, 99 - i);

@@ -14,14 +14,14 @@ namespace {
 /// The same numbers on every machine, which the standard's distributions do not promise.
 class Numbers {
  public:
-  explicit Numbers(std::uint32_t seed) : engine_(seed) {}
+  explicit Numbers(std::uint32_t seed) : pass_(seed) {}
   /// On a lattice of 2^-16 of the range, so that arithmetic is exact.
   float between(float low, float high) {
-    return low + (high - low) * float(engine_() >> 16) / 65536.0f;
+    return low + (high - low) * float(pass_() >> 16) / 65536.0f;
   }
 
  private:
-  std::mt19937 engine_;
+  std::mt19937 pass_;
 };
 
 /// Pythagorean quaternions: of unit length in any arithmetic.
@@ -72,7 +72,7 @@ std::string difference(const Field& a, const Field& b) {
   return "";
 }
 
-std::string difference(const EncodedGrid& a, const EncodedGrid& b) {
+std::string difference(const StoredGrid& a, const StoredGrid& b) {
   if (!(a.descriptor == b.descriptor)) return "descriptor";
   if (!sameBits(a.descriptor.background, b.descriptor.background)) return "background";
   if (a.topology != b.topology || a.leaves != b.leaves || a.mask != b.mask) return "topology";
@@ -104,8 +104,8 @@ Ellipsoids sampleEllipsoids(std::size_t n, std::uint32_t seed, EllipsoidParts pa
   return format::inMortonOrder(e);
 }
 
-EncodedGrid fogGrid(std::size_t ellipsoids) {
-  EncodedGrid grid;
+StoredGrid fogGrid(std::size_t ellipsoids) {
+  StoredGrid grid;
   auto& d = grid.descriptor;
   d.name = "density";
   d.gridClass = GridClass::kFogVolume;
@@ -121,12 +121,12 @@ EncodedGrid fogGrid(std::size_t ellipsoids) {
   grid.activeBox = {{-16, 8, 4096}, {47, 71, 4159}};
   grid.activeVoxels = 12345;
   grid.valueMax = 1.5f;
-  grid.curve = {{0.5, 10, 100, 31.25, 20.5, 0.25}, {1.5, 30, 200, 41.25, 30.5, 0.125}};
+  grid.curve = {{10, 100, 31.25, 20.5, 0.25}, {30, 200, 41.25, 30.5, 0.125}};
   return grid;
 }
 
-EncodedGrid levelSetGrid(std::size_t ellipsoids) {
-  EncodedGrid grid;
+StoredGrid levelSetGrid(std::size_t ellipsoids) {
+  StoredGrid grid;
   auto& d = grid.descriptor;
   d.name = "surface";
   d.gridClass = GridClass::kLevelSet;
@@ -147,8 +147,8 @@ EncodedGrid levelSetGrid(std::size_t ellipsoids) {
   return grid;
 }
 
-EncodedGrid chunkedGrid(std::size_t ellipsoidsPerChunk) {
-  EncodedGrid grid;
+StoredGrid chunkedGrid(std::size_t ellipsoidsPerChunk) {
+  StoredGrid grid;
   grid.descriptor.name = "wide";
   grid.descriptor.transform.mapType = "AffineMap";
   grid.field.chunks = {
@@ -171,8 +171,8 @@ std::vector<std::uint8_t> threeHighest(std::vector<std::uint8_t> precision) {
   return precision;
 }
 
-EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk, bool layered) {
-  EncodedGrid grid = emptyGrid();
+StoredGrid quantisedGrid(std::size_t ellipsoidsPerChunk, bool layered) {
+  StoredGrid grid = emptyGrid();
   grid.descriptor.name = "compact";
   const std::vector<double> curvature(ellipsoidsPerChunk, 4.0);
   for (std::uint32_t c = 0; c < 2; ++c) {
@@ -192,19 +192,19 @@ EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk, bool layered) {
 
 }  // namespace
 
-EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk) {
+StoredGrid quantisedGrid(std::size_t ellipsoidsPerChunk) {
   return quantisedGrid(ellipsoidsPerChunk, false);
 }
 
-EncodedGrid layeredGrid(std::size_t ellipsoidsPerChunk) {
-  EncodedGrid grid = quantisedGrid(ellipsoidsPerChunk, true);
+StoredGrid layeredGrid(std::size_t ellipsoidsPerChunk) {
+  StoredGrid grid = quantisedGrid(ellipsoidsPerChunk, true);
   for (std::size_t k = 0; layerCount(grid) > 1 && k < layerCount(grid); ++k)
     grid.layerErrors.push_back({20.0f + 5.0f * float(k), 1.0f / float(1 + k)});
   return grid;
 }
 
-EncodedGrid emptyGrid() {
-  EncodedGrid grid;
+StoredGrid emptyGrid() {
+  StoredGrid grid;
   grid.descriptor.background = grid.field.background = 1.0f;
   return grid;
 }
@@ -215,7 +215,7 @@ EsvrFile everything(std::size_t ellipsoids) {
            quantisedGrid(ellipsoids), layeredGrid(ellipsoids), emptyGrid()}};
 }
 
-EsvrFile fileOf(EncodedGrid grid) { return {{}, {std::move(grid)}}; }
+EsvrFile fileOf(StoredGrid grid) { return {{}, {std::move(grid)}}; }
 
 std::vector<std::byte> bytesOf(const std::string& text) {
   const auto bytes = std::as_bytes(std::span(text));

@@ -22,27 +22,27 @@ struct EllipsoidParts {
                                           EllipsoidParts parts = {});
 
 /// A fog volume of one chunk with metadata and a curve.
-[[nodiscard]] EncodedGrid fogGrid(std::size_t ellipsoids);
+[[nodiscard]] StoredGrid fogGrid(std::size_t ellipsoids);
 
 /// A level set with leaves, double background, frustum map (no affine), no rotations.
-[[nodiscard]] EncodedGrid levelSetGrid(std::size_t ellipsoids);
+[[nodiscard]] StoredGrid levelSetGrid(std::size_t ellipsoids);
 
 /// Three chunks, the middle one empty, the last with a kappa for each ellipsoid.
-[[nodiscard]] EncodedGrid chunkedGrid(std::size_t ellipsoidsPerChunk);
+[[nodiscard]] StoredGrid chunkedGrid(std::size_t ellipsoidsPerChunk);
 
 /// A fog volume whose ellipsoids are quantised, in two chunks, the second with signs.
-[[nodiscard]] EncodedGrid quantisedGrid(std::size_t ellipsoidsPerChunk);
+[[nodiscard]] StoredGrid quantisedGrid(std::size_t ellipsoidsPerChunk);
 
 /// The same in importance layers, four a chunk where there are so many precisions.
-[[nodiscard]] EncodedGrid layeredGrid(std::size_t ellipsoidsPerChunk);
+[[nodiscard]] StoredGrid layeredGrid(std::size_t ellipsoidsPerChunk);
 
 /// A grid with a background and nothing else.
-[[nodiscard]] EncodedGrid emptyGrid();
+[[nodiscard]] StoredGrid emptyGrid();
 
 /// All of the above and metadata of the file.
 [[nodiscard]] EsvrFile everything(std::size_t ellipsoids);
 
-[[nodiscard]] EsvrFile fileOf(EncodedGrid grid);
+[[nodiscard]] EsvrFile fileOf(StoredGrid grid);
 
 [[nodiscard]] std::vector<std::byte> bytesOf(const std::string& text);
 

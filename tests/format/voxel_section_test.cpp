@@ -88,7 +88,7 @@ TEST(VoxelSection, KnowsCommonValues) {
 
 EsvrFile voxelFile() {
   const SparseVolume tube = test::tubeVolume({-16, 8, 1 << 20});
-  return test::fileOf(encodeVoxels({}, tube, exactLayer(tube)));
+  return test::fileOf(makeStoredVoxels({}, tube, exactLayer(tube)));
 }
 
 TEST(VoxelFile, GivesBackItsVoxels) {
@@ -109,7 +109,7 @@ TEST(VoxelFile, TakesNoThreshold) {
 
 TEST(Residual, IsRefusedWhereItIsNone) {
   const SparseVolume tube = test::tubeVolume();
-  EncodedGrid grid = test::emptyGrid();
+  StoredGrid grid = test::emptyGrid();
   grid.residual = exactLayer(tube);  // no lattice
   EXPECT_THROW((void)encodeEsvr({{}, {grid}}), RuntimeFailure);
   grid.residual = boundedLayer(tube, 0.1, Activity::kExact);  // not all of it active

@@ -94,10 +94,10 @@ double imagePsnr(const Image& a, const Image& b) {
 }
 
 double largestDifference(const Image& a, const Image& b) {
-  double most = 0.0;
+  double largest = 0.0;
   for (std::size_t i = 0; i < a.rgba.size(); ++i)
-    most = std::max(most, std::abs(double(a.rgba[i]) - b.rgba.at(i)));
-  return most;
+    largest = std::max(largest, std::abs(double(a.rgba[i]) - b.rgba.at(i)));
+  return largest;
 }
 
 }  // namespace esvr::test

@@ -1,4 +1,4 @@
-// Plan: pictures of sums of random ellipsoids (Between::kSum; lattice_tile_test.cpp has the other)
+// Plan: pictures of sums of random ellipsoids (Between::kSum; window_tile_test.cpp has the other)
 // against the float64 reference (reference_picture.h), from
 // every kind of camera. What may differ: sums in float32 (1e-6 of the intensities), the table of
 // the transfer function where the color map bends (1e-5 of a color), samples on the end of a

@@ -34,25 +34,25 @@ struct BrickEntries {
 template <int kThreads>
 __device__ int sumExponent(const BrickPassArguments& a, BrickEntries entries) {
   constexpr int kBits = 29, kFarthest = 100;
-  float most = 0.0f;
+  float largest = 0.0f;
   for (std::uint32_t k = entries.begin + threadIdx.x; k < entries.end; k += kThreads)
-    most = fmaxf(most, fabsf(a.forms[a.lists.primitive[k]].form.intensity));
-  const float bound = blockMax<kThreads>(most) * float(entries.end - entries.begin);
+    largest = fmaxf(largest, fabsf(a.forms[a.lists.ellipsoid[k]].form.intensity));
+  const float bound = blockMax<kThreads>(largest) * float(entries.end - entries.begin);
   return bound > 0.0f ? max(-kFarthest, min(kBits - ilogbf(bound), kFarthest)) : 0;
 }
 
-/// kOwnKernels: primitives differ in their edge.
+/// kOwnKernels: ellipsoids differ in their edge.
 template <bool kOwnKernels>
 __device__ const KernelConstants<float>& kernelOf(const BrickPassArguments& a,
                                                   std::uint32_t entry) {
-  if constexpr (kOwnKernels) return a.kernels[a.lists.primitive[entry]];
+  if constexpr (kOwnKernels) return a.kernels[a.lists.ellipsoid[entry]];
   return a.kernel;
 }
 
 template <bool kOwnKernels>
 __device__ void addPair(const BrickPassArguments& a, std::uint32_t entry, Coord corner, float unit,
                         int* sums) {
-  const PairForm p = a.forms[a.lists.primitive[entry]];
+  const PairForm p = a.forms[a.lists.ellipsoid[entry]];
   const KernelConstants<float>& kernel = kernelOf<kOwnKernels>(a, entry);
   const float height = p.form.intensity * unit;
   visitLines(p, corner, kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
@@ -161,7 +161,7 @@ __device__ float transposeSum(float* s) {
 template <bool kOwnKernels>
 __device__ void writeMoments(const BrickPassArguments& a, std::uint32_t entry, Coord corner,
                              const int* r) {
-  const PairForm p = a.forms[a.lists.primitive[entry]];
+  const PairForm p = a.forms[a.lists.ellipsoid[entry]];
   float s[kMomentSlots] = {};
   sumMoments(p, kernelOf<kOwnKernels>(a, entry), corner, r, s);
   float* const out = a.moments + std::size_t(a.lists.pair[entry]) * kMoments;

@@ -14,7 +14,7 @@ struct BrickPassArguments {
   const Coord* bricks;
   std::uint32_t brickCount, targetCount;
   PairListsView lists;
-  const PairForm* forms;  ///< a primitive's
+  const PairForm* forms;  ///< an ellipsoid's
   KernelConstants<float> kernel;
   const float* target;    ///< kBrickVoxels a target brick
   bool narrowBand;        ///< residuals saturate at the target's range
@@ -22,7 +22,7 @@ struct BrickPassArguments {
   double* brickLoss;      ///< out, a brick's: sum of r^2
   float* moments;         ///< out, kMoments a pair; not written for residuals alone
   float* residual;        ///< kBrickVoxels a brick; out, or null
-  const KernelConstants<float>* kernels = nullptr;  ///< a primitive's; null: all have `kernel`
+  const KernelConstants<float>* kernels = nullptr;  ///< an ellipsoid's; null: all have `kernel`
   const float* lossByValue = nullptr;  ///< kBrickVoxels a brick, for launchGivenGradients
 };
 

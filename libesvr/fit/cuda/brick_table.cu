@@ -28,7 +28,7 @@ __global__ void insertTargets(const Coord* bricks, std::uint32_t count, std::uin
 struct ReachedInsertion {
   ReachedSlot* slots;
   std::uint32_t mask;
-  std::uint32_t most;
+  std::uint32_t maxCount;
   std::uint32_t* count;
   BrickTableView targets;  ///< these bricks and
   Box within;              ///< those beyond are passed over
@@ -42,7 +42,7 @@ __device__ void insertReached(const ReachedInsertion& into, Coord brick) {
     ReachedSlot& slot = into.slots[s];
     volatile int* const state = &slot.state;
     if (*state == ReachedSlot::kEmpty) {
-      if (*static_cast<volatile std::uint32_t*>(into.count) > into.most) return;
+      if (*static_cast<volatile std::uint32_t*>(into.count) > into.maxCount) return;
       if (atomicCAS(&slot.state, ReachedSlot::kEmpty, ReachedSlot::kBeingWritten) ==
           ReachedSlot::kEmpty) {
         slot.brick = brick;
@@ -132,12 +132,12 @@ bool BrickTable::collect(Launch&& launch) {
   ReachedSlot* const slots = reachedSlots_.reserve(reachedSlotCount_);
   check(cudaMemsetAsync(slots, 0, reachedSlotCount_ * sizeof(*slots), stream_), "clearing a table");
   check(cudaMemsetAsync(counter_.data(), 0, sizeof(std::uint32_t), stream_), "clearing a counter");
-  const auto most = std::uint32_t(reachedSlotCount_ / 2);
-  launch(ReachedInsertion{slots, std::uint32_t(reachedSlotCount_ - 1), most, counter_.data(),
+  const auto maxCount = std::uint32_t(reachedSlotCount_ / 2);
+  launch(ReachedInsertion{slots, std::uint32_t(reachedSlotCount_ - 1), maxCount, counter_.data(),
                           view(), kAllBricks});
   check(cudaGetLastError(), "finding reached bricks");
   reachedCount_ = downloadValue(counter_.data(), stream_);
-  return reachedCount_ <= most;
+  return reachedCount_ <= maxCount;
 }
 
 void BrickTable::number() {

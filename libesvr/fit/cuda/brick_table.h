@@ -2,7 +2,7 @@
 /// The bricks of a fit on the device, found by their coordinates.
 ///
 /// Target bricks are known from the start. Those that only supports reach come and go with the
-/// primitives: each rebuild finds them anew, and numbers them in increasing order of their
+/// ellipsoids: each rebuild finds them anew, and numbers them in increasing order of their
 /// coordinates, so that numbers do not depend on the order in which threads found them.
 
 #include <cstdint>

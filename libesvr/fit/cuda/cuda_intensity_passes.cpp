@@ -54,7 +54,7 @@ CudaIntensityPasses::CudaIntensityPasses(const IntensityTarget& target)
       bricks_(bricksOf(target), stream_.get()),
       lists_(stream_.get()),
       source_(valuesOf(target), stream_.get()),
-      primitives_(stream_.get()),
+      ellipsoids_(stream_.get()),
       forms_(stream_.get()),
       heights_(stream_.get()),
       errors_(stream_.get()),
@@ -64,15 +64,15 @@ CudaIntensityPasses::CudaIntensityPasses(const IntensityTarget& target)
 
 void CudaIntensityPasses::setShapes(const Field& field) {
   requireOneKappa(field);
-  const auto primitives = importField(field, origin_, 1.0);
+  const auto ellipsoids = importField(field, origin_, 1.0);
   const double radius = supportRadius(kernelConstants<double>(field.kernel));
   fieldBackground_ = field.background;
   kernel_ = kernelConstants<float>(field.kernel);
-  count_ = primitives.size();
-  uploadTo(primitives_.reserve(count_), std::span<const Primitive>(primitives), stream_.get());
-  launchForms(primitives_.data(), std::uint32_t(count_), radius, forms_.reserve(count_),
+  count_ = ellipsoids.size();
+  uploadTo(ellipsoids_.reserve(count_), std::span<const Ellipsoid>(ellipsoids), stream_.get());
+  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius, forms_.reserve(count_),
               stream_.get());
-  const SupportSource supports{primitives_.data(), count_, radius, kRoundingSlack};
+  const SupportSource supports{ellipsoids_.data(), count_, radius, kRoundingSlack};
   if (!restricted_) bricks_.findReached(supports);
   lists_.rebuild(supports, bricks_);
   errors_.reserve(bricks_.size());
@@ -114,8 +114,8 @@ StoredError CudaIntensityPasses::totalError() {
 void CudaIntensityPasses::sumPairs(std::vector<double>* rPhi, std::vector<double>* phi2) {
   double* const sums = sums_.data();
   launchProjectionSums({.projections = projections_.data(),
-                        .primitiveBegin = lists_.view().primitiveBegin,
-                        .primitiveCount = std::uint32_t(count_),
+                        .ellipsoidBegin = lists_.view().ellipsoidBegin,
+                        .ellipsoidCount = std::uint32_t(count_),
                         .rPhi = sums,
                         .phi2 = phi2 ? sums + count_ : nullptr},
                        stream_.get());

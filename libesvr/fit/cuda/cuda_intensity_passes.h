@@ -30,12 +30,12 @@ class CudaIntensityPasses final : public IntensityPasses {
   Box box_;
   bool restricted_;
   KernelConstants<float> kernel_{};
-  std::size_t count_ = 0;  ///< of primitives
+  std::size_t count_ = 0;  ///< of ellipsoids
   Stream stream_;
   BrickTable bricks_;
   PairLists lists_;
   DeviceBuffer<float> source_;
-  GrowingBuffer<Primitive> primitives_;
+  GrowingBuffer<Ellipsoid> ellipsoids_;
   GrowingBuffer<PairForm> forms_;
   GrowingBuffer<float> heights_;
   GrowingBuffer<StoredError> errors_;

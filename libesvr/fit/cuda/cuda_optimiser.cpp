@@ -7,13 +7,13 @@
 #include "core/cuda/use_device.h"
 #include "esvr/error.h"
 #include "field/gather.h"
+#include "fit/cpu/seed.h"
 #include "fit/cuda/copy.h"
 #include "fit/cuda/make_cuda_optimiser.h"
 #include "fit/cuda/memory_plan.h"
 #include "fit/cuda/memory_pool.h"
 #include "fit/cuda/place_seeds.h"
 #include "fit/scene.h"
-#include "fit/seed.h"
 
 namespace esvr {
 namespace cuda {
@@ -26,7 +26,7 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       lists_(stream_.get()),
       targetValues_(target.values, stream_.get()),
       active_(*target.active, stream_.get()),
-      primitives_(stream_.get()),
+      ellipsoids_(stream_.get()),
       adam_(stream_.get()),
       forms_(stream_.get()),
       usefulness_(stream_.get()),
@@ -37,7 +37,7 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       loss_(stream_.get()),
       slope_(stream_.get()),
       diverged_(1, stream_.get()),
-      draw_(stream_.get()),
+      sampling_(stream_.get()),
       ranking_(stream_.get()),
       errorSums_(stream_.get()),
       windows_({}, stream_.get()),
@@ -71,7 +71,7 @@ BrickPassArguments CudaOptimiser::passArguments() {
 }
 
 StepArguments CudaOptimiser::stepArguments(double factor) {
-  return {.primitiveCount = std::uint32_t(count_),
+  return {.ellipsoidCount = std::uint32_t(count_),
           .chunkCount = std::uint32_t(lists_.chunkCount()),
           .brickCount = std::uint32_t(bricks_.size()),
           .lists = lists_.view(),
@@ -79,7 +79,7 @@ StepArguments CudaOptimiser::stepArguments(double factor) {
           .brickLoss = brickLoss_.data(),
           .chunkSums = chunkSums_.data(),
           .loss = loss_.data(),
-          .primitives = primitives_.data(),
+          .ellipsoids = ellipsoids_.data(),
           .states = adam_.data(),
           .forms = forms_.data(),
           .usefulness = usefulness_.data(),
@@ -93,7 +93,7 @@ StepArguments CudaOptimiser::stepArguments(double factor) {
 }
 
 void CudaOptimiser::rebuildLists(double slack) {
-  const SupportSource supports{primitives_.data(), count_, radius_, slack};
+  const SupportSource supports{ellipsoids_.data(), count_, radius_, slack};
   if (!target_.narrowBand) bricks_.findReached(supports);
   lists_.rebuild(supports, bricks_);
   threads_.listsChanged();
@@ -112,43 +112,43 @@ void CudaOptimiser::refreshResiduals() {
   iterationsSinceRebuild_ = kListsStale;
 }
 
-void CudaOptimiser::reserve(std::size_t primitives) {
-  primitives_.extend(primitives, count_);
-  adam_.extend(primitives, count_);
-  forms_.extend(primitives, count_);
-  usefulness_.extend(primitives, count_);
+void CudaOptimiser::reserve(std::size_t ellipsoids) {
+  ellipsoids_.extend(ellipsoids, count_);
+  adam_.extend(ellipsoids, count_);
+  forms_.extend(ellipsoids, count_);
+  usefulness_.extend(ellipsoids, count_);
 }
 
-std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t primitives,
+std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t ellipsoids,
                                       const std::uint32_t* into) {
   refreshResiduals();
   launchSums(stepArguments(0.0), stream_.get());
   const double loss = downloadValue(loss_.data(), stream_.get());
-  const DeviceDraw drawn = draw_.draw(
+  const DeviceSampling drawn = sampling_.draw(
       residual_.data(), loss, bricks_.view().bricks,
-      {count, bricks_.targetCount(), signsOf(target_), options_.seed ^ (++draws_ << 32)});
+      {count, bricks_.targetCount(), signsOf(target_), options_.seed ^ (++samplings_ << 32)});
   launchPlaceSeeds({.voxels = drawn.voxels,
                     .count = drawn.count,
                     .bricks = bricks_.view(),
                     .residual = residual_.data(),
-                    .window = seedWindow(target_, primitives, tuning_),
+                    .window = seedWindow(target_, ellipsoids, tuning_),
                     .unitVariance = unitVariance_,
                     .intensity = tuning_.seedIntensity,
                     .share = drawn.share,
                     .into = into,
                     .firstPlace = std::uint32_t(count_),
-                    .primitives = primitives_.data(),
+                    .ellipsoids = ellipsoids_.data(),
                     .states = adam_.data()},
                    stream_.get());
   return drawn.count;
 }
 
-void CudaOptimiser::requireMemoryFor(std::size_t primitives) const {
+void CudaOptimiser::requireMemoryFor(std::size_t ellipsoids) const {
   constexpr double kWithReached = 2.0;  // bricks that supports reach beyond the target's
   const double windows = options_.loss == Loss::kPaper
                              ? PaperLoss::bytesFor(kWithReached * double(target_.bricks.size()))
                              : 0.0;
-  requireMemory(target_, primitives, options_.maxDeviceBytes, windows);
+  requireMemory(target_, ellipsoids, options_.maxDeviceBytes, windows);
 }
 
 void CudaOptimiser::growTo(std::size_t count) {
@@ -157,7 +157,7 @@ void CudaOptimiser::growTo(std::size_t count) {
   requireMemoryFor(count);
   reserve(count);
   count_ += placeSeeds(count - count_, std::max(count - count_, count_), nullptr);
-  launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
 }
 
 void CudaOptimiser::relocate(std::size_t count) {
@@ -166,7 +166,7 @@ void CudaOptimiser::relocate(std::size_t count) {
   const auto chosen = ranking_.leastUseful(stepArguments(0.0), count, tuning_.graceSteps);
   if (chosen.count == 0) return;
   placeSeeds(chosen.count, count_, chosen.places);
-  launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
 }
 
 void CudaOptimiser::takePaperGradients() {
@@ -227,9 +227,9 @@ void CudaOptimiser::setKappa(float kappa) {
   const double before = kernelWidth(kernel_).m;
   options_.kernel.kappa = kappa;
   setKernel();
-  launchShrink(primitives_.data(), std::uint32_t(count_),
+  launchShrink(ellipsoids_.data(), std::uint32_t(count_),
                std::sqrt(kernelWidth(kernel_).m / before), stream_.get());
-  launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
   iterationsSinceRebuild_ = kListsStale;
 }
 
@@ -245,42 +245,42 @@ FitErrors CudaOptimiser::measure() {
 
 std::size_t CudaOptimiser::deviceBytes() const { return peakMemory(); }
 
-std::vector<Primitive> CudaOptimiser::primitives() const {
-  std::vector<Primitive> host(count_);
-  downloadTo(std::span<Primitive>(host), primitives_.data(), stream_.get());
+std::vector<Ellipsoid> CudaOptimiser::ellipsoids() const {
+  std::vector<Ellipsoid> host(count_);
+  downloadTo(std::span<Ellipsoid>(host), ellipsoids_.data(), stream_.get());
   return host;
 }
 
-void CudaOptimiser::setPrimitives(std::span<const Primitive> primitives) {
+void CudaOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
   count_ = 0;
-  reserve(primitives.size());
-  count_ = primitives.size();
-  uploadTo(primitives_.data(), primitives, stream_.get());
+  reserve(ellipsoids.size());
+  count_ = ellipsoids.size();
+  uploadTo(ellipsoids_.data(), ellipsoids, stream_.get());
   const std::vector<AdamState> fresh(count_);
   uploadTo(adam_.data(), std::span<const AdamState>(fresh), stream_.get());
-  launchForms(primitives_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
   iterationsSinceRebuild_ = kListsStale;
 }
 
-std::vector<PrimitiveGradient> CudaOptimiser::gradients(int threads) {
+std::vector<EllipsoidGradient> CudaOptimiser::gradients(int threads) {
   rebuildLists(tuning_.listSlack);
   takeGradients(threads);
   launchSums(stepArguments(0.0), stream_.get());
-  DeviceBuffer<PrimitiveGradient> out(count_, stream_.get());
+  DeviceBuffer<EllipsoidGradient> out(count_, stream_.get());
   launchReadGradients(stepArguments(0.0), out.data(), stream_.get());
-  std::vector<PrimitiveGradient> host(count_);
+  std::vector<EllipsoidGradient> host(count_);
   out.download(host);
   return host;
 }
 
 void CudaOptimiser::dropUnseen() {
   if (count_ == 0) return;
-  const auto all = primitives();
+  const auto all = ellipsoids();
   const auto seen = gradients();
-  std::vector<Primitive> kept;
+  std::vector<Ellipsoid> kept;
   for (std::size_t i = 0; i < all.size(); ++i)
     if (seen[i].phi2 > 0.0 && all[i].intensity != 0.0) kept.push_back(all[i]);
-  setPrimitives(kept);
+  setEllipsoids(kept);
 }
 
 }  // namespace cuda

@@ -1,18 +1,18 @@
 #pragma once
-/// A fit on a GPU. What runs over bricks, pairs and primitives is in the kernels beside this file;
+/// A fit on a GPU. What runs over bricks, pairs and ellipsoids is in the kernels beside this file;
 /// here is their order.
 
 #include "core/cuda/stream.h"
 #include "fit/cuda/brick_pass.h"
 #include "fit/cuda/brick_table.h"
-#include "fit/cuda/draw.h"
 #include "fit/cuda/error_sums.h"
 #include "fit/cuda/pair_lists.h"
-#include "fit/cuda/paper_loss.h"
-#include "fit/cuda/rank_primitives.h"
+#include "fit/cuda/rank_ellipsoids.h"
+#include "fit/cuda/sample_voxels.h"
 #include "fit/cuda/step.h"
 #include "fit/cuda/threads_per_brick.h"
 #include "fit/optimiser.h"
+#include "fit/paper/cuda/paper_loss.h"
 
 namespace esvr::cuda {
 
@@ -31,17 +31,17 @@ class CudaOptimiser final : public Optimiser {
   [[nodiscard]] double kappaSlope() override;
   void setKappa(float kappa) override;
 
-  [[nodiscard]] std::size_t primitiveCount() const override { return count_; }
-  [[nodiscard]] std::vector<Primitive> primitives() const override;
+  [[nodiscard]] std::size_t ellipsoidCount() const override { return count_; }
+  [[nodiscard]] std::vector<Ellipsoid> ellipsoids() const override;
   [[nodiscard]] std::uint64_t pairCount() const override { return lists_.pairCount(); }
   [[nodiscard]] std::size_t deviceBytes() const override;
   [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
 
-  /// Gradients of 1/2 sum r^2, or of the paper's loss, where the primitives are.
+  /// Gradients of 1/2 sum r^2, or of the paper's loss, where the ellipsoids are.
   /// \param threads  ThreadsPerBrick::threads of a choice; changes no bit
-  [[nodiscard]] std::vector<PrimitiveGradient> gradients(int threads = ThreadsPerBrick::threads(1));
-  /// Takes over primitives as they are; they have taken no step yet.
-  void setPrimitives(std::span<const Primitive> primitives);
+  [[nodiscard]] std::vector<EllipsoidGradient> gradients(int threads = ThreadsPerBrick::threads(1));
+  /// Takes over ellipsoids as they are; they have taken no step yet.
+  void setEllipsoids(std::span<const Ellipsoid> ellipsoids);
 
  private:
   /// Iterations without hearing from the device; events come more often in all but long runs.
@@ -56,10 +56,10 @@ class CudaOptimiser final : public Optimiser {
   void takeGradients(std::optional<int> threads = std::nullopt);
   void takePaperGradients();
   void refreshUsefulness();
-  void reserve(std::size_t primitives);
-  void requireMemoryFor(std::size_t primitives) const;
+  void reserve(std::size_t ellipsoids);
+  void requireMemoryFor(std::size_t ellipsoids) const;
   /// \return how many seeds there are: `count`, fewer where errors are few
-  std::size_t placeSeeds(std::size_t count, std::size_t primitives, const std::uint32_t* into);
+  std::size_t placeSeeds(std::size_t count, std::size_t ellipsoids, const std::uint32_t* into);
   [[nodiscard]] BrickPassArguments passArguments();
   [[nodiscard]] StepArguments stepArguments(double factor);
 
@@ -75,22 +75,22 @@ class CudaOptimiser final : public Optimiser {
   ThreadsPerBrick threads_;
   DeviceBuffer<float> targetValues_;
   DeviceBuffer<BrickMask> active_;
-  GrowingBuffer<Primitive> primitives_;
+  GrowingBuffer<Ellipsoid> ellipsoids_;
   GrowingBuffer<AdamState> adam_;
   GrowingBuffer<PairForm> forms_;
   GrowingBuffer<Usefulness> usefulness_;
   GrowingBuffer<float> moments_, residual_;
   GrowingBuffer<double> brickLoss_, chunkSums_, loss_, slope_;
-  std::size_t stepped_ = 0;  ///< primitives that took part in the last step
+  std::size_t stepped_ = 0;  ///< ellipsoids that took part in the last step
   DeviceBuffer<int> diverged_;
-  VoxelDraw draw_;
-  PrimitiveRanking ranking_;
+  VoxelSampling sampling_;
+  EllipsoidRanking ranking_;
   ErrorSums errorSums_;
   BrickTable windows_;  ///< of the paper's loss
   PaperLoss paperLoss_;
   std::size_t count_ = 0;
   double secondsSeeding_ = 0.0;
-  std::uint64_t draws_ = 0;  ///< events so far: each draws from its own random stream
+  std::uint64_t samplings_ = 0;  ///< events so far: each draws from its own random stream
   int iterationsSinceRebuild_ = kListsStale;
 };
 

@@ -25,26 +25,27 @@ __device__ double warpMax(double value) {
 }
 
 /// Values are summed as integers, whose sum has no order, in units of 2^-exponent: as fine as 31
-/// bits allow where all of the brick's primitives have their maximum at one voxel.
+/// bits allow where all of the brick's ellipsoids have their maximum at one voxel.
 __device__ int sumExponent(const IntensityPassArguments& a, BrickEntries entries) {
   constexpr int kBits = 29, kFarthest = 100;
   __shared__ float parts[kBlock / kWarp];
-  float most = 0.0f;
+  float largest = 0.0f;
   for (std::uint32_t k = entries.begin + threadIdx.x; k < entries.end; k += kBlock)
-    most = fmaxf(most, fabsf(a.heights[a.lists.primitive[k]]));
-  for (int d = kWarp / 2; d > 0; d /= 2) most = fmaxf(most, __shfl_xor_sync(kAllLanes, most, d));
-  if (threadIdx.x % kWarp == 0) parts[threadIdx.x / kWarp] = most;
+    largest = fmaxf(largest, fabsf(a.heights[a.lists.ellipsoid[k]]));
+  for (int d = kWarp / 2; d > 0; d /= 2)
+    largest = fmaxf(largest, __shfl_xor_sync(kAllLanes, largest, d));
+  if (threadIdx.x % kWarp == 0) parts[threadIdx.x / kWarp] = largest;
   __syncthreads();
-  for (const float part : parts) most = fmaxf(most, part);
-  const float bound = most * float(entries.end - entries.begin);
+  for (const float part : parts) largest = fmaxf(largest, part);
+  const float bound = largest * float(entries.end - entries.begin);
   return bound > 0.0f ? max(-kFarthest, min(kBits - ilogbf(bound), kFarthest)) : 0;
 }
 
 /// Calls visit(place of the voxel, phi) for a lane's share of a pair.
 template <class Visit>
-__device__ void visitVoxels(const IntensityPassArguments& a, std::uint32_t primitive, Coord corner,
+__device__ void visitVoxels(const IntensityPassArguments& a, std::uint32_t ellipsoid, Coord corner,
                             Visit&& visit) {
-  const PairForm p = a.forms[primitive];
+  const PairForm p = a.forms[ellipsoid];
   visitLines(p, corner, a.kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
     float t = line.t;
     for (int y = line.yBegin; y < line.yEnd; ++y, t += 1.0f)
@@ -63,7 +64,7 @@ __device__ void visitEntries(BrickEntries entries, Visit&& visit) {
 __device__ void addPairs(const IntensityPassArguments& a, Coord corner, BrickEntries entries,
                          float unit, int* sums) {
   visitEntries(entries, [&](std::uint32_t k) {
-    const std::uint32_t i = a.lists.primitive[k];
+    const std::uint32_t i = a.lists.ellipsoid[k];
     const float height = a.heights[i] * unit;
     visitVoxels(a, i, corner,
                 [&](int at, float phi) { atomicAdd(&sums[at], __float2int_rn(height * phi)); });
@@ -106,9 +107,9 @@ __device__ void toResiduals(const IntensityPassArguments& a, std::uint32_t brick
     sums[at] = __float_as_int(missed.residual);
     const unsigned exact = __ballot_sync(kAllLanes, missed.stored == 0.0);
     const double counted = a.box.contains(corner + voxelLocal(v)) ? missed.stored : 0.0;
-    const double square = warpSum(counted * counted), most = warpMax(fabs(counted));
+    const double square = warpSum(counted * counted), peak = warpMax(fabs(counted));
     if (v % kWarp != 0) continue;
-    squares[warp] = square, largest[warp] = most;
+    squares[warp] = square, largest[warp] = peak;
     if (kMarksExact)
       a.exact[std::size_t(brick) * IntensityPassArguments::kMaskWords + std::size_t(warp)] = exact;
   }
@@ -132,7 +133,7 @@ __device__ void project(const IntensityPassArguments& a, Coord corner, BrickEntr
                         const int* values) {
   visitEntries(entries, [&](std::uint32_t k) {
     PairProjection sum{};
-    visitVoxels(a, a.lists.primitive[k], corner, [&](int at, float phi) {
+    visitVoxels(a, a.lists.ellipsoid[k], corner, [&](int at, float phi) {
       sum.rPhi += __int_as_float(values[at]) * phi;
       sum.phi2 += phi * phi;
     });
@@ -170,12 +171,12 @@ void launch(const IntensityPassArguments& arguments, cudaStream_t stream) {
   check(cudaGetLastError(), "starting a pass of the solve for intensities");
 }
 
-/// A warp a primitive.
+/// A warp an ellipsoid.
 __global__ void sumProjections(const ProjectionSums s) {
   const std::uint32_t i = (blockIdx.x * kBlock + threadIdx.x) / kWarp;
-  if (i >= s.primitiveCount) return;
+  if (i >= s.ellipsoidCount) return;
   double rPhi = 0.0, phi2 = 0.0;
-  for (std::uint32_t k = s.primitiveBegin[i] + threadIdx.x % kWarp; k < s.primitiveBegin[i + 1];
+  for (std::uint32_t k = s.ellipsoidBegin[i] + threadIdx.x % kWarp; k < s.ellipsoidBegin[i + 1];
        k += kWarp) {
     rPhi += double(s.projections[k].rPhi);
     phi2 += double(s.projections[k].phi2);
@@ -201,8 +202,8 @@ void launchNormalProduct(const IntensityPassArguments& arguments, cudaStream_t s
 }
 
 void launchProjectionSums(const ProjectionSums& sums, cudaStream_t stream) {
-  if (sums.primitiveCount == 0) return;
-  sumProjections<<<blocksFor(std::size_t(sums.primitiveCount) * kWarp, kBlock), kBlock, 0,
+  if (sums.ellipsoidCount == 0) return;
+  sumProjections<<<blocksFor(std::size_t(sums.ellipsoidCount) * kWarp, kBlock), kBlock, 0,
                    stream>>>(sums);
   check(cudaGetLastError(), "starting the sums of projections");
 }

@@ -1,6 +1,6 @@
 #pragma once
 /// Passes over the bricks for a solve of intensities: sums, what a reader makes of them, and back
-/// to the primitives.
+/// to the ellipsoids.
 
 #include <cuda_runtime_api.h>
 
@@ -20,7 +20,7 @@ struct IntensityPassArguments {
   const Coord* bricks;
   std::uint32_t brickCount, targetCount;
   PairListsView lists;
-  const PairForm* forms;  ///< a primitive's; without their intensity
+  const PairForm* forms;  ///< an ellipsoid's; without their intensity
   const float* heights;   ///< instead of it
   KernelConstants<float> kernel;
   const float* source;  ///< kBrickVoxels a target brick
@@ -39,12 +39,12 @@ void launchIntensityGradient(const IntensityPassArguments& arguments, cudaStream
 /// Writes projections of the sum, less its exact voxels.
 void launchNormalProduct(const IntensityPassArguments& arguments, cudaStream_t stream);
 
-/// Sums of the projections of each primitive's pairs, in one order.
+/// Sums of the projections of each ellipsoid's pairs, in one order.
 struct ProjectionSums {
   const PairProjection* projections;
-  const std::uint32_t* primitiveBegin;
-  std::uint32_t primitiveCount;
-  double *rPhi, *phi2;  ///< out, a primitive's; null: not wanted
+  const std::uint32_t* ellipsoidBegin;
+  std::uint32_t ellipsoidCount;
+  double *rPhi, *phi2;  ///< out, an ellipsoid's; null: not wanted
 };
 void launchProjectionSums(const ProjectionSums& sums, cudaStream_t stream);
 

@@ -25,25 +25,25 @@ constexpr double kBytesPerTarget = double(kBrickVoxels * sizeof(float) + sizeof(
 constexpr double kBytesPerReached = kSlotsPerEntry * sizeof(ReachedSlot);
 constexpr double kBytesPerPair =
     double(kMoments * sizeof(float)) + 8.0 * sizeof(std::uint32_t);  // lists, sorted and not
-constexpr double kBytesPerPrimitive =
-    double(sizeof(Primitive) + sizeof(AdamState) + sizeof(PairForm) + sizeof(Usefulness)) +
+constexpr double kBytesPerEllipsoid =
+    double(sizeof(Ellipsoid) + sizeof(AdamState) + sizeof(PairForm) + sizeof(Usefulness)) +
     double(kMoments * sizeof(double)) + 9.0 * sizeof(std::uint32_t) + sizeof(Coord) * 2;
 
-double pairsOf(const FitTarget& target, double primitives) {
-  const double distance = std::cbrt(double(target.activeVoxels) / primitives);
-  return primitives * std::pow(1.0 + kReach * distance / kBrickSide, 3.0);
+double pairsOf(const FitTarget& target, double ellipsoids) {
+  const double distance = std::cbrt(double(target.activeVoxels) / ellipsoids);
+  return ellipsoids * std::pow(1.0 + kReach * distance / kBrickSide, 3.0);
 }
 
-double bytesOf(const FitTarget& target, double primitives) {
+double bytesOf(const FitTarget& target, double ellipsoids) {
   const auto targets = double(target.bricks.size());
   const double reached = target.narrowBand ? 0.0 : kReachedShare * targets;
   return targets * kBytesPerTarget +
          kSpare * ((targets + reached) * kBytesPerBrick + reached * kBytesPerReached +
-                   primitives * kBytesPerPrimitive + pairsOf(target, primitives) * kBytesPerPair);
+                   ellipsoids * kBytesPerEllipsoid + pairsOf(target, ellipsoids) * kBytesPerPair);
 }
 
-/// The most primitives whose fit stays within a bound; 0 where the bricks alone exceed it.
-std::size_t mostPrimitives(const FitTarget& target, double bound) {
+/// The most ellipsoids whose fit stays within a bound; 0 where the bricks alone exceed it.
+std::size_t maxEllipsoidsIn(const FitTarget& target, double bound) {
   double low = 0.0, high = double(target.activeVoxels);
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
@@ -74,26 +74,26 @@ std::size_t freeBytes() {
 
 }  // namespace
 
-std::size_t predictedBytes(const FitTarget& target, std::size_t primitives) {
-  return std::size_t(bytesOf(target, std::max(double(primitives), 1.0)));
+std::size_t predictedBytes(const FitTarget& target, std::size_t ellipsoids) {
+  return std::size_t(bytesOf(target, std::max(double(ellipsoids), 1.0)));
 }
 
-void requireMemory(const FitTarget& target, std::size_t primitives, std::optional<std::size_t> most,
-                   double extra) {
-  const double need = double(predictedBytes(target, primitives)) + extra;
-  const auto have = double(most ? *most : freeBytes());
+void requireMemory(const FitTarget& target, std::size_t ellipsoids,
+                   std::optional<std::size_t> maxBytes, double extra) {
+  const double need = double(predictedBytes(target, ellipsoids)) + extra;
+  const auto have = double(maxBytes ? *maxBytes : freeBytes());
   if (need <= have) return;
-  const std::size_t would = mostPrimitives(target, have - extra);
-  throw DeviceError("fitting " + std::to_string(primitives) + " ellipsoids to " +
+  const std::size_t would = maxEllipsoidsIn(target, have - extra);
+  throw DeviceError("fitting " + std::to_string(ellipsoids) + " ellipsoids to " +
                     std::to_string(target.bricks.size()) + " bricks takes about " +
                     megabytes(need) + " on the GPU, and " + megabytes(have) +
-                    (most ? " are allowed" : " are free") +
+                    (maxBytes ? " are allowed" : " are free") +
                     (would > 0 ? "; " + std::to_string(would) + " ellipsoids would fit"
                                : "; the bricks alone do not fit: use --device cpu"));
 }
 
-bool fitsInMemory(const FitTarget& target, std::optional<std::size_t> most) {
-  return 2.0 * double(predictedBytes(target, 1)) <= double(most ? *most : freeBytes());
+bool fitsInMemory(const FitTarget& target, std::optional<std::size_t> maxBytes) {
+  return 2.0 * double(predictedBytes(target, 1)) <= double(maxBytes ? *maxBytes : freeBytes());
 }
 
 std::size_t peakMemory() {

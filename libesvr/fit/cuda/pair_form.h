@@ -1,8 +1,8 @@
 #pragma once
-/// A primitive as the passes over bricks read it.
+/// An ellipsoid as the passes over bricks read it.
 
+#include "fit/ellipsoid.h"
 #include "fit/frame.h"
-#include "fit/primitive.h"
 
 namespace esvr::cuda {
 
@@ -13,7 +13,7 @@ struct alignas(16) PairForm {
 };
 
 #if defined(__CUDACC__)
-__device__ inline PairForm pairForm(const Primitive& p, double radius) {
+__device__ inline PairForm pairForm(const Ellipsoid& p, double radius) {
   const Coord frame = frameOf(p.center);
   const Matrix3 F = inverse(p.L);
   return {makeLineForm(inFrame(p.center, frame), p.L, radius, p.intensity), frame,

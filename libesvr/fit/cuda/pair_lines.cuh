@@ -1,5 +1,5 @@
 #pragma once
-/// The lines along y on which a primitive meets a brick, shared out among a group of lanes.
+/// The lines along y on which an ellipsoid meets a brick, shared out among a group of lanes.
 
 #include "esvr/sparse_volume.h"
 #include "field/line_math.h"
@@ -26,7 +26,7 @@ __device__ inline int paddedOffset(int voxel) {
 struct PairLine {
   int offset;  ///< of voxel y = 0, padded
   int yBegin, yEnd;
-  float dx, dz;   ///< from the primitive's center
+  float dx, dz;   ///< from the ellipsoid's center
   float closest;  ///< m at the closest approach
   float t;        ///< how far yBegin lies beyond the closest approach
 };

@@ -16,7 +16,7 @@ namespace {
 
 constexpr unsigned kAllLanes = 0xffffffffu;
 
-/// Calls visit(brick's number, brick, position among the primitive's pairs) for each pair.
+/// Calls visit(brick's number, brick, position among the ellipsoid's pairs) for each pair.
 /// \return how many there are, on all lanes
 template <class Visit>
 __device__ std::uint32_t visitPairs(const Support& support, const BrickTableView& bricks,
@@ -40,7 +40,7 @@ __global__ void countPairsKernel(SupportSource source, BrickTableView bricks, st
       visitPairs(supportOf(source, i), bricks, [](std::uint32_t, Coord, std::uint32_t) {});
   if (threadIdx.x % kWarp != 0) return;
   counts[i] = n;
-  // Every primitive has a chunk: one that reaches nothing still takes a step, of zero.
+  // Every ellipsoid has a chunk: one that reaches nothing still takes a step, of zero.
   chunks[i] = n == 0 ? 1 : (n - 1) / PairListsView::kChunk + 1;
 }
 
@@ -75,10 +75,10 @@ __global__ void listPairsKernel(SupportSource source, BrickTableView bricks,
   });
 }
 
-__global__ void listChunks(const std::uint32_t* begin, std::uint32_t primitives,
+__global__ void listChunks(const std::uint32_t* begin, std::uint32_t ellipsoids,
                            std::uint32_t* owner) {
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
-  if (i >= primitives) return;
+  if (i >= ellipsoids) return;
   for (std::uint32_t c = begin[i]; c < begin[i + 1]; ++c) owner[c] = i;
 }
 
@@ -93,9 +93,9 @@ __global__ void findBrickBegins(const std::uint32_t* sorted, std::uint32_t entri
 }
 
 __global__ void gatherOwners(const std::uint32_t* pair, const std::uint32_t* owner,
-                             std::uint32_t entries, std::uint32_t* primitive) {
+                             std::uint32_t entries, std::uint32_t* ellipsoid) {
   const std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x;
-  if (k < entries) primitive[k] = owner[pair[k]];
+  if (k < entries) ellipsoid[k] = owner[pair[k]];
 }
 
 __global__ void countBrickPairs(const std::uint32_t* begin, std::uint32_t bricks,
@@ -112,7 +112,7 @@ PairLists::PairLists(cudaStream_t stream)
     : stream_(stream),
       counts_(stream),
       chunkCounts_(stream),
-      primitiveBegin_(stream),
+      ellipsoidBegin_(stream),
       chunkBegin_(stream),
       chunkOwner_(stream),
       key_(stream),
@@ -120,7 +120,7 @@ PairLists::PairLists(cudaStream_t stream)
       pair_(stream),
       pairSorted_(stream),
       owner_(stream),
-      primitive_(stream),
+      ellipsoid_(stream),
       brickBegin_(stream),
       brickPairs_(stream),
       brickPairsSorted_(stream),
@@ -144,7 +144,7 @@ void PairLists::countPairs(const SupportSource& supports, const BrickTableView& 
       return cub::DeviceScan::ExclusiveSum(memory, bytes, from, to, n + 1, stream_);
     });
   };
-  sum(counts, primitiveBegin_.reserve(n + 1));
+  sum(counts, ellipsoidBegin_.reserve(n + 1));
   sum(chunks, chunkBegin_.reserve(n + 1));
 }
 
@@ -176,7 +176,7 @@ void PairLists::listPairs(const SupportSource& supports, const BrickTableView& b
   std::uint32_t* const chunkOwner = chunkOwner_.reserve(chunkCount_);
   if (n == 0) return;
   listPairsKernel<<<blocksFor(n * kWarp, kBlock), kBlock, 0, stream_>>>(
-      supports, bricks, primitiveBegin_.data(), key, pair, owner);
+      supports, bricks, ellipsoidBegin_.data(), key, pair, owner);
   check(cudaGetLastError(), "listing pairs");
   listChunks<<<blocksFor(n, kBlock), kBlock, 0, stream_>>>(chunkBegin_.data(), std::uint32_t(n),
                                                            chunkOwner);
@@ -189,7 +189,7 @@ void PairLists::sortByBrick(std::size_t bricks) {
   std::uint32_t* const pair = pairSorted_.reserve(pairCount_);
   if (entries > 0)
     withTemporary(temporary_, "sorting pairs", [&](void* memory, std::size_t& bytes) {
-      // Stable: primitives of as many lines keep their order.
+      // Stable: ellipsoids of as many lines keep their order.
       return cub::DeviceRadixSort::SortPairs(memory, bytes, key_.data(), sorted, pair_.data(), pair,
                                              pairCount_, 0,
                                              int(std::bit_width(bricks)) + kLinesBits, stream_);
@@ -197,11 +197,11 @@ void PairLists::sortByBrick(std::size_t bricks) {
   findBrickBegins<<<blocksFor(pairCount_ + 1, kBlock), kBlock, 0, stream_>>>(
       sorted, entries, std::uint32_t(bricks), brickBegin_.reserve(bricks + 1));
   check(cudaGetLastError(), "finding the pairs of bricks");
-  std::uint32_t* const primitive = primitive_.reserve(pairCount_);
+  std::uint32_t* const ellipsoid = ellipsoid_.reserve(pairCount_);
   if (entries > 0)
     gatherOwners<<<blocksFor(pairCount_, kBlock), kBlock, 0, stream_>>>(pair, owner_.data(),
-                                                                        entries, primitive);
-  check(cudaGetLastError(), "listing the primitives of bricks");
+                                                                        entries, ellipsoid);
+  check(cudaGetLastError(), "listing the ellipsoids of bricks");
 }
 
 /// Blocks start in order: the fullest bricks first, so that none is left over for the end.
@@ -221,8 +221,8 @@ void PairLists::orderBricks(std::size_t bricks) {
 }
 
 void PairLists::rebuild(const SupportSource& supports, const BrickTable& bricks) {
-  constexpr std::size_t kMostBricks = std::size_t{1} << (32 - kLinesBits);
-  if (bricks.size() >= kMostBricks)
+  constexpr std::size_t kMaxBricks = std::size_t{1} << (32 - kLinesBits);
+  if (bricks.size() >= kMaxBricks)
     throw DeviceError("fitting on the GPU: " + std::to_string(bricks.size()) +
                       " bricks are more than the lists can hold");
   countPairs(supports, bricks.view());
@@ -233,8 +233,8 @@ void PairLists::rebuild(const SupportSource& supports, const BrickTable& bricks)
 }
 
 PairListsView PairLists::view() const {
-  return {brickOrder_.data(),     brickBegin_.data(), primitive_.data(), pairSorted_.data(),
-          primitiveBegin_.data(), chunkBegin_.data(), chunkOwner_.data()};
+  return {brickOrder_.data(),     brickBegin_.data(), ellipsoid_.data(), pairSorted_.data(),
+          ellipsoidBegin_.data(), chunkBegin_.data(), chunkOwner_.data()};
 }
 
 }  // namespace esvr::cuda

@@ -1,5 +1,5 @@
 #pragma once
-/// Which primitives reach which bricks, listed both ways on the device.
+/// Which ellipsoids reach which bricks, listed both ways on the device.
 
 #include <cstdint>
 
@@ -7,19 +7,19 @@
 
 namespace esvr::cuda {
 
-/// A primitive's pairs are numbered one after the other, in the bricks' order; moments are kept
-/// under these numbers, so that a primitive's own lie side by side. A primitive's pairs are summed
+/// An ellipsoid's pairs are numbered one after the other, in the bricks' order; moments are kept
+/// under these numbers, so that an ellipsoid's own lie side by side. An ellipsoid's pairs are summed
 /// in chunks, so that one which covers half the volume does not keep its thread for long.
 struct PairListsView {
   static constexpr std::uint32_t kChunk = 256;  ///< pairs
 
   const std::uint32_t* brickOrder;      ///< bricks, those with the most pairs first
   const std::uint32_t* brickBegin;      ///< bricks + 1: range of a brick's entries
-  const std::uint32_t* primitive;       ///< an entry's; those with the most lines first
-  const std::uint32_t* pair;            ///< an entry's number among the primitives' pairs
-  const std::uint32_t* primitiveBegin;  ///< primitives + 1: range of a primitive's pairs
-  const std::uint32_t* chunkBegin;      ///< primitives + 1: range of a primitive's chunks
-  const std::uint32_t* chunkOwner;      ///< a chunk's primitive
+  const std::uint32_t* ellipsoid;       ///< an entry's; those with the most lines first
+  const std::uint32_t* pair;            ///< an entry's number among the ellipsoids' pairs
+  const std::uint32_t* ellipsoidBegin;  ///< ellipsoids + 1: range of an ellipsoid's pairs
+  const std::uint32_t* chunkBegin;      ///< ellipsoids + 1: range of an ellipsoid's chunks
+  const std::uint32_t* chunkOwner;      ///< a chunk's ellipsoid
 };
 
 class PairLists {
@@ -35,15 +35,15 @@ class PairLists {
 
  private:
   void countPairs(const SupportSource& supports, const BrickTableView& bricks);
-  void readTotals(std::size_t primitives);
+  void readTotals(std::size_t ellipsoids);
   void listPairs(const SupportSource& supports, const BrickTableView& bricks);
   void sortByBrick(std::size_t bricks);
   void orderBricks(std::size_t bricks);
 
   cudaStream_t stream_;
   std::size_t pairCount_ = 0, chunkCount_ = 0;
-  GrowingBuffer<std::uint32_t> counts_, chunkCounts_, primitiveBegin_, chunkBegin_, chunkOwner_;
-  GrowingBuffer<std::uint32_t> key_, keySorted_, pair_, pairSorted_, owner_, primitive_;
+  GrowingBuffer<std::uint32_t> counts_, chunkCounts_, ellipsoidBegin_, chunkBegin_, chunkOwner_;
+  GrowingBuffer<std::uint32_t> key_, keySorted_, pair_, pairSorted_, owner_, ellipsoid_;
   GrowingBuffer<std::uint32_t> brickBegin_, brickPairs_, brickPairsSorted_, bricks_, brickOrder_;
   GrowingBuffer<std::uint64_t> total_;
   GrowingBuffer<char> temporary_;

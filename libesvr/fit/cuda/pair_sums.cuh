@@ -6,7 +6,7 @@
 
 namespace esvr::cuda {
 
-/// A primitive's moments; wants launchSums before.
+/// An ellipsoid's moments; wants launchSums before.
 __device__ inline PairSums sumsOf(const StepArguments& a, std::uint32_t i) {
   PairSums s{};
   for (std::uint32_t c = a.lists.chunkBegin[i]; c < a.lists.chunkBegin[i + 1]; ++c) {
@@ -19,7 +19,7 @@ __device__ inline PairSums sumsOf(const StepArguments& a, std::uint32_t i) {
 }
 
 /// A sum over all numbers of it: one that is not finite shows.
-__device__ inline bool finite(const Primitive& p) {
+__device__ inline bool finite(const Ellipsoid& p) {
   double sum = p.intensity;
   for (const double c : p.center) sum += c;
   for (const double l : p.L) sum += l;

@@ -64,7 +64,7 @@ __global__ void placeSeeds(const SeedArguments a) {
   const SeedMoments moments = momentsAround(around, r < 0.0 ? -1.0 : 1.0, a.window);
   if (threadIdx.x % kWarp != 0) return;
   const std::uint32_t place = a.into != nullptr ? a.into[n] : a.firstPlace + n;
-  a.primitives[place] = seedFromMoments(voxel, r, moments, {a.unitVariance, a.intensity, a.share});
+  a.ellipsoids[place] = seedFromMoments(voxel, r, moments, {a.unitVariance, a.intensity, a.share});
   a.states[place] = AdamState{};
 }
 

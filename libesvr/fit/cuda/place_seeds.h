@@ -1,5 +1,5 @@
 #pragma once
-/// New primitives at drawn voxels.
+/// New ellipsoids at drawn voxels.
 
 #include <cuda_runtime_api.h>
 
@@ -18,9 +18,9 @@ struct SeedArguments {
   double unitVariance;        ///< of the kernel
   double intensity;           ///< of the residual at the seed
   double share;               ///< energy that each draw stood for
-  const std::uint32_t* into;  ///< places of the new primitives; null: firstPlace and on
+  const std::uint32_t* into;  ///< places of the new ellipsoids; null: firstPlace and on
   std::uint32_t firstPlace;
-  Primitive* primitives;
+  Ellipsoid* ellipsoids;
   AdamState* states;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The bricks that a primitive reaches, a warp for each primitive.
+/// The bricks that an ellipsoid reaches, a warp for each ellipsoid.
 
 #include <cstdint>
 
@@ -14,9 +14,9 @@ __device__ inline std::size_t warpNumber() {
   return (std::size_t(blockIdx.x) * blockDim.x + threadIdx.x) / kWarp;
 }
 
-/// Primitive i's.
+/// Ellipsoid i's.
 __device__ inline Support supportOf(const SupportSource& source, std::size_t i) {
-  const Primitive& p = source.primitives[i];
+  const Ellipsoid& p = source.ellipsoids[i];
   return makeSupport(p.center, p.L, source.radiusOf(i), source.slack);
 }
 

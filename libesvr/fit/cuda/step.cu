@@ -9,7 +9,7 @@ namespace esvr::cuda {
 namespace {
 
 constexpr int kLanes = 16;      // of a chunk: one a moment, and some to spare
-constexpr int kStepBlock = 64;  // small: few primitives are to use many processors
+constexpr int kStepBlock = 64;  // small: few ellipsoids are to use many processors
 constexpr int kLossBlock = 1024;
 static_assert(kLanes >= kMoments);
 
@@ -20,8 +20,8 @@ __global__ void sumChunks(const StepArguments a) {
   if (chunk >= a.chunkCount || lane >= kMoments) return;
   const std::uint32_t i = a.lists.chunkOwner[chunk];
   const std::uint32_t begin =
-      a.lists.primitiveBegin[i] + (chunk - a.lists.chunkBegin[i]) * PairListsView::kChunk;
-  const std::uint32_t end = min(a.lists.primitiveBegin[i + 1], begin + PairListsView::kChunk);
+      a.lists.ellipsoidBegin[i] + (chunk - a.lists.chunkBegin[i]) * PairListsView::kChunk;
+  const std::uint32_t end = min(a.lists.ellipsoidBegin[i + 1], begin + PairListsView::kChunk);
   double sum = 0.0;
 #pragma unroll 4
   for (std::uint32_t k = begin; k < end; ++k)
@@ -54,24 +54,24 @@ __global__ void __launch_bounds__(kLossBlock)
       count, [&](std::uint32_t i) { return double(usefulness[i].edge); }, out);
 }
 
-__device__ std::uint32_t ownPrimitive() { return blockIdx.x * kStepBlock + threadIdx.x; }
+__device__ std::uint32_t ownEllipsoid() { return blockIdx.x * kStepBlock + threadIdx.x; }
 
 __device__ Usefulness usefulnessOf(const StepArguments& a, const PairSums& sums,
-                                   const PrimitiveGradient& gradient) {
+                                   const EllipsoidGradient& gradient) {
   return {float(sums.phi2), float(sums.rPhi), float(edgeGradient(gradient, a.edge.logMByKappa))};
 }
 
 __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
-  const std::uint32_t i = ownPrimitive();
-  if (i >= a.primitiveCount) return;
+  const std::uint32_t i = ownEllipsoid();
+  if (i >= a.ellipsoidCount) return;
 
   const PairSums sums = sumsOf(a, i);
-  Primitive p = a.primitives[i];
+  Ellipsoid p = a.ellipsoids[i];
   AdamState adam = a.states[i];
-  const PrimitiveGradient gradient = primitiveGradient(a.forms[i].form, sums, a.edge.slope);
+  const EllipsoidGradient gradient = ellipsoidGradient(a.forms[i].form, sums, a.edge.slope);
   const ParameterVector largest = largestStep(p, a.sizes.scaled(a.factor));
   moveWithin(p, adamDirection(adam, gradient.byParameter, a.adam, largest), a.limits);
-  a.primitives[i] = p;
+  a.ellipsoids[i] = p;
   a.states[i] = adam;
   a.forms[i] = pairForm(p, a.radius);
   a.usefulness[i] = usefulnessOf(a, sums, gradient);
@@ -79,29 +79,29 @@ __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
 }
 
 __global__ void __launch_bounds__(kStepBlock) writeUsefulness(const StepArguments a) {
-  const std::uint32_t i = ownPrimitive();
-  if (i >= a.primitiveCount) return;
+  const std::uint32_t i = ownEllipsoid();
+  if (i >= a.ellipsoidCount) return;
   const PairSums sums = sumsOf(a, i);
-  a.usefulness[i] = usefulnessOf(a, sums, primitiveGradient(a.forms[i].form, sums, a.edge.slope));
+  a.usefulness[i] = usefulnessOf(a, sums, ellipsoidGradient(a.forms[i].form, sums, a.edge.slope));
 }
 
 __global__ void __launch_bounds__(kStepBlock)
-    readGradients(const StepArguments a, PrimitiveGradient* out) {
-  const std::uint32_t i = ownPrimitive();
-  if (i >= a.primitiveCount) return;
-  out[i] = primitiveGradient(a.forms[i].form, sumsOf(a, i), a.edge.slope);
+    readGradients(const StepArguments a, EllipsoidGradient* out) {
+  const std::uint32_t i = ownEllipsoid();
+  if (i >= a.ellipsoidCount) return;
+  out[i] = ellipsoidGradient(a.forms[i].form, sumsOf(a, i), a.edge.slope);
 }
 
 __global__ void __launch_bounds__(kStepBlock)
-    writeForms(const Primitive* primitives, std::uint32_t count, double radius, PairForm* forms) {
-  const std::uint32_t i = ownPrimitive();
-  if (i < count) forms[i] = pairForm(primitives[i], radius);
+    writeForms(const Ellipsoid* ellipsoids, std::uint32_t count, double radius, PairForm* forms) {
+  const std::uint32_t i = ownEllipsoid();
+  if (i < count) forms[i] = pairForm(ellipsoids[i], radius);
 }
 
 __global__ void __launch_bounds__(kStepBlock)
-    shrink(Primitive* primitives, std::uint32_t count, double factor) {
-  const std::uint32_t i = ownPrimitive();
-  if (i < count) shrinkBy(primitives[i], factor);
+    shrink(Ellipsoid* ellipsoids, std::uint32_t count, double factor) {
+  const std::uint32_t i = ownEllipsoid();
+  if (i < count) shrinkBy(ellipsoids[i], factor);
 }
 
 }  // namespace
@@ -115,20 +115,20 @@ void launchSums(const StepArguments& a, cudaStream_t stream) {
 }
 
 void launchStep(const StepArguments& a, cudaStream_t stream) {
-  if (a.primitiveCount == 0) return;
-  step<<<blocksFor(a.primitiveCount, kStepBlock), kStepBlock, 0, stream>>>(a);
+  if (a.ellipsoidCount == 0) return;
+  step<<<blocksFor(a.ellipsoidCount, kStepBlock), kStepBlock, 0, stream>>>(a);
   check(cudaGetLastError(), "starting a step");
 }
 
 void launchUsefulness(const StepArguments& a, cudaStream_t stream) {
-  if (a.primitiveCount == 0) return;
-  writeUsefulness<<<blocksFor(a.primitiveCount, kStepBlock), kStepBlock, 0, stream>>>(a);
-  check(cudaGetLastError(), "starting to weigh primitives");
+  if (a.ellipsoidCount == 0) return;
+  writeUsefulness<<<blocksFor(a.ellipsoidCount, kStepBlock), kStepBlock, 0, stream>>>(a);
+  check(cudaGetLastError(), "starting to weigh ellipsoids");
 }
 
-void launchReadGradients(const StepArguments& a, PrimitiveGradient* out, cudaStream_t stream) {
-  if (a.primitiveCount == 0) return;
-  readGradients<<<blocksFor(a.primitiveCount, kStepBlock), kStepBlock, 0, stream>>>(a, out);
+void launchReadGradients(const StepArguments& a, EllipsoidGradient* out, cudaStream_t stream) {
+  if (a.ellipsoidCount == 0) return;
+  readGradients<<<blocksFor(a.ellipsoidCount, kStepBlock), kStepBlock, 0, stream>>>(a, out);
   check(cudaGetLastError(), "starting to read gradients");
 }
 
@@ -138,18 +138,18 @@ void launchEdgeSum(const Usefulness* usefulness, std::uint32_t count, double* su
   check(cudaGetLastError(), "starting the sum of slopes by kappa");
 }
 
-void launchShrink(Primitive* primitives, std::uint32_t count, double factor, cudaStream_t stream) {
+void launchShrink(Ellipsoid* ellipsoids, std::uint32_t count, double factor, cudaStream_t stream) {
   if (count == 0) return;
-  shrink<<<blocksFor(count, kStepBlock), kStepBlock, 0, stream>>>(primitives, count, factor);
-  check(cudaGetLastError(), "starting to shrink primitives");
+  shrink<<<blocksFor(count, kStepBlock), kStepBlock, 0, stream>>>(ellipsoids, count, factor);
+  check(cudaGetLastError(), "starting to shrink ellipsoids");
 }
 
-void launchForms(const Primitive* primitives, std::uint32_t count, double radius, PairForm* forms,
+void launchForms(const Ellipsoid* ellipsoids, std::uint32_t count, double radius, PairForm* forms,
                  cudaStream_t stream) {
   if (count == 0) return;
-  writeForms<<<blocksFor(count, kStepBlock), kStepBlock, 0, stream>>>(primitives, count, radius,
+  writeForms<<<blocksFor(count, kStepBlock), kStepBlock, 0, stream>>>(ellipsoids, count, radius,
                                                                       forms);
-  check(cudaGetLastError(), "starting to prepare primitives");
+  check(cudaGetLastError(), "starting to prepare ellipsoids");
 }
 
 }  // namespace esvr::cuda

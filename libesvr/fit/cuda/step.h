@@ -1,5 +1,5 @@
 #pragma once
-/// From moments to gradients to a step, one thread a primitive and so one writer.
+/// From moments to gradients to a step, one thread an ellipsoid and so one writer.
 
 #include <cuda_runtime_api.h>
 
@@ -15,7 +15,7 @@ struct KernelEdge {
   double logMByKappa;  ///< KernelWidth::logMByKappa
 };
 
-/// What a primitive is worth, from the last gradients.
+/// What an ellipsoid is worth, from the last gradients.
 struct Usefulness {
   float phi2;  ///< sum of phi^2
   float rPhi;  ///< sum of r phi
@@ -24,23 +24,23 @@ struct Usefulness {
 
 /// Pointers are to device memory, borrowed.
 struct StepArguments {
-  std::uint32_t primitiveCount, chunkCount, brickCount;
+  std::uint32_t ellipsoidCount, chunkCount, brickCount;
   PairListsView lists;
   const float* moments;     ///< kMoments a pair
   const double* brickLoss;  ///< a brick's
   double* chunkSums;        ///< kMoments a chunk
   double* loss;             ///< one value: sum of r^2 before the step
-  Primitive* primitives;
+  Ellipsoid* ellipsoids;
   AdamState* states;
   PairForm* forms;
   Usefulness* usefulness;
-  int* diverged;  ///< set to 1 where a primitive is not finite
+  int* diverged;  ///< set to 1 where an ellipsoid is not finite
   double radius;  ///< of the support in the unit frame
   KernelEdge edge;
   double factor;  ///< of the step sizes
   StepSizes sizes;
   AdamOptions adam;
-  PrimitiveLimits limits;
+  EllipsoidLimits limits;
 };
 
 /// Sums the moments of chunks, and the loss.
@@ -49,19 +49,19 @@ void launchSums(const StepArguments& arguments, cudaStream_t stream);
 void launchStep(const StepArguments& arguments, cudaStream_t stream);
 /// Writes only the usefulness; wants launchSums before.
 void launchUsefulness(const StepArguments& arguments, cudaStream_t stream);
-/// Writes the gradients of all primitives; wants launchSums before.
-void launchReadGradients(const StepArguments& arguments, PrimitiveGradient* out,
+/// Writes the gradients of all ellipsoids; wants launchSums before.
+void launchReadGradients(const StepArguments& arguments, EllipsoidGradient* out,
                          cudaStream_t stream);
 
-/// Sums byKappa of `count` primitives, in one order.
+/// Sums byKappa of `count` ellipsoids, in one order.
 void launchEdgeSum(const Usefulness* usefulness, std::uint32_t count, double* sum,
                    cudaStream_t stream);
 
-/// Divides the scales of `count` primitives by a factor.
-void launchShrink(Primitive* primitives, std::uint32_t count, double factor, cudaStream_t stream);
+/// Divides the scales of `count` ellipsoids by a factor.
+void launchShrink(Ellipsoid* ellipsoids, std::uint32_t count, double factor, cudaStream_t stream);
 
-/// Writes the forms of `count` primitives.
-void launchForms(const Primitive* primitives, std::uint32_t count, double radius, PairForm* forms,
+/// Writes the forms of `count` ellipsoids.
+void launchForms(const Ellipsoid* ellipsoids, std::uint32_t count, double radius, PairForm* forms,
                  cudaStream_t stream);
 
 }  // namespace esvr::cuda

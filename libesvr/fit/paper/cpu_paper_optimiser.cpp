@@ -7,14 +7,14 @@
 
 #include "esvr/error.h"
 #include "field/gather.h"
-#include "fit/fit_errors.h"
+#include "fit/cpu/fit_errors.h"
 #include "fit/scene.h"
 
 namespace esvr::paper {
 namespace {
 
 template <class Visit>
-void forEachPrimitive(std::size_t count, Visit&& visit) {
+void forEachEllipsoid(std::size_t count, Visit&& visit) {
   tbb::parallel_for(std::size_t(0), count, visit);
 }
 
@@ -22,11 +22,11 @@ void forEachPrimitive(std::size_t count, Visit&& visit) {
 
 CpuPaperOptimiser::CpuPaperOptimiser(const FitTarget& target, const PaperOptions& options)
     : options_(options) {
-  const auto kernel = kernelConstants<double>(kernelOf(options.kind));
-  const Space space = spaceOf(target);
-  for (auto& volume : cutSubvolumes(target, space, options.subvolumeSide)) {
-    FitEngine engine(volume->target, kernel);
-    parts_.push_back({std::move(volume), std::move(engine)});
+  resizeKernels(1);
+  setKernel(0, kernelConstants<double>(kernelOf(options.kind)));
+  for (auto& volume : cutSubvolumes(target, spaceOf(target), options.subvolumeSide)) {
+    CpuPaperPass pass(volume->target, kernels_);
+    parts_.push_back({std::move(volume), std::move(pass)});
   }
 }
 
@@ -35,77 +35,81 @@ void CpuPaperOptimiser::put(const Population& population) {
   for (Part& part : parts_) part.motionLeft = -1.0;
 }
 
-void CpuPaperOptimiser::formPrimitives() {
+void CpuPaperOptimiser::resizeKernels(std::size_t count) {
+  kernels_.all.resize(count);
+  kernels_.radii.resize(count);
+}
+
+void CpuPaperOptimiser::setKernel(std::size_t i, const KernelConstants<double>& kernel) {
+  kernels_.all[i] = narrowed(kernel);
+  kernels_.radii[i] = supportRadius(kernel);
+}
+
+void CpuPaperOptimiser::formEllipsoids() {
   const std::size_t n = population_.size();
-  primitives_.resize(n);
+  ellipsoids_.resize(n);
   gradients_.resize(n);
-  if (options_.kind.learnK) {
-    kernels_.constants.resize(n);
-    kernels_.radii.resize(n);
-  }
-  forEachPrimitive(n, [&](std::size_t i) {
-    primitives_[i] = primitiveOf(population_.primitives[i], options_.kind);
-    if (!options_.kind.learnK) return;
-    const auto k = kernelConstants<double>(kernelOf(options_.kind), population_.primitives[i].k);
-    kernels_.constants[i] = narrowed(k);
-    kernels_.radii[i] = supportRadius(k);
+  if (options_.kind.learnK) resizeKernels(n);
+  forEachEllipsoid(n, [&](std::size_t i) {
+    ellipsoids_[i] = ellipsoidOf(population_.ellipsoids[i], options_.kind);
+    if (options_.kind.learnK)
+      setKernel(i, kernelConstants<double>(kernelOf(options_.kind), population_.ellipsoids[i].k));
   });
 }
 
 void CpuPaperOptimiser::rebuildLists(Part& part, double slack) {
-  part.engine.useKernels(options_.kind.learnK ? &kernels_ : nullptr);
-  part.engine.rebuild(primitives_, slack);
+  part.pass.rebuild(ellipsoids_, slack);
   part.motionLeft = slack;
 }
 
 PaperVector CpuPaperOptimiser::gradientOf(std::size_t i) const {
-  return byPaperParameters(population_.primitives[i], primitives_[i], gradients_[i]);
+  return byPaperParameters(population_.ellipsoids[i], ellipsoids_[i], gradients_[i]);
 }
 
 double CpuPaperOptimiser::takeGradients(Part& part) {
   const FitTarget& target = part.volume->target;
-  part.engine.residuals(primitives_, residuals_);
+  part.pass.residuals(ellipsoids_, residuals_);
   const double loss =
-      loss_.evaluate({part.engine.index(), residuals_, target.values, target.boxVoxels,
-                      options_.beta, target.highest - target.lowest, target.within},
+      loss_.evaluate({part.pass.index(), residuals_, target.values, target.boxVoxels, options_.beta,
+                      target.highest - target.lowest, target.within},
                      lossByValue_);
-  part.engine.gradientsOf(primitives_, lossByValue_, gradients_);
+  part.pass.gradients(ellipsoids_, lossByValue_, gradients_);
   return loss;
 }
 
 LossGradients CpuPaperOptimiser::gradients(std::size_t subvolume) {
-  formPrimitives();
+  formEllipsoids();
   rebuildLists(parts_[subvolume], kListSlack);
   LossGradients result{takeGradients(parts_[subvolume]), {}};
-  for (std::size_t i = 0; i < population_.size(); ++i) result.byPrimitive.push_back(gradientOf(i));
+  for (std::size_t i = 0; i < population_.size(); ++i) result.byEllipsoid.push_back(gradientOf(i));
   return result;
 }
 
 void CpuPaperOptimiser::iterate(std::size_t subvolume, const PaperStep& step) {
   Part& part = parts_[subvolume];
-  formPrimitives();
+  formEllipsoids();
   if (part.motionLeft < 0.0) rebuildLists(part, kListSlack);
   takeGradients(part);
-  const auto& begin = part.engine.pairs().ellipsoidBegin;
-  forEachPrimitive(population_.size(), [&](std::size_t i) {
-    takeStep(population_.primitives[i], population_.states[i], gradientOf(i),
+  const auto& begin = part.pass.pairs().ellipsoidBegin;
+  forEachEllipsoid(population_.size(), [&](std::size_t i) {
+    takeStep(population_.ellipsoids[i], population_.states[i], gradientOf(i),
              begin[i + 1] > begin[i], step);
   });
   for (Part& each : parts_) each.motionLeft -= motionOf(step);
 }
 
 FitErrors CpuPaperOptimiser::measure() {
-  formPrimitives();
-  for (const Primitive& p : primitives_)
+  formEllipsoids();
+  for (const Ellipsoid& p : ellipsoids_)
     if (!std::isfinite(p.center[0] + p.L[0] + p.intensity))
       throw RuntimeFailure("the fit diverged: an ellipsoid is not finite");
   FitErrors errors;
   pairCount_ = 0;
   for (Part& part : parts_) {
     rebuildLists(part, kRoundingSlack);
-    pairCount_ += part.engine.pairs().pairCount();
-    part.engine.residuals(primitives_, residuals_);
-    errors.add(errorsOf(part.volume->target, {part.engine.index(), residuals_}));
+    pairCount_ += part.pass.pairs().pairCount();
+    part.pass.residuals(ellipsoids_, residuals_);
+    errors.add(errorsOf(part.volume->target, {part.pass.index(), residuals_}));
   }
   return errors;
 }

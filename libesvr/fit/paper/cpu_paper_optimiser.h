@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "fit/engine.h"
+#include "fit/paper/cpu_paper_pass.h"
+#include "fit/paper/paper_loss.h"
 #include "fit/paper/paper_optimiser.h"
-#include "fit/paper_loss.h"
 
 namespace esvr::paper {
 
@@ -18,7 +18,7 @@ class CpuPaperOptimiser final : public PaperOptimiser {
   [[nodiscard]] LossGradients gradients(std::size_t subvolume) override;
   void put(const Population& population) override;
   [[nodiscard]] Population population() const override { return population_; }
-  [[nodiscard]] std::size_t primitiveCount() const override { return population_.size(); }
+  [[nodiscard]] std::size_t ellipsoidCount() const override { return population_.size(); }
   [[nodiscard]] FitErrors measure() override;
   [[nodiscard]] std::uint64_t pairCount() const override { return pairCount_; }
   [[nodiscard]] std::size_t deviceBytes() const override { return 0; }
@@ -26,21 +26,23 @@ class CpuPaperOptimiser final : public PaperOptimiser {
  private:
   struct Part {
     std::unique_ptr<Subvolume> volume;
-    FitEngine engine;
+    CpuPaperPass pass;
     double motionLeft = -1.0;  ///< voxels that supports may still move by; below 0: lists are stale
   };
 
-  void formPrimitives();
+  void resizeKernels(std::size_t count);
+  void setKernel(std::size_t i, const KernelConstants<double>& kernel);
+  void formEllipsoids();
   void rebuildLists(Part& part, double slack);
   double takeGradients(Part& part);
-  [[nodiscard]] PaperVector gradientOf(std::size_t primitive) const;
+  [[nodiscard]] PaperVector gradientOf(std::size_t ellipsoid) const;
 
   PaperOptions options_;
+  PopulationKernels kernels_;
   std::vector<Part> parts_;
   Population population_;
-  std::vector<Primitive> primitives_;  ///< the same in the form that passes take
-  OwnKernels kernels_;
-  std::vector<PrimitiveGradient> gradients_;
+  std::vector<Ellipsoid> ellipsoids_;  ///< the same in the form that passes take
+  std::vector<EllipsoidGradient> gradients_;
   std::vector<float> residuals_, lossByValue_;
   PaperLoss loss_;
   std::uint64_t pairCount_ = 0;

@@ -5,8 +5,8 @@
 #include <numbers>
 #include <utility>
 
-#include "fit/draw_options.h"
 #include "fit/paper/paper_math.h"
+#include "fit/sampling_options.h"
 
 namespace esvr::paper {
 namespace {
@@ -20,7 +20,7 @@ std::vector<std::size_t> chosen(const Population& population, const DensifyRule&
   for (std::size_t i = 0; i < population.size(); ++i)
     if (const double g = meanGradient(population.states[i]); g > 0.0 && g >= rule.threshold)
       candidates.emplace_back(-g, i);
-  const std::size_t room = rule.most - std::min(rule.most, population.size());
+  const std::size_t room = rule.maxCount - std::min(rule.maxCount, population.size());
   if (candidates.size() > room) {
     std::nth_element(candidates.begin(), candidates.begin() + std::ptrdiff_t(room),
                      candidates.end());
@@ -32,7 +32,7 @@ std::vector<std::size_t> chosen(const Population& population, const DensifyRule&
   return places;
 }
 
-double largestScale(const PaperPrimitive& p) {
+double largestScale(const PaperEllipsoid& p) {
   return std::exp(*std::max_element(p.logScale.begin(), p.logScale.end()));
 }
 
@@ -41,7 +41,7 @@ class Normals {
  public:
   explicit Normals(std::uint64_t seed) : seed_(seed) {}
   double operator()() {
-    const double u = 1.0 - drawUniform(seed_, next_), angle = drawUniform(seed_, next_ + 1);
+    const double u = 1.0 - sampleUniform(seed_, next_), angle = sampleUniform(seed_, next_ + 1);
     next_ += 2;
     return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * std::numbers::pi * angle);
   }
@@ -50,8 +50,8 @@ class Normals {
   std::uint64_t seed_, next_ = 0;
 };
 
-PaperPrimitive partOf(const PaperPrimitive& whole, Normals& normal) {
-  PaperPrimitive part = whole;
+PaperEllipsoid partOf(const PaperEllipsoid& whole, Normals& normal) {
+  PaperEllipsoid part = whole;
   const Matrix3 R = rotationOf(normalised(whole.rotation));
   for (int j = 0; j < 3; ++j) {
     const double along = std::exp(whole.logScale[j]) * normal();
@@ -66,10 +66,10 @@ void removeSplit(Population& population, const std::vector<bool>& split) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < population.size(); ++i) {
     if (split[i]) continue;
-    population.primitives[kept] = population.primitives[i];
+    population.ellipsoids[kept] = population.ellipsoids[i];
     population.states[kept++] = population.states[i];
   }
-  population.primitives.resize(kept);
+  population.ellipsoids.resize(kept);
   population.states.resize(kept);
 }
 
@@ -80,11 +80,11 @@ double meanGradient(const PaperState& state) {
 }
 
 DensifyCounts densify(Population& population, const DensifyRule& rule) {
-  std::vector<PaperPrimitive> clones, parts;
+  std::vector<PaperEllipsoid> clones, parts;
   std::vector<bool> split(population.size(), false);
   Normals normal(rule.seed);
   for (const std::size_t i : chosen(population, rule)) {
-    PaperPrimitive& p = population.primitives[i];
+    PaperEllipsoid& p = population.ellipsoids[i];
     split[i] = largestScale(p) > rule.splitAbove;
     if (split[i]) {
       for (int n = 0; n < kParts; ++n) parts.push_back(partOf(p, normal));
@@ -95,7 +95,7 @@ DensifyCounts densify(Population& population, const DensifyRule& rule) {
   }
   removeSplit(population, split);
   for (const auto* added : {&clones, &parts})
-    population.primitives.insert(population.primitives.end(), added->begin(), added->end());
+    population.ellipsoids.insert(population.ellipsoids.end(), added->begin(), added->end());
   population.states.resize(population.size());
   for (PaperState& state : population.states) state.gradientSum = 0.0, state.seen = 0;
   return {clones.size(), parts.size() / kParts};

@@ -1,17 +1,17 @@
 #pragma once
-/// Clones and splits primitives with large gradients (3D Gaussian Splatting, section 5.2).
+/// Clones and splits ellipsoids with large gradients (3D Gaussian Splatting, section 5.2).
 
 #include <cstddef>
 #include <cstdint>
 
-#include "fit/paper/paper_primitive.h"
+#include "fit/paper/paper_ellipsoid.h"
 
 namespace esvr::paper {
 
 struct DensifyRule {
-  double threshold = 0.0;   ///< of the mean gradient by position (PaperMethod::gradientThreshold)
-  double splitAbove = 0.0;  ///< voxels: larger scales are split, others cloned
-  std::size_t most = 0;     ///< primitives; where more would come, the largest gradients go first
+  double threshold = 0.0;    ///< of the mean gradient by position (PaperMethod::gradientThreshold)
+  double splitAbove = 0.0;   ///< voxels: larger scales are split, others cloned
+  std::size_t maxCount = 0;  ///< ellipsoids; where more would come, the largest gradients go first
   std::uint64_t seed = 1;
 };
 

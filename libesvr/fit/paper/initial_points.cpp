@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "fit/draw_options.h"
+#include "fit/sampling_options.h"
 
 namespace esvr::paper {
 namespace {
@@ -28,7 +28,7 @@ double massOf(const KernelConstants<double>& kernel) {
 
 }  // namespace
 
-std::vector<PaperPrimitive> initialPoints(const FitTarget& target, std::size_t points,
+std::vector<PaperEllipsoid> initialPoints(const FitTarget& target, std::size_t points,
                                           const KernelKind& kind, std::uint64_t seed) {
   const std::uint64_t voxels = voxelsToDrawFrom(target);
   const std::uint64_t count = std::min<std::uint64_t>(points, voxels);
@@ -36,17 +36,17 @@ std::vector<PaperPrimitive> initialPoints(const FitTarget& target, std::size_t p
   const double scale = std::cbrt(each), units = kind.unitsPerScale(kind.k);
   const double mass = massOf(kernelConstants<double>(kernelOf(kind))) / std::pow(units, 3.0);
 
-  std::vector<PaperPrimitive> drawn;
+  std::vector<PaperEllipsoid> drawn;
   const auto nextAt = [&] {
     const auto n = double(drawn.size());
-    return std::uint64_t((n + drawUniform(seed, drawn.size())) * each);
+    return std::uint64_t((n + sampleUniform(seed, drawn.size())) * each);
   };
   std::uint64_t passed = 0, wanted = nextAt();
   for (std::size_t i = 0; i < target.values.size() && drawn.size() < count; ++i) {
     if (target.values[i] == 0.0f || passed++ != wanted) continue;
     const Coord v =
         target.bricks[i / kBrickVoxels] * kBrickSide + voxelLocal(int(i % kBrickVoxels));
-    PaperPrimitive p{
+    PaperEllipsoid p{
         {double(v.x), double(v.y), double(v.z)}, {}, {1.0, 0.0, 0.0, 0.0}, 0.0, kind.k};
     p.logScale.fill(std::log(scale));
     p.intensity = double(target.values[i]) / mass;

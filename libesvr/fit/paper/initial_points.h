@@ -1,7 +1,7 @@
 #pragma once
 /// Where the paper's method begins.
 
-#include "fit/paper/paper_primitive.h"
+#include "fit/paper/paper_ellipsoid.h"
 #include "fit/target.h"
 
 namespace esvr::paper {
@@ -10,7 +10,7 @@ namespace esvr::paper {
 /// order and none twice: as many as asked for, or as there are such voxels. Their scale is the
 /// distance of neighbours if they were spread evenly, their intensity the voxel's share where so
 /// many overlap.
-[[nodiscard]] std::vector<PaperPrimitive> initialPoints(const FitTarget& target, std::size_t points,
+[[nodiscard]] std::vector<PaperEllipsoid> initialPoints(const FitTarget& target, std::size_t points,
                                                         const KernelKind& kind, std::uint64_t seed);
 
 }  // namespace esvr::paper

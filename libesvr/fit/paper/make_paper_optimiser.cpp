@@ -1,5 +1,5 @@
-#include "fit/cuda/make_cuda_paper_optimiser.h"
 #include "fit/paper/cpu_paper_optimiser.h"
+#include "fit/paper/cuda/make_cuda_paper_optimiser.h"
 
 namespace esvr::paper {
 

@@ -8,21 +8,21 @@
 namespace esvr::paper {
 
 Field fieldOf(const Population& population, const KernelKind& kind, ExportFrame frame) {
-  std::vector<Primitive> primitives;
+  std::vector<Ellipsoid> ellipsoids;
   std::vector<double> kappas;
-  for (const PaperPrimitive& p : population.primitives) {
-    primitives.push_back(primitiveOf(p, kind));
+  for (const PaperEllipsoid& p : population.ellipsoids) {
+    ellipsoids.push_back(ellipsoidOf(p, kind));
     if (kind.learnK) kappas.push_back(p.k);
   }
   frame.kernel = kernelOf(kind);
   frame.kappas = kappas;
-  return exportField(primitives, frame);
+  return exportField(ellipsoids, frame);
 }
 
 void dropUnseen(Population& population, const KernelKind& kind, const Box& box) {
   std::vector<double> seen(population.size());
   tbb::parallel_for(std::size_t(0), seen.size(), [&](std::size_t i) {
-    seen[i] = coverageOf(population.primitives[i], {kind, box, 0.0}).voxels > 0.0 ? 1.0 : 0.0;
+    seen[i] = coverageOf(population.ellipsoids[i], {kind, box, 0.0}).voxels > 0.0 ? 1.0 : 0.0;
   });
   std::size_t count = 0;
   for (const double s : seen) count += s > 0.0 ? 1 : 0;

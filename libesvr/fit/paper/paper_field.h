@@ -1,9 +1,9 @@
 #pragma once
-/// From the paper's primitives to what files store.
+/// From the paper's ellipsoids to what files store.
 
 #include "esvr/ellipsoids.h"
 #include "fit/export_field.h"
-#include "fit/paper/paper_primitive.h"
+#include "fit/paper/paper_ellipsoid.h"
 
 namespace esvr::paper {
 
@@ -11,7 +11,7 @@ namespace esvr::paper {
 [[nodiscard]] Field fieldOf(const Population& population, const KernelKind& kind,
                             ExportFrame frame);
 
-/// Drops primitives that no voxel of a box sees. They cost bytes and change nothing.
+/// Drops ellipsoids that no voxel of a box sees. They cost bytes and change nothing.
 void dropUnseen(Population& population, const KernelKind& kind, const Box& box);
 
 }  // namespace esvr::paper

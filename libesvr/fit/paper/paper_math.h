@@ -1,10 +1,10 @@
 #pragma once
-/// One primitive's frame, gradient and step, for host and device.
+/// One ellipsoid's frame, gradient and step, for host and device.
 
 #include <cmath>
 
 #include "fit/adam.h"
-#include "fit/paper/paper_primitive.h"
+#include "fit/paper/paper_ellipsoid.h"
 #include "fit/parameter_gradient.h"
 
 namespace esvr::paper {
@@ -39,10 +39,10 @@ ESVR_HD inline Matrix3 rotationOf(const std::array<double, 4>& q) {
 }
 
 /// L = units S^-1 R^T: the same ellipsoid in the form that passes take.
-ESVR_HD inline Primitive primitiveOf(const PaperPrimitive& p, const KernelKind& kind) {
+ESVR_HD inline Ellipsoid ellipsoidOf(const PaperEllipsoid& p, const KernelKind& kind) {
   const Matrix3 R = rotationOf(normalised(p.rotation));
   const double units = kind.unitsPerScale(p.k);
-  Primitive unit{p.center, {}, p.intensity};
+  Ellipsoid unit{p.center, {}, p.intensity};
   for (int j = 0; j < 3; ++j) {
     const double inverse = units * std::exp(-p.logScale[j]);
     for (int i = 0; i < 3; ++i) unit.L[3 * j + i] = inverse * R[3 * i + j];
@@ -54,7 +54,7 @@ namespace paper_math {
 
 /// By the angles of a turn about the own axes: with W its generator, A = S^-1 W S changes L as
 /// exp(-A) L, of which the loss sees the symmetric part.
-ESVR_HD inline std::array<double, 3> byTurn(const PaperPrimitive& p, const ParameterVector& g) {
+ESVR_HD inline std::array<double, 3> byTurn(const PaperEllipsoid& p, const ParameterVector& g) {
   const auto skew = [&](int j, int k) {
     return 0.5 *
            (std::exp(p.logScale[k] - p.logScale[j]) - std::exp(p.logScale[j] - p.logScale[k]));
@@ -64,7 +64,7 @@ ESVR_HD inline std::array<double, 3> byTurn(const PaperPrimitive& p, const Param
 
 /// By a quaternion's components: a turn by t about own axis j adds t/2 (q e_j) to a unit
 /// quaternion.
-ESVR_HD inline std::array<double, 4> byQuaternion(const PaperPrimitive& p,
+ESVR_HD inline std::array<double, 4> byQuaternion(const PaperEllipsoid& p,
                                                   const std::array<double, 3>& turn) {
   const std::array<double, 4> q = normalised(p.rotation);
   const double w = q[0], x = q[1], y = q[2], z = q[3];
@@ -76,10 +76,10 @@ ESVR_HD inline std::array<double, 4> byQuaternion(const PaperPrimitive& p,
 
 }  // namespace paper_math
 
-/// From the gradient in the primitive's own frame (primitive.h) to that by the paper's parameters.
-/// \param unit  primitiveOf(p)
-ESVR_HD inline PaperVector byPaperParameters(const PaperPrimitive& p, const Primitive& unit,
-                                             const PrimitiveGradient& gradient) {
+/// From the gradient in the ellipsoid's own frame (ellipsoid.h) to that by the paper's parameters.
+/// \param unit  ellipsoidOf(p)
+ESVR_HD inline PaperVector byPaperParameters(const PaperEllipsoid& p, const Ellipsoid& unit,
+                                             const EllipsoidGradient& gradient) {
   const ParameterVector& g = gradient.byParameter;
   PaperVector out{};
   // center = F delta, so that d/d center = L^T d/d delta.
@@ -96,8 +96,8 @@ ESVR_HD inline PaperVector byPaperParameters(const PaperPrimitive& p, const Prim
 }
 
 /// Remembers the gradient's length and takes Adam's step.
-/// \param reached  the subvolume just visited holds voxels that the primitive reaches
-ESVR_HD inline void takeStep(PaperPrimitive& p, PaperState& state, const PaperVector& gradient,
+/// \param reached  the subvolume just visited holds voxels that the ellipsoid reaches
+ESVR_HD inline void takeStep(PaperEllipsoid& p, PaperState& state, const PaperVector& gradient,
                              bool reached, const PaperStep& step) {
   if (reached) {
     const double x = gradient[0], y = gradient[1], z = gradient[2];

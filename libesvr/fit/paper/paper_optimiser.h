@@ -26,7 +26,7 @@ struct PaperOptions {
 
 struct LossGradients {
   double loss = 0.0;
-  std::vector<PaperVector> byPrimitive;
+  std::vector<PaperVector> byEllipsoid;
 };
 
 class PaperOptimiser {
@@ -35,20 +35,20 @@ class PaperOptimiser {
 
   [[nodiscard]] virtual std::size_t subvolumeCount() const = 0;
 
-  /// Gradients of the loss over one subvolume, and a step of every primitive: those that it does
+  /// Gradients of the loss over one subvolume, and a step of every ellipsoid: those that it does
   /// not reach go on by their momentum.
   virtual void iterate(std::size_t subvolume, const PaperStep& step) = 0;
 
   /// What iterate() would step by.
   [[nodiscard]] virtual LossGradients gradients(std::size_t subvolume) = 0;
 
-  /// Takes over primitives as they are.
+  /// Takes over ellipsoids as they are.
   virtual void put(const Population& population) = 0;
   [[nodiscard]] virtual Population population() const = 0;
-  [[nodiscard]] virtual std::size_t primitiveCount() const = 0;
+  [[nodiscard]] virtual std::size_t ellipsoidCount() const = 0;
 
-  /// Over all subvolumes; a primitive beyond all of them counts for nothing.
-  /// \throws RuntimeFailure  a primitive is not finite
+  /// Over all subvolumes; an ellipsoid beyond all of them counts for nothing.
+  /// \throws RuntimeFailure  an ellipsoid is not finite
   [[nodiscard]] virtual FitErrors measure() = 0;
 
   /// Of the lists last built.

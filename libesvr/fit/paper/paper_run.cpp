@@ -47,7 +47,7 @@ class Epochs {
  private:
   void place() {
     Population population;
-    population.primitives =
+    population.ellipsoids =
         initialPoints(run_.target, run_.method.points, kindOf(run_.method), run_.options.seed);
     population.states.resize(population.size());
     record_.points = population.size();
@@ -111,7 +111,7 @@ class Epochs {
     const auto counts =
         densify(population, {.threshold = run_.method.gradientThreshold,
                              .splitAbove = run_.method.percentDense * unit_,
-                             .most = run_.method.most,
+                             .maxCount = run_.method.maxEllipsoids,
                              .seed = run_.options.seed ^ (std::uint64_t(epoch) << 32)});
     record_.cloned += counts.cloned;
     record_.split += counts.split;
@@ -130,7 +130,7 @@ class Epochs {
     PruneRecord note{pass.epoch, population.size()};
     note.psnrBoxBefore = recordPoint().psnrBox;
     if (run_.method.countHits) note.hitsBefore = hitsOf(population);
-    const auto scores = pruneScores(population.primitives, run_.method.score,
+    const auto scores = pruneScores(population.ellipsoids, run_.method.score,
                                     {kindOf(run_.method), space_.voxels(), kFloorShare * range_});
     keepHighest(population, scores, keptBy(pass, population.size()));
     optimiser_.put(population);
@@ -143,8 +143,8 @@ class Epochs {
     return averageHits(fieldOf(population, kindOf(run_.method), {}));
   }
 
-  const CurvePoint& recordPoint() {
-    return recorder_.record(optimiser_.measure(), optimiser_.primitiveCount(), record_.iterations);
+  const TimedCurvePoint& recordPoint() {
+    return recorder_.record(optimiser_.measure(), optimiser_.ellipsoidCount(), record_.iterations);
   }
 
   /// Looks at the clock after every epoch, and at the error now and then.
@@ -154,7 +154,7 @@ class Epochs {
     const bool timeUp = options.seconds && recorder_.seconds() >= *options.seconds;
     const bool due = epoch % std::max(1u, epochs / kCurvePoints) == 0 || epoch == epochs;
     if (!due && !timeUp) return std::nullopt;
-    const CurvePoint& now = recordPoint();
+    const TimedCurvePoint& now = recordPoint();
     recorder_.report(now, double(epoch) / epochs);
     if (options.psnr && now.psnrBox > *options.psnr) return FitEnd::kPsnrReached;
     if (timeUp) return FitEnd::kTimeUp;

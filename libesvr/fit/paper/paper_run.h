@@ -1,5 +1,5 @@
 #pragma once
-/// Epochs, densification and pruning: the paper's algorithm (appendix, 'Structure-aware primitive
+/// Epochs, densification and pruning: the paper's algorithm (appendix, 'Structure-aware ellipsoid
 /// learning').
 
 #include "esvr/paper_method.h"
@@ -12,7 +12,7 @@ namespace esvr::paper {
 struct PaperRun {
   const FitTarget& target;
   const PaperMethod& method;
-  const FitOptions& options;  ///< seed, psnr and seconds, at which it ends too
+  const CommonFitOptions& options;  ///< seed, and psnr and seconds, at which it ends too
 };
 
 [[nodiscard]] KernelKind kindOf(const PaperMethod& method);

@@ -12,7 +12,7 @@
 namespace esvr::paper {
 namespace {
 
-KernelConstants<double> constantsOf(const PaperPrimitive& p, const KernelKind& kind) {
+KernelConstants<double> constantsOf(const PaperEllipsoid& p, const KernelKind& kind) {
   const Kernel kernel = kernelOf(kind);
   return kernelConstants<double>(kernel, kind.learnK ? p.k : double(kernel.kappa));
 }
@@ -27,7 +27,7 @@ Box reachOf(const Support& s, const Box& box) {
   return reach;
 }
 
-double squaredAt(const Primitive& p, Coord v) {
+double squaredAt(const Ellipsoid& p, Coord v) {
   const double d[3] = {v.x - p.center[0], v.y - p.center[1], v.z - p.center[2]};
   double m = 0.0;
   for (int r = 0; r < 3; ++r) {
@@ -37,15 +37,15 @@ double squaredAt(const Primitive& p, Coord v) {
   return m;
 }
 
-double volumeOf(const PaperPrimitive& p) {
+double volumeOf(const PaperEllipsoid& p) {
   return std::exp(p.logScale[0] + p.logScale[1] + p.logScale[2]);
 }
 
 /// LightGaussian's gamma: volumes over that of the 90th percentile, at most 1, to the power 0.1.
-std::vector<double> volumeFactors(std::span<const PaperPrimitive> primitives) {
+std::vector<double> volumeFactors(std::span<const PaperEllipsoid> ellipsoids) {
   constexpr double kPercentile = 0.9, kPower = 0.1;
-  std::vector<double> volumes(primitives.size());
-  std::transform(primitives.begin(), primitives.end(), volumes.begin(), volumeOf);
+  std::vector<double> volumes(ellipsoids.size());
+  std::transform(ellipsoids.begin(), ellipsoids.end(), volumes.begin(), volumeOf);
   if (volumes.empty()) return volumes;
   std::vector<double> sorted = volumes;
   const auto at = sorted.begin() + std::ptrdiff_t(kPercentile * double(sorted.size() - 1));
@@ -54,7 +54,7 @@ std::vector<double> volumeFactors(std::span<const PaperPrimitive> primitives) {
   return volumes;
 }
 
-double scoreOf(const PaperPrimitive& p, PruneScore score, const CoverageOptions& options) {
+double scoreOf(const PaperEllipsoid& p, PruneScore score, const CoverageOptions& options) {
   const double fa = fractionalAnisotropy(p.logScale);
   if (score == PruneScore::kOnlyFa) return fa;
   const Coverage coverage = coverageOf(p, options);
@@ -74,9 +74,9 @@ double fractionalAnisotropy(const std::array<double, 3>& logScale) {
   return std::sqrt(0.5 * between / (a * a + b * b + c * c));
 }
 
-Coverage coverageOf(const PaperPrimitive& primitive, const CoverageOptions& options) {
-  const Primitive p = primitiveOf(primitive, options.kind);
-  const auto kernel = constantsOf(primitive, options.kind);
+Coverage coverageOf(const PaperEllipsoid& ellipsoid, const CoverageOptions& options) {
+  const Ellipsoid p = ellipsoidOf(ellipsoid, options.kind);
+  const auto kernel = constantsOf(ellipsoid, options.kind);
   const double height = std::abs(p.intensity);
   const Box reach = reachOf(makeSupport(p.center, p.L, supportRadius(kernel), 0.0), options.box);
   Coverage coverage;
@@ -92,13 +92,13 @@ Coverage coverageOf(const PaperPrimitive& primitive, const CoverageOptions& opti
   return coverage;
 }
 
-std::vector<double> pruneScores(std::span<const PaperPrimitive> primitives, PruneScore score,
+std::vector<double> pruneScores(std::span<const PaperEllipsoid> ellipsoids, PruneScore score,
                                 const CoverageOptions& options) {
-  std::vector<double> scores(primitives.size());
+  std::vector<double> scores(ellipsoids.size());
   tbb::parallel_for(std::size_t(0), scores.size(),
-                    [&](std::size_t i) { scores[i] = scoreOf(primitives[i], score, options); });
+                    [&](std::size_t i) { scores[i] = scoreOf(ellipsoids[i], score, options); });
   if (score != PruneScore::kContribution) return scores;
-  const auto factors = volumeFactors(primitives);
+  const auto factors = volumeFactors(ellipsoids);
   for (std::size_t i = 0; i < scores.size(); ++i) scores[i] *= factors[i];
   return scores;
 }
@@ -112,10 +112,10 @@ void keepHighest(Population& population, std::span<const double> scores, std::si
   order.resize(keep);
   std::sort(order.begin(), order.end());
   for (std::size_t n = 0; n < keep; ++n) {
-    population.primitives[n] = population.primitives[order[n]];
+    population.ellipsoids[n] = population.ellipsoids[order[n]];
     population.states[n] = population.states[order[n]];
   }
-  population.primitives.resize(keep);
+  population.ellipsoids.resize(keep);
   population.states.resize(keep);
 }
 

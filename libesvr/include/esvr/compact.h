@@ -25,7 +25,7 @@ struct CompactOptions {
 };
 
 struct CompactResult {
-  EncodedGrid grid;  ///< `quantised` is set, its field is what a reader gets
+  StoredGrid grid;  ///< `quantised` is set, its field is what a reader gets
   QuantiserSteps steps;
   double loss = 0.0;        ///< dB; below 0 where solving for the intensities gained more
   std::uint64_t bytes = 0;  ///< of the ellipsoids
@@ -33,9 +33,9 @@ struct CompactResult {
 
 /// Deterministic; devices round differently, and may come to other bits. Where the PSNR or the size
 /// asked for is out of reach, the result is as near as rounding comes.
-/// \param grid  as encodeGrid made it from `source`; without kappas of each ellipsoid
+/// \param grid  as makeStoredGrid made it from `source`; without kappas of each ellipsoid
 /// \throws RuntimeFailure  ellipsoids that no lattice holds; DeviceError  the GPU cannot be used
-[[nodiscard]] CompactResult compactGrid(const EncodedGrid& grid, const SparseVolume& source,
+[[nodiscard]] CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                                         const CompactOptions& options = {});
 
 }  // namespace esvr

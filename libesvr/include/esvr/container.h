@@ -39,7 +39,7 @@ struct LayerError {
 };
 
 /// One grid of a file.
-struct EncodedGrid {
+struct StoredGrid {
   GridDescriptor descriptor;
   Field field;
   TopologyKind topology = TopologyKind::kThreshold;
@@ -67,21 +67,21 @@ struct EncodedGrid {
 struct StreamBytes {
   std::uint64_t positions = 0, scales = 0, rotations = 0, intensities = 0;
 };
-[[nodiscard]] StreamBytes streamBytes(const EncodedGrid& grid);
+[[nodiscard]] StreamBytes streamBytes(const StoredGrid& grid);
 
 /// Importance layers of a grid: the most that a chunk of it has, 1 where nothing is layered, 0
 /// without ellipsoids.
-[[nodiscard]] std::size_t layerCount(const EncodedGrid& grid);
+[[nodiscard]] std::size_t layerCount(const StoredGrid& grid);
 
 /// What each layer adds to a grid whose ellipsoids are quantised; nothing where they are not.
 struct LayerSize {
   std::uint64_t ellipsoids = 0, bytes = 0;
 };
-[[nodiscard]] std::vector<LayerSize> layerSizes(const EncodedGrid& grid);
+[[nodiscard]] std::vector<LayerSize> layerSizes(const StoredGrid& grid);
 
 struct EsvrFile {
   std::vector<MetaItem> metadata;  ///< the source's file-level metadata, verbatim
-  std::vector<EncodedGrid> grids;
+  std::vector<StoredGrid> grids;
 };
 
 struct ContainerWriteOptions {
@@ -121,6 +121,10 @@ struct PartOfFile {
 /// \throws BadInput  as readEsvr
 [[nodiscard]] PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part);
 
+/// Bytes that a grid adds to a file: its sections, their alignment and its rows of the section table.
+/// \throws RuntimeFailure  as encodeEsvr
+[[nodiscard]] std::uint64_t bytesAdded(const StoredGrid& grid);
+
 /// The same from and to memory. The same content gives the same bytes. A chunk's ellipsoids are
 /// stored in Morton order of their centers: what comes back is that order, bit for bit the same
 /// ellipsoids.
@@ -135,7 +139,7 @@ struct PartOfFile {
 /// A row of a file's section table, for --list.
 struct SectionSummary {
   std::string
-      kind;  ///< "grid", "primitives", ...; "unknown 0x...." where this reader does not know it
+      kind;  ///< "grid", "ellipsoids", ...; "unknown 0x...." where this reader does not know it
   std::string codec;       ///< "raw", "blosc"
   std::uint32_t grid = 0;  ///< grid it belongs to, or 0xffffffff for the file
   std::uint64_t storedBytes = 0, rawBytes = 0;

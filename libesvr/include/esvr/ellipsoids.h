@@ -22,7 +22,7 @@ struct Ellipsoids {
   std::vector<float> kappa;  ///< edge of each ellipsoid; empty where one serves all
 
   [[nodiscard]] std::size_t size() const { return intensity.size(); }
-  void resize(std::size_t n, bool perPrimitiveKappa = false);
+  void resize(std::size_t n, bool perEllipsoidKappa = false);
   friend bool operator==(const Ellipsoids&, const Ellipsoids&) = default;
 };
 
@@ -47,7 +47,7 @@ struct Field {
   Kernel kernel;  ///< the scene's kernel; its kappa where `Ellipsoids::kappa` is empty
   std::vector<Chunk> chunks;
 
-  [[nodiscard]] std::size_t primitiveCount() const;
+  [[nodiscard]] std::size_t ellipsoidCount() const;
 };
 
 }  // namespace esvr

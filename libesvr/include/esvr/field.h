@@ -1,5 +1,5 @@
 #pragma once
-/// Evaluates a Field on bricks. Primitives are gathered in their order in the field, brick by
+/// Evaluates a Field on bricks. Ellipsoids are gathered in their order in the field, brick by
 /// brick, so a result is the same bits for any number of threads (the calling TBB arena's).
 
 #include <cstdint>
@@ -24,18 +24,18 @@ namespace esvr {
 /// \param out      kBrickVoxels a brick, in voxelOffset order
 void evaluateBricks(const Field& field, std::span<const Coord> corners, std::span<float> out);
 
-struct PrimitiveHits {
+struct EllipsoidHits {
   std::uint64_t pairs = 0;   ///< of an ellipsoid and a voxel that its support holds
   std::uint64_t voxels = 0;  ///< that any support holds
 };
 /// \param corners  index corners of the bricks whose voxels count, multiples of 8
-[[nodiscard]] PrimitiveHits countHits(const Field& field, std::span<const Coord> corners);
+[[nodiscard]] EllipsoidHits countHits(const Field& field, std::span<const Coord> corners);
 
 /// Average number of ellipsoids whose support holds a voxel, over the voxels that any does (the
-/// paper's 'average primitive hits'); 0 where there are none.
+/// paper's 'average ellipsoid hits'); 0 where there are none.
 [[nodiscard]] double averageHits(const Field& field);
 
-/// The same as evaluateBricks in float64 by the definition: sums every primitive at every voxel.
+/// The same as evaluateBricks in float64 by the definition: sums every ellipsoid at every voxel.
 /// For tests and checks.
 [[nodiscard]] double evaluateReference(const Field& field, Coord voxel);
 

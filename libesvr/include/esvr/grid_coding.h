@@ -21,21 +21,22 @@ namespace esvr {
 ///  is
 ///    asked for (`activity`), the source's mask.
 /// The curve is left empty.
-[[nodiscard]] EncodedGrid encodeGrid(const GridDescriptor& descriptor, const SparseVolume& source,
-                                     Field field, Activity activity = Activity::kByValue);
+[[nodiscard]] StoredGrid makeStoredGrid(const GridDescriptor& descriptor,
+                                        const SparseVolume& source, Field field,
+                                        Activity activity = Activity::kByValue);
 
-/// True for a level set with a half width that none of its active voxels exceeds: what encodeGrid
+/// True for a level set with a half width that none of its active voxels exceeds: what makeStoredGrid
 /// stores as a narrow band, and FitOptions::narrowBand is meant for. A level set that is active
 /// beyond its half width, or has none, is fitted and stored like any other grid.
 [[nodiscard]] bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source);
 
 /// A grid that holds its voxels and no ellipsoids. \param layer  of `source` (voxel_layer.h)
-[[nodiscard]] EncodedGrid encodeVoxels(const GridDescriptor& descriptor, const SparseVolume& source,
-                                       VoxelLayer layer);
+[[nodiscard]] StoredGrid makeStoredVoxels(const GridDescriptor& descriptor,
+                                          const SparseVolume& source, VoxelLayer layer);
 
 /// By what rule decodeGrid() makes voxels of the sum: the grid's threshold, range and band, without
 /// its bricks, mask and residual.
-[[nodiscard]] RevoxeliseOptions voxelRule(const EncodedGrid& grid);
+[[nodiscard]] RevoxeliseOptions voxelRule(const StoredGrid& grid);
 
 struct DecodeOptions {
   std::optional<float> threshold{};  ///< instead of the grid's own; 0 or above
@@ -44,6 +45,6 @@ struct DecodeOptions {
 };
 
 /// The voxels that a file gives back. \throws UsageError  threshold negative or not finite
-[[nodiscard]] SparseVolume decodeGrid(const EncodedGrid& grid, const DecodeOptions& options = {});
+[[nodiscard]] SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options = {});
 
 }  // namespace esvr

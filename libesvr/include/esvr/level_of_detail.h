@@ -8,12 +8,12 @@
 namespace esvr {
 
 /// The grid of its first importance layers, without a residual; itself where it has no more.
-[[nodiscard]] EncodedGrid firstLayers(EncodedGrid grid, std::size_t layers);
+[[nodiscard]] StoredGrid firstLayers(StoredGrid grid, std::size_t layers);
 
 /// The grid of its `count` heaviest ellipsoids, in their order; itself where it has no more. The
 /// weight is |I| sqrt(s1 s2 s3), the root of the sum of squares over voxels up to a factor that all
 /// ellipsoids of a kappa share. Fewer than all are no longer quantised, have no layers and no
 /// residual.
-[[nodiscard]] EncodedGrid heaviest(EncodedGrid grid, std::size_t count);
+[[nodiscard]] StoredGrid heaviest(StoredGrid grid, std::size_t count);
 
 }  // namespace esvr

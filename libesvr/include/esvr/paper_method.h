@@ -1,9 +1,9 @@
 #pragma once
-/// The paper's own method (section 3.2, appendix 'Structure-aware Primitive Learning' and 'Training
+/// The paper's own method (section 3.2, appendix 'Structure-aware Ellipsoid Learning' and 'Training
 /// Implementation Details'), for comparison with it. Not the default: fit.h chooses better.
 ///
 /// L1 + D-SSIM by Adam on position, scales, rotation and intensity; subvolumes one after the other,
-/// an epoch being a round of all; primitives with large gradients are cloned or split while it goes
+/// an epoch being a round of all; ellipsoids with large gradients are cloned or split while it goes
 /// up, and the ones of least score removed once or a few times. Every part can be switched, so that
 /// the paper's ablations can be rerun.
 ///
@@ -17,9 +17,12 @@
 #include <optional>
 #include <vector>
 
+#include "esvr/fit.h"
+#include "esvr/sparse_volume.h"
+
 namespace esvr {
 
-/// What pruning ranks primitives by. Omega are the voxels of the volume where |I| phi is at least a
+/// What pruning ranks ellipsoids by. Omega are the voxels of the volume where |I| phi is at least a
 /// 255th of the range of values, FA the fractional anisotropy of Sigma.
 enum class PruneScore {
   kFull,         ///< |Omega| |I| FA (eq. score)
@@ -30,7 +33,7 @@ enum class PruneScore {
 
 struct PrunePass {
   std::uint32_t epoch;  ///< after which it comes
-  double share;         ///< of the primitives, removed
+  double share;         ///< of the ellipsoids, removed
 };
 
 /// First learning rates; all decay to a tenth over the run. The paper has none.
@@ -42,9 +45,10 @@ struct PaperRates {
   double k = 1e-2;
 };
 
-/// Defaults: the paper's for small and medium volumes.
+/// The defaults are the paper's for small and medium volumes.
 struct PaperMethod {
   bool gaussian = false;         ///< Gaussians of 3 sigma in the place of ellipsoids
+  double beta = 0.2;             ///< share of L1 in the loss; the rest is D-SSIM (eq. 7)
   double k = 5.0;                ///< sharpness of the ellipsoids
   bool learnK = false;           ///< k of each ellipsoid is learned, beginning there
   std::size_t points = 100'000;  ///< at the start, on voxels that differ from the background
@@ -56,19 +60,19 @@ struct PaperMethod {
   bool densify = true;
   std::uint32_t densifyFrom = 16, densifyUntil = 400, densifyEvery = 4;  ///< epochs
   /// Mean length of the loss's derivative by position, in units of half the longest axis, from
-  /// which a primitive is cloned or split. The paper's 2.5e-9 is in units that it does not give:
-  /// here nearly all primitives exceed it. With this one Aneurysm's number stays about that of the
+  /// which an ellipsoid is cloned or split. The paper's 2.5e-9 is in units that it does not give:
+  /// here nearly all ellipsoids exceed it. With this one Aneurysm's number stays about that of the
   /// points, as in the paper.
   double gradientThreshold = 1e-3;
-  double percentDense = 0.008;   ///< of half the longest axis: larger scales are split
-  std::size_t most = 1'000'000;  ///< primitives: no more are added
+  double percentDense = 0.008;            ///< of half the longest axis: larger scales are split
+  std::size_t maxEllipsoids = 1'000'000;  ///< ellipsoids: no more are added
 
   PruneScore score = PruneScore::kFull;
   std::vector<PrunePass> prunes = {{1200, 0.66}};
   std::optional<std::size_t> keep;  ///< the last pass leaves so many, whatever its share
 
   PaperRates rates;
-  bool countHits = false;  ///< average numbers of primitives a voxel before each pruning
+  bool countHits = false;  ///< average numbers of ellipsoids a voxel before each pruning
 };
 
 /// The same run in fewer or more epochs: all that is said in epochs is scaled.
@@ -80,9 +84,9 @@ struct PaperMethod {
 /// What a pruning pass did.
 struct PruneRecord {
   std::uint32_t epoch = 0;
-  std::size_t before = 0, after = 0;               ///< primitives
+  std::size_t before = 0, after = 0;               ///< ellipsoids
   double psnrBoxBefore = 0.0, psnrBoxAfter = 0.0;  ///< dB over the box, of the sum
-  double hitsBefore = 0.0;                         ///< average primitives a voxel; 0: not counted
+  double hitsBefore = 0.0;                         ///< average ellipsoids a voxel; 0: not counted
 };
 
 /// What a run did.
@@ -95,5 +99,20 @@ struct PaperRecord {
   double firstGradient = 0.0;  ///< median of what gradientThreshold was first compared with
   std::vector<PruneRecord> prunes;
 };
+
+/// The options of a fit by the paper's method. `count` is the number that the last pruning pass
+/// leaves; without pruning, the number up to which ellipsoids are added.
+struct PaperFitOptions : CommonFitOptions {
+  PaperMethod method;
+};
+
+struct PaperFitResult {
+  FitResult fit;
+  PaperRecord record;
+};
+
+/// Fits by the paper's method, on the CPU or a GPU. Deterministic as fit() is.
+/// \throws UsageError  a method that makes no sense; else as fit
+[[nodiscard]] PaperFitResult fitByPaper(const SparseVolume& volume, const PaperFitOptions& options);
 
 }  // namespace esvr

@@ -57,7 +57,7 @@ struct RenderOptions {
   const CancelToken* cancel = nullptr;  ///< looked at before each row of tiles
 };
 
-/// Draws the sum of ellipsoids without keeping voxels of it (paper, section "Per-primitive ray
+/// Draws the sum of ellipsoids without keeping voxels of it (paper, section "Per-ellipsoid ray
 /// sampling", algorithm 2), by tiles of pixels and bins of samples. Between::kSum: each ellipsoid
 /// adds to those samples of each ray that lie in its support, found by solving for entry and exit.
 /// Between::kVoxels: each adds to those voxels of its support that a tile's samples in a bin lie

@@ -15,8 +15,8 @@ struct alignas(16) Staged {
   std::uint32_t unused;
   RayForm form;
 };
-static_assert(sizeof(Staged) == sizeof(PrimitiveView) &&
-                  offsetof(Staged, form) == offsetof(PrimitiveView, form),
+static_assert(sizeof(Staged) == sizeof(EllipsoidView) &&
+                  offsetof(Staged, form) == offsetof(EllipsoidView, form),
               "staged in place of what was read");
 
 /// The groups share a list's ellipsoids among them.
@@ -197,7 +197,7 @@ __device__ void addBin(const SumArguments& a, Shared& s, const Place& place, con
 
 /// What the rule makes of each sum, by all threads: a warp takes whole samples, so that it alone
 /// overwrites what it has read.
-__device__ void classify(const DrawArguments& a, Shared& s) {
+__device__ void classify(const SamplingArguments& a, Shared& s) {
   const int warp = int(threadIdx.x) / kWarp, lane = int(threadIdx.x) % kWarp;
   for (int sample = warp; sample < kBinSamples; sample += kWarps) {
     if ((s.touched >> sample & 1u) == 0) continue;
@@ -216,7 +216,7 @@ __device__ void classify(const DrawArguments& a, Shared& s) {
 }
 
 /// By the threads of the first group; leaves the sums zero.
-__device__ void composite(const DrawArguments& a, Shared& s, const Place& place,
+__device__ void composite(const SamplingArguments& a, Shared& s, const Place& place,
                           const SumWork& work, float firstSample, RayState& ray) {
   if (place.group == 0) {
     const float toEye = float(a.frame.firstBin) * kBinSamples;

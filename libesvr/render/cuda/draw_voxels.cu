@@ -1,12 +1,12 @@
 #include "render/cuda/draw_work.cuh"
-#include "render/lattice_window.h"
+#include "render/voxel_window.h"
 
 namespace esvr::cuda {
 namespace {
 
 constexpr int kLanes = DrawTuning::kLanesOfForm, kTeams = kThreads / kLanes;
 /// A block that is split leaves one behind; each side is halved three times, samples five.
-constexpr int kMostBlocks = 12;
+constexpr int kMaxBlocks = 12;
 static_assert(kSide == 8 && kBinSamples == 32 && DrawTuning::kWindowSlabs <= 64);
 
 /// Samples of a rectangle of a tile's rays: pixels from the tile's first, samples from the bin's.
@@ -26,8 +26,8 @@ struct Reach {
 struct Pass {
   Block block;
   const RayBundle* bundle;
-  LatticeWindow window;
-  LatticeOrigin origin;
+  VoxelWindow window;
+  WindowOrigin origin;
 };
 
 /// Its first pixel.
@@ -43,12 +43,12 @@ struct Shared : WorkShared {
   /// Of the window's voxels first sums, in units so fine that the sum of all intensities just fits:
   /// sums of whole numbers have no order. Then what voxels they are, as float.
   int values[DrawTuning::kWindowVoxels];
-  LatticeSlab slabs[DrawTuning::kWindowSlabs];
+  WindowSlab slabs[DrawTuning::kWindowSlabs];
   SampledRay rays[kRays];
   RayState behind[kGroups - 1][kRays];  ///< of the groups but the first
   unsigned long long filled;            ///< a bit a slab that something was added to
   RayBundle ofTile, ofBlock;
-  Block blocks[kMostBlocks];  ///< that are left, the next one last
+  Block blocks[kMaxBlocks];  ///< that are left, the next one last
   int left;
   Reach reach;
   Pass pass;
@@ -58,7 +58,7 @@ __device__ void layRay(const VoxelArguments& a, Shared& s, const Place& place, c
   const View& view = a.draw.frame.view;
   const double x = view.planeX(work.firstColumn + place.column);
   const double y = view.planeY(work.firstRow + place.row);
-  s.rays[place.ray] = {lattice_window::originOf(view, x, y),
+  s.rays[place.ray] = {voxel_window::originOf(view, x, y),
                        scaled(view.directionAt(x, y), a.draw.frame.step / view.unitAlong(x, y))};
 }
 
@@ -134,7 +134,7 @@ __device__ void laySlab(Shared& s, int slab) {
 
 /// Empties the window and says where its slabs lie.
 __device__ void layOut(Shared& s) {
-  const LatticeWindow& w = s.pass.window;
+  const VoxelWindow& w = s.pass.window;
   for (int i = int(threadIdx.x); i < w.voxels(); i += kThreads) s.values[i] = 0;
   if (int(threadIdx.x) < w.slabs) laySlab(s, int(threadIdx.x));
   if (threadIdx.x == 0) s.filled = 0;
@@ -146,23 +146,23 @@ struct Units {
   float ofOne, one;
 };
 __device__ Units unitsFor(float bound, std::uint32_t n) {
-  constexpr int kBits = 21, kBitsOfSum = 29, kMost = 126;
+  constexpr int kBits = 21, kBitsOfSum = 29, kMaxExponent = 126;
   const int e = min(kBits - ilogbf(bound), kBitsOfSum - ilogbf(bound * float(n)));
-  const int within = max(-kMost, min(kMost, e));
+  const int within = max(-kMaxExponent, min(kMaxExponent, e));
   return {ldexpf(1.0f, within), ldexpf(1.0f, -within)};
 }
 
 /// An ellipsoid in the window, its values in units, for the threads of a team.
 struct Placed {
-  LatticeKernel kernel;
-  LatticeOrder order;
-  LatticePlace center;
+  WindowKernel kernel;
+  WindowOrder order;
+  WindowPlace center;
 };
 
 __device__ Placed placedIn(const VoxelArguments& a, const Pass& pass, std::uint32_t id,
                            float unitsOfOne) {
-  const LatticeForm& f = a.forms[id];
-  const LatticeAxes axes = pass.window.axes;
+  const WindowForm& f = a.forms[id];
+  const WindowAxes axes = pass.window.axes;
   const Vec3& origin = a.origins[f.chunk];
   Placed p{f.kernel,
            f.order[axes.slab],
@@ -175,7 +175,7 @@ __device__ Placed placedIn(const VoxelArguments& a, const Pass& pass, std::uint3
 
 /// The values of a run that is long, to `values` from its first on. Its exponentials are each the
 /// one before times a factor, and the factors likewise: after 12 of them some 5e-6 off.
-__device__ void addLongRun(const LatticeKernel& k, const LatticeRun& run, int* values) {
+__device__ void addLongRun(const WindowKernel& k, const WindowRun& run, int* values) {
   const float t = float(run.first) - run.middle;
   float y = exp2f(run.nearest + run.speed * t * t);
   float factor = exp2f(run.speed * (2.0f * t + 1.0f));
@@ -189,14 +189,14 @@ __device__ void addLongRun(const LatticeKernel& k, const LatticeRun& run, int* v
 /// \return true where the support has voxels there
 __device__ bool addRow(Shared& s, const Placed& p, int slab, int row) {
   constexpr int kLong = 5;  // and so wide a support that nothing overflows
-  constexpr float kMostCutoff = 60.0f;
-  const LatticeSlab at = s.slabs[slab];
+  constexpr float kMaxCutoff = 60.0f;
+  const WindowSlab at = s.slabs[slab];
   const int columns = s.pass.window.columns;
-  const LatticeRun run = runOn(p.kernel, p.order,
-                               {float(slab) - p.center.slab, float(row) - p.center.row,
-                                p.center.column, at.column, at.column + columns - 1});
+  const WindowRun run = runOn(p.kernel, p.order,
+                              {float(slab) - p.center.slab, float(row) - p.center.row,
+                               p.center.column, at.column, at.column + columns - 1});
   int* const values = &s.values[0] + (at.start + row * columns);
-  if (run.last - run.first + 1 >= kLong && p.kernel.cutoff < kMostCutoff)
+  if (run.last - run.first + 1 >= kLong && p.kernel.cutoff < kMaxCutoff)
     addLongRun(p.kernel, run, values);
   else
     for (int c = run.first; c <= run.last; ++c)
@@ -206,13 +206,13 @@ __device__ bool addRow(Shared& s, const Placed& p, int slab, int row) {
 
 /// The rows of voxels that a support meets, slab by slab, a lane each.
 __device__ void addForm(Shared& s, const Placed& p, int lane) {
-  const LatticeWindow& w = s.pass.window;
+  const VoxelWindow& w = s.pass.window;
   const WholeRange slabs =
       wholeWithin(p.center.slab - p.order.slabs, p.center.slab + p.order.slabs, {0, w.slabs - 1});
   unsigned long long filled = 0;
   for (int slab = slabs.first; slab <= slabs.last; ++slab) {
     const int first = s.slabs[slab].row;
-    const LatticeExtent at = rowsOf(p.kernel, p.order, float(slab) - p.center.slab);
+    const WindowExtent at = rowsOf(p.kernel, p.order, float(slab) - p.center.slab);
     const WholeRange rows =
         wholeWithin(p.center.row + at.low, p.center.row + at.high, {first, first + w.rows - 1});
     for (int row = rows.first + lane; row <= rows.last; row += kLanes)
@@ -223,7 +223,7 @@ __device__ void addForm(Shared& s, const Placed& p, int lane) {
 
 /// What revoxelise() makes of the sums, near slabs that have any.
 __device__ void finishVoxels(const VoxelArguments& a, Shared& s, float one) {
-  const LatticeWindow& w = s.pass.window;
+  const VoxelWindow& w = s.pass.window;
   const unsigned long long near = s.filled | s.filled << 1 | s.filled >> 1;
   const int ofSlab = w.rows * w.columns, lane = int(threadIdx.x) % kWarp;
   const float background = a.draw.rule.background;
@@ -240,13 +240,13 @@ __device__ void finishVoxels(const VoxelArguments& a, Shared& s, float one) {
 __device__ float along(const Vec3& v, int axis) {
   return float(axis == 0 ? v[0] : (axis == 1 ? v[1] : v[2]));
 }
-__device__ LatticePlace inAxes(const Vec3& v, const LatticeAxes& axes) {
+__device__ WindowPlace inAxes(const Vec3& v, const WindowAxes& axes) {
   return {along(v, axes.slab), along(v, axes.row), along(v, axes.column)};
 }
 
 /// The first sample of the block on the thread's ray, from the window's first voxel.
-__device__ LatticePlace firstPlace(const Pass& pass, const SampledRay& ray, double binSample) {
-  const LatticeAxes& axes = pass.window.axes;
+__device__ WindowPlace firstPlace(const Pass& pass, const SampledRay& ray, double binSample) {
+  const WindowAxes& axes = pass.window.axes;
   Vec3 corner;
   for (int i = 0; i < 3; ++i)
     corner[i] =
@@ -280,16 +280,16 @@ __device__ void addSamples(const VoxelArguments& a, const Shared& s, const Place
   const Pass& pass = s.pass;
   const Share share = shareOf(a, pass, place);
   const double toFrame = double(a.draw.frame.firstBin) * kBinSamples;
-  const LatticePlace first =
+  const WindowPlace first =
       firstPlace(pass, s.rays[place.ray], toFrame + double(bin) * kBinSamples);
-  const LatticePlace apart = inAxes(s.rays[place.ray].apart, pass.window.axes);
+  const WindowPlace apart = inAxes(s.rays[place.ray].apart, pass.window.axes);
   const auto* const values = reinterpret_cast<const float*>(s.values);
   const unsigned long long filled = s.filled, near = filled | filled >> 1;
   const float ofBin = float(bin * kBinSamples + pass.block.firstSample);
   for (int i = share.first; i < share.end && rule.open(ray); ++i) {
     const float n = float(i);
-    const LatticePlace p{first.slab + n * apart.slab, first.row + n * apart.row,
-                         first.column + n * apart.column};
+    const WindowPlace p{first.slab + n * apart.slab, first.row + n * apart.row,
+                        first.column + n * apart.column};
     const float number = ofBin + n;
     if ((near >> wholeBelow(p.slab) & 1u) == 0) continue;
     if (!(number >= work.firstSample && number <= work.lastSample)) continue;
@@ -328,8 +328,8 @@ __device__ void addList(const VoxelArguments& a, Shared& s, const std::uint32_t*
 /// What a list's ellipsoids reach, into s.reach.
 __device__ void findReach(const VoxelArguments& a, Shared& s, const std::uint32_t* ids,
                           std::uint32_t n) {
-  constexpr int kMost = 0x7fffffff;
-  if (threadIdx.x == 0) s.reach = {kMost, -1, kMost, -1, kMost, 0};
+  constexpr int kMaxInt = 0x7fffffff;
+  if (threadIdx.x == 0) s.reach = {kMaxInt, -1, kMaxInt, -1, kMaxInt, 0};
   __syncthreads();
   for (std::uint32_t i = threadIdx.x; i < n; i += kThreads) {
     const Footprint& f = a.footprints[ids[i]];
@@ -351,10 +351,10 @@ __device__ Block reachedBlock(const TileFrame& frame, const Shared& s, const Til
   const Reach& r = s.reach;
   const int column = max(r.firstColumn - tile.column, 0), row = max(r.firstRow - tile.row, 0);
   const UnitRange& unit = s.ofTile.unit;
-  const double nearest = floor(double(__int_as_float(r.nearest)) * unit.least / frame.step);
-  const double farthest = ceil(double(__int_as_float(r.farthest)) * unit.most / frame.step);
-  const int first = int(primitive_math::clampedTo(nearest - binSample, 0.0, kBinSamples));
-  const int last = int(primitive_math::clampedTo(farthest - binSample, -1.0, kBinSamples - 1));
+  const double nearest = floor(double(__int_as_float(r.nearest)) * unit.min / frame.step);
+  const double farthest = ceil(double(__int_as_float(r.farthest)) * unit.max / frame.step);
+  const int first = int(ellipsoid_math::clampedTo(nearest - binSample, 0.0, kBinSamples));
+  const int last = int(ellipsoid_math::clampedTo(farthest - binSample, -1.0, kBinSamples - 1));
   return {column,
           row,
           min(r.lastColumn - tile.column, whole.columns - 1) - column + 1,
@@ -407,7 +407,7 @@ __device__ void drawBin(const VoxelArguments& a, Shared& s, const Place& place, 
 }
 
 __global__ void __launch_bounds__(kThreads, DrawTuning::kBlocksPerMultiprocessor)
-    drawVoxelsKernel(const __grid_constant__ VoxelArguments a) {
+    sampleVoxelsKernel(const __grid_constant__ VoxelArguments a) {
   extern __shared__ float4 memory[];
   Shared& s = *reinterpret_cast<Shared*>(memory);
   if (!listsFit(*a.draw.lists.counters, a.draw.lists, a.draw.frame.between)) return;
@@ -425,7 +425,7 @@ __global__ void __launch_bounds__(kThreads, DrawTuning::kBlocksPerMultiprocessor
 }  // namespace
 
 void launchDrawVoxels(const VoxelArguments& arguments, int multiprocessors, cudaStream_t stream) {
-  launchOverTiles(drawVoxelsKernel, arguments, sizeof(Shared),
+  launchOverTiles(sampleVoxelsKernel, arguments, sizeof(Shared),
                   multiprocessors * DrawTuning::kBlocksPerMultiprocessor, stream);
 }
 

@@ -43,7 +43,7 @@ struct Work {
   float firstSample, lastSample;
 };
 
-__device__ inline void clipTo(const DrawArguments& a, const Place& place, Work& w) {
+__device__ inline void clipTo(const SamplingArguments& a, const Place& place, Work& w) {
   w.firstSample = 0.0f, w.lastSample = float(a.frame.bins) * kBinSamples;
   if (!a.clip.given) return;
   const Ray ray = a.frame.view.ray(w.firstColumn + place.column, w.firstRow + place.row);
@@ -52,7 +52,7 @@ __device__ inline void clipTo(const DrawArguments& a, const Place& place, Work& 
   w.firstSample = float(range.first - first), w.lastSample = float(range.last - first);
 }
 
-__device__ inline Work workOf(const DrawArguments& a, std::uint32_t tile, const Place& place) {
+__device__ inline Work workOf(const SamplingArguments& a, std::uint32_t tile, const Place& place) {
   const TileFrame& frame = a.frame;
   Work w;
   w.firstColumn = int(tile) % frame.tileColumns * kSide;
@@ -68,7 +68,7 @@ __device__ inline bool isOpen(const WorkShared& s, const Place& place) {
 }
 __device__ inline bool anyOpen(const WorkShared& s) { return (s.openRays[0] | s.openRays[1]) != 0; }
 
-__device__ inline void writePixel(const DrawArguments& a, const Place& place, const Work& work,
+__device__ inline void writePixel(const SamplingArguments& a, const Place& place, const Work& work,
                                   const RayState& ray) {
   if (!work.inPicture || place.group != 0) return;
   const int row = work.firstRow + place.row - a.frame.firstTileRow * kSide;
@@ -85,8 +85,8 @@ __device__ inline RayState loadResult(const RayState* results, std::uint32_t res
 }
 
 /// Whoever finishes a tile's last part puts them over each other.
-__device__ inline void joinParts(const DrawArguments& a, const TilePart& item, const Place& place,
-                                 const Work& work) {
+__device__ inline void joinParts(const SamplingArguments& a, const TilePart& item,
+                                 const Place& place, const Work& work) {
   if (place.group != 0) return;
   const std::uint32_t* const resultOf = &a.lists.resultOf[std::size_t(item.tile) * a.frame.parts];
   RayState ray;
@@ -97,7 +97,7 @@ __device__ inline void joinParts(const DrawArguments& a, const TilePart& item, c
 }
 
 /// \return true in all threads where the other parts of the tile are done, and visible
-__device__ inline bool storeResult(const DrawArguments& a, WorkShared& s, const TilePart& item,
+__device__ inline bool storeResult(const SamplingArguments& a, WorkShared& s, const TilePart& item,
                                    const Place& place, const RayState& ray) {
   const std::uint32_t result = a.lists.resultOf[std::size_t(item.tile) * a.frame.parts + item.part];
   if (place.group == 0) a.lists.results[std::size_t(result) * kRays + std::size_t(place.ray)] = ray;
@@ -114,7 +114,7 @@ __device__ inline bool storeResult(const DrawArguments& a, WorkShared& s, const 
 }
 
 /// The next item of work, the longest lists first.
-__device__ inline void takeItem(const DrawArguments& a, WorkShared& s) {
+__device__ inline void takeItem(const SamplingArguments& a, WorkShared& s) {
   FrameCounters& counters = *a.lists.counters;
   std::uint32_t n = atomicAdd(&counters.next, 1u);
   s.hasItem = 0;
@@ -130,7 +130,7 @@ __device__ inline void takeItem(const DrawArguments& a, WorkShared& s) {
 }
 
 /// True where a part before this one lets nothing through: then this one shows nowhere.
-__device__ inline bool isHidden(const DrawArguments& a, const TilePart& item) {
+__device__ inline bool isHidden(const SamplingArguments& a, const TilePart& item) {
   return __ldcg(&a.lists.closedAt[item.tile]) < item.part;
 }
 
@@ -139,7 +139,7 @@ __device__ inline bool isHidden(const DrawArguments& a, const TilePart& item) {
 /// \param drawBin  (list, bin, ray): adds a bin's samples to the ray, and tells s.openRays which
 ///                 rays are still open
 template <class DrawBin>
-__device__ RayState drawPart(const DrawArguments& a, WorkShared& s, const TilePart& item,
+__device__ RayState drawPart(const SamplingArguments& a, WorkShared& s, const TilePart& item,
                              const Place& place, const Work& work, DrawBin&& drawBin) {
   const unsigned inside = __ballot_sync(kAllLanes, work.inPicture);
   if (place.group == 0 && place.lane == 0) s.openRays[place.half] = inside;
@@ -155,7 +155,7 @@ __device__ RayState drawPart(const DrawArguments& a, WorkShared& s, const TilePa
 }
 
 template <class DrawBin>
-__device__ void drawItem(const DrawArguments& a, WorkShared& s, const TilePart& item,
+__device__ void drawItem(const SamplingArguments& a, WorkShared& s, const TilePart& item,
                          const Place& place, const Work& work, DrawBin&& drawBin) {
   if (a.lists.partsOfTile[item.tile] == 1)
     return writePixel(a, place, work, drawPart(a, s, item, place, work, drawBin));
@@ -167,7 +167,7 @@ __device__ void drawItem(const DrawArguments& a, WorkShared& s, const TilePart& 
 
 /// Calls draw(item) for items until there are none.
 template <class Draw>
-__device__ void forEachItem(const DrawArguments& a, WorkShared& s, Draw&& draw) {
+__device__ void forEachItem(const SamplingArguments& a, WorkShared& s, Draw&& draw) {
   while (true) {
     if (threadIdx.x == 0) takeItem(a, s);
     __syncthreads();

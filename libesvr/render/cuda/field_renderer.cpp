@@ -7,16 +7,16 @@
 #include "core/cuda/use_device.h"
 #include "esvr/error.h"
 #include "render/cuda/make_cuda_renderer.h"
-#include "render/lattice_scene.h"
+#include "render/ellipsoid_view.h"
 #include "render/picture.h"
-#include "render/primitive_view.h"
+#include "render/window_scene.h"
 
 namespace esvr::cuda {
 namespace {
 
 constexpr int kSide = DrawTuning::kTileSide;
 /// Lists count with 32 bits and signs.
-constexpr std::int64_t kMostLists = std::int64_t{1} << 30;
+constexpr std::int64_t kMaxLists = std::int64_t{1} << 30;
 
 /// Some to spare, so that lists which grow from view to view do not allocate each time.
 std::size_t withSpare(std::size_t n) { return n + n / 4 + 1024; }
@@ -35,11 +35,11 @@ std::size_t bytesOf(const Buffers&... buffers) {
 }
 
 float largestIntensity(const Field& field) {
-  float most = 0.0f;
+  float largest = 0.0f;
   for (const Chunk& chunk : field.chunks)
     for (const float intensity : chunk.ellipsoids.intensity)
-      most = std::max(most, std::abs(intensity));
-  return most;
+      largest = std::max(largest, std::abs(intensity));
+  return largest;
 }
 
 int tilesAlong(int pixels) { return (pixels + kSide - 1) / kSide; }
@@ -57,7 +57,7 @@ void SceneMemory::prepare(const Field& field, Between between, cudaStream_t stre
   if (between == Between::kSum)
     atLeast(views, ellipsoids.size(), stream);
   else if (forms.size() < ellipsoids.size())
-    forms = DeviceBuffer<LatticeForm>(latticeForms(field), stream);
+    forms = DeviceBuffer<WindowForm>(windowForms(field), stream);
 }
 
 std::size_t SceneMemory::bytes() const {
@@ -140,7 +140,7 @@ TileFrame FieldRenderer::frameOf(const Scene& scene, Band band) const {
   const Resolution resolution = scene.options.resolution;
   const int columns = tilesAlong(resolution.width);
   const std::int64_t bins = scene.bins.last - scene.bins.first + 1;
-  if (bins > kMostLists / columns)
+  if (bins > kMaxLists / columns)
     throw UsageError("rays of " + std::to_string(bins * kBinSamples) +
                      " samples are too long; take a longer step");
   // How deep a ray comes depends on all that lies before.
@@ -214,10 +214,10 @@ int FieldRenderer::chosenParts(const TileFrame& f) {
   if (f.between == Between::kVoxels && c.occupiedTiles >= blocks) return 1;
   const double share = double(c.pairs) / blocks;
   return int(std::clamp(std::ceil(double(c.longestTile) / (2.0 * share)), 1.0,
-                        double(DrawTuning::kMostParts)));
+                        double(DrawTuning::kMaxParts)));
 }
 
-void FieldRenderer::launch(const DrawArguments& a) {
+void FieldRenderer::launch(const SamplingArguments& a) {
   if (a.frame.between == Between::kSum)
     launchDrawSums({a, scene_.views.data(), scene_.footprints.data()}, multiprocessors_,
                    stream_.get());
@@ -245,7 +245,7 @@ FrameCounters FieldRenderer::drawOnce(const Scene& scene, const TileFrame& f) {
 }
 
 void FieldRenderer::grow(const FrameCounters& c, Between between) {
-  if (c.pairs > std::uint64_t(kMostLists))
+  if (c.pairs > std::uint64_t(kMaxLists))
     throw DeviceError("drawing on the GPU: " + std::to_string(c.pairs) +
                       " pairs of ellipsoids and tiles are more than the lists can hold");
   const cudaStream_t stream = stream_.get();
@@ -259,7 +259,7 @@ void FieldRenderer::grow(const FrameCounters& c, Between between) {
 void FieldRenderer::drawBand(const Scene& scene, Band band, Image* image) {
   checkCancelled(scene.options);
   TileFrame f = frameOf(scene, band);
-  const bool tooMany = std::int64_t(f.tiles()) * f.bins > kMostLists;
+  const bool tooMany = std::int64_t(f.tiles()) * f.bins > kMaxLists;
   const auto tooLarge = [&](std::size_t bytes) {
     return limits_.maxBytes != 0 && bytes > limits_.maxBytes;
   };

@@ -1,5 +1,5 @@
 #pragma once
-/// Draws a field by per-primitive ray sampling on a CUDA device.
+/// Draws a field by per-ellipsoid ray sampling on a CUDA device.
 
 #include <optional>
 #include <vector>
@@ -24,8 +24,8 @@ struct SceneMemory {
   DeviceBuffer<PackedEllipsoid> ellipsoids;
   DeviceBuffer<Vec3> origins;
   DeviceBuffer<RayKernel> kernels;
-  DeviceBuffer<PrimitiveView> views;  ///< for Between::kSum
-  DeviceBuffer<LatticeForm> forms;    ///< for Between::kVoxels
+  DeviceBuffer<EllipsoidView> views;  ///< for Between::kSum
+  DeviceBuffer<WindowForm> forms;     ///< for Between::kVoxels
   DeviceBuffer<Footprint> footprints;
   DeviceBuffer<std::uint32_t> large;
 
@@ -71,7 +71,7 @@ class FieldRenderer final : public Renderer {
   void reserve(const TileFrame& frame);
   void list(const TileFrame& frame);
   [[nodiscard]] int chosenParts(const TileFrame& frame);
-  void launch(const DrawArguments& arguments);
+  void launch(const SamplingArguments& arguments);
   [[nodiscard]] FrameCounters drawOnce(const Scene& scene, const TileFrame& frame);
   void grow(const FrameCounters& counters, Between between);
   [[nodiscard]] FrameCounters readCounters();

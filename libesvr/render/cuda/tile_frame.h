@@ -6,11 +6,11 @@
 
 #include <cstdint>
 
-#include "render/lattice_form.h"
-#include "render/primitive_math.h"
 #include "render/ray_box.h"
 #include "render/sample_rule.h"
+#include "render/seen_ellipsoid.h"
 #include "render/voxel_value.h"
+#include "render/window_form.h"
 
 namespace esvr::cuda {
 
@@ -33,7 +33,7 @@ struct DrawTuning {
   static constexpr int kListBlocksPerMultiprocessor = 8;
   /// Work begins with the tiles of the longest lists; their lengths are told apart by powers of 2.
   static constexpr int kLengthClasses = 12;
-  static constexpr int kMostParts = 16;  ///< of the depth
+  static constexpr int kMaxParts = 16;  ///< of the depth
 };
 
 /// Where an ellipsoid lies in the picture.
@@ -116,7 +116,7 @@ struct DeviceEllipsoids {
 
 /// Ellipsoids seen by a frame.
 struct SeenEllipsoids {
-  PrimitiveView* views;  ///< for Between::kSum
+  EllipsoidView* views;  ///< for Between::kSum
   Footprint* footprints;
   std::uint32_t* large;  ///< numbers of those in many lists, in any order
 };
@@ -134,7 +134,7 @@ void launchFill(const TileFrame& frame, std::uint32_t count, const SeenEllipsoid
                 const TileLists& lists, int multiprocessors, cudaStream_t stream);
 
 /// What drawing needs, whatever is between voxels.
-struct DrawArguments {
+struct SamplingArguments {
   TileFrame frame;
   TileLists lists;
   SampleRule rule;
@@ -143,14 +143,14 @@ struct DrawArguments {
 };
 
 struct SumArguments {
-  DrawArguments draw;
-  const PrimitiveView* views;
+  SamplingArguments draw;
+  const EllipsoidView* views;
   const Footprint* footprints;
 };
 
 struct VoxelArguments {
-  DrawArguments draw;
-  const LatticeForm* forms;
+  SamplingArguments draw;
+  const WindowForm* forms;
   const Footprint* footprints;
   const Vec3* origins;  ///< of the chunks
   float bound;          ///< of all intensities: what sums are exact by

@@ -55,8 +55,8 @@ __device__ __noinline__ Columns columnsIn(const TileFrame& frame, const Footprin
   const PixelSpan span = columnsBetween(outlineIn(p), tileRow * kSide, lastRow);
   const int width = frame.resolution.width;
   if (!(span.low <= span.high)) return {1, 0};
-  return {max(c.first, primitive_math::firstPixel(span.low, width)),
-          min(c.last, primitive_math::lastPixel(span.high, width))};
+  return {max(c.first, ellipsoid_math::firstPixel(span.low, width)),
+          min(c.last, ellipsoid_math::lastPixel(span.high, width))};
 }
 
 /// Bins of the frame, counted from its first.
@@ -130,7 +130,7 @@ __device__ bool look(const TileFrame& frame, const DeviceEllipsoids& all, const 
   const SeenEllipsoid seen =
       seenBy(frame.view, e, difference(all.origins[e.chunk], frame.view.eye));
   const bool ofVoxels = frame.between == Between::kVoxels;
-  Seen s = lookAt(frame.view, seen, radius, ofVoxels, frame.resolution);
+  ScreenExtent s = screenExtentOf(frame.view, seen, radius, ofVoxels, frame.resolution);
   const bool any = visible(s.bounds);
   if (!any) s.bounds.firstRow = 1, s.bounds.lastRow = 0;
   const Footprint footprint = footprintOf(s.outline, s.bounds);

@@ -1,13 +1,13 @@
 // Plan: gradients, loss and curvature of the GPU against those of the CPU, whose own are checked
-// against float64 differences: over the kernel's edge, needles, primitives that cover everything,
-// narrow bands, bricks that only supports reach, and many primitives in one brick.
+// against float64 differences: over the kernel's edge, needles, ellipsoids that cover everything,
+// narrow bands, bricks that only supports reach, and many ellipsoids in one brick.
 
 #include <cmath>
 
-#include "../random_primitives.h"
+#include "../random_ellipsoids.h"
 #include "../volumes.h"
+#include "fit/cpu/cpu_pass.h"
 #include "fit/cuda/cuda_optimiser.h"
-#include "fit/engine.h"
 #include "gpu_test.h"
 
 namespace esvr {
@@ -29,16 +29,16 @@ double distance(const ParameterVector& a, const ParameterVector& b) {
 
 /// Every gradient within `tolerance` of the largest one: residuals nearly cancel in some.
 void expectAgreement(const FitTarget& target, const Kernel& kernel,
-                     const std::vector<Primitive>& primitives, double tolerance) {
-  FitEngine engine(target, kernelConstants<double>(kernel));
-  engine.rebuild(primitives, 0.5);
-  std::vector<PrimitiveGradient> expected(primitives.size());
-  const double loss = engine.gradients(primitives, expected);
+                     const std::vector<Ellipsoid>& ellipsoids, double tolerance) {
+  CpuPass engine(target, kernelConstants<double>(kernel));
+  engine.rebuild(ellipsoids, 0.5);
+  std::vector<EllipsoidGradient> expected(ellipsoids.size());
+  const double loss = engine.gradients(ellipsoids, expected);
 
   OptimiserOptions options;
   options.kernel = kernel;
   cuda::CudaOptimiser onGpu(target, options, {});
-  onGpu.setPrimitives(primitives);
+  onGpu.setEllipsoids(ellipsoids);
   const auto found = onGpu.gradients();
   ASSERT_EQ(found.size(), expected.size());
   double largest = 0.0, largestPhi2 = 0.0, largestByKappa = 0.0;
@@ -63,7 +63,7 @@ TEST_P(GradientOnGpu, AgreesWithTheCpu) {
   const Case& c = GetParam();
   const SparseVolume volume = test::denseVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
-  expectAgreement(target, {.kappa = c.kappa}, test::randomPrimitives(c.count, c.smallest, c.aspect),
+  expectAgreement(target, {.kappa = c.kappa}, test::randomEllipsoids(c.count, c.smallest, c.aspect),
                   1e-4);
 }
 INSTANTIATE_TEST_SUITE_P(
@@ -80,7 +80,7 @@ TEST_F(NarrowBandOnGpu, SaturatesAsTheCpuDoes) {
   const SparseVolume volume = test::levelSetVolume();
   FitTarget target = makeTarget(volume, std::nullopt);
   target.narrowBand = true;
-  expectAgreement(target, {.kappa = 2.0f}, test::randomPrimitives(100, 1.0, 3.0), 1e-4);
+  expectAgreement(target, {.kappa = 2.0f}, test::randomEllipsoids(100, 1.0, 3.0), 1e-4);
 }
 
 }  // namespace

@@ -42,7 +42,7 @@ TEST_F(IntensitiesOnGpu, AreMovedAsOnTheCpu) {
   const auto gpu = makeIntensityPasses(crowd.target, device_);
   cpu->setShapes(crowd.field);
   gpu->setShapes(crowd.field);
-  std::vector<float> intensities(crowd.field.primitiveCount(), 0.01f);
+  std::vector<float> intensities(crowd.field.ellipsoidCount(), 0.01f);
   IntensityGradient expected, found;
   const StoredError error = cpu->gradient(intensities, expected);
   EXPECT_NEAR(gpu->gradient(intensities, found).squares, error.squares, 1e-4 * error.squares);
@@ -61,7 +61,7 @@ TEST_F(IntensitiesOnGpu, AreTheSameBitsInEveryRun) {
   for (int run = 0; run < 3; ++run) {
     IntensityProblem problem(crowd.target, device_);
     problem.setShapes(crowd.field);
-    runs.emplace_back(crowd.field.primitiveCount(), 0.01f);
+    runs.emplace_back(crowd.field.ellipsoidCount(), 0.01f);
     (void)problem.solve(runs.back(), 6);
   }
   EXPECT_EQ(runs[1], runs[0]);

@@ -1,5 +1,5 @@
 // Plan: the GPU against the CPU: a step is the CPU's step, seeds are the CPU's seeds, a whole fit
-// reaches what the CPU reaches; no primitive holds up the others; memory is predicted; what is not
+// reaches what the CPU reaches; no ellipsoid holds up the others; memory is predicted; what is not
 // finite ends a run. What both devices must do alike is in optimiser_test.cpp.
 
 #include <gmock/gmock.h>
@@ -8,9 +8,9 @@
 #include <chrono>
 #include <cmath>
 
-#include "../random_primitives.h"
+#include "../random_ellipsoids.h"
 #include "../volumes.h"
-#include "fit/cpu_optimiser.h"
+#include "fit/cpu/cpu_optimiser.h"
 #include "fit/cuda/cuda_optimiser.h"
 #include "fit/cuda/memory_plan.h"
 #include "gpu_test.h"
@@ -32,22 +32,22 @@ FitResult fitOn(const Device& device, const SparseVolume& volume) {
 TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
   const SparseVolume volume = test::denseVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
-  const auto start = test::randomPrimitives(50, 1.0, 3.0);
+  const auto start = test::randomEllipsoids(50, 1.0, 3.0);
   const Tuning tuning;
   CudaOptimiser onGpu(target, {}, tuning);
-  onGpu.setPrimitives(start);
+  onGpu.setEllipsoids(start);
   onGpu.iterate(std::array{0.5});
 
-  FitEngine engine(target, kernelConstants<double>(Kernel{}));
+  CpuPass engine(target, kernelConstants<double>(Kernel{}));
   engine.rebuild(start, tuning.listSlack);
-  std::vector<PrimitiveGradient> gradients(start.size());
+  std::vector<EllipsoidGradient> gradients(start.size());
   engine.gradients(start, gradients);
   auto expected = start;
   std::vector<AdamState> states(start.size());
   adamStep(expected, states, gradients, tuning.steps.scaled(0.5), tuning.adam,
            {tuning.smallestScale, tuning.largestScale, tuning.intensityHeadroom * target.lowest,
             tuning.intensityHeadroom * target.highest});
-  const auto found = onGpu.primitives();
+  const auto found = onGpu.ellipsoids();
   // Adam's first step has the size of the step and the sign of the gradient, so that only where a
   // gradient is lost in rounding can a component differ, and then by twice the step.
   int differing = 0;
@@ -61,7 +61,7 @@ TEST_F(OptimiserOnGpu, TheThreadsOfABrickChangeNoBit) {
   const SparseVolume volume = test::denseVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
   CudaOptimiser onGpu(target, {}, {});
-  onGpu.setPrimitives(test::randomPrimitives(2000, 0.5, 4.0));
+  onGpu.setEllipsoids(test::randomEllipsoids(2000, 0.5, 4.0));
   const auto expected = onGpu.gradients(cuda::ThreadsPerBrick::threads(0));
   for (int choice = 1; choice < cuda::ThreadsPerBrick::kChoices; ++choice) {
     const auto found = onGpu.gradients(cuda::ThreadsPerBrick::threads(choice));
@@ -79,7 +79,7 @@ TEST_F(OptimiserOnGpu, SeedsAsTheCpuDoes) {
   CudaOptimiser onGpu(target, {}, {});
   onCpu.growTo(50);
   onGpu.growTo(50);
-  const auto expected = onCpu.primitives(), found = onGpu.primitives();
+  const auto expected = onCpu.ellipsoids(), found = onGpu.ellipsoids();
   // The same draws: running energies are integers here and float64 there, so that a draw next to
   // the border between two voxels may fall on the other side.
   int differing = 0;
@@ -98,40 +98,40 @@ TEST_F(OptimiserOnGpu, ReachesWhatTheCpuReaches) {
   EXPECT_NEAR(onGpu, onCpu, 1.0);
 }
 
-/// (primitive, voxel) pairs of round supports that lie inside the volume.
-double voxelPairs(const std::vector<Primitive>& primitives) {
+/// (ellipsoid, voxel) pairs of round supports that lie inside the volume.
+double voxelPairs(const std::vector<Ellipsoid>& ellipsoids) {
   const double radius = supportRadius(kernelConstants<double>(Kernel{}));
   double sum = 0.0;
-  for (const Primitive& p : primitives) sum += 4.18879 * std::pow(radius / p.L[0], 3.0);
+  for (const Ellipsoid& p : ellipsoids) sum += 4.18879 * std::pow(radius / p.L[0], 3.0);
   return sum;
 }
 
 /// Seconds of an iteration for each of its pairs.
-double secondsPerPair(const FitTarget& target, const std::vector<Primitive>& primitives) {
+double secondsPerPair(const FitTarget& target, const std::vector<Ellipsoid>& ellipsoids) {
   constexpr int kIterations = 50;
   Tuning tuning;
   tuning.largestScale = 64.0;
   CudaOptimiser optimiser(target, {}, tuning);
-  optimiser.setPrimitives(primitives);
+  optimiser.setEllipsoids(ellipsoids);
   const std::vector<double> factors(kIterations, 1e-6);  // lists stay as they are
   optimiser.iterate(factors);
   const auto start = std::chrono::steady_clock::now();
   optimiser.iterate(factors);
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-  return taken.count() / kIterations / voxelPairs(primitives);
+  return taken.count() / kIterations / voxelPairs(ellipsoids);
 }
 
-TEST_F(OptimiserOnGpu, APrimitiveThatCoversHalfHoldsNothingUp) {
+TEST_F(OptimiserOnGpu, AnEllipsoidThatCoversHalfHoldsNothingUp) {
   const SparseVolume volume = test::volumeOf({}, 24, 0.0f, [](Coord) { return 0.5f; });
   const FitTarget target = makeTarget(volume, std::nullopt);
   test::Random random(3);
-  std::vector<Primitive> primitives(50'000);
-  for (Primitive& p : primitives)
+  std::vector<Ellipsoid> ellipsoids(50'000);
+  for (Ellipsoid& p : ellipsoids)
     p = {{random(0, 192), random(0, 192), random(0, 192)}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 0.1};
-  const double without = secondsPerPair(target, primitives);
+  const double without = secondsPerPair(target, ellipsoids);
   constexpr double kInverse = 1.0 / 34.0;  // a support of about 91 voxels' radius
-  primitives.push_back({{96, 96, 96}, {kInverse, 0, 0, 0, kInverse, 0, 0, 0, kInverse}, 0.1});
-  EXPECT_LT(secondsPerPair(target, primitives), 1.3 * without);
+  ellipsoids.push_back({{96, 96, 96}, {kInverse, 0, 0, 0, kInverse, 0, 0, 0, kInverse}, 0.1});
+  EXPECT_LT(secondsPerPair(target, ellipsoids), 1.3 * without);
 }
 
 TEST_F(OptimiserOnGpu, SaysHowManyEllipsoidsTheMemoryHolds) {
@@ -161,9 +161,9 @@ TEST_F(OptimiserOnGpu, ALossThatIsNotFiniteEndsTheRun) {
   const SparseVolume volume = test::tubeVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
   CudaOptimiser optimiser(target, {}, {});
-  auto primitives = test::randomPrimitives(5, 1.0, 2.0);
-  primitives[2].intensity = std::nan("");
-  optimiser.setPrimitives(primitives);
+  auto ellipsoids = test::randomEllipsoids(5, 1.0, 2.0);
+  ellipsoids[2].intensity = std::nan("");
+  optimiser.setEllipsoids(ellipsoids);
   EXPECT_THROW(optimiser.iterate(std::array{1.0}), RuntimeFailure);
 }
 

@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kSplitAbove = 2.0;
 
-PaperPrimitive sphere(double x, double scale) {
-  PaperPrimitive p{{x, 0.0, 0.0}, {}, {1.0, 0.0, 0.0, 0.0}, 0.8, 5.0};
+PaperEllipsoid sphere(double x, double scale) {
+  PaperEllipsoid p{{x, 0.0, 0.0}, {}, {1.0, 0.0, 0.0, 0.0}, 0.8, 5.0};
   p.logScale.fill(std::log(scale));
   return p;
 }
@@ -33,8 +33,8 @@ Population fourOf() {
           {stateOf(0.5), stateOf(2.0), stateOf(0.5), stateOf(2.0)}};
 }
 
-DensifyRule ruleOf(std::size_t most = 100) {
-  return {.threshold = 1.0, .splitAbove = kSplitAbove, .most = most, .seed = 7};
+DensifyRule ruleOf(std::size_t maxCount = 100) {
+  return {.threshold = 1.0, .splitAbove = kSplitAbove, .maxCount = maxCount, .seed = 7};
 }
 
 TEST(Densify, ClonesTheSmallAndSplitsTheLargeOfThoseWithLargeGradients) {
@@ -44,10 +44,10 @@ TEST(Densify, ClonesTheSmallAndSplitsTheLargeOfThoseWithLargeGradients) {
   EXPECT_EQ(counts.split, 1u);
   ASSERT_EQ(population.size(), 6u);
   ASSERT_EQ(population.states.size(), 6u);
-  EXPECT_EQ(population.primitives[0].center[0], 0.0);
-  EXPECT_EQ(population.primitives[1].center[0], 10.0);
-  EXPECT_EQ(population.primitives[2].center[0], 20.0);  // the large one that was split is gone
-  EXPECT_EQ(population.primitives[3].center[0], 10.0);  // the clone
+  EXPECT_EQ(population.ellipsoids[0].center[0], 0.0);
+  EXPECT_EQ(population.ellipsoids[1].center[0], 10.0);
+  EXPECT_EQ(population.ellipsoids[2].center[0], 20.0);  // the large one that was split is gone
+  EXPECT_EQ(population.ellipsoids[3].center[0], 10.0);  // the clone
 }
 
 TEST(Densify, AThresholdCountsWhereItIsMetExactly) {
@@ -68,39 +68,39 @@ TEST(Densify, WhatWasNeverSeenIsLeftEvenAtAThresholdOfZero) {
 TEST(Densify, ACloneAndItsOriginalAddUpToWhatWas) {
   Population population = fourOf();
   densify(population, ruleOf());
-  EXPECT_EQ(population.primitives[1].intensity + population.primitives[3].intensity, 0.8);
-  EXPECT_EQ(population.primitives[1].logScale, population.primitives[3].logScale);
+  EXPECT_EQ(population.ellipsoids[1].intensity + population.ellipsoids[3].intensity, 0.8);
+  EXPECT_EQ(population.ellipsoids[1].logScale, population.ellipsoids[3].logScale);
 }
 
 TEST(Densify, PartsOfASplitAreSmallerAndLieWithinAFewScales) {
   Population population = fourOf();
   densify(population, ruleOf());
   for (const std::size_t i : {4u, 5u}) {
-    const PaperPrimitive& part = population.primitives[i];
+    const PaperEllipsoid& part = population.ellipsoids[i];
     EXPECT_NEAR(std::exp(part.logScale[0]), 3.0 / 1.6, 1e-12);
     EXPECT_EQ(part.intensity, 0.8);
     EXPECT_NE(part.center[0], 30.0);
     EXPECT_LT(std::hypot(part.center[0] - 30.0, part.center[1], part.center[2]), 6.0 * 3.0);
   }
-  EXPECT_NE(population.primitives[4].center, population.primitives[5].center);
+  EXPECT_NE(population.ellipsoids[4].center, population.ellipsoids[5].center);
 }
 
 // A normal distribution's mean and deviation over n draws err by s / sqrt(n) and s / sqrt(2 n).
 TEST(Densify, PartsAreDrawnWithTheScalesOfTheWhole) {
   constexpr std::size_t kCount = 4000;
   Population population;
-  PaperPrimitive needle = sphere(0.0, 3.0);
+  PaperEllipsoid needle = sphere(0.0, 3.0);
   needle.logScale = {std::log(8.0), std::log(3.0), std::log(1.0)};
   const double half = std::sqrt(0.5);
   needle.rotation = {half, 0.0, 0.0, half};  // by 90 degrees about z: the long axis along y
-  population.primitives.assign(kCount, needle);
+  population.ellipsoids.assign(kCount, needle);
   population.states.assign(kCount, stateOf(2.0));
-  densify(population, {.threshold = 1.0, .splitAbove = 2.0, .most = 3 * kCount, .seed = 3});
+  densify(population, {.threshold = 1.0, .splitAbove = 2.0, .maxCount = 3 * kCount, .seed = 3});
   ASSERT_EQ(population.size(), 2 * kCount);
   const double expected[3] = {3.0, 8.0, 1.0};
   for (std::size_t a = 0; a < 3; ++a) {
     double sum = 0.0, squares = 0.0;
-    for (const auto& p : population.primitives) {
+    for (const auto& p : population.ellipsoids) {
       sum += p.center[a];
       squares += p.center[a] * p.center[a];
     }
@@ -135,7 +135,7 @@ TEST(Densify, ChoosesTheSameInEveryRun) {
   densify(a, ruleOf());
   densify(b, ruleOf());
   for (std::size_t i = 0; i < a.size(); ++i)
-    EXPECT_EQ(a.primitives[i].center, b.primitives[i].center);
+    EXPECT_EQ(a.ellipsoids[i].center, b.ellipsoids[i].center);
 }
 
 }  // namespace

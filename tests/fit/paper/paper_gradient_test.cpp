@@ -8,8 +8,8 @@
 #include <cmath>
 #include <optional>
 
-#include "../dense_paper_loss.h"
-#include "../random_primitives.h"
+#include "../random_ellipsoids.h"
+#include "dense_paper_loss.h"
 #include "fit/paper/paper_optimiser.h"
 #include "on_device.h"
 
@@ -32,9 +32,9 @@ SparseVolume smallVolume() {
   return makeVolume(std::move(bricks), 0.0f);
 }
 
-Population fewPrimitives() {
+Population fewEllipsoids() {
   Population population;
-  population.primitives = {{{11.3, 12.1, 10.7}, {1.1, 0.4, -0.2}, {0.9, 0.2, -0.4, 0.3}, 0.6, 5.0},
+  population.ellipsoids = {{{11.3, 12.1, 10.7}, {1.1, 0.4, -0.2}, {0.9, 0.2, -0.4, 0.3}, 0.6, 5.0},
                            {{9.1, 9.7, 13.2}, {0.5, 1.2, 0.3}, {1.7, -0.3, 0.8, 0.1}, 0.3, 3.2},
                            {{6.4, 14.8, 9.9}, {1.0, 1.0, 1.3}, {0.2, 0.3, 0.1, -0.2}, -0.2, 7.5}};
   population.states.resize(population.size());
@@ -53,7 +53,7 @@ double kernelAt(double q, double k, bool gaussian) {
   return phi(k, q) > last ? phi(k, q) : 0.0;
 }
 
-double squaredDistance(const PaperPrimitive& p, Coord v) {
+double squaredDistance(const PaperEllipsoid& p, Coord v) {
   const Matrix3 R = rotationOf(normalised(p.rotation));
   const double d[3] = {v.x - p.center[0], v.y - p.center[1], v.z - p.center[2]};
   double q = 0.0;
@@ -77,7 +77,7 @@ class DenseLoss {
   [[nodiscard]] double operator()(const Population& population) const {
     test::DenseValues prediction(paddedBrick());
     forEachVoxel([&](Coord v) {
-      for (const PaperPrimitive& p : population.primitives)
+      for (const PaperEllipsoid& p : population.ellipsoids)
         prediction[v] += p.intensity * kernelAt(squaredDistance(p, v), kind_.learnK ? p.k : kind_.k,
                                                 kind_.gaussian);
     });
@@ -95,7 +95,7 @@ class DenseLoss {
   test::DenseLossOptions options_{};
 };
 
-double& parameter(PaperPrimitive& p, int n) {
+double& parameter(PaperEllipsoid& p, int n) {
   if (n < 3) return p.center[n];
   if (n < 6) return p.logScale[n - 3];
   if (n < 10) return p.rotation[n - 6];
@@ -118,7 +118,7 @@ class PaperGradientOn : public test::OnDevice {
                                                        .maxDeviceBytes = {},
                                                        .visitOnly = false});
     ASSERT_EQ(optimiser->subvolumeCount(), 8u);
-    const Population population = fewPrimitives();
+    const Population population = fewEllipsoids();
     optimiser->put(population);
     const LossGradients found = optimiser->gradients(kSubvolume);
     const DenseLoss loss(target, kind, kBeta);
@@ -129,14 +129,14 @@ class PaperGradientOn : public test::OnDevice {
         if (n == kPaperParameters - 1 && !kind.learnK) continue;
         const auto lossAt = [&](double step) {
           Population moved = population;
-          parameter(moved.primitives[i], n) += step;
+          parameter(moved.ellipsoids[i], n) += step;
           return loss(moved);
         };
         const double difference = (lossAt(kStep) - lossAt(-kStep)) / (2.0 * kStep);
-        error += std::pow(found.byPrimitive[i][n] - difference, 2);
+        error += std::pow(found.byEllipsoid[i][n] - difference, 2);
         norm += difference * difference;
       }
-      EXPECT_LT(std::sqrt(error), kTolerance * std::sqrt(norm)) << "primitive " << i;
+      EXPECT_LT(std::sqrt(error), kTolerance * std::sqrt(norm)) << "ellipsoid " << i;
     }
   }
 };
@@ -163,20 +163,20 @@ TEST_P(PaperGradientOn, IsTheSameWhereOnlyTheVisitedSubvolumeIsThere) {
   step.rates.fill(1e-3);
   step.smallestLogScale = -3.0, step.largestLogScale = 3.0;
   for (PaperOptimiser* optimiser : {all.get(), visited.get()}) {
-    optimiser->put(fewPrimitives());
+    optimiser->put(fewEllipsoids());
     for (std::size_t s = 0; s < optimiser->subvolumeCount(); ++s) optimiser->iterate(s, step);
   }
   EXPECT_EQ(all->measure().squaredSum, visited->measure().squaredSum);
-  EXPECT_EQ(all->gradients(kSubvolume).byPrimitive, visited->gradients(kSubvolume).byPrimitive);
+  EXPECT_EQ(all->gradients(kSubvolume).byEllipsoid, visited->gradients(kSubvolume).byEllipsoid);
 }
 
 ESVR_ON_DEVICES(PaperGradientOn);
 
-TEST(PaperPrimitive, IsTheSameFunctionInBothForms) {
+TEST(PaperEllipsoid, IsTheSameFunctionInBothForms) {
   for (const KernelKind kind :
        {KernelKind{}, KernelKind{.gaussian = true}, KernelKind{.learnK = true}})
-    for (const PaperPrimitive& p : fewPrimitives().primitives) {
-      const Primitive unit = primitiveOf(p, kind);
+    for (const PaperEllipsoid& p : fewEllipsoids().ellipsoids) {
+      const Ellipsoid unit = ellipsoidOf(p, kind);
       const auto kernel =
           kernelConstants<double>(kernelOf(kind), kind.learnK ? p.k : double(kernelOf(kind).kappa));
       for (const Coord v : {Coord{11, 12, 10}, Coord{9, 11, 12}, Coord{8, 14, 9}}) {

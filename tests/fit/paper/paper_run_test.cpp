@@ -134,7 +134,7 @@ TEST_P(PaperRunOn, LowersTheErrorAndSaysWhatItDid) {
   EXPECT_NEAR(double(pass.after), 0.7 * double(pass.before), 0.5);
   EXPECT_LT(pass.psnrBoxAfter, pass.psnrBoxBefore);
   EXPECT_GT(result.curve.back().psnrBox, pass.psnrBoxAfter + 1.0);
-  EXPECT_LE(result.field.primitiveCount(), pass.after);
+  EXPECT_LE(result.field.ellipsoidCount(), pass.after);
   EXPECT_EQ(result.field.kernel.form, KernelForm::kPaper);
 }
 
@@ -150,7 +150,7 @@ TEST_P(PaperRunOn, WithoutPruningAddsUpToTheCount) {
   PaperMethod method = shortMethod();
   method.prunes.clear();
   method.gradientThreshold = 0.0;
-  EXPECT_EQ(run(method, {}, options).curve.end()[-2].primitives, 400u);
+  EXPECT_EQ(run(method, {}, options).curve.end()[-2].ellipsoids, 400u);
 }
 
 TEST_P(PaperRunOn, WithoutDensifyingOnlyMovesThePoints) {
@@ -158,7 +158,7 @@ TEST_P(PaperRunOn, WithoutDensifyingOnlyMovesThePoints) {
   method.densify = false;
   method.prunes.clear();
   const FitResult result = run(method);
-  EXPECT_EQ(result.curve.end()[-2].primitives, 300u);
+  EXPECT_EQ(result.curve.end()[-2].ellipsoids, 300u);
   EXPECT_GT(result.curve.back().psnrBox, result.curve.front().psnrBox);
 }
 

@@ -16,7 +16,7 @@ namespace {
 const Box kBox{{0, 0, 0}, {23, 23, 23}};
 constexpr double kFloor = 1.0 / 255;
 
-PaperPrimitive ellipsoid(double a, double b, double c, double intensity = 0.5) {
+PaperEllipsoid ellipsoid(double a, double b, double c, double intensity = 0.5) {
   return {{11.2, 12.7, 10.4},
           {std::log(a), std::log(b), std::log(c)},
           {0.8, 0.1, -0.5, 0.3},
@@ -40,8 +40,8 @@ TEST(FractionalAnisotropy, IsTheSameForEverySizeAndOrder) {
     EXPECT_NEAR(fractionalAnisotropy({1.0 + size, 0.2 + size, -0.4 + size}), value, 1e-12);
 }
 
-Coverage countedOverAll(const PaperPrimitive& p, const KernelKind& kind) {
-  const Primitive unit = primitiveOf(p, kind);
+Coverage countedOverAll(const PaperEllipsoid& p, const KernelKind& kind) {
+  const Ellipsoid unit = ellipsoidOf(p, kind);
   const auto kernel = kernelConstants<double>(kernelOf(kind));
   Coverage counted;
   for (int x = kBox.min.x; x <= kBox.max.x; ++x)
@@ -62,7 +62,7 @@ Coverage countedOverAll(const PaperPrimitive& p, const KernelKind& kind) {
 
 TEST(Coverage, CountsTheVoxelsAboveTheFloor) {
   for (const KernelKind kind : {KernelKind{}, KernelKind{.gaussian = true}})
-    for (const PaperPrimitive& p :
+    for (const PaperEllipsoid& p :
          {ellipsoid(3, 2, 1), ellipsoid(12, 1, 1), ellipsoid(0.3, 0.3, 0.3),
           ellipsoid(4, 4, 1, -0.4), ellipsoid(2, 2, 2, 0.001)}) {
       const Coverage found = coverageOf(p, {kind, kBox, kFloor}), counted = countedOverAll(p, kind);
@@ -72,13 +72,13 @@ TEST(Coverage, CountsTheVoxelsAboveTheFloor) {
 }
 
 TEST(Coverage, IsNothingBeyondTheBox) {
-  PaperPrimitive outside = ellipsoid(2, 2, 2);
+  PaperEllipsoid outside = ellipsoid(2, 2, 2);
   outside.center = {-20.0, 0.0, 0.0};
   EXPECT_EQ(coverageOf(outside, {{}, kBox, kFloor}).voxels, 0.0);
 }
 
 TEST(PruneScores, AreProductsOfTheirTerms) {
-  const std::vector<PaperPrimitive> all = {ellipsoid(3, 2, 1), ellipsoid(2, 2, 2, 0.9),
+  const std::vector<PaperEllipsoid> all = {ellipsoid(3, 2, 1), ellipsoid(2, 2, 2, 0.9),
                                            ellipsoid(6, 1, 1, -0.2)};
   const CoverageOptions options{{}, kBox, kFloor};
   const auto full = pruneScores(all, PruneScore::kFull, options),
@@ -102,7 +102,7 @@ TEST(PruneScores, AreProductsOfTheirTerms) {
 TEST(KeepHighest, KeepsOrderAndTheEarlierOfEqualOnes) {
   Population population;
   for (int i = 0; i < 6; ++i) {
-    population.primitives.push_back(ellipsoid(1, 1, 1, i));
+    population.ellipsoids.push_back(ellipsoid(1, 1, 1, i));
     population.states.push_back({});
     population.states.back().seen = std::uint32_t(i);
   }
@@ -111,7 +111,7 @@ TEST(KeepHighest, KeepsOrderAndTheEarlierOfEqualOnes) {
   ASSERT_EQ(population.size(), 3u);
   const double kept[3] = {1, 2, 3};
   for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(population.primitives[i].intensity, kept[i]);
+    EXPECT_EQ(population.ellipsoids[i].intensity, kept[i]);
     EXPECT_EQ(population.states[i].seen, std::uint32_t(kept[i]));
   }
   keepHighest(population, std::vector<double>(3, 1.0), 10);

@@ -26,10 +26,10 @@ CameraWish inside() {
 }
 
 double largestDifference(const Image& a, const Image& b) {
-  double most = a.rgba.size() == b.rgba.size() ? 0.0 : 1.0;
+  double largest = a.rgba.size() == b.rgba.size() ? 0.0 : 1.0;
   for (std::size_t i = 0; i < std::min(a.rgba.size(), b.rgba.size()); ++i)
-    most = std::max(most, std::abs(double(a.rgba[i]) - double(b.rgba[i])));
-  return most;
+    largest = std::max(largest, std::abs(double(a.rgba[i]) - double(b.rgba[i])));
+  return largest;
 }
 
 TEST(FieldRenderer, SaysWhichDeviceIsNotThere) {

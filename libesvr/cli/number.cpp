@@ -1,0 +1,37 @@
+#include "cli/number.h"
+
+#include <charconv>
+#include <cmath>
+
+namespace esvr::cli {
+namespace {
+
+/// A number of type T at the beginning of a text, and what is left behind it.
+template <class T>
+bool takeNumber(std::string_view& text, T& value) {
+  const auto [next, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{}) return false;
+  text.remove_prefix(std::size_t(next - text.data()));
+  return true;
+}
+
+}  // namespace
+
+std::optional<LeadingNumber> parseLeadingNumber(std::string_view text) {
+  LeadingNumber number;
+  if (!takeNumber(text, number.value) || !std::isfinite(number.value)) return std::nullopt;
+  number.rest = text;
+  return number;
+}
+
+std::optional<double> parseNumber(std::string_view text) {
+  const auto number = parseLeadingNumber(text);
+  return number && number->rest.empty() ? std::optional(number->value) : std::nullopt;
+}
+
+std::optional<std::int64_t> parseWhole(std::string_view text) {
+  std::int64_t value = 0;
+  return takeNumber(text, value) && text.empty() ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace esvr::cli

@@ -1,0 +1,84 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "codec/lattice_bits.h"
+#include "esvr/quantised.h"
+
+namespace esvr {
+namespace {
+
+using Range = tbb::blocked_range<std::size_t>;
+constexpr std::size_t kGrain = 256;  // ellipsoids
+
+/// A quaternion's components but the largest lie within +-sqrt(1/2).
+constexpr double kRotationSide = std::numbers::sqrt2;
+
+/// The middle of a cell.
+double middle(double code, int bits) { return std::ldexp(code + 0.5, -bits); }
+
+void putScales(const QuantisedEllipsoids& q, std::size_t i, Ellipsoids& e) {
+  const int bits = scaleBits(q.lattice, q.precision[i]);
+  double log = double(q.lattice.lowestScale);
+  for (std::size_t a = 0; a < 3; ++a) {
+    log += middle(q.scale[a][i], bits);
+    e.logScale[2 - a][i] = float(log * q.lattice.scaleStep);
+  }
+}
+
+void putCenter(const QuantisedEllipsoids& q, std::size_t i, int bits, Ellipsoids& e) {
+  const Coord& low = q.lattice.lowestCell;
+  const double lowest[] = {double(low.x), double(low.y), double(low.z)};
+  for (std::size_t a = 0; a < 3; ++a)
+    e.center[a][i] = float((lowest[a] + middle(q.position[a][i], bits)) * q.lattice.cell);
+}
+
+void putRotation(const QuantisedEllipsoids& q, std::size_t i, int bits, Ellipsoids& e) {
+  std::array<double, 4> r{1.0, 0.0, 0.0, 0.0};
+  double norm2 = 0.0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    r[a + 1] = (middle(q.rotation[a][i], bits) - 0.5) * kRotationSide;
+    norm2 = norm2 + r[a + 1] * r[a + 1];
+  }
+  r[0] = std::sqrt(std::max(0.0, 1.0 - norm2));
+  const double norm = std::sqrt(norm2 + r[0] * r[0]);
+  for (std::size_t a = 0; a < 4; ++a) e.rotation[a][i] = float(r[a] / norm);
+}
+
+void putIntensity(const QuantisedEllipsoids& q, std::size_t i, int shift, Ellipsoids& e) {
+  const std::int32_t code = q.intensity[i];
+  const double magnitude = middle(code < 0 ? -1 - code : code, shift) * q.lattice.intensityStep;
+  e.intensity[i] = float(code < 0 ? -magnitude : magnitude);
+}
+
+void put(const QuantisedEllipsoids& q, std::size_t i, Ellipsoids& e) {
+  const CoarseScales s = coarseScales(q, i);
+  putScales(q, i, e);
+  putCenter(q, i, positionBits(q.lattice, q.precision[i], s), e);
+  putRotation(q, i, rotationBits(q.lattice, q.precision[i], s), e);
+  putIntensity(q, i, intensityShift(q.lattice, s), e);
+}
+
+}  // namespace
+
+void QuantisedEllipsoids::resize(std::size_t n) {
+  for (auto& v : position) v.resize(n);
+  precision.resize(n);
+  for (auto& v : scale) v.resize(n);
+  for (auto& v : rotation) v.resize(n);
+  intensity.resize(n);
+}
+
+Ellipsoids dequantise(const QuantisedEllipsoids& q) {
+  Ellipsoids e;
+  e.resize(q.size());
+  tbb::parallel_for(Range(0, q.size(), kGrain), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) put(q, i, e);
+  });
+  return e;
+}
+
+}  // namespace esvr

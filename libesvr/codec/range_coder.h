@@ -1,0 +1,151 @@
+#pragma once
+/// An adaptive binary range coder: every decision has a model that learns how likely it is.
+/// Integers alone, so that what one machine wrote any other reads (docs/format.md, "Range coder").
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace esvr::codec {
+
+/// The probability of a zero, learnt: the n-th decision moves it by 1/(n + 1.5) of the way, and
+/// later ones by as much as the last.
+class BitModel {
+ public:
+  static constexpr int kBits = 16;
+  static constexpr std::uint32_t kOne = 1u << kBits;
+
+  /// Of a zero, in 1/kOne; neither 0 nor 1.
+  [[nodiscard]] std::uint32_t zero() const { return zero_; }
+
+  void learn(bool bit) {
+    const std::uint32_t share = kShares[count_];
+    if (bit)
+      zero_ -= std::uint32_t((std::uint64_t(zero_ - kMinZero) * share) >> kBits);
+    else
+      zero_ += std::uint32_t((std::uint64_t(kOne - kMinZero - zero_) * share) >> kBits);
+    if (count_ + 1u < kShares.size()) ++count_;
+  }
+
+ private:
+  static constexpr std::uint32_t kMinZero = 32;
+  static constexpr std::size_t kMemory = 160;  ///< decisions that count
+  static constexpr std::array<std::uint16_t, kMemory> kShares = [] {
+    std::array<std::uint16_t, kMemory> shares{};
+    for (std::uint32_t n = 0; n < kMemory; ++n) shares[n] = std::uint16_t(2 * kOne / (2 * n + 3));
+    return shares;
+  }();
+
+  std::uint32_t zero_ = kOne / 2;
+  std::uint8_t count_ = 0;
+};
+
+class RangeEncoder {
+ public:
+  void bit(BitModel& model, bool value) {
+    const std::uint32_t bound = (range_ >> BitModel::kBits) * model.zero();
+    if (value) {
+      low_ += bound;
+      range_ -= bound;
+    } else {
+      range_ = bound;
+    }
+    model.learn(value);
+    normalise();
+  }
+
+  /// The lowest `bits` bits of a value, the highest of them first, each as likely 0 as 1.
+  void raw(std::uint32_t value, int bits) {
+    while (bits-- > 0) {
+      range_ >>= 1;
+      if ((value >> bits) & 1u) low_ += range_;
+      normalise();
+    }
+  }
+
+  /// What was encoded; zeros at its end are left out, a decoder finds them there anyway.
+  [[nodiscard]] std::vector<std::byte> finish() {
+    for (int i = 0; i < 5; ++i) shiftLow();
+    bytes_.erase(bytes_.begin());  // the first is always 0
+    while (!bytes_.empty() && bytes_.back() == std::byte{}) bytes_.pop_back();
+    return std::move(bytes_);
+  }
+
+ private:
+  void normalise() {
+    while (range_ < (1u << 24)) {
+      range_ <<= 8;
+      shiftLow();
+    }
+  }
+
+  /// Sends the top byte of `low_` on its way: it waits behind bytes that a carry could still reach.
+  void shiftLow() {
+    if (low_ < 0xff000000u || low_ > 0xffffffffu) {
+      const auto carry = std::uint32_t(low_ >> 32);
+      for (; waiting_ > 0; --waiting_) {
+        bytes_.push_back(std::byte((pending_ + carry) & 0xffu));
+        pending_ = 0xff;
+      }
+      pending_ = std::uint32_t(low_ >> 24) & 0xffu;
+    }
+    ++waiting_;
+    low_ = (low_ & 0x00ffffffu) << 8;
+  }
+
+  std::uint64_t low_ = 0;
+  std::uint32_t range_ = 0xffffffffu;
+  std::uint32_t pending_ = 0;
+  std::uint64_t waiting_ = 1;
+  std::vector<std::byte> bytes_;
+};
+
+class RangeDecoder {
+ public:
+  explicit RangeDecoder(std::span<const std::byte> bytes) : bytes_(bytes) {
+    for (int i = 0; i < 4; ++i) code_ = code_ << 8 | next();
+  }
+
+  [[nodiscard]] bool bit(BitModel& model) {
+    const std::uint32_t bound = (range_ >> BitModel::kBits) * model.zero();
+    const bool value = code_ >= bound;
+    if (value) {
+      code_ -= bound;
+      range_ -= bound;
+    } else {
+      range_ = bound;
+    }
+    model.learn(value);
+    normalise();
+    return value;
+  }
+
+  [[nodiscard]] std::uint32_t raw(int bits) {
+    std::uint32_t value = 0;
+    while (bits-- > 0) {
+      range_ >>= 1;
+      const bool one = code_ >= range_;
+      if (one) code_ -= range_;
+      value = value << 1 | std::uint32_t(one);
+      normalise();
+    }
+    return value;
+  }
+
+ private:
+  void normalise() {
+    while (range_ < (1u << 24)) {
+      range_ <<= 8;
+      code_ = code_ << 8 | next();
+    }
+  }
+  std::uint32_t next() { return at_ < bytes_.size() ? std::uint32_t(bytes_[at_++]) : 0u; }
+
+  std::span<const std::byte> bytes_;
+  std::size_t at_ = 0;
+  std::uint32_t range_ = 0xffffffffu, code_ = 0;
+};
+
+}  // namespace esvr::codec

@@ -1,0 +1,185 @@
+#include "codec/voxel_coder.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+
+#include "codec/voxel_predictor.h"
+#include "esvr/error.h"
+
+namespace esvr::codec {
+namespace {
+
+/// A voxel's mirror image that has been coded before it.
+struct Image {
+  std::int32_t code = 0;
+  bool active = false;
+};
+
+/// Finds images: the first axis along which one lies before the voxel.
+class Mirrors {
+ public:
+  Mirrors(const VoxelModel& model, const VoxelLayer& layer, const BrickIndex& index)
+      : model_(model), layer_(layer), index_(index) {}
+
+  [[nodiscard]] std::optional<Image> imageOf(Coord voxel) {
+    constexpr std::int32_t Coord::*kAxes[] = {&Coord::x, &Coord::y, &Coord::z};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::int32_t place = model_.mirror[a] - voxel.*kAxes[a];
+      if (model_.mirror[a] == VoxelModel::kNoMirror || place >= voxel.*kAxes[a]) continue;
+      voxel.*kAxes[a] = place;
+      return at(voxel);
+    }
+    return std::nullopt;
+  }
+
+ private:
+  Image at(Coord voxel) {
+    const Coord brick = brickOf(voxel);
+    if (brick != lastBrick_) {
+      lastBrick_ = brick;
+      last_ = index_.find(brick);
+    }
+    if (last_ == BrickIndex::kNone) return {model_.vacantCode, false};
+    const int v = voxelOffset(localOf(voxel));
+    return {layer_.codes[last_ * std::size_t(kBrickVoxels) + std::size_t(v)],
+            layer_.active[last_].test(v)};
+  }
+
+  const VoxelModel& model_;
+  const VoxelLayer& layer_;
+  const BrickIndex& index_;
+  Coord lastBrick_{Box::kMin, 0, 0};
+  std::uint32_t last_ = BrickIndex::kNone;
+};
+
+constexpr std::size_t kActivities = 128, kImages = 3;  // no image, not active, active
+constexpr std::size_t kVacancies = 5;                  // no image, and four of activity and code
+constexpr int kClassBits = 4;
+constexpr std::size_t kClasses = std::size_t{1} << kClassBits;
+
+template <class Side>
+class VoxelCoder {
+ public:
+  VoxelCoder(Side& side, const VoxelModel& model, VoxelLayer& layer)
+      : side_(side),
+        model_(model),
+        layer_(layer),
+        index_(layer.bricks),
+        mirrors_(model, layer, index_) {}
+
+  void brick(std::size_t b) {
+    halo_.fill(layer_, index_, b, model_.vacantCode);
+    for (int v = 0; v < kBrickVoxels; ++v) voxel(b, v);
+  }
+
+ private:
+  void voxel(std::size_t b, int v) {
+    const auto cell = std::size_t(Halo::cell(voxelLocal(v)));
+    const auto image = mirrors_.imageOf(layer_.bricks[b] * kBrickSide + voxelLocal(v));
+    std::int32_t& code = layer_.codes[b * kBrickVoxels + std::size_t(v)];
+    const bool active = codeActive(int(cell), image, layer_.active[b].test(v));
+    if (active) layer_.active[b].set(v);
+    const bool vacant = !active && codeVacant(image, layer_.vacant[b].test(v));
+    if (vacant) layer_.vacant[b].set(v);
+    code = vacant ? model_.vacantCode : codeValue(int(cell), image, code);
+    halo_.code[cell] = code;
+    halo_.active[cell] = active;
+  }
+
+  bool codeActive(int cell, const std::optional<Image>& image, bool active) {
+    const std::size_t state = image ? (image->active ? 2u : 1u) : 0u;
+    return side_.bit(active_[halo_.activityAround(cell)][state], active);
+  }
+
+  bool codeVacant(const std::optional<Image>& image, bool vacant) {
+    std::size_t state = 0;
+    if (image)
+      state = 1u + 2u * std::size_t(image->active) + std::size_t(image->code == model_.vacantCode);
+    return side_.bit(vacant_[state], vacant);
+  }
+
+  std::int32_t codeValue(int cell, const std::optional<Image>& image, std::int32_t written) {
+    if (!model_.common.empty())
+      if (const std::uint32_t known = codeClass(cell, image, written); known > 0)
+        return model_.common[known - 1];
+    return codeDistance(cell, image, written);
+  }
+
+  /// 1 for the first of the common codes, 0 for any that is not common.
+  [[nodiscard]] std::uint32_t classOf(std::int32_t code) const {
+    const auto it = std::find(model_.common.begin(), model_.common.end(), code);
+    return it == model_.common.end() ? 0u : std::uint32_t(it - model_.common.begin()) + 1u;
+  }
+
+  std::uint32_t codeClass(int cell, const std::optional<Image>& image, std::int32_t written) {
+    auto& model = image ? imageClasses_[classOf(image->code)] : classes_[classesAround(cell)];
+    const std::uint32_t coded = model.code(side_, classOf(written));
+    if (coded > model_.common.size()) throw BadInput("a voxel is none of the common ones");
+    return coded;
+  }
+
+  [[nodiscard]] std::size_t classesAround(int cell) const {
+    std::size_t classes = 0;
+    for (const int back : {Halo::kStepX, Halo::kStepY, Halo::kStepZ})
+      classes = classes * kClasses + classOf(halo_.code[std::size_t(cell - back)]);
+    return classes;
+  }
+
+  std::int32_t codeDistance(int cell, const std::optional<Image>& image, std::int32_t written) {
+    predictor_.look(&halo_.code[std::size_t(cell)],
+                    image ? std::optional(image->code) : std::nullopt);
+    const std::size_t context = predictor_.context();
+    const std::int64_t difference = std::int64_t(written) - predictor_.guess();
+    const std::uint64_t magnitude =
+        magnitudes_[context].code(side_, std::uint64_t(std::abs(difference)));
+    if (magnitude > kMaxDifference) throw BadInput("a voxel is further off than can be");
+    const bool negative =
+        magnitude != 0 && side_.bit(sign_[context][lastNegative_], difference < 0);
+    if (magnitude != 0) lastNegative_ = negative;
+    const auto coded = std::int64_t(magnitude);
+    const std::int64_t result = predictor_.guess() + (negative ? -coded : coded);
+    if (result != std::int32_t(result)) throw BadInput("a voxel does not fit 32 bits");
+    predictor_.learn(result);
+    return std::int32_t(result);
+  }
+
+  /// A guess is a sum of seven codes at most.
+  static constexpr std::uint64_t kMaxDifference = std::uint64_t{1} << 35;
+
+  Side& side_;
+  const VoxelModel& model_;
+  VoxelLayer& layer_;
+  BrickIndex index_;
+  Mirrors mirrors_;
+  Halo halo_{};
+  VoxelPredictor predictor_;
+  bool lastNegative_ = false;
+  std::array<std::array<BitModel, kImages>, kActivities> active_;
+  std::array<BitModel, kVacancies> vacant_;
+  std::array<TreeModel<kClassBits>, kClasses * kClasses * kClasses> classes_;
+  std::array<TreeModel<kClassBits>, kClasses> imageClasses_;
+  std::array<std::array<BitModel, 2>, VoxelPredictor::kContexts> sign_;
+  std::array<NumberModelOf<6>, VoxelPredictor::kContexts> magnitudes_;
+};
+
+template <class Side>
+void code(Side& side, std::span<const std::size_t> order, const VoxelModel& model,
+          VoxelLayer& layer) {
+  const auto coder = std::make_unique<VoxelCoder<Side>>(side, model, layer);
+  for (const std::size_t b : order) coder->brick(b);
+}
+
+}  // namespace
+
+void codeVoxels(Writer& side, std::span<const std::size_t> order, const VoxelModel& model,
+                VoxelLayer& layer) {
+  code(side, order, model, layer);
+}
+void codeVoxels(Reader& side, std::span<const std::size_t> order, const VoxelModel& model,
+                VoxelLayer& layer) {
+  code(side, order, model, layer);
+}
+
+}  // namespace esvr::codec

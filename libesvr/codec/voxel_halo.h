@@ -1,0 +1,63 @@
+#pragma once
+/// A brick with the voxels before it, one deep along every axis: what the coders of voxels look at.
+
+#include <array>
+#include <cstdint>
+
+#include "esvr/voxel_layer.h"
+#include "field/brick_index.h"
+
+namespace esvr::codec {
+
+struct Halo {
+  static constexpr int kSide = kBrickSide + 1;
+  static constexpr int kStepX = kSide * kSide, kStepY = kSide, kStepZ = 1;
+  static constexpr int kCells = kSide * kSide * kSide;
+
+  std::array<std::int32_t, kCells> code;
+  std::array<bool, kCells> active;
+
+  static int cell(Coord local) {
+    return (local.x + 1) * kStepX + (local.y + 1) * kStepY + local.z + 1;
+  }
+
+  /// What lies before brick b; nothing within it is changed: each voxel is set before it is read.
+  /// \param vacantCode  of voxels where no brick is
+  void fill(const VoxelLayer& layer, const BrickIndex& index, std::size_t b,
+            std::int32_t vacantCode) {
+    for (int corner = 0; corner < 7; ++corner) {  // of 8, the last being the brick itself
+      const Coord step{(corner >> 2 & 1) - 1, (corner >> 1 & 1) - 1, (corner & 1) - 1};
+      copyFrom(layer, index.find(layer.bricks[b] + step), step, vacantCode);
+    }
+  }
+
+  /// Which of the seven voxels before one are active, as bits from the highest: A, B, C, AB, AC,
+  /// BC, ABC, those before it along x, y, z, x and y, ...
+  [[nodiscard]] std::size_t activityAround(int cell) const {
+    std::size_t bits = 0;
+    for (const int back : {kStepX, kStepY, kStepZ, kStepX + kStepY, kStepX + kStepZ,
+                           kStepY + kStepZ, kStepX + kStepY + kStepZ})
+      bits = bits << 1 | std::size_t(active[std::size_t(cell - back)]);
+    return bits;
+  }
+
+ private:
+  /// The last slice along every axis on which the step is -1.
+  void copyFrom(const VoxelLayer& layer, std::uint32_t neighbour, Coord step,
+                std::int32_t vacantCode) {
+    const auto first = [](int s) { return s < 0 ? -1 : 0; };
+    const auto last = [](int s) { return s < 0 ? -1 : kBrickSide - 1; };
+    for (int x = first(step.x); x <= last(step.x); ++x)
+      for (int y = first(step.y); y <= last(step.y); ++y)
+        for (int z = first(step.z); z <= last(step.z); ++z) {
+          const auto at = std::size_t(cell({x, y, z}));
+          const int v = voxelOffset(localOf({x, y, z}));
+          const bool there = neighbour != BrickIndex::kNone;
+          code[at] = there ? layer.codes[neighbour * std::size_t(kBrickVoxels) + std::size_t(v)]
+                           : vacantCode;
+          active[at] = there && layer.active[neighbour].test(v);
+        }
+  }
+};
+
+}  // namespace esvr::codec

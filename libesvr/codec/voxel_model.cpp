@@ -1,0 +1,134 @@
+#include "codec/voxel_model.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <unordered_map>
+#include <utility>
+
+#include "field/brick_index.h"
+
+namespace esvr::codec {
+namespace {
+
+constexpr std::size_t kCommonShare = 512;     // one of so many voxels makes a code common
+constexpr std::size_t kSamples = 2048;        // of voxels, to find a mirror by
+constexpr double kAlike = 0.9;                // of the samples, for a mirror to be tried
+constexpr std::int32_t kMaxExtent = 1 << 14;  // voxels: further apart no mirror is looked for
+
+constexpr std::int32_t Coord::*kAxes[] = {&Coord::x, &Coord::y, &Coord::z};
+
+bool vacantAt(const VoxelLayer& layer, std::size_t i) {
+  return layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels));
+}
+
+/// What the coder takes vacant voxels for. Any would do: a code near the background serves best.
+std::int32_t vacantCodeOf(const VoxelLayer& layer) {
+  for (std::size_t i = 0; i < layer.codes.size(); ++i)
+    if (vacantAt(layer, i)) return layer.codes[i];
+  return 0;
+}
+
+std::vector<std::int32_t> commonCodes(const VoxelLayer& layer) {
+  if (layer.form != VoxelForm::kFloat && layer.form != VoxelForm::kHalf) return {};
+  std::unordered_map<std::int32_t, std::size_t> counts;
+  std::size_t voxels = 0;
+  for (std::size_t i = 0; i < layer.codes.size(); ++i) {
+    if (vacantAt(layer, i)) continue;
+    ++counts[layer.codes[i]];
+    ++voxels;
+  }
+  std::vector<std::pair<std::size_t, std::int32_t>> often;
+  for (const auto& [code, count] : counts)
+    if (count * kCommonShare >= voxels) often.emplace_back(count, code);
+  std::sort(often.begin(), often.end(), std::greater<>());
+  if (often.size() > VoxelModel::kMaxCommon) often.resize(VoxelModel::kMaxCommon);
+  std::vector<std::int32_t> codes;
+  for (const auto& [count, code] : often) codes.push_back(code);
+  return codes;
+}
+
+struct Sample {
+  Coord place;  ///< voxels from the layer's origin
+  std::int32_t code = 0;
+};
+
+class MirrorSearch {
+ public:
+  MirrorSearch(const VoxelLayer& layer, std::int32_t vacantCode)
+      : layer_(layer), vacantCode_(vacantCode), index_(layer.bricks) {
+    takeSamples();
+    for (const Coord brick : layer.bricks)
+      last_ = maxCoord(last_, brick * kBrickSide + Coord{7, 7, 7});
+  }
+
+  /// The best of the mirrors about the middle half of the grid.
+  [[nodiscard]] std::int32_t along(std::int32_t Coord::*axis) const {
+    const std::int32_t extent = last_.*axis + 1;
+    if (samples_.empty() || extent > kMaxExtent) return VoxelModel::kNoMirror;
+    std::int32_t best = VoxelModel::kNoMirror;
+    double largest = kAlike * double(samples_.size());
+    for (std::int32_t mirror = extent / 2; mirror < extent + extent / 2; ++mirror) {
+      const double now = double(alike(axis, mirror));
+      if (now <= largest) continue;
+      largest = now;
+      best = mirror;
+    }
+    return best;
+  }
+
+ private:
+  /// Evenly among the voxels that are not vacant.
+  void takeSamples() {
+    std::size_t voxels = 0, seen = 0;
+    for (std::size_t i = 0; i < layer_.codes.size(); ++i) voxels += vacantAt(layer_, i) ? 0 : 1;
+    const std::size_t every = std::max<std::size_t>(voxels / kSamples, 1);
+    for (std::size_t i = 0; i < layer_.codes.size(); ++i) {
+      if (vacantAt(layer_, i) || seen++ % every != 0) continue;
+      const Coord local = voxelLocal(int(i % kBrickVoxels));
+      samples_.push_back({layer_.bricks[i / kBrickVoxels] * kBrickSide + local, layer_.codes[i]});
+    }
+  }
+
+  [[nodiscard]] std::size_t alike(std::int32_t Coord::*axis, std::int32_t mirror) const {
+    return std::size_t(std::count_if(samples_.begin(), samples_.end(), [&](Sample sample) {
+      sample.place.*axis = mirror - sample.place.*axis;
+      return codeAt(sample.place) == sample.code;
+    }));
+  }
+
+  [[nodiscard]] std::int32_t codeAt(Coord place) const {
+    const std::uint32_t b = index_.find(brickOf(place));
+    if (b == BrickIndex::kNone) return vacantCode_;
+    return layer_.codes[b * std::size_t(kBrickVoxels) + std::size_t(voxelOffset(localOf(place)))];
+  }
+
+  const VoxelLayer& layer_;
+  std::int32_t vacantCode_;
+  BrickIndex index_;
+  Coord last_;
+  std::vector<Sample> samples_;
+};
+
+}  // namespace
+
+VoxelModel chooseModel(const VoxelLayer& layer) {
+  VoxelModel model;
+  model.vacantCode = vacantCodeOf(layer);
+  model.common = commonCodes(layer);
+  const MirrorSearch search(layer, model.vacantCode);
+  for (std::size_t a = 0; a < 3; ++a) model.mirror[a] = search.along(kAxes[a]);
+  return model;
+}
+
+bool hasMirror(const VoxelModel& model) {
+  return std::any_of(model.mirror.begin(), model.mirror.end(),
+                     [](auto mirror) { return mirror != VoxelModel::kNoMirror; });
+}
+
+VoxelModel withoutMirrors(VoxelModel model) {
+  model.mirror.fill(VoxelModel::kNoMirror);
+  return model;
+}
+
+}  // namespace esvr::codec

@@ -1,0 +1,75 @@
+#pragma once
+/// Foretells a voxel's code from those before it and from its mirror image, by whichever rule has
+/// done best lately. Integers alone (docs/format.md, "Voxels").
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstdlib>
+#include <optional>
+
+#include "codec/voxel_halo.h"
+
+namespace esvr::codec {
+
+class VoxelPredictor {
+ public:
+  static constexpr std::size_t kAroundContexts = 80, kImageContexts = 31;
+  static constexpr std::size_t kContexts = kAroundContexts + kImageContexts;
+
+  /// \param at  the voxel in a halo's codes \param image  its mirror image's code, where it has one
+  void look(const std::int32_t* at, std::optional<std::int32_t> image) {
+    constexpr int kX = Halo::kStepX, kY = Halo::kStepY, kZ = Halo::kStepZ;
+    const std::int64_t a = at[-kX], b = at[-kY], c = at[-kZ], ab = at[-kX - kY], ac = at[-kX - kZ],
+                       bc = at[-kY - kZ], abc = at[-kX - kY - kZ];
+    const std::int64_t low = std::min({a, b, c}), high = std::max({a, b, c});
+    const std::int64_t lorenzo = a + b + c - ab - ac - bc + abc;
+    guesses_ = {image.value_or(0),
+                std::clamp(lorenzo, low, high),
+                (a + b + c) / 3,
+                (2 * (a + b + c) - ab - ac - bc) / 3,
+                c + (b - bc + a - ac) / 2,
+                lorenzo,
+                c};
+    spread_ = std::abs(a - ab) + std::abs(b - bc) + std::abs(c - ac) + std::abs(a - ac) +
+              std::abs(b - ab) + std::abs(c - bc);
+    first_ = image ? kImage : kImage + 1;
+    const auto best = std::min_element(errors_.begin() + first_, errors_.end());
+    best_ = std::size_t(best - errors_.begin());
+  }
+
+  [[nodiscard]] std::int64_t guess() const { return guesses_[best_]; }
+
+  /// How far off the guess is likely to be: of an image, the width of its late errors; else that of
+  /// the spread around the voxel and of late errors, in half octaves.
+  [[nodiscard]] std::size_t context() const {
+    const auto late = std::uint64_t(errors_[best_]);
+    if (best_ == kImage)
+      return kAroundContexts +
+             std::min<std::size_t>(std::size_t(std::bit_width(late / 4)), kImageContexts - 1);
+    const std::uint64_t around = std::uint64_t(spread_) + late / 64;
+    const int width = int(std::bit_width(around));
+    const bool upper = width > 1 && ((around >> (width - 2)) & 1u) != 0;
+    return std::min(std::size_t(2 * width + (upper ? 1 : 0)), kAroundContexts - 1);
+  }
+
+  void learn(std::int64_t code) {
+    for (std::size_t k = std::size_t(first_); k < kGuesses; ++k)
+      errors_[k] +=
+          kUnit * std::min(std::abs(code - guesses_[k]), kMaxError) - errors_[k] / kMemory;
+  }
+
+ private:
+  static constexpr std::size_t kGuesses = 7, kImage = 0;
+  static constexpr std::int64_t kUnit = 16;    // errors are counted in sixteenths
+  static constexpr std::int64_t kMemory = 16;  // and fade by a sixteenth
+  static constexpr std::int64_t kMaxError = std::int64_t{1} << 34;
+
+  std::array<std::int64_t, kGuesses> guesses_{}, errors_{};
+  std::int64_t spread_ = 0;
+  std::ptrdiff_t first_ = 0;  ///< of the guesses that there are
+  std::size_t best_ = 0;
+};
+
+}  // namespace esvr::codec

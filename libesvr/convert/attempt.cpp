@@ -1,0 +1,79 @@
+#include "convert/attempt.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr::convert {
+namespace {
+
+constexpr std::uint32_t kShortShare = 4;  // a short fit has one of so many iterations
+
+FitOptions optionsFor(const Job& job, std::size_t count, FitLength length) {
+  FitOptions options = job.options.fit;
+  options.count = count;
+  options.psnr.reset();
+  options.seconds.reset();
+  return length == FitLength::kWhole ? options : shortened(std::move(options));
+}
+
+std::size_t within(double count, std::uint64_t voxels) {
+  return std::size_t(
+      std::clamp(std::floor(count), 1.0, double(std::max<std::uint64_t>(voxels, 1))));
+}
+
+double psnrOf(const Job& job, const StoredGrid& grid) {
+  const CompareOptions options{.box = job.options.fit.box, .peak = {}, .ssim = false};
+  return compareVolumes(job.input.source, decodeGrid(grid), options).psnrBox;
+}
+
+}  // namespace
+
+FitOptions shortened(FitOptions options) {
+  if (options.iterations)
+    options.iterations = std::max(*options.iterations / kShortShare, 1u);
+  else
+    options.preset = Preset::kDraft;
+  return options;
+}
+
+Attempt attempt(const Job& job, double count, FitLength length) {
+  const SparseVolume& source = job.input.source;
+  Attempt result;
+  result.asked = within(count, activeVoxelCount(source));
+  result.fit = fit(source, optionsFor(job, result.asked, length));
+  result.grid = makeStoredGrid(job.input.descriptor, source, std::move(result.fit.field),
+                               job.options.storage.activity);
+  result.psnr = psnrOf(job, result.grid);
+  return result;
+}
+
+CompactResult compacted(const Job& job, const Attempt& attempt, const StorageTarget& target) {
+  const FitOptions& fit = job.options.fit;
+  return compactGrid(attempt.grid, job.input.source,
+                     {.loss = target.loss,
+                      .psnr = target.psnr,
+                      .bytes = target.bytes,
+                      .box = fit.box,
+                      .device = fit.device});
+}
+
+Conversion conversionOf(FitResult fit, CompactResult compact) {
+  Conversion conversion;
+  conversion.grid = std::move(compact.grid);
+  conversion.fit = std::move(fit);
+  conversion.compact = CompactRecord{compact.loss, compact.steps};
+  return conversion;
+}
+
+Conversion conversionOf(Attempt attempt) {
+  Conversion conversion;
+  conversion.grid = std::move(attempt.grid);
+  conversion.fit = std::move(attempt.fit);
+  return conversion;
+}
+
+}  // namespace esvr::convert

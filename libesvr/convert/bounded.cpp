@@ -1,0 +1,95 @@
+#include "convert/bounded.h"
+
+#include <string>
+#include <utility>
+
+#include "compact/measure_layers.h"
+#include "convert/size_search.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+#include "esvr/residual.h"
+
+namespace esvr::convert {
+namespace {
+
+// Measured on the volumes of docs/benchmarks.md.
+constexpr std::uint64_t kEllipsoidShare = 4;  // ellipsoids get one of so many bytes of the voxels
+constexpr double kPromising = 1.15;  // bytes of a short fit, to the voxels', for a whole one
+
+Conversion asVoxels(const Job& job, VoxelLayer layer) {
+  Conversion conversion;
+  conversion.grid = makeStoredVoxels(job.input.descriptor, job.input.source, std::move(layer));
+  return conversion;
+}
+
+/// Nothing where there is no grid of so few bytes, or no residual to it.
+std::optional<Conversion> withEllipsoids(const Job& job, double bound, std::uint64_t bytes) {
+  auto conversion = searchSize(job, bytes).conversion;
+  if (!conversion) return std::nullopt;
+  auto grid = withResidual(std::move(conversion->grid), job.input.source, bound);
+  if (!grid) return std::nullopt;
+  conversion->grid = std::move(*grid);
+  const Box box = job.options.fit.box.value_or(activeBox(job.input.source));
+  conversion->grid.layerErrors = measureLayers(conversion->grid, job.input.source, box);
+  return conversion;
+}
+
+/// The smallest form that was found, and what it was chosen from.
+struct Smallest {
+  Conversion conversion;
+  BoundRecord record;
+
+  void take(Conversion now) {
+    const std::uint64_t bytes = bytesAdded(now.grid);
+    if (record.ellipsoidBytes != 0 && bytes >= record.ellipsoidBytes) return;
+    record.ellipsoidBytes = bytes;
+    if (bytes < record.voxelBytes) conversion = std::move(now);
+  }
+};
+
+/// Tries a short fit, then a whole one where the short one came near to the voxels.
+void tryEllipsoids(const Job& job, double bound, Smallest& best) {
+  ConvertOptions shortFit = job.options;
+  shortFit.fit = shortened(shortFit.fit);
+  for (const ConvertOptions* options : {&std::as_const(shortFit), &job.options}) {
+    auto now =
+        withEllipsoids({job.input, *options}, bound, best.record.voxelBytes / kEllipsoidShare);
+    if (!now) return;
+    const bool promising =
+        double(bytesAdded(now->grid)) <= kPromising * double(best.record.voxelBytes);
+    best.take(std::move(*now));
+    if (!promising) return;
+  }
+}
+
+}  // namespace
+
+double boundOf(const BoundGoal& goal, const SparseVolume& source) {
+  if (!goal.relative) return goal.bound;
+  const ValueRange range = activeRange(source);
+  return goal.bound * (double(range.max) - double(range.min));
+}
+
+Conversion convertLossless(const Job& job) {
+  if (job.input.descriptor.valueType == ValueType::kDouble)
+    throw UsageError(
+        "grid '" + job.input.descriptor.name +
+        "' is of doubles, which are read as float32: a lossless file cannot hold them");
+  return asVoxels(job, exactLayer(job.input.source));
+}
+
+Conversion convertWithin(const Job& job, const BoundGoal& goal) {
+  const SparseVolume& source = job.input.source;
+  const double bound = boundOf(goal, source);
+  if (bound == 0.0) return asVoxels(job, exactLayer(source));
+  Conversion voxels = asVoxels(job, boundedLayer(source, bound, job.options.storage.activity));
+  if (isNarrowBand(job.input.descriptor, source)) return voxels;
+  Smallest best{std::move(voxels), {}};
+  best.record.voxelBytes = bytesAdded(best.conversion.grid);
+  if (!goal.voxelsOnly) tryEllipsoids(job, bound, best);
+  best.conversion.bound = best.record;
+  return std::move(best.conversion);
+}
+
+}  // namespace esvr::convert

@@ -1,0 +1,113 @@
+#include "esvr/convert.h"
+
+#include <string>
+#include <utility>
+
+#include "convert/attempt.h"
+#include "convert/bounded.h"
+#include "convert/psnr_search.h"
+#include "convert/size_search.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr {
+namespace {
+
+using convert::Job;
+
+/// A fit that was made, as `storage` has it.
+Conversion stored(const ConvertInput& input, FitResult fit, const CommonFitOptions& options,
+                  const StorageOptions& storage) {
+  StoredGrid grid =
+      makeStoredGrid(input.descriptor, input.source, std::move(fit.field), storage.activity);
+  grid.curve = withoutTimes(fit.curve);
+  Conversion conversion;
+  if (storage.form == Storage::kFloat32) {
+    conversion.fit = std::move(fit);
+    conversion.grid = std::move(grid);
+    return conversion;
+  }
+  return convert::conversionOf(std::move(fit), compactGrid(grid, input.source,
+                                                           {.loss = storage.loss,
+                                                            .psnr = options.psnr,
+                                                            .box = options.box,
+                                                            .device = options.device}));
+}
+
+/// What a goal asks for is made by the function of its name.
+class Converter {
+ public:
+  explicit Converter(Job job) : job_(job) {}
+
+  Conversion operator()(const FitGoal&) const {
+    const FitOptions& options = job_.options.fit;
+    return stored(job_.input, fit(job_.input.source, options), options, job_.options.storage);
+  }
+  Conversion operator()(const SizeGoal& goal) const {
+    if (job_.options.storage.form != Storage::kCompact)
+      throw UsageError("a size needs the compact storage, where bits can be chosen");
+    auto result = convert::searchSize(job_, goal.bytes);
+    if (result.conversion) return std::move(*result.conversion);
+    throw UsageError("grid '" + job_.input.descriptor.name + "' takes at least " +
+                     std::to_string(result.needed) + " bytes; there are " +
+                     std::to_string(goal.bytes));
+  }
+  Conversion operator()(const PsnrGoal& goal) const { return convert::searchPsnr(job_, goal.psnr); }
+  Conversion operator()(const BoundGoal& goal) const { return convert::convertWithin(job_, goal); }
+  Conversion operator()(const LosslessGoal&) const { return convert::convertLossless(job_); }
+
+ private:
+  Job job_;
+};
+
+/// What a reader gets: through the file's own bytes, so that what is measured is what is stored.
+StoredGrid throughTheFormat(StoredGrid grid) {
+  EsvrFile file;
+  file.grids.push_back(std::move(grid));
+  const auto bytes = encodeEsvr(file);
+  return std::move(decodeEsvr(bytes, "the stored grid").grids.front());
+}
+
+std::optional<double> boundOf(const Goal& goal, const SparseVolume& source) {
+  if (std::holds_alternative<LosslessGoal>(goal)) return 0.0;
+  if (const auto* within = std::get_if<BoundGoal>(&goal)) return convert::boundOf(*within, source);
+  return std::nullopt;
+}
+
+/// A bound is checked on what the file holds.
+void requireBound(const ConvertInput& input, const StoredGrid& grid, double bound) {
+  const double error = largestDifference(input.source, decodeGrid(grid));
+  if (error > bound)
+    throw RuntimeFailure("grid '" + input.descriptor.name + "': an error of " +
+                         std::to_string(error) + " exceeds the bound of " + std::to_string(bound));
+}
+
+}  // namespace
+
+Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options) {
+  ConvertOptions own = options;
+  own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
+  Conversion conversion = std::visit(Converter({input, own}), options.goal);
+  conversion.grid = throughTheFormat(std::move(conversion.grid));
+  if (const auto bound = boundOf(options.goal, input.source))
+    requireBound(input, conversion.grid, *bound);
+  return conversion;
+}
+
+PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions& options,
+                               const StorageOptions& storage) {
+  if (options.method.learnK && storage.form == Storage::kCompact)
+    throw UsageError("a k for each ellipsoid needs float32: the compact form has one edge");
+  if (isNarrowBand(input.descriptor, input.source))
+    throw UsageError(
+        "grid '" + input.descriptor.name +
+        "' is a level set: the paper's loss compares windows, which a narrow band does "
+        "not fill");
+  PaperFitResult made = fitByPaper(input.source, options);
+  Conversion conversion = stored(input, std::move(made.fit), options, storage);
+  conversion.grid = throughTheFormat(std::move(conversion.grid));
+  return {std::move(conversion), std::move(made.record)};
+}
+
+}  // namespace esvr

@@ -1,0 +1,148 @@
+#include "convert/psnr_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace esvr::convert {
+namespace {
+
+// Measured on the volumes of docs/benchmarks.md.
+constexpr double kDbPerDoubling = 4.5;        // PSNR that twice the ellipsoids gain
+constexpr double kShortFitBehind = 2.5;       // dB that a short fit stays behind a whole one
+constexpr double kVoxelsPerEllipsoid = 35.0;  // the first guess
+constexpr double kMaxGrowth = 8.0;            // factor of the number, from fit to fit
+constexpr std::size_t kMaxFits = 3;           // and more until one reaches the PSNR
+
+/// dB by which an attempt may exceed the PSNR: more ellipsoids or more bits would cost as much.
+/// The optimum is flat.
+struct Margin {
+  double aim, min, max;
+};
+constexpr Margin kCompactMargin{kUsualLoss, 0.35, 2.0};
+constexpr Margin kFloat32Margin{0.3, 0.0, 0.9};
+
+class PsnrSearch {
+ public:
+  PsnrSearch(const Job& job, double psnr)
+      : job_(job),
+        psnr_(psnr),
+        compact_(job.options.storage.form == Storage::kCompact),
+        margin_(compact_ ? kCompactMargin : kFloat32Margin),
+        maxCount_(job.options.fit.count.value_or(activeVoxelCount(job.input.source))) {}
+
+  Conversion run() {
+    const double guess = double(activeVoxelCount(job_.input.source)) / kVoxelsPerEllipsoid;
+    const Attempt draft = attempt(job_, capped(guess), FitLength::kShort);
+    double count = scaledCount(draft, aim() - kShortFitBehind);
+    do {
+      attempts_.push_back(attempt(job_, capped(count), FitLength::kWhole));
+      if (attempts_.back().cancelled() || goodEnough(attempts_.back())) break;
+      count = nextCount();
+    } while (attempts_.size() < kMaxFits || !anyReached());
+    return anyReached() ? smallest() : best();
+  }
+
+ private:
+  [[nodiscard]] double aim() const { return psnr_ + margin_.aim; }
+  [[nodiscard]] double capped(double count) const { return std::min(count, double(maxCount_)); }
+  [[nodiscard]] bool reached(const Attempt& a) const { return a.psnr > psnr_; }
+  [[nodiscard]] bool anyReached() const {
+    return std::any_of(attempts_.begin(), attempts_.end(),
+                       [&](const Attempt& a) { return reached(a); });
+  }
+
+  [[nodiscard]] bool nearAim(const Attempt& a) const {
+    const double over = a.psnr - psnr_;
+    return over >= margin_.min && over <= margin_.max;
+  }
+
+  [[nodiscard]] bool goodEnough(const Attempt& a) const {
+    const bool allThereIs =
+        a.asked >= std::min<std::uint64_t>(maxCount_, activeVoxelCount(job_.input.source));
+    return nearAim(a) || (a.psnr < psnr_ + margin_.min && allThereIs);
+  }
+
+  /// The number that should reach a PSNR, from what an attempt reached.
+  [[nodiscard]] static double scaledCount(const Attempt& from, double psnr) {
+    const double factor = std::exp2((psnr - from.psnr) / kDbPerDoubling);
+    return double(std::max<std::size_t>(from.count(), 1)) *
+           std::clamp(factor, 1.0 / kMaxGrowth, kMaxGrowth);
+  }
+
+  /// The nearest attempt below the aim, or above it; null where there is none.
+  [[nodiscard]] const Attempt* nearest(bool above) const {
+    const Attempt* found = nullptr;
+    for (const Attempt& a : attempts_)
+      if ((a.psnr >= aim()) == above && (!found || (a.psnr < found->psnr) == above)) found = &a;
+    return found;
+  }
+
+  /// Interpolated between the nearest attempts on either side; else scaled from the last.
+  [[nodiscard]] double nextCount() const {
+    const Attempt *below = nearest(false), *above = nearest(true);
+    if (!below || !above) return scaledCount(attempts_.back(), aim());
+    const double share = (aim() - below->psnr) / (above->psnr - below->psnr);
+    return double(below->count()) *
+           std::pow(double(above->count()) / double(below->count()), share);
+  }
+
+  /// Whether an attempt that reached the PSNR may be the smallest: where some are near the aim,
+  /// only these; else the one that exceeds the PSNR least.
+  [[nodiscard]] bool candidate(const Attempt& a) const {
+    if (!reached(a)) return false;
+    const auto near = [&](const Attempt& other) { return nearAim(other); };
+    if (std::any_of(attempts_.begin(), attempts_.end(), near)) return nearAim(a);
+    return std::none_of(attempts_.begin(), attempts_.end(), [&](const Attempt& other) {
+      return reached(other) && other.psnr < a.psnr;
+    });
+  }
+
+  [[nodiscard]] Conversion stored(Attempt attempt) const {
+    if (!compact_) return conversionOf(std::move(attempt));
+    CompactResult compact = compacted(job_, attempt, {.psnr = psnr_});
+    return conversionOf(std::move(attempt.fit), std::move(compact));
+  }
+
+  [[nodiscard]] Conversion marked(Attempt attempt, FitEnd end) const {
+    if (!attempt.cancelled()) attempt.fit.end = end;
+    return stored(std::move(attempt));
+  }
+
+  [[nodiscard]] Conversion smallest() {
+    std::optional<Conversion> smallest;
+    std::uint64_t fewest = 0;
+    std::vector<bool> candidates;
+    for (const Attempt& a : attempts_) candidates.push_back(candidate(a));
+    for (std::size_t i = 0; i < attempts_.size(); ++i) {
+      if (!candidates[i]) continue;
+      Conversion now = marked(std::move(attempts_[i]), FitEnd::kPsnrReached);
+      const std::uint64_t bytes = bytesAdded(now.grid);
+      if (smallest && bytes >= fewest) continue;
+      smallest = std::move(now);
+      fewest = bytes;
+    }
+    return std::move(*smallest);
+  }
+
+  [[nodiscard]] Conversion best() {
+    const auto worse = [](const Attempt& a, const Attempt& b) { return a.psnr < b.psnr; };
+    return marked(std::move(*std::max_element(attempts_.begin(), attempts_.end(), worse)),
+                  FitEnd::kPsnrMissed);
+  }
+
+  const Job& job_;
+  double psnr_;
+  bool compact_;
+  Margin margin_;
+  std::uint64_t maxCount_;
+  std::vector<Attempt> attempts_;
+};
+
+}  // namespace
+
+Conversion searchPsnr(const Job& job, double psnr) { return PsnrSearch(job, psnr).run(); }
+
+}  // namespace esvr::convert

@@ -1,0 +1,96 @@
+#include "convert/size_search.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "format/layout.h"
+
+namespace esvr::convert {
+namespace {
+
+// Measured on the volumes of docs/benchmarks.md.
+constexpr double kBytesPerEllipsoid = 8.0;  // the first guess
+constexpr double kShortFitPrice =
+    0.94;                               // bytes an ellipsoid of a short fit takes, to a whole one's
+constexpr double kMaxUsefulLoss = 2.5;  // dB: beyond it, fewer ellipsoids are better
+constexpr double kRepairFactor = 1.25;  // bytes an ellipsoid grow by at least, repair by repair
+constexpr int kMaxRepairs = 3;
+constexpr std::uint64_t kWorthRefilling = 100;  // one of so many bytes unused is worth a search
+
+/// Sections of ellipsoids begin at multiples of kAlignment, one a chunk.
+std::uint64_t paddingOf(const StoredGrid& grid) {
+  return grid.field.chunks.size() * (format::kAlignment - 1);
+}
+
+/// What a grid adds to a file besides its ellipsoids, padding included.
+std::uint64_t bytesBesides(const CompactResult& compact) {
+  return bytesAdded(compact.grid) - compact.bytes + paddingOf(compact.grid);
+}
+
+class SizeSearch {
+ public:
+  SizeSearch(const Job& job, std::uint64_t bytes) : job_(job), bytes_(bytes) {}
+
+  SizeResult run() {
+    Attempt last = attempt(job_, double(bytes_) / kBytesPerEllipsoid, FitLength::kShort);
+    const Price first = priceOf(last);
+    if (!reserve(first.besides)) return refused();
+    double each = first.each / kShortFitPrice;
+    for (int repairs = 0; !last.cancelled(); ++repairs) {
+      last = attempt(job_, double(left_) / each, FitLength::kWhole);
+      CompactResult now = filled(last);
+      if (besides_ >= bytes_) return refused();
+      const bool fits = now.bytes <= left_;
+      if (fits && (now.loss <= kMaxUsefulLoss || repairs + 1 >= kMaxRepairs))
+        return {conversionOf(std::move(last.fit), std::move(now)), 0};
+      if (!fits && last.asked == 1) return {std::nullopt, besides_ + now.bytes};
+      each = std::max(priceOf(last).each, kRepairFactor * each);
+    }
+    CompactResult compact = compactFor(last);
+    return {conversionOf(std::move(last.fit), std::move(compact)), 0};
+  }
+
+ private:
+  /// What an attempt's ellipsoids cost at the usual loss.
+  struct Price {
+    double each = 0.0;          ///< bytes an ellipsoid
+    std::uint64_t besides = 0;  ///< bytes of the grid's other sections
+  };
+  [[nodiscard]] Price priceOf(const Attempt& attempt) const {
+    const CompactResult compact = compacted(job_, attempt, {});
+    const double count = double(std::max<std::size_t>(attempt.count(), 1));
+    return {std::max(double(compact.bytes) / count, 1.0), bytesBesides(compact)};
+  }
+
+  /// Keeps room for the grid's other sections. \return false where they take all there is
+  bool reserve(std::uint64_t besides) {
+    besides_ = besides;
+    left_ = besides < bytes_ ? bytes_ - besides : 0;
+    return left_ > 0;
+  }
+
+  [[nodiscard]] SizeResult refused() const { return {std::nullopt, besides_}; }
+
+  [[nodiscard]] CompactResult compactFor(const Attempt& attempt) const {
+    return compacted(job_, attempt, {.bytes = left_});
+  }
+
+  /// The whole fit's grid may have other sections than the short one's, larger or smaller.
+  CompactResult filled(const Attempt& attempt) {
+    CompactResult now = compactFor(attempt);
+    const std::uint64_t besides = bytesBesides(now), padding = paddingOf(now.grid);
+    const bool larger = besides > besides_ + padding;
+    const bool muchSmaller = besides_ > besides + padding + bytes_ / kWorthRefilling;
+    if ((larger || muchSmaller) && reserve(besides)) now = compactFor(attempt);
+    return now;
+  }
+
+  const Job& job_;
+  std::uint64_t bytes_, besides_ = 0, left_ = 0;
+};
+
+}  // namespace
+
+SizeResult searchSize(const Job& job, std::uint64_t bytes) { return SizeSearch(job, bytes).run(); }
+
+}  // namespace esvr::convert

@@ -1,0 +1,68 @@
+#include <tbb/parallel_for.h>
+
+#include <array>
+
+#include "esvr/field.h"
+#include "field/evaluate_plan.h"
+#include "field/line_math.h"
+
+namespace esvr {
+namespace {
+
+using Counts = std::array<std::uint32_t, kBrickVoxels>;
+
+/// Adds 1 to every voxel of a brick that lies in an ellipsoid's support.
+void addHits(const LineForm& f, const std::array<float, 3>& corner, float cutoff, Counts& counts) {
+  const float cx = f.center[0] - corner[0], cy = f.center[1] - corner[1],
+              cz = f.center[2] - corner[2];
+  for (int x = 0; x < kBrickSide; ++x)
+    for (int z = 0; z < kBrickSide; ++z) {
+      const float dx = float(x) - cx, dz = float(z) - cz;
+      const float pz[3] = {f.pz[0] * dz, f.pz[1] * dz, f.pz[2] * dz};
+      const float closest = closestSquared(f, dx, pz);
+      if (!(closest < cutoff)) continue;
+      for (int y = 0; y < kBrickSide; ++y)
+        if (squaredAt(f, closest, distanceAlong(f, float(y), cy, dx, dz)) < cutoff)
+          ++counts[std::size_t(voxelOffset({x, y, z}))];
+    }
+}
+
+EllipsoidHits totalOf(const Counts& counts) {
+  EllipsoidHits total;
+  for (const std::uint32_t count : counts) {
+    total.pairs += count;
+    total.voxels += count > 0 ? 1 : 0;
+  }
+  return total;
+}
+
+/// What the ellipsoids of a brick's list do in it.
+EllipsoidHits hitsInBrick(const EvaluatePlan& plan, std::size_t b, Coord brickCorner) {
+  Counts counts{};
+  for (auto pair = plan.pairs.brickBegin[b]; pair != plan.pairs.brickBegin[b + 1]; ++pair) {
+    const std::size_t i = plan.pairs.ellipsoid[pair];
+    const Coord corner = brickCorner - plan.field.origin(i);
+    addHits(plan.field.forms[i], {float(corner.x), float(corner.y), float(corner.z)},
+            plan.field.kernel(i).cutoff, counts);
+  }
+  return totalOf(counts);
+}
+
+}  // namespace
+
+EllipsoidHits countHits(const Field& field, std::span<const Coord> corners) {
+  const EvaluatePlan plan = planEvaluation(field, corners);
+  std::vector<EllipsoidHits> hits(corners.size());
+  tbb::parallel_for(std::size_t(0), corners.size(),
+                    [&](std::size_t b) { hits[b] = hitsInBrick(plan, b, corners[b]); });
+  EllipsoidHits total;
+  for (const EllipsoidHits& h : hits) total.pairs += h.pairs, total.voxels += h.voxels;
+  return total;
+}
+
+double averageHits(const Field& field) {
+  const EllipsoidHits total = countHits(field, reachedBricks(field));
+  return total.voxels > 0 ? double(total.pairs) / double(total.voxels) : 0.0;
+}
+
+}  // namespace esvr

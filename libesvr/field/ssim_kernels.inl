@@ -1,0 +1,38 @@
+// Body of ssim_kernels_*.cpp: the same source under other instruction sets; the loops over i are
+// for the compiler to vectorise. No inline library function may be called here, as in
+// brick_kernels.inl.
+
+#include "field/ssim_kernels.h"
+#include "field/ssim_window.h"
+
+namespace esvr::ESVR_KERNEL_NAMESPACE {
+namespace {
+
+/// The window is symmetric: two voxels share a multiplication.
+inline double sumAt(const double* weights, const double* in, int stride) {
+  double sum = weights[kSsimRadius] * in[kSsimRadius * stride];
+  for (int tap = 0; tap < kSsimRadius; ++tap)
+    sum += weights[tap] * (in[tap * stride] + in[(kSsimTaps - 1 - tap) * stride]);
+  return sum;
+}
+
+void sumTaps(const double* weights, const double* in, int stride, double* __restrict out,
+             int count) {
+  for (int i = 0; i < count; ++i) out[i] = sumAt(weights, in + i, stride);
+}
+
+void sumRows(const double* weights, const double* in, double* __restrict out, int rows) {
+  for (int row = 0; row < rows; ++row, in += kHaloSide, out += kBrickSide)
+    for (int i = 0; i < kBrickSide; ++i) out[i] = sumAt(weights, in + i, 1);
+}
+
+void multiply(const double* a, const double* b, double* __restrict product, int count) {
+  for (int i = 0; i < count; ++i) product[i] = a[i] * b[i];
+}
+
+}  // namespace
+
+extern const SsimKernels kSsimKernels;
+const SsimKernels kSsimKernels{ESVR_KERNEL_NAME, sumTaps, sumRows, multiply};
+
+}  // namespace esvr::ESVR_KERNEL_NAMESPACE

@@ -1,0 +1,3 @@
+#define ESVR_KERNEL_NAMESPACE avx2
+#define ESVR_KERNEL_NAME "avx2"
+#include "field/ssim_kernels.inl"

@@ -1,0 +1,3 @@
+#define ESVR_KERNEL_NAMESPACE avx512
+#define ESVR_KERNEL_NAME "avx512"
+#include "field/ssim_kernels.inl"

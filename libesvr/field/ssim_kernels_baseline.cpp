@@ -1,0 +1,3 @@
+#define ESVR_KERNEL_NAMESPACE baseline
+#define ESVR_KERNEL_NAME "baseline"
+#include "field/ssim_kernels.inl"

@@ -1,0 +1,188 @@
+#include "fit/cpu/cpu_intensity_passes.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace esvr {
+namespace {
+
+using Range = tbb::blocked_range<std::size_t>;
+constexpr std::size_t kBrickGrain = 4, kEllipsoidGrain = 256;
+/// Pairs whose tapes are kept from pass to pass: some 200 MB. More are worked out anew each time.
+constexpr std::size_t kMaxKept = 400'000;
+
+std::vector<Coord> asBricks(std::vector<Coord> corners) {
+  for (Coord& c : corners) c = brickOf(c);
+  return corners;
+}
+
+/// Sets the voxels of a mask to 0; most words of it are all ones or none.
+void clearVoxels(const BrickMask& mask, float* values) {
+  for (const std::uint64_t word : mask.words) {
+    if (word == ~std::uint64_t{0}) {
+      std::fill_n(values, 64, 0.0f);
+    } else {
+      for (std::uint64_t left = word; left != 0; left &= left - 1)
+        values[std::countr_zero(left)] = 0.0f;
+    }
+    values += 64;
+  }
+}
+
+bool contains(const Box& box, Coord corner) {
+  return box.contains(corner) &&
+         box.contains(corner + Coord{kBrickSide - 1, kBrickSide - 1, kBrickSide - 1});
+}
+
+}  // namespace
+
+CpuIntensityPasses::CpuIntensityPasses(const IntensityTarget& target)
+    : source_(target.source),
+      stored_(storedRule(target.stored)),
+      box_(target.box),
+      restricted_(target.restrictToBricks),
+      known_(asBricks(knownCorners(target))) {
+  for (const Coord brick : known_.bricks())
+    wanted_.push_back(sourceValues(source_, brick * kBrickSide));
+}
+
+void CpuIntensityPasses::setShapes(const Field& field) {
+  background_ = field.background;
+  const auto reach = supports(field);
+  const SupportOf supportOf = [&](std::size_t i) -> const Support& { return reach[i]; };
+  BrickIndex index = known_;
+  if (!restricted_) index.append(missingBricks(known_, reach.size(), supportOf));
+  plan_ = {gather(field), pairsWithin(index, reach.size(), supportOf)};
+  corners_.clear();
+  for (const Coord brick : index.bricks()) corners_.push_back(brick * kBrickSide);
+  projections_.resize(plan_.pairs.pairCount());
+  keeps_ = plan_.pairs.pairCount() <= kMaxKept;
+  kept_ = false;
+  tapes_.resize(keeps_ ? corners_.size() : 0);
+  brickError_.resize(corners_.size());
+  exact_.assign(corners_.size(), {});
+}
+
+template <class Number>
+void CpuIntensityPasses::setForms(std::span<const Number> intensities) {
+  for (std::size_t i = 0; i < intensities.size(); ++i)
+    plan_.field.forms[i].intensity = float(intensities[i]);
+}
+
+/// The sum of a brick's ellipsoids, and their phi on the tapes.
+std::span<const PairTape> CpuIntensityPasses::forward(std::size_t brick, PairTapes& scratch,
+                                                      float* sum) {
+  const BrickKernels& kernels = brickKernels();
+  const auto& [gathered, pairs] = plan_;
+  const auto begin = pairs.brickBegin[brick], end = pairs.brickBegin[brick + 1];
+  if (kept_) {
+    const auto tapes = tapes_[brick].tapes();
+    for (auto pair = begin; pair != end; ++pair)
+      kernels.addTape(tapes[pair - begin], gathered.forms[pairs.ellipsoid[pair]].intensity, sum);
+    return tapes;
+  }
+  scratch.reserve(end - begin);
+  float* phi = scratch.phi.get();
+  for (auto pair = begin; pair != end; ++pair) {
+    const auto i = pairs.ellipsoid[pair];
+    const Coord local = corners_[brick] - gathered.origin(i);
+    const float corner[3] = {float(local.x), float(local.y), float(local.z)};
+    PairTape& tape = scratch.tapes[pair - begin];
+    tape.phi = phi;
+    kernels.forward(gathered.forms[i], corner, gathered.kernel(i), sum, tape);
+    phi += tape.floats;
+  }
+  if (keeps_) tapes_[brick].keep(scratch.tapes);
+  return scratch.tapes;
+}
+
+/// Forward over every brick, middle(brick, sum), which makes the sum what is to be projected on
+/// the ellipsoids, and, where asked, backward.
+template <class Middle>
+void CpuIntensityPasses::pass(bool backward, const Middle& middle) {
+  tbb::enumerable_thread_specific<PairTapes> scratches;
+  tbb::parallel_for(Range(0, corners_.size(), kBrickGrain), [&](const Range& range) {
+    PairTapes& scratch = scratches.local();
+    for (std::size_t b = range.begin(); b != range.end(); ++b) {
+      alignas(64) float sum[kBrickVoxels] = {};
+      const auto tapes = forward(b, scratch, sum);
+      middle(b, sum);
+      if (!backward) continue;
+      const auto begin = plan_.pairs.brickBegin[b];
+      for (std::size_t k = 0; k < tapes.size(); ++k)
+        brickKernels().projectTape(tapes[k], sum, projections_[begin + k]);
+    }
+  });
+  kept_ = keeps_;
+}
+
+void CpuIntensityPasses::sumPairs(float PairProjection::*value, std::vector<double>& out) const {
+  const auto& pairs = plan_.pairs;
+  const std::size_t n = plan_.field.forms.size();
+  out.assign(n, 0.0);
+  tbb::parallel_for(Range(0, n, kEllipsoidGrain), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      for (auto k = pairs.ellipsoidBegin[i]; k != pairs.ellipsoidBegin[i + 1]; ++k)
+        out[i] += double(projections_[pairs.pairOf[k]].*value);
+  });
+}
+
+StoredError CpuIntensityPasses::residualOf(std::size_t brick, float* sum, BrickMask* exact) const {
+  const float* const wanted = brick < wanted_.size() ? wanted_[brick] : nullptr;
+  const Coord corner = corners_[brick];
+  const bool inBox = contains(box_, corner);
+  StoredError error;
+  for (int v = 0; v < kBrickVoxels; ++v) {
+    const float target = wanted ? wanted[v] : source_.background;
+    const float value = background_ + sum[v];
+    const double missed = double(stored_(value)) - double(target);
+    sum[v] = missed == 0.0 ? 0.0f : value - target;
+    if (missed == 0.0) {
+      if (exact) exact->set(v);
+    } else if (inBox || box_.contains(corner + voxelLocal(v))) {
+      error.squares += missed * missed;
+      error.largest = std::max(error.largest, std::abs(missed));
+    }
+  }
+  return error;
+}
+
+StoredError CpuIntensityPasses::total() const {
+  StoredError total;
+  for (const StoredError& e : brickError_) {
+    total.squares += e.squares;
+    total.largest = std::max(total.largest, e.largest);
+  }
+  return total;
+}
+
+StoredError CpuIntensityPasses::error(std::span<const float> intensities) {
+  setForms(intensities);
+  pass(false, [&](std::size_t b, float* sum) { brickError_[b] = residualOf(b, sum, nullptr); });
+  return total();
+}
+
+StoredError CpuIntensityPasses::gradient(std::span<const float> intensities,
+                                         IntensityGradient& out) {
+  setForms(intensities);
+  pass(true, [&](std::size_t b, float* sum) {
+    exact_[b] = {};
+    brickError_[b] = residualOf(b, sum, &exact_[b]);
+  });
+  sumPairs(&PairProjection::rPhi, out.byIntensity);
+  sumPairs(&PairProjection::phi2, out.curvature);
+  return total();
+}
+
+void CpuIntensityPasses::applyNormal(std::span<const double> direction, std::vector<double>& out) {
+  setForms(direction);
+  pass(true, [&](std::size_t b, float* sum) { clearVoxels(exact_[b], sum); });
+  sumPairs(&PairProjection::rPhi, out);
+}
+
+}  // namespace esvr

@@ -1,0 +1,141 @@
+#include "fit/cpu/cpu_optimiser.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/add_seconds.h"
+#include "esvr/error.h"
+#include "field/gather.h"
+#include "fit/cpu/fit_errors.h"
+#include "fit/ellipsoid_math.h"
+#include "fit/parameter_gradient.h"
+#include "fit/scene.h"
+
+namespace esvr {
+namespace {
+
+constexpr int kListsStale = -1;
+
+}  // namespace
+
+CpuOptimiser::CpuOptimiser(const FitTarget& target, const OptimiserOptions& options,
+                           const Tuning& tuning)
+    : target_(target),
+      options_(options),
+      tuning_(tuning),
+      pass_(target, kernelConstants<double>(options.kernel)),
+      unitVariance_(kernelVariance(pass_.kernel())),
+      limits_(limitsOf(target, tuning)) {}
+
+void CpuOptimiser::rebuildLists() {
+  pass_.rebuild(ellipsoids_, tuning_.listSlack);
+  iterationsSinceRebuild_ = 0;
+}
+
+void CpuOptimiser::refreshResiduals() {
+  pass_.rebuild(ellipsoids_, kRoundingSlack);
+  pass_.residuals(ellipsoids_, residuals_);
+  iterationsSinceRebuild_ = kListsStale;
+}
+
+std::vector<Ellipsoid> CpuOptimiser::newSeeds(std::size_t count) {
+  const AddSeconds timer(secondsSeeding_);
+  refreshResiduals();
+  SeedOptions options;
+  options.draw = {count, target_.bricks.size(), signsOf(target_),
+                  options_.seed ^ (++samplings_ << 32)};
+  options.window = seedWindow(target_, std::max(count, ellipsoids_.size()), tuning_);
+  options.unitVariance = unitVariance_;
+  options.intensity = tuning_.seedIntensity;
+  return seedsFromResidual({pass_.index(), residuals_}, options);
+}
+
+void CpuOptimiser::growTo(std::size_t count) {
+  if (count <= ellipsoids_.size()) return;
+  const auto seeds = newSeeds(count - ellipsoids_.size());
+  ellipsoids_.insert(ellipsoids_.end(), seeds.begin(), seeds.end());
+  states_.resize(ellipsoids_.size());
+  gradients_.resize(ellipsoids_.size());
+}
+
+std::vector<std::size_t> CpuOptimiser::leastUseful(std::size_t count) const {
+  std::vector<std::pair<double, std::size_t>> settled;
+  for (std::size_t i = 0; i < ellipsoids_.size(); ++i)
+    if (states_[i].steps >= std::uint32_t(tuning_.graceSteps))
+      settled.emplace_back(removalError(ellipsoids_[i].intensity, gradients_[i].phi2,
+                                        gradients_[i].byParameter[kParameters - 1]),
+                           i);
+  count = std::min(count, settled.size());
+  std::nth_element(settled.begin(), settled.begin() + std::ptrdiff_t(count), settled.end());
+  std::vector<std::size_t> chosen;
+  for (std::size_t k = 0; k < count; ++k) chosen.push_back(settled[k].second);
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
+}
+
+void CpuOptimiser::relocate(std::size_t count) {
+  const auto chosen = leastUseful(count);
+  if (chosen.empty()) return;
+  const auto seeds = newSeeds(chosen.size());
+  for (std::size_t k = 0; k < seeds.size(); ++k) {
+    ellipsoids_[chosen[k]] = seeds[k];
+    states_[chosen[k]] = {};
+  }
+}
+
+double CpuOptimiser::iterateOnce(double factor) {
+  if (iterationsSinceRebuild_ < 0 || iterationsSinceRebuild_ >= tuning_.rebuildEvery)
+    rebuildLists();
+  ++iterationsSinceRebuild_;
+  const double loss = pass_.gradients(ellipsoids_, gradients_);
+  if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
+  adamStep(ellipsoids_, states_, gradients_, tuning_.steps.scaled(factor), tuning_.adam, limits_);
+  return loss;
+}
+
+double CpuOptimiser::iterate(std::span<const double> factors) {
+  double loss = 0.0;
+  for (const double factor : factors) loss = iterateOnce(factor);
+  return loss;
+}
+
+FitErrors CpuOptimiser::measure() {
+  refreshResiduals();
+  return errorsOf(target_, {pass_.index(), residuals_});
+}
+
+double CpuOptimiser::kappaSlope() {
+  double slope = 0.0;
+  const double logMByKappa = kernelWidth(pass_.kernel()).logMByKappa;
+  for (const EllipsoidGradient& g : gradients_) slope += edgeGradient(g, logMByKappa);
+  return slope;
+}
+
+void CpuOptimiser::setKappa(float kappa) {
+  const double before = kernelWidth(pass_.kernel()).m;
+  options_.kernel.kappa = kappa;
+  pass_.setKernel(kernelConstants<double>(options_.kernel));
+  unitVariance_ = kernelVariance(pass_.kernel());
+  const double factor = std::sqrt(kernelWidth(pass_.kernel()).m / before);
+  for (Ellipsoid& p : ellipsoids_) shrinkBy(p, factor);
+  iterationsSinceRebuild_ = kListsStale;
+}
+
+void CpuOptimiser::dropUnseen() {
+  if (ellipsoids_.empty()) return;
+  rebuildLists();
+  pass_.gradients(ellipsoids_, gradients_);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < ellipsoids_.size(); ++i)
+    if (gradients_[i].phi2 > 0.0 && ellipsoids_[i].intensity != 0.0)
+      ellipsoids_[kept++] = ellipsoids_[i];
+  ellipsoids_.resize(kept);
+  states_.resize(kept);
+  gradients_.resize(kept);
+  iterationsSinceRebuild_ = kListsStale;
+}
+
+}  // namespace esvr

@@ -1,0 +1,59 @@
+#pragma once
+/// A fit on the CPU.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "fit/adam.h"
+#include "fit/cpu/cpu_pass.h"
+#include "fit/cpu/seed.h"
+#include "fit/optimiser.h"
+#include "fit/tuning.h"
+
+namespace esvr {
+
+class CpuOptimiser final : public Optimiser {
+ public:
+  /// The target must outlive the optimiser.
+  CpuOptimiser(const FitTarget& target, const OptimiserOptions& options, const Tuning& tuning);
+
+  void growTo(std::size_t count) override;
+  void relocate(std::size_t count) override;
+  double iterate(std::span<const double> factors) override;
+  [[nodiscard]] std::uint32_t batchSize() const override { return 1; }
+  [[nodiscard]] FitErrors measure() override;
+  void dropUnseen() override;
+  [[nodiscard]] const Kernel& kernel() const override { return options_.kernel; }
+  [[nodiscard]] double kappaSlope() override;
+  void setKappa(float kappa) override;
+
+  [[nodiscard]] std::size_t ellipsoidCount() const override { return ellipsoids_.size(); }
+  [[nodiscard]] std::vector<Ellipsoid> ellipsoids() const override { return ellipsoids_; }
+  [[nodiscard]] std::size_t deviceBytes() const override { return 0; }
+  [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
+  [[nodiscard]] std::uint64_t pairCount() const override { return pass_.pairs().pairCount(); }
+
+ private:
+  [[nodiscard]] std::vector<Ellipsoid> newSeeds(std::size_t count);
+  [[nodiscard]] std::vector<std::size_t> leastUseful(std::size_t count) const;
+  void rebuildLists();
+  void refreshResiduals();
+  double iterateOnce(double factor);
+
+  const FitTarget& target_;
+  OptimiserOptions options_;
+  Tuning tuning_;
+  CpuPass pass_;
+  double unitVariance_;
+  EllipsoidLimits limits_;
+  std::vector<Ellipsoid> ellipsoids_;
+  std::vector<AdamState> states_;
+  std::vector<EllipsoidGradient> gradients_;
+  std::vector<float> residuals_;
+  double secondsSeeding_ = 0.0;
+  std::uint64_t samplings_ = 0;      ///< events so far: each draws from its own random stream
+  int iterationsSinceRebuild_ = -1;  ///< -1: lists are stale
+};
+
+}  // namespace esvr

@@ -1,0 +1,44 @@
+#pragma once
+/// The pass of a fit on the CPU: squared errors, all ellipsoids with the scene's kernel.
+
+#include <span>
+#include <vector>
+
+#include "field/support.h"
+#include "fit/cpu/pair_pass.h"
+
+namespace esvr {
+
+/// One kernel for all ellipsoids.
+class SceneKernel {
+ public:
+  explicit SceneKernel(const KernelConstants<double>& kernel);
+
+  [[nodiscard]] const KernelConstants<float>& constants(std::size_t) const { return narrowed_; }
+  [[nodiscard]] double radius(std::size_t) const { return radius_; }
+  [[nodiscard]] const KernelConstants<double>& exact() const { return exact_; }
+
+ private:
+  KernelConstants<double> exact_;
+  KernelConstants<float> narrowed_;
+  double radius_;
+};
+
+class CpuPass : public PairPass<SceneKernel> {
+ public:
+  CpuPass(const FitTarget& target, const KernelConstants<double>& kernel)
+      : PairPass(target, SceneKernel(kernel)) {}
+
+  /// Gradients of 1/2 sum r^2, r = V - target, over all bricks of the lists.
+  /// \return sum of r^2
+  double gradients(std::span<const Ellipsoid> ellipsoids, std::span<EllipsoidGradient> out);
+
+  /// Lists must be built anew after it.
+  void setKernel(const KernelConstants<double>& kernel) { setKernels(SceneKernel(kernel)); }
+  [[nodiscard]] const KernelConstants<double>& kernel() const { return kernels().exact(); }
+
+ private:
+  std::vector<double> brickLoss_;
+};
+
+}  // namespace esvr

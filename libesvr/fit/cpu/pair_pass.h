@@ -1,0 +1,183 @@
+#pragma once
+/// The parts that every pass of a fit over its bricks is made of, on the CPU: lists of the pairs of
+/// ellipsoids and bricks, forward and backward over one brick, and the sum of an ellipsoid's pairs.
+/// Passes differ in the loss that they descend (cpu_pass.h, paper/cpu_paper_pass.h).
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "field/brick_kernels.h"
+#include "field/brick_pairs.h"
+#include "fit/adam.h"
+#include "fit/cpu/pair_tapes.h"
+#include "fit/ellipsoid.h"
+#include "fit/frame.h"
+#include "fit/parameter_gradient.h"
+#include "fit/target.h"
+
+namespace esvr {
+
+/// Keeps the pair lists and the prepared forms. Lists hold while no support has moved by more than
+/// the slack they were built with; the caller says when to rebuild.
+/// \tparam Kernels  has constants(i) and radius(i): the kernel of ellipsoid i, and the radius of its
+///                  support in the unit frame
+template <class Kernels>
+class PairPass {
+ public:
+  /// The target must outlive the pass.
+  PairPass(const FitTarget& target, const Kernels& kernels)
+      : target_(target), kernels_(kernels), index_(target.bricks) {}
+
+  /// Lists must be rebuilt after it.
+  void setKernels(const Kernels& kernels) { kernels_ = kernels; }
+  [[nodiscard]] const Kernels& kernels() const { return kernels_; }
+
+  /// Builds the lists anew, with supports widened by `slack` voxels.
+  void rebuild(std::span<const Ellipsoid> ellipsoids, double slack) {
+    std::vector<Support> reach(ellipsoids.size());
+    forEachEllipsoid(ellipsoids.size(), [&](std::size_t i) {
+      reach[i] = makeSupport(ellipsoids[i].center, ellipsoids[i].L, kernels_.radius(i), slack);
+    });
+    const auto supportOf = [&](std::size_t i) -> const Support& { return reach[i]; };
+    index_ = BrickIndex(target_.bricks);
+    if (!target_.narrowBand) appendReached(ellipsoids.size(), supportOf);
+    pairs_ = pairsWithin(index_, ellipsoids.size(), supportOf);
+    moments_.resize(pairs_.pairCount());
+  }
+
+  /// Writes r = V - target for every brick: those of the target first, then those that only
+  /// supports reach.
+  void residuals(std::span<const Ellipsoid> ellipsoids, std::vector<float>& out) {
+    prepare(ellipsoids);
+    out.resize(brickCount() * kBrickVoxels);
+    forEachBrick([&](std::size_t b) {
+      alignas(64) float r[kBrickVoxels];
+      startFromTarget(b, r);
+      const Coord corner = index_.bricks()[b] * kBrickSide;
+      for (auto pair = pairs_.brickBegin[b]; pair != pairs_.brickBegin[b + 1]; ++pair) {
+        const auto i = pairs_.ellipsoid[pair];
+        brickKernels().add(forms_[i], cornerIn(frames_[i], corner).data(), kernels_.constants(i),
+                           r);
+      }
+      if (target_.narrowBand) saturate(b, r);
+      std::copy_n(r, kBrickVoxels, out.data() + b * kBrickVoxels);
+    });
+  }
+
+  [[nodiscard]] const FitTarget& target() const { return target_; }
+  [[nodiscard]] const BrickIndex& index() const { return index_; }
+  [[nodiscard]] std::size_t brickCount() const { return index_.size(); }
+  [[nodiscard]] const BrickPairs& pairs() const { return pairs_; }
+
+ protected:
+  using Range = tbb::blocked_range<std::size_t>;
+
+  template <class Visit>
+  static void forEachEllipsoid(std::size_t count, const Visit& visit) {
+    constexpr std::size_t kGrain = 64;
+    tbb::parallel_for(Range(0, count, kGrain), [&](const Range& range) {
+      for (std::size_t i = range.begin(); i != range.end(); ++i) visit(i);
+    });
+  }
+
+  template <class Visit>
+  void forEachBrick(const Visit& visit) const {
+    constexpr std::size_t kGrain = 4;
+    tbb::parallel_for(Range(0, brickCount(), kGrain), [&](const Range& range) {
+      for (std::size_t b = range.begin(); b != range.end(); ++b) visit(b);
+    });
+  }
+
+  /// Forms of the ellipsoids as they are now.
+  void prepare(std::span<const Ellipsoid> ellipsoids) {
+    forms_.resize(ellipsoids.size());
+    frames_.resize(ellipsoids.size());
+    forEachEllipsoid(ellipsoids.size(), [&](std::size_t i) {
+      const Ellipsoid& p = ellipsoids[i];
+      frames_[i] = frameOf(p.center);
+      forms_[i] = makeLineForm(inFrame(p.center, frames_[i]), p.L, kernels_.radius(i), p.intensity);
+    });
+  }
+
+  void startFromTarget(std::size_t brick, float* r) const {
+    if (brick >= target_.bricks.size()) {
+      std::fill_n(r, kBrickVoxels, 0.0f);
+      return;
+    }
+    const float* t = target_.values.data() + brick * kBrickVoxels;
+    for (int v = 0; v < kBrickVoxels; ++v) r[v] = -t[v];
+  }
+
+  /// r = clamp(V, lowest, highest) - target: a narrow band's ends stand for all that is beyond.
+  void saturate(std::size_t brick, float* r) const {
+    const float* t = target_.values.data() + brick * kBrickVoxels;
+    const auto low = float(target_.lowest), high = float(target_.highest);
+    for (int v = 0; v < kBrickVoxels; ++v) r[v] = std::clamp(r[v], low - t[v], high - t[v]);
+  }
+
+  /// Adds the sum to r and keeps phi on the tapes.
+  void forwardBrick(std::size_t brick, PairTapes& scratch, float* r) const {
+    const auto begin = pairs_.brickBegin[brick], end = pairs_.brickBegin[brick + 1];
+    const Coord corner = index_.bricks()[brick] * kBrickSide;
+    const BrickKernels& kernels = brickKernels();
+    scratch.reserve(end - begin);
+    float* phi = scratch.phi.get();
+    for (auto pair = begin; pair != end; ++pair) {
+      const auto i = pairs_.ellipsoid[pair];
+      PairTape& tape = scratch.tapes[pair - begin];
+      tape.phi = phi;
+      const auto at = cornerIn(frames_[i], corner);
+      kernels.forward(forms_[i], at.data(), kernels_.constants(i), r, tape);
+      phi += tape.floats;
+    }
+  }
+
+  /// Moments of the brick's pairs. \param byValue  the loss's derivative by V
+  void backwardBrick(std::size_t brick, const PairTapes& scratch, const float* byValue) {
+    const auto begin = pairs_.brickBegin[brick], end = pairs_.brickBegin[brick + 1];
+    const Coord corner = index_.bricks()[brick] * kBrickSide;
+    const BrickKernels& kernels = brickKernels();
+    for (auto pair = begin; pair != end; ++pair) {
+      const auto i = pairs_.ellipsoid[pair];
+      const auto at = cornerIn(frames_[i], corner);
+      kernels.backward(forms_[i], at.data(), kernels_.constants(i), byValue,
+                       scratch.tapes[pair - begin], moments_[pair]);
+    }
+  }
+
+  /// Gradients from the moments of all pairs.
+  void reduce(std::span<EllipsoidGradient> out) const {
+    forEachEllipsoid(forms_.size(), [&](std::size_t i) {
+      PairSums sums{};
+      for (auto k = pairs_.ellipsoidBegin[i]; k != pairs_.ellipsoidBegin[i + 1]; ++k)
+        sums.add(moments_[pairs_.pairOf[k]]);
+      out[i] = ellipsoidGradient(forms_[i], sums, double(kernels_.constants(i).slope));
+    });
+  }
+
+  tbb::enumerable_thread_specific<PairTapes> tapes_;
+
+ private:
+  template <class SupportOf>
+  void appendReached(std::size_t ellipsoids, const SupportOf& supportOf) {
+    auto reached = missingBricks(index_, ellipsoids, supportOf);
+    if (target_.within)
+      std::erase_if(reached, [&](Coord brick) { return !target_.within->contains(brick); });
+    index_.append(reached);
+  }
+
+  const FitTarget& target_;
+  Kernels kernels_;
+  BrickIndex index_;
+  BrickPairs pairs_;
+  std::vector<LineForm> forms_;
+  std::vector<Coord> frames_;  ///< origin of a form's center: near it, so that float32 holds
+  std::vector<PairMoments> moments_;
+};
+
+}  // namespace esvr

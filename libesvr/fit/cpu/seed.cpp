@@ -1,0 +1,56 @@
+#include "fit/cpu/seed.h"
+
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+
+#include "fit/seed_math.h"
+
+namespace esvr {
+namespace {
+
+SeedMoments momentsAround(const ResidualField& residual, Coord voxel, double sign, int w) {
+  SeedMoments m;
+  for (int x = -w; x <= w; ++x)
+    for (int y = -w; y <= w; ++y)
+      for (int z = -w; z <= w; ++z) {
+        if (!inSeedWindow({x, y, z}, w)) continue;
+        const double r = sign * residual.at(voxel + Coord{x, y, z});
+        if (r > 0.0) m.add({x, y, z}, r);
+      }
+  return m;
+}
+
+Ellipsoid seedAt(const ResidualField& residual, Coord voxel, const SeedOptions& options,
+                 double share) {
+  const double r = residual.at(voxel);
+  const auto moments = momentsAround(residual, voxel, r < 0.0 ? -1.0 : 1.0, options.window);
+  return seedFromMoments(voxel, r, moments, {options.unitVariance, options.intensity, share});
+}
+
+}  // namespace
+
+std::vector<Ellipsoid> seedsFromResidual(const ResidualField& residual,
+                                         const SeedOptions& options) {
+  const auto [voxels, share] = sampleVoxels(residual, options.draw);
+  std::vector<Ellipsoid> seeds(voxels.size());
+  tbb::parallel_for(std::size_t(0), seeds.size(), [&, &at = voxels, each = share](std::size_t i) {
+    seeds[i] = seedAt(residual, at[i], options, each);
+  });
+  return seeds;
+}
+
+double kernelVariance(const KernelConstants<double>& kernel) {
+  constexpr int kSteps = 400;
+  const double radius = supportRadius(kernel);
+  double mass = 0.0, second = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double q = radius * (i + 0.5) / kSteps;
+    const double weight = kernelPhi(kernel, q * q) * q * q;
+    mass += weight;
+    second += weight * q * q / 3.0;
+  }
+  return second / mass;
+}
+
+}  // namespace esvr

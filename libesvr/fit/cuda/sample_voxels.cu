@@ -1,0 +1,167 @@
+#include <thrust/iterator/discard_iterator.h>
+#include <cmath>
+#include <cub/device/device_scan.cuh>
+#include <cub/device/device_select.cuh>
+
+#include "esvr/sparse_volume.h"
+#include "field/brick_hash.h"
+#include "fit/cuda/copy.h"
+#include "fit/cuda/launch.h"
+#include "fit/cuda/sample_voxels.h"
+#include "fit/cuda/temporary.h"
+
+namespace esvr::cuda {
+
+/// Energies as integers, whose running sums have no order and no rounding.
+struct EnergyUnits {
+  double scale;  ///< a power of two
+  __device__ std::uint64_t operator()(float residual, SignsAllowed signs) const {
+    return std::uint64_t(sampleEnergy(residual, signs) * scale);
+  }
+};
+
+struct SamplingArguments {
+  const float* residual;
+  const Coord* bricks;
+  SignsAllowed signs;
+  EnergyUnits units;
+  std::uint32_t targetBricks;
+  std::uint64_t seed;
+};
+
+namespace {
+
+constexpr unsigned kAllLanes = 0xffffffffu;
+constexpr int kVoxelsPerLane = kBrickVoxels / kWarp;
+
+/// Of all voxels together at most 2^61.
+EnergyUnits unitsFor(double loss) { return {std::ldexp(1.0, 60 - std::ilogb(loss))}; }
+
+__device__ std::uint64_t warpSum(std::uint64_t value) {
+  for (int d = kWarp / 2; d > 0; d /= 2) value += __shfl_xor_sync(kAllLanes, value, d);
+  return value;
+}
+
+__device__ int warpMin(int value) {
+  for (int d = kWarp / 2; d > 0; d /= 2) value = min(value, __shfl_xor_sync(kAllLanes, value, d));
+  return value;
+}
+
+/// A warp a brick.
+__global__ void brickEnergies(const SamplingArguments a, std::uint64_t* energy) {
+  const std::size_t b = (std::size_t(blockIdx.x) * kBlock + threadIdx.x) / kWarp;
+  if (b >= a.targetBricks) return;
+  std::uint64_t sum = 0;
+  for (int v = int(threadIdx.x % kWarp); v < kBrickVoxels; v += kWarp)
+    sum += a.units(a.residual[b * kBrickVoxels + v], a.signs);
+  sum = warpSum(sum);
+  if (threadIdx.x % kWarp == 0) energy[b] = sum;
+}
+
+/// First brick whose running sum exceeds `at`.
+__device__ std::uint32_t brickAt(const std::uint64_t* sums, std::uint32_t bricks,
+                                 std::uint64_t at) {
+  std::uint32_t low = 0, high = bricks - 1;
+  while (low < high) {
+    const std::uint32_t middle = low + (high - low) / 2;
+    if (sums[middle] > at)
+      high = middle;
+    else
+      low = middle + 1;
+  }
+  return low;
+}
+
+/// The voxel of a brick at which the running energy exceeds `at`. A warp works on it; a lane has
+/// kVoxelsPerLane in a row.
+__device__ int voxelAt(const SamplingArguments& a, std::uint32_t brick, std::uint64_t at) {
+  const int lane = int(threadIdx.x % kWarp);
+  const float* const r =
+      a.residual + std::size_t(brick) * kBrickVoxels + std::size_t(lane) * kVoxelsPerLane;
+  std::uint64_t own = 0;
+  for (int v = 0; v < kVoxelsPerLane; ++v) own += a.units(r[v], a.signs);
+  std::uint64_t before = own;
+  for (int d = 1; d < kWarp; d *= 2) {
+    const std::uint64_t below = __shfl_up_sync(kAllLanes, before, d);
+    if (lane >= d) before += below;
+  }
+  before -= own;
+  int found = kBrickVoxels;
+  if (before <= at && at < before + own)
+    for (int v = 0; v < kVoxelsPerLane && found == kBrickVoxels; ++v) {
+      before += a.units(r[v], a.signs);
+      if (before > at) found = lane * kVoxelsPerLane + v;
+    }
+  return warpMin(found);
+}
+
+/// A warp a draw: `count` equal shares of the energy, one voxel from each.
+__global__ void sampleVoxelsKernel(const SamplingArguments a, const std::uint64_t* sums,
+                                   std::uint32_t count, Coord* out) {
+  const std::uint32_t n = (blockIdx.x * kBlock + threadIdx.x) / kWarp;
+  if (n >= count) return;
+  const std::uint64_t total = sums[a.targetBricks - 1];
+  const double share = double(total) / count;
+  const auto wanted = std::uint64_t((double(n) + sampleUniform(a.seed, n)) * share);
+  const std::uint64_t at = wanted < total ? wanted : total - 1;
+  const std::uint32_t brick = brickAt(sums, a.targetBricks, at);
+  const int voxel = voxelAt(a, brick, at - (brick > 0 ? sums[brick - 1] : 0));
+  if (threadIdx.x % kWarp == 0) out[n] = a.bricks[brick] * kBrickSide + voxelLocal(voxel);
+}
+
+struct SameVoxel {
+  __host__ __device__ bool operator()(const Coord& a, const Coord& b) const {
+    return sameBrick(a, b);
+  }
+};
+
+}  // namespace
+
+VoxelSampling::VoxelSampling(cudaStream_t stream)
+    : stream_(stream),
+      energy_(stream),
+      sums_(stream),
+      drawn_(stream),
+      voxels_(stream),
+      count_(stream),
+      temporary_(stream) {}
+
+DeviceSampling VoxelSampling::draw(const float* residual, double loss, const Coord* bricks,
+                                   const SamplingOptions& options) {
+  if (!(loss > 0.0) || options.count == 0) return {};
+  const auto targets = std::uint32_t(options.targetBricks);
+  const SamplingArguments a{residual, bricks, options.signs, unitsFor(loss), targets, options.seed};
+  const std::uint64_t total = sumEnergies(a);
+  if (total == 0) return {};
+  const auto count = std::uint32_t(options.count);
+  Coord* const drawn = drawn_.reserve(count);
+  sampleVoxelsKernel<<<blocksFor(options.count * kWarp, kBlock), kBlock, 0, stream_>>>(
+      a, sums_.data(), count, drawn);
+  check(cudaGetLastError(), "drawing voxels");
+  return {voxels_.reserve(count), keepEachOnce(count), double(total) / a.units.scale / count};
+}
+
+std::uint64_t VoxelSampling::sumEnergies(const SamplingArguments& a) {
+  std::uint64_t* const energy = energy_.reserve(a.targetBricks);
+  std::uint64_t* const sums = sums_.reserve(a.targetBricks);
+  brickEnergies<<<blocksFor(std::size_t(a.targetBricks) * kWarp, kBlock), kBlock, 0, stream_>>>(
+      a, energy);
+  check(cudaGetLastError(), "summing energies");
+  withTemporary(temporary_, "summing energies", [&](void* memory, std::size_t& bytes) {
+    return cub::DeviceScan::InclusiveSum(memory, bytes, energy, sums, a.targetBricks, stream_);
+  });
+  return downloadValue(sums + a.targetBricks - 1, stream_);
+}
+
+std::uint32_t VoxelSampling::keepEachOnce(std::uint32_t count) {
+  // Draws of one voxel follow each other.
+  const SameVoxel same;
+  withTemporary(temporary_, "listing drawn voxels", [&](void* memory, std::size_t& bytes) {
+    return cub::DeviceSelect::UniqueByKey(memory, bytes, drawn_.data(), drawn_.data(),
+                                          voxels_.data(), thrust::make_discard_iterator(),
+                                          count_.reserve(1), count, same, stream_);
+  });
+  return downloadValue(count_.data(), stream_);
+}
+
+}  // namespace esvr::cuda

@@ -1,0 +1,24 @@
+#pragma once
+/// The fit of a volume that nowhere differs from its background: the empty sum is exact.
+
+#include "esvr/fit.h"
+#include "fit/recorder.h"
+#include "fit/target.h"
+
+namespace esvr {
+
+[[nodiscard]] inline bool isEmpty(const FitTarget& target) {
+  return target.lowest == 0.0 && target.highest == 0.0;
+}
+
+[[nodiscard]] inline FitResult emptyFit(const SparseVolume& volume, float kappa) {
+  FitResult result;
+  result.field.background = volume.background;
+  result.field.kernel.kappa = kappa;
+  TimedCurvePoint point;
+  point.psnrBox = point.psnrActive = kPerfectPsnr;
+  result.curve.push_back(point);
+  return result;
+}
+
+}  // namespace esvr

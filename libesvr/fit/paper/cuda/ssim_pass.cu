@@ -1,0 +1,206 @@
+#include <cub/block/block_reduce.cuh>
+
+#include "core/cuda/check.h"
+#include "fit/cuda/launch.h"
+#include "fit/paper/cuda/ssim_pass.h"
+#include "fit/paper/ssim_math.h"
+
+namespace esvr::cuda {
+namespace {
+
+constexpr int kThreads = 256;
+constexpr int kOwnVoxels = kBrickVoxels / kThreads;  // of a thread
+constexpr int kNeighbours = 27;
+constexpr int kSlice = kHaloSide * kHaloSide;
+/// Sums along x, then along x and y, of the windows around a brick's voxels.
+constexpr int kSumsX = kBrickSide * kSlice, kSumsXy = kBrickSide * kBrickSide * kHaloSide;
+constexpr std::size_t kSumBytes = (kSumsX + kSumsXy) * sizeof(double);
+constexpr std::size_t kWindowSideBytes = kSumBytes + 2 * kHaloVoxels * sizeof(float);
+constexpr std::size_t kValueSideBytes = kSumBytes + kHaloVoxels * sizeof(double);
+
+using Weights = std::array<double, kSsimTaps>;
+using OwnSums = double[kOwnVoxels];
+
+/// Numbers of the bricks around one, itself in the middle. Ends with a barrier.
+__device__ void findAround(const BrickTableView& table, Coord brick, std::uint32_t* around) {
+  const int n = int(threadIdx.x);
+  if (n < kNeighbours) around[n] = table.find(brick + Coord{n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1});
+  __syncthreads();
+}
+
+/// Where a place of the halo lies: in which of the bricks around, and at which voxel.
+struct HaloPlace {
+  int brick, voxel;
+};
+__device__ HaloPlace placeOf(int halo) {
+  const Coord at{halo / kSlice - kSsimRadius, halo / kHaloSide % kHaloSide - kSsimRadius,
+                 halo % kHaloSide - kSsimRadius};
+  const Coord step = brickOf(at);
+  return {(step.x + 1) * 9 + (step.y + 1) * 3 + step.z + 1, voxelOffset(localOf(at))};
+}
+
+/// A window's sum along one axis; it is symmetric, so two values share a multiplication.
+/// \param at  at(tap): the value under a tap
+template <class At>
+__device__ double sumTaps(const Weights& weights, At&& at) {
+  double sum = weights[kSsimRadius] * at(kSsimRadius);
+#pragma unroll
+  for (int tap = 0; tap < kSsimRadius; ++tap)
+    sum += weights[tap] * (at(tap) + at(kSsimTaps - 1 - tap));
+  return sum;
+}
+
+/// Shared memory of one block.
+struct Scratch {
+  double *sumsX, *sumsXy;
+  void* halo;
+};
+__device__ Scratch scratch() {
+  extern __shared__ double memory[];
+  return {memory, memory + kSumsX, memory + kSumsX + kSumsXy};
+}
+
+/// The voxel whose sums a thread has in place n.
+__device__ int ownVoxel(int n) { return int(threadIdx.x) + n * kThreads; }
+
+/// Sums of the windows around the brick's voxels, axis by axis.
+/// \param value  value(offset in the halo)
+template <class Value>
+__device__ void sumWindows(const Weights& weights, const Scratch& s, Value&& value, OwnSums& out) {
+  for (int i = int(threadIdx.x); i < kSumsX; i += kThreads)
+    s.sumsX[i] = sumTaps(weights, [&](int tap) { return value(i + tap * kSlice); });
+  __syncthreads();
+  for (int i = int(threadIdx.x); i < kSumsXy; i += kThreads) {
+    constexpr int kRows = kBrickSide * kHaloSide;  // of the result, in a slice
+    const double* const from = s.sumsX + i / kRows * kSlice + i % kRows;
+    s.sumsXy[i] = sumTaps(weights, [&](int tap) { return from[tap * kHaloSide]; });
+  }
+  __syncthreads();
+  for (int n = 0; n < kOwnVoxels; ++n) {
+    const int v = ownVoxel(n);
+    const double* const from = s.sumsXy + v / kBrickSide * kHaloSide + v % kBrickSide;
+    out[n] = sumTaps(weights, [&](int tap) { return from[tap]; });
+  }
+}
+
+/// A block's sum, in one order.
+__device__ double blockSum(double value) {
+  using Reduce = cub::BlockReduce<double, kThreads>;
+  __shared__ typename Reduce::TempStorage memory;
+  return Reduce(memory).Sum(value);
+}
+
+/// Residual and target around a brick. Ends with a barrier. \return whether any is not zero
+__device__ bool fillHalo(const SsimPassArguments& a, const std::uint32_t* around, float* r,
+                         float* t) {
+  bool any = false;
+  for (int i = int(threadIdx.x); i < kHaloVoxels; i += kThreads) {
+    const HaloPlace place = placeOf(i);
+    const std::uint32_t brick = around[place.brick];
+    const std::size_t at = std::size_t(brick) * kBrickVoxels + std::size_t(place.voxel);
+    r[i] = brick != kNoBrick ? a.residual[at] : 0.0f;
+    t[i] = brick != kNoBrick && brick < a.targetCount ? a.target[at] : 0.0f;
+    any = any || r[i] != 0.0f || t[i] != 0.0f;
+  }
+  return __syncthreads_or(any) != 0;
+}
+
+/// A block a brick of windows.
+__global__ void __launch_bounds__(kThreads) windowSide(const SsimPassArguments a) {
+  __shared__ std::uint32_t around[kNeighbours];
+  const Scratch s = scratch();
+  float* const r = static_cast<float*>(s.halo);
+  float* const t = r + kHaloVoxels;
+  findAround(a.values, a.windows.bricks[blockIdx.x], around);
+
+  OwnSums sumT{}, sumTt{}, sumR{}, sumRr{}, sumTr{};
+  if (fillHalo(a, around, r, t)) {
+    sumWindows(
+        a.weights, s, [&](int i) { return double(t[i]); }, sumT);
+    sumWindows(
+        a.weights, s, [&](int i) { return double(r[i]); }, sumR);
+    sumWindows(
+        a.weights, s, [&](int i) { return double(t[i]) * double(t[i]); }, sumTt);
+    sumWindows(
+        a.weights, s, [&](int i) { return double(r[i]) * double(r[i]); }, sumRr);
+    sumWindows(
+        a.weights, s, [&](int i) { return double(t[i]) * double(r[i]); }, sumTr);
+  }
+  double loss = 0.0;
+  for (int n = 0; n < kOwnVoxels; ++n) {
+    const Dissimilarity d =
+        dissimilarity({sumT[n], sumTt[n], sumR[n], sumRr[n], sumTr[n]}, a.constants);
+    const std::size_t at = std::size_t(blockIdx.x) * kBrickVoxels + std::size_t(ownVoxel(n));
+    a.byR[at] = d.byR;
+    a.byRr[at] = d.byRr;
+    a.byTr[at] = d.byTr;
+    loss += d.value;
+  }
+  loss = blockSum(loss);
+  if (threadIdx.x == 0) a.windowLoss[blockIdx.x] = a.ssimScale * loss;
+}
+
+/// Sums of what the windows around a brick have in `values`.
+template <class T>
+__device__ void sumGradients(const SsimPassArguments& a, const std::uint32_t* around,
+                             const T* values, OwnSums& out) {
+  const Scratch s = scratch();
+  double* const halo = static_cast<double*>(s.halo);
+  for (int i = int(threadIdx.x); i < kHaloVoxels; i += kThreads) {
+    const HaloPlace place = placeOf(i);
+    const std::uint32_t brick = around[place.brick];
+    const std::size_t at = std::size_t(brick) * kBrickVoxels + std::size_t(place.voxel);
+    halo[i] = brick != kNoBrick ? double(values[at]) : 0.0;
+  }
+  __syncthreads();
+  sumWindows(
+      a.weights, s, [&](int i) { return halo[i]; }, out);
+}
+
+/// A block a brick of values.
+__global__ void __launch_bounds__(kThreads) valueSide(const SsimPassArguments a) {
+  __shared__ std::uint32_t around[kNeighbours];
+  OwnSums byR{}, byRr{}, byTr{};
+  if (a.ssimScale != 0.0) {
+    findAround(a.windows, a.values.bricks[blockIdx.x], around);
+    sumGradients(a, around, a.byR, byR);
+    sumGradients(a, around, a.byRr, byRr);
+    sumGradients(a, around, a.byTr, byTr);
+  }
+  double absolute = 0.0;
+  for (int n = 0; n < kOwnVoxels; ++n) {
+    const std::size_t at = std::size_t(blockIdx.x) * kBrickVoxels + std::size_t(ownVoxel(n));
+    const double r = double(a.residual[at]);
+    const double t = blockIdx.x < a.targetCount ? double(a.target[at]) : 0.0;
+    const double bySsim = byR[n] + (2.0 * r * byRr[n] + t * byTr[n]) / a.constants.c2;
+    const double bySign = double((r > 0.0) - (r < 0.0));
+    a.lossByValue[at] = float(a.absoluteScale * bySign + a.ssimScale * bySsim);
+    absolute += fabs(r);
+  }
+  absolute = blockSum(absolute);
+  if (threadIdx.x == 0) a.valueLoss[blockIdx.x] = a.absoluteScale * absolute;
+}
+
+template <class Kernel>
+void allowShared(Kernel* kernel, std::size_t bytes) {
+  check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, int(bytes)),
+        "asking for shared memory");
+}
+
+}  // namespace
+
+void launchWindowSide(const SsimPassArguments& a, cudaStream_t stream) {
+  if (a.windowCount == 0) return;
+  allowShared(windowSide, kWindowSideBytes);
+  windowSide<<<a.windowCount, kThreads, kWindowSideBytes, stream>>>(a);
+  check(cudaGetLastError(), "starting the windows of SSIM");
+}
+
+void launchValueSide(const SsimPassArguments& a, cudaStream_t stream) {
+  if (a.valueCount == 0) return;
+  allowShared(valueSide, kValueSideBytes);
+  valueSide<<<a.valueCount, kThreads, kValueSideBytes, stream>>>(a);
+  check(cudaGetLastError(), "starting the derivatives of SSIM");
+}
+
+}  // namespace esvr::cuda

@@ -1,0 +1,276 @@
+#pragma once
+/// How a camera sees an ellipsoid: its outline in the picture, how deep it lies and what a ray
+/// needs of it. Written once for host and device, in float64: a camera may be a million voxels
+/// away.
+
+#include <cstdint>
+
+#include "render/ray_math.h"
+#include "render/view.h"
+
+namespace esvr {
+
+/// Parameters as they are kept for drawing.
+struct alignas(16) PackedEllipsoid {
+  float center[3];  ///< relative to its chunk's origin
+  float intensity;
+  float scale[3];
+  std::uint32_t chunk;
+  float rotation[4];  ///< w, x, y, z; need not have unit length
+};
+static_assert(sizeof(PackedEllipsoid) == 48);
+
+/// In the view's coordinates: right, up, forward.
+struct SeenEllipsoid {
+  Vec3 center;
+  std::array<Vec3, 3> axes;  ///< of unit length
+  Vec3 scale;                ///< of the axes
+};
+
+/// What a ray needs of an ellipsoid.
+struct alignas(16) EllipsoidView {
+  double column, row;  ///< the pixel that dx and dy of `form` are counted from
+  double depth;        ///< tau of the closest approach there
+  RayForm form;
+};
+
+/// A support's outline, an ellipse about (column, row): all (c, r) with
+/// (c - column, r - row) [xx xy; xy yy]^-1 (c - column, r - row) < 1. In pixels.
+struct ScreenEllipse {
+  double column, row;
+  double xx, xy, yy;
+  bool everywhere;  ///< the support reaches the plane of the eye: no bounds are known
+};
+
+/// A support's bounds, errs on the side of inclusion.
+struct ScreenBounds {
+  std::int32_t firstColumn, lastColumn, firstRow, lastRow;  ///< pixels whose rays may meet it
+  double nearest, farthest;                                 ///< along forward, not below 0
+};
+
+/// Of pixels' middles.
+struct PixelSpan {
+  double low, high;
+};
+
+namespace ellipsoid_math {
+
+inline constexpr double kSlack = 1e-3;  ///< pixels, for rounding
+
+ESVR_HD inline Vec3 row(const std::array<Vec3, 3>& axes, const Vec3& lengths, int coordinate) {
+  return {axes[0][coordinate] * lengths[0], axes[1][coordinate] * lengths[1],
+          axes[2][coordinate] * lengths[2]};
+}
+ESVR_HD inline double atLeastZero(double v) { return v > 0.0 ? v : 0.0; }
+ESVR_HD inline double lesser(double a, double b) { return b < a ? b : a; }
+ESVR_HD inline double greater(double a, double b) { return a < b ? b : a; }
+ESVR_HD inline double clampedTo(double v, double low, double high) {
+  return greater(low, lesser(v, high));
+}
+ESVR_HD inline void store(const Vec3& from, double factor, float (&to)[3]) {
+  for (int i = 0; i < 3; ++i) to[i] = float(from[i] * factor);
+}
+
+/// Rows of the support's half axes: |row| is its half extent along a coordinate of the view.
+struct HalfAxes {
+  Vec3 x, y, z;
+};
+ESVR_HD inline HalfAxes halfAxes(const SeenEllipsoid& e, double radius) {
+  const Vec3 lengths = scaled(e.scale, radius);
+  return {row(e.axes, lengths, 0), row(e.axes, lengths, 1), row(e.axes, lengths, 2)};
+}
+
+/// The planes through the eye that touch the support are a conic, whose dual is the outline. The
+/// terms are written so that nothing cancels for a support that is small and far away.
+ESVR_HD inline ScreenEllipse perspectiveOutline(const View& view, const Vec3& c,
+                                                const HalfAxes& f) {
+  const double a = c[2] * c[2] - inner(f.z, f.z), s = 1.0 / (a * view.pixel);
+  const Vec3 mixedX = scaled(difference(scaled(f.x, c[2]), scaled(f.z, c[0])), s);
+  const Vec3 mixedY = scaled(difference(scaled(f.y, c[2]), scaled(f.z, c[1])), s);
+  const Vec3 normalX = scaled(cross(f.x, f.z), s), normalY = scaled(cross(f.y, f.z), s);
+  return {view.columnAt((c[0] * c[2] - inner(f.x, f.z)) / a),
+          view.rowAt((c[1] * c[2] - inner(f.y, f.z)) / a),
+          atLeastZero(inner(mixedX, mixedX) - inner(normalX, normalX)),
+          -(inner(mixedX, mixedY) - inner(normalX, normalY)),  // rows count downwards
+          atLeastZero(inner(mixedY, mixedY) - inner(normalY, normalY)),
+          false};
+}
+
+ESVR_HD inline ScreenEllipse orthographicOutline(const View& view, const Vec3& c,
+                                                 const HalfAxes& f) {
+  const double s = 1.0 / (view.pixel * view.pixel);
+  return {view.columnAt(c[0]),  view.rowAt(c[1]),    inner(f.x, f.x) * s,
+          -inner(f.x, f.y) * s, inner(f.y, f.y) * s, false};
+}
+
+ESVR_HD inline std::int32_t firstPixel(double low, int count) {
+  return std::int32_t(std::ceil(clampedTo(low - kSlack, 0.0, double(count))));
+}
+ESVR_HD inline std::int32_t lastPixel(double high, int count) {
+  return std::int32_t(std::floor(clampedTo(high + kSlack, -1.0, double(count - 1))));
+}
+
+}  // namespace ellipsoid_math
+
+/// \param fromEye  of the origin of its chunk
+ESVR_HD inline SeenEllipsoid seenBy(const View& view, const PackedEllipsoid& e,
+                                    const Vec3& fromEye) {
+  double w = e.rotation[0], x = e.rotation[1], y = e.rotation[2], z = e.rotation[3];
+  const double norm = 1.0 / std::sqrt(w * w + x * x + y * y + z * z);
+  w *= norm, x *= norm, y *= norm, z *= norm;
+  const Vec3 first{1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)};
+  const Vec3 second{2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)};
+  const Vec3 third{2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)};
+  const Vec3 center{double(e.center[0]), double(e.center[1]), double(e.center[2])};
+  return {view.coordinates(sum(fromEye, center)),
+          {view.coordinates(first), view.coordinates(second), view.coordinates(third)},
+          {double(e.scale[0]), double(e.scale[1]), double(e.scale[2])}};
+}
+
+/// An ellipsoid whose support, of radius 1 in its unit frame, holds all places that are
+/// interpolated from a voxel in the support of `e`: a ball around a cell, added to it. Of the
+/// ellipsoids that hold both, the one whose squared axes have the least sum.
+ESVR_HD inline SeenEllipsoid widenedByCells(const SeenEllipsoid& e, double radius) {
+  constexpr double kCell2 = 3.0;  // squared, from a voxel to the end of the cells around it
+  const Vec3 half = scaled(e.scale, radius);
+  const double p = std::sqrt(inner(half, half) / (3.0 * kCell2));
+  SeenEllipsoid wide = e;
+  for (int i = 0; i < 3; ++i)
+    wide.scale[i] = std::sqrt((1.0 + 1.0 / p) * half[i] * half[i] + (1.0 + p) * kCell2);
+  return wide;
+}
+
+/// \param radius  of the support in the unit frame
+ESVR_HD inline ScreenEllipse outlineOf(const View& view, const SeenEllipsoid& e, double radius) {
+  using namespace ellipsoid_math;
+  const HalfAxes f = halfAxes(e, radius);
+  if (!view.perspective) return orthographicOutline(view, e.center, f);
+  if (!(e.center[2] > 0.0 && e.center[2] * e.center[2] > inner(f.z, f.z)))
+    return {0.0, 0.0, 0.0, 0.0, 0.0, true};
+  return perspectiveOutline(view, e.center, f);
+}
+
+ESVR_HD inline ScreenBounds boundsOf(const ScreenEllipse& o, const SeenEllipsoid& e, double radius,
+                                     Resolution resolution) {
+  using namespace ellipsoid_math;
+  const Vec3 f = row(e.axes, scaled(e.scale, radius), 2);
+  const double halfDepth = std::sqrt(inner(f, f));
+  ScreenBounds b{0,
+                 resolution.width - 1,
+                 0,
+                 resolution.height - 1,
+                 atLeastZero(e.center[2] - halfDepth),
+                 e.center[2] + halfDepth};
+  if (o.everywhere) return b;
+  const double halfWidth = std::sqrt(o.xx), halfHeight = std::sqrt(o.yy);
+  b.firstColumn = firstPixel(o.column - halfWidth, resolution.width);
+  b.lastColumn = lastPixel(o.column + halfWidth, resolution.width);
+  b.firstRow = firstPixel(o.row - halfHeight, resolution.height);
+  b.lastRow = lastPixel(o.row + halfHeight, resolution.height);
+  return b;
+}
+
+ESVR_HD inline bool visible(const ScreenBounds& b) {
+  return b.farthest >= 0.0 && b.firstColumn <= b.lastColumn && b.firstRow <= b.lastRow;
+}
+
+/// Where an ellipsoid shows.
+struct ScreenExtent {
+  ScreenEllipse outline;
+  ScreenBounds bounds;
+};
+
+/// \param radius    of the support in the unit frame
+/// \param ofVoxels  true: where anything shows that is interpolated from voxels in the support
+ESVR_HD inline ScreenExtent screenExtentOf(const View& view, const SeenEllipsoid& e, double radius,
+                                           bool ofVoxels, Resolution resolution) {
+  const SeenEllipsoid shown = ofVoxels ? widenedByCells(e, radius) : e;
+  const double reach = ofVoxels ? 1.0 : radius;
+  const ScreenEllipse outline = outlineOf(view, shown, reach);
+  return {outline, boundsOf(outline, shown, reach, resolution)};
+}
+
+/// The columns that an outline covers between two rows; low > high where it does not come there.
+/// Exact but for kSlack: its left and right end are where its outline is vertical, or else at the
+/// row nearest to that.
+ESVR_HD inline PixelSpan columnsBetween(const ScreenEllipse& o, double firstRow, double lastRow) {
+  using namespace ellipsoid_math;
+  const double halfHeight = std::sqrt(o.yy);
+  const double top = greater(firstRow - kSlack - o.row, -halfHeight);
+  const double bottom = lesser(lastRow + kSlack - o.row, halfHeight);
+  if (!(top <= bottom)) return {1.0, -1.0};
+  if (!(o.yy > 0.0)) return {o.column - std::sqrt(o.xx), o.column + std::sqrt(o.xx)};
+  const double slope = o.xy / o.yy, reach = atLeastZero(o.xx - o.xy * slope);
+  const auto half = [&](double y) { return std::sqrt(reach * atLeastZero(1.0 - y * y / o.yy)); };
+  const double extreme = o.xx > 0.0 ? o.xy / std::sqrt(o.xx) : 0.0;
+  const double right = clampedTo(extreme, top, bottom), left = clampedTo(-extreme, top, bottom);
+  return {o.column + slope * left - half(left), o.column + slope * right + half(right)};
+}
+
+/// Perspective rays share their origin, eye, and run along forward + x right + y up; orthographic
+/// ones run along forward from eye + x right + y up. Where the support reaches the plane of the
+/// eye, the ray through the center may point backwards, and the middle of the picture is taken
+/// instead.
+ESVR_HD inline EllipsoidView viewOf(const View& view, const SeenEllipsoid& e, bool reachesEye,
+                                    float intensity, const RayKernel& kernel) {
+  using namespace ellipsoid_math;
+  const Vec3 inverse{1.0 / e.scale[0], 1.0 / e.scale[1], 1.0 / e.scale[2]};
+  const Vec3 right = row(e.axes, inverse, 0), up = row(e.axes, inverse, 1),
+             forward = row(e.axes, inverse, 2), none{0.0, 0.0, 0.0};
+  const Vec3 eye = scaled(
+      sum(sum(scaled(right, e.center[0]), scaled(up, e.center[1])), scaled(forward, e.center[2])),
+      -1.0);
+  const bool centered = !view.perspective || !reachesEye;
+  const double z = e.center[2];
+  const double x0 = !centered ? 0.0 : (view.perspective ? e.center[0] / z : e.center[0]);
+  const double y0 = !centered ? 0.0 : (view.perspective ? e.center[1] / z : e.center[1]);
+  const Vec3 along = view.perspective && centered ? scaled(eye, -1.0 / z) : forward;
+  const Vec3 alongX = view.perspective ? right : none, alongY = view.perspective ? up : none;
+  const Vec3 besideX = view.perspective ? cross(eye, right) : cross(right, forward);
+  const Vec3 besideY = view.perspective ? cross(eye, up) : cross(up, forward);
+  const double depth = centered ? z : -inner(eye, forward) / inner(forward, forward);
+  const Vec3 closest = centered ? none : sum(eye, scaled(forward, depth));
+  const double dx = view.pixel, dy = -view.pixel;  // a step to the next column, to the next row
+
+  EllipsoidView p;
+  p.column = view.columnAt(x0), p.row = view.rowAt(y0), p.depth = depth;
+  store(along, 1.0, p.form.along);
+  store(alongX, dx, p.form.alongX);
+  store(alongY, dy, p.form.alongY);
+  store(centered ? none : cross(eye, forward), 1.0, p.form.beside);
+  store(besideX, dx, p.form.besideX);
+  store(besideY, dy, p.form.besideY);
+  p.form.offX = float(dx * (view.perspective ? inner(closest, right) : inner(right, forward)));
+  p.form.offY = float(dy * (view.perspective ? inner(closest, up) : inner(up, forward)));
+  p.form.gain = intensity * kernel.numerator, p.form.base = intensity * kernel.base;
+  p.form.plateau = kernel.plateau, p.form.shift = kernel.shift, p.form.cutoff = kernel.cutoff;
+  return p;
+}
+
+/// How long one unit along forward is on the rays of a rectangle of pixels.
+struct UnitRange {
+  double min, max;
+};
+ESVR_HD inline UnitRange unitRange(const View& view, int firstColumn, int lastColumn, int firstRow,
+                                   int lastRow) {
+  using namespace ellipsoid_math;
+  if (!view.perspective) return {1.0, 1.0};
+  const double x0 = view.planeX(firstColumn), x1 = view.planeX(lastColumn);
+  const double y0 = view.planeY(lastRow), y1 = view.planeY(firstRow);
+  return {view.unitAlong(clampedTo(0.0, x0, x1), clampedTo(0.0, y0, y1)),
+          view.unitAlong(greater(-x0, x1), greater(-y0, y1))};
+}
+
+/// The bins, counted from the eye, that a support's samples lie in.
+struct BinRange {
+  std::int64_t first, last;
+};
+ESVR_HD inline BinRange binsOf(const ScreenBounds& b, const UnitRange& unit, double step) {
+  constexpr double kRounding = 1e-6;  // a bound may lie on a sample
+  const double binLength = step * kBinSamples;
+  const double first = std::floor(b.nearest * unit.min / binLength - kRounding);
+  const double last = std::floor(b.farthest * unit.max / binLength + kRounding);
+  return {first > 0.0 ? std::int64_t(first) : 0, std::int64_t(last)};
+}
+
+}  // namespace esvr

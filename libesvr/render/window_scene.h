@@ -1,0 +1,17 @@
+#pragma once
+/// Ellipsoids for the voxels of windows.
+
+#include <vector>
+
+#include "esvr/ellipsoids.h"
+#include "render/seen_ellipsoid.h"
+#include "render/window_form.h"
+
+namespace esvr {
+
+[[nodiscard]] WindowForm windowForm(const PackedEllipsoid& e, const RayKernel& kernel);
+
+/// In the order of `packed`.
+[[nodiscard]] std::vector<WindowForm> windowForms(const Field& field);
+
+}  // namespace esvr

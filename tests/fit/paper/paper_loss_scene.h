@@ -1,0 +1,136 @@
+#pragma once
+/// Bricks with predictions and targets for the tests of the paper's loss, and what the textbook's
+/// formula makes of them.
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "esvr/sparse_volume.h"
+#include "field/random_field.h"
+#include "fit/paper/dense_paper_loss.h"
+
+namespace esvr::test {
+
+inline constexpr int kMargin = 5;  // voxels beyond the bricks that windows see
+
+struct Scene {
+  std::vector<Coord> bricks;
+  std::size_t targetBricks = 0;
+  std::vector<float> prediction{}, target{};  // of all bricks
+  double voxels = 5000.0, beta = 0.2, peak = 1.0;
+  std::optional<Box> within{};  // bricks around whose voxels windows count
+
+  [[nodiscard]] DenseLossOptions denseOptions() const {
+    DenseLossOptions options{voxels, beta, peak};
+    if (within)
+      options.windows = {within->min * kBrickSide,
+                         (within->max + Coord{1, 1, 1}) * kBrickSide - Coord{1, 1, 1}};
+    return options;
+  }
+};
+
+/// Bricks that touch by face, edge and corner, one apart, on both sides of zero; the last three
+/// hold a prediction only.
+inline std::vector<Coord> mixedBricks() {
+  return {{-2, -1, 0}, {-1, -1, 0}, {-1, 0, 1}, {0, 1, 0}, {0, -1, -1}, {-1, -1, 1}, {1, 1, 1}};
+}
+
+using ValueAt = std::function<float(Coord)>;
+
+inline Scene makeScene(const std::vector<Coord>& bricks, std::size_t targetBricks,
+                       const ValueAt& target, const ValueAt& prediction) {
+  Scene scene{.bricks = bricks, .targetBricks = targetBricks};
+  for (std::size_t b = 0; b < bricks.size(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Coord at = bricks[b] * kBrickSide + voxelLocal(v);
+      scene.target.push_back(b < targetBricks ? target(at) : 0.0f);
+      scene.prediction.push_back(prediction(at));
+    }
+  return scene;
+}
+
+inline Scene randomScene(std::uint64_t seed, const std::vector<Coord>& bricks = mixedBricks()) {
+  Random random(seed);
+  const auto value = [&](Coord) { return float(random(0.0, 1.0)); };
+  return makeScene(bricks, (bricks.size() + 1) / 2, value, value);
+}
+
+/// Prediction less target. Exact for values of one exponent or multiples of one step, which these
+/// tests use where they compare bits.
+inline std::vector<float> residualOf(const Scene& scene) {
+  std::vector<float> residual(scene.target.size());
+  for (std::size_t v = 0; v < residual.size(); ++v)
+    residual[v] = scene.prediction[v] - scene.target[v];
+  return residual;
+}
+
+struct LossAndGradient {
+  double loss = 0.0;
+  std::vector<float> gradient;
+};
+
+inline Box boxAround(const std::vector<Coord>& bricks, int margin) {
+  Box box;
+  for (const Coord b : bricks) {
+    box.expand(b * kBrickSide - Coord{margin, margin, margin});
+    box.expand((b + Coord{1, 1, 1}) * kBrickSide + Coord{margin - 1, margin - 1, margin - 1});
+  }
+  return box;
+}
+
+inline DenseValues denseOf(const Scene& scene, const std::vector<float>& values) {
+  DenseValues dense(boxAround(scene.bricks, kMargin));
+  for (std::size_t v = 0; v < values.size(); ++v)
+    dense[scene.bricks[v / kBrickVoxels] * kBrickSide + voxelLocal(int(v % kBrickVoxels))] =
+        values[v];
+  return dense;
+}
+
+/// The prediction as the library sees it: target + residual, the residual in float32.
+inline DenseValues densePrediction(const Scene& scene) {
+  const auto residual = residualOf(scene);
+  DenseValues dense = denseOf(scene, scene.target);
+  const DenseValues difference = denseOf(scene, residual);
+  for (std::size_t v = 0; v < residual.size(); ++v) {
+    const Coord at =
+        scene.bricks[v / kBrickVoxels] * kBrickSide + voxelLocal(int(v % kBrickVoxels));
+    dense[at] += difference.at(at);
+  }
+  return dense;
+}
+
+inline double denseLoss(const Scene& scene) {
+  return densePaperLoss(densePrediction(scene), denseOf(scene, scene.target), scene.denseOptions());
+}
+
+inline std::vector<double> denseGradient(const Scene& scene) {
+  const DenseValues dense = densePaperLossGradient(
+      densePrediction(scene), denseOf(scene, scene.target), scene.denseOptions());
+  std::vector<double> gradient(scene.target.size());
+  for (std::size_t v = 0; v < gradient.size(); ++v)
+    gradient[v] =
+        dense.at(scene.bricks[v / kBrickVoxels] * kBrickSide + voxelLocal(int(v % kBrickVoxels)));
+  return gradient;
+}
+
+template <class A, class B>
+double relativeDifference(const std::vector<A>& values, const std::vector<B>& reference) {
+  double difference = 0.0, norm = 0.0;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    difference += std::pow(double(values[i]) - double(reference[i]), 2);
+    norm += std::pow(double(reference[i]), 2);
+  }
+  return std::sqrt(difference / norm);
+}
+
+inline std::vector<Coord> cubeOfBricks(int side) {
+  std::vector<Coord> bricks;
+  for (int i = 0; i < side * side * side; ++i)
+    bricks.push_back({i / (side * side), i / side % side, i % side});
+  return bricks;
+}
+
+}  // namespace esvr::test

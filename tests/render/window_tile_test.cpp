@@ -1,0 +1,169 @@
+// Plan: pictures whose samples are interpolated from voxels (Between::kVoxels) against those of the
+// voxels that revoxelise() makes, marched by renderVolume: over cameras, steps, zooms, shapes and
+// rules. Voxels differ by rounding, some 1e-6 of the sum of the intensities that reach them, and
+// samples by that of a place in float32, 1e-5 voxel; so do the places of a sharp edge, a kappa of
+// 12 and above, whose slope is a few times as steep. 80 dB is asked for; a voxel missed or a sample
+// of another cell costs more. Where a rule has a threshold, a voxel on it may come out either way
+// and is off by the threshold: 70 dB.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <string>
+
+#include "esvr/fit.h"
+#include "esvr/render.h"
+#include "esvr/vdb_io.h"
+#include "field/random_field.h"
+#include "render/reference_picture.h"
+
+namespace esvr::test {
+namespace {
+
+constexpr double kAsked = 80.0, kAskedByThreshold = 70.0;
+constexpr Box kBox{{0, 0, 0}, {39, 39, 39}};
+
+RenderOptions optionsFor(const CameraWish& wish = {}, Resolution resolution = {50, 37}) {
+  RenderOptions o;
+  o.resolution = resolution;
+  o.camera = fitCamera(kBox, wish, resolution);
+  o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
+  o.opacityLength = 8.0;
+  return o;
+}
+
+CameraWish orthographic() { return {.projection = Projection::kOrthographic}; }
+
+double agreement(const Field& field, const RenderOptions& o, const RevoxeliseOptions& rule = {}) {
+  const Image drawn = renderField(field, o, rule);
+  double light = 0.0;
+  for (const float v : drawn.rgba) light += v;
+  EXPECT_GT(light, 0.0) << "an empty picture proves nothing";
+  return imagePsnr(renderVolume(revoxelise(field, rule), o), drawn);
+}
+
+TEST(WindowTile, DrawsTheVoxelsPictureFromEveryDirection) {
+  const Field field = randomField({.count = 200});
+  for (int turn = 0; turn < 8; ++turn) {
+    RenderOptions o = optionsFor();
+    o.camera = turned(o.camera, 45.0 * turn + 3.0);
+    EXPECT_GE(agreement(field, o), kAsked) << turn;
+    o.camera = turned(optionsFor(orthographic()).camera, 45.0 * turn);
+    EXPECT_GE(agreement(field, o), kAsked) << turn << ", along an axis and across";
+  }
+  for (const Vec3 eye : {Vec3{20, 150, 20}, Vec3{20, -110, 20}})
+    EXPECT_GE(agreement(field, optionsFor({.eye = eye, .up = Vec3{0, 0, 1}})), kAsked);
+}
+
+TEST(WindowTile, DrawsTheVoxelsPictureFromInside) {
+  for (const double fov : {80.0, 170.0}) {
+    const CameraWish inside{.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = fov};
+    EXPECT_GE(agreement(randomField({.count = 200}), optionsFor(inside)), kAsked) << fov;
+  }
+}
+
+TEST(WindowTile, DrawsTheVoxelsPictureFromFarAway) {
+  CameraWish far{.eye = Vec3{1e6, 2e6, 3.3e6}, .center = Vec3{20, 20, 20}};
+  far.fov = 2.0 * std::atan(30.0 / 4e6) * 180.0 / 3.14159265358979;
+  EXPECT_GE(agreement(randomField({.count = 200}), optionsFor(far)), kAsked);
+}
+
+TEST(WindowTile, DrawsTheVoxelsPictureAtEveryStep) {
+  const Field field = randomField({.count = 200});
+  for (const double step : {0.1, 0.5, 1.0, 2.5, 7.0}) {
+    RenderOptions o = optionsFor();
+    o.step = step;
+    EXPECT_GE(agreement(field, o), kAsked) << step;
+  }
+  RenderOptions o = optionsFor();
+  o.step = 60.0;  // most rays have one sample in the volume
+  o.transfer.opacity = {{0.0, 0.5}};
+  o.opacityLength = 60.0;
+  EXPECT_GE(agreement(randomField({.count = 2000}), o), kAsked);
+}
+
+TEST(WindowTile, DrawsTheVoxelsPictureAtEveryZoom) {
+  const Field field = randomField({.count = 200});
+  for (const double times : {0.02, 0.3, 2.0, 10.0, 100.0}) {
+    RenderOptions o = optionsFor(orthographic());
+    o.camera.height *= times;
+    EXPECT_GE(imagePsnr(renderVolume(revoxelise(field, {}), o), renderField(field, o)), kAsked)
+        << times;
+  }
+}
+
+TEST(WindowTile, DrawsTheVoxelsPictureOfSmallAndThinEllipsoids) {
+  EXPECT_GE(agreement(randomField({.count = 4000, .smallest = 0.15, .aspect = 3.0}), optionsFor()),
+            kAsked);
+  EXPECT_GE(agreement(randomField({.count = 200, .smallest = 0.1, .aspect = 200.0}), optionsFor()),
+            kAsked);
+  for (const float kappa : {-3.0f, 0.0f, 12.0f})
+    EXPECT_GE(agreement(randomField({.count = 100, .kappa = kappa}), optionsFor()), kAsked)
+        << kappa;
+}
+
+TEST(WindowTile, DrawsOneEllipsoidThatCoversEverything) {
+  // Of float32 at a distance of hundreds of voxels and no more than its curvature: 1e-5.
+  Field field = randomField({.count = 1, .smallest = 60.0, .aspect = 1.5});
+  field.chunks[0].ellipsoids.intensity[0] = 0.3f;
+  EXPECT_GE(agreement(field, optionsFor()), kAsked);
+}
+
+TEST(WindowTile, DrawsABackgroundSeveralChunksAndKappas) {
+  Field field = randomField({.count = 20});
+  field.background = 0.25f;
+  field.chunks.push_back(randomField({.count = 20, .extent = 20.0, .seed = 9}).chunks[0]);
+  field.chunks[1].origin = {16, -8, 8};
+  field.chunks[0].ellipsoids.kappa.assign(20, 1.0f);
+  field.chunks[0].ellipsoids.kappa[3] = 20.0f;
+  field.chunks[1].ellipsoids.kappa.assign(20, 4.0f);
+  EXPECT_GE(agreement(field, optionsFor()), kAsked);
+}
+
+TEST(WindowTile, DrawsByTheRuleOfTheVoxels) {
+  const Field field = randomField({.count = 200});
+  EXPECT_GE(agreement(field, optionsFor(), {.threshold = 0.2f}), kAskedByThreshold);
+  EXPECT_GE(agreement(field, optionsFor(), {.range = ValueRange{-0.3f, 0.4f}}), kAsked);
+}
+
+TEST(WindowTile, IsTheSameForAnyNumberOfThreads) {
+  const Field field = randomField({.count = 300});
+  const RenderOptions o = optionsFor({}, {130, 70});
+  const auto withThreads = [&](std::size_t n) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, n);
+    return renderField(field, o).rgba;
+  };
+  const auto one = withThreads(1);
+  EXPECT_EQ(one, withThreads(2));
+  EXPECT_EQ(one, withThreads(5));
+}
+
+TEST(WindowTile, NothingToSeeIsTransparent) {
+  const auto away = optionsFor({.eye = Vec3{20, 20, 200}, .center = Vec3{20, 20, 300}});
+  for (const float v : renderField(randomField({}), away).rgba) ASSERT_EQ(v, 0.0f);
+  for (const float v : renderField(Field{}, optionsFor()).rgba) ASSERT_EQ(v, 0.0f);
+}
+
+/// A short fit: many of its ellipsoids are smaller than a voxel.
+TEST(WindowTile, RealFileAgreesWithItsVoxelsAtEveryStep) {
+  if (std::string(ESVR_DATA_DIR).empty())
+    GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>";
+  const VolumeGrid grid = readGrid(std::string(ESVR_DATA_DIR) + "/aneurism.vdb", "density");
+  FitOptions options;
+  options.count = 3000, options.iterations = 60;
+  const FitResult fitted = fit(grid.volume, options);
+  const RevoxeliseOptions rule{.threshold = 0.02f};
+  const SparseVolume voxels = revoxelise(fitted.field, rule);
+  RenderOptions o;
+  o.resolution = {200, 200};
+  o.camera = fitCamera(activeBox(grid.volume), {}, o.resolution);
+  o.transfer =
+      rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, activeRange(grid.volume));
+  for (const double step : {0.25, 0.5, 1.0, 2.0}) {
+    o.step = step;
+    EXPECT_GE(imagePsnr(renderVolume(voxels, o), renderField(fitted.field, o, rule)), 60.0) << step;
+  }
+}
+
+}  // namespace
+}  // namespace esvr::test
