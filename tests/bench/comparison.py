@@ -1,17 +1,15 @@
 #!/usr/bin/env python3
-"""Makes docs/comparison.md: an .esvr against everything else, on eight volumes, at two sizes each.
+"""Makes docs/comparison.md, which compares ESVR with other formats on eight volumes at two sizes.
 
     comparison.py sizes --bin BUILD --data DATA
     comparison.py fit   --bin BUILD --data DATA --out OUT [--device cuda]
-    comparison.py page  --bin BUILD --data DATA --out OUT --page docs/comparison.md
+    comparison.py page  --bin BUILD --data DATA --out OUT --page docs/comparison.md [--device cuda]
 
-`sizes` prints what is asked for: the half-float Blosc VDB over 50 and over 10. `fit` makes the .esvr
-files, on whatever device, and their reports beside them. `page` measures every row with esvr-compare
-and writes the page; rows that OUT holds already are not measured again.
+`sizes` prints the two sizes of every volume: the size of its half-float Blosc VDB divided by 50 and by
+10. `fit` makes the .esvr files and their reports. `page` measures every row with esvr-compare and writes
+the page; it does not repeat measurements that OUT already holds.
 
-Rows of systems that esvr-compare does not have come from external_points.csv: bytes, PSNR and times as
-measured with their own programs on the same volumes (SZ3 3.1.8 and 3.3.2, TTHRESH, and the dense volume
-rounded to L steps, then `xz -9e`), on two CPU cores.
+Rows of compressors that esvr-compare does not run come from external_points.csv (external_points.md).
 """
 import argparse
 import csv
@@ -110,7 +108,7 @@ def external_points(name, budget, peak):
 
 
 class Size:
-    """All that a volume can be stored in within one budget."""
+    """The rows of one volume within one budget of bytes."""
 
     def __init__(self, volume, table, part):
         self.part = part
@@ -123,6 +121,14 @@ class Size:
         self.missing = [r for r in matched if 'psnr_box' not in r]
         self.externals = external_points(volume.name, self.budget, table['peak'])
         self.time = volume.time_of(part)
+
+    def all_others(self):
+        return self.rows + self.externals
+
+    def built_in(self):
+        """The rows of OpenVDB, of NanoVDB as it lies in memory, and of ZFP."""
+        return [r for r in self.rows if r['name'].startswith(('OpenVDB', 'ZFP')) or
+                r['name'].endswith(' raw')]
 
     def better(self, key, rows, ours=None):
         mine = psnr(ours or self.ours, key)
@@ -144,8 +150,8 @@ def names(rows, key):
 
 
 def losses(title, key, lost, ours):
-    return [f'- {title}, {name}: {text(psnr(ours(name), key))} dB, below {names(rows, key)}'
-            for name, rows in lost.items()]
+    return [f'- {title}, {name}: ESVR has {text(psnr(ours(name), key))} dB; better: '
+            f'{names(rows, key)}' for name, rows in lost.items()]
 
 
 def flip_losses(title, sizes):
@@ -154,51 +160,59 @@ def flip_losses(title, sizes):
         rows = sorted(size.less_flip(), key=lambda r: r['flip'])
         if rows:
             less = ', '.join(f"{r['name']} ({text(r['flip'], 4)})" for r in rows)
-            lines.append(f"- {title}, {name}: {text(size.bricks['flip'], 4)}, above {less}")
+            lines.append(f"- {title}, {name}: ESVR has {text(size.bricks['flip'], 4)}; as "
+                         f"low or lower: {less}")
     return lines
 
 
-def built_in(size):
-    """OpenVDB, NanoVDB in memory and ZFP: what the claim at a tenth is about."""
-    return [r for r in size.rows if r['name'].startswith(('OpenVDB', 'ZFP')) or
-            r['name'].endswith(' raw')]
+def won(sizes, title, others_of, better_of):
+    """A line that counts the volumes where no other row is better. Only volumes that have another
+    row count: a volume that nothing else can store in this size is no win."""
+    there = {name: size for name, size in sizes.items() if others_of(size)}
+    best = [name for name, size in there.items() if not better_of(size)]
+    return f'- {title}: {len(best)} of {len(there)} ({", ".join(best) or "none"})'
 
 
-def won(sizes, title, of_size):
-    """A line that counts the volumes where no row is better."""
-    names_won = [name for name, size in sizes.items() if not of_size(size)]
-    return f'- {title}: {len(names_won)} ({", ".join(names_won) or "none"})'
+def won_psnr(sizes, title, others_of):
+    return won(sizes, title, others_of, lambda s: s.better('psnr_box', others_of(s)))
 
 
 def lost(sizes, of_size):
     return {name: of_size(size) for name, size in sizes.items() if of_size(size)}
 
 
+def wins(part, sizes):
+    at = f'1/{part}'
+    alone = [name for name, size in sizes.items() if not size.all_others()]
+    lines = [won_psnr(sizes, f'PSNR over the box at {at}, against all other rows', Size.all_others),
+             won_psnr(sizes, f'PSNR over the box at {at}, against the external compressors',
+                      lambda s: s.externals),
+             won_psnr(sizes, f'PSNR over the box at {at}, against OpenVDB, NanoVDB in memory and ZFP',
+                      Size.built_in),
+             won(sizes, f'PSNR of pictures at {at}, drawn from decoded voxels', lambda s: s.rows,
+                 Size.better_pictures),
+             won(sizes, f'PSNR of pictures at {at}, drawn as ellipsoids', lambda s: s.rows,
+                 Size.better_than_ellipsoids)]
+    if alone:
+        lines.append(f'- Not counted at {at}, since no other row exists at that size: {", ".join(alone)}')
+    return lines
+
+
 def verdict(low, high):
-    lines = ['## Where something else is better', '']
+    lines = ['## Where another format is better', '']
     for part, sizes in ((LOW, low), (HIGH, high)):
         at = f'1/{part}'
-        lines += losses(f'{at}, PSNR over the box', 'psnr_box',
-                        lost(sizes, lambda s: s.better('psnr_box', s.rows + s.externals)),
+        lines += losses(f'PSNR over the box at {at}', 'psnr_box',
+                        lost(sizes, lambda s: s.better('psnr_box', s.all_others())),
                         lambda n: sizes[n].ours)
-        lines += losses(f'{at}, PSNR of pictures drawn from voxels', 'image_psnr',
+        lines += losses(f'PSNR of pictures at {at}, drawn from decoded voxels', 'image_psnr',
                         lost(sizes, Size.better_pictures), lambda n: sizes[n].bricks)
-        lines += losses(f'{at}, PSNR of pictures drawn as ellipsoids', 'image_psnr',
+        lines += losses(f'PSNR of pictures at {at}, drawn as ellipsoids', 'image_psnr',
                         lost(sizes, Size.better_than_ellipsoids), lambda n: sizes[n].ours)
-        lines += flip_losses(f'{at}, FLIP of pictures drawn from voxels', sizes)
-    lines += ['', '## Where ESVR is', '', f'Of {len(low)} volumes, above', '',
-              won(low, f'every other row in PSNR over the box, at 1/{LOW}',
-                  lambda s: s.better('psnr_box', s.rows + s.externals)),
-              won(low, f'every row that was drawn in PSNR of pictures, at 1/{LOW}, drawn from voxels',
-                  Size.better_pictures),
-              won(low, 'the same, drawn as ellipsoids', Size.better_than_ellipsoids),
-              won(high, f'every OpenVDB, NanoVDB-memory and ZFP row in PSNR over the box, at 1/{HIGH}',
-                  lambda s: s.better('psnr_box', built_in(s))),
-              won(high, f'every other row in PSNR over the box, at 1/{HIGH}',
-                  lambda s: s.better('psnr_box', s.rows + s.externals)),
-              won(high, f'every row that was drawn in PSNR of pictures, at 1/{HIGH}, drawn from voxels',
-                  Size.better_pictures), '']
-    return lines
+        lines += flip_losses(f'FLIP of pictures at {at}, drawn from decoded voxels', sizes)
+    lines += ['', '## Where ESVR is better than every other row', '',
+              'Each line counts volumes, and only those for which another row exists.', '']
+    return lines + wins(LOW, low) + wins(HIGH, high) + ['']
 
 
 COLUMNS = [('bytes', 0), ('psnr_box', 2), ('psnr_active', 2), ('max_error', 4), ('ssim', 4),
@@ -235,31 +249,47 @@ def section(size):
             f"{r['name']} ({r['note']})" if r['note'] != 'out of reach' else r['name']
             for r in size.missing) + '.']
     if not size.externals:
-        lines += ['', 'There is no external point at or under this size.']
+        lines += ['', 'No external compressor was measured at or below this size.']
     return lines + ['']
+
+
+INTRODUCTION = """\
+# Comparison with other formats
+
+`tests/bench/comparison.py` makes this page from real volumes:
+
+    tests/bench/comparison.py fit  --bin BUILD --data DATA --out OUT --device cuda
+    tests/bench/comparison.py page --bin BUILD --data DATA --out OUT --device cuda --page docs/comparison.md
+
+[compare.md](compare.md) has the rules that every row follows. The two sizes of a volume are the size of its
+pruned grid as a half-float Blosc VDB file, divided by 50 and by 10. Every row is the best file of its form that
+is not larger.
+
+- *encode s* of an ESVR row is the run time of the whole command `vdb2esvr --size` on the device that the row
+  names. The other forms are encoded, and all forms are decoded, on the CPU of the same machine; these times are
+  medians of three runs.
+- *image PSNR* and *FLIP* compare pictures of four views with pictures of the source: 400 x 400 pixels, viridis
+  with linear opacity, one voxel between samples. *FPS* is pictures a second. *VRAM* is the device memory that
+  drawing held. Voxels are drawn from NanoVDB grids, those of quantised rows from quantised grids.
+- Each ESVR file has two rows: one is drawn from the ellipsoids, the other from the decoded voxels
+  (`esvr-render --method bricks`).
+- The rows of SZ3, TTHRESH, quantise+xz, xz-lossless and zstd-lossless are *external compressors*. They were
+  measured separately, on another machine, and for four of the volumes only
+  ([external_points.md](../tests/bench/external_points.md)). Their times cannot be compared with the others, and
+  they have no picture figures.
+"""
 
 
 def introduction(tables):
     table = next(iter(tables.values()))
-    return ['# Comparison', '',
-            'Made by `tests/bench/comparison.py`; the rules of the rows are in [compare.md](compare.md).',
-            'Sizes are the half-float Blosc VDB of the grid over 50 and over 10, pruned first. Encode seconds of',
-            'ESVR are those of the whole `vdb2esvr --size` on the device that the row names; all other times are',
-            'of the CPU beside it, medians of three runs; those of externals as measured elsewhere. Pictures: four',
-            'views, viridis with linear opacity, 400 x 400, one voxel between samples, drawn on the device that each',
-            'volume names; FPS are pictures a second, VRAM is what drawing held on the device: NanoVDB grids for voxels,',
-            'quantised ones for quantised rows. Rows without picture figures are externals, whose voxels were not at hand;',
-            'there are points of four volumes, and not at every size, so that a table without them is no win over them.',
-            'ESVR is drawn from its ellipsoids, and in a second row from the voxels that the file decodes to',
-            '(`esvr-render --method bricks`).', '',
-            '    ' + '\n    '.join(table['versions']), '']
+    return [INTRODUCTION, '    ' + '\n    '.join(table['versions']), '']
 
 
 def reference_cost(table):
     pictures = table['pictures']
     vram = pictures['reference_vram_bytes']
-    held = f', {vram / 1e6:.1f} MB' if vram else ''
-    return (f"The reference is drawn at {pictures['reference_fps']:.0f} pictures a second{held} "
+    held = f' with {vram / 1e6:.1f} MB of device memory' if vram else ''
+    return (f"The source is drawn at {pictures['reference_fps']:.0f} pictures a second{held} "
             f"({pictures['device']}).")
 
 

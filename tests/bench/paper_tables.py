@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""The paper's tables of its ablations, ours beside its own columns.
+"""The tables of the paper's ablations: our runs of its method beside the paper's own figures.
 
     paper_tables.py run --bin BUILD --data DIR --out OUT [--device cuda] [--epochs N] ...
-    paper_tables.py tables --out OUT     markdown from what was measured
-    paper_tables.py draw --out OUT       error against time, the paper's method beside ours (matplotlib)
+    paper_tables.py tables --out OUT     Markdown of what was measured
+    paper_tables.py draw --out OUT       error against run time, the paper's method and ours (matplotlib)
 
-Runs `vdb2esvr --preset paper` in its variants on aneurism and on the paper's five synthetic volumes
-(esvr-sample), and the default fit with as many ellipsoids. FPS of the paper's tables stands on other
-hardware and another renderer; average hits, of which it is a function, are measured in its place.
---epochs shortens every run by the same factor; its default is the paper's own length. --jobs runs
-several at once, whose seconds are then not to be quoted.
+`run` runs `vdb2esvr --paper` in its variants on aneurism and on the paper's five synthetic volumes
+(esvr-sample), and the default fit with as many ellipsoids. The paper's frames per second depend on other
+hardware and another renderer; average hits, which they follow from, are measured instead. --epochs
+shortens every run by the same factor; its default is the paper's own length. --jobs runs several at
+once, whose seconds must then not be quoted.
 """
 import argparse
 import concurrent.futures
@@ -20,9 +20,9 @@ from fit_benchmarks import convert, run
 
 SYNTHETIC = ["8area", "empty-sphere", "synth-tube", "synth-wiggle", "diffuse-scalar"]
 CURVES = ["aneurism", "smoke1"]
-CURVE_MOST = 150_000  # ellipsoids before pruning; smoke would else grow to a million
+CURVE_MAX = 150_000  # ellipsoids before pruning; smoke would else grow to a million
 PAPER_EPOCHS = 2800  # of PaperMethod
-# Ellipsoids in thousands, PSNR, average hits; before and after pruning (tables 'Ellipsoid type').
+# Ellipsoids in thousands, PSNR, average hits; before and after pruning (tables 'Primitive type').
 PAPER_TYPES = {
     "aneurism": {"ellipsoid": [(93, 51.20, 20.10), (31, 50.70, 9.05)],
                  "gaussian": [(95, 44.97, 34.73), (32, 48.16, 19.96)]},
@@ -60,24 +60,30 @@ def sources(arguments):
     return {name: found[name] for name in arguments.volumes}
 
 
-def paper(arguments, name, *options):
+def method(arguments, **keys):
+    """The options of a run by the paper's method."""
+    keys = {"epochs": arguments.epochs, **keys}
+    return ["--paper", ",".join(f"{k.replace('_', '-')}={v}" for k, v in keys.items()), "--hits"]
+
+
+def paper(arguments, name, **keys):
     """Densification ends at the number that the paper's table has before pruning: the paper matches
     numbers by the threshold."""
-    most = 1000 * PAPER_TYPES[name]["ellipsoid"][0][0]
-    return ["--preset", "paper", "--epochs", arguments.epochs, "--hits", "--points", most // 2,
-            "--most", most, "--densify-threshold", arguments.threshold, *options]
+    count = 1000 * PAPER_TYPES[name]["ellipsoid"][0][0]
+    return method(arguments, points=count // 2, max=count, densify_threshold=arguments.threshold,
+                  **keys)
 
 
 def variants(arguments, name):
     """What is run on a volume: key and options."""
     yield "ellipsoid", paper(arguments, name)
-    yield "gaussian", paper(arguments, name, "--ellipsoid", "gaussian")
+    yield "gaussian", paper(arguments, name, kernel="gaussian")
     if name not in arguments.ablate:
         return
     for score in ["no-fa", "only-fa", "contribution"]:
-        yield f"score {score}", paper(arguments, name, "--prune-score", score)
-    yield "k 3", paper(arguments, name, "--sharpness", "3")
-    yield "k learned", paper(arguments, name, "--sharpness", "learned")
+        yield f"score {score}", paper(arguments, name, prune_score=score)
+    yield "k 3", paper(arguments, name, k=3)
+    yield "k learned", paper(arguments, name, k="learned")
 
 
 def measure(arguments, job):
@@ -115,11 +121,10 @@ def second_jobs(arguments, found, rows):
         yield name, "default", source, box, ["--count", count, "--storage", "float32", "--hits"]
         if name in arguments.ablate:
             yield (name, "score full in three passes", source, box,
-                   paper(arguments, name, "--prune-passes", "3", "--count", count))
+                   [*paper(arguments, name, prunes=3), "--count", count])
             yield (name, "score none", source, box,
-                   ["--preset", "paper", "--epochs", arguments.epochs, "--hits", "--prune-passes",
-                    "0", "--points", max(1, count // 2), "--count", count, "--densify-threshold",
-                    "0"])
+                   [*method(arguments, prunes=0, points=max(1, count // 2), densify_threshold=0),
+                    "--count", count])
 
 
 def measure_all(arguments):
@@ -141,8 +146,8 @@ def measure_curves(arguments):
         box = whole(256) if name == "aneurism" else []
         source = arguments.data / f"{name}.vdb"
         rows.append(measure(arguments, (name, "curve paper", source, box,
-                                        ["--preset", "paper", "--epochs",
-                                         arguments.curve_epochs, "--most", CURVE_MOST])))
+                                        ["--paper", f"epochs={arguments.curve_epochs},"
+                                                    f"max={CURVE_MAX}"])))
         count = rows[-1]["grid"]["ellipsoids"]
         rows.append(measure(arguments, (name, "curve default", source, box,
                                         ["--count", count, "--storage", "float32"])))
@@ -175,7 +180,7 @@ def type_rows(rows):
             cells += [cell(1000 * n, psnr, hits) for n, psnr, hits in theirs[kind]]
             yield f"| {name} | {kind} | " + " | ".join(cells) + " |"
         if default := by_key.get((name, "default")):
-            yield (f"| {name} | default fit | | "
+            yield (f"| {name} | *default fit* | | "
                    + cell(default["ellipsoids"], default["metrics"]["psnr_box"],
                           default["fit"]["hits"]) + " | | |")
 
@@ -201,7 +206,7 @@ def print_tables(arguments):
     measured = load(arguments, "paper_tables.json")
     rows = measured["rows"]
     print(f"\n{measured['epochs']} epochs; ellipsoids, PSNR over the box in dB, average hits\n")
-    print("| volume | ellipsoid | before pruning | after | the paper: before | after |")
+    print("| volume | kernel | before pruning | after pruning | paper, before | paper, after |")
     print("|---|---|---|---|---|---|")
     print("\n".join(type_rows(rows)))
     for title, prefix, theirs, first in [("pruning score", "score ", PAPER_SCORES, "full"),

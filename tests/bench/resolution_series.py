@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""One skeleton rasterised at rising resolutions: bytes at 25 dB over the active voxels.
+"""Makes docs/resolution.md: one skeleton rasterised at rising resolutions, at 25 dB over the active voxels.
 
     resolution_series.py fit  --bin BUILD --swc FILE.swc --out OUT [--device cuda] [--resolutions 256 512 ...]
     resolution_series.py page --bin BUILD --swc FILE.swc --out OUT [--resolutions 256 512 ...]
 
-`fit` makes the volumes and, for each, .esvr files of more and more ellipsoids until one is above 25 dB; from the two
-about it follows the number that should reach it, which is fitted once more. `page` prints a Markdown table of that file and of the
-smallest NanoVDB and ZFP files that reach 25 dB too, of those settings that it tries, and the exponents by
-which bytes grow.
+`fit` rasterises the skeleton and fits .esvr files with different numbers of ellipsoids until one is within
+0.3 dB of 25 dB, above or below; it keeps the one that is nearest. `page` prints Markdown tables of these
+files, of the smallest NanoVDB and ZFP files among SETTINGS that reach 25 dB, and of the exponents by which
+files grow with the resolution.
 """
 import argparse
 import json
@@ -130,22 +130,34 @@ def figure(row, key, form):
     return form.format(row[key]) if row.get(key) is not None else '-'
 
 
+def print_fits(options):
+    print('| resolution | active voxels | ellipsoids | bytes | PSNR active | PSNR box | seconds |')
+    print('|--:|--:|--:|--:|--:|--:|--:|')
+    for resolution in options.resolutions:
+        report = json.loads(Resolution(options, resolution).report.read_text())
+        grid = report['grids'][0]
+        print(f"| {resolution} | {grid['source']['active_voxels']} | {grid['ellipsoids']} | "
+              f"{report['output']['bytes']} | {grid['metrics']['psnr_active']:.2f} | "
+              f"{grid['metrics']['psnr_box']:.2f} | {report['seconds']['total']:.1f} |")
+
+
 def page(options):
-    print('| resolution | active voxels | row | bytes | PSNR box | active | decode s |')
-    print('|--:|--:|---|--:|--:|--:|--:|')
+    print_fits(options)
+    print('\n| resolution | row | bytes | times ESVR | PSNR active | PSNR box | decode s |')
+    print('|--:|---|--:|--:|--:|--:|--:|')
     sizes = {}
     for resolution in options.resolutions:
-        table, rows = Resolution(options, resolution).rows()
+        _, rows = Resolution(options, resolution).rows()
+        ours = rows[0]['bytes']
         for row in rows:
-            print(f"| {resolution} | {table['active_voxels']} | {row['name']} | "
-                  f"{figure(row, 'bytes', '{}')} | {figure(row, 'psnr_box', '{:.2f}')} | "
-                  f"{figure(row, 'psnr_active', '{:.2f}')} | {figure(row, 'decode_s', '{:.4f}')} |")
-            if 'bytes' in row:
-                sizes.setdefault(row['name'], []).append((resolution, row['bytes']))
-    print()
+            print(f"| {resolution} | {row['name']} | {row['bytes']} | {row['bytes'] / ours:.1f} | "
+                  f"{figure(row, 'psnr_active', '{:.2f}')} | {figure(row, 'psnr_box', '{:.2f}')} | "
+                  f"{figure(row, 'decode_s', '{:.4f}')} |")
+            sizes.setdefault(row['name'], []).append((resolution, row['bytes']))
+    print('\n| form | growth of the file, as a power of the resolution | resolutions |')
+    print('|---|--:|---|')
     for name, points in sizes.items():
-        print(f'- {name}: bytes grow as resolution^{exponent(points):.2f} '
-              f'({points[0][0]} to {points[-1][0]})')
+        print(f'| {name} | {exponent(points):.2f} | {points[0][0]} to {points[-1][0]} |')
 
 
 def main():

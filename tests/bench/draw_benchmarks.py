@@ -1,0 +1,138 @@
+#!/usr/bin/env python3
+"""Speed and errors of drawing, as the section "Drawing" of docs/benchmarks.md shows them.
+
+    draw_benchmarks.py fit    --bin BUILD --data DIR --out OUT   the files that are drawn
+    draw_benchmarks.py speed  --bin BUILD --data DIR --out OUT   frames a second and errors, against NanoVDB
+    draw_benchmarks.py bins   --bin BUILD --data DIR --out OUT   by --bins and --min-transmittance
+    draw_benchmarks.py sheets --bin BUILD --data DIR --out OUT   pictures: drawn, NanoVDB, difference
+    draw_benchmarks.py large  --bin BUILD --swc FILE --out OUT   a neuron of 50 million voxels
+
+`fit` comes first. The others print the rows of their Markdown tables; `sheets` writes
+OUT/drawing_*.png. --device says where to fit and to draw.
+"""
+import argparse
+import json
+import pathlib
+
+from fit_benchmarks import WHOLE_ANEURISM, run
+
+SCENES = [("aneurism", "12000"), ("aneurism", "59000"), ("smoke1", "12000"),
+          ("wdas_cloud_sixteenth", "12000"), ("neuron_rp140212", "20000"), ("neuron_m207", "30000"),
+          ("hydrogen_atom", "4000")]
+ITERATIONS = "1500"
+SHEETS = [("aneurism", "59000"), *SCENES[2:]]
+METHODS = {"ellipsoids": [], "sum": ["--between", "sum"], "bricks": ["--method", "bricks"]}
+BINS = [["--bins", "1"], ["--bins", "4"], ["--bins", "8"], ["--bins", "16"],
+        ["--min-transmittance", "0"]]
+
+
+def box_of(name):
+    return {"aneurism": WHOLE_ANEURISM, "hydrogen_atom": ["--box", "0,0,0,127,127,127"]}.get(name, [])
+
+
+def esvr(arguments, name, count):
+    return arguments.out / f"draw_{name}_{count}.esvr"
+
+
+def label(name, count):
+    return f"{name}, {int(count):,}" if name == "aneurism" else name
+
+
+def fit(arguments):
+    for name, count in SCENES:
+        run([arguments.bin / "vdb2esvr/vdb2esvr", arguments.data / f"{name}.vdb",
+             esvr(arguments, name, count), "--count", count, "--iterations", ITERATIONS, "--storage",
+             "float32", *box_of(name), "--device", arguments.device, "--force", "--quiet"])
+
+
+def bench(arguments, file, *options):
+    """The report of esvr-render --bench."""
+    report = arguments.out / "bench.json"
+    run([arguments.bin / "render/esvr-render", file, "--bench", "--device", arguments.device,
+         "--report", report, "--force", "--quiet", *options])
+    return json.loads(report.read_text())
+
+
+def megabytes(figures):
+    return f"{figures['device_bytes'] / 1e6:.1f}"
+
+
+def ratio(report):
+    return f"{report['drawn']['fps_median'] / report['reference']['fps_median']:.1f}"
+
+
+def speed(arguments):
+    for name, count in SCENES:
+        file = esvr(arguments, name, count)
+        reference = ["--ref", arguments.data / f"{name}.vdb"]
+        each, summed, bricks = (bench(arguments, file, *reference, *options)
+                                for options in METHODS.values())
+        nano, drawn = each["reference"], each["drawn"]
+        print(f"| {label(name, count)} | {nano['fps_median']:.0f} | {megabytes(nano)} | "
+              f"{drawn['fps_median']:.0f} ({drawn['fps_1_percent_low']:.0f}) | {ratio(each)} | "
+              f"{drawn['list_ms']:.3f} | {drawn['draw_ms']:.3f} | {megabytes(drawn)} | "
+              f"{each['image']['psnr']['mean']:.1f} | {each['image']['ssim']['mean']:.4f} | "
+              f"{summed['drawn']['fps_median']:.0f} | {ratio(summed)} | "
+              f"{summed['image']['psnr']['mean']:.1f} | {bricks['drawn']['fps_median']:.0f} | "
+              f"{ratio(bricks)} | {megabytes(bricks['drawn'])} | "
+              f"{bricks['image']['psnr']['mean']:.1f} |", flush=True)
+
+
+def bins(arguments):
+    for method in ["sum", "ellipsoids"]:
+        print(f"\n{method}")
+        for name, count in SCENES:
+            file = esvr(arguments, name, count)
+            reports = [bench(arguments, file, "--turntable", "180", *METHODS[method], *options)
+                       for options in BINS]
+            print(f"| {label(name, count)} | "
+                  + " | ".join(f"{r['drawn']['fps_median']:.0f}" for r in reports) + " |", flush=True)
+
+
+def sheets(arguments):
+    for name, count in SHEETS:
+        for between in ["voxels", "sum"]:
+            run([arguments.bin / "render/esvr-render", esvr(arguments, name, count),
+                 arguments.out / "picture.png", "--resolution", "400x400", "--background", "1,1,1",
+                 "--between", between, "--ref", arguments.data / f"{name}.vdb", "--sheet",
+                 arguments.out / f"drawing_{name}_{between}.png", "--device", arguments.device,
+                 "--force", "--quiet"])
+
+
+def large(arguments):
+    volume, file = arguments.out / "large.vdb", arguments.out / "large.esvr"
+    run([arguments.bin / "samples/swc2vdb", arguments.swc, volume, "--resolution", "7400",
+         "--min-radius", "5.4", "--force"])
+    run([arguments.bin / "vdb2esvr/vdb2esvr", volume, file, "--count", "150000", "--storage",
+         "float32", "--kappa", "2", "--seconds", "15", "--device", arguments.device, "--force"])
+    reports = {name: bench(arguments, file, "--turntable", "120", "--ref", volume, *options)
+               for name, options in METHODS.items()}
+    nano = reports["ellipsoids"]["reference"]
+    print(f"| NanoVDB float | {nano['fps_median']:.0f} | {nano['fps_1_percent_low']:.0f} | | "
+          f"{megabytes(nano)} | | |")
+    for name, report in reports.items():
+        drawn, image = report["drawn"], report["image"]
+        print(f"| {name} | {drawn['fps_median']:.0f} | {drawn['fps_1_percent_low']:.0f} | "
+              f"{ratio(report)} | {megabytes(drawn)} | {image['psnr']['mean']:.1f} | "
+              f"{image['ssim']['mean']:.4f} |")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    jobs = {"fit": fit, "speed": speed, "bins": bins, "sheets": sheets, "large": large}
+    parser.add_argument("what", choices=jobs)
+    parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
+    parser.add_argument("--data", type=pathlib.Path)
+    parser.add_argument("--swc", type=pathlib.Path)
+    parser.add_argument("--out", type=pathlib.Path, required=True)
+    parser.add_argument("--device", default="cuda")
+    arguments = parser.parse_args()
+    if not (arguments.swc if arguments.what == "large" else arguments.data):
+        parser.error(f"{arguments.what} needs --" + ("swc" if arguments.what == "large" else "data"))
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    jobs[arguments.what](arguments)
+
+
+if __name__ == "__main__":
+    main()

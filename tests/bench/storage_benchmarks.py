@@ -1,0 +1,106 @@
+#!/usr/bin/env python3
+"""Bytes and errors of stored grids, as the section "Storage" of docs/benchmarks.md shows them.
+
+    storage_benchmarks.py compact  --bin BUILD --data DIR --out OUT   quantised against float32 ellipsoids
+    storage_benchmarks.py layers   --bin BUILD --data DIR --out OUT   what the first importance layers give
+    storage_benchmarks.py targets  --bin BUILD --data DIR --out OUT   files of a given size or PSNR
+    storage_benchmarks.py lossless --bin BUILD --data DIR --out OUT   voxels stored exactly
+    storage_benchmarks.py bounds   --bin BUILD --data DIR --out OUT   voxels or a residual within a bound
+
+Each prints the rows of its Markdown table. Fits run on two threads of the CPU, or where --device says.
+"""
+import argparse
+import pathlib
+
+from fit_benchmarks import THREADS, WHOLE_ANEURISM, convert
+
+HYDROGEN = ["--box", "0,0,0,127,127,127"]
+BOXES = {"aneurism": WHOLE_ANEURISM, "hydrogen_atom": HYDROGEN}
+COMPACT = [("aneurism", "12000"), ("smoke1", "4500"), ("wdas_cloud_sixteenth", "5000"),
+           ("hydrogen_atom", "4000"), ("neuron_m207", "22000")]
+LAYERS = [("aneurism", "12000"), ("wdas_cloud_sixteenth", "5000"), ("smoke1", "4500")]
+TARGETS = [("aneurism", ["--size", "50KB"]), ("aneurism", ["--psnr", "51.54"]),
+           ("aneurism", ["--psnr", "70"]), ("smoke1", ["--size", "125KB"]),
+           ("smoke1", ["--size", "40KB"]), ("wdas_cloud_sixteenth", ["--size", "40KB"]),
+           ("wdas_cloud_sixteenth", ["--size", "80KB"]), ("neuron_m207", ["--size", "200KB"])]
+LOSSLESS = ["aneurism", "smoke1", "wdas_cloud_sixteenth", "hydrogen_atom", "neuron_m207"]
+BOUNDS = [("smoke1", "0.5%"), ("smoke1", "1%"), ("smoke1", "2%"), ("smoke1", "5%"),
+          ("hydrogen_atom", "1%"), ("hydrogen_atom", "5%"), ("wdas_cloud_sixteenth", "2%"),
+          ("aneurism", "1%")]
+STREAMS = ["positions", "scales", "rotations", "intensities"]
+
+
+def fitted(arguments, name, *options):
+    """The report of one conversion."""
+    where = ["--device", arguments.device]
+    if arguments.device == "cpu":
+        where += ["--threads", THREADS]
+    return convert(arguments.bin, arguments.data / f"{name}.vdb", arguments.out / "storage.esvr",
+                   [*options, *BOXES.get(name, [])], where)
+
+
+def kilobytes(report):
+    return f"{report['output']['bytes'] / 1e3:.1f}"
+
+
+def compact(arguments):
+    for name, count in COMPACT:
+        plain = fitted(arguments, name, "--count", count, "--storage", "float32")
+        packed = fitted(arguments, name, "--count", count)
+        grid = packed["grids"][0]
+        each = [grid["compact"]["bytes"][s] / grid["ellipsoids"] for s in STREAMS]
+        print(f"| {name} | `--count {count}` | {plain['grids'][0]['metrics']['psnr_box']:.2f} | "
+              f"{grid['metrics']['psnr_box']:.2f} | {kilobytes(plain)} | {kilobytes(packed)} | "
+              f"{sum(each):.2f} | " + " | ".join(f"{e:.2f}" for e in each) + " |", flush=True)
+
+
+def layers(arguments):
+    for name, count in LAYERS:
+        for k, layer in enumerate(fitted(arguments, name, "--count", count)["grids"][0]["layers"]):
+            print(f"| {name} | {k + 1} | {layer['ellipsoids']:,} | {layer['bytes']:,} | "
+                  f"{layer['psnr_box']:.2f} |", flush=True)
+
+
+def targets(arguments):
+    for name, options in TARGETS:
+        report = fitted(arguments, name, *options)
+        grid = report["grids"][0]
+        print(f"| {name} | `{' '.join(options)}` | {grid['ellipsoids']:,} | "
+              f"{report['output']['bytes']:,} | {grid['metrics']['psnr_box']:.2f} | "
+              f"{report['process']['seconds']:.0f} |", flush=True)
+
+
+def lossless(arguments):
+    for name in LOSSLESS:
+        report = fitted(arguments, name, "--lossless")
+        source = (arguments.data / f"{name}.vdb").stat().st_size
+        print(f"| {name} | {source:,} | {report['output']['bytes']:,} | "
+              f"{report['process']['seconds']:.1f} |", flush=True)
+
+
+def bounds(arguments):
+    for name, bound in BOUNDS:
+        report = fitted(arguments, name, "--max-error", bound)
+        found = report["grids"][0]["bound"]
+        tried = f"{found['ellipsoid_bytes']:,}" if found["ellipsoid_bytes"] else "-"
+        print(f"| {name} | {bound} | {found['voxel_bytes']:,} | {tried} | {found['stored']} | "
+              f"{report['process']['seconds']:.0f} |", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    jobs = {"compact": compact, "layers": layers, "targets": targets, "lossless": lossless,
+            "bounds": bounds}
+    parser.add_argument("what", choices=jobs)
+    parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
+    parser.add_argument("--data", type=pathlib.Path, required=True)
+    parser.add_argument("--out", type=pathlib.Path, required=True)
+    parser.add_argument("--device", default="cpu")
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    jobs[arguments.what](arguments)
+
+
+if __name__ == "__main__":
+    main()
