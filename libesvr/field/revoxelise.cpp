@@ -1,18 +1,18 @@
 #include <algorithm>
 
 #include "esvr/field.h"
-#include "field/activity.h"
 #include "field/brick_batches.h"
+#include "field/voxel_rule.h"
 
 namespace esvr {
 namespace {
 
-/// Applies rule and threshold to one brick. \return its active voxels
-BrickMask settle(const ActivityRule& rule, float threshold, std::span<float> values) {
+/// Turns the sums of one brick into voxels. \return its active voxels
+BrickMask settle(const VoxelRule& rule, std::span<float> values) {
   BrickMask mask;
   for (int v = 0; v < kBrickVoxels; ++v) {
     values[v] = rule.settled(values[v]);
-    if (rule.activity(values[v]) > threshold)
+    if (rule.isActive(values[v]))
       mask.set(v);
     else
       values[v] = rule.inactiveValue(values[v]);
@@ -39,13 +39,13 @@ void tightenOrigin(SparseVolume& volume) {
 
 SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
                            const RevoxeliseOptions& options) {
-  const ActivityRule rule{field.background, options.range, options.narrowBand};
+  const VoxelRule rule = makeVoxelRule(field.background, options);
   SparseVolume volume;
   volume.background = field.background;
   if (corners.empty()) return volume;
   volume.origin = smallest(corners);
   forEachBrick(field, corners, [&](Coord corner, std::span<float> values) {
-    const BrickMask mask = settle(rule, options.threshold, values);
+    const BrickMask mask = settle(rule, values);
     if (mask.count() == 0) return;
     volume.bricks.push_back(brickOf(corner - volume.origin));
     volume.active.push_back(mask);

@@ -48,7 +48,7 @@ Image renderField(const Field& field, const RenderOptions& options,
                         ellipsoids,
                         origins,
                         sampleRule(options, picture.table.view(), field.background),
-                        voxelValue(field.background, voxels)};
+                        makeVoxelRule(field.background, voxels)};
   tbb::parallel_for(0, tilesAlong(options.resolution.height), [&](int row) {
     checkCancelled(options);
     drawRow(scene, row * kTileSide, picture);

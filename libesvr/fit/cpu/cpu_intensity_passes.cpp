@@ -43,7 +43,7 @@ bool contains(const Box& box, Coord corner) {
 
 CpuIntensityPasses::CpuIntensityPasses(const IntensityTarget& target)
     : source_(target.source),
-      stored_(storedRule(target.stored)),
+      stored_(target.rule),
       box_(target.box),
       restricted_(target.restrictToBricks),
       known_(asBricks(knownCorners(target))) {

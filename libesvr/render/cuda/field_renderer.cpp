@@ -107,7 +107,7 @@ FieldRenderer::FieldRenderer(const Field& field, const Device& device, const Ren
                              const RevoxeliseOptions& voxels)
     : field_(field),
       limits_(limits),
-      voxelValue_(voxelValue(field.background, voxels)),
+      voxelRule_(makeVoxelRule(field.background, voxels)),
       bound_(largestIntensity(field)),
       box_(supportBox(field)),
       multiprocessors_(multiprocessorsOf(device)),
@@ -223,7 +223,7 @@ void FieldRenderer::launch(const SamplingArguments& a) {
                    stream_.get());
   else
     launchDrawVoxels({a, scene_.forms.data(), scene_.footprints.data(), scene_.origins.data(),
-                      bound_, voxelValue_},
+                      bound_, voxelRule_},
                      multiprocessors_, stream_.get());
 }
 
