@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <cstdint>
 
+#include "esvr/error.h"
 #include "esvr/field.h"
 #include "field/brick_batches.h"
 #include "field/voxel_rule.h"
@@ -26,6 +28,17 @@ Coord smallest(std::span<const Coord> corners) {
   return low;
 }
 
+void refuseTooFarApart(Coord low, std::span<const Coord> corners) {
+  constexpr std::int64_t kMaxExtent = std::int64_t{Box::kMax} - kBrickSide;
+  for (const Coord c : corners) {
+    const auto extent =
+        std::max({std::int64_t(c.x) - low.x, std::int64_t(c.y) - low.y, std::int64_t(c.z) - low.z});
+    if (extent > kMaxExtent)
+      throw RuntimeFailure("the ellipsoids reach the voxels " + toString(low) + " and " +
+                           toString(c) + ", which are 2^31 voxels or more apart");
+  }
+}
+
 /// Moves the origin to the smallest corner that is left, as makeVolume would have it.
 void tightenOrigin(SparseVolume& volume) {
   if (volume.bricks.empty()) {
@@ -44,6 +57,7 @@ SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
   volume.background = field.background;
   if (corners.empty()) return volume;
   volume.origin = smallest(corners);
+  refuseTooFarApart(volume.origin, corners);
   forEachBrick(field, corners, [&](Coord corner, std::span<float> values) {
     const BrickMask mask = settle(rule, values);
     if (mask.count() == 0) return;
