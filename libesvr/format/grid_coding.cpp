@@ -136,14 +136,15 @@ std::optional<std::vector<Coord>> bricksWanted(const StoredGrid& grid,
                                                const DecodeOptions& options) {
   const bool stored = grid.topology != TopologyKind::kThreshold;
   if (!stored && !options.box) return std::nullopt;
-  std::vector<Coord> bricks = stored ? grid.leaves : reachedBricks(grid.field);
+  if (!stored) return reachedBricks(grid.field, *options.box);
+  std::vector<Coord> bricks = grid.leaves;
   if (options.box)
     std::erase_if(bricks, [&](Coord corner) { return !meets(*options.box, corner); });
   return bricks;
 }
 
 /// Bricks of the sum and those of its residual.
-std::vector<Coord> withResidualBricks(const VoxelLayer& residual, std::vector<Coord> bricks,
+std::vector<Coord> withResidualBricks(const VoxelLayer& residual, std::span<const Coord> bricks,
                                       const DecodeOptions& options) {
   std::vector<Coord> own, all;
   for (const Coord brick : residual.bricks) {
@@ -183,8 +184,9 @@ SparseVolume withActivity(const SparseVolume& volume, const VoxelRule& rule) {
 }
 
 SparseVolume evaluatedWithResidual(const StoredGrid& grid, const DecodeOptions& options) {
-  auto bricks = bricksWanted(grid, options).value_or(reachedBricks(grid.field));
-  bricks = withResidualBricks(*grid.residual, std::move(bricks), options);
+  auto wanted = bricksWanted(grid, options);
+  if (!wanted) wanted = reachedBricks(grid.field);
+  const auto bricks = withResidualBricks(*grid.residual, *wanted, options);
   SparseVolume volume = revoxelise(grid.field, {.threshold = kAlwaysActive,
                                                 .range = voxelRule(grid).range,
                                                 .bricks = bricks,
@@ -244,6 +246,9 @@ SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
     throw UsageError("grid '" + grid.descriptor.name +
                      "' says itself which voxels are active: it takes no threshold");
   if (options.box && options.box->empty()) throw UsageError("the box of voxels is empty");
+  if (options.maxBytes != kNoMemoryLimit)
+    requireWithinMemory(estimateDecode(grid, options).bytes(), options.maxBytes,
+                        "grid '" + grid.descriptor.name + "'");
   SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
   if (!grid.voxels && grid.topology == TopologyKind::kMask) applyMask(grid, volume);
   if (options.box) clip(*options.box, ruleOf(grid), volume);

@@ -268,11 +268,14 @@ struct BinRange {
   std::int64_t first, last;
 };
 ESVR_HD inline BinRange binsOf(const ScreenBounds& b, const UnitRange& unit, double step) {
-  constexpr double kRounding = 1e-6;  // a bound may lie on a sample
+  using ellipsoid_math::clampedTo;
+  constexpr double kRounding = 1e-6;   // a bound may lie on a sample
+  constexpr double kLastBin = 0x1p52;  // a support may reach beyond all places that there are
   const double binLength = step * kBinSamples;
   const double first = std::floor(b.nearest * unit.min / binLength - kRounding);
   const double last = std::floor(b.farthest * unit.max / binLength + kRounding);
-  return {first > 0.0 ? std::int64_t(first) : 0, std::int64_t(last)};
+  return {std::int64_t(clampedTo(first, 0.0, kLastBin)),
+          std::int64_t(clampedTo(last, -1.0, kLastBin))};
 }
 
 }  // namespace esvr
