@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <unordered_map>
 
-#include "field/brick_hash.h"
+#include "core/brick_hash.h"
 #include "field/brick_walk.h"
 
 namespace esvr {

@@ -1,7 +1,7 @@
 #pragma once
 /// IntensityPasses on the CPU.
 
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 #include "field/brick_kernels.h"
 #include "field/evaluate_plan.h"
 #include "fit/cpu/pair_tapes.h"

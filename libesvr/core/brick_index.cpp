@@ -1,4 +1,4 @@
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 
 #include <bit>
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "esvr/coord.h"
-#include "field/brick_hash.h"
+#include "core/brick_hash.h"
 
 namespace esvr {
 
