@@ -15,10 +15,20 @@ install(
   DESTINATION ${packageDir}
   COMPONENT library)
 
+foreach(component library programs)
+  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT ${component})
+endforeach()
+
 get_target_property(libraryType esvr TYPE)
 string(COMPARE EQUAL ${libraryType} STATIC_LIBRARY ESVR_STATIC)
 if(ESVR_WITH_CUDA)
   set(ESVR_CUDA_IN TRUE)
+  set(ESVR_CUDART libesvr_cudart_static.a) # of its own name: there may be another beside it
+  if(ESVR_STATIC)
+    get_target_property(cudart CUDA::cudart_static IMPORTED_LOCATION)
+    install(FILES ${cudart} DESTINATION ${CMAKE_INSTALL_LIBDIR} RENAME ${ESVR_CUDART}
+            COMPONENT library)
+  endif()
 else()
   set(ESVR_CUDA_IN FALSE)
 endif()
@@ -27,8 +37,11 @@ if(ESVR_WITH_ZFP)
 else()
   set(ESVR_ZFP_IN FALSE)
 endif()
-configure_package_config_file(cmake/esvrConfig.cmake.in ${PROJECT_BINARY_DIR}/esvrConfig.cmake
-                              INSTALL_DESTINATION ${packageDir})
+set(ESVR_LIBRARY_DIR ${CMAKE_INSTALL_LIBDIR})
+configure_package_config_file(
+  cmake/esvrConfig.cmake.in ${PROJECT_BINARY_DIR}/esvrConfig.cmake
+  INSTALL_DESTINATION ${packageDir}
+  PATH_VARS ESVR_LIBRARY_DIR)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/esvrConfigVersion.cmake
                                  COMPATIBILITY SameMinorVersion)
 file(GLOB findModules CONFIGURE_DEPENDS cmake/Find*.cmake)

@@ -8,10 +8,10 @@ namespace esvr::esvr2vdb {
 
 void check(const Options& options) {
   const std::string name = cli::printable(options.input.string());
-  const auto notes = checkEsvr(options.input);
+  const auto notes = checkEsvr(options.input, {options.maxMemory});
   if (options.verbosity == cli::Verbosity::kQuiet) return;
   for (const auto& note : notes) std::cout << name << ": note: " << cli::printable(note) << '\n';
-  std::cout << name << ": whole\n";
+  std::cout << name << ": OK\n";
 }
 
 }  // namespace esvr::esvr2vdb

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <utility>
@@ -24,20 +25,26 @@ void checkFiles(const Options& options) {
 }
 
 EsvrFile read(const Options& options, const cli::Log& log) {
-  if (readsAll(options)) return readEsvr(options.input);
-  PartOfFile part = readEsvrPart(options.input, options.part);
+  const ReadLimits limits{options.maxMemory};
+  if (readsAll(options)) return readEsvr(options.input, limits);
+  ReadPart wanted = options.part;
+  wanted.limits = limits;
+  PartOfFile part = readEsvrPart(options.input, wanted);
   log.info("read " + std::to_string(part.bytesRead) + " of " +
            std::to_string(std::filesystem::file_size(options.input)) + " bytes");
   return std::move(part.file);
 }
 
-VolumeGrid decoded(const StoredGrid& grid, const Options& options) {
+VolumeGrid decoded(const StoredGrid& grid, const Options& options, const DecodeOptions& decode) {
   VolumeGrid result;
   result.descriptor = grid.descriptor;
-  result.volume = options.maxEllipsoids
-                      ? decodeGrid(heaviest(grid, *options.maxEllipsoids), options.decode)
-                      : decodeGrid(grid, options.decode);
+  result.volume = options.maxEllipsoids ? decodeGrid(heaviest(grid, *options.maxEllipsoids), decode)
+                                        : decodeGrid(grid, decode);
   return result;
+}
+
+std::uint64_t bytesOf(const SparseVolume& volume) {
+  return volume.brickCount() * (kBrickVoxels * sizeof(float) + sizeof(BrickMask) + sizeof(Coord));
 }
 
 void tellEmpty(const VolumeGrid& grid, const cli::Log& log) {
@@ -48,9 +55,13 @@ void tellEmpty(const VolumeGrid& grid, const cli::Log& log) {
 std::vector<VolumeGrid> decodeAll(const EsvrFile& file, const std::vector<std::size_t>& chosen,
                                   const Options& options, const cli::Log& log) {
   std::vector<VolumeGrid> grids;
+  DecodeOptions decode = options.decode;
+  decode.maxBytes = options.maxMemory;
   for (const std::size_t g : chosen) {
-    grids.push_back(decoded(file.grids[g], options));
+    grids.push_back(decoded(file.grids[g], options, decode));
     tellEmpty(grids.back(), log);
+    // All grids are held, each twice while they are written.
+    decode.maxBytes -= std::min(decode.maxBytes, 2 * bytesOf(grids.back().volume));
   }
   return grids;
 }

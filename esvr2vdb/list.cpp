@@ -114,7 +114,7 @@ void printDetails(const Listing& listing) {
 }  // namespace
 
 void list(const Options& options) {
-  Listing listing{readEsvr(options.input), inspectEsvr(options.input), {}};
+  Listing listing{readEsvr(options.input, {options.maxMemory}), inspectEsvr(options.input), {}};
   listing.names = uniqueNames(listing.file);
   std::cout << cli::printable(options.input.string()) << ": .esvr format "
             << listing.summary.versionMajor << '.' << listing.summary.versionMinor << ", "

@@ -5,6 +5,7 @@
 #include "cli/box_option.h"
 #include "cli/choice.h"
 #include "cli/command_line.h"
+#include "cli/memory_limit.h"
 
 namespace esvr::esvr2vdb {
 namespace {
@@ -67,6 +68,7 @@ cli::CommandLine commandLine() {
      "x0,y0,z0,x1,y1,z1 of the PSNR (default: the reference's active bounding box)")
     ("force,f", bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
+  cli::addMaxMemory(line);
   return line;
 }
 
@@ -138,6 +140,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.input = arguments->get<std::string>("input");
   options.threads = arguments->threads;
   options.verbosity = arguments->verbosity;
+  options.maxMemory = cli::maxMemoryOf(*arguments);
   if (options.job == Job::kConvert) readConversion(*arguments, options);
   return options;
 }

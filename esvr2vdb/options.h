@@ -27,8 +27,9 @@ struct Options {
   std::optional<std::size_t> maxEllipsoids;  ///< of each grid
   WriteOptions write;
   std::optional<std::filesystem::path> reference;
-  std::optional<Box> box;  ///< of the reference's PSNR
-  int threads = 0;         ///< 0: all
+  std::optional<Box> box;       ///< of the reference's PSNR
+  std::uint64_t maxMemory = 0;  ///< bytes
+  int threads = 0;              ///< 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
 };
 

@@ -4,6 +4,7 @@
 
 #include "cli/choice.h"
 #include "cli/command_line.h"
+#include "cli/memory_limit.h"
 #include "cli/number_list.h"
 #include "render/camera_file.h"
 
@@ -14,7 +15,7 @@ using cli::Arguments;
 using cli::po::bool_switch;
 using cli::po::value;
 
-constexpr int kMaxSide = 16384;    // pixels
+constexpr int kMaxSide = Resolution::kMaxSide;
 constexpr int kMaxFrames = 9999;   // four digits in a frame's name
 constexpr double kMinStep = 1e-3;  // voxels
 constexpr int kMaxBins = 16;
@@ -138,6 +139,7 @@ cli::CommandLine commandLine() {
      "of a turntable, only the pictures from number A to B")
     ("force,f", bool_switch(), "replace OUT.png if it exists");
   // clang-format on
+  cli::addMaxMemory(line);
   return line;
 }
 
@@ -365,6 +367,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
                                          {{"voxels", Between::kVoxels}, {"sum", Between::kSum}});
   readMeasuring(a, options);
   options.overwrite = a.get<bool>("force");
+  options.maxMemory = cli::maxMemoryOf(a);
   options.threads = a.threads;
   options.verbosity = a.verbosity;
   options.commandLine = joined(argc, argv);

@@ -51,7 +51,8 @@ struct Options {
   bool bench = false;
   std::string report;  ///< empty: none
   bool overwrite = false;
-  int threads = 0;  ///< 0: all
+  std::uint64_t maxMemory = 0;  ///< bytes
+  int threads = 0;              ///< 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::string commandLine;  ///< for the picture's metadata
 };

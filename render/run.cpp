@@ -15,6 +15,7 @@
 #include "cli/table.h"
 #include "cli/version_text.h"
 #include "esvr/image_metrics.h"
+#include "esvr/memory_limit.h"
 #include "render/bench.h"
 #include "render/exr_file.h"
 #include "render/png_file.h"
@@ -87,6 +88,17 @@ void checkFiles(const Options& options, const std::vector<fs::path>& files) {
   if (toFile) cli::checkOutput(options.report, {".json"}, options.overwrite);
 }
 
+/// A picture is held as four floats a pixel and encoded in memory, and so are, with --ref, that of
+/// the reference, their difference and a sheet of all three.
+void checkPictureSize(const Options& options) {
+  constexpr double kBytesPerPixel = 48.0;
+  const double pictures = options.reference.empty() ? 1.0 : (options.sheet.empty() ? 3.0 : 6.0);
+  const Resolution r = options.resolution;
+  requireWithinMemory(
+      pictures * kBytesPerPixel * r.width * r.height, options.maxMemory,
+      "a picture of " + std::to_string(r.width) + " x " + std::to_string(r.height) + " pixels");
+}
+
 ValueRange rangeOf(const Options& options, const Scene& scene) {
   if (options.rangeKind == RangeKind::kGiven) return options.range;
   if (options.rangeKind == RangeKind::kData) return scene.data;
@@ -124,7 +136,8 @@ std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings&
   if (options.reference.empty()) return nullptr;
   DrawSettings own = settings;
   if (options.input.extension() != ".esvr") own.values.reset();
-  return std::make_unique<Drawing>(readScene(options.reference, std::nullopt), own, sample);
+  return std::make_unique<Drawing>(readScene({options.reference, std::nullopt, options.maxMemory}),
+                                   own, sample);
 }
 
 std::string summary(const fs::path& file, const Scene& scene, Resolution r, double seconds) {
@@ -228,9 +241,10 @@ void run(const Options& options) {
   const cli::Interrupts interrupts;
   const auto files = options.bench ? std::vector<fs::path>{} : outputs(options);
   checkFiles(options, files);
+  checkPictureSize(options);
   const DrawSettings settings{selectDevice(options.device), options.method, options.limits,
-                              options.values};
-  Scene scene = readScene(options.input, options.grid);
+                              options.values, options.maxMemory};
+  Scene scene = readScene({options.input, options.grid, options.maxMemory});
   RenderOptions r = renderOptions(options, scene);
   Drawing drawing(std::move(scene), settings, r);
   const auto reference = referenceOf(options, settings, r);

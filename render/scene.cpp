@@ -20,16 +20,16 @@ std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
 }
 
 /// A grid that holds its voxels is drawn from them: they are what it stands for.
-Scene encoded(const std::filesystem::path& path, const std::optional<std::string>& wanted) {
-  EsvrFile file = readEsvr(path);
-  StoredGrid& grid = file.grids[placeOf(file, path, wanted)];
+Scene encoded(const SceneFile& from) {
+  EsvrFile file = readEsvr(from.path, {from.maxMemory});
+  StoredGrid& grid = file.grids[placeOf(file, from.path, from.grid)];
   Scene scene;
   scene.grid = grid.descriptor.name;
   scene.box = grid.activeBox;
   scene.data = {grid.valueMin, grid.valueMax};
   scene.background = float(grid.descriptor.background);
   if (grid.voxels)
-    scene.content = VolumeGrid{grid.descriptor, decodeGrid(grid), 0};
+    scene.content = VolumeGrid{grid.descriptor, decodeGrid(grid, {.maxBytes = from.maxMemory}), 0};
   else
     scene.content = grid.field, scene.encoded = std::move(grid);
   return scene;
@@ -41,8 +41,9 @@ std::string firstDrawable(const std::filesystem::path& path) {
   throw BadInput(path.string() + ": no grid that can be drawn");
 }
 
-Scene voxels(const std::filesystem::path& path, const std::optional<std::string>& wanted) {
-  VolumeGrid grid = readGrid(path, wanted ? *wanted : firstDrawable(path));
+Scene voxels(const SceneFile& from) {
+  VolumeGrid grid = readGrid(from.path, from.grid ? *from.grid : firstDrawable(from.path),
+                             {.maxBytes = from.maxMemory});
   Scene scene;
   scene.grid = grid.descriptor.name;
   scene.box = activeBox(grid.volume);
@@ -54,9 +55,9 @@ Scene voxels(const std::filesystem::path& path, const std::optional<std::string>
 
 }  // namespace
 
-Scene readScene(const std::filesystem::path& path, const std::optional<std::string>& grid) {
-  Scene scene = path.extension() == ".esvr" ? encoded(path, grid) : voxels(path, grid);
-  if (scene.box.empty()) throw BadInput(path.string() + ": nothing active to draw");
+Scene readScene(const SceneFile& file) {
+  Scene scene = file.path.extension() == ".esvr" ? encoded(file) : voxels(file);
+  if (scene.box.empty()) throw BadInput(file.path.string() + ": nothing active to draw");
   return scene;
 }
 
@@ -97,7 +98,7 @@ void SceneRenderer::drawField(const Field& field, const Scene& scene, const Draw
   if (s.method != Method::kBricks)
     renderer_ = makeFieldRenderer(field, s.device, s.limits, voxelRule(*scene.encoded));
   if (s.method == Method::kEllipsoids) return;
-  decoded_ = decodeGrid(*scene.encoded);
+  decoded_ = decodeGrid(*scene.encoded, {.maxBytes = s.maxMemory});
   if (s.method == Method::kBricks) {
     renderer_ = makeVolumeRenderer(decoded_, s.device, s.limits);
     return;

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "esvr/grid_coding.h"
+#include "esvr/memory_limit.h"
 #include "esvr/renderer.h"
 
 namespace esvr::render {
@@ -20,10 +21,15 @@ struct Scene {
   std::optional<StoredGrid> encoded{};  ///< what a field was read from
 };
 
-/// \param grid  nothing: the first that can be drawn
-/// \throws BadInput  the file cannot be read, has no such grid or none that can be drawn
-[[nodiscard]] Scene readScene(const std::filesystem::path& path,
-                              const std::optional<std::string>& grid);
+struct SceneFile {
+  std::filesystem::path path;
+  std::optional<std::string> grid;           ///< nothing: the first that can be drawn
+  std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes
+};
+
+/// \throws BadInput  the file cannot be read, has no such grid or none that can be drawn;
+///                   MemoryExceeded
+[[nodiscard]] Scene readScene(const SceneFile& file);
 
 /// Where and how to draw.
 enum class Method { kEllipsoids, kBricks, kAuto };
@@ -32,7 +38,8 @@ struct DrawSettings {
   Device device;
   Method method = Method::kEllipsoids;  ///< of a field
   RendererLimits limits;
-  std::optional<NanoValues> values;  ///< march voxels as a NanoVDB grid of these
+  std::optional<NanoValues> values;          ///< march voxels as a NanoVDB grid of these
+  std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes that decoding may take
 };
 
 /// Draws a scene, which must outlive it.

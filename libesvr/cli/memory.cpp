@@ -4,7 +4,9 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
+#include <limits>
 #include <string>
 
 namespace esvr::cli {
@@ -12,17 +14,51 @@ namespace {
 
 constexpr std::uint64_t kUnit = 1024;  // of the system's figures
 
-/// A line of /proc/self/status.
-std::optional<std::uint64_t> statusBytes(const std::string& key) {
-  std::ifstream status("/proc/self/status");
-  for (std::string word; status >> word;) {
+/// A line of one of the system's tables.
+std::optional<std::uint64_t> bytesIn(const char* table, const std::string& key) {
+  std::ifstream lines(table);
+  for (std::string word; lines >> word;) {
     std::uint64_t value = 0;
-    if (word == key && status >> value) return value * kUnit;
+    if (word == key && lines >> value) return value * kUnit;
   }
   return std::nullopt;
 }
 
+std::optional<std::uint64_t> statusBytes(const std::string& key) {
+  return bytesIn("/proc/self/status", key);
+}
+
+/// A file that holds one number; nothing where it holds a word, as "max", or is not there.
+std::optional<std::uint64_t> numberIn(const char* path) {
+  std::ifstream file(path);
+  std::uint64_t value = 0;
+  return file >> value ? std::optional(value) : std::nullopt;
+}
+
+std::uint64_t difference(std::uint64_t limit, std::uint64_t held) {
+  return limit > held ? limit - held : 0;
+}
+
+/// What the control group of a container leaves.
+std::uint64_t leftInGroup() {
+  const auto limit = numberIn("/sys/fs/cgroup/memory.max");
+  if (!limit) return std::numeric_limits<std::uint64_t>::max();
+  return difference(*limit, numberIn("/sys/fs/cgroup/memory.current").value_or(0));
+}
+
+std::uint64_t leftInAddressSpace() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY)
+    return std::numeric_limits<std::uint64_t>::max();
+  return difference(limit.rlim_cur, statusBytes("VmSize:").value_or(0));
+}
+
 }  // namespace
+
+std::uint64_t availableMemory() {
+  const auto free = bytesIn("/proc/meminfo", "MemAvailable:").value_or(physicalMemory());
+  return std::min({free, leftInGroup(), leftInAddressSpace()});
+}
 
 std::uint64_t physicalMemory() {
   return std::uint64_t(sysconf(_SC_PHYS_PAGES)) * std::uint64_t(sysconf(_SC_PAGESIZE));

@@ -9,6 +9,10 @@ namespace esvr::cli {
 /// Bytes of physical memory.
 [[nodiscard]] std::uint64_t physicalMemory();
 
+/// Bytes that the process can still allocate before the system has to swap, or before a limit of its
+/// control group or of its address space is reached.
+[[nodiscard]] std::uint64_t availableMemory();
+
 /// Bytes of the most memory that the process has held at once.
 [[nodiscard]] std::uint64_t peakMemory();
 

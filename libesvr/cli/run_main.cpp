@@ -31,6 +31,8 @@ int runMain(const std::string& program, const std::function<int()>& body) {
     complain(error.what());
     if (error.kind() == ErrorKind::kUsage)
       std::cerr << "Try '" << program << " --help' for more information.\n";
+    if (dynamic_cast<const MemoryExceeded*>(&error) != nullptr)
+      std::cerr << "The option --max-memory allows more.\n";
     return error.exitCode();
   } catch (const std::bad_alloc&) {
     complain("out of memory");

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "esvr/voxel_layer.h"
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 
 namespace esvr::codec {
 

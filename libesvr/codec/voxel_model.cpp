@@ -6,7 +6,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 
 namespace esvr::codec {
 namespace {

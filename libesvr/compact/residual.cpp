@@ -10,7 +10,6 @@
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "field/evaluate_plan.h"
-#include "format/grid_rule.h"
 #include "format/residual_value.h"
 
 namespace esvr {
@@ -141,7 +140,7 @@ VoxelLayer layerOf(const std::vector<BrickCodes>& bricks, double divisor) {
 /// The sum in bricks, every voxel active.
 SparseVolume sumIn(const StoredGrid& grid, std::span<const Coord> corners) {
   return revoxelise(grid.field, {.threshold = -std::numeric_limits<float>::max(),
-                                 .range = format::ruleOf(grid).range,
+                                 .range = voxelRule(grid).range,
                                  .bricks = corners,
                                  .restrictToBricks = true});
 }

@@ -99,12 +99,12 @@ std::vector<float> ofFirstLayers(const Trial& trial, std::size_t layers) {
 
 TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
     : target_{target.source,
-              {format::ruleOf(grid), grid.activeThreshold},
+              format::ruleOf(grid),
               target.box,
               grid.leaves,
               grid.topology != TopologyKind::kThreshold},
       sampleBricks_(sampleOf(knownCorners(target_))),
-      sampleTarget_{target.source, target_.stored, target.box, sampleBricks_, true},
+      sampleTarget_{target.source, target_.rule, target.box, sampleBricks_, true},
       problem_(target_, target.device),
       sampleProblem_(sampleTarget_, target.device),
       field_(grid.field),

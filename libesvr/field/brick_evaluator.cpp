@@ -15,9 +15,8 @@ void BrickEvaluator::evaluateBrick(std::size_t brick, float* sum) const {
   const auto& [gathered, pairs] = plan_;
   for (auto pair = pairs.brickBegin[brick]; pair != pairs.brickBegin[brick + 1]; ++pair) {
     const auto i = pairs.ellipsoid[pair];
-    const Coord local = corners_[brick] - gathered.origin(i);
-    const float corner[3] = {float(local.x), float(local.y), float(local.z)};
-    kernels.add(gathered.forms[i], corner, gathered.kernel(i), sum);
+    const auto corner = gathered.fromOrigin(i, corners_[brick]);
+    kernels.add(gathered.forms[i], corner.data(), gathered.kernel(i), sum);
   }
 }
 

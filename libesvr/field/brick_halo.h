@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 #include "field/ssim_window.h"
 
 namespace esvr {

@@ -6,15 +6,34 @@
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
-#include <numeric>
+
+#include "field/brick_walk.h"
+#include "field/offsets.h"
 
 namespace esvr {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
 
-void exclusiveSum(std::vector<std::uint32_t>& counts) {
-  std::exclusive_scan(counts.begin(), counts.end(), counts.begin(), 0u);
+/// Calls visit(brick position) for the bricks of an index that a support may touch, in the order of
+/// their coordinates: looks at the bricks around the support or at those of the index, whichever are
+/// fewer.
+template <class Visit>
+void forEachPair(const BrickIndex& index, const Support& support, Visit&& visit) {
+  constexpr double kLookUps = 16.0;  // find() takes a fraction of what mayTouch() and sorting take
+  const Box around = common(brickRange(support), index.bounds());
+  if (around.volume() <= kLookUps * double(index.size()))
+    return forEachReachedBrick(support, index.bounds(), [&](Coord brick) {
+      if (const auto b = index.find(brick); b != BrickIndex::kNone) visit(b);
+    });
+  std::vector<std::uint32_t> touched;
+  for (std::uint32_t b = 0; b < index.size(); ++b)
+    if (around.contains(index.bricks()[b]) && mayTouch(support, index.bricks()[b]))
+      touched.push_back(b);
+  std::sort(touched.begin(), touched.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return index.bricks()[a] < index.bricks()[b];
+  });
+  for (const std::uint32_t b : touched) visit(b);
 }
 
 /// Calls visit(ellipsoid, its n-th pair, brick position) for every pair, ellipsoids in parallel.
@@ -24,9 +43,7 @@ void visitPairs(const BrickIndex& index, std::size_t ellipsoids, const SupportOf
   tbb::parallel_for(Range(0, ellipsoids, 64), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       std::uint32_t n = 0;
-      forEachReachedBrick(supportOf(i), [&](Coord brick) {
-        if (const auto b = index.find(brick); b != BrickIndex::kNone) visit(i, n++, b);
-      });
+      forEachPair(index, supportOf(i), [&](std::uint32_t b) { visit(i, n++, b); });
     }
   });
 }
@@ -38,7 +55,7 @@ std::vector<std::uint32_t> bricksByEllipsoid(const BrickIndex& index, std::size_
   begin.assign(ellipsoids + 1, 0);
   visitPairs(index, ellipsoids, supportOf,
              [&](std::size_t i, std::uint32_t n, std::uint32_t) { begin[i] = n + 1; });
-  exclusiveSum(begin);
+  makeOffsets(begin);
   std::vector<std::uint32_t> bricks(begin.back());
   visitPairs(index, ellipsoids, supportOf,
              [&](std::size_t i, std::uint32_t n, std::uint32_t b) { bricks[begin[i] + n] = b; });
@@ -53,7 +70,7 @@ BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
   const auto bricks = bricksByEllipsoid(index, ellipsoids, supportOf, pairs.ellipsoidBegin);
   pairs.brickBegin.assign(index.size() + 1, 0);
   for (const auto b : bricks) ++pairs.brickBegin[b];
-  exclusiveSum(pairs.brickBegin);
+  makeOffsets(pairs.brickBegin);
 
   pairs.ellipsoid.resize(bricks.size());
   pairs.pairOf.resize(bricks.size());
@@ -68,12 +85,12 @@ BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
 }
 
 std::vector<Coord> missingBricks(const BrickIndex& index, std::size_t ellipsoids,
-                                 const SupportOf& supportOf) {
+                                 const SupportOf& supportOf, const Box& within) {
   tbb::enumerable_thread_specific<std::vector<Coord>> found;
   tbb::parallel_for(Range(0, ellipsoids, 64), [&](const Range& range) {
     auto& mine = found.local();
     for (std::size_t i = range.begin(); i != range.end(); ++i)
-      forEachReachedBrick(supportOf(i), [&](Coord brick) {
+      forEachReachedBrick(supportOf(i), within, [&](Coord brick) {
         if (index.find(brick) == BrickIndex::kNone) mine.push_back(brick);
       });
   });

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 #include "field/support.h"
 
 namespace esvr {
@@ -25,11 +25,14 @@ struct BrickPairs {
 using SupportOf = std::function<Support(std::size_t)>;
 
 /// Pairs over the bricks of an index. Bricks not in the index are left out.
+/// \throws RuntimeFailure  2^32 pairs or more
 [[nodiscard]] BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
                                      const SupportOf& supportOf);
 
 /// Bricks that some support reaches and the index lacks, in increasing order.
+/// \param within  a box of brick coordinates; bricks elsewhere are left out
 [[nodiscard]] std::vector<Coord> missingBricks(const BrickIndex& index, std::size_t ellipsoids,
-                                               const SupportOf& supportOf);
+                                               const SupportOf& supportOf,
+                                               const Box& within = bricksOf(Box::whole()));
 
 }  // namespace esvr

@@ -41,9 +41,8 @@ EllipsoidHits hitsInBrick(const EvaluatePlan& plan, std::size_t b, Coord brickCo
   Counts counts{};
   for (auto pair = plan.pairs.brickBegin[b]; pair != plan.pairs.brickBegin[b + 1]; ++pair) {
     const std::size_t i = plan.pairs.ellipsoid[pair];
-    const Coord corner = brickCorner - plan.field.origin(i);
-    addHits(plan.field.forms[i], {float(corner.x), float(corner.y), float(corner.z)},
-            plan.field.kernel(i).cutoff, counts);
+    addHits(plan.field.forms[i], plan.field.fromOrigin(i, brickCorner), plan.field.kernel(i).cutoff,
+            counts);
   }
   return totalOf(counts);
 }

@@ -17,7 +17,12 @@ struct GatheredField {
   [[nodiscard]] const KernelConstants<float>& kernel(std::size_t i) const {
     return kernels[kernels.size() == 1 ? 0 : i];
   }
-  [[nodiscard]] Coord origin(std::size_t i) const { return origins[chunkOf[i]]; }
+  /// Where a voxel lies from the origin of ellipsoid i's chunk. The difference may have 33 bits.
+  [[nodiscard]] std::array<float, 3> fromOrigin(std::size_t i, Coord voxel) const {
+    const Coord o = origins[chunkOf[i]];
+    return {float(double(voxel.x) - o.x), float(double(voxel.y) - o.y),
+            float(double(voxel.z) - o.z)};
+  }
 };
 
 [[nodiscard]] GatheredField gather(const Field& field);

@@ -13,13 +13,11 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/rotation.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/kernel.h"
 
 namespace esvr {
-
-/// Row-major 3x3: rows are L's rows, so that u = L d.
-using Matrix3 = std::array<double, 9>;
 
 struct LineForm {
   std::array<float, 3> center;  ///< voxels, relative to whatever frame the caller works in
@@ -38,7 +36,7 @@ struct LineForm {
                                                    const Matrix3& L, double radius,
                                                    double intensity);
 
-/// L = S^-1 R^T of ellipsoid i.
+/// L = S^-1 R^T of ellipsoid i: u = L d.
 [[nodiscard]] Matrix3 unitFrame(const Ellipsoids& e, std::size_t i);
 
 /// F = L^-1: its columns are the semi-axes' directions times their scales, up to a rotation.
@@ -53,7 +51,6 @@ namespace line_form {
 
 using Vec3 = std::array<double, 3>;
 
-ESVR_HD inline Vec3 column(const Matrix3& m, int c) { return {m[c], m[3 + c], m[6 + c]}; }
 ESVR_HD inline double dot(const Vec3& u, const Vec3& v) {
   return u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
 }
@@ -87,7 +84,7 @@ ESVR_HD inline Matrix3 inverse(const Matrix3& m) {
 ESVR_HD inline LineForm makeLineForm(const std::array<double, 3>& center, const Matrix3& L,
                                      double radius, double intensity) {
   using namespace line_form;
-  const Vec3 lx = column(L, 0), ly = column(L, 1), lz = column(L, 2);
+  const Vec3 lx = columnOf(L, 0), ly = columnOf(L, 1), lz = columnOf(L, 2);
   const double a = dot(ly, ly), cx = dot(lx, ly) / a, cz = dot(lz, ly) / a;
   const Matrix3 F = inverse(L);
   const double sxx = sigma(F, 0, 0);

@@ -1,18 +1,20 @@
 #include <algorithm>
+#include <cstdint>
 
+#include "esvr/error.h"
 #include "esvr/field.h"
-#include "field/activity.h"
 #include "field/brick_batches.h"
+#include "field/voxel_rule.h"
 
 namespace esvr {
 namespace {
 
-/// Applies rule and threshold to one brick. \return its active voxels
-BrickMask settle(const ActivityRule& rule, float threshold, std::span<float> values) {
+/// Turns the sums of one brick into voxels. \return its active voxels
+BrickMask settle(const VoxelRule& rule, std::span<float> values) {
   BrickMask mask;
   for (int v = 0; v < kBrickVoxels; ++v) {
     values[v] = rule.settled(values[v]);
-    if (rule.activity(values[v]) > threshold)
+    if (rule.isActive(values[v]))
       mask.set(v);
     else
       values[v] = rule.inactiveValue(values[v]);
@@ -24,6 +26,17 @@ Coord smallest(std::span<const Coord> corners) {
   Coord low = corners.front();
   for (const Coord c : corners) low = minCoord(low, c);
   return low;
+}
+
+void refuseTooFarApart(Coord low, std::span<const Coord> corners) {
+  constexpr std::int64_t kMaxExtent = std::int64_t{Box::kMax} - kBrickSide;
+  for (const Coord c : corners) {
+    const auto extent =
+        std::max({std::int64_t(c.x) - low.x, std::int64_t(c.y) - low.y, std::int64_t(c.z) - low.z});
+    if (extent > kMaxExtent)
+      throw RuntimeFailure("the ellipsoids reach the voxels " + toString(low) + " and " +
+                           toString(c) + ", which are 2^31 voxels or more apart");
+  }
 }
 
 /// Moves the origin to the smallest corner that is left, as makeVolume would have it.
@@ -39,13 +52,14 @@ void tightenOrigin(SparseVolume& volume) {
 
 SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
                            const RevoxeliseOptions& options) {
-  const ActivityRule rule{field.background, options.range, options.narrowBand};
+  const VoxelRule rule = makeVoxelRule(field.background, options);
   SparseVolume volume;
   volume.background = field.background;
   if (corners.empty()) return volume;
   volume.origin = smallest(corners);
+  refuseTooFarApart(volume.origin, corners);
   forEachBrick(field, corners, [&](Coord corner, std::span<float> values) {
-    const BrickMask mask = settle(rule, options.threshold, values);
+    const BrickMask mask = settle(rule, values);
     if (mask.count() == 0) return;
     volume.bricks.push_back(brickOf(corner - volume.origin));
     volume.active.push_back(mask);

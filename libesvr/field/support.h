@@ -27,42 +27,57 @@ struct Support {
   return s;
 }
 
+/// The middle of a brick's voxels along an axis.
+[[nodiscard]] ESVR_HD inline double middleOf(std::int32_t brick) {
+  return double(brick) * kBrickSide + (kBrickSide - 1) / 2.0;
+}
+
+/// How far a brick's middle may lie from the support's center, measured along row j of L, while the
+/// brick may touch the support.
+[[nodiscard]] ESVR_HD inline double slabBound(const Support& s, int j) {
+  constexpr double kHalf = (kBrickSide - 1) / 2.0;  // voxels are points: a brick spans 7, not 8
+  const double* row = &s.L[3 * j];
+  const double reach = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
+  const double length2 = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
+  return s.radius + kHalf * reach + s.slack * std::sqrt(length2);
+}
+
 /// False only where the brick's voxels certainly lie outside: tests the planes that bound the
 /// support perpendicular to the rows of L, which are its principal axes when L = S^-1 R^T.
 [[nodiscard]] ESVR_HD inline bool mayTouch(const Support& s, Coord brick) {
-  constexpr double kHalf = (kBrickSide - 1) / 2.0;  // voxels are points: a brick spans 7, not 8
-  const double d[3] = {double(brick.x) * kBrickSide + kHalf - s.center[0],
-                       double(brick.y) * kBrickSide + kHalf - s.center[1],
-                       double(brick.z) * kBrickSide + kHalf - s.center[2]};
+  const double d[3] = {middleOf(brick.x) - s.center[0], middleOf(brick.y) - s.center[1],
+                       middleOf(brick.z) - s.center[2]};
   for (int j = 0; j < 3; ++j) {
     const double* row = &s.L[3 * j];
     const double u = row[0] * d[0] + row[1] * d[1] + row[2] * d[2];
-    const double reach = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
-    const double length2 = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
-    const double bound = s.radius + kHalf * reach + s.slack * std::sqrt(length2);
-    if (std::abs(u) > bound) return false;
+    if (std::abs(u) > slabBound(s, j)) return false;
   }
   return true;
 }
 
-/// Bricks that overlap the bounding box, as a box of brick coordinates.
-[[nodiscard]] ESVR_HD inline Box brickRange(const Support& s) {
-  const auto low = [&](int a) {
-    return std::int32_t(std::ceil(s.center[a] - s.half[a])) >> kBrickLog2;
-  };
-  const auto high = [&](int a) {
-    return std::int32_t(std::floor(s.center[a] + s.half[a])) >> kBrickLog2;
-  };
-  return {{low(0), low(1), low(2)}, {high(0), high(1), high(2)}};
+/// The bricks that hold a voxel of a box, as a box of brick coordinates.
+[[nodiscard]] constexpr Box bricksOf(const Box& voxels) {
+  return {brickOf(voxels.min), brickOf(voxels.max)};
 }
 
-template <class Visit>
-void forEachReachedBrick(const Support& s, Visit&& visit) {
-  const Box range = brickRange(s);
-  for (std::int32_t x = range.min.x; x <= range.max.x; ++x)
-    for (std::int32_t y = range.min.y; y <= range.max.y; ++y)
-      for (std::int32_t z = range.min.z; z <= range.max.z; ++z)
-        if (const Coord brick{x, y, z}; mayTouch(s, brick)) visit(brick);
+/// The brick along an axis that holds a place, which may lie beyond all voxels that there can be.
+[[nodiscard]] ESVR_HD inline std::int32_t brickAlong(double place) {
+  constexpr double kFirst = Box::kMin, kLast = Box::kMax;
+  const double inside = place < kFirst ? kFirst : (place < kLast ? place : kLast);
+  return std::int32_t(inside) >> kBrickLog2;
+}
+
+/// Bricks that overlap the bounding box, as a box of brick coordinates. It is cut off at the ends of
+/// the index space, and has no brick where the support has no extent that is a number.
+[[nodiscard]] ESVR_HD inline Box brickRange(const Support& s) {
+  std::int32_t low[3], high[3];
+  for (int a = 0; a < 3; ++a) {
+    const double first = s.center[a] - s.half[a], last = s.center[a] + s.half[a];
+    if (!(first <= last)) return {{0, 0, 0}, {-1, -1, -1}};
+    low[a] = brickAlong(std::ceil(first));
+    high[a] = brickAlong(std::floor(last));
+  }
+  return {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
 }
 
 }  // namespace esvr

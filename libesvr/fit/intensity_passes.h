@@ -9,14 +9,14 @@
 #include "esvr/device.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/sparse_volume.h"
-#include "field/stored_value.h"
+#include "field/voxel_rule.h"
 
 namespace esvr {
 
 /// What the sum is to be, and how it becomes voxels.
 struct IntensityTarget {
   const SparseVolume& source;
-  StoredValue stored;
+  VoxelRule rule;
   Box box;                          ///< errors count here
   std::span<const Coord> bricks{};  ///< index corners of all bricks that can hold an active voxel
   bool restrictToBricks = false;    ///< else those of the source and those supports reach as well

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "esvr/sparse_volume.h"
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 
 namespace esvr {
 

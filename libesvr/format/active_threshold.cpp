@@ -33,7 +33,7 @@ struct Tally {
 
 class Histogram {
  public:
-  void add(const ActivityRule& rule, float value, float wanted, bool active) {
+  void add(const VoxelRule& rule, float value, float wanted, bool active) {
     const float settled = rule.settled(value);
     const double kept = double(wanted) - settled;
     error_ += kept * kept;
@@ -82,7 +82,7 @@ class Histogram {
 }  // namespace
 
 ThresholdChoice chooseThreshold(const SparseVolume& source, const Field& field,
-                                const ActivityRule& rule, std::span<const Coord> bricks) {
+                                const VoxelRule& rule, std::span<const Coord> bricks) {
   Histogram histogram;
   forEachBrick(field, bricks, [&](Coord corner, std::span<float> values) {
     const auto b = findBrick(source, brickOf(corner - source.origin));

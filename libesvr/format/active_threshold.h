@@ -5,7 +5,7 @@
 
 #include "esvr/ellipsoids.h"
 #include "esvr/sparse_volume.h"
-#include "field/activity.h"
+#include "field/voxel_rule.h"
 
 namespace esvr::format {
 
@@ -18,8 +18,8 @@ struct ThresholdChoice {
 /// threshold: one evaluation of the field and a histogram. Where several thresholds do as well, one
 /// amid them, so that rounding on another machine changes nothing. \param bricks  where the field
 /// will be evaluated: increasing index corners
+/// \param rule  its threshold takes no part
 [[nodiscard]] ThresholdChoice chooseThreshold(const SparseVolume& source, const Field& field,
-                                              const ActivityRule& rule,
-                                              std::span<const Coord> bricks);
+                                              const VoxelRule& rule, std::span<const Coord> bricks);
 
 }  // namespace esvr::format

@@ -33,10 +33,10 @@ void noteGrid(const StoredGrid& grid, std::vector<std::string>& notes) {
 
 }  // namespace
 
-std::vector<std::string> checkEsvr(const std::filesystem::path& path) {
+std::vector<std::string> checkEsvr(const std::filesystem::path& path, const ReadLimits& limits) {
   const auto table = readTable(FileSource(path));
-  const EsvrFile file = readEsvr(path);
-  if (encodeEsvr(file) != encodeEsvr(readEsvr(path)))
+  const EsvrFile file = readEsvr(path, limits);
+  if (encodeEsvr(file) != encodeEsvr(readEsvr(path, limits)))
     throw BadInput(path.string() + ": decoding it twice gives two contents");
 
   std::vector<std::string> notes;

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/rotation.h"
+
 namespace esvr::format {
 namespace {
 
@@ -30,22 +32,14 @@ void expand(Box& box, const Vec3& center, const Vec3& half) {
                    clampedCeil(center[2] + half[2])});
 }
 
-/// Rows of the rotation's matrix.
-std::array<Vec3, 3> rotationRows(const Ellipsoids& e, std::size_t i) {
-  const double w = e.rotation[0][i], x = e.rotation[1][i], y = e.rotation[2][i],
-               z = e.rotation[3][i];
-  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
-}
-
 /// Half widths of an ellipsoid's bounding box at support radius 1: lengths of the rows of R S.
 Vec3 unitHalfWidths(const Ellipsoids& e, std::size_t i) {
-  const auto rows = rotationRows(e, i);
+  const Matrix3 R =
+      rotationOf({e.rotation[0][i], e.rotation[1][i], e.rotation[2][i], e.rotation[3][i]});
   Vec3 half{};
   for (std::size_t a = 0; a < 3; ++a) {
     for (std::size_t j = 0; j < 3; ++j)
-      half[a] = std::hypot(half[a], rows[a][j] * std::exp(double(e.logScale[j][i])));
+      half[a] = std::hypot(half[a], R[3 * a + j] * std::exp(double(e.logScale[j][i])));
     // 0 * inf where a scale overflows: as far as it gets
     if (std::isnan(half[a])) half[a] = HUGE_VAL;
   }

@@ -15,8 +15,8 @@ std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
   return bytes.size();
 }
 
-EsvrFile readEsvr(const std::filesystem::path& path) {
-  return format::decode(format::FileSource(path));
+EsvrFile readEsvr(const std::filesystem::path& path, const ReadLimits& limits) {
+  return format::decode(format::FileSource(path), limits);
 }
 
 PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part) {

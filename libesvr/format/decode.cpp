@@ -24,6 +24,9 @@ namespace {
 
 using namespace format;
 
+/// Bytes that a quantised ellipsoid takes in memory, as integers and as floats.
+constexpr double kBytesPerEllipsoid = 128.0;
+
 bool meet(const Box& a, const Box& b) {
   const Coord low = maxCoord(a.min, b.min), high = minCoord(a.max, b.max);
   return low.x <= high.x && low.y <= high.y && low.z <= high.z;
@@ -165,6 +168,9 @@ class GridDecoder {
     std::vector<std::size_t> chosen;
     for (std::size_t b = 0; b < blocks.size(); ++b)
       if (blocks[b].layer < layers_ && wanted(blocks[b].box)) chosen.push_back(b);
+    for (const std::size_t b : chosen)
+      sections_.budget().take(double(blocks[b].run.count) * kBytesPerEllipsoid,
+                              open.section->name());
     grid.quantised[c] = getBlocks(*open.section, open.directory, chosen);
     Chunk chunk{record.origin, dequantise(grid.quantised[c])};
     refuse(faultOf(chunk.ellipsoids), c);
@@ -207,7 +213,10 @@ class GridDecoder {
 
   Ellipsoids readQuantised(std::uint32_t c, std::uint64_t count, QuantisedEllipsoids& quantised) {
     const auto section = id(SectionKind::kEllipsoids, c);
-    quantised = getEllipsoids(sections_.get(section), count, sections_.place(section));
+    const auto content = sections_.get(section);
+    const auto held = std::min(count, kMaxEllipsoidsPerByte * content.size());
+    sections_.budget().take(double(held) * kBytesPerEllipsoid, sections_.place(section));
+    quantised = getEllipsoids(content, count, sections_.place(section));
     return dequantise(quantised);
   }
 
@@ -219,7 +228,7 @@ class GridDecoder {
 
   void readMask(StoredGrid& grid) {
     const auto section = id(SectionKind::kMask);
-    Mask mask = getMask(sections_.get(section), sections_.place(section));
+    Mask mask = getMask(sections_.get(section), sections_.place(section), sections_.budget());
     grid.leaves = std::move(mask.leaves);
     grid.mask = std::move(mask.active);
   }
@@ -227,14 +236,14 @@ class GridDecoder {
   void readVoxels(StoredGrid& grid) {
     const auto section = id(SectionKind::kVoxels);
     if (sections_.has(section))
-      grid.voxels = getVoxels(sections_.get(section), sections_.place(section));
+      grid.voxels = getVoxels(sections_.get(section), sections_.place(section), sections_.budget());
   }
 
   /// Of all layers: some of them alone have none.
   void readResidual(StoredGrid& grid) {
     const auto section = id(SectionKind::kResidual);
     if (!sections_.has(section) || layers_ != kAllLayers) return;
-    grid.residual = getVoxels(sections_.get(section), sections_.place(section));
+    grid.residual = getVoxels(sections_.get(section), sections_.place(section), sections_.budget());
     refuse(residualFaultOf(grid));
   }
 
@@ -288,15 +297,15 @@ EsvrFile decodeGrids(SectionReader& sections, const ReadPart* part) {
 
 }  // namespace
 
-EsvrFile decode(const ByteSource& source) {
-  SectionReader sections(source);
+EsvrFile decode(const ByteSource& source, const ReadLimits& limits) {
+  SectionReader sections(source, limits.maxBytes);
   EsvrFile file = decodeGrids(sections, nullptr);
   sections.finish();
   return file;
 }
 
 EsvrFile decodePart(const ByteSource& source, const ReadPart& part) {
-  SectionReader sections(source);
+  SectionReader sections(source, part.limits.maxBytes);
   return decodeGrids(sections, &part);
 }
 

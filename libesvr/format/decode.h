@@ -6,10 +6,10 @@
 
 namespace esvr::format {
 
-/// \throws BadInput
-[[nodiscard]] EsvrFile decode(const ByteSource& source);
+/// \throws BadInput, MemoryExceeded
+[[nodiscard]] EsvrFile decode(const ByteSource& source, const ReadLimits& limits = {});
 
-/// \throws BadInput
+/// \throws BadInput, MemoryExceeded
 [[nodiscard]] EsvrFile decodePart(const ByteSource& source, const ReadPart& part);
 
 }  // namespace esvr::format

@@ -65,16 +65,19 @@ void chooseTopology(const SparseVolume& source, StoredGrid& grid) {
 
 namespace format {
 
-ActivityRule ruleOf(const StoredGrid& grid) {
-  const float background = grid.field.background;
-  ActivityRule rule{.background = background};
-  if (grid.withinRange) rule.range = rangeOf(grid);
-  rule.narrowBand =
-      grid.topology != TopologyKind::kThreshold && isLevelSet(grid.descriptor, background);
-  return rule;
+VoxelRule ruleOf(const StoredGrid& grid) {
+  return makeVoxelRule(grid.field.background, voxelRule(grid));
 }
 
 }  // namespace format
+
+RevoxeliseOptions voxelRule(const StoredGrid& grid) {
+  RevoxeliseOptions options{.threshold = grid.activeThreshold};
+  if (grid.withinRange) options.range = rangeOf(grid);
+  options.narrowBand = grid.topology != TopologyKind::kThreshold &&
+                       isLevelSet(grid.descriptor, grid.field.background);
+  return options;
+}
 
 bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) {
   return isLevelSet(descriptor, source.background) &&
@@ -133,14 +136,15 @@ std::optional<std::vector<Coord>> bricksWanted(const StoredGrid& grid,
                                                const DecodeOptions& options) {
   const bool stored = grid.topology != TopologyKind::kThreshold;
   if (!stored && !options.box) return std::nullopt;
-  std::vector<Coord> bricks = stored ? grid.leaves : reachedBricks(grid.field);
+  if (!stored) return reachedBricks(grid.field, *options.box);
+  std::vector<Coord> bricks = grid.leaves;
   if (options.box)
     std::erase_if(bricks, [&](Coord corner) { return !meets(*options.box, corner); });
   return bricks;
 }
 
 /// Bricks of the sum and those of its residual.
-std::vector<Coord> withResidualBricks(const VoxelLayer& residual, std::vector<Coord> bricks,
+std::vector<Coord> withResidualBricks(const VoxelLayer& residual, std::span<const Coord> bricks,
                                       const DecodeOptions& options) {
   std::vector<Coord> own, all;
   for (const Coord brick : residual.bricks) {
@@ -163,14 +167,14 @@ void addResidual(const VoxelLayer& residual, SparseVolume& volume) {
   }
 }
 
-/// As revoxelise() would have it, of values that are not a field's.
-SparseVolume settled(const SparseVolume& volume, const ActivityRule& rule, float threshold) {
+/// As revoxelise() would have it, of settled values that are not a field's.
+SparseVolume withActivity(const SparseVolume& volume, const VoxelRule& rule) {
   std::vector<BrickInput> bricks;
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
     BrickInput brick{volume.brickCorner(b), {}, {}};
     for (int v = 0; v < kBrickVoxels; ++v) {
       const float value = volume.brickValues(b)[v];
-      const bool active = rule.activity(value) > threshold;
+      const bool active = rule.isActive(value);
       brick.values[std::size_t(v)] = active ? value : rule.inactiveValue(value);
       if (active) brick.active.set(v);
     }
@@ -180,32 +184,32 @@ SparseVolume settled(const SparseVolume& volume, const ActivityRule& rule, float
 }
 
 SparseVolume evaluatedWithResidual(const StoredGrid& grid, const DecodeOptions& options) {
-  const ActivityRule rule = ruleOf(grid);
-  auto bricks = bricksWanted(grid, options).value_or(reachedBricks(grid.field));
-  bricks = withResidualBricks(*grid.residual, std::move(bricks), options);
+  auto wanted = bricksWanted(grid, options);
+  if (!wanted) wanted = reachedBricks(grid.field);
+  const auto bricks = withResidualBricks(*grid.residual, *wanted, options);
   SparseVolume volume = revoxelise(grid.field, {.threshold = kAlwaysActive,
-                                                .range = rule.range,
+                                                .range = voxelRule(grid).range,
                                                 .bricks = bricks,
                                                 .restrictToBricks = true});
   addResidual(*grid.residual, volume);
-  return settled(volume, rule, options.threshold.value_or(grid.activeThreshold));
+  VoxelRule rule = ruleOf(grid);
+  rule.threshold = options.threshold.value_or(rule.threshold);
+  return withActivity(volume, rule);
 }
 
 SparseVolume evaluated(const StoredGrid& grid, const DecodeOptions& options) {
   if (grid.residual) return evaluatedWithResidual(grid, options);
-  const ActivityRule rule = ruleOf(grid);
+  RevoxeliseOptions revoxel = voxelRule(grid);
+  revoxel.threshold = options.threshold.value_or(revoxel.threshold);
   const auto bricks = bricksWanted(grid, options);
-  return revoxelise(grid.field,
-                    {.threshold = options.threshold.value_or(grid.activeThreshold),
-                     .range = rule.range,
-                     .narrowBand = rule.narrowBand,
-                     .bricks = bricks ? std::span<const Coord>(*bricks) : std::span<const Coord>{},
-                     .restrictToBricks = bricks.has_value()});
+  if (bricks) revoxel.bricks = *bricks;
+  revoxel.restrictToBricks = bricks.has_value();
+  return revoxelise(grid.field, revoxel);
 }
 
 /// Voxels that the mask has not become inactive.
 void applyMask(const StoredGrid& grid, SparseVolume& volume) {
-  const ActivityRule rule = ruleOf(grid);
+  const VoxelRule rule = ruleOf(grid);
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
     const auto leaf =
         std::lower_bound(grid.leaves.begin(), grid.leaves.end(), volume.brickCorner(b));
@@ -218,7 +222,7 @@ void applyMask(const StoredGrid& grid, SparseVolume& volume) {
 }
 
 /// Voxels outside a box become inactive, bricks without an active voxel go.
-void clip(const Box& box, const ActivityRule& rule, SparseVolume& volume) {
+void clip(const Box& box, const VoxelRule& rule, SparseVolume& volume) {
   std::vector<BrickInput> kept;
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
     BrickInput brick{volume.brickCorner(b), {}, {}};
@@ -235,11 +239,6 @@ void clip(const Box& box, const ActivityRule& rule, SparseVolume& volume) {
 
 }  // namespace
 
-RevoxeliseOptions voxelRule(const StoredGrid& grid) {
-  const ActivityRule rule = ruleOf(grid);
-  return {.threshold = grid.activeThreshold, .range = rule.range, .narrowBand = rule.narrowBand};
-}
-
 SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
   if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
@@ -247,6 +246,9 @@ SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
     throw UsageError("grid '" + grid.descriptor.name +
                      "' says itself which voxels are active: it takes no threshold");
   if (options.box && options.box->empty()) throw UsageError("the box of voxels is empty");
+  if (options.maxBytes != kNoMemoryLimit)
+    requireWithinMemory(estimateDecode(grid, options).bytes(), options.maxBytes,
+                        "grid '" + grid.descriptor.name + "'");
   SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
   if (!grid.voxels && grid.topology == TopologyKind::kMask) applyMask(grid, volume);
   if (options.box) clip(*options.box, ruleOf(grid), volume);

@@ -1,11 +1,11 @@
 #pragma once
-/// How the voxels of a stored grid are found active.
+/// The rule by which the sum of a stored grid becomes voxels.
 
 #include "esvr/container.h"
-#include "field/activity.h"
+#include "field/voxel_rule.h"
 
 namespace esvr::format {
 
-[[nodiscard]] ActivityRule ruleOf(const StoredGrid& grid);
+[[nodiscard]] VoxelRule ruleOf(const StoredGrid& grid);
 
 }  // namespace esvr::format

@@ -39,8 +39,8 @@ std::vector<std::byte> putMask(std::span<const Coord> leaves, std::span<const Br
   return putVoxels(layer);
 }
 
-Mask getMask(std::span<const std::byte> content, const std::string& where) {
-  VoxelLayer layer = getVoxels(content, where);
+Mask getMask(std::span<const std::byte> content, const std::string& where, MemoryBudget& budget) {
+  VoxelLayer layer = getVoxels(content, where, budget);
   if (layer.form != VoxelForm::kPalette || layer.palette.size() != 1)
     throw BadInput(where + ": a mask of voxels with values");
   Mask mask;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/memory_budget.h"
 #include "esvr/sparse_volume.h"
 
 namespace esvr::format {
@@ -19,7 +20,8 @@ struct Mask {
 [[nodiscard]] std::vector<std::byte> putMask(std::span<const Coord> leaves,
                                              std::span<const BrickMask> active);
 
-/// \throws BadInput  damaged; begins with `where`
-[[nodiscard]] Mask getMask(std::span<const std::byte> content, const std::string& where);
+/// \throws BadInput  damaged; begins with `where`; MemoryExceeded: the budget holds fewer bricks
+[[nodiscard]] Mask getMask(std::span<const std::byte> content, const std::string& where,
+                           MemoryBudget& budget);
 
 }  // namespace esvr::format

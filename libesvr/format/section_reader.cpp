@@ -7,8 +7,20 @@
 
 namespace esvr::format {
 
-SectionReader::SectionReader(const ByteSource& source)
-    : source_(source), table_(readTable(source)) {
+namespace {
+
+/// Bytes of memory that a byte of a section's content becomes, at most. An item of metadata may be
+/// three lengths of four bytes each, and becomes three containers.
+double expansionOf(SectionKind kind) {
+  constexpr double kOfMetadata = 32.0, kOfArrays = 4.0;
+  const bool hasMetadata = kind == SectionKind::kFileMetadata || kind == SectionKind::kGrid;
+  return hasMetadata ? kOfMetadata : kOfArrays;
+}
+
+}  // namespace
+
+SectionReader::SectionReader(const ByteSource& source, std::uint64_t maxBytes)
+    : source_(source), table_(readTable(source)), budget_(maxBytes) {
   for (std::size_t i = 0; i < table_.entries.size(); ++i) unread_[table_.entries[i].id] = i;
 }
 
@@ -32,7 +44,11 @@ std::size_t SectionReader::take(const SectionId& id) {
 }
 
 std::vector<std::byte> SectionReader::get(const SectionId& id) {
-  return readSection(source_, table_, take(id));
+  const std::size_t taken = take(id);
+  const SectionEntry& entry = table_.entries[taken];
+  budget_.take(double(entry.rawBytes) * expansionOf(id.kind),
+               placeOf(source_.name(), table_, taken));
+  return readSection(source_, table_, taken);
 }
 
 std::unique_ptr<ByteSource> SectionReader::open(const SectionId& id, bool whole) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/memory_budget.h"
 #include "format/byte_source.h"
 #include "format/section_table.h"
 
@@ -13,8 +14,9 @@ namespace esvr::format {
 
 class SectionReader {
  public:
+  /// \param maxBytes  of memory that the content may take
   /// \throws BadInput  header or table damaged
-  explicit SectionReader(const ByteSource& source);
+  explicit SectionReader(const ByteSource& source, std::uint64_t maxBytes = kNoMemoryLimit);
 
   [[nodiscard]] const SectionTable& table() const { return table_; }
 
@@ -26,7 +28,11 @@ class SectionReader {
 
   [[nodiscard]] bool has(const SectionId& id) const { return unread_.contains(id); }
 
-  /// A section's content; each can be had once. \throws BadInput  damaged; there is none
+  /// What is left for content, from which get() takes.
+  [[nodiscard]] MemoryBudget& budget() { return budget_; }
+
+  /// A section's content; each can be had once.
+  /// \throws BadInput  damaged; there is none; MemoryExceeded
   [[nodiscard]] std::vector<std::byte> get(const SectionId& id);
 
   /// A section to be read piece by piece; instead of get(), and like it once.
@@ -43,6 +49,7 @@ class SectionReader {
 
   const ByteSource& source_;
   SectionTable table_;
+  MemoryBudget budget_;
   std::map<SectionId, std::size_t> unread_;
 };
 

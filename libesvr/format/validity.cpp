@@ -1,6 +1,7 @@
 #include "format/validity.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <span>
@@ -34,6 +35,18 @@ std::optional<Fault> nonFinite(SectionKind section, const char* what,
   return std::nullopt;
 }
 
+std::optional<Fault> extremeScale(const std::array<std::vector<float>, 3>& logScale) {
+  const auto extreme = [](float v) { return std::abs(v) > kMaxLogScale; };
+  for (const auto& plane : logScale) {
+    const auto it = std::find_if(plane.begin(), plane.end(), extreme);
+    if (it != plane.end())
+      return Fault{SectionKind::kScales, "a scale of ellipsoid " +
+                                             std::to_string(it - plane.begin()) +
+                                             " is not between e^-32 and e^32 voxels"};
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<Fault> faultOf(const StoredGrid& grid) {
@@ -62,6 +75,7 @@ std::optional<Fault> residualFaultOf(const StoredGrid& grid) {
 std::optional<Fault> faultOf(const Ellipsoids& e) {
   if (auto f = nonFinite(SectionKind::kCenters, "the center", e.center)) return f;
   if (auto f = nonFinite(SectionKind::kScales, "a scale", e.logScale)) return f;
+  if (auto f = extremeScale(e.logScale)) return f;
   if (auto f = nonFinite(SectionKind::kRotations, "the rotation", e.rotation)) return f;
   if (auto f = nonFinite(SectionKind::kIntensities, "the intensity", {&e.intensity, 1})) return f;
   if (auto f = nonFinite(SectionKind::kKappas, "the kappa", {&e.kappa, 1})) return f;

@@ -18,8 +18,9 @@ struct Fault {
 /// All but leaves, curve and chunks: finite numbers, a kernel that can be evaluated, ranges.
 [[nodiscard]] std::optional<Fault> faultOf(const StoredGrid& grid);
 
-/// Finite parameters, quaternions of unit length.
 [[nodiscard]] std::optional<Fault> residualFaultOf(const StoredGrid& grid);
+
+/// Parameters must be finite, scales within kMaxLogScale and quaternions of unit length.
 [[nodiscard]] std::optional<Fault> faultOf(const Ellipsoids& ellipsoids);
 
 }  // namespace esvr::format

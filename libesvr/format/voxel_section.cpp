@@ -21,6 +21,10 @@ namespace {
 constexpr std::uint64_t kMaxBricksPerByte = 4;
 constexpr int kMaxBrickBits = 21;
 
+/// Bytes of memory that a brick takes while it is read: codes, masks, and values that are checked.
+constexpr double kBytesPerBrick =
+    kBrickVoxels * (sizeof(std::int32_t) + sizeof(float)) + 3.0 * sizeof(BrickMask) + 64.0;
+
 std::uint64_t keyOf(Coord brick) {
   return spreadBits(std::uint64_t(brick.x)) | spreadBits(std::uint64_t(brick.y)) << 1 |
          spreadBits(std::uint64_t(brick.z)) << 2;
@@ -189,10 +193,12 @@ std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   return out.take();
 }
 
-VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where) {
+VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,
+                     MemoryBudget& budget) {
   ByteReader in(content, where);
   VoxelLayer layer = getHeader(in);
   const BrickCount count = getBrickCount(in, content.size());
+  budget.take(double(count.bricks) * kBytesPerBrick, where);
   const codec::VoxelModel model = getModel(in);
   decodeStream(in, count, model, layer);
   checkValues(layer, in);

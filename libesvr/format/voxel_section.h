@@ -6,13 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "core/memory_budget.h"
 #include "esvr/voxel_layer.h"
 
 namespace esvr::format {
 
 [[nodiscard]] std::vector<std::byte> putVoxels(const VoxelLayer& layer);
 
-/// \throws BadInput  damaged; begins with `where`
-[[nodiscard]] VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where);
+/// \throws BadInput  damaged; begins with `where`; MemoryExceeded: the budget holds fewer bricks
+[[nodiscard]] VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,
+                                   MemoryBudget& budget);
 
 }  // namespace esvr::format

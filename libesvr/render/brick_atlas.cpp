@@ -6,7 +6,7 @@
 #include <array>
 
 #include "esvr/error.h"
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 
 namespace esvr {
 namespace {

@@ -89,6 +89,8 @@ void checkCamera(const Camera& camera, Resolution resolution) {
   require(camera.height > 0.0 && std::isfinite(camera.height),
           "the height of the picture in voxels must be positive");
   require(resolution.width > 0 && resolution.height > 0, "a picture needs a pixel at least");
+  require(std::max(resolution.width, resolution.height) <= Resolution::kMaxSide,
+          "a picture may have 32767 pixels a side at most");
 }
 
 View::View(const Camera& camera, Resolution resolution)

@@ -2,6 +2,7 @@
 
 #include "esvr/render.h"
 #include "render/picture.h"
+#include "render/scene_depth.h"
 #include "render/tile.h"
 
 namespace esvr {
@@ -40,6 +41,8 @@ void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
 Image renderField(const Field& field, const RenderOptions& options,
                   const RevoxeliseOptions& voxels) {
   Picture picture(options);
+  if (const auto box = supportBox(field))
+    checkRayLength(binsWithin(shownBox(*box, options.between), picture.view, options.step));
   const auto ellipsoids =
       visibleEllipsoids(field, picture.view, options.resolution, options.between);
   const auto origins = chunkOrigins(field);
@@ -48,7 +51,7 @@ Image renderField(const Field& field, const RenderOptions& options,
                         ellipsoids,
                         origins,
                         sampleRule(options, picture.table.view(), field.background),
-                        voxelValue(field.background, voxels)};
+                        makeVoxelRule(field.background, voxels)};
   tbb::parallel_for(0, tilesAlong(options.resolution.height), [&](int row) {
     checkCancelled(options);
     drawRow(scene, row * kTileSide, picture);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
+#include "esvr/error.h"
 #include "render/ellipsoid_view.h"
 
 namespace esvr {
@@ -77,6 +79,14 @@ BinRange binsWithin(const PlaceBox& box, const View& view, double step) {
   ScreenBounds bounds{};
   bounds.nearest = std::max(0.0, d.nearest), bounds.farthest = d.farthest;
   return binsOf(bounds, {1.0, 1.0}, step);
+}
+
+void checkRayLength(const BinRange& bins) {
+  constexpr std::int64_t kMaxBins = (std::int64_t{1} << 24) / kBinSamples;
+  const std::int64_t count = bins.last - bins.first + 1;
+  if (count > kMaxBins)
+    throw UsageError("rays of " + std::to_string(count * kBinSamples) +
+                     " samples are too long; take a longer step");
 }
 
 }  // namespace esvr

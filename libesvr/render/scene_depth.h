@@ -18,4 +18,7 @@ namespace esvr {
 /// The bins of the rays' samples that may lie in a box; last < first where none does.
 [[nodiscard]] BinRange binsWithin(const PlaceBox& box, const View& view, double step);
 
+/// \throws UsageError  rays that pass all these bins have more than 2^24 samples
+void checkRayLength(const BinRange& bins);
+
 }  // namespace esvr

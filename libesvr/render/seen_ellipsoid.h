@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "core/rotation.h"
 #include "render/ray_math.h"
 #include "render/view.h"
 
@@ -19,6 +20,11 @@ struct alignas(16) PackedEllipsoid {
   float rotation[4];  ///< w, x, y, z; need not have unit length
 };
 static_assert(sizeof(PackedEllipsoid) == 48);
+
+ESVR_HD inline Matrix3 unitRotation(const PackedEllipsoid& e) {
+  return rotationOf(normalised({double(e.rotation[0]), double(e.rotation[1]), double(e.rotation[2]),
+                                double(e.rotation[3])}));
+}
 
 /// In the view's coordinates: right, up, forward.
 struct SeenEllipsoid {
@@ -115,15 +121,11 @@ ESVR_HD inline std::int32_t lastPixel(double high, int count) {
 /// \param fromEye  of the origin of its chunk
 ESVR_HD inline SeenEllipsoid seenBy(const View& view, const PackedEllipsoid& e,
                                     const Vec3& fromEye) {
-  double w = e.rotation[0], x = e.rotation[1], y = e.rotation[2], z = e.rotation[3];
-  const double norm = 1.0 / std::sqrt(w * w + x * x + y * y + z * z);
-  w *= norm, x *= norm, y *= norm, z *= norm;
-  const Vec3 first{1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)};
-  const Vec3 second{2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)};
-  const Vec3 third{2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)};
+  const Matrix3 R = unitRotation(e);
   const Vec3 center{double(e.center[0]), double(e.center[1]), double(e.center[2])};
   return {view.coordinates(sum(fromEye, center)),
-          {view.coordinates(first), view.coordinates(second), view.coordinates(third)},
+          {view.coordinates(columnOf(R, 0)), view.coordinates(columnOf(R, 1)),
+           view.coordinates(columnOf(R, 2))},
           {double(e.scale[0]), double(e.scale[1]), double(e.scale[2])}};
 }
 
@@ -266,11 +268,14 @@ struct BinRange {
   std::int64_t first, last;
 };
 ESVR_HD inline BinRange binsOf(const ScreenBounds& b, const UnitRange& unit, double step) {
-  constexpr double kRounding = 1e-6;  // a bound may lie on a sample
+  using ellipsoid_math::clampedTo;
+  constexpr double kRounding = 1e-6;   // a bound may lie on a sample
+  constexpr double kLastBin = 0x1p52;  // a support may reach beyond all places that there are
   const double binLength = step * kBinSamples;
   const double first = std::floor(b.nearest * unit.min / binLength - kRounding);
   const double last = std::floor(b.farthest * unit.max / binLength + kRounding);
-  return {first > 0.0 ? std::int64_t(first) : 0, std::int64_t(last)};
+  return {std::int64_t(clampedTo(first, 0.0, kLastBin)),
+          std::int64_t(clampedTo(last, -1.0, kLastBin))};
 }
 
 }  // namespace esvr

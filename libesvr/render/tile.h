@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
+#include "field/voxel_rule.h"
 #include "render/ellipsoid_view.h"
 #include "render/picture.h"
 #include "render/ray_box.h"
-#include "render/voxel_value.h"
 
 namespace esvr {
 
@@ -25,7 +25,7 @@ struct TileScene {
   const VisibleEllipsoids& ellipsoids;
   const std::vector<Vec3>& origins;  ///< of the chunks
   SampleRule rule;
-  VoxelValue voxelValue;
+  VoxelRule voxelRule;
 };
 
 class Tile {

@@ -7,7 +7,7 @@
 
 #include "esvr/camera.h"
 #include "esvr/sparse_volume.h"
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 
 namespace esvr {
 

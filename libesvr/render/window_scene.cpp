@@ -11,14 +11,11 @@ namespace {
 using Columns = std::array<Vec3, 3>;
 
 Columns unitColumns(const PackedEllipsoid& e) {
-  double w = e.rotation[0], x = e.rotation[1], y = e.rotation[2], z = e.rotation[3];
-  const double norm = 1.0 / std::sqrt(w * w + x * x + y * y + z * z);
-  w *= norm, x *= norm, y *= norm, z *= norm;
-  const double a = 1.0 / double(e.scale[0]), b = 1.0 / double(e.scale[1]),
-               c = 1.0 / double(e.scale[2]);
-  return {Vec3{a * (1 - 2 * (y * y + z * z)), b * 2 * (x * y - w * z), c * 2 * (x * z + w * y)},
-          Vec3{a * 2 * (x * y + w * z), b * (1 - 2 * (x * x + z * z)), c * 2 * (y * z - w * x)},
-          Vec3{a * 2 * (x * z - w * y), b * 2 * (y * z + w * x), c * (1 - 2 * (x * x + y * y))}};
+  const Matrix3 R = unitRotation(e);
+  Columns columns;
+  for (int c = 0; c < 3; ++c)
+    for (int r = 0; r < 3; ++r) columns[c][r] = 1.0 / double(e.scale[r]) * R[3 * c + r];
+  return columns;
 }
 
 Vec3 without(const Vec3& v, const Vec3& direction, double along) {

@@ -106,7 +106,7 @@ bool WindowTile::addRow(const WindowForm& form, const WindowPlace& center, int s
 
 void WindowTile::finishVoxels() {
   const float background = scene_.rule.background;
-  for (float& v : values_) v = v == 0.0f ? background : scene_.voxelValue(background + v);
+  for (float& v : values_) v = v == 0.0f ? background : scene_.voxelRule(background + v);
 }
 
 void WindowTile::drawRay(const Block& block, int column, int row) {

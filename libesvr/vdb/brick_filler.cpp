@@ -4,14 +4,14 @@
 #include <string>
 
 #include "esvr/error.h"
+#include "esvr/memory_limit.h"
 
 namespace esvr::vdb {
 namespace {
 
-constexpr std::uint64_t kBrickBytes =
-    kBrickVoxels * sizeof(float) + sizeof(BrickMask) + sizeof(Coord);
-
-std::string mebibytes(std::uint64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; }
+/// Bytes of a brick in the volume, and of what it is filled from.
+constexpr double kBrickBytes =
+    kBrickVoxels * sizeof(float) + sizeof(BrickMask) + 2.0 * sizeof(Coord) + 32.0;
 
 void refuseTooFarApart(Coord low, Coord high) {
   constexpr std::int64_t kMaxExtent = std::numeric_limits<std::int32_t>::max() - kBrickSide;
@@ -32,12 +32,9 @@ float narrowBackground(double background) {
 }
 
 void refuseTooLarge(std::uint64_t bricks, std::uint64_t treeBytes, const ReadOptions& options) {
-  if (treeBytes > options.maxBytes)
-    throw BadInput("its tree takes " + mebibytes(treeBytes) + ", more than the limit of " +
-                   mebibytes(options.maxBytes));
-  if (bricks > options.maxBytes / kBrickBytes)
-    throw BadInput("its " + std::to_string(bricks) + " bricks of 8^3 voxels, active tiles " +
-                   "included, exceed the limit of " + mebibytes(options.maxBytes));
+  requireWithinMemory(
+      double(treeBytes) + double(bricks) * kBrickBytes, options.maxBytes,
+      "it has " + std::to_string(bricks) + " bricks of 8^3 voxels, active tiles included, and");
 }
 
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite) {

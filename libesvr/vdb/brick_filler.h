@@ -28,7 +28,7 @@ struct FillRules {
 /// The background as float. \throws BadInput  not finite there
 float narrowBackground(double background);
 
-/// \throws BadInput  so many bricks, or the tree they come from, exceed options.maxBytes
+/// \throws MemoryExceeded  the bricks and the tree they come from take more than options.maxBytes
 void refuseTooLarge(std::uint64_t bricks, std::uint64_t treeBytes, const ReadOptions& options);
 
 /// Active voxels that float cannot hold: NaN, infinite, or a double out of range.

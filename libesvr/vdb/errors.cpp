@@ -17,6 +17,8 @@ void rethrowCommon(const std::string& where) {
     throw BadInput(where + e.what());
   } catch (const UsageError& e) {
     throw UsageError(where + e.what());
+  } catch (const MemoryExceeded& e) {
+    throw MemoryExceeded(where + e.what());
   } catch (const RuntimeFailure& e) {
     throw RuntimeFailure(where + e.what());
   } catch (const Error& e) {

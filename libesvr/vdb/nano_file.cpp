@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "esvr/error.h"
+#include "esvr/memory_limit.h"
 
 namespace esvr::vdb {
 namespace {
@@ -120,9 +121,7 @@ std::vector<NanoEntry> readNanoDirectory(InputFile& file) {
 NanoBuffer readNanoBuffer(InputFile& file, const NanoEntry& entry, std::uint64_t maxBytes) {
   file.seek(entry.at);
   if (entry.codec == kNone) file.need(entry.gridBytes);
-  if (entry.gridBytes > maxBytes)
-    throw BadInput("takes " + std::to_string(entry.gridBytes >> 20) +
-                   " MiB, more than the limit of " + std::to_string(maxBytes >> 20));
+  requireWithinMemory(double(entry.gridBytes), maxBytes, "it");
   NanoBuffer buffer(entry.gridBytes);
   switch (entry.codec) {
     case kNone:

@@ -52,7 +52,7 @@ class NanoBuffer {
   std::size_t size_;
 };
 
-/// \throws BadInput  damaged, or larger than maxBytes
+/// \throws BadInput  damaged; MemoryExceeded: larger than maxBytes
 NanoBuffer readNanoBuffer(InputFile& file, const NanoEntry& entry, std::uint64_t maxBytes);
 
 }  // namespace esvr::vdb

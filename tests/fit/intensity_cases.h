@@ -113,7 +113,7 @@ TEST_P(Intensities, AgreeWithDenseNormalEquations) {
 /// A reader's rule that leaves voxels inactive and clamps others.
 struct ReaderRule {
   RevoxeliseOptions options{.threshold = 0.2f, .range = ValueRange{0.0f, 0.9f}};
-  StoredValue stored{{.range = options.range}, options.threshold};
+  VoxelRule rule = makeVoxelRule(0.0f, options);
 };
 
 TEST_P(Intensities, HaveTheErrorThatAReaderGets) {
@@ -122,7 +122,7 @@ TEST_P(Intensities, HaveTheErrorThatAReaderGets) {
   const ReaderRule rule;
   Box box = activeBox(volume);
   box.min.x += 3, box.max.z -= 5;  // not along bricks
-  const auto found = problemOf(field, {volume, rule.stored, box}).error(intensitiesOf(field));
+  const auto found = problemOf(field, {volume, rule.rule, box}).error(intensitiesOf(field));
   const auto metrics = compareVolumes(volume, revoxelise(field, rule.options), {.box = box});
   // values within 1e-6, errors up to 1, some 20,000 voxels whose differences cancel
   EXPECT_NEAR(found.squares, metrics.mseBox * metrics.boxVoxels, 1e-4);
@@ -144,7 +144,7 @@ TEST_P(Intensities, LeaveExactVoxelsAlone) {
   const SparseVolume volume = tubeVolume();
   // nothing is active: every voxel of the background is exact, and no other matters to the fit
   IntensityTarget target = targetOf(volume);
-  target.stored.threshold = 1e6f;
+  target.rule.threshold = 1e6f;
   auto passes = makeIntensityPasses(target, device_);
   passes->setShapes(field);
   IntensityGradient gradient;
@@ -152,7 +152,7 @@ TEST_P(Intensities, LeaveExactVoxelsAlone) {
   const std::vector<double> direction(field.ellipsoidCount(), 1.0);
   std::vector<double> some, all;
   passes->applyNormal(direction, some);
-  target.stored.threshold = -1.0f;
+  target.rule.threshold = -1.0f;
   auto unrestricted = makeIntensityPasses(target, device_);
   unrestricted->setShapes(field);
   (void)unrestricted->gradient(std::vector<float>(direction.size(), 0.5f), gradient);

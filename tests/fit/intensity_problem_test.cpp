@@ -1,11 +1,7 @@
-// Plan: intensity_cases.h on the CPU; the same bits on any number of threads; the rule of stored
-// values in its two forms.
+// Plan: intensity_cases.h on the CPU; the same bits on any number of threads.
 
 #include <tbb/global_control.h>
 
-#include <limits>
-
-#include "fit/stored_rule.h"
 #include "intensity_cases.h"
 
 namespace esvr {
@@ -26,17 +22,6 @@ TEST(IntensityProblem, GivesTheSameBitsOnOneThread) {
   problem.setShapes(field);
   (void)problem.solve(one, 10);
   EXPECT_EQ(many, one);
-}
-
-TEST(StoredRule, IsStoredValueInAnotherForm) {
-  const StoredValue values[] = {
-      {{.background = 0.25f}, 0.1f},
-      {{.background = 0.25f}, -std::numeric_limits<float>::max()},
-      {{.background = 0.0f, .range = ValueRange{-0.5f, 0.75f}}, 0.2f},
-      {{.background = 3.0f, .narrowBand = true}, 0.0f},
-      {{.background = 3.0f, .range = ValueRange{-2.0f, 2.5f}, .narrowBand = true}, 0.6f}};
-  for (const StoredValue& stored : values)
-    for (float v = -5.0f; v < 5.0f; v += 0.03125f) EXPECT_EQ(storedRule(stored)(v), stored(v)) << v;
 }
 
 }  // namespace

@@ -28,6 +28,11 @@ using test::CraftedFile;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
+VoxelLayer voxelsOf(std::span<const std::byte> content, const std::string& where) {
+  MemoryBudget budget(kNoMemoryLimit);
+  return getVoxels(content, where, budget);
+}
+
 std::vector<VoxelLayer> someLayers() {
   const SparseVolume tube = test::tubeVolume(), ball = test::levelSetVolume();
   SparseVolume halves = tube;
@@ -37,11 +42,11 @@ std::vector<VoxelLayer> someLayers() {
 }
 
 TEST(VoxelSection, ComesBackIntegerByInteger) {
-  for (const VoxelLayer& layer : someLayers()) EXPECT_EQ(getVoxels(putVoxels(layer), "v"), layer);
+  for (const VoxelLayer& layer : someLayers()) EXPECT_EQ(voxelsOf(putVoxels(layer), "v"), layer);
 }
 
 TEST(VoxelSection, OfNoBrickComesBack) {
-  EXPECT_EQ(getVoxels(putVoxels(VoxelLayer{}), "v"), VoxelLayer{});
+  EXPECT_EQ(voxelsOf(putVoxels(VoxelLayer{}), "v"), VoxelLayer{});
 }
 
 TEST(VoxelSection, PredictsWhatIsSmooth) {
@@ -71,7 +76,7 @@ TEST(VoxelSection, FindsMirrors) {
   });
   // a quarter of the voxels, two columns of them without an image; and what it takes to say so
   EXPECT_LT(double(bytesOf(mirrored)), 0.35 * double(bytesOf(plain)));
-  EXPECT_EQ(getVoxels(putVoxels(exactLayer(mirrored)), "v"), exactLayer(mirrored));
+  EXPECT_EQ(voxelsOf(putVoxels(exactLayer(mirrored)), "v"), exactLayer(mirrored));
 }
 
 /// Floats that are one value for the most part: what stands between does not spoil the guesses.
@@ -83,7 +88,7 @@ TEST(VoxelSection, KnowsCommonValues) {
   ASSERT_EQ(layer.form, VoxelForm::kFloat);
   // 23 bits of noise for half of the voxels, next to nothing for the others
   EXPECT_LT(double(putVoxels(layer).size()) * 8.0, 0.5 * 25.0 * double(volume.values.size()));
-  EXPECT_EQ(getVoxels(putVoxels(layer), "v"), layer);
+  EXPECT_EQ(voxelsOf(putVoxels(layer), "v"), layer);
 }
 
 EsvrFile voxelFile() {
@@ -157,7 +162,7 @@ TEST(VoxelLies, AKilobyteCannotAskForAGigabyte) {
     std::copy(bytes.begin(), bytes.end(), content.begin() + std::ptrdiff_t(countAt));
     const test::AllocationMeter meter;
     try {
-      (void)getVoxels(content, "lie");
+      (void)voxelsOf(content, "lie");
     } catch (const BadInput&) {
     }
     EXPECT_LT(meter.bytes(), std::size_t{64} << 20) << count;
@@ -174,8 +179,8 @@ TEST(VoxelLies, AnyBytesAreReadOrRefused) {
       bytes[(state >> 8) % bytes.size()] = std::byte(state >> 24);
     }
     try {
-      const VoxelLayer once = getVoxels(bytes, "any");
-      EXPECT_EQ(getVoxels(putVoxels(once), "again"), once);
+      const VoxelLayer once = voxelsOf(bytes, "any");
+      EXPECT_EQ(voxelsOf(putVoxels(once), "again"), once);
     } catch (const BadInput&) {
     }
   }

@@ -16,9 +16,14 @@ file(RENAME ${scratch}/prefix ${scratch}/moved)
 if(sanitize)
   string(APPEND flags " -fsanitize=${sanitize}")
 endif()
+if(NOT EXISTS ${scratch}/moved/share/doc/esvr/LICENSE)
+  message(FATAL_ERROR "the license is not installed")
+endif()
+# A consumer that calls nothing of CUDA needs none of its packages, however libesvr was built.
 run(${CMAKE_COMMAND} -S ${consumer} -B ${scratch}/build -G ${generator}
     -D CMAKE_BUILD_TYPE=Release -D CMAKE_PREFIX_PATH=${scratch}/moved
-    -D CMAKE_CXX_COMPILER=${compiler} "-DCMAKE_CXX_FLAGS=${flags}")
+    -D CMAKE_CXX_COMPILER=${compiler} "-DCMAKE_CXX_FLAGS=${flags}"
+    -D CMAKE_DISABLE_FIND_PACKAGE_CUDAToolkit=ON)
 run(${CMAKE_COMMAND} --build ${scratch}/build)
 run(${scratch}/build/consumer)
 

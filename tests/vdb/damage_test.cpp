@@ -39,6 +39,8 @@ class Damage : public testing::Test {
       }
     } catch (const BadInput&) {
       return false;
+    } catch (const MemoryExceeded&) {
+      return false;
     }
     return true;
   }

@@ -116,7 +116,8 @@ TEST_F(Voxels, ATileTooLargeForTheLimitIsRefusedBeforeItIsExpanded) {
   source->tree().addTile(3, {4096, 0, 0}, 1.0f, true);  // 4096^3 voxels: 288 GB of bricks
   test::save(path(), {source});
   EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
-              ThrowsMessage<BadInput>(AllOf(HasSubstr("134217729 bricks"), HasSubstr("density"))));
+              ThrowsMessage<MemoryExceeded>(
+                  AllOf(HasSubstr("134217729 bricks"), HasSubstr("density"), HasSubstr("GB"))));
 }
 
 TEST_F(Voxels, TheLimitCountsLeavesToo) {
@@ -124,7 +125,7 @@ TEST_F(Voxels, TheLimitCountsLeavesToo) {
   test::save(path(), {source});
   ReadOptions options;
   options.maxBytes = 1000;
-  EXPECT_THROW((void)readGrid(path(), "density", options), BadInput);
+  EXPECT_THROW((void)readGrid(path(), "density", options), MemoryExceeded);
 }
 
 TEST_F(Voxels, InactiveVoxelsReadAsBackgroundWhateverTheyHold) {

@@ -43,7 +43,7 @@ bool contains(const Box& box, Coord corner) {
 
 CpuIntensityPasses::CpuIntensityPasses(const IntensityTarget& target)
     : source_(target.source),
-      stored_(storedRule(target.stored)),
+      stored_(target.rule),
       box_(target.box),
       restricted_(target.restrictToBricks),
       known_(asBricks(knownCorners(target))) {
@@ -90,11 +90,10 @@ std::span<const PairTape> CpuIntensityPasses::forward(std::size_t brick, PairTap
   float* phi = scratch.phi.get();
   for (auto pair = begin; pair != end; ++pair) {
     const auto i = pairs.ellipsoid[pair];
-    const Coord local = corners_[brick] - gathered.origin(i);
-    const float corner[3] = {float(local.x), float(local.y), float(local.z)};
+    const auto corner = gathered.fromOrigin(i, corners_[brick]);
     PairTape& tape = scratch.tapes[pair - begin];
     tape.phi = phi;
-    kernels.forward(gathered.forms[i], corner, gathered.kernel(i), sum, tape);
+    kernels.forward(gathered.forms[i], corner.data(), gathered.kernel(i), sum, tape);
     phi += tape.floats;
   }
   if (keeps_) tapes_[brick].keep(scratch.tapes);

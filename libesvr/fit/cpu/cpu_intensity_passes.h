@@ -1,12 +1,12 @@
 #pragma once
 /// IntensityPasses on the CPU.
 
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 #include "field/brick_kernels.h"
 #include "field/evaluate_plan.h"
 #include "fit/cpu/pair_tapes.h"
 #include "fit/intensity_passes.h"
-#include "fit/stored_rule.h"
+#include "field/voxel_rule.h"
 
 namespace esvr {
 
@@ -31,7 +31,7 @@ class CpuIntensityPasses final : public IntensityPasses {
   [[nodiscard]] StoredError total() const;
 
   const SparseVolume& source_;
-  StoredRule stored_;
+  VoxelRule stored_;
   Box box_;
   bool restricted_;
   BrickIndex known_;  ///< bricks that are there whatever the field

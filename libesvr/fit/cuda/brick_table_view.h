@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "field/brick_hash.h"
+#include "core/brick_hash.h"
 
 namespace esvr::cuda {
 

@@ -48,7 +48,7 @@ void requireOneKappa(const Field& field) {
 CudaIntensityPasses::CudaIntensityPasses(const IntensityTarget& target)
     : origin_(target.source.origin),
       sourceBackground_(target.source.background),
-      stored_(storedRule(target.stored)),
+      stored_(target.rule),
       box_{target.box.min - origin_, target.box.max - origin_},
       restricted_(target.restrictToBricks),
       bricks_(bricksOf(target), stream_.get()),

@@ -26,7 +26,7 @@ class CudaIntensityPasses final : public IntensityPasses {
 
   Coord origin_;  ///< of the bricks' frame
   float sourceBackground_, fieldBackground_ = 0.0f;
-  StoredRule stored_;
+  VoxelRule stored_;
   Box box_;
   bool restricted_;
   KernelConstants<float> kernel_{};

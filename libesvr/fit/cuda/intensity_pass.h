@@ -8,7 +8,7 @@
 #include "fit/cuda/pair_form.h"
 #include "fit/cuda/pair_lists.h"
 #include "fit/intensity_passes.h"
-#include "fit/stored_rule.h"
+#include "field/voxel_rule.h"
 
 namespace esvr::cuda {
 
@@ -25,7 +25,7 @@ struct IntensityPassArguments {
   KernelConstants<float> kernel;
   const float* source;  ///< kBrickVoxels a target brick
   float sourceBackground, fieldBackground;
-  StoredRule stored;
+  VoxelRule stored;
   Box box;                      ///< of errors, in the bricks' frame
   StoredError* errors;          ///< out, a brick's
   std::uint32_t* exact;         ///< kMaskWords a brick

@@ -4,7 +4,7 @@
 #include <cub/device/device_select.cuh>
 
 #include "esvr/sparse_volume.h"
-#include "field/brick_hash.h"
+#include "core/brick_hash.h"
 #include "fit/cuda/copy.h"
 #include "fit/cuda/launch.h"
 #include "fit/cuda/sample_voxels.h"

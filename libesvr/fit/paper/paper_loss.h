@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 #include "fit/paper/ssim_gradient.h"
 
 namespace esvr {

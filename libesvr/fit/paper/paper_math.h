@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "core/rotation.h"
 #include "fit/adam.h"
 #include "fit/paper/paper_ellipsoid.h"
 #include "fit/parameter_gradient.h"
@@ -21,22 +22,6 @@ struct PaperStep {
 inline constexpr double kBeta1 = 0.9, kBeta2 = 0.999, kAdamEpsilon = 1e-15;
 /// Learned k stays within: below, an ellipsoid has no edge, beyond, no slope that a voxel sees.
 inline constexpr double kSmallestK = 0.5, kLargestK = 50.0;
-
-ESVR_HD inline double lengthOf(const std::array<double, 4>& q) {
-  return std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-}
-ESVR_HD inline std::array<double, 4> normalised(const std::array<double, 4>& q) {
-  const double s = 1.0 / lengthOf(q);
-  return {q[0] * s, q[1] * s, q[2] * s, q[3] * s};
-}
-
-/// Row-major matrix of a unit quaternion.
-ESVR_HD inline Matrix3 rotationOf(const std::array<double, 4>& q) {
-  const double w = q[0], x = q[1], y = q[2], z = q[3];
-  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-          2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
-}
 
 /// L = units S^-1 R^T: the same ellipsoid in the form that passes take.
 ESVR_HD inline Ellipsoid ellipsoidOf(const PaperEllipsoid& p, const KernelKind& kind) {

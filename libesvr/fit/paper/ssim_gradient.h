@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "field/brick_halo.h"
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 #include "field/ssim_window.h"
 
 namespace esvr {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 
 namespace esvr::paper {
 namespace {

@@ -23,6 +23,8 @@ struct Camera {
 };
 
 struct Resolution {
+  static constexpr int kMaxSide = 32767;  ///< the renderers keep pixels' numbers in 16 bits
+
   int width = 800, height = 800;  ///< pixels
 };
 
@@ -42,7 +44,7 @@ struct CameraWish {
 [[nodiscard]] Camera turned(const Camera& camera, double degrees);
 
 /// \throws UsageError  not finite; eye and center in one place; up of no length or along the view;
-///                     fov not between 0 and 180; height not positive; fewer pixels than one
+///                     fov not between 0 and 180; height not positive; fewer pixels than one, or a side above kMaxSide
 void checkCamera(const Camera& camera, Resolution resolution);
 
 }  // namespace esvr

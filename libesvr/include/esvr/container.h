@@ -13,6 +13,7 @@
 #include "esvr/ellipsoids.h"
 #include "esvr/fit_record.h"
 #include "esvr/grid_descriptor.h"
+#include "esvr/memory_limit.h"
 #include "esvr/quantised.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/voxel_layer.h"
@@ -95,11 +96,17 @@ struct ContainerWriteOptions {
 std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
                         const ContainerWriteOptions& options = {});
 
+/// What reading may take. Few bytes of a file may stand for many: a section may be compressed, and
+/// equal ellipsoids or voxels cost next to nothing.
+struct ReadLimits {
+  std::uint64_t maxBytes = kNoMemoryLimit;
+};
+
 /// Reads a whole file. Trusts nothing: every size is checked before it is allocated, every section
 /// against its checksum, every parameter for being finite.
 /// \throws BadInput  missing, not an .esvr, a newer major version, truncated or damaged (says
-/// where)
-[[nodiscard]] EsvrFile readEsvr(const std::filesystem::path& path);
+/// where); MemoryExceeded: its content takes more memory than the limits allow
+[[nodiscard]] EsvrFile readEsvr(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// Which part of a file is wanted: that it is needed at all is told from the section table, chunk
 /// records and directories of blocks. A grid that is stored as voxels is read whole.
@@ -110,6 +117,7 @@ struct ReadPart {
   std::optional<std::size_t> layers{};  ///< at most so many importance layers, from the heaviest
   /// Of these, as many as it takes for so many ellipsoids: whole layers, so there may be more.
   std::optional<std::size_t> ellipsoids{};
+  ReadLimits limits{};
 };
 
 struct PartOfFile {
@@ -118,7 +126,7 @@ struct PartOfFile {
 };
 
 /// Reads what is needed and nothing else, which is therefore not checked.
-/// \throws BadInput  as readEsvr
+/// \throws BadInput, MemoryExceeded  as readEsvr
 [[nodiscard]] PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part);
 
 /// Bytes that a grid adds to a file at most: its sections, the padding before and behind them, and
@@ -159,7 +167,8 @@ struct EsvrSummary {
 /// All that readEsvr checks, and that decoding twice gives one content.
 /// \return what a user may want to know of a file that is whole, a line each: sections that this
 ///         reader skips, a newer minor version, grids without ellipsoids
-/// \throws BadInput  as readEsvr
-[[nodiscard]] std::vector<std::string> checkEsvr(const std::filesystem::path& path);
+/// \throws BadInput, MemoryExceeded  as readEsvr
+[[nodiscard]] std::vector<std::string> checkEsvr(const std::filesystem::path& path,
+                                                 const ReadLimits& limits = {});
 
 }  // namespace esvr

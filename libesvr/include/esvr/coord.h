@@ -40,6 +40,9 @@ struct Box {
   Coord min{kMax, kMax, kMax};
   Coord max{kMin, kMin, kMin};
 
+  /// All voxels that there can be.
+  [[nodiscard]] static constexpr Box whole() { return {{kMin, kMin, kMin}, {kMax, kMax, kMax}}; }
+
   friend constexpr bool operator==(const Box&, const Box&) = default;
   [[nodiscard]] constexpr bool empty() const {
     return min.x > max.x || min.y > max.y || min.z > max.z;
@@ -62,5 +65,10 @@ struct Box {
     return (double(max.x) - min.x + 1) * (double(max.y) - min.y + 1) * (double(max.z) - min.z + 1);
   }
 };
+
+/// The voxels of both boxes.
+[[nodiscard]] constexpr Box common(const Box& a, const Box& b) {
+  return {maxCoord(a.min, b.min), minCoord(a.max, b.max)};
+}
 
 }  // namespace esvr

@@ -26,6 +26,10 @@ struct Ellipsoids {
   friend bool operator==(const Ellipsoids&, const Ellipsoids&) = default;
 };
 
+/// The largest magnitude of a logScale that files hold. A scale of e^32 voxels is larger than the
+/// index space; products of three such scales are far from the ends of float64.
+inline constexpr float kMaxLogScale = 32.0f;
+
 /// Throws std::logic_error where the arrays differ in length.
 void checkInvariants(const Ellipsoids& e);
 

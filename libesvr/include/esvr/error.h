@@ -14,7 +14,7 @@ enum class ErrorKind {
   kUsage = 2,         ///< options that make no sense
   kBadInput = 3,      ///< the input cannot be used: missing, damaged, nothing to fit
   kTargetMissed = 4,  ///< a quality target was not reached, or a comparison failed
-  kDevice = 5         ///< the device is missing or out of memory
+  kDevice = 5         ///< the device is missing, or memory is not enough
 };
 
 class Error : public std::runtime_error {
@@ -41,6 +41,10 @@ struct TargetMissed : Error {
 };
 struct DeviceError : Error {
   explicit DeviceError(const std::string& what) : Error(ErrorKind::kDevice, what) {}
+};
+/// The input asks for more memory than is allowed. The text says how much it needs.
+struct MemoryExceeded : Error {
+  explicit MemoryExceeded(const std::string& what) : Error(ErrorKind::kDevice, what) {}
 };
 /// Thrown where a CancelToken (progress.h) was set and no partial result was asked for.
 struct Cancelled : Error {

@@ -16,7 +16,10 @@ namespace esvr {
 /// Index corners (multiples of 8, increasing) of all bricks that the support of an ellipsoid
 /// reaches. Outside them the field is exactly the background. Found by an exact test of brick
 /// against ellipsoid up to rounding, which errs on the side of inclusion.
-[[nodiscard]] std::vector<Coord> reachedBricks(const Field& field);
+/// \param within  bricks without a voxel in this box are left out
+/// \throws MemoryExceeded  there may be more than 2^32 pairs of an ellipsoid and a brick
+[[nodiscard]] std::vector<Coord> reachedBricks(const Field& field,
+                                               const Box& within = Box::whole());
 
 /// V at the voxels of bricks, float32, SIMD. Each value is within 4e-6 * sum |I_i| of the reference
 /// (evaluateReference) for aspect ratios up to 100, 2e-4 * sum |I_i| up to 1000.
@@ -52,7 +55,8 @@ struct RevoxeliseOptions {
 };
 
 /// Voxels that are not active hold the background, as `narrowBand` says; bricks without an active
-/// voxel are dropped.
+/// voxel are dropped. \throws RuntimeFailure  bricks that are 2^31 voxels or more apart;
+/// MemoryExceeded: as reachedBricks
 [[nodiscard]] SparseVolume revoxelise(const Field& field, const RevoxeliseOptions& options);
 
 }  // namespace esvr

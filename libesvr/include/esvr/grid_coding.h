@@ -7,8 +7,10 @@
 #include "esvr/ellipsoids.h"
 #include "esvr/field.h"
 #include "esvr/grid_descriptor.h"
+#include "esvr/memory_limit.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/voxel_layer.h"
+#include "esvr/work_estimate.h"
 
 namespace esvr {
 
@@ -42,9 +44,16 @@ struct DecodeOptions {
   std::optional<float> threshold{};  ///< instead of the grid's own; 0 or above
   /// Voxels elsewhere come back inactive; bricks elsewhere are not evaluated.
   std::optional<Box> box{};
+  /// What evaluating and keeping the voxels may take.
+  std::uint64_t maxBytes = kNoMemoryLimit;
 };
 
-/// The voxels that a file gives back. \throws UsageError  threshold negative or not finite
+/// What decodeGrid() takes at most. Nothing is evaluated.
+[[nodiscard]] WorkEstimate estimateDecode(const StoredGrid& grid,
+                                          const DecodeOptions& options = {});
+
+/// The voxels that a file gives back. \throws UsageError  threshold negative or not finite;
+/// MemoryExceeded: the estimate is above options.maxBytes, and nothing was begun
 [[nodiscard]] SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options = {});
 
 }  // namespace esvr

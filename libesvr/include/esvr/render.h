@@ -66,7 +66,8 @@ struct RenderOptions {
 /// \param voxels  how sums become voxels; its bricks are not looked at. Of a narrow band, voxels
 ///                inside are -background wherever an ellipsoid reaches
 /// \throws UsageError  as checkCamera and checkTransferFunction; step, opacityLength or
-///                     minTransmittance out of range; a clip box that is no box; Cancelled
+///                     minTransmittance out of range; a clip box that is no box; rays of more than 2^24 samples
+///                     through the supports; Cancelled
 [[nodiscard]] Image renderField(const Field& field, const RenderOptions& options,
                                 const RevoxeliseOptions& voxels = {});
 

@@ -47,7 +47,8 @@ enum class NonFinite { kRefuse, kZero };
 struct ReadOptions {
   NonFinite nonFinite = NonFinite::kRefuse;
   bool allowEmpty = false;  ///< a grid without an active voxel is a volume without bricks
-  /// Bound on the bricks' memory: active tiles become bricks, and a huge tile would not fit.
+  /// Bound on the memory of the file's tree and of the bricks that are made from it. Active tiles
+  /// become bricks; a tile may stand for 2^27 of them.
   std::uint64_t maxBytes = std::uint64_t{16} << 30;
 };
 
@@ -65,7 +66,7 @@ struct VolumeGrid {
 /// \throws BadInput  as inspectVdb; no such grid (lists those there are); a type that cannot be
 /// fitted;
 ///                   no active voxel (without allowEmpty); non-finite voxels (first coordinate and
-///                   count); more than maxBytes of bricks
+///                   count); MemoryExceeded: more than maxBytes
 [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                                   const ReadOptions& options = {});
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "core/cuda/use_device.h"
@@ -42,12 +43,20 @@ float largestIntensity(const Field& field) {
   return largest;
 }
 
+/// \throws DeviceError  kernels number ellipsoids with 32 bits
+std::vector<PackedEllipsoid> numbered(std::vector<PackedEllipsoid> ellipsoids) {
+  if (ellipsoids.size() > std::size_t(std::numeric_limits<std::int32_t>::max()))
+    throw DeviceError("drawing on the GPU: " + std::to_string(ellipsoids.size()) +
+                      " ellipsoids are more than 2^31");
+  return ellipsoids;
+}
+
 int tilesAlong(int pixels) { return (pixels + kSide - 1) / kSide; }
 
 }  // namespace
 
 SceneMemory::SceneMemory(const Field& field, cudaStream_t stream)
-    : ellipsoids(packed(field), stream),
+    : ellipsoids(numbered(packed(field)), stream),
       origins(chunkOrigins(field), stream),
       kernels(rayKernels(field), stream),
       footprints(ellipsoids.size(), stream),
@@ -107,7 +116,7 @@ FieldRenderer::FieldRenderer(const Field& field, const Device& device, const Ren
                              const RevoxeliseOptions& voxels)
     : field_(field),
       limits_(limits),
-      voxelValue_(voxelValue(field.background, voxels)),
+      voxelRule_(makeVoxelRule(field.background, voxels)),
       bound_(largestIntensity(field)),
       box_(supportBox(field)),
       multiprocessors_(multiprocessorsOf(device)),
@@ -131,6 +140,7 @@ void FieldRenderer::drawFrame(const RenderOptions& options, Image* image) {
   tiles_ = occupied_ = 0;
   if (box_) scene.bins = binsWithin(shownBox(*box_, options.between), scene.view, options.step);
   if (scene.bins.last < scene.bins.first) return;
+  checkRayLength(scene.bins);
   table_.update(options, stream_.get());
   scene_.prepare(field_, options.between, stream_.get());
   drawBand(scene, {0, tilesAlong(options.resolution.height)}, image);
@@ -142,7 +152,7 @@ TileFrame FieldRenderer::frameOf(const Scene& scene, Band band) const {
   const std::int64_t bins = scene.bins.last - scene.bins.first + 1;
   if (bins > kMaxLists / columns)
     throw UsageError("rays of " + std::to_string(bins * kBinSamples) +
-                     " samples are too long; take a longer step");
+                     " samples are too long for so wide a picture; take a longer step");
   // How deep a ray comes depends on all that lies before.
   const bool whole = scene.options.mode == RenderMode::kDepth;
   const int parts = whole ? 1 : std::clamp(parts_, 1, int(bins));
@@ -223,7 +233,7 @@ void FieldRenderer::launch(const SamplingArguments& a) {
                    stream_.get());
   else
     launchDrawVoxels({a, scene_.forms.data(), scene_.footprints.data(), scene_.origins.data(),
-                      bound_, voxelValue_},
+                      bound_, voxelRule_},
                      multiprocessors_, stream_.get());
 }
 

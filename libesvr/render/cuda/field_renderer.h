@@ -80,7 +80,7 @@ class FieldRenderer final : public Renderer {
 
   const Field& field_;
   RendererLimits limits_;
-  VoxelValue voxelValue_;
+  VoxelRule voxelRule_;
   float bound_;
   std::optional<PlaceBox> box_;
   int multiprocessors_ = 0;

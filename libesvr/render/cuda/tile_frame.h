@@ -6,10 +6,10 @@
 
 #include <cstdint>
 
+#include "field/voxel_rule.h"
 #include "render/ray_box.h"
 #include "render/sample_rule.h"
 #include "render/seen_ellipsoid.h"
-#include "render/voxel_value.h"
 #include "render/window_form.h"
 
 namespace esvr::cuda {
@@ -154,7 +154,7 @@ struct VoxelArguments {
   const Footprint* footprints;
   const Vec3* origins;  ///< of the chunks
   float bound;          ///< of all intensities: what sums are exact by
-  VoxelValue value;
+  VoxelRule rule;
 };
 
 /// Both do nothing where the lists did not fit. \param multiprocessors  of the device

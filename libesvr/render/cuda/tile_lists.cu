@@ -184,12 +184,15 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
   });
 }
 
+/// A number of entries of many lists, of which each has less than 2^32.
+using Entries = unsigned long long;
+
 /// The sum over the lanes below; `total` gets that over all.
-__device__ std::uint32_t sumBelow(std::uint32_t value, std::uint32_t& total) {
+__device__ Entries sumBelow(Entries value, Entries& total) {
   const int lane = int(threadIdx.x) % kWarp;
-  std::uint32_t sum = value;
+  Entries sum = value;
   for (int d = 1; d < kWarp; d *= 2) {
-    const std::uint32_t below = __shfl_up_sync(kAllLanes, sum, d);
+    const Entries below = __shfl_up_sync(kAllLanes, sum, d);
     if (lane >= d) sum += below;
   }
   total = __shfl_sync(kAllLanes, sum, kWarp - 1);
@@ -197,12 +200,12 @@ __device__ std::uint32_t sumBelow(std::uint32_t value, std::uint32_t& total) {
 }
 
 struct TileTotals {
-  std::uint32_t entries = 0, longestBin = 0, parts = 0;
+  Entries entries = 0;
+  std::uint32_t longestBin = 0, parts = 0;
 };
 
-__device__ std::uint32_t entriesOfPart(const TileFrame& frame, const std::uint32_t* counts,
-                                       int part) {
-  std::uint32_t entries = 0;
+__device__ Entries entriesOfPart(const TileFrame& frame, const std::uint32_t* counts, int part) {
+  Entries entries = 0;
   const int end = min((part + 1) * frame.binsOfPart, frame.bins);
   for (int bin = part * frame.binsOfPart; bin < end; ++bin) entries += counts[bin];
   return entries;
@@ -213,7 +216,7 @@ __device__ TileTotals totalsOf(const TileFrame& frame, const std::uint32_t* coun
   for (int bin = 0; bin < frame.bins; ++bin)
     totals.longestBin = max(totals.longestBin, counts[bin]);
   for (int part = 0; part < frame.parts; ++part) {
-    const std::uint32_t entries = entriesOfPart(frame, counts, part);
+    const Entries entries = entriesOfPart(frame, counts, part);
     totals.entries += entries;
     totals.parts += entries > 0 ? 1 : 0;
   }
@@ -221,8 +224,8 @@ __device__ TileTotals totalsOf(const TileFrame& frame, const std::uint32_t* coun
 }
 
 /// 0 for the longest lists.
-__device__ int lengthClass(std::uint32_t entries) {
-  const int log = 31 - __clz(int(entries));
+__device__ int lengthClass(Entries entries) {
+  const int log = 63 - __clzll((long long)(entries));
   return max(0, DrawTuning::kLengthClasses - 1 - log);
 }
 
@@ -234,7 +237,7 @@ __device__ void planTile(const TileFrame& frame, const TileLists& lists, int til
   lists.closedAt[tile] = kNoResult;
   for (int part = 0; part < frame.parts; ++part) {
     std::uint32_t result = kNoResult;
-    if (const std::uint32_t entries = entriesOfPart(frame, counts, part); entries > 0) {
+    if (const Entries entries = entriesOfPart(frame, counts, part); entries > 0) {
       const int of = lengthClass(entries);
       const std::size_t room = std::size_t(frame.tiles()) * frame.parts;
       const std::uint32_t at = atomicAdd(&lists.counters->items[of], 1u);
@@ -253,11 +256,10 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
   TileTotals totals;
   if (any) totals = totalsOf(frame, &lists.counts[std::size_t(tile) * frame.bins]);
 
-  std::uint32_t ofWarp = 0;
-  const std::uint32_t below = sumBelow(totals.entries, ofWarp);
-  unsigned long long begin = 0;
-  if (threadIdx.x % kWarp == 0 && ofWarp > 0)
-    begin = atomicAdd(&lists.counters->pairs, static_cast<unsigned long long>(ofWarp));
+  Entries ofWarp = 0;
+  const Entries below = sumBelow(totals.entries, ofWarp);
+  Entries begin = 0;
+  if (threadIdx.x % kWarp == 0 && ofWarp > 0) begin = atomicAdd(&lists.counters->pairs, ofWarp);
   begin = __shfl_sync(kAllLanes, begin, 0) + below;
   if (!any) return;
 
@@ -270,7 +272,7 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
   }
   if (totals.entries == 0) return;
   atomicAdd(&lists.counters->occupiedTiles, 1u);
-  atomicMax(&lists.counters->longestTile, totals.entries);
+  atomicMax(&lists.counters->longestTile, std::uint32_t(min(totals.entries, Entries{0xffffffffu})));
   atomicMax(&lists.counters->longestBin, totals.longestBin);
 }
 

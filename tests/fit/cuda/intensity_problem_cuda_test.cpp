@@ -17,7 +17,7 @@ struct Crowd {
   Field field = test::randomField(
       {.count = 3000, .extent = 40.0, .smallest = 0.5, .aspect = 4.0, .origin = {0, 0, 0}});
   test::ReaderRule rule;
-  IntensityTarget target{volume, rule.stored, activeBox(volume)};
+  IntensityTarget target{volume, rule.rule, activeBox(volume)};
 };
 
 double largestOf(const std::vector<double>& values) {

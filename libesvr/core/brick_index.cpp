@@ -1,16 +1,26 @@
-#include "field/brick_index.h"
+#include "core/brick_index.h"
 
 #include <bit>
 
+#include "esvr/error.h"
+
 namespace esvr {
 
-BrickIndex::BrickIndex(std::span<const Coord> bricks) : bricks_(bricks.begin(), bricks.end()) {
+BrickIndex::BrickIndex(std::span<const Coord> bricks) {
+  add(bricks);
   rehash();
+}
+
+void BrickIndex::add(std::span<const Coord> bricks) {
+  if (bricks_.size() + bricks.size() >= kNone)
+    throw RuntimeFailure("there are 2^32 bricks or more");
+  bricks_.insert(bricks_.end(), bricks.begin(), bricks.end());
+  for (const Coord brick : bricks) bounds_.expand(brick);
 }
 
 void BrickIndex::append(std::span<const Coord> bricks) {
   const std::size_t first = bricks_.size();
-  bricks_.insert(bricks_.end(), bricks.begin(), bricks.end());
+  add(bricks);
   if (2 * bricks_.size() > slots_.size()) return rehash();
   for (std::size_t b = first; b < bricks_.size(); ++b) insert(std::uint32_t(b));
 }

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "esvr/coord.h"
-#include "field/brick_hash.h"
+#include "core/brick_hash.h"
 
 namespace esvr {
 
@@ -15,6 +15,7 @@ class BrickIndex {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
+  /// \throws RuntimeFailure  2^32 bricks or more, as append() does
   explicit BrickIndex(std::span<const Coord> bricks);
 
   /// Position of a brick, kNone where there is none.
@@ -29,13 +30,17 @@ class BrickIndex {
 
   [[nodiscard]] const std::vector<Coord>& bricks() const { return bricks_; }
   [[nodiscard]] std::size_t size() const { return bricks_.size(); }
+  /// The smallest box of brick coordinates around all bricks.
+  [[nodiscard]] const Box& bounds() const { return bounds_; }
 
  private:
   static std::size_t hash(Coord c) { return std::size_t(hashOf(c)); }
+  void add(std::span<const Coord> bricks);
   void insert(std::uint32_t position);
   void rehash();
 
   std::vector<Coord> bricks_;
+  Box bounds_;
   std::vector<std::uint32_t> slots_;
   std::size_t mask_ = 0;
 };

@@ -1,0 +1,74 @@
+#include "field/count_bricks.h"
+
+#include <algorithm>
+#include <unordered_map>
+
+#include "core/brick_hash.h"
+#include "field/brick_walk.h"
+
+namespace esvr {
+namespace {
+
+struct HashOfBrick {
+  std::size_t operator()(Coord brick) const { return std::size_t(hashOf(brick)); }
+};
+
+/// A set of bricks, one bit each in blocks of 8^3.
+class BrickSet {
+ public:
+  void insert(Coord brick) {
+    BrickMask& block = blocks_[brickOf(brick)];
+    const int bit = voxelOffset(localOf(brick));
+    if (block.test(bit)) return;
+    block.set(bit);
+    ++size_;
+  }
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+
+ private:
+  std::unordered_map<Coord, BrickMask, HashOfBrick> blocks_;
+  std::uint64_t size_ = 0;
+};
+
+double determinant(const Matrix3& m) {
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+         m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
+/// The bricks' middles lie between three pairs of planes (mayTouch). Around each middle lies a cube
+/// as large as a brick, and the cubes do not overlap: their number is bounded by the volume between
+/// planes that are moved outwards by half a brick.
+double bricksBetweenSlabs(const Support& s) {
+  constexpr double kHalf = kBrickSide / 2.0, kBrickVolume = kBrickVoxels;
+  double volume = 8.0 / std::abs(determinant(s.L));
+  for (int j = 0; j < 3; ++j) {
+    const double* row = &s.L[3 * j];
+    const double reach = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
+    volume *= slabBound(s, j) + kHalf * reach;
+  }
+  return volume / kBrickVolume;
+}
+
+}  // namespace
+
+double maxBricks(const Support& support, const Box& within) {
+  const double boxed = common(brickRange(support), within).volume();
+  const double slabs = bricksBetweenSlabs(support);
+  return slabs < boxed ? slabs : boxed;
+}
+
+double countBricks(std::span<const Support> supports, const Box& within, double enough) {
+  constexpr std::int32_t kSlice = 64;  // bricks along x between two looks at the count
+  BrickSet set;
+  for (const Support& support : supports) {
+    Box left = common(brickRange(support), within);
+    for (; !left.empty() && double(set.size()) <= enough; left.min.x += kSlice) {
+      Box slice = left;
+      slice.max.x = std::min(left.max.x, left.min.x + kSlice - 1);
+      forEachReachedBrick(support, slice, [&](Coord brick) { set.insert(brick); });
+    }
+  }
+  return double(set.size());
+}
+
+}  // namespace esvr

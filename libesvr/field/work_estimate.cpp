@@ -1,0 +1,51 @@
+#include "esvr/work_estimate.h"
+
+#include <algorithm>
+
+#include "field/brick_walk.h"
+#include "field/count_bricks.h"
+#include "field/gather.h"
+
+namespace esvr {
+namespace {
+
+// Bytes that are held at once, at most. Measured with decodeGrid() and writeGrids() on the volumes
+// of docs/benchmarks.md; lists that grow hold twice their content while they are copied.
+constexpr double kBytesPerEllipsoid = 512.0;  // parameters, support, prepared form
+constexpr double kBytesPerPair = 16.0;        // lists both ways, and what they are made from
+constexpr double kBytesPerBrick = 2.0 * (kBrickVoxels * sizeof(float) + sizeof(BrickMask)) + 96.0;
+
+/// Each brick is counted for each ellipsoid that reaches it.
+WorkEstimate boundOf(std::span<const Support> supports, const Box& within, double maxOfAll) {
+  WorkEstimate bound{.ellipsoids = double(supports.size())};
+  Box all;
+  for (const Support& support : supports) {
+    const Box range = common(brickRange(support), within);
+    if (range.empty()) continue;
+    bound.pairs += std::min(maxBricks(support, within), maxOfAll);
+    all.expand(range);
+  }
+  bound.bricks = std::min({bound.pairs, all.volume(), maxOfAll});
+  return bound;
+}
+
+}  // namespace
+
+double WorkEstimate::bytes() const {
+  return ellipsoids * kBytesPerEllipsoid + pairs * kBytesPerPair + bricks * kBytesPerBrick;
+}
+
+WorkEstimate estimateWork(const Field& field, const EstimateOptions& options) {
+  const auto reach = supports(field);
+  const Box within = bricksOf(options.within);
+  WorkEstimate estimate = boundOf(reach, within, options.maxBricks);
+  WorkEstimate withoutBricks = estimate;
+  withoutBricks.bricks = 0.0;
+  const double left = options.enough - withoutBricks.bytes();
+  if (estimate.bytes() <= options.enough || !(left > 0.0)) return estimate;
+  const double counted = countBricks(reach, within, left / kBytesPerBrick);
+  if (counted <= left / kBytesPerBrick) estimate.bricks = std::min(estimate.bricks, counted);
+  return estimate;
+}
+
+}  // namespace esvr

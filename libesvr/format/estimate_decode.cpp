@@ -1,0 +1,35 @@
+#include <algorithm>
+
+#include "esvr/grid_coding.h"
+
+namespace esvr {
+namespace {
+
+Box boxAround(const std::vector<Coord>& corners) {
+  Box box;
+  for (const Coord corner : corners)
+    box.expand(Box{corner, corner + Coord{kBrickSide - 1, kBrickSide - 1, kBrickSide - 1}});
+  return box;
+}
+
+EstimateOptions optionsFor(const StoredGrid& grid, const DecodeOptions& options) {
+  EstimateOptions estimate{.within = options.box.value_or(Box::whole()),
+                           .enough = double(options.maxBytes)};
+  if (grid.topology == TopologyKind::kThreshold) return estimate;
+  estimate.within = common(estimate.within, boxAround(grid.leaves));
+  estimate.maxBricks = double(grid.leaves.size());
+  return estimate;
+}
+
+}  // namespace
+
+WorkEstimate estimateDecode(const StoredGrid& grid, const DecodeOptions& options) {
+  if (grid.voxels) return {.bricks = double(grid.voxels->bricks.size())};
+  WorkEstimate work = estimateWork(grid.field, optionsFor(grid, options));
+  if (grid.topology != TopologyKind::kThreshold) work.bricks = double(grid.leaves.size());
+  // Adding a residual copies the bricks.
+  if (grid.residual) work.bricks = 2.0 * (work.bricks + double(grid.residual->bricks.size()));
+  return work;
+}
+
+}  // namespace esvr
