@@ -1,68 +1,83 @@
 #include <algorithm>
-#include <bit>
 #include <cub/device/device_merge_sort.cuh>
 
+#include "core/cuda/copy.h"
+#include "core/cuda/count32.h"
+#include "core/cuda/launch.h"
+#include "core/cuda/temporary.h"
 #include "fit/cuda/brick_table.h"
-#include "fit/cuda/copy.h"
-#include "fit/cuda/launch.h"
 #include "fit/cuda/reached_bricks.cuh"
-#include "fit/cuda/temporary.h"
 
 namespace esvr::cuda {
 namespace {
 
-constexpr std::size_t kFewestReachedSlots = std::size_t{1} << 12;
+constexpr std::size_t kMinReachedSlots = std::size_t{1} << 12;
 
-/// Slots for so many entries: at most half full, so that probes stay short.
-std::size_t slotsFor(std::size_t entries) { return std::bit_ceil(2 * entries + 2); }
+/// A table that is at most half full has no probe of this length: of 2^24 slots the longest is
+/// about 90.
+constexpr int kMaxProbes = 256;
 
 __global__ void insertTargets(const Coord* bricks, std::uint32_t count, std::uint32_t* slots,
                               std::uint32_t mask) {
-  const std::uint32_t number = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::size_t number = threadNumber();
   if (number >= count) return;
   std::uint32_t s = std::uint32_t(hashOf(bricks[number])) & mask;
-  while (atomicCAS(&slots[s], kNoBrick, number) != kNoBrick) s = (s + 1) & mask;
+  while (atomicCAS(&slots[s], kNoBrick, std::uint32_t(number)) != kNoBrick) s = (s + 1) & mask;
 }
 
-/// Where, which and how many: the counter goes beyond `most` when the table is too small.
+/// Where bricks go. The counter goes beyond maxCount when the table is too small.
 struct ReachedInsertion {
   ReachedSlot* slots;
   std::uint32_t mask;
   std::uint32_t maxCount;
   std::uint32_t* count;
-  BrickTableView targets;  ///< these bricks and
-  Box within;              ///< those beyond are passed over
+  BrickTableView targets;  ///< these bricks are passed over,
+  Box within;              ///< and those beyond
 };
 
-/// Claims a slot for a brick, or finds the one it has.
+/// Waits until a slot that another thread has claimed holds its brick.
+__device__ bool holds(ReachedSlot& slot, Coord brick) {
+  volatile int* const state = &slot.state;
+  while (*state != ReachedSlot::kReady) __nanosleep(20);
+  __threadfence();
+  const volatile Coord& there = slot.brick;
+  return there.x == brick.x && there.y == brick.y && there.z == brick.z;
+}
+
+/// Claims an empty slot for a brick. \return whether no other thread was faster
+__device__ bool claim(ReachedSlot& slot, Coord brick, std::uint32_t* count) {
+  if (atomicCAS(&slot.state, ReachedSlot::kEmpty, ReachedSlot::kBeingWritten) !=
+      ReachedSlot::kEmpty)
+    return false;
+  slot.brick = brick;
+  __threadfence();
+  atomicExch(&slot.state, ReachedSlot::kReady);
+  atomicAdd(count, 1u);
+  return true;
+}
+
+__device__ bool tooSmall(const ReachedInsertion& into) {
+  return *static_cast<volatile std::uint32_t*>(into.count) > into.maxCount;
+}
+
+/// Claims a slot for a brick, or finds the one it has. Threads that begin together can fill the
+/// table before any of them sees the count, so the length of a probe ends it too.
 __device__ void insertReached(const ReachedInsertion& into, Coord brick) {
-  if (!into.within.contains(brick)) return;
-  if (into.targets.findTarget(brick, std::uint32_t(hashOf(brick))) != kNoBrick) return;
-  for (std::uint32_t s = std::uint32_t(hashOf(brick)) & into.mask;; s = (s + 1) & into.mask) {
-    ReachedSlot& slot = into.slots[s];
-    volatile int* const state = &slot.state;
-    if (*state == ReachedSlot::kEmpty) {
-      if (*static_cast<volatile std::uint32_t*>(into.count) > into.maxCount) return;
-      if (atomicCAS(&slot.state, ReachedSlot::kEmpty, ReachedSlot::kBeingWritten) ==
-          ReachedSlot::kEmpty) {
-        slot.brick = brick;
-        __threadfence();
-        atomicExch(&slot.state, ReachedSlot::kReady);
-        atomicAdd(into.count, 1u);
-        return;
-      }
-    }
-    while (*state != ReachedSlot::kReady) __nanosleep(20);
-    __threadfence();
-    const volatile Coord& there = slot.brick;
-    if (there.x == brick.x && there.y == brick.y && there.z == brick.z) return;
+  const auto hash = std::uint32_t(hashOf(brick));
+  if (!into.within.contains(brick) || into.targets.findTarget(brick, hash) != kNoBrick) return;
+  for (int probe = 0; probe < kMaxProbes; ++probe) {
+    ReachedSlot& slot = into.slots[(hash + std::uint32_t(probe)) & into.mask];
+    const bool empty = *static_cast<volatile int*>(&slot.state) == ReachedSlot::kEmpty;
+    if (empty && tooSmall(into)) return;
+    if ((empty && claim(slot, brick, into.count)) || holds(slot, brick)) return;
   }
+  atomicMax(into.count, into.maxCount + 1);
 }
 
 __global__ void collectReached(SupportSource source, ReachedInsertion into) {
   const std::size_t i = warpNumber();
   if (i >= source.count) return;
-  visitReachedBricks(supportOf(source, i), [&](Coord brick, bool reached) {
+  visitReachedBricks(supportOf(source, i), into.within, [&](Coord brick, bool reached) {
     if (reached) insertReached(into, brick);
   });
 }
@@ -70,7 +85,7 @@ __global__ void collectReached(SupportSource source, ReachedInsertion into) {
 constexpr int kNeighbours = 27;  // a brick itself is one
 
 __global__ void collectAround(const Coord* bricks, std::uint32_t count, ReachedInsertion into) {
-  const std::size_t n = std::size_t(blockIdx.x) * blockDim.x + threadIdx.x;
+  const std::size_t n = threadNumber();
   if (n >= std::size_t(count) * kNeighbours) return;
   const int side = int(n % kNeighbours);
   insertReached(into,
@@ -80,18 +95,18 @@ __global__ void collectAround(const Coord* bricks, std::uint32_t count, ReachedI
 /// In any order; they are sorted next.
 __global__ void listReached(const ReachedSlot* slots, std::uint32_t slotCount, Coord* out,
                             std::uint32_t* count) {
-  const std::uint32_t s = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::size_t s = threadNumber();
   if (s < slotCount && slots[s].state == ReachedSlot::kReady)
     out[atomicAdd(count, 1u)] = slots[s].brick;
 }
 
 __global__ void numberReached(const Coord* sorted, std::uint32_t count, std::uint32_t first,
                               ReachedSlot* slots, std::uint32_t mask) {
-  const std::uint32_t n = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::size_t n = threadNumber();
   if (n >= count) return;
   std::uint32_t s = std::uint32_t(hashOf(sorted[n])) & mask;
   while (!sameBrick(slots[s].brick, sorted[n])) s = (s + 1) & mask;
-  slots[s].number = first + n;
+  slots[s].number = first + std::uint32_t(n);
 }
 
 struct InOrder {
@@ -105,12 +120,14 @@ struct InOrder {
 
 BrickTable::BrickTable(std::span<const Coord> targetBricks, cudaStream_t stream)
     : stream_(stream),
-      targetCount_(targetBricks.size()),
+      targetCount_(count32(targetBricks.size(), "bricks")),
       bricks_(stream),
       slots_(stream),
       reachedSlots_(stream),
       counter_(stream),
       temporary_(stream) {
+  for (const Coord brick : targetBricks) targetBounds_.expand(brick);
+  bounds_ = targetBounds_;
   uploadTo(bricks_.reserve(targetCount_), targetBricks, stream);
   buildTargetTable();
   counter_.reserve(1);
@@ -127,14 +144,15 @@ void BrickTable::buildTargetTable() {
 }
 
 /// \param launch  launch(where to) starts the kernel that inserts
+/// \return whether the table was large enough
 template <class Launch>
-bool BrickTable::collect(Launch&& launch) {
+bool BrickTable::collect(const Box& within, Launch&& launch) {
   ReachedSlot* const slots = reachedSlots_.reserve(reachedSlotCount_);
   check(cudaMemsetAsync(slots, 0, reachedSlotCount_ * sizeof(*slots), stream_), "clearing a table");
   check(cudaMemsetAsync(counter_.data(), 0, sizeof(std::uint32_t), stream_), "clearing a counter");
   const auto maxCount = std::uint32_t(reachedSlotCount_ / 2);
   launch(ReachedInsertion{slots, std::uint32_t(reachedSlotCount_ - 1), maxCount, counter_.data(),
-                          view(), kAllBricks});
+                          view(), within});
   check(cudaGetLastError(), "finding reached bricks");
   reachedCount_ = downloadValue(counter_.data(), stream_);
   return reachedCount_ <= maxCount;
@@ -158,28 +176,35 @@ void BrickTable::number() {
   check(cudaGetLastError(), "numbering reached bricks");
 }
 
+void BrickTable::forgetReached() {
+  reachedCount_ = 0;
+  bounds_ = targetBounds_;
+}
+
+/// \param expected  reached bricks; a table that turns out too small grows
 template <class Launch>
-void BrickTable::find(Launch&& launch) {
-  reachedSlotCount_ = std::max(reachedSlotCount_, kFewestReachedSlots);
-  while (!collect(launch)) reachedSlotCount_ *= 4;
+void BrickTable::find(std::size_t expected, const Box& within, Launch&& launch) {
+  reachedSlotCount_ = std::max({reachedSlotCount_, kMinReachedSlots, slotsFor(expected)});
+  while (!collect(within, launch))
+    reachedSlotCount_ = count32(4 * reachedSlotCount_, "slots of a table of bricks");
+  (void)count32(size(), "bricks");
+  if (reachedCount_ > 0) bounds_.expand(within);
   number();
 }
 
 void BrickTable::findReached(const SupportSource& supports, const Box& within) {
-  reachedCount_ = 0;
+  forgetReached();
   if (supports.count == 0) return;
-  find([&](ReachedInsertion into) {
-    into.within = within;
+  find(targetCount_, within, [&](const ReachedInsertion& into) {
     collectReached<<<blocksFor(supports.count * kWarp, kBlock), kBlock, 0, stream_>>>(supports,
                                                                                       into);
   });
 }
 
 void BrickTable::findAround(const BrickTable& other, const Box& within) {
-  reachedCount_ = 0;
+  forgetReached();
   if (other.size() == 0) return;
-  find([&](ReachedInsertion into) {
-    into.within = within;
+  find(2 * other.size(), within, [&](const ReachedInsertion& into) {
     collectAround<<<blocksFor(other.size() * kNeighbours, kBlock), kBlock, 0, stream_>>>(
         other.bricks_.data(), std::uint32_t(other.size()), into);
   });
@@ -191,7 +216,8 @@ BrickTableView BrickTable::view() const {
           std::uint32_t(slotCount_ - 1),
           reachedSlots_.data(),
           std::uint32_t(reachedSlotCount_ - 1),
-          reachedCount_ > 0};
+          reachedCount_ > 0,
+          bounds_};
 }
 
 }  // namespace esvr::cuda

@@ -25,6 +25,7 @@ struct BrickTableView {
   const ReachedSlot* reachedSlots;
   std::uint32_t reachedMask;
   bool anyReached;
+  Box bounds;  ///< no brick lies beyond
 
 #if defined(__CUDACC__)
   /// Number of a brick, kNoBrick where there is none.

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 
+#include "core/cuda/copy.h"
+#include "core/cuda/count32.h"
 #include "core/cuda/use_device.h"
 #include "esvr/error.h"
 #include "field/gather.h"
-#include "fit/cuda/copy.h"
 #include "fit/cuda/make_cuda_intensity_passes.h"
 #include "fit/cuda/memory_pool.h"
 #include "fit/cuda/step.h"
@@ -68,7 +69,7 @@ void CudaIntensityPasses::setShapes(const Field& field) {
   const double radius = supportRadius(kernelConstants<double>(field.kernel));
   fieldBackground_ = field.background;
   kernel_ = kernelConstants<float>(field.kernel);
-  count_ = ellipsoids.size();
+  count_ = count32(ellipsoids.size(), "ellipsoids");
   uploadTo(ellipsoids_.reserve(count_), std::span<const Ellipsoid>(ellipsoids), stream_.get());
   launchForms(ellipsoids_.data(), std::uint32_t(count_), radius, forms_.reserve(count_),
               stream_.get());
@@ -83,11 +84,12 @@ void CudaIntensityPasses::setShapes(const Field& field) {
 
 IntensityPassArguments CudaIntensityPasses::arguments(std::span<const float> heights) {
   uploadTo(heights_.reserve(count_), heights, stream_.get());
-  return {.bricks = bricks_.view().bricks,
-          .brickCount = std::uint32_t(bricks_.size()),
-          .targetCount = std::uint32_t(bricks_.targetCount()),
-          .lists = lists_.view(),
-          .forms = forms_.data(),
+  return {.scene = {.bricks = bricks_.view().bricks,
+                    .brickCount = std::uint32_t(bricks_.size()),
+                    .targetCount = std::uint32_t(bricks_.targetCount()),
+                    .pairCount = std::uint32_t(lists_.pairCount()),
+                    .lists = lists_.view(),
+                    .forms = forms_.data()},
           .heights = heights_.data(),
           .kernel = kernel_,
           .source = source_.data(),

@@ -4,11 +4,12 @@
 #include <cmath>
 
 #include "core/add_seconds.h"
+#include "core/cuda/copy.h"
+#include "core/cuda/count32.h"
 #include "core/cuda/use_device.h"
 #include "esvr/error.h"
 #include "field/gather.h"
 #include "fit/cpu/seed.h"
-#include "fit/cuda/copy.h"
 #include "fit/cuda/make_cuda_optimiser.h"
 #include "fit/cuda/memory_plan.h"
 #include "fit/cuda/memory_pool.h"
@@ -17,6 +18,7 @@
 
 namespace esvr {
 namespace cuda {
+
 CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& options,
                              const Tuning& tuning)
     : target_(target),
@@ -39,9 +41,7 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       diverged_(1, stream_.get()),
       sampling_(stream_.get()),
       ranking_(stream_.get()),
-      errorSums_(stream_.get()),
-      windows_({}, stream_.get()),
-      paperLoss_(stream_.get()) {
+      errorSums_(stream_.get()) {
   setKernel();
   loss_.reserve(1);
   slope_.reserve(1);
@@ -55,16 +55,17 @@ void CudaOptimiser::setKernel() {
 }
 
 BrickPassArguments CudaOptimiser::passArguments() {
-  return {.bricks = bricks_.view().bricks,
-          .brickCount = std::uint32_t(bricks_.size()),
-          .targetCount = std::uint32_t(bricks_.targetCount()),
-          .lists = lists_.view(),
-          .forms = forms_.data(),
+  return {.scene = {.bricks = bricks_.view().bricks,
+                    .brickCount = std::uint32_t(bricks_.size()),
+                    .targetCount = std::uint32_t(bricks_.targetCount()),
+                    .pairCount = std::uint32_t(lists_.pairCount()),
+                    .lists = lists_.view(),
+                    .forms = forms_.data()},
           .kernel = narrowed(kernel_),
-          .target = targetValues_.data(),
-          .narrowBand = target_.narrowBand,
-          .lowest = float(target_.lowest),
-          .highest = float(target_.highest),
+          .target = {.values = targetValues_.data(),
+                     .narrowBand = target_.narrowBand,
+                     .lowest = float(target_.lowest),
+                     .highest = float(target_.highest)},
           .brickLoss = brickLoss_.data(),
           .moments = moments_.data(),
           .residual = nullptr};
@@ -72,13 +73,10 @@ BrickPassArguments CudaOptimiser::passArguments() {
 
 StepArguments CudaOptimiser::stepArguments(double factor) {
   return {.ellipsoidCount = std::uint32_t(count_),
-          .chunkCount = std::uint32_t(lists_.chunkCount()),
-          .brickCount = std::uint32_t(bricks_.size()),
-          .lists = lists_.view(),
-          .moments = moments_.data(),
-          .brickLoss = brickLoss_.data(),
-          .chunkSums = chunkSums_.data(),
-          .loss = loss_.data(),
+          .sums = {.lists = lists_.view(),
+                   .chunkCount = std::uint32_t(lists_.chunkCount()),
+                   .moments = moments_.data(),
+                   .chunkSums = chunkSums_.data()},
           .ellipsoids = ellipsoids_.data(),
           .states = adam_.data(),
           .forms = forms_.data(),
@@ -97,7 +95,6 @@ void CudaOptimiser::rebuildLists(double slack) {
   if (!target_.narrowBand) bricks_.findReached(supports);
   lists_.rebuild(supports, bricks_);
   threads_.listsChanged();
-  if (options_.loss == Loss::kPaper) windows_.findAround(bricks_);
   moments_.reserve(lists_.pairCount() * kMoments);
   chunkSums_.reserve(lists_.chunkCount() * kMoments);
   brickLoss_.reserve(bricks_.size());
@@ -113,6 +110,7 @@ void CudaOptimiser::refreshResiduals() {
 }
 
 void CudaOptimiser::reserve(std::size_t ellipsoids) {
+  (void)count32(ellipsoids, "ellipsoids");
   ellipsoids_.extend(ellipsoids, count_);
   adam_.extend(ellipsoids, count_);
   forms_.extend(ellipsoids, count_);
@@ -122,7 +120,7 @@ void CudaOptimiser::reserve(std::size_t ellipsoids) {
 std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t ellipsoids,
                                       const std::uint32_t* into) {
   refreshResiduals();
-  launchSums(stepArguments(0.0), stream_.get());
+  sumLoss();
   const double loss = downloadValue(loss_.data(), stream_.get());
   const DeviceSampling drawn = sampling_.draw(
       residual_.data(), loss, bricks_.view().bricks,
@@ -143,18 +141,10 @@ std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t ellipsoids,
   return drawn.count;
 }
 
-void CudaOptimiser::requireMemoryFor(std::size_t ellipsoids) const {
-  constexpr double kWithReached = 2.0;  // bricks that supports reach beyond the target's
-  const double windows = options_.loss == Loss::kPaper
-                             ? PaperLoss::bytesFor(kWithReached * double(target_.bricks.size()))
-                             : 0.0;
-  requireMemory(target_, ellipsoids, options_.maxDeviceBytes, windows);
-}
-
 void CudaOptimiser::growTo(std::size_t count) {
   if (count <= count_) return;
   const AddSeconds timer(secondsSeeding_);
-  requireMemoryFor(count);
+  requireMemory(target_, count, options_.maxDeviceBytes);
   reserve(count);
   count_ += placeSeeds(count - count_, std::max(count - count_, count_), nullptr);
   launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
@@ -162,41 +152,20 @@ void CudaOptimiser::growTo(std::size_t count) {
 
 void CudaOptimiser::relocate(std::size_t count) {
   const AddSeconds timer(secondsSeeding_);
-  if (options_.loss == Loss::kPaper && count_ > 0) refreshUsefulness();
   const auto chosen = ranking_.leastUseful(stepArguments(0.0), count, tuning_.graceSteps);
   if (chosen.count == 0) return;
   placeSeeds(chosen.count, count_, chosen.places);
   launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
 }
 
-void CudaOptimiser::takePaperGradients() {
-  BrickPassArguments pass = passArguments();
-  pass.residual = residual_.reserve(bricks_.size() * kBrickVoxels);
-  launchResiduals(pass, stream_.get());
-  pass.lossByValue = paperLoss_.derivative({.bricks = bricks_,
-                                            .windows = windows_,
-                                            .residual = pass.residual,
-                                            .target = targetValues_.data(),
-                                            .targetBricks = bricks_.targetCount(),
-                                            .voxels = target_.boxVoxels,
-                                            .beta = options_.beta,
-                                            .peak = target_.highest - target_.lowest});
-  launchGivenGradients(pass, stream_.get());
-}
-
 void CudaOptimiser::takeGradients(std::optional<int> threads) {
-  if (options_.loss == Loss::kPaper) return takePaperGradients();
   if (threads) return launchGradients(passArguments(), *threads, stream_.get());
   threads_.run(stream_.get(),
                [&](int best) { launchGradients(passArguments(), best, stream_.get()); });
 }
 
-/// What a removal costs is counted in squares, whatever loss is descended.
-void CudaOptimiser::refreshUsefulness() {
-  rebuildLists(tuning_.listSlack);
-  launchGradients(passArguments(), ThreadsPerBrick::threads(1), stream_.get());
-  launchSums(stepArguments(0.0), stream_.get());
-  launchUsefulness(stepArguments(0.0), stream_.get());
+void CudaOptimiser::sumLoss() {
+  launchLossSum(brickLoss_.data(), std::uint32_t(bricks_.size()), loss_.data(), stream_.get());
 }
 
 void CudaOptimiser::step(double factor) {
@@ -205,7 +174,8 @@ void CudaOptimiser::step(double factor) {
   ++iterationsSinceRebuild_;
   takeGradients();
   const StepArguments arguments = stepArguments(factor);
-  launchSums(arguments, stream_.get());
+  sumLoss();
+  launchMomentSums(arguments.sums, stream_.get());
   launchStep(arguments, stream_.get());
   stepped_ = count_;
 }
@@ -265,7 +235,7 @@ void CudaOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
 std::vector<EllipsoidGradient> CudaOptimiser::gradients(int threads) {
   rebuildLists(tuning_.listSlack);
   takeGradients(threads);
-  launchSums(stepArguments(0.0), stream_.get());
+  launchMomentSums(stepArguments(0.0).sums, stream_.get());
   DeviceBuffer<EllipsoidGradient> out(count_, stream_.get());
   launchReadGradients(stepArguments(0.0), out.data(), stream_.get());
   std::vector<EllipsoidGradient> host(count_);

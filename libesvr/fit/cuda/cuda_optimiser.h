@@ -12,7 +12,6 @@
 #include "fit/cuda/step.h"
 #include "fit/cuda/threads_per_brick.h"
 #include "fit/optimiser.h"
-#include "fit/paper/cuda/paper_loss.h"
 
 namespace esvr::cuda {
 
@@ -37,7 +36,7 @@ class CudaOptimiser final : public Optimiser {
   [[nodiscard]] std::size_t deviceBytes() const override;
   [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
 
-  /// Gradients of 1/2 sum r^2, or of the paper's loss, where the ellipsoids are.
+  /// Gradients of 1/2 sum r^2 where the ellipsoids are.
   /// \param threads  ThreadsPerBrick::threads of a choice; changes no bit
   [[nodiscard]] std::vector<EllipsoidGradient> gradients(int threads = ThreadsPerBrick::threads(1));
   /// Takes over ellipsoids as they are; they have taken no step yet.
@@ -54,10 +53,8 @@ class CudaOptimiser final : public Optimiser {
   void step(double factor);
   /// \param threads  of a brick; default: the best measured
   void takeGradients(std::optional<int> threads = std::nullopt);
-  void takePaperGradients();
-  void refreshUsefulness();
+  void sumLoss();
   void reserve(std::size_t ellipsoids);
-  void requireMemoryFor(std::size_t ellipsoids) const;
   /// \return how many seeds there are: `count`, fewer where errors are few
   std::size_t placeSeeds(std::size_t count, std::size_t ellipsoids, const std::uint32_t* into);
   [[nodiscard]] BrickPassArguments passArguments();
@@ -86,8 +83,6 @@ class CudaOptimiser final : public Optimiser {
   VoxelSampling sampling_;
   EllipsoidRanking ranking_;
   ErrorSums errorSums_;
-  BrickTable windows_;  ///< of the paper's loss
-  PaperLoss paperLoss_;
   std::size_t count_ = 0;
   double secondsSeeding_ = 0.0;
   std::uint64_t samplings_ = 0;  ///< events so far: each draws from its own random stream

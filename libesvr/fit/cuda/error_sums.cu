@@ -1,29 +1,20 @@
 #include <array>
 #include <cub/device/device_reduce.cuh>
 
-#include "fit/cuda/copy.h"
+#include "core/cuda/copy.h"
+#include "core/cuda/reduce.cuh"
+#include "core/cuda/temporary.h"
+#include "core/cuda/thread_number.cuh"
 #include "fit/cuda/error_sums.h"
-#include "fit/cuda/launch.h"
-#include "fit/cuda/temporary.h"
 
 namespace esvr::cuda {
 namespace {
 
-constexpr unsigned kAllLanes = 0xffffffffu;
 constexpr int kColumns = 4;  // of FitErrors, in its order
-
-__device__ double warpSum(double value) {
-  for (int d = kWarp / 2; d > 0; d /= 2) value += __shfl_xor_sync(kAllLanes, value, d);
-  return value;
-}
-__device__ double warpMax(double value) {
-  for (int d = kWarp / 2; d > 0; d /= 2) value = fmax(value, __shfl_xor_sync(kAllLanes, value, d));
-  return value;
-}
 
 /// A warp a brick; column c of brick b goes to out[c brickCount + b].
 __global__ void brickErrors(const ErrorArguments a, double* out) {
-  const std::size_t b = (std::size_t(blockIdx.x) * kBlock + threadIdx.x) / kWarp;
+  const std::size_t b = warpNumber();
   if (b >= a.brickCount) return;
   const Coord corner = a.bricks[b] * kBrickSide;
   double all = 0.0, box = 0.0, active = 0.0, largest = 0.0;

@@ -3,8 +3,8 @@
 
 #include <cuda_runtime_api.h>
 
+#include "core/cuda/growing_buffer.h"
 #include "esvr/sparse_volume.h"
-#include "fit/cuda/growing_buffer.h"
 #include "fit/optimiser.h"
 
 namespace esvr::cuda {

@@ -5,8 +5,7 @@
 #include <cuda_runtime_api.h>
 
 #include "field/brick_kernels.h"
-#include "fit/cuda/pair_form.h"
-#include "fit/cuda/pair_lists.h"
+#include "fit/cuda/pass_scene.h"
 #include "fit/intensity_passes.h"
 #include "field/voxel_rule.h"
 
@@ -14,14 +13,11 @@ namespace esvr::cuda {
 
 /// Pointers are to device memory, borrowed.
 struct IntensityPassArguments {
-  /// Of a brick in `exact`: bit v of them says that voxel v was stored exactly.
+  /// Words of a brick in `exact`: their bit v says that voxel v was stored exactly.
   static constexpr std::uint32_t kMaskWords = kBrickVoxels / 32;
 
-  const Coord* bricks;
-  std::uint32_t brickCount, targetCount;
-  PairListsView lists;
-  const PairForm* forms;  ///< an ellipsoid's; without their intensity
-  const float* heights;   ///< instead of it
+  PassScene scene;       ///< its forms have no intensity
+  const float* heights;  ///< one for each ellipsoid, instead of it
   KernelConstants<float> kernel;
   const float* source;  ///< kBrickVoxels a target brick
   float sourceBackground, fieldBackground;

@@ -3,18 +3,16 @@
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_reduce.cuh>
 #include <cub/device/device_scan.cuh>
-#include <limits>
 
-#include "fit/cuda/copy.h"
-#include "fit/cuda/launch.h"
+#include "core/cuda/copy.h"
+#include "core/cuda/count32.h"
+#include "core/cuda/reduce.cuh"
+#include "core/cuda/temporary.h"
 #include "fit/cuda/pair_lists.h"
 #include "fit/cuda/reached_bricks.cuh"
-#include "fit/cuda/temporary.h"
 
 namespace esvr::cuda {
 namespace {
-
-constexpr unsigned kAllLanes = 0xffffffffu;
 
 /// Calls visit(brick's number, brick, position among the ellipsoid's pairs) for each pair.
 /// \return how many there are, on all lanes
@@ -22,7 +20,7 @@ template <class Visit>
 __device__ std::uint32_t visitPairs(const Support& support, const BrickTableView& bricks,
                                     Visit&& visit) {
   std::uint32_t before = 0;
-  visitReachedBricks(support, [&](Coord brick, bool reached) {
+  visitReachedBricks(support, bricks.bounds, [&](Coord brick, bool reached) {
     const std::uint32_t number = reached ? bricks.find(brick) : kNoBrick;
     const unsigned present = __ballot_sync(kAllLanes, number != kNoBrick);
     const unsigned below = present & ((1u << threadIdx.x % kWarp) - 1u);
@@ -77,33 +75,33 @@ __global__ void listPairsKernel(SupportSource source, BrickTableView bricks,
 
 __global__ void listChunks(const std::uint32_t* begin, std::uint32_t ellipsoids,
                            std::uint32_t* owner) {
-  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::size_t i = threadNumber();
   if (i >= ellipsoids) return;
-  for (std::uint32_t c = begin[i]; c < begin[i + 1]; ++c) owner[c] = i;
+  for (std::uint32_t c = begin[i]; c < begin[i + 1]; ++c) owner[c] = std::uint32_t(i);
 }
 
 /// From the sorted keys of all entries to where each brick's begin.
 __global__ void findBrickBegins(const std::uint32_t* sorted, std::uint32_t entries,
                                 std::uint32_t bricks, std::uint32_t* begin) {
-  const std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::size_t k = threadNumber();
   if (k > entries) return;
   const std::uint32_t first = k == 0 ? 0 : (sorted[k - 1] >> kLinesBits) + 1;
   const std::uint32_t last = k == entries ? bricks : sorted[k] >> kLinesBits;
-  for (std::uint32_t b = first; b <= last; ++b) begin[b] = k;
+  for (std::uint32_t b = first; b <= last; ++b) begin[b] = std::uint32_t(k);
 }
 
 __global__ void gatherOwners(const std::uint32_t* pair, const std::uint32_t* owner,
                              std::uint32_t entries, std::uint32_t* ellipsoid) {
-  const std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::size_t k = threadNumber();
   if (k < entries) ellipsoid[k] = owner[pair[k]];
 }
 
 __global__ void countBrickPairs(const std::uint32_t* begin, std::uint32_t bricks,
                                 std::uint32_t* pairs, std::uint32_t* brick) {
-  const std::uint32_t b = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::size_t b = threadNumber();
   if (b >= bricks) return;
   pairs[b] = begin[b + 1] - begin[b];
-  brick[b] = b;
+  brick[b] = std::uint32_t(b);
 }
 
 }  // namespace
@@ -161,11 +159,8 @@ void PairLists::readTotals(std::size_t n) {
   });
   std::array<std::uint64_t, 2> totals{};
   downloadTo(std::span<std::uint64_t>(totals), total_.data(), stream_);
-  if (totals[0] >= std::numeric_limits<std::uint32_t>::max())
-    throw DeviceError("fitting on the GPU: " + std::to_string(totals[0]) +
-                      " pairs of ellipsoids and bricks are more than the lists can hold");
-  pairCount_ = totals[0];
-  chunkCount_ = totals[1];
+  pairCount_ = count32(totals[0], "pairs of ellipsoids and bricks");
+  chunkCount_ = count32(totals[1], "chunks of pairs");
 }
 
 void PairLists::listPairs(const SupportSource& supports, const BrickTableView& bricks) {

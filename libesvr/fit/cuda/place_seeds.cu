@@ -1,13 +1,13 @@
 #include "core/cuda/check.h"
+#include "core/cuda/reduce.cuh"
+#include "core/cuda/thread_number.cuh"
 #include "esvr/sparse_volume.h"
-#include "fit/cuda/launch.h"
 #include "fit/cuda/place_seeds.h"
 #include "fit/seed_math.h"
 
 namespace esvr::cuda {
 namespace {
 
-constexpr unsigned kAllLanes = 0xffffffffu;
 constexpr int kNeighbours = 27;
 
 /// Residuals around a voxel: the window is smaller than a brick, so 27 bricks hold it. Each lane
@@ -35,10 +35,6 @@ class Surroundings {
   std::uint32_t number_;
 };
 
-__device__ void sumOverWarp(double& value) {
-  for (int d = kWarp / 2; d > 0; d /= 2) value += __shfl_xor_sync(kAllLanes, value, d);
-}
-
 __device__ SeedMoments momentsAround(const Surroundings& around, double sign, int w) {
   SeedMoments m;
   const int side = 2 * w + 1, cube = side * side * side;
@@ -50,20 +46,20 @@ __device__ SeedMoments momentsAround(const Surroundings& around, double sign, in
   }
   for (double* part :
        {&m.mass, &m.energy, &m.x, &m.y, &m.z, &m.xx, &m.yy, &m.zz, &m.xy, &m.xz, &m.yz})
-    sumOverWarp(*part);
+    *part = warpSum(*part);
   return m;
 }
 
 /// A warp a seed.
 __global__ void placeSeeds(const SeedArguments a) {
-  const std::uint32_t n = (blockIdx.x * kBlock + threadIdx.x) / kWarp;
+  const std::size_t n = warpNumber();
   if (n >= a.count) return;
   const Coord voxel = a.voxels[n];
   const Surroundings around(a, voxel);
   const double r = double(around.at({0, 0, 0}));
   const SeedMoments moments = momentsAround(around, r < 0.0 ? -1.0 : 1.0, a.window);
   if (threadIdx.x % kWarp != 0) return;
-  const std::uint32_t place = a.into != nullptr ? a.into[n] : a.firstPlace + n;
+  const std::uint32_t place = a.into != nullptr ? a.into[n] : a.firstPlace + std::uint32_t(n);
   a.ellipsoids[place] = seedFromMoments(voxel, r, moments, {a.unitVariance, a.intensity, a.share});
   a.states[place] = AdamState{};
 }

@@ -2,10 +2,11 @@
 #include <cub/device/device_radix_sort.cuh>
 #include <limits>
 
-#include "fit/cuda/copy.h"
-#include "fit/cuda/launch.h"
+#include "core/cuda/copy.h"
+#include "core/cuda/launch.h"
+#include "core/cuda/temporary.h"
+#include "core/cuda/thread_number.cuh"
 #include "fit/cuda/rank_ellipsoids.h"
-#include "fit/cuda/temporary.h"
 #include "fit/parameter_gradient.h"
 
 namespace esvr::cuda {
@@ -13,7 +14,7 @@ namespace {
 
 __global__ void writeKeys(const StepArguments a, std::uint32_t graceSteps, float* keys,
                           std::uint32_t* places, std::uint32_t* settled) {
-  const std::uint32_t i = blockIdx.x * kBlock + threadIdx.x;
+  const std::size_t i = threadNumber();
   if (i >= a.ellipsoidCount) return;
   const bool old = a.states[i].steps >= graceSteps;
   places[i] = i;

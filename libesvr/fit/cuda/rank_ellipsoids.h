@@ -3,7 +3,7 @@
 
 #include <cuda_runtime_api.h>
 
-#include "fit/cuda/growing_buffer.h"
+#include "core/cuda/growing_buffer.h"
 #include "fit/cuda/step.h"
 
 namespace esvr::cuda {

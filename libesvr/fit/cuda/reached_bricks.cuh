@@ -3,16 +3,10 @@
 
 #include <cstdint>
 
-#include "field/support.h"
-#include "fit/cuda/launch.h"
+#include "core/cuda/thread_number.cuh"
 #include "fit/cuda/supports.h"
 
 namespace esvr::cuda {
-
-/// Number of this thread's warp among all.
-__device__ inline std::size_t warpNumber() {
-  return (std::size_t(blockIdx.x) * blockDim.x + threadIdx.x) / kWarp;
-}
 
 /// Ellipsoid i's.
 __device__ inline Support supportOf(const SupportSource& source, std::size_t i) {
@@ -20,15 +14,15 @@ __device__ inline Support supportOf(const SupportSource& source, std::size_t i) 
   return makeSupport(p.center, p.L, source.radiusOf(i), source.slack);
 }
 
-/// Calls visit(brick, reached) on all lanes together until every brick near a support has been
-/// visited by one lane, lanes and rounds in increasing order of the bricks.
+/// Calls visit(brick, reached) on all lanes together until every brick of `within` that is near a
+/// support has been visited by one lane, lanes and rounds in increasing order of the bricks.
 template <class Visit>
-__device__ void visitReachedBricks(const Support& support, Visit&& visit) {
-  const Box range = brickRange(support);
+__device__ void visitReachedBricks(const Support& support, const Box& within, Visit&& visit) {
+  const Box range = clippedRange(support, within);
   const auto nx = std::int64_t(range.max.x) - range.min.x + 1;
   const auto ny = std::int64_t(range.max.y) - range.min.y + 1;
   const auto nz = std::int64_t(range.max.z) - range.min.z + 1;
-  const std::int64_t count = nx * ny * nz;
+  const std::int64_t count = nx > 0 && ny > 0 && nz > 0 ? nx * ny * nz : 0;
   for (std::int64_t first = 0; first < count; first += kWarp) {
     const std::int64_t n = first + threadIdx.x % kWarp;
     const Coord brick{range.min.x + std::int32_t(n / (ny * nz)),

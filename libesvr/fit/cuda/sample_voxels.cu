@@ -3,12 +3,14 @@
 #include <cub/device/device_scan.cuh>
 #include <cub/device/device_select.cuh>
 
-#include "esvr/sparse_volume.h"
 #include "core/brick_hash.h"
-#include "fit/cuda/copy.h"
-#include "fit/cuda/launch.h"
+#include "core/cuda/copy.h"
+#include "core/cuda/count32.h"
+#include "core/cuda/reduce.cuh"
+#include "core/cuda/temporary.h"
+#include "core/cuda/thread_number.cuh"
+#include "esvr/sparse_volume.h"
 #include "fit/cuda/sample_voxels.h"
-#include "fit/cuda/temporary.h"
 
 namespace esvr::cuda {
 
@@ -31,25 +33,14 @@ struct SamplingArguments {
 
 namespace {
 
-constexpr unsigned kAllLanes = 0xffffffffu;
 constexpr int kVoxelsPerLane = kBrickVoxels / kWarp;
 
 /// Of all voxels together at most 2^61.
 EnergyUnits unitsFor(double loss) { return {std::ldexp(1.0, 60 - std::ilogb(loss))}; }
 
-__device__ std::uint64_t warpSum(std::uint64_t value) {
-  for (int d = kWarp / 2; d > 0; d /= 2) value += __shfl_xor_sync(kAllLanes, value, d);
-  return value;
-}
-
-__device__ int warpMin(int value) {
-  for (int d = kWarp / 2; d > 0; d /= 2) value = min(value, __shfl_xor_sync(kAllLanes, value, d));
-  return value;
-}
-
 /// A warp a brick.
 __global__ void brickEnergies(const SamplingArguments a, std::uint64_t* energy) {
-  const std::size_t b = (std::size_t(blockIdx.x) * kBlock + threadIdx.x) / kWarp;
+  const std::size_t b = warpNumber();
   if (b >= a.targetBricks) return;
   std::uint64_t sum = 0;
   for (int v = int(threadIdx.x % kWarp); v < kBrickVoxels; v += kWarp)
@@ -98,7 +89,7 @@ __device__ int voxelAt(const SamplingArguments& a, std::uint32_t brick, std::uin
 /// A warp a draw: `count` equal shares of the energy, one voxel from each.
 __global__ void sampleVoxelsKernel(const SamplingArguments a, const std::uint64_t* sums,
                                    std::uint32_t count, Coord* out) {
-  const std::uint32_t n = (blockIdx.x * kBlock + threadIdx.x) / kWarp;
+  const std::size_t n = warpNumber();
   if (n >= count) return;
   const std::uint64_t total = sums[a.targetBricks - 1];
   const double share = double(total) / count;
@@ -133,7 +124,7 @@ DeviceSampling VoxelSampling::draw(const float* residual, double loss, const Coo
   const SamplingArguments a{residual, bricks, options.signs, unitsFor(loss), targets, options.seed};
   const std::uint64_t total = sumEnergies(a);
   if (total == 0) return {};
-  const auto count = std::uint32_t(options.count);
+  const std::uint32_t count = count32(options.count, "voxels to draw");
   Coord* const drawn = drawn_.reserve(count);
   sampleVoxelsKernel<<<blocksFor(options.count * kWarp, kBlock), kBlock, 0, stream_>>>(
       a, sums_.data(), count, drawn);

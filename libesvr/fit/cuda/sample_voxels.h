@@ -3,8 +3,8 @@
 
 #include <cuda_runtime_api.h>
 
+#include "core/cuda/growing_buffer.h"
 #include "esvr/coord.h"
-#include "fit/cuda/growing_buffer.h"
 #include "fit/sampling_options.h"
 
 namespace esvr::cuda {

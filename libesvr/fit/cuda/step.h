@@ -4,7 +4,7 @@
 #include <cuda_runtime_api.h>
 
 #include "fit/adam.h"
-#include "fit/cuda/brick_pass.h"
+#include "fit/cuda/moment_sums.h"
 #include "fit/parameter_gradient.h"
 
 namespace esvr::cuda {
@@ -24,12 +24,8 @@ struct Usefulness {
 
 /// Pointers are to device memory, borrowed.
 struct StepArguments {
-  std::uint32_t ellipsoidCount, chunkCount, brickCount;
-  PairListsView lists;
-  const float* moments;     ///< kMoments a pair
-  const double* brickLoss;  ///< a brick's
-  double* chunkSums;        ///< kMoments a chunk
-  double* loss;             ///< one value: sum of r^2 before the step
+  std::uint32_t ellipsoidCount;
+  MomentSums sums;
   Ellipsoid* ellipsoids;
   AdamState* states;
   PairForm* forms;
@@ -43,16 +39,14 @@ struct StepArguments {
   EllipsoidLimits limits;
 };
 
-/// Sums the moments of chunks, and the loss.
-void launchSums(const StepArguments& arguments, cudaStream_t stream);
-/// Takes the step; wants launchSums before.
+/// Takes the step; wants launchMomentSums before.
 void launchStep(const StepArguments& arguments, cudaStream_t stream);
-/// Writes only the usefulness; wants launchSums before.
-void launchUsefulness(const StepArguments& arguments, cudaStream_t stream);
-/// Writes the gradients of all ellipsoids; wants launchSums before.
+/// Writes the gradients of all ellipsoids; wants launchMomentSums before.
 void launchReadGradients(const StepArguments& arguments, EllipsoidGradient* out,
                          cudaStream_t stream);
 
+/// Sums a value of each brick, in one order.
+void launchLossSum(const double* brickLoss, std::uint32_t bricks, double* sum, cudaStream_t stream);
 /// Sums byKappa of `count` ellipsoids, in one order.
 void launchEdgeSum(const Usefulness* usefulness, std::uint32_t count, double* sum,
                    cudaStream_t stream);

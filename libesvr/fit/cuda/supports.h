@@ -3,6 +3,7 @@
 
 #include <cstddef>
 
+#include "field/support.h"
 #include "fit/ellipsoid.h"
 
 namespace esvr::cuda {
@@ -18,5 +19,17 @@ struct SupportSource {
     return radii != nullptr ? radii[i] : radius;
   }
 };
+
+/// \return the bricks of `within` that a support's bounding box overlaps: an ellipsoid over
+///         everything is looked for only where bricks can be. Empty where there are none.
+[[nodiscard]] ESVR_HD inline Box clippedRange(const Support& support, const Box& within) {
+  const Box range = brickRange(support);
+  const auto larger = [](std::int32_t a, std::int32_t b) { return a > b ? a : b; };
+  const auto smaller = [](std::int32_t a, std::int32_t b) { return a < b ? a : b; };
+  return {{larger(range.min.x, within.min.x), larger(range.min.y, within.min.y),
+           larger(range.min.z, within.min.z)},
+          {smaller(range.max.x, within.max.x), smaller(range.max.y, within.max.y),
+           smaller(range.max.z, within.max.z)}};
+}
 
 }  // namespace esvr::cuda

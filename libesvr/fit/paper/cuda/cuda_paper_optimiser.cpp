@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/cuda/copy.h"
+#include "core/cuda/count32.h"
 #include "core/cuda/use_device.h"
 #include "esvr/error.h"
 #include "field/gather.h"
-#include "fit/cuda/copy.h"
 #include "fit/cuda/memory_plan.h"
 #include "fit/cuda/memory_pool.h"
 #include "fit/paper/cuda/make_cuda_paper_optimiser.h"
@@ -48,13 +49,10 @@ CudaPaperOptimiser::CudaPaperOptimiser(const FitTarget& target, const paper::Pap
       residual_(stream_.get()),
       visited_(stream_.get()),
       active_(stream_.get()),
-      brickLoss_(stream_.get()),
       chunkSums_(stream_.get()),
-      squares_(stream_.get()),
       diverged_(1, stream_.get()),
       errorSums_(stream_.get()),
       loss_(stream_.get()) {
-  squares_.reserve(1);
   diverged_.setZero();
   for (auto& volume : paper::cutSubvolumes(target, paper::spaceOf(target), options.subvolumeSide))
     parts_.push_back(std::make_unique<Part>(std::move(volume), options.visitOnly, stream_.get()));
@@ -75,34 +73,29 @@ PaperEllipsoids CudaPaperOptimiser::ellipsoids() {
           .diverged = diverged_.data()};
 }
 
-BrickPassArguments CudaPaperOptimiser::passArguments(const Part& part) {
-  return {.bricks = part.bricks.view().bricks,
-          .brickCount = std::uint32_t(part.bricks.size()),
-          .targetCount = std::uint32_t(part.bricks.targetCount()),
-          .lists = part.lists.view(),
-          .forms = forms_.data(),
+PaperPassArguments CudaPaperOptimiser::passArguments(const Part& part) {
+  return {.scene = {.bricks = part.bricks.view().bricks,
+                    .brickCount = std::uint32_t(part.bricks.size()),
+                    .targetCount = std::uint32_t(part.bricks.targetCount()),
+                    .pairCount = std::uint32_t(part.lists.pairCount()),
+                    .lists = part.lists.view(),
+                    .forms = forms_.data()},
           .kernel = narrowed(constants_),
-          .target = values_,
-          .narrowBand = false,
-          .lowest = float(target_.lowest),
-          .highest = float(target_.highest),
-          .brickLoss = brickLoss_.data(),
-          .moments = moments_.data(),
+          .kernels = ellipsoids().kernels,
+          .target = {.values = values_,
+                     .narrowBand = false,
+                     .lowest = float(target_.lowest),
+                     .highest = float(target_.highest)},
           .residual = residual_.data(),
-          .kernels = ellipsoids().kernels};
+          .lossByValue = nullptr,
+          .moments = moments_.data()};
 }
 
-StepArguments CudaPaperOptimiser::sumArguments(const Part& part) {
-  StepArguments a{};
-  a.ellipsoidCount = std::uint32_t(count_);
-  a.chunkCount = std::uint32_t(part.lists.chunkCount());
-  a.brickCount = std::uint32_t(part.bricks.size());
-  a.lists = part.lists.view();
-  a.moments = moments_.data();
-  a.brickLoss = brickLoss_.data();
-  a.chunkSums = chunkSums_.data();
-  a.loss = squares_.data();
-  return a;
+MomentSums CudaPaperOptimiser::momentSums(const Part& part) {
+  return {.lists = part.lists.view(),
+          .chunkCount = std::uint32_t(part.lists.chunkCount()),
+          .moments = moments_.data(),
+          .chunkSums = chunkSums_.data()};
 }
 
 void CudaPaperOptimiser::rebuildLists(Part& part, double slack) {
@@ -128,15 +121,14 @@ void CudaPaperOptimiser::bring(const Part& part) {
 void CudaPaperOptimiser::takeResiduals(Part& part) {
   moments_.reserve(part.lists.pairCount() * kMoments);
   chunkSums_.reserve(part.lists.chunkCount() * kMoments);
-  brickLoss_.reserve(part.bricks.size());
   residual_.reserve(part.bricks.size() * kBrickVoxels);
   bring(part);
-  launchResiduals(passArguments(part), stream_.get());
+  launchPaperResiduals(passArguments(part), stream_.get());
 }
 
 void CudaPaperOptimiser::takeGradients(Part& part) {
   takeResiduals(part);
-  BrickPassArguments pass = passArguments(part);
+  PaperPassArguments pass = passArguments(part);
   pass.lossByValue = loss_.derivative({.bricks = part.bricks,
                                        .windows = part.windows,
                                        .residual = residual_.data(),
@@ -145,15 +137,15 @@ void CudaPaperOptimiser::takeGradients(Part& part) {
                                        .voxels = part.volume->target.boxVoxels,
                                        .beta = options_.beta,
                                        .peak = target_.highest - target_.lowest});
-  launchGivenGradients(pass, stream_.get());
-  launchSums(sumArguments(part), stream_.get());
+  launchPaperMoments(pass, stream_.get());
+  launchMomentSums(momentSums(part), stream_.get());
 }
 
 void CudaPaperOptimiser::iterate(std::size_t subvolume, const paper::PaperStep& step) {
   Part& part = *parts_[subvolume];
   if (part.motionLeft < 0.0) rebuildLists(part, paper::kListSlack);
   takeGradients(part);
-  launchPaperStep(ellipsoids(), sumArguments(part), step, stream_.get());
+  launchPaperStep(ellipsoids(), momentSums(part), step, stream_.get());
   for (auto& each : parts_) each->motionLeft -= paper::motionOf(step);
 }
 
@@ -168,7 +160,7 @@ void CudaPaperOptimiser::requireMemoryFor(std::size_t count) const {
 
 void CudaPaperOptimiser::put(const paper::Population& population) {
   requireMemoryFor(population.size());
-  count_ = population.size();
+  count_ = count32(population.size(), "ellipsoids");
   uploadTo(ellipsoids_.reserve(count_), std::span(population.ellipsoids), stream_.get());
   uploadTo(states_.reserve(count_), std::span(population.states), stream_.get());
   units_.reserve(count_);
@@ -219,7 +211,7 @@ paper::LossGradients CudaPaperOptimiser::gradients(std::size_t subvolume) {
   rebuildLists(part, paper::kListSlack);
   takeGradients(part);
   DeviceBuffer<paper::PaperVector> out(count_, stream_.get());
-  launchPaperGradients(ellipsoids(), sumArguments(part), out.data(), stream_.get());
+  launchPaperGradients(ellipsoids(), momentSums(part), out.data(), stream_.get());
   paper::LossGradients result{loss_.loss(), std::vector<paper::PaperVector>(count_)};
   out.download(result.byEllipsoid);
   return result;

@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "core/cuda/stream.h"
-#include "fit/cuda/brick_pass.h"
 #include "fit/cuda/brick_table.h"
 #include "fit/cuda/error_sums.h"
 #include "fit/cuda/pair_lists.h"
 #include "fit/paper/cuda/paper_loss.h"
+#include "fit/paper/cuda/paper_pass.h"
 #include "fit/paper/cuda/paper_step.h"
 #include "fit/paper/paper_optimiser.h"
 
@@ -48,8 +48,8 @@ class CudaPaperOptimiser final : public paper::PaperOptimiser {
   void takeGradients(Part& part);
   void takeResiduals(Part& part);
   [[nodiscard]] PaperEllipsoids ellipsoids();
-  [[nodiscard]] BrickPassArguments passArguments(const Part& part);
-  [[nodiscard]] StepArguments sumArguments(const Part& part);
+  [[nodiscard]] PaperPassArguments passArguments(const Part& part);
+  [[nodiscard]] MomentSums momentSums(const Part& part);
 
   const FitTarget& target_;
   paper::PaperOptions options_;
@@ -66,7 +66,7 @@ class CudaPaperOptimiser final : public paper::PaperOptimiser {
   GrowingBuffer<float> moments_, residual_, visited_;
   GrowingBuffer<BrickMask> active_;
   const float* values_ = nullptr;  ///< of the subvolume that is visited
-  GrowingBuffer<double> brickLoss_, chunkSums_, squares_;
+  GrowingBuffer<double> chunkSums_;
   DeviceBuffer<int> diverged_;
   ErrorSums errorSums_;
   PaperLoss loss_;

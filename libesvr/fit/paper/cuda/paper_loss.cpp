@@ -3,7 +3,7 @@
 #include <numeric>
 #include <vector>
 
-#include "fit/cuda/copy.h"
+#include "core/cuda/copy.h"
 
 namespace esvr::cuda {
 namespace {

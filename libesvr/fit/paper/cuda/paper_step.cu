@@ -1,6 +1,6 @@
 #include "core/cuda/check.h"
-#include "fit/cuda/launch.h"
-#include "fit/cuda/pair_sums.cuh"
+#include "core/cuda/launch.h"
+#include "fit/cuda/moment_sums.cuh"
 #include "fit/paper/cuda/paper_step.h"
 #include "fit/scene.h"
 
@@ -27,7 +27,7 @@ __device__ void writeForms(const PaperEllipsoids& a, std::uint32_t i,
   if (!finite(unit)) *a.diverged = 1;
 }
 
-__device__ paper::PaperVector gradientOf(const PaperEllipsoids& a, const StepArguments& s,
+__device__ paper::PaperVector gradientOf(const PaperEllipsoids& a, const MomentSums& s,
                                          std::uint32_t i, const paper::PaperEllipsoid& p) {
   const PairSums sums = sumsOf(s, i);
   const double slope = a.kernels != nullptr ? double(a.kernels[i].slope) : a.constants.slope;
@@ -40,7 +40,7 @@ __global__ void __launch_bounds__(kStepBlock) formsKernel(const PaperEllipsoids 
 }
 
 __global__ void __launch_bounds__(kStepBlock)
-    stepKernel(const PaperEllipsoids a, const StepArguments s, const paper::PaperStep step) {
+    stepKernel(const PaperEllipsoids a, const MomentSums s, const paper::PaperStep step) {
   const std::uint32_t i = ownEllipsoid();
   if (i >= a.count) return;
   paper::PaperEllipsoid p = a.ellipsoids[i];
@@ -53,7 +53,7 @@ __global__ void __launch_bounds__(kStepBlock)
 }
 
 __global__ void __launch_bounds__(kStepBlock)
-    gradientsKernel(const PaperEllipsoids a, const StepArguments s, paper::PaperVector* out) {
+    gradientsKernel(const PaperEllipsoids a, const MomentSums s, paper::PaperVector* out) {
   const std::uint32_t i = ownEllipsoid();
   if (i < a.count) out[i] = gradientOf(a, s, i, a.ellipsoids[i]);
 }
@@ -66,15 +66,15 @@ void launchPaperForms(const PaperEllipsoids& a, cudaStream_t stream) {
   check(cudaGetLastError(), "starting to prepare ellipsoids");
 }
 
-void launchPaperStep(const PaperEllipsoids& a, const StepArguments& sums,
-                     const paper::PaperStep& step, cudaStream_t stream) {
+void launchPaperStep(const PaperEllipsoids& a, const MomentSums& sums, const paper::PaperStep& step,
+                     cudaStream_t stream) {
   if (a.count == 0) return;
   stepKernel<<<blocksFor(a.count, kStepBlock), kStepBlock, 0, stream>>>(a, sums, step);
   check(cudaGetLastError(), "starting a step");
 }
 
-void launchPaperGradients(const PaperEllipsoids& a, const StepArguments& sums,
-                          paper::PaperVector* out, cudaStream_t stream) {
+void launchPaperGradients(const PaperEllipsoids& a, const MomentSums& sums, paper::PaperVector* out,
+                          cudaStream_t stream) {
   if (a.count == 0) return;
   gradientsKernel<<<blocksFor(a.count, kStepBlock), kStepBlock, 0, stream>>>(a, sums, out);
   check(cudaGetLastError(), "starting to read gradients");

@@ -3,7 +3,7 @@
 
 #include <cuda_runtime_api.h>
 
-#include "fit/cuda/step.h"
+#include "fit/cuda/moment_sums.h"
 #include "fit/paper/paper_math.h"
 
 namespace esvr::cuda {
@@ -27,12 +27,12 @@ struct PaperEllipsoids {
 /// Writes units, forms, kernels and radii.
 void launchPaperForms(const PaperEllipsoids& ellipsoids, cudaStream_t stream);
 
-/// Takes the step; wants launchSums before. Of `sums`, the lists and the sums of moments are read.
-void launchPaperStep(const PaperEllipsoids& ellipsoids, const StepArguments& sums,
+/// Takes the step; wants launchMomentSums before.
+void launchPaperStep(const PaperEllipsoids& ellipsoids, const MomentSums& sums,
                      const paper::PaperStep& step, cudaStream_t stream);
 
-/// Writes the gradients by the paper's parameters; wants launchSums before.
-void launchPaperGradients(const PaperEllipsoids& ellipsoids, const StepArguments& sums,
+/// Writes the gradients by the paper's parameters; wants launchMomentSums before.
+void launchPaperGradients(const PaperEllipsoids& ellipsoids, const MomentSums& sums,
                           paper::PaperVector* out, cudaStream_t stream);
 
 }  // namespace esvr::cuda

@@ -1,7 +1,4 @@
-#include <cub/block/block_reduce.cuh>
-
-#include "core/cuda/check.h"
-#include "fit/cuda/launch.h"
+#include "core/cuda/reduce.cuh"
 #include "fit/paper/cuda/ssim_pass.h"
 #include "fit/paper/ssim_math.h"
 
@@ -83,13 +80,6 @@ __device__ void sumWindows(const Weights& weights, const Scratch& s, Value&& val
   }
 }
 
-/// A block's sum, in one order.
-__device__ double blockSum(double value) {
-  using Reduce = cub::BlockReduce<double, kThreads>;
-  __shared__ typename Reduce::TempStorage memory;
-  return Reduce(memory).Sum(value);
-}
-
 /// Residual and target around a brick. Ends with a barrier. \return whether any is not zero
 __device__ bool fillHalo(const SsimPassArguments& a, const std::uint32_t* around, float* r,
                          float* t) {
@@ -136,7 +126,7 @@ __global__ void __launch_bounds__(kThreads) windowSide(const SsimPassArguments a
     a.byTr[at] = d.byTr;
     loss += d.value;
   }
-  loss = blockSum(loss);
+  loss = blockSum<kThreads>(loss);
   if (threadIdx.x == 0) a.windowLoss[blockIdx.x] = a.ssimScale * loss;
 }
 
@@ -177,7 +167,7 @@ __global__ void __launch_bounds__(kThreads) valueSide(const SsimPassArguments a)
     a.lossByValue[at] = float(a.absoluteScale * bySign + a.ssimScale * bySsim);
     absolute += fabs(r);
   }
-  absolute = blockSum(absolute);
+  absolute = blockSum<kThreads>(absolute);
   if (threadIdx.x == 0) a.valueLoss[blockIdx.x] = a.absoluteScale * absolute;
 }
 

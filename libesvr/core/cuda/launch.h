@@ -1,8 +1,9 @@
 #pragma once
-/// Grid sizes.
+/// Sizes of grids, blocks and warps.
 
 #include <cstddef>
 #include <limits>
+#include <string>
 
 #include "core/cuda/check.h"
 
@@ -11,9 +12,10 @@ namespace esvr::cuda {
 inline constexpr int kWarp = 32;
 inline constexpr int kBlock = 256;  ///< threads of a block, where nothing else is said
 
-/// Blocks that cover `items`, `perBlock` each. \throws DeviceError  more than a launch can have
+/// \return the number of blocks that cover `items`, `perBlock` each
+/// \throws DeviceError  a launch cannot have so many
 inline unsigned blocksFor(std::size_t items, std::size_t perBlock) {
-  const std::size_t blocks = (items + perBlock - 1) / perBlock;
+  const std::size_t blocks = items / perBlock + (items % perBlock != 0);
   if (blocks > std::size_t(std::numeric_limits<int>::max()))
     throw DeviceError("CUDA: a launch of " + std::to_string(blocks) + " blocks is too large");
   return unsigned(blocks);

@@ -1,7 +1,7 @@
 #pragma once
 /// CUB's temporary memory.
 
-#include "fit/cuda/growing_buffer.h"
+#include "core/cuda/growing_buffer.h"
 
 namespace esvr::cuda {
 

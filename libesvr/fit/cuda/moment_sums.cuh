@@ -1,13 +1,13 @@
 #pragma once
 /// What the kernels that step have in common.
 
-#include "fit/cuda/step.h"
+#include "fit/cuda/moment_sums.h"
 #include "fit/parameter_gradient.h"
 
 namespace esvr::cuda {
 
-/// An ellipsoid's moments; wants launchSums before.
-__device__ inline PairSums sumsOf(const StepArguments& a, std::uint32_t i) {
+/// \return the moments of ellipsoid i; wants launchMomentSums before
+__device__ inline PairSums sumsOf(const MomentSums& a, std::uint32_t i) {
   PairSums s{};
   for (std::uint32_t c = a.lists.chunkBegin[i]; c < a.lists.chunkBegin[i + 1]; ++c) {
     const double* const m = a.chunkSums + std::size_t(c) * kMoments;
@@ -18,7 +18,7 @@ __device__ inline PairSums sumsOf(const StepArguments& a, std::uint32_t i) {
   return s;
 }
 
-/// A sum over all numbers of it: one that is not finite shows.
+/// A sum over all of an ellipsoid's numbers shows whether one of them is not finite.
 __device__ inline bool finite(const Ellipsoid& p) {
   double sum = p.intensity;
   for (const double c : p.center) sum += c;

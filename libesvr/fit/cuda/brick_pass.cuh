@@ -1,0 +1,168 @@
+#pragma once
+/// The parts of a pass over the bricks, for passes whose ellipsoids share a kernel and for passes
+/// whose ellipsoids have their own.
+
+#include "fit/cuda/brick_pass.h"
+#include "fit/cuda/brick_sums.cuh"
+
+namespace esvr::cuda {
+
+/// Which kernel an ellipsoid has.
+struct SharedKernel {
+  const KernelConstants<float>& kernel;
+  __device__ const KernelConstants<float>& of(std::uint32_t) const { return kernel; }
+};
+struct OwnKernels {
+  const KernelConstants<float>* kernels;
+  __device__ const KernelConstants<float>& of(std::uint32_t ellipsoid) const {
+    return kernels[ellipsoid];
+  }
+};
+
+/// Where a pass leaves residuals; null: it does not.
+struct ResidualOutput {
+  double* brickLoss;  ///< a brick's sum of r^2
+  float* residual;    ///< kBrickVoxels for each brick
+};
+
+constexpr int kMomentSlots = 16;  // kMoments, made a power of two
+static_assert(kMomentSlots % kGroup == 0, "each lane ends with some of the moments");
+
+/// Adds a lane's share of a pair to the sums.
+template <class Sum>
+__device__ void addPair(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
+                        float units, Sum* sums) {
+  const float height = p.form.intensity * units;
+  visitLines(p, corner, kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
+    float t = line.t;
+    for (int y = line.yBegin; y < line.yEnd; ++y, t += 1.0f) {
+      const float phi = fastPhi(kernel, squaredAt(p.form, line.closest, t));
+      addUnits(sums[line.offset + y * kBrickSide], height * phi);
+    }
+  });
+}
+
+/// \return the residual of voxel v, r = V - target
+__device__ inline float residualOf(const PassTarget& target, bool inTarget, std::size_t v,
+                                   float sum) {
+  if (!inTarget) return sum;
+  const float t = target.values[v];
+  const float r = sum - t;
+  return target.narrowBand ? fminf(fmaxf(r, target.lowest - t), target.highest - t) : r;
+}
+
+/// Replaces sums by residuals. Squares are summed in the same order whatever the number of threads.
+template <class Sum, int kThreads>
+__device__ void toResiduals(const PassScene& scene, const PassTarget& target,
+                            const ResidualOutput& out, std::uint32_t brick, float unit, Sum* sums) {
+  __shared__ double parts[kBrickVoxels / kWarp];
+  const std::size_t first = std::size_t(brick) * kBrickVoxels;
+  for (int v = int(threadIdx.x); v < kBrickVoxels; v += kThreads) {
+    Sum& sum = sums[paddedOffset(v)];
+    const float r = residualOf(target, brick < scene.targetCount, first + v, float(sum) * unit);
+    putValue(sum, r);
+    if (out.residual != nullptr) out.residual[first + v] = r;
+    const double squares = warpSum(double(r) * double(r));
+    if (v % kWarp == 0) parts[v / kWarp] = squares;
+  }
+  __syncthreads();
+  if (threadIdx.x != 0 || out.brickLoss == nullptr) return;
+  double loss = 0.0;
+  for (const double part : parts) loss += part;
+  out.brickLoss[brick] = loss;
+}
+
+/// Leaves the residuals of a brick in `sums`, for the thread that wrote them.
+template <class Sum, int kThreads, class Kernels>
+__device__ void sumBrick(const PassScene& scene, const Kernels& kernels, const PassTarget& target,
+                         const ResidualOutput& out, const BlockBrick& brick, Sum* sums) {
+  const auto ellipsoid = [&](std::uint32_t k) { return scene.lists.ellipsoid[k]; };
+  const float unit = sumEntries<Sum, kThreads>(
+      brick.entries, sums,
+      [&](std::uint32_t k) { return scene.forms[ellipsoid(k)].form.intensity; },
+      [&](std::uint32_t k, float units) {
+        const std::uint32_t i = ellipsoid(k);
+        const PairForm p = scene.forms[i];
+        addPair(p, kernels.of(i), brick.corner, units, sums);
+      });
+  toResiduals<Sum, kThreads>(scene, target, out, brick.number, unit, sums);
+}
+
+/// A lane's moments of a pair, in the order of PairMoments.
+/// \param byValue  the loss's derivative by each voxel
+template <class Sum>
+__device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
+                           const Sum* byValue, float (&s)[kMomentSlots]) {
+  const float slopeBase = kernel.slope * kernel.base - 1.0f;
+  visitLines(p, corner, kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
+    float w0 = 0.0f, w1 = 0.0f, t = line.t;
+    for (int y = line.yBegin; y < line.yEnd; ++y, t += 1.0f) {
+      const float phi = fastPhi(kernel, squaredAt(p.form, line.closest, t));
+      const float g = valueIn(byValue[line.offset + y * kBrickSide]);
+      const float gq = phi > 0.0f ? g * (phi + kernel.base) : 0.0f;
+      const float w = gq * (phi * kernel.slope + slopeBase);  // g phi'
+      const float wt = w * t;
+      w0 += w;
+      w1 += wt;
+      s[8] += wt * t;
+      s[9] += g * phi;
+      s[10] += phi * phi;
+      s[11] += gq - gq * phi;
+    }
+    const float w0x = w0 * line.dx, w0z = w0 * line.dz;
+    s[0] += w0x;
+    s[1] += w0z;
+    s[2] += w0x * line.dx;
+    s[3] += w0x * line.dz;
+    s[4] += w0z * line.dz;
+    s[5] += w1;
+    s[6] += w1 * line.dx;
+    s[7] += w1 * line.dz;
+  });
+}
+
+/// Sums kGroup values over a group's lanes; lane n gets the sum of value n. Each exchange halves
+/// what a lane keeps.
+__device__ inline float transposeSum(float* s) {
+  const unsigned group = lanesOfGroup<kGroup>();
+  const unsigned lane = threadIdx.x % kGroup;
+#pragma unroll
+  for (int w = kGroup / 2; w > 0; w /= 2) {
+    const bool upper = (lane & unsigned(w)) != 0;
+#pragma unroll
+    for (int k = 0; k < w; ++k) {
+      const float sent = upper ? s[k] : s[k + w];
+      const float kept = upper ? s[k + w] : s[k];
+      s[k] = kept + __shfl_xor_sync(group, sent, w);
+    }
+  }
+  return s[0];
+}
+
+/// Writes the moments of an entry, by a group of lanes.
+template <class Kernels, class Sum>
+__device__ void writeMoments(const PassScene& scene, const Kernels& kernels, std::uint32_t entry,
+                             Coord corner, const Sum* byValue, float* moments) {
+  const std::uint32_t i = scene.lists.ellipsoid[entry];
+  const PairForm p = scene.forms[i];
+  float s[kMomentSlots] = {};
+  sumMoments(p, kernels.of(i), corner, byValue, s);
+  float* const out = moments + std::size_t(scene.lists.pair[entry]) * kMoments;
+#pragma unroll
+  for (int first = 0; first < kMomentSlots; first += kGroup) {
+    const float value = transposeSum(s + first);
+    const int moment = first + int(threadIdx.x % kGroup);
+    if (moment < kMoments) out[moment] = value;
+  }
+}
+
+/// Writes the moments of all entries of a brick.
+template <int kThreads, class Kernels, class Sum>
+__device__ void writeAllMoments(const PassScene& scene, const Kernels& kernels,
+                                const BlockBrick& brick, const Sum* byValue, float* moments) {
+  visitEntries<kThreads>(brick.entries, [&](std::uint32_t k) {
+    writeMoments(scene, kernels, k, brick.corner, byValue, moments);
+  });
+}
+
+}  // namespace esvr::cuda

@@ -1,0 +1,36 @@
+#include "fit/cuda/moment_sums.h"
+
+#include "core/cuda/launch.h"
+#include "core/cuda/thread_number.cuh"
+
+namespace esvr::cuda {
+namespace {
+
+constexpr int kLanes = 16;  // of a chunk: one for each moment, and some to spare
+static_assert(kLanes >= kMoments);
+
+/// One lane a moment: the pairs of a chunk lie side by side.
+__global__ void sumChunks(const MomentSums a) {
+  const std::size_t thread = threadNumber();
+  const std::size_t chunk = thread / kLanes, lane = thread % kLanes;
+  if (chunk >= a.chunkCount || lane >= kMoments) return;
+  const std::uint32_t i = a.lists.chunkOwner[chunk];
+  const std::uint32_t begin = a.lists.ellipsoidBegin[i] +
+                              std::uint32_t(chunk - a.lists.chunkBegin[i]) * PairListsView::kChunk;
+  const std::uint32_t end = min(a.lists.ellipsoidBegin[i + 1], begin + PairListsView::kChunk);
+  double sum = 0.0;
+#pragma unroll 4
+  for (std::uint32_t k = begin; k < end; ++k)
+    sum += double(a.moments[std::size_t(k) * kMoments + lane]);
+  a.chunkSums[chunk * kMoments + lane] = sum;
+}
+
+}  // namespace
+
+void launchMomentSums(const MomentSums& sums, cudaStream_t stream) {
+  if (sums.chunkCount == 0) return;
+  sumChunks<<<blocksFor(std::size_t(sums.chunkCount) * kLanes, kBlock), kBlock, 0, stream>>>(sums);
+  check(cudaGetLastError(), "starting the sums of moments");
+}
+
+}  // namespace esvr::cuda

@@ -1,0 +1,31 @@
+#pragma once
+/// What every pass over the bricks reads: bricks, ellipsoids, and which of them meet.
+
+#include <algorithm>
+
+#include "fit/cuda/pair_form.h"
+#include "fit/cuda/pair_lists.h"
+
+namespace esvr::cuda {
+
+/// Pointers are to device memory, borrowed.
+struct PassScene {
+  const Coord* bricks;  ///< the target's first
+  std::uint32_t brickCount, targetCount;
+  std::uint32_t pairCount;
+  PairListsView lists;
+  const PairForm* forms;  ///< one for each ellipsoid
+};
+
+/// A brick whose list is longer than this is summed in 64-bit integers. In 32 bits a list of this
+/// length has units of 2^-17 of its largest intensity, and ordinary lists, of some 200 entries,
+/// units of 2^-22.
+inline constexpr std::uint32_t kMaxNarrowEntries = 4096;
+
+/// \return an upper bound for the number of bricks with longer lists, which come first in
+///         PairListsView::brickOrder
+[[nodiscard]] inline std::uint32_t maxWideBricks(const PassScene& scene) {
+  return std::min(scene.brickCount, scene.pairCount / (kMaxNarrowEntries + 1));
+}
+
+}  // namespace esvr::cuda
