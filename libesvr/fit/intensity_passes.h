@@ -63,10 +63,10 @@ class IntensityPasses {
 [[nodiscard]] std::unique_ptr<IntensityPasses> makeIntensityPasses(const IntensityTarget& target,
                                                                    const Device& device);
 
-/// Index corners of the bricks that are there whatever the field, in increasing order.
+/// Index corners of the bricks that do not depend on the field, in increasing order.
 [[nodiscard]] std::vector<Coord> knownCorners(const IntensityTarget& target);
 
-/// A brick's values in the source; null where it has none.
+/// The values of a brick in the source; null if the source does not have the brick.
 [[nodiscard]] const float* sourceValues(const SparseVolume& source, Coord corner);
 
 }  // namespace esvr
