@@ -1,5 +1,5 @@
 #pragma once
-/// How far a fit is, on a terminal.
+/// Shows the progress of a fit on a terminal.
 
 #include <string>
 
@@ -7,12 +7,12 @@
 
 namespace esvr::vdb2esvr {
 
-/// One line on stderr that is redrawn and gone when the bar is. Where stderr is no terminal,
-/// nothing is drawn.
+/// A line on stderr that is redrawn, and removed by the destructor. Nothing is drawn if stderr is
+/// not a terminal.
 class ProgressBar {
  public:
-  /// \param grid   begins the line
-  /// \param shown  false: draws nothing (--quiet)
+  /// \param grid   name of the grid, with which the line begins
+  /// \param shown  false with --quiet: nothing is drawn
   ProgressBar(std::string grid, bool shown);
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
@@ -25,7 +25,8 @@ class ProgressBar {
   bool shown_;
 };
 
-/// "density  45 % [#########-----------]  51.20 dB  12000 ellipsoids  1:23 left", cut to a width.
+/// The text of the line, cut to a width, for example
+/// "density  45 % [#########-----------]  51.20 dB  12000 ellipsoids  1:23 left".
 [[nodiscard]] std::string progressLine(const std::string& grid, const FitProgress& progress,
                                        std::size_t width);
 
