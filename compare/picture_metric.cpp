@@ -25,7 +25,7 @@ std::filesystem::path written(const Image& image, const std::filesystem::path& p
   return path;
 }
 
-/// What a shell's command prints. \throws RuntimeFailure  it ends with another code than 0
+/// The output of a shell command. \throws RuntimeFailure  its exit code is not 0
 std::string outputOf(const std::string& command) {
   FILE* pipe = popen(command.c_str(), "r");
   if (!pipe) throw RuntimeFailure("--lpips: cannot run " + command);
@@ -47,10 +47,10 @@ double lastNumber(const std::string& command, const std::string& text) {
   double value = NAN;
   try {
     value = std::stod(last, &used);
-  } catch (const std::logic_error&) {  // no number at all, or one that no double holds
+  } catch (const std::logic_error&) {  // not a number, or out of the range of double
   }
   if (used != last.size() || !std::isfinite(value))
-    throw RuntimeFailure("--lpips: " + command + " printed '" + last + "', which is no number");
+    throw RuntimeFailure("--lpips: " + command + " printed '" + last + "', which is not a number");
   return value;
 }
 
