@@ -1,5 +1,6 @@
 // esvr-compare: compares .esvr files with their source and with other ways to store it.
 
+#include <string>
 #include <string_view>
 
 #include "cli/command_line.h"

@@ -23,7 +23,7 @@ void visitVoxels(const Box& local, const Visit& visit) {
       for (int z = local.min.z; z <= local.max.z; ++z) visit(Coord{x, y, z});
 }
 
-/// Appends a brick of the array unless all of it is background.
+/// Appends a brick of the array unless all its voxels are background.
 void appendBrick(const DenseBox& dense, Coord corner, float activeAbove, SparseVolume& volume) {
   std::array<float, kBrickVoxels> values;
   values.fill(volume.background);

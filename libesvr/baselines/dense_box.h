@@ -1,5 +1,5 @@
 #pragma once
-/// The voxels of a box as an array, for compressors that know no sparsity.
+/// The voxels of a box as an array, for compressors of dense data.
 
 #include <array>
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace esvr::baselines {
 
-/// x fastest, as ZFP, SZ and raw files of images have it.
+/// An array of values with x fastest, as in ZFP, SZ and raw image files.
 struct DenseBox {
   Box box;
   std::vector<float> values;
@@ -26,15 +26,16 @@ struct DenseBox {
   }
 };
 
-/// \throws UsageError  more than maxBytes (0: no bound)
+/// Copies the voxels of a box to an array.
+/// \throws UsageError  the array takes more than maxBytes (0: no limit)
 [[nodiscard]] DenseBox densify(const SparseVolume& volume, const Box& box, std::uint64_t maxBytes);
 
-/// Voxels of the array that differ from the background by more than `activeAbove` are active; the
-/// others keep their value in bricks that hold any but background.
+/// Makes a volume from an array. Voxels that differ from the background by more than `activeAbove`
+/// are active; other voxels keep their values. Bricks of background only are left out.
 [[nodiscard]] SparseVolume sparsify(const DenseBox& dense, float background, float activeAbove);
 
-/// Half of the smallest difference from the background that an active voxel has; voxels that have
-/// none are passed over.
+/// Half of the smallest difference between an active voxel and the background. Active voxels that
+/// equal the background are ignored.
 [[nodiscard]] float activityThreshold(const SparseVolume& volume);
 
 }  // namespace esvr::baselines

@@ -1,5 +1,5 @@
 #pragma once
-/// Lossy by leaving out: the voxels that matter least become background.
+/// Lossy compression of VDB files by dropping voxels near the background.
 
 #include <vector>
 
@@ -7,8 +7,8 @@
 
 namespace esvr::baselines {
 
-/// How far a voxel is from what it would become: |value - background|; in a level set the distance
-/// from the band's edge, |background| - |value|.
+/// The change of a voxel's value if it is dropped: |value - background|, or, in a level set, the
+/// distance from the band's edge, |background| - |value|.
 class Deviation {
  public:
   explicit Deviation(const GridDescriptor& descriptor)
@@ -21,11 +21,11 @@ class Deviation {
   bool levelSet_;
 };
 
-/// Distinct deviations of the active voxels, increasing: the thresholds that make a difference.
+/// The distinct deviations of the active voxels, increasing. Other thresholds have the same effect.
 [[nodiscard]] std::vector<float> thresholds(const VolumeGrid& grid);
 
-/// The grid without the active voxels that deviate by `threshold` or less: they are inactive and
-/// hold the background (in a level set, with their sign). Bricks without an active voxel are gone.
+/// Drops the active voxels that deviate by `threshold` or less: they become inactive and hold the
+/// background (in a level set, with their sign). Bricks without an active voxel are removed.
 [[nodiscard]] VolumeGrid withoutVoxels(const VolumeGrid& grid, double threshold);
 
 }  // namespace esvr::baselines

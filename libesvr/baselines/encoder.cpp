@@ -32,8 +32,8 @@ std::vector<std::byte> readBytes(const std::filesystem::path& path) {
 
 }  // namespace
 
-/// What one setting after the other shares: the grid without the voxels of the last threshold as
-/// OpenVDB has it, and the array for ZFP. Either is made when it is first asked for.
+/// Data that several settings share: the OpenVDB grid of the last threshold, and the array for ZFP.
+/// Each is made when it is first needed.
 struct BaselineEncoder::State {
   explicit State(const BaselineSource& s) : source(s) {}
 

@@ -13,31 +13,32 @@
 namespace esvr {
 namespace {
 
-constexpr double kNotNeeded = std::numeric_limits<double>::quiet_NaN();
-constexpr double kNearEnough = 0.98;  // of the bytes asked for
-constexpr int kMaxBisections = 24;    // a million distinct values, and some
+constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
+/// Share of the wanted bytes at which a bisection of the threshold ends.
+constexpr double kSufficientShareOfBytes = 0.98;
+constexpr int kMaxBisections = 24;  // enough for 2^24 distinct values
 
-/// FpN's tolerances that a size is tried with, as shares of the peak, from coarse to fine in steps
+/// FpN's tolerances in the search for a size, as shares of the peak, from coarse to fine in steps
 /// of about sqrt(2).
 constexpr std::array kTolerances{0.5,    0.35,   0.25,   0.17, 0.12,  0.085, 0.06,   0.042,
                                  0.03,   0.02,   0.014,  0.01, 0.007, 0.005, 0.0035, 0.0025,
                                  1.7e-3, 1.2e-3, 8.5e-4, 6e-4, 4e-4,  3e-4,  2e-4,   1e-4};
-constexpr int kPatience = 3;  // tolerances in a row that are worse end the search
+constexpr int kMaxWorseTolerances = 3;  // number of consecutive worse tolerances at which it ends
 
-constexpr int kAccuracySteps = 40;  // powers of two below the peak
+constexpr int kAccuracySteps = 40;  // number of accuracies, which are powers of two
 constexpr int kMaxPlanes = 32;
 
-/// Tries settings and keeps what came of them.
+/// Tries settings and keeps the best result.
 class Search {
  public:
   explicit Search(BaselineEncoder& encoder) : encoder_(encoder) {}
 
-  /// \return the bytes
+  /// Encodes with a setting. \return the bytes
   std::uint64_t tryBytes(const BaselineSetting& setting) {
-    match_.steps.push_back({setting, encoder_.encode(setting).bytes, kNotNeeded});
+    match_.steps.push_back({setting, encoder_.encode(setting).bytes, kNotMeasured});
     return match_.steps.back().bytes;
   }
-  /// The PSNR of what was tried last.
+  /// Measures the PSNR of the last setting.
   double measure() {
     const BaselineSource& source = encoder_.source();
     const auto metrics = compareVolumes(source.grid.volume, encoder_.decode(),
@@ -68,8 +69,9 @@ class Search {
   Match match_;
 };
 
-/// The lowest threshold whose file is small enough, by bisection over those that make a difference;
-/// measured and kept where it is the closest so far. \return false where even one voxel is too much
+/// Searches the lowest threshold whose file is small enough, by bisection over the distinct
+/// deviations. The result is measured, and kept if its PSNR is the highest so far.
+/// \return false if no threshold makes the file small enough
 bool matchThreshold(Search& search, BaselineSetting setting, std::span<const float> thresholds,
                     std::uint64_t bytes) {
   setting.threshold = 0.0;
@@ -78,7 +80,7 @@ bool matchThreshold(Search& search, BaselineSetting setting, std::span<const flo
     search.keepIfCloser();
     return true;
   }
-  std::size_t low = 0, high = thresholds.size();  // the last would leave no voxel
+  std::size_t low = 0, high = thresholds.size();  // the last threshold would drop all voxels
   std::optional<double> found;
   for (int i = 0; i < kMaxBisections && low + 1 < high; ++i) {
     const std::size_t middle = low + (high - low) / 2;
@@ -86,7 +88,7 @@ bool matchThreshold(Search& search, BaselineSetting setting, std::span<const flo
     const std::uint64_t size = search.tryBytes(setting);
     (size > bytes ? low : high) = middle;
     if (size <= bytes) found = setting.threshold;
-    if (size <= bytes && double(size) >= kNearEnough * double(bytes)) break;
+    if (size <= bytes && double(size) >= kSufficientShareOfBytes * double(bytes)) break;
   }
   if (!found) return false;
   setting.threshold = *found;
@@ -98,20 +100,20 @@ bool matchThreshold(Search& search, BaselineSetting setting, std::span<const flo
 
 void matchToleranceAndThreshold(Search& search, const BaselineSetting& like,
                                 std::span<const float> thresholds, std::uint64_t bytes) {
-  int idle = 0;
+  int worse = 0;
   for (const double share : kTolerances) {
     BaselineSetting setting = like;
     std::get<VoxelPacking>(setting.how).tolerance = share * search.source().peak;
     const double before = search.bestPsnr();
     const bool fits = matchThreshold(search, setting, thresholds, bytes);
-    // As good as before is no reason to end: a leaf's bits are 1, 2, 4, 8 or 16, so that many
-    // tolerances give one file.
-    idle = fits && search.last().psnr >= before ? 0 : idle + 1;
-    if (idle == kPatience) return;
+    // An equal PSNR does not count as worse: a leaf's bits are 1, 2, 4, 8 or 16, so several
+    // tolerances give the same file.
+    worse = fits && search.last().psnr >= before ? 0 : worse + 1;
+    if (worse == kMaxWorseTolerances) return;
   }
 }
 
-/// ZFP's settings of a mode from coarse to fine.
+/// ZFP's settings of a mode, from coarse to fine.
 std::vector<BaselineSetting> ladder(ZfpMode mode, double peak) {
   std::vector<BaselineSetting> settings;
   if (mode == ZfpMode::kPrecision) {
@@ -119,7 +121,7 @@ std::vector<BaselineSetting> ladder(ZfpMode mode, double peak) {
       settings.push_back({.how = ZfpSetting{mode, double(planes)}});
     return settings;
   }
-  const int first = std::ilogb(peak) + 3;  // ZFP keeps well within its bound
+  const int first = std::ilogb(peak) + 3;  // above the peak, since ZFP's errors are below its bound
   for (int i = 0; i < kAccuracySteps; ++i)
     settings.push_back({.how = ZfpSetting{mode, std::ldexp(1.0, first - i)}});
   return settings;
@@ -142,9 +144,9 @@ void matchZfpPsnr(Search& search, ZfpMode mode, double psnr) {
   }
 }
 
-/// The coarsest tolerance that reaches a PSNR, by bisection of its logarithm.
+/// Searches the coarsest tolerance that reaches a PSNR, by bisection of its logarithm.
 void matchTolerance(Search& search, BaselineSetting setting, double psnr) {
-  constexpr int kSteps = 12;  // to a 400th of a factor of e
+  constexpr int kSteps = 12;  // the tolerance is then accurate to 0.3 %
   auto& tolerance = std::get<VoxelPacking>(setting.how).tolerance;
   double coarse = std::log(search.source().peak), fine = coarse + std::log(1e-5);
   for (int i = 0; i < kSteps; ++i) {
@@ -180,7 +182,7 @@ Match matchPsnr(BaselineEncoder& encoder, const BaselineSetting& like, double ps
   else if (std::get<VoxelPacking>(like.how).form == PackedForm::kNanoFpN)
     matchTolerance(search, like, psnr);
   else
-    throw UsageError("only FpN and ZFP have a setting that a PSNR decides");
+    throw UsageError("only FpN and ZFP have a setting that can be matched to a PSNR");
   return search.take();
 }
 

@@ -33,7 +33,7 @@ constexpr std::array kCodecs{CodecWord{"-zip", PackedCodec::kZip},
 constexpr const char *kZfp = "zfp", *kAccuracy = "accuracy", *kPrecision = "precision",
                      *kTolerance = "tolerance", *kThreshold = "threshold";
 
-/// The shortest text that reads back as the same number.
+/// The shortest text that represents the same number.
 std::string exactText(double value) {
   std::array<char, 32> text;
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
@@ -68,7 +68,7 @@ std::vector<std::string> split(const std::string& text, char at) {
 }
 
 [[noreturn]] void refuse(const std::string& text, const std::string& why) {
-  throw UsageError("'" + text + "' is no baseline: " + why);
+  throw UsageError("'" + text + "' is not a baseline: " + why);
 }
 
 double numberOf(const std::string& text, const std::string& number) {

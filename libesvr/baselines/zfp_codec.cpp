@@ -23,7 +23,7 @@ using Field = std::unique_ptr<zfp_field, FreeField>;
 using Stream = std::unique_ptr<zfp_stream, CloseStream>;
 using Bits = std::unique_ptr<bitstream, CloseBits>;
 
-constexpr unsigned kMaxPlanes = 32;  // of float
+constexpr unsigned kMaxPlanes = 32;  // bit planes of a float
 
 Field fieldOf(baselines::DenseBox& dense) {
   const auto [nx, ny, nz] = dense.side();
@@ -52,7 +52,7 @@ std::string zfpVersion() {
 namespace baselines {
 
 std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& setting) {
-  DenseBox& source = const_cast<DenseBox&>(dense);  // ZFP's interface knows no const; it only reads
+  DenseBox& source = const_cast<DenseBox&>(dense);  // ZFP takes no const pointer, but only reads
   const Field field = fieldOf(source);
   const Stream stream(zfp_stream_open(nullptr));
   apply(setting, stream.get());
@@ -77,7 +77,7 @@ void decompressZfp(std::span<const std::byte> bytes, DenseBox& dense) {
   const bool read = zfp_read_header(stream.get(), field.get(), ZFP_HEADER_FULL) != 0 &&
                     zfp_field_size(field.get(), nullptr) == dense.values.size() &&
                     zfp_decompress(stream.get(), field.get()) != 0;
-  if (!read) throw BadInput("is no ZFP stream of this box");
+  if (!read) throw BadInput("the ZFP stream does not belong to this box");
 }
 
 }  // namespace baselines

@@ -1,5 +1,5 @@
 #pragma once
-/// ZFP on a box of voxels. In a build without ZFP both throw, and say so.
+/// ZFP on a box of voxels. In a build without ZFP both functions throw UsageError.
 
 #include <cstddef>
 #include <span>
@@ -10,10 +10,12 @@
 
 namespace esvr::baselines {
 
-/// A ZFP stream with its header. \throws UsageError  precision out of range, or no ZFP
+/// Compresses an array to a ZFP stream with a header.
+/// \throws UsageError  the precision is out of range, or the build has no ZFP
 [[nodiscard]] std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& setting);
 
-/// Into an array of the same box. \throws BadInput  not such a stream
+/// Decompresses a stream to an array of the same box.
+/// \throws BadInput  the stream does not belong to such an array
 void decompressZfp(std::span<const std::byte> bytes, DenseBox& dense);
 
 }  // namespace esvr::baselines

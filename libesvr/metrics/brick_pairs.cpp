@@ -6,7 +6,7 @@
 namespace esvr::metrics {
 namespace {
 
-/// Bricks of one volume at their places in index space.
+/// The bricks of one volume by their positions in index space.
 class BrickCursor {
  public:
   explicit BrickCursor(const SparseVolume& volume)

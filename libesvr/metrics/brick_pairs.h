@@ -1,5 +1,5 @@
 #pragma once
-/// The bricks of two volumes side by side: what every metric walks over.
+/// Pairs of the bricks of two volumes, which all metrics iterate over.
 
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace esvr::metrics {
 
-/// One place where at least one of two volumes has a brick.
+/// A position at which at least one of two volumes has a brick.
 struct BrickPair {
   Coord brick;                       ///< in bricks of index space: corner / 8
   const float* reference = nullptr;  ///< null where only the candidate has a brick here
@@ -17,16 +17,17 @@ struct BrickPair {
   const BrickMask* candidateActive = nullptr;
 };
 
-/// The union of both volumes' bricks, in increasing order of Coord. Points into the volumes.
+/// The union of both volumes' bricks in increasing order of Coord. The pairs point into the
+/// volumes.
 [[nodiscard]] std::vector<BrickPair> pairBricks(const SparseVolume& reference,
                                                 const SparseVolume& candidate);
 
-/// The two volumes' values outside their bricks.
+/// The values of the two volumes outside their bricks.
 struct Backgrounds {
   double reference = 0.0, candidate = 0.0;
 };
 
-/// A pair's voxels, with the backgrounds standing in where a side has no brick.
+/// The voxels of a pair. A volume that does not have the brick has its background there.
 class PairValues {
  public:
   PairValues(const BrickPair& pair, const Backgrounds& backgrounds)
@@ -54,7 +55,7 @@ class PairValues {
   const Backgrounds& backgrounds_;
 };
 
-/// The voxels of a brick that lie in a box, as local coordinates; empty where there are none.
+/// The voxels of a brick that lie in a box, in local coordinates; empty if there are none.
 [[nodiscard]] Box localBox(Coord brick, const Box& box);
 
 }  // namespace esvr::metrics

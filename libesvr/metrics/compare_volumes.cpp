@@ -34,7 +34,7 @@ Box chooseBox(const SparseVolume& reference, const CompareOptions& options) {
   return box;
 }
 
-/// Successor of a brick in the order of Coord among the bricks of a box.
+/// The next brick of a box in the order of Coord.
 Coord nextBrick(Coord brick, const Box& bricks) {
   if (++brick.z <= bricks.max.z) return brick;
   brick.z = bricks.min.z;
@@ -44,8 +44,8 @@ Coord nextBrick(Coord brick, const Box& bricks) {
   return brick;
 }
 
-/// First voxel of the box outside all pairs. Takes one step a pair at most, since each step away
-/// from a free place needs a pair in the way.
+/// The first voxel of the box outside all pairs. The search makes at most one step for each pair,
+/// because every step passes a pair.
 Coord firstFreeVoxel(std::span<const BrickPair> pairs, const Box& box) {
   const Box bricks{brickOf(box.min), brickOf(box.max)};
   Coord place = bricks.min;
@@ -57,7 +57,7 @@ Coord firstFreeVoxel(std::span<const BrickPair> pairs, const Box& box) {
   return maxCoord(place * kBrickSide, box.min);
 }
 
-/// Adds the voxels of the box that lie in no brick: each differs by the backgrounds' difference.
+/// Adds the voxels of the box that lie in no brick; their error is the backgrounds' difference.
 void addEmptySpace(ErrorSums& sums, std::span<const BrickPair> pairs,
                    const metrics::ErrorDomain& domain) {
   const double empty = domain.box.volume() - sums.voxels;

@@ -9,7 +9,7 @@
 namespace esvr::metrics {
 namespace {
 
-constexpr std::size_t kPairsPerTask = 64;  // small enough to balance, large enough to be cheap
+constexpr std::size_t kPairsPerTask = 64;
 
 void keepLargest(ErrorSums& sums, double error, Coord at) {
   if (error <= sums.maxError) return;
@@ -72,7 +72,7 @@ ErrorSums ofPair(const BrickPair& pair, const ErrorDomain& domain) {
   return sums;
 }
 
-/// `b` holds the later bricks: the earlier voxel wins where largest errors are equal.
+/// Merges sums. `b` belongs to later bricks; of equal largest errors, the first voxel is kept.
 ErrorSums joined(ErrorSums a, const ErrorSums& b) {
   a.voxels += b.voxels;
   a.squaredError += b.squaredError;

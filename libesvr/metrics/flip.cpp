@@ -36,13 +36,13 @@ void checkPictures(const Image& reference, const Image& candidate, double pixels
 Color shownColor(const float* rgba) {
   Color color;
   for (int c = 0; c < kColors; ++c) {
-    if (std::isnan(rgba[c])) throw BadInput("a picture with a color that is no number");
+    if (std::isnan(rgba[c])) throw BadInput("a picture has a color that is not a number");
     color[c] = std::clamp(double(rgba[c]), 0.0, 1.0);
   }
   return color;
 }
 
-/// The picture in opponent colors.
+/// Converts a picture to opponent colors.
 Planes ycxczOf(const Image& image) {
   Planes planes;
   const std::size_t pixels = std::size_t(image.width) * image.height;
@@ -55,7 +55,7 @@ Planes ycxczOf(const Image& image) {
   return planes;
 }
 
-/// What the eye sees of a picture, in a space where distances are differences.
+/// Filters a picture by contrast sensitivity and converts it to a space of perceived differences.
 std::vector<Color> perceivedColors(const Planes& ycxcz, const metrics::EyeFilters& eye) {
   const Planes seen{blurred(ycxcz[0], eye.achromatic), blurred(ycxcz[1], eye.redGreen),
                     blurred(ycxcz[2], eye.blueYellow)};
@@ -69,21 +69,22 @@ std::vector<Color> perceivedColors(const Planes& ycxcz, const metrics::EyeFilter
   return colors;
 }
 
-/// The largest difference that two colors of a screen have: green and blue.
+/// The largest difference of two sRGB colors, which is that of green and blue.
 double largestColorDifference() {
   return std::pow(metrics::hyab(metrics::huntLabFromLinear({0.0, 1.0, 0.0}),
                                 metrics::huntLabFromLinear({0.0, 0.0, 1.0})),
                   kColorExponent);
 }
 
-/// Spreads the differences that pictures mostly have over most of 0 to 1.
+/// Maps a color difference to 0 to 1 with a knee, so that usual differences cover most of the
+/// range.
 double redistributed(double difference, double largest) {
   const double knee = kKneeAt * largest;
   if (difference < knee) return kKneeValue / knee * difference;
   return kKneeValue + (difference - knee) / (largest - knee) * (1.0 - kKneeValue);
 }
 
-/// How strong edges and points are at each pixel.
+/// The strength of edges and points at each pixel.
 struct Features {
   std::vector<double> edges, points;
 };
@@ -106,7 +107,7 @@ double featureDifference(const Features& a, const Features& b, std::size_t i) {
   return std::pow(difference / std::sqrt(2.0), kFeatureExponent);
 }
 
-/// Everything that one picture is compared by.
+/// The filtered colors and features of one picture.
 struct Seen {
   std::vector<Color> colors;
   Features features;

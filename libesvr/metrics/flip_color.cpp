@@ -7,7 +7,7 @@ namespace {
 
 using Matrix = std::array<Color, 3>;  // rows
 
-/// Linear RGB to XYZ for sRGB's primaries and D65.
+/// Matrix from linear RGB to XYZ for sRGB's primaries and D65.
 constexpr Matrix kXyzFromRgb{{
     {10135552.0 / 24577794.0, 8788810.0 / 24577794.0, 4435075.0 / 24577794.0},
     {2613072.0 / 12288897.0, 8788810.0 / 12288897.0, 887015.0 / 12288897.0},
@@ -21,10 +21,10 @@ constexpr Color times(const Matrix& m, const Color& v) {
   return result;
 }
 
-/// XYZ of white: that of RGB (1, 1, 1).
+/// XYZ of white, RGB (1, 1, 1).
 constexpr Color kWhite = times(kXyzFromRgb, {1.0, 1.0, 1.0});
 
-/// Cofactor of an entry; rows and columns taken in turn, so that its sign is right.
+/// Cofactor of an entry. Rows and columns are taken cyclically, which gives the right sign.
 constexpr double cofactor(const Matrix& m, int row, int column) {
   const int r1 = (row + 1) % 3, r2 = (row + 2) % 3;
   const int c1 = (column + 1) % 3, c2 = (column + 2) % 3;
@@ -47,7 +47,7 @@ Color relativeToWhite(const Color& xyz) {
   return {xyz[0] / kWhite[0], xyz[1] / kWhite[1], xyz[2] / kWhite[2]};
 }
 
-/// From three stimuli to lightness and two opponent colors, and back.
+/// Converts three stimuli to lightness and two opponent colors, and back.
 Color opponent(const Color& v) {
   return {116.0 * v[1] - 16.0, 500.0 * (v[0] - v[1]), 200.0 * (v[1] - v[2])};
 }
@@ -56,7 +56,7 @@ Color stimuli(const Color& opponentColor) {
   return {y + opponentColor[1] / 500.0, y, y - opponentColor[2] / 200.0};
 }
 
-/// CIE's cube root with a straight piece near black.
+/// CIE's cube root, which is linear near black.
 double lightness(double v) {
   constexpr double kDelta = 6.0 / 29.0;
   return v > kDelta * kDelta * kDelta ? std::cbrt(v) : v / (3.0 * kDelta * kDelta) + 4.0 / 29.0;

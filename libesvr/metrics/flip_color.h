@@ -8,17 +8,17 @@ namespace esvr::metrics {
 
 using Color = std::array<double, 3>;
 
-/// Linear RGB from what a screen takes (IEC 61966-2-1).
+/// Converts sRGB to linear RGB (IEC 61966-2-1).
 [[nodiscard]] Color linearFromSrgb(const Color& srgb);
 
-/// Opponent colors, linear in the light: what the eye's spatial filters act on.
+/// Converts to opponent colors (YCxCz), which are linear in light and which the filters act on.
 [[nodiscard]] Color ycxczFromLinear(const Color& linear);
 [[nodiscard]] Color linearFromYcxcz(const Color& ycxcz);
 
-/// L*a*b* with chroma that fades in the dark (Hunt): a and b times L / 100.
+/// L*a*b* with the Hunt effect: a and b are multiplied by L / 100.
 [[nodiscard]] Color huntLabFromLinear(const Color& linear);
 
-/// |L difference| + length of the chroma's difference (Abasi et al. 2020).
+/// The distance |difference of L| + length of the difference of chroma (Abasi et al. 2020).
 [[nodiscard]] double hyab(const Color& a, const Color& b);
 
 }  // namespace esvr::metrics

@@ -13,9 +13,9 @@ namespace {
 
 constexpr int kRowsPerTask = 16;
 constexpr double kPi = std::numbers::pi;
-constexpr double kRadii = 3.0;  // standard deviations that a filter reaches
+constexpr double kRadiusInSigmas = 3.0;  // radius of a filter in standard deviations
 
-/// a sqrt(pi / b) exp(-pi^2 d^2 / b), d in degrees: a Gaussian of the paper's fit.
+/// A Gaussian of the paper's fit: a sqrt(pi / b) exp(-pi^2 d^2 / b) with d in degrees.
 struct Term {
   double a, b;
 };
@@ -27,7 +27,7 @@ constexpr double kEdgeWidth = 0.082;  // degrees: two standard deviations
 
 double sum(const Taps& taps) { return std::accumulate(taps.begin(), taps.end(), 0.0); }
 
-/// weight(x) for x from -radius to radius.
+/// The weights weight(x) for x from -radius to radius.
 template <class Weight>
 Taps makeTaps(int radius, const Weight& weight) {
   Taps taps;
@@ -47,7 +47,7 @@ Taps gaussian(const Term& term, double pixelsPerDegree, int radius) {
   });
 }
 
-/// The terms as blurs whose shares sum up to 1.
+/// Makes blurs of the terms; their shares have the sum 1.
 std::vector<Blur> blursOf(std::initializer_list<Term> terms, double pixelsPerDegree, int radius) {
   std::vector<Blur> blurs;
   double total = 0.0;
@@ -62,7 +62,7 @@ std::vector<Blur> blursOf(std::initializer_list<Term> terms, double pixelsPerDeg
   return blurs;
 }
 
-/// Positive weights sum up to 1, negative ones to -1.
+/// Scales the positive weights to the sum 1 and the negative ones to the sum -1.
 Taps balanced(Taps taps) {
   double positive = 0.0, negative = 0.0;
   for (const double tap : taps) (tap > 0.0 ? positive : negative) += std::abs(tap);
@@ -112,7 +112,7 @@ Plane filtered(const Plane& plane, const Taps& x, const Taps& y) {
 }
 
 EyeFilters eyeFilters(double ppd) {
-  const int radius = int(std::ceil(kRadii * std::sqrt(kWidest / (2.0 * kPi * kPi)) * ppd));
+  const int radius = int(std::ceil(kRadiusInSigmas * std::sqrt(kWidest / (2.0 * kPi * kPi)) * ppd));
   return {blursOf({kAchromatic}, ppd, radius), blursOf({kRedGreen}, ppd, radius),
           blursOf({kBlueYellow1, kBlueYellow2}, ppd, radius)};
 }
@@ -129,7 +129,7 @@ Plane blurred(const Plane& plane, const std::vector<Blur>& blurs) {
 
 FeatureFilters featureFilters(double ppd) {
   const double deviation = 0.5 * kEdgeWidth * ppd;
-  const int radius = int(std::ceil(kRadii * deviation));
+  const int radius = int(std::ceil(kRadiusInSigmas * deviation));
   const auto bell = [&](double x) { return std::exp(-x * x / (2.0 * deviation * deviation)); };
   const Taps across = makeTaps(radius, bell);
   return {balanced(makeTaps(radius, [&](double x) { return -x * bell(x); })),

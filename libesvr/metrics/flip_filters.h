@@ -1,11 +1,11 @@
 #pragma once
-/// FLIP's filters. All are products of a filter along x and one along y, or sums of such.
+/// FLIP's filters. Each is a product of a filter along x and a filter along y, or a sum of these.
 
 #include <vector>
 
 namespace esvr::metrics {
 
-/// Weights at the places -radius to radius.
+/// Weights at the offsets -radius to radius.
 using Taps = std::vector<double>;
 
 /// One channel of a picture.
@@ -14,17 +14,17 @@ struct Plane {
   std::vector<double> values;
 };
 
-/// The plane under a filter of taps `x` along rows and `y` along columns; beyond the border, the
-/// border's value goes on.
+/// Filters a plane with the taps `x` along rows and `y` along columns. Outside the plane, the value
+/// of the nearest border pixel is used.
 [[nodiscard]] Plane filtered(const Plane& plane, const Taps& x, const Taps& y);
 
-/// A share of a sum of filters that are alike along both axes.
+/// A term of a sum of filters, with the same taps along both axes.
 struct Blur {
   double share = 1.0;
   Taps taps;  ///< sum up to 1
 };
 
-/// How the eye blurs each opponent channel: Gaussians fitted to its contrast sensitivity.
+/// The blur of each opponent channel: Gaussians fitted to the contrast sensitivity of the eye.
 struct EyeFilters {
   std::vector<Blur> achromatic, redGreen, blueYellow;
 };
@@ -32,8 +32,8 @@ struct EyeFilters {
 
 [[nodiscard]] Plane blurred(const Plane& plane, const std::vector<Blur>& blurs);
 
-/// Derivatives of a Gaussian of the width of an edge that the eye detects. Weights of either sign
-/// sum up to 1 and -1.
+/// Derivatives of a Gaussian that has the width of an edge that the eye detects. The positive
+/// weights have the sum 1, the negative ones the sum -1.
 struct FeatureFilters {
   Taps edge, point, across;
 };

@@ -35,14 +35,14 @@ void checkSizes(const Image& reference, const Image& candidate) {
                      " pixels cannot be compared");
 }
 
-/// One color channel, as a screen would show it.
+/// One color channel, clamped to 0 to 1.
 class Plane {
  public:
   Plane(const Image& image, int channel)
       : width(image.width), height(image.height), values_(std::size_t(width) * height) {
     for (std::size_t i = 0; i < values_.size(); ++i) {
       const double v = image.rgba[i * kChannels + channel];
-      if (std::isnan(v)) throw BadInput("a picture with a color that is no number");
+      if (std::isnan(v)) throw BadInput("a picture has a color that is not a number");
       values_[i] = std::clamp(v, 0.0, kPeak);
     }
   }
@@ -54,7 +54,7 @@ class Plane {
   std::vector<double> values_;
 };
 
-/// A window's taps that lie in a picture, and what they weigh together.
+/// The taps of a window that lie in a picture, and the sum of their weights.
 struct Taps {
   int first, last;
   double weight;
@@ -74,7 +74,7 @@ class Window {
   std::array<double, kSsimTaps> weights_ = ssimWeights();
 };
 
-/// Weighted means over windows: of a, b, a^2, b^2 and a b.
+/// Weighted means of a, b, a^2, b^2 and a b over windows.
 struct Means {
   double a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
 
@@ -85,7 +85,7 @@ struct Means {
 
 Means productsOf(double a, double b) { return {a, b, a * a, b * b, a * b}; }
 
-/// Down the columns of a row of windows.
+/// Sums along the columns for a row of windows.
 std::vector<Means> columnMeans(const Plane& a, const Plane& b, const Window& window, int y) {
   std::vector<Means> means(a.width);
   const Taps taps = window.within(y, a.height);
@@ -179,7 +179,7 @@ Image errorMap(const Image& reference, const Image& candidate, double gain) {
 }
 
 Image sideBySide(std::span<const Image> images) {
-  if (images.empty()) throw UsageError("no pictures to put beside each other");
+  if (images.empty()) throw UsageError("there are no pictures to place side by side");
   for (const Image& image : images) checkSizes(images.front(), image);
   const std::size_t ofRow = std::size_t(kChannels) * std::size_t(images.front().width);
   Image all{int(images.size()) * images.front().width, images.front().height, {}};

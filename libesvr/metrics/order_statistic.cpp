@@ -13,14 +13,14 @@ namespace {
 constexpr int kDigitBits = 16;
 constexpr int kKeyBits = 64;
 constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
-constexpr std::size_t kPairsPerTask = 4096;  // a task's counters are as large as 512 bricks
+constexpr std::size_t kPairsPerTask = 4096;  // large, since a task's counters take 512 KB
 
 using Histogram = std::vector<std::uint64_t>;
 
-/// Bits that order as the non-negative value does.
+/// The bit pattern of a non-negative value, which has the same order as the values.
 std::uint64_t keyOf(double value) { return std::bit_cast<std::uint64_t>(value); }
 
-/// Calls visit(|error|) at every voxel that either side has active.
+/// Calls visit(|error|) at every voxel that is active in either volume.
 template <class Visit>
 void visitErrors(const BrickPair& pair, const Backgrounds& backgrounds, Visit visit) {
   const PairValues values(pair, backgrounds);
@@ -29,7 +29,7 @@ void visitErrors(const BrickPair& pair, const Backgrounds& backgrounds, Visit vi
       visit(std::abs(values.error(offset)));
 }
 
-/// The answer's leading bits as far as they are known.
+/// The leading bits of the result that are known so far.
 struct Prefix {
   std::uint64_t bits = 0;
   int unknown = kKeyBits;  ///< trailing bits still to be found

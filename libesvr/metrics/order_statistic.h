@@ -1,5 +1,5 @@
 #pragma once
-/// An exact order statistic of the errors, without storing them.
+/// An exact order statistic of the errors, computed without storing them.
 
 #include <cstdint>
 #include <span>
@@ -8,14 +8,14 @@
 
 namespace esvr::metrics {
 
-/// The rank-th smallest |error| (from 1) over the union of active voxels. Selects the digits of the
-/// answer's bit pattern one after the other by counting: memory does not follow the voxels, and
-/// counts do not depend on the order of threads.
+/// The rank-th smallest |error| (from 1) over the union of active voxels. The digits of its bit
+/// pattern are determined one after the other by counting. The memory does not depend on the number
+/// of voxels, and the counts do not depend on the order of threads.
 [[nodiscard]] double errorOfRank(std::span<const BrickPair> pairs, const Backgrounds& backgrounds,
                                  std::uint64_t rank);
 
-/// Rank of a percentile by the nearest-rank definition: the smallest that at least `permille`
-/// thousandths of `count` values do not exceed.
+/// Rank of a percentile by the nearest-rank definition: the rank of the smallest value that at
+/// least `permille` thousandths of `count` values do not exceed.
 [[nodiscard]] std::uint64_t nearestRank(std::uint64_t count, std::uint64_t permille);
 
 }  // namespace esvr::metrics

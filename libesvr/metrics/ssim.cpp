@@ -39,7 +39,7 @@ class SsimFormula {
         (2.0 * m.meanA * m.meanB + c_.c1) / (square(m.meanA) + square(m.meanB) + c_.c1);
     return luminance * (2.0 * m.covariance + c_.c2) / (m.varianceA + m.varianceB + c_.c2);
   }
-  /// Of a window that sees the backgrounds only; exactly 1 where they are equal.
+  /// SSIM of a window that covers the backgrounds only; exactly 1 if they are equal.
   [[nodiscard]] double ofBackgrounds(const Backgrounds& b) const {
     return (*this)({b.reference, b.candidate, 0.0, 0.0, 0.0});
   }
@@ -49,7 +49,7 @@ class SsimFormula {
   SsimConstants c_;
 };
 
-/// What all bricks of one comparison share.
+/// The data that all bricks of a comparison share.
 struct SsimScene {
   std::span<const BrickPair> pairs;
   Box box;
@@ -57,17 +57,19 @@ struct SsimScene {
   SsimFormula formula;
 };
 
-/// The SSIM map of one brick at a time. Works on differences from the backgrounds, which are zero
-/// in empty space: means shift by the background, variances not at all.
+/// Computes the SSIM map of one brick at a time. It uses the differences from the backgrounds,
+/// which are zero in empty space. Means are then shifted by the background; variances are
+/// unchanged.
 class SsimBrick {
  public:
   explicit SsimBrick(const SsimScene& scene) : scene_(scene) {}
 
-  /// Sum over the brick's voxels in the box of (SSIM - SSIM of empty space).
+  /// Sum of (SSIM - SSIM of empty space) over the brick's voxels in the box.
   double excess(Coord brick);
 
  private:
-  /// Of the windows around a brick's voxels, along one axis: less than 1 where the box clips them.
+  /// Weights of the windows around a brick's voxels along one axis: less than 1 if the box clips
+  /// the window.
   using AxisWeights = std::array<double, kBrickSide>;
 
   void gather(Coord brick);
@@ -154,7 +156,7 @@ double SsimBrick::excess(Coord brick) {
   const AxisWeights weightsY = axisWeights(corner.y, box.min.y, box.max.y);
   const AxisWeights weightsZ = axisWeights(corner.z, box.min.z, box.max.z);
   const double empty = scene_.formula.ofBackgrounds(scene_.backgrounds);
-  // The other windows see background only: their excess is exactly zero.
+  // The other windows cover background only, and their difference is exactly zero.
   const Box inBox = metrics::localBox(brick, box), reached = windowsThatSee(support_);
   const Box local{maxCoord(inBox.min, reached.min), minCoord(inBox.max, reached.max)};
   double sum = 0.0;
@@ -167,7 +169,7 @@ double SsimBrick::excess(Coord brick) {
   return sum;
 }
 
-/// Bricks of the box whose windows can see anything but background.
+/// The bricks of the box whose windows may cover more than background.
 std::vector<Coord> bricksToVisit(std::span<const BrickPair> pairs, const Box& box) {
   std::vector<Coord> bricks(pairs.size());
   std::transform(pairs.begin(), pairs.end(), bricks.begin(),

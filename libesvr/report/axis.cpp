@@ -8,7 +8,7 @@
 namespace esvr::report {
 namespace {
 
-constexpr double kRoom = 0.04;  // beyond the outermost values, of the axis
+constexpr double kMargin = 0.04;  // margin at each end, relative to the range of the values
 constexpr double kMaxTicks = 8.0;
 
 std::string labelOf(double value) {
@@ -20,7 +20,7 @@ std::string labelOf(double value) {
   return text.data();
 }
 
-/// The smallest of 1, 2 and 5 times a power of ten that is not below.
+/// The smallest number of the form 1, 2 or 5 times a power of ten that is not below a number.
 double roundUp(double value) {
   const double power = std::pow(10.0, std::floor(std::log10(value)));
   for (const double digit : {1.0, 2.0, 5.0})
@@ -32,7 +32,7 @@ double roundUp(double value) {
 
 Axis::Axis(std::span<const double> values, bool logarithmic) : logarithmic_(logarithmic) {
   include(values);
-  const double room = high_ > low_ ? kRoom * (high_ - low_) : 0.5;
+  const double room = high_ > low_ ? kMargin * (high_ - low_) : 0.5;
   low_ -= room;
   high_ += room;
 }
@@ -64,7 +64,7 @@ std::vector<double> Axis::linearTicks() const {
   return values;
 }
 
-/// Powers of ten, and between them 2 and 5, or every digit, where there are few.
+/// Ticks at the powers of ten; if there are few of them, also at 2 and 5, or at every digit.
 std::vector<double> Axis::logarithmicTicks() const {
   constexpr double kFewDecades = 3.0, kOneDecade = 1.0;
   const double decades = high_ - low_;

@@ -1,5 +1,5 @@
 #pragma once
-/// An axis of a plot: from values to places, and where to write numbers.
+/// An axis of a plot: it maps values to positions and chooses the ticks.
 
 #include <span>
 #include <string>
@@ -14,14 +14,15 @@ struct Tick {
 
 class Axis {
  public:
-  /// An axis that holds all values and some room around them. On a logarithmic one values that are
-  /// not above 0 take no part.
+  /// Makes an axis that covers all values with a margin. A logarithmic axis ignores values that are
+  /// not above 0.
   Axis(std::span<const double> values, bool logarithmic);
 
   [[nodiscard]] bool holds(double value) const;
-  /// 0 at the lower end, 1 at the upper. \param value  one that the axis holds
+  /// The position of a value: 0 at the lower end, 1 at the upper end.
+  /// \param value  a value that the axis covers
   [[nodiscard]] double place(double value) const;
-  /// At round numbers, some five to ten of them.
+  /// About five to ten ticks at round numbers.
   [[nodiscard]] std::vector<Tick> ticks() const;
 
  private:

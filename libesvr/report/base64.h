@@ -1,5 +1,5 @@
 #pragma once
-/// Bytes as text (RFC 4648), for pictures within a page.
+/// Base64 (RFC 4648), for pictures within a page.
 
 #include <string>
 #include <string_view>

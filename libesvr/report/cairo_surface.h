@@ -1,5 +1,5 @@
 #pragma once
-/// Cairo's surfaces, owned and checked.
+/// Cairo surfaces with ownership and error checks.
 
 #include <cairo.h>
 
@@ -18,13 +18,13 @@ struct FreeContext {
 };
 using Context = std::unique_ptr<cairo_t, FreeContext>;
 
-/// \throws RuntimeFailure  cairo's own words
+/// \throws RuntimeFailure  cairo reports an error (the text is cairo's)
 void check(cairo_status_t status);
 
-/// The surface as a PNG file's bytes. \throws RuntimeFailure
+/// Encodes a surface as PNG. \throws RuntimeFailure  cairo reports an error
 [[nodiscard]] std::string pngBytes(const Surface& surface);
 
-/// Appends to the std::string that `closure` points to: cairo's way of writing.
+/// A write callback for cairo, which appends to the std::string that `closure` points to.
 cairo_status_t appendBytes(void* closure, const unsigned char* data, unsigned int length);
 
 }  // namespace esvr::report

@@ -83,7 +83,7 @@ DataTable withColumns(const DataTable& table, const std::vector<std::string>& ke
   for (const auto& key : keys) {
     const auto column = std::find_if(table.columns.begin(), table.columns.end(),
                                      [&](const Column& c) { return c.key == key; });
-    if (column == table.columns.end()) throw std::logic_error("no column is called " + key);
+    if (column == table.columns.end()) throw std::logic_error("the table has no column " + key);
     result.columns.push_back(*column);
     const auto at = std::size_t(column - table.columns.begin());
     for (std::size_t r = 0; r < table.rows.size(); ++r) result.rows[r].push_back(table.rows[r][at]);

@@ -1,5 +1,5 @@
 #pragma once
-/// A table of figures on its way to a terminal, a page or a spreadsheet.
+/// A table of figures as text, Markdown or comma-separated values.
 
 #include <string>
 #include <variant>
@@ -7,7 +7,7 @@
 
 namespace esvr::report {
 
-/// How a column's figures read.
+/// The format of a column's figures.
 enum class Kind {
   kText,
   kBytes,     ///< all digits
@@ -24,30 +24,31 @@ struct Column {
   Kind kind = Kind::kNumber;
 };
 
-/// Nothing where there is no figure.
+/// A figure or a text; nothing if there is no figure.
 using Cell = std::variant<std::monostate, double, std::string>;
 using Row = std::vector<Cell>;
 
-/// Rows are as long as `columns`.
+/// A table whose rows have as many cells as there are columns.
 struct DataTable {
   std::string title;
   std::vector<Column> columns;
   std::vector<Row> rows;
 };
 
-/// As people read it; "-" where there is none.
+/// A cell in a form for people; "-" if there is no figure.
 [[nodiscard]] std::string cellText(const Column& column, const Cell& cell);
 
-/// All digits, "inf" for what is infinite, nothing where there is none.
+/// A cell with all digits; "inf" if it is infinite, empty if there is no figure.
 [[nodiscard]] std::string exactText(const Cell& cell);
 
-/// The columns of these keys, in their order. \throws std::logic_error  no such column
+/// A table of the columns with these keys, in the order of the keys.
+/// \throws std::logic_error  a column does not exist
 [[nodiscard]] DataTable withColumns(const DataTable& table, const std::vector<std::string>& keys);
 
-/// Comma-separated values (RFC 4180): a line of keys, then the rows.
+/// The table as comma-separated values (RFC 4180): a line of keys, then the rows.
 [[nodiscard]] std::string toCsv(const DataTable& table);
 
-/// A GitHub table under a heading.
+/// The table in GitHub's Markdown, under a heading.
 [[nodiscard]] std::string toMarkdown(const DataTable& table);
 
 }  // namespace esvr::report

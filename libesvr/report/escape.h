@@ -1,13 +1,13 @@
 #pragma once
-/// Text of unknown origin on its way into HTML, XML and UTF-8.
+/// Escapes text of unknown origin for HTML and XML.
 
 #include <string>
 #include <string_view>
 
 namespace esvr::report {
 
-/// The text with markup's characters as entities; what is no UTF-8, or a control character but a
-/// line's end, becomes '?'.
+/// Replaces markup characters by entities. Bytes that are not UTF-8 and control characters other
+/// than line feeds become '?'.
 [[nodiscard]] std::string escaped(std::string_view text);
 
 }  // namespace esvr::report

@@ -26,8 +26,8 @@ figure img { max-width: 100%; }
 pre { background: #f4f4f4; padding: 1em; overflow-x: auto; }
 )";
 
-// A click sorts by the column, numbers by value and rows without a figure last; another click turns
-// the order around. A slider cuts the candidate's picture off on its left.
+// A click on a header sorts by this column, numbers by value and rows without a figure last;
+// another click reverses the order. A slider hides the left part of the candidate's picture.
 constexpr const char* kScript = R"(
 function sortBy(header) {
   const table = header.closest('table'), body = table.tBodies[0], at = header.cellIndex;
@@ -63,7 +63,8 @@ const char* classOf(const Column& column) {
   return column.kind == Kind::kText ? " class=\"text\"" : "";
 }
 
-/// The number that a cell sorts by; none for text, empty where there is no figure.
+/// The attribute with the number by which a cell is sorted: none for text, empty if there is no
+/// figure.
 std::string sortValue(const Column& column, const Cell& cell) {
   if (column.kind == Kind::kText) return {};
   const auto* value = std::get_if<double>(&cell);

@@ -1,5 +1,5 @@
 #pragma once
-/// One self-contained page: no file beside it, nothing from the network.
+/// A self-contained HTML page, which needs no other file and no network.
 
 #include <string>
 #include <vector>
@@ -8,14 +8,14 @@
 
 namespace esvr::report {
 
-/// A picture as bytes of a file of its type, shown under a caption.
+/// A picture as the bytes of a file, with a caption.
 struct Picture {
   std::string caption;
   std::string type;  ///< "image/png", "image/svg+xml"
   std::string bytes;
 };
 
-/// Two pictures of one size in one place; a slider moves the border between them.
+/// Two pictures of the same size on top of each other; a slider moves the border between them.
 struct Slider {
   std::string caption;
   Picture reference, candidate;
@@ -30,7 +30,7 @@ struct HtmlPage {
   std::vector<std::string> commands;  ///< and versions: a line each
 };
 
-/// HTML 5 in UTF-8. Whatever the texts hold, they are text.
+/// The page as HTML 5 in UTF-8. All texts are escaped.
 [[nodiscard]] std::string toHtml(const HtmlPage& page);
 
 }  // namespace esvr::report

@@ -16,7 +16,7 @@ namespace {
 struct Rgb {
   double r, g, b;
 };
-/// Okabe and Ito's colors, which those who see few colors can tell apart, without yellow on white.
+/// The colors of Okabe and Ito, which color-blind people can distinguish, without yellow.
 constexpr std::array kPalette{Rgb{0.00, 0.45, 0.70}, Rgb{0.84, 0.37, 0.00}, Rgb{0.00, 0.62, 0.45},
                               Rgb{0.80, 0.47, 0.65}, Rgb{0.00, 0.00, 0.00}, Rgb{0.34, 0.71, 0.91},
                               Rgb{0.90, 0.62, 0.00}, Rgb{0.50, 0.50, 0.50}, Rgb{0.45, 0.20, 0.55},
@@ -30,7 +30,7 @@ constexpr double kTurn = 6.283185307179586, kQuarter = kTurn / 4;
 
 enum class Anchor { kStart, kMiddle, kEnd };
 
-/// Draws one plot on a surface of its size.
+/// Draws a plot on a surface of its size.
 class Painter {
  public:
   Painter(const Plot& plot, const Surface& surface)
@@ -74,7 +74,7 @@ class Painter {
     cairo_stroke(cr_.get());
   }
 
-  /// Sets the font, too.
+  /// The extents of a text; this also sets the font.
   double widthOf(const std::string& shown, double size) {
     cairo_select_font_face(cr_.get(), "sans-serif", CAIRO_FONT_SLANT_NORMAL,
                            CAIRO_FONT_WEIGHT_NORMAL);
@@ -128,11 +128,11 @@ class Painter {
   }
 
   void drawSeries(std::size_t i) {
-    constexpr std::size_t kMaxMarkers = 40;  // more would hide the line
+    constexpr std::size_t kMaxMarkers = 40;  // more markers would hide the line
     const auto& points = plot_.series[i].points;
     color(colorOf(i));
     cairo_set_line_width(cr_.get(), kLine);
-    cairo_new_path(cr_.get());  // a text leaves its end as the current point
+    cairo_new_path(cr_.get());  // a text sets the current point to its end
     for (const Point& point : points)
       if (shows(point)) cairo_line_to(cr_.get(), pixelX(point.x), pixelY(point.y));
     cairo_stroke(cr_.get());
@@ -145,7 +145,7 @@ class Painter {
     return x_.holds(point.x) && y_.holds(point.y);
   }
 
-  /// Beside the curves, so that it hides none.
+  /// Draws the legend beside the curves.
   void measureLegend() {
     for (const auto& series : plot_.series)
       legendWidth_ = std::max(

@@ -1,5 +1,5 @@
 #pragma once
-/// Curves as a picture, drawn by cairo: the same lines as SVG and as PNG.
+/// Plots of curves, drawn by cairo as SVG and as PNG.
 
 #include <string>
 #include <vector>
@@ -22,7 +22,7 @@ struct Plot {
   int width = 900, height = 560;  ///< pixels
 };
 
-/// \throws RuntimeFailure  cairo's own words
+/// \throws RuntimeFailure  cairo reports an error (the text is cairo's)
 [[nodiscard]] std::string toSvg(const Plot& plot);
 [[nodiscard]] std::string toPng(const Plot& plot);
 

@@ -10,7 +10,7 @@
 namespace esvr::report {
 namespace {
 
-/// Cairo's RGB24: blue in the lowest byte of a word.
+/// A color in cairo's RGB24, with blue in the lowest byte of a word.
 std::uint32_t pixelOf(const float* rgba) {
   std::uint32_t pixel = 0;
   for (int c = 0; c < 3; ++c)

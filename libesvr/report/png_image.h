@@ -1,5 +1,5 @@
 #pragma once
-/// Rendered pictures as PNG.
+/// Converts pictures to PNG.
 
 #include <string>
 
@@ -7,7 +7,8 @@
 
 namespace esvr::report {
 
-/// The colors in front of black, 8 bits each. \throws RuntimeFailure
+/// The colors in front of black with 8 bits per channel, as PNG.
+/// \throws RuntimeFailure  cairo reports an error
 [[nodiscard]] std::string toPng(const Image& image);
 
 }  // namespace esvr::report

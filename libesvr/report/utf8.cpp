@@ -6,7 +6,7 @@
 namespace esvr::report {
 namespace {
 
-/// Bytes of the UTF-8 character that begins here; 0 where none does.
+/// The number of bytes of the UTF-8 character at this position; 0 if there is none.
 std::size_t characterAt(std::string_view text) {
   const auto byte = [&](std::size_t i) { return std::uint8_t(text[i]); };
   const std::size_t length = byte(0) < 0x80   ? 1

@@ -1,12 +1,12 @@
 #pragma once
-/// Text of unknown origin as UTF-8.
+/// Converts text of unknown origin to valid UTF-8.
 
 #include <string>
 #include <string_view>
 
 namespace esvr::report {
 
-/// What is no UTF-8, or a control character but a line's end, becomes '?'.
+/// Replaces bytes that are not UTF-8, and control characters other than line feeds, by '?'.
 [[nodiscard]] std::string validUtf8(std::string_view text);
 
 }  // namespace esvr::report
