@@ -14,7 +14,7 @@ namespace esvr::samples {
 namespace {
 
 constexpr int kBlobs = 40;
-constexpr double kSmallestRadius = 0.06, kLargestRadius = 0.22;  // of the cube's side
+constexpr double kSmallestRadius = 0.06, kLargestRadius = 0.22;  // in sides of the cube
 
 double heightAt(const Blob& blob, Vec3 p) {
   const Vec3 d = p - blob.center;

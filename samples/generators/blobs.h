@@ -1,5 +1,5 @@
 #pragma once
-/// Diffuse blobs: smooth densities without any edge.
+/// Diffuse blobs: smooth densities without an edge.
 
 #include <cstdint>
 #include <optional>
@@ -12,16 +12,17 @@
 
 namespace esvr::samples {
 
-/// height * (1 - (distance / radius)^2)^3: three derivatives vanish at the rim. Index coordinates.
+/// A blob in index coordinates: height * (1 - (distance / radius)^2)^3, of which two derivatives
+/// vanish at the rim.
 struct Blob {
   Vec3 center;
   double radius = 0.0, height = 0.0;
 };
 
-/// The sum of blobs above a background; what is fainter than kFaintestBlob is empty.
+/// A background plus a sum of blobs; points where the sum is below kFaintestBlob are empty.
 class BlobShape {
  public:
-  /// \param blobs  must outlive all that is narrowed from this shape
+  /// \param blobs  blobs that outlive all shapes narrowed from this one
   BlobShape(std::span<const Blob> blobs, float background);
 
   [[nodiscard]] std::optional<BlobShape> within(const Ball& ball) const;

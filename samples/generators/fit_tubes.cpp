@@ -35,8 +35,7 @@ ScaledTubes fitTubes(std::span<const Tube> tubes, const TubeScale& scale) {
   const Extent extent = extentOf(tubes);
   const Vec3 size = extent.high - extent.low;
   const double longest = std::max({size.x, size.y, size.z});
-  if (!(longest > 0.0) || !std::isfinite(longest))
-    throw BadInput("the tubes have no extent: nothing to make voxels of");
+  if (!(longest > 0.0) || !std::isfinite(longest)) throw BadInput("the tubes have no extent");
 
   ScaledTubes scaled;
   scaled.voxelSize = longest / scale.resolution;

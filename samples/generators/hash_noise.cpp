@@ -5,7 +5,7 @@
 namespace esvr::samples {
 namespace {
 
-constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15u;  // 2^64 / golden ratio: spreads counters
+constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15u;  // 2^64 / golden ratio, spreads counters
 
 /// Stafford's mixer 13 of the 64-bit finaliser of MurmurHash3.
 std::uint64_t mix(std::uint64_t h) {
@@ -16,8 +16,8 @@ std::uint64_t mix(std::uint64_t h) {
 
 double unit(std::uint64_t h) { return double(h >> 11) * 0x1p-53; }
 
-/// Odd numbers near 2^64 / p, 2^64 / p^2, 2^64 / p^3, where p^4 = p + 1: multiples of them fill the
-/// range evenly, so that one mixing serves three coordinates.
+/// Odd numbers near 2^64 / p, 2^64 / p^2 and 2^64 / p^3 with p^4 = p + 1. Their multiples fill the
+/// range evenly, so that one mixing step suffices for three coordinates.
 constexpr std::uint64_t kStrideX = 0xd1b54a32d192ed03u;
 constexpr std::uint64_t kStrideY = 0xabc98388fb8fac03u;
 constexpr std::uint64_t kStrideZ = 0x8cb92ba72f3d8dd7u;
@@ -28,7 +28,7 @@ double latticeValue(std::uint64_t start, std::int64_t x, std::int64_t y, std::in
   return 2.0 * unit(mix(start + place)) - 1.0;
 }
 
-/// Weight with two vanishing derivatives at 0 and 1, so that noise has no visible lattice.
+/// A weight whose first two derivatives vanish at 0 and 1, so that noise shows no lattice.
 double fade(double t) { return t * t * t * (t * (t * 6.0 - 15.0) + 10.0); }
 
 double mixLinear(double a, double b, double t) { return a + (b - a) * t; }

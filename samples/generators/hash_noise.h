@@ -1,6 +1,6 @@
 #pragma once
-/// Random numbers and noise that are the same on every machine: integer hashes and exact float64
-/// operations, nothing of the standard library's distributions or transcendental functions.
+/// Random numbers and noise that are the same on every machine. They use integer hashes and exact
+/// float64 operations, but no distributions or transcendental functions of the standard library.
 
 #include <cstdint>
 
@@ -11,7 +11,7 @@ namespace esvr::samples {
 /// Mixes all bits of a counter and a seed.
 [[nodiscard]] std::uint64_t hash(std::uint64_t seed, std::uint64_t counter);
 
-/// A stream of random numbers: the n-th is a hash of n.
+/// A stream of random numbers, of which the n-th is a hash of n.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : seed_(seed) {}
@@ -28,10 +28,11 @@ class Random {
 /// Smooth noise with features of size 1, in [-1, 1].
 [[nodiscard]] double noise(std::uint64_t seed, Vec3 p);
 
-/// Steepest slope of noise along an axis: its range times the steepest slope of the fade, 15 / 8.
+/// Largest slope of noise along an axis: its range times the largest slope of the fade, 15 / 8.
 inline constexpr double kNoiseSlope = 2.0 * 15.0 / 8.0;
 
-/// Sum of noise of sizes 1, 1/2, 1/4, ... weighted 1, 1/2, 1/4, ..., scaled to stay in [-1, 1].
+/// Sum of noise with features of sizes 1, 1/2, 1/4, ... and weights 1, 1/2, 1/4, ..., scaled to
+/// [-1, 1].
 [[nodiscard]] double fractalNoise(std::uint64_t seed, Vec3 p, int octaves);
 
 }  // namespace esvr::samples

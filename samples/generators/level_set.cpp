@@ -6,7 +6,7 @@
 namespace esvr::samples {
 namespace {
 
-// In units of the resolution, around the middle.
+// Lengths are in units of the resolution, relative to the middle.
 constexpr double kRingRadius = 0.33, kRingThickness = 0.1;
 constexpr Vec3 kBallCenters[] = {{0.33, 0.0, 0.0}, {-0.2, 0.1, 0.2}};
 constexpr double kBallRadius = 0.15;

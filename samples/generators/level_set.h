@@ -11,14 +11,16 @@ namespace esvr::samples {
 
 inline constexpr double kBandVoxels = 3.0;  ///< half width of the narrow band, OpenVDB's default
 
-/// A ring and two balls that cut into it, about `resolution` voxels wide. Values are distances
-/// times the voxel size, negative inside; active within the band; +-background beyond it.
+/// A ring and two balls that intersect it, about `resolution` voxels wide. Values are distances
+/// times the voxel size, negative inside. Voxels within the band are active; others hold plus or
+/// minus the background.
 class LevelSetShape {
  public:
   LevelSetShape(int resolution, double voxelSize)
       : resolution_(resolution), voxelSize_(voxelSize) {}
 
-  /// In voxels; exact but deep inside, where parts overlap: there it is a lower bound of the depth.
+  /// The signed distance in voxels. It is exact except deep inside, where parts overlap; there it
+  /// is a lower bound of the depth.
   [[nodiscard]] double distance(Vec3 p) const;
   [[nodiscard]] std::optional<LevelSetShape> within(const Ball& ball) const;
   [[nodiscard]] Sample at(Vec3 p) const;

@@ -14,18 +14,19 @@
 namespace esvr::samples {
 namespace {
 
-// Lengths are in units of the resolution, around the middle of the cube.
+// Lengths are in units of the resolution, relative to the middle of the cube.
 constexpr double kChunkCenter = 0.25, kChunkHalf = 0.21, kChunkNoiseSize = 0.1;
 constexpr double kShellRadius = 0.45, kShellThickness = 0.02;
 constexpr double kDiffuseRadius = 0.28, kDiffuseEdge = 0.4;
-constexpr double kFaintest = 1.0 / 1024.0;  // fainter voxels count as empty
+constexpr double kFaintest = 1.0 / 1024.0;  // smallest value of a voxel that is not empty
 
 Vec3 fromMiddle(Vec3 voxel, int resolution) {
   return (voxel + Vec3{0.5, 0.5, 0.5}) * (1.0 / resolution) - Vec3{0.5, 0.5, 0.5};
 }
 
-/// A solid given by the distance to its surface and a density inside, with a soft edge.
-/// Solid has distance(p), which changes no faster than p, and density(p); p as of fromMiddle.
+/// A solid with a soft edge.
+/// \tparam Solid  a type with distance(p), the distance to the surface (with a slope of at most 1),
+///                and density(p); p is a result of fromMiddle
 template <class Solid>
 class SoftShape {
  public:
@@ -97,8 +98,8 @@ SparseVolume makeTubes(const std::vector<Tube>& tubes, const SampleOptions& opti
                        options.limits);
 }
 
-/// A tube winding around the x axis of its own frame, from x = -0.5 to 0.5. Turns by a fixed angle
-/// a step: of cosine 24/25 and sine 7/25, exact without a trigonometric function.
+/// A tube that winds around the x axis of its own frame from x = -0.5 to 0.5. Each step turns by
+/// the angle with cosine 24/25 and sine 7/25, which needs no trigonometric function.
 void appendWiggle(std::vector<Tube>& tubes, Vec3 start, double radius) {
   constexpr int kSteps = 66;  // 3 turns
   constexpr double kCos = 24.0 / 25.0, kSin = 7.0 / 25.0, kAmplitude = 0.12, kThickness = 0.018;

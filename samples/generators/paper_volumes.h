@@ -1,6 +1,6 @@
 #pragma once
 /// The five synthetic volumes on which the paper compares kinds of ellipsoids (appendix, 'Ellipsoid
-/// Type Comparison'). It shows slices and gives no formulas: these have the same character.
+/// Type Comparison'). The paper shows slices and gives no formulas; these volumes are similar.
 
 #include "esvr/sparse_volume.h"
 #include "generators/sample_options.h"

@@ -10,19 +10,18 @@
 namespace esvr::samples {
 namespace {
 
-// All lengths in heights of the plume.
+// All lengths are in units of the plume's height.
 constexpr double kFootRadius = 0.05, kWidening = 0.2;
-constexpr double kSway = 0.05;        // how far the axis strays
-constexpr double kSwaySize = 0.4;     // height over which it does
-constexpr double kBillowSize = 0.12;  // largest eddies
-constexpr double kBillowDepth =
-    1.1;  // smoke reaches this far out, in radii, and eddies cut as deep
-constexpr double kWarpSize = 0.25, kWarp = 0.05;  // eddies drag each other along
-constexpr double kFadeStart = 0.7;                // the top dissolves from this height on
+constexpr double kSway = 0.05;                    // amplitude of the axis's deviation
+constexpr double kSwaySize = 0.4;                 // size of the axis's bends
+constexpr double kBillowSize = 0.12;              // size of the largest eddies
+constexpr double kBillowDepth = 1.1;              // depth of eddies, in radii of the envelope
+constexpr double kWarpSize = 0.25, kWarp = 0.05;  // size and amplitude of the warp of eddies
+constexpr double kFadeStart = 0.7;                // height at which the top begins to dissolve
 constexpr double kSmallestEddy = 4.0;             // voxels
-constexpr double kFaintest = 1.0 / 512.0;         // fainter voxels count as empty
+constexpr double kFaintest = 1.0 / 512.0;         // smallest value of a voxel that is not empty
 
-/// Bound on how fast (distance to the axis - kBillowDepth * radius of the envelope) changes.
+/// Bound on the slope of (distance to the axis - kBillowDepth * radius of the envelope).
 constexpr double kAxisSlope = kSway * (1.0 + kNoiseSlope / kSwaySize);  // along x, and along z
 constexpr double kEnvelopeSlope = 1.0 + 2.0 * kAxisSlope + kBillowDepth * kWidening;
 

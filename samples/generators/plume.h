@@ -10,8 +10,8 @@
 
 namespace esvr::samples {
 
-/// Smoke that rises along y, widens and breaks up, `resolution` voxels high. The noise goes down to
-/// a few voxels: a finer plume has more detail, as smoke has.
+/// Smoke that rises along y, widens and dissolves; it is `resolution` voxels high. The noise has
+/// features down to a few voxels, so a finer plume has more detail.
 class PlumeShape {
  public:
   PlumeShape(std::uint64_t seed, int resolution);
@@ -20,7 +20,7 @@ class PlumeShape {
   [[nodiscard]] Sample at(Vec3 voxel) const;
 
  private:
-  // points p below: height 0 to 1 along y, the axis near x = z = 0
+  // points p have a height of 0 to 1 along y; the axis is near x = z = 0
   [[nodiscard]] Vec3 place(Vec3 voxel) const;
   [[nodiscard]] double envelopeRadius(double y) const;
   [[nodiscard]] double distanceToAxis(Vec3 p) const;

@@ -1,5 +1,5 @@
 #pragma once
-/// What all generators take.
+/// The options of all generators.
 
 #include <cstdint>
 #include <limits>
@@ -8,7 +8,7 @@
 
 namespace esvr::samples {
 
-/// When to give up.
+/// Limits of a generation.
 struct Limits {
   std::uint64_t maxBricks = std::numeric_limits<std::uint64_t>::max();  ///< then DeviceError
   const CancelToken* cancel = nullptr;                                  ///< then Cancelled

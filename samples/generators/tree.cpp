@@ -9,14 +9,15 @@ namespace esvr::samples {
 namespace {
 
 constexpr double kTrunkRadius = 1.0;
-constexpr double kTwigRadius = 0.09;  // branches thinner than this do not fork
+constexpr double kTwigRadius = 0.09;  // radius below which branches do not fork
 constexpr int kTubesPerBranch = 6;
-constexpr double kTubeLength = 2.9;  // in radii of the branch
+constexpr double kTubeLength = 2.9;  // length of a tube in radii of the branch
 constexpr double kMeander = 0.32;    // random share of each step's direction
-constexpr double kTaper = 0.98;      // of the radius, a step
+constexpr double kTaper = 0.98;      // factor of the radius for each step
 constexpr double kSpread = 0.45;     // sideways share of a fork's directions
 
-/// Radii of a fork's two branches over their parent's: by Murray's law their cubes sum to 1.
+/// Radii of a fork's two branches relative to their parent's. By Murray's law the sum of their
+/// cubes is 1.
 constexpr std::array<std::array<double, 2>, 3> kForks{
     {{0.794, 0.794}, {0.870, 0.699}, {0.930, 0.580}}};
 
@@ -25,7 +26,7 @@ struct Branch {
   double radius;
 };
 
-/// Adds a branch's tubes. \return where it ends
+/// Adds the tubes of a branch. \return the end of the branch
 Branch grow(Branch at, Random& random, std::vector<Tube>& tubes) {
   for (int i = 0; i < kTubesPerBranch; ++i) {
     at.direction = normalised(at.direction + random.direction() * kMeander);

@@ -9,12 +9,13 @@
 
 namespace esvr::samples {
 
-/// The tree's tubes, its longest side being `resolution` voxels. The tree is the same for every
-/// resolution, but that no tube is thinner than kThinnestTube.
+/// The tubes of the tree, whose longest side is `resolution` voxels. The tree is the same for every
+/// resolution, except that no tube is thinner than kThinnestTube.
 [[nodiscard]] std::vector<Tube> treeTubes(const SampleOptions& options);
 
 [[nodiscard]] SparseVolume makeTree(const SampleOptions& options);
 
-inline constexpr double kThinnestTube = 0.75;  ///< radius in voxels: thinner would break up
+inline constexpr double kThinnestTube =
+    0.75;  ///< smallest radius in voxels; thinner tubes would have gaps
 
 }  // namespace esvr::samples

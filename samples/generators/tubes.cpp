@@ -31,8 +31,8 @@ Coord floorCoord(Vec3 v) {
 double signedDistance(const Tube& tube, Vec3 p) {
   const Vec3 axis = tube.b - tube.a;
   const double span = length(axis);
-  // the radius shrinks by `slope` a unit of length; where it changes faster than the centre moves,
-  // the larger ball holds the smaller one
+  // the radius shrinks by `slope` for each unit of length; if it changes faster than the centre
+  // moves, the larger ball contains the smaller one
   const double shrink = tube.radiusA - tube.radiusB;
   if (std::abs(shrink) >= span)
     return shrink > 0.0 ? distanceToBall(tube.a, tube.radiusA, p)
@@ -41,7 +41,7 @@ double signedDistance(const Tube& tube, Vec3 p) {
   const Vec3 direction = axis * (1.0 / span), relative = p - tube.a;
   const double along = dot(relative, direction);
   const double across = length(relative - direction * along);
-  // the ball whose surface is nearest: minimum over t of |p - c(t)| - r(t)
+  // the ball with the nearest surface: the minimum over t of |p - c(t)| - r(t)
   const double nearest = along - slope * across / std::sqrt(1.0 - slope * slope);
   const double t = std::clamp(nearest, 0.0, span);
   return distanceToBall(tube.a + direction * t, tube.radiusA - slope * t, p);
@@ -57,8 +57,8 @@ std::optional<TubeShape> TubeShape::within(const Ball& ball) const {
   std::transform(near_.begin(), near_.end(), distances.begin(),
                  [&](std::uint32_t i) { return signedDistance(tubes_[i], ball.center); });
   const double nearest = *std::min_element(distances.begin(), distances.end());
-  // distances change no faster than the place: a tube further than this is the nearest nowhere
-  // in the ball, or too far for its edge to be seen
+  // The slope of distances is at most 1. A tube further away than this is nowhere the nearest in
+  // the ball, or its edge does not reach the ball.
   const double furthest = std::min(nearest + 2.0 * ball.radius, ball.radius + edge_ / 2.0);
   std::vector<std::uint32_t> near;
   for (std::size_t k = 0; k < near_.size(); ++k)

@@ -1,5 +1,5 @@
 #pragma once
-/// Soft-edged tubes: what vessels and neurons look like in a scanner.
+/// Soft-edged tubes, which look like vessels and neurons in a scan.
 
 #include <cstdint>
 #include <memory>
@@ -14,20 +14,20 @@
 
 namespace esvr::samples {
 
-/// A round cone: all balls whose centre goes from a to b while the radius goes from radiusA to
-/// radiusB. Index coordinates.
+/// A round cone in index coordinates: the union of balls whose centre moves from a to b while the
+/// radius changes from radiusA to radiusB.
 struct Tube {
   Vec3 a, b;
   double radiusA = 0.0, radiusB = 0.0;
 };
 
-/// Distance of a point to the surface, negative inside; exact.
+/// The exact distance of a point to the surface, negative inside.
 [[nodiscard]] double signedDistance(const Tube& tube, Vec3 p);
 
-/// The union of tubes: 1 inside, falling to 0 over `edge` voxels across the surface.
+/// The union of tubes: 1 inside, with a soft edge of `edge` voxels to 0 outside.
 class TubeShape {
  public:
-  /// \param tubes  must outlive all that is narrowed from this shape
+  /// \param tubes  tubes that outlive all shapes narrowed from this one
   TubeShape(std::span<const Tube> tubes, double edge);
 
   [[nodiscard]] std::optional<TubeShape> within(const Ball& ball) const;
@@ -42,12 +42,12 @@ class TubeShape {
   std::vector<std::uint32_t> near_;  ///< the tubes that reach where this shape is used
 };
 
-/// The box of voxels that the tubes and their edges reach. \param tubes  not empty
+/// The box of voxels that the tubes and their edges reach. \param tubes  at least one tube
 [[nodiscard]] Box boundsOf(std::span<const Tube> tubes, double edge);
 
-inline constexpr double kDefaultEdge = 2.0;  ///< voxels
+inline constexpr double kDefaultEdge = 2.0;  ///< width of a soft edge, voxels
 
-/// Background 0; active where the value is above 0.
+/// Makes a volume with background 0, in which voxels above 0 are active.
 [[nodiscard]] SparseVolume voxeliseTubes(std::span<const Tube> tubes, double edge,
                                          const Limits& limits);
 

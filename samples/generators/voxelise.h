@@ -1,6 +1,6 @@
 #pragma once
-/// Turns a shape into a sparse volume brick by brick: an octree is searched for the bricks that
-/// hold anything, then they are filled. Time and memory follow the active voxels, not the box.
+/// Converts a shape to a sparse volume: an octree is searched for bricks with active voxels, which
+/// are then filled. Time and memory are proportional to the active voxels, not to the bounding box.
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -33,8 +33,8 @@ struct Ball {
 };
 
 /// A scalar field over index space that can be narrowed to a part of it.
-/// within(ball): the shape for use in this ball only, or nothing where no point of it is active.
-/// at(p): the sample at index coordinates.
+/// within(ball) is the shape for use in this ball only, or nothing if no point of it is active.
+/// at(p) is the sample at index coordinates.
 template <class S>
 concept Shape = requires(const S& shape, const Ball& ball, Vec3 p) {
   { shape.within(ball) } -> std::same_as<std::optional<S>>;
@@ -48,7 +48,7 @@ struct VoxeliseOptions {
   const CancelToken* cancel = nullptr;
 };
 
-/// A brick that has active voxels, with the shape narrowed to it.
+/// A brick with active voxels, and the shape narrowed to it.
 template <class S>
 struct ShapedBrick {
   Coord brick;
@@ -59,14 +59,14 @@ namespace detail {
 
 inline Vec3 toVec(Coord c) { return {double(c.x), double(c.y), double(c.z)}; }
 
-/// A cube of 2^level bricks a side, placed on multiples of its size.
+/// A cube with a side of 2^level bricks at multiples of its size.
 struct Cell {
   Coord place;  ///< in units of the cell's side
   int level = 0;
 
   [[nodiscard]] Ball ball() const {
     const double side = double(std::int64_t{kBrickSide} << level);
-    const double half = (side - 1.0) / 2.0;  // from the centre to the outermost voxels' centres
+    const double half = (side - 1.0) / 2.0;  // distance from the centre to the outermost voxels
     return {toVec(place) * side + Vec3{half, half, half}, std::sqrt(3.0) * half};
   }
   [[nodiscard]] Cell child(int octant) const {
@@ -74,7 +74,7 @@ struct Cell {
   }
 };
 
-/// The cells, eight at most, that cover a box.
+/// The cells, at most eight, that cover a box.
 inline std::vector<Cell> rootCells(const Box& box) {
   const Coord low = brickOf(box.min), high = brickOf(box.max);
   const Coord extent = high - low;
@@ -160,9 +160,10 @@ Coord smallestBrick(const std::vector<ShapedBrick<S>>& bricks) {
 
 }  // namespace detail
 
-/// The same bits for any number of threads. Holds the volume (2124 bytes a brick) and one narrowed
-/// shape a brick.
-/// \throws Cancelled; DeviceError  more than maxBricks
+/// Converts a shape. The result is bit-identical for any number of threads. The memory is that of
+/// the volume (2124 bytes for each brick) and of one narrowed shape for each brick.
+/// \throws Cancelled  options.cancel was set
+/// \throws DeviceError  the volume has more than maxBricks
 template <Shape S>
 SparseVolume voxelise(const S& shape, const VoxeliseOptions& options) {
   SparseVolume volume;

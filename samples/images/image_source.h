@@ -13,7 +13,7 @@
 
 namespace esvr::samples {
 
-/// Some slices of an image.
+/// Consecutive slices of an image.
 struct Slab {
   std::int32_t firstZ = 0, slices = 0;
 };
@@ -22,18 +22,18 @@ class ImageSource {
  public:
   virtual ~ImageSource() = default;
 
-  /// Voxels along x, y and z.
+  /// Numbers of voxels along x, y and z.
   [[nodiscard]] virtual Coord size() const = 0;
-  /// Largest value of an integer type; nothing for the others.
+  /// Largest value of an integer type; nothing for other types.
   [[nodiscard]] virtual std::optional<double> typeMaximum() const = 0;
-  /// Row-vector affine 4x4, row major.
+  /// Affine 4x4 matrix for row vectors, in row-major order.
   [[nodiscard]] virtual std::array<double, 16> indexToWorld() const = 0;
-  /// x fastest, then y, z. Integers beyond 2^24 and doubles are rounded to float.
-  /// \throws BadInput  the file ends before
+  /// Reads a slab with x fastest, then y and z. Integers above 2^24 and doubles are rounded.
+  /// \throws BadInput  the file is too short
   virtual void read(const Slab& slab, std::span<float> out) = 0;
 };
 
-/// What a file without a header cannot say of itself.
+/// The layout of a file without a header.
 struct RawLayout {
   Coord size;
   std::string
@@ -43,12 +43,16 @@ struct RawLayout {
   double voxelSize = 1.0;
 };
 
-/// \throws BadInput  missing, or not exactly as long as the layout says; UsageError: no such type
+/// Opens a RAW image.
+/// \throws BadInput  the file is missing, or its length does not match the layout
+/// \throws UsageError  the type is unknown
 [[nodiscard]] std::unique_ptr<ImageSource> openRaw(const std::filesystem::path& path,
                                                    const RawLayout& layout);
 
-/// NRRD with the data in the same file or beside it (.nhdr), any encoding that teem knows.
-/// \throws BadInput  not readable (says why), not three axes of scalars, larger than memory
+/// Opens an NRRD image with data in the same file or in another one (.nhdr), in any encoding that
+/// teem supports.
+/// \throws BadInput  the file is not readable (the text says why), has not three axes of scalars,
+///                   or does not fit into memory
 [[nodiscard]] std::unique_ptr<ImageSource> openNrrd(const std::filesystem::path& path);
 
 }  // namespace esvr::samples

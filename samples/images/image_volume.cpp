@@ -41,11 +41,11 @@ double scaleOf(ImageSource& image, const ImageOptions& options, const CancelToke
   if (!options.normalise) return 1.0;
   const auto typeMaximum = image.typeMaximum();
   const double largest = typeMaximum ? *typeMaximum : largestMagnitude(image, cancel);
-  if (largest == 0.0) throw BadInput("every voxel is 0: nothing to normalise by");
+  if (largest == 0.0) throw BadInput("every voxel is 0, so the image cannot be normalised");
   return 1.0 / largest;
 }
 
-/// Counts what is not finite and makes it 0.
+/// Counts the values that are not finite and replaces them by 0.
 class NonFiniteFilter {
  public:
   explicit NonFiniteFilter(Coord size) : size_(size) {}
@@ -76,7 +76,7 @@ class NonFiniteFilter {
   Coord first_;
 };
 
-/// Turns slabs into the bricks of a volume.
+/// Converts slabs to the bricks of a volume.
 class BrickMaker {
  public:
   BrickMaker(Coord size, const ImageOptions& options, double scale, std::uint64_t maxBricks)

@@ -1,5 +1,5 @@
 #pragma once
-/// A dense image as a sparse volume.
+/// Converts a dense image to a sparse volume.
 
 #include <cstdint>
 #include <optional>
@@ -11,10 +11,12 @@
 namespace esvr::samples {
 
 struct ImageOptions {
-  /// In the image's units: active where value >= threshold; nothing: where value != background.
+  /// Threshold in the image's units: voxels with value >= threshold are active. Without it, voxels
+  /// with value != background are active.
   std::optional<double> threshold{};
   double background = 0.0;  ///< in the image's units: the value of what is not active
-  /// Divides by the type's largest value, or where the type is no integer by the largest |value|.
+  /// Whether values are divided by the largest value of an integer type, or by the largest |value|
+  /// of other types.
   bool normalise = false;
   bool zeroNonFinite = false;  ///< NaN and infinite voxels become 0 instead of an error
 };
@@ -24,8 +26,10 @@ struct ImageVolume {
   std::uint64_t nonFiniteReplaced = 0;
 };
 
-/// Reads the image slab by slab: memory follows the active bricks, not the image.
-/// \throws BadInput  non-finite voxels (the first and their count), nothing to normalise by
+/// Converts an image slab by slab; the memory is proportional to the active bricks, not to the
+/// image.
+/// \throws BadInput  voxels are not finite (the text gives the first one and their number), or the
+///                   image cannot be normalised
 [[nodiscard]] ImageVolume volumeOf(ImageSource& image, const ImageOptions& options,
                                    const Limits& limits);
 

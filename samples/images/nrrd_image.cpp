@@ -26,7 +26,7 @@ struct IoStateDeleter {
   void operator()(NrrdIoState* state) const { nrrdIoStateNix(state); }
 };
 
-/// The innermost reason of teem's last error, which is the last of its lines.
+/// The innermost reason of teem's last error, which is the last line of its text.
 std::string lastReason() {
   char* const text = biffGetDone(NRRD);
   std::string reason = text ? text : "unknown error";
@@ -47,7 +47,8 @@ NrrdPointer load(const fs::path& path, bool headerOnly) {
 void checkHeader(const Nrrd& nrrd, const fs::path& path) {
   if (nrrd.dim != kAxes)
     throw BadInput(path.string() + " has " + std::to_string(nrrd.dim) + " axes, not three");
-  if (nrrd.type == nrrdTypeBlock) throw BadInput(path.string() + " has blocks, not numbers");
+  if (nrrd.type == nrrdTypeBlock)
+    throw BadInput(path.string() + " holds blocks instead of numbers");
   double bytes = double(nrrdTypeSize[nrrd.type]);
   for (unsigned a = 0; a < kAxes; ++a) {
     bytes *= double(nrrd.axis[a].size);
@@ -56,7 +57,7 @@ void checkHeader(const Nrrd& nrrd, const fs::path& path) {
   }
   if (bytes > double(cli::physicalMemory()))
     throw BadInput(path.string() + " has " + std::to_string(bytes) +
-                   " bytes of data, more than memory");
+                   " bytes of data, which do not fit into memory");
 }
 
 class NrrdImage : public ImageSource {
@@ -76,7 +77,7 @@ class NrrdImage : public ImageSource {
     return nrrdTypeMax[nrrd_->type];
   }
 
-  /// Space directions and origin where there are any, else the axes' spacings, else 1.
+  /// The transform by space directions and origin, or by the axes' spacings, or the identity.
   [[nodiscard]] std::array<double, 16> indexToWorld() const override {
     std::array<double, 16> m{};
     m[15] = 1.0;

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 static_assert(std::endian::native == std::endian::little,
               "values are swapped for big-endian files");
 
-/// Values of one type as bytes of a file, to floats.
+/// Converts the bytes of values of one type to floats.
 using Convert = void (*)(std::span<std::byte> bytes, bool swap, std::span<float> out);
 
 template <class T>
@@ -56,7 +56,7 @@ const RawType& findType(const std::string& name) {
     if (name == type.name) return type;
     known += (known.empty() ? "" : ", ") + std::string(type.name);
   }
-  throw UsageError("no type is called '" + name + "'; there are " + known);
+  throw UsageError("unknown type '" + name + "'; the types are " + known);
 }
 
 class RawImage : public ImageSource {

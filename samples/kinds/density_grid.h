@@ -1,5 +1,5 @@
 #pragma once
-/// A volume as a grid that other programs read.
+/// Makes grids of volumes for VDB files.
 
 #include <string>
 
@@ -7,7 +7,7 @@
 
 namespace esvr::samples {
 
-/// A grid of class fog volume, saved as float.
+/// Makes a fog volume of float values.
 [[nodiscard]] VolumeGrid densityGrid(SparseVolume volume, const Transform& transform,
                                      const std::string& name = "density");
 

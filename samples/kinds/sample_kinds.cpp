@@ -18,7 +18,8 @@ namespace esvr::samples {
 namespace {
 
 constexpr const char* kCreator = "esvr-sample";
-/// Blender takes files for Y-up whose creator begins so; a converter that loses it turns the scene.
+/// Blender reads files as Y-up if their creator begins with "Houdini". A converter that loses this
+/// item turns the scene.
 constexpr const char* kHoudiniCreator = "Houdini (as written by esvr-sample)";
 constexpr float kTemperatureBackground = 0.25f;
 
@@ -31,7 +32,7 @@ MetaItem floatItem(const std::string& name, float value) {
   return item;
 }
 
-/// Scaled, turned by the angle of the triangle 3-4-5 around z, and moved.
+/// A transform with a scale, a rotation about z by the angle of the triangle 3-4-5, and an offset.
 Transform rotatedTransform(double size) {
   const double c = 0.8 * size, s = 0.6 * size;
   return affineTransform({c, s, 0, 0, -s, c, 0, 0, 0, 0, size, 0, 1.5, -2.5, 10, 1});
@@ -77,14 +78,14 @@ constexpr SampleKind kKinds[] = {
     {"tree", "branching vessels: sparse, soft-edged tubes", oneDensity<makeTree>},
     {"plume", "a noisy smoke plume", oneDensity<makePlume>},
     {"blobs", "diffuse blobs without an edge", oneDensity<blobsOnZero>},
-    {"levelset", "signed distances in a narrow band", levelSet},
+    {"levelset", "a level set: signed distances in a narrow band", levelSet},
     {"two-grids", "density (half, turned) and temperature (background 0.25), with metadata",
      twoGrids},
-    {"8area", "the paper's: eight dense chunks", oneDensity<makeEightAreas>},
-    {"empty-sphere", "the paper's: a thin shell", oneDensity<makeEmptySphere>},
-    {"synth-tube", "the paper's: straight tubes", oneDensity<makeSynthTube>},
-    {"synth-wiggle", "the paper's: winding tubes", oneDensity<makeSynthWiggle>},
-    {"diffuse-scalar", "the paper's: a ball with a diffuse boundary",
+    {"8area", "like the paper's 8area: eight dense chunks", oneDensity<makeEightAreas>},
+    {"empty-sphere", "like the paper's EmptySphere: a thin shell", oneDensity<makeEmptySphere>},
+    {"synth-tube", "like the paper's SynthTube: straight tubes", oneDensity<makeSynthTube>},
+    {"synth-wiggle", "like the paper's SynthWiggle: winding tubes", oneDensity<makeSynthWiggle>},
+    {"diffuse-scalar", "like the paper's DiffuseScalar: a ball with a diffuse boundary",
      oneDensity<makeDiffuseScalar>},
 };
 
@@ -98,7 +99,7 @@ const SampleKind& sampleKind(const std::string& name) {
     if (name == kind.name) return kind;
     known += (known.empty() ? "" : ", ") + std::string(kind.name);
   }
-  throw UsageError("no sample is called '" + name + "'; there are " + known);
+  throw UsageError("unknown sample '" + name + "'; the samples are " + known);
 }
 
 }  // namespace esvr::samples

@@ -1,5 +1,5 @@
 #pragma once
-/// The samples by name: generated volumes as the grids of a file.
+/// The samples by name: generated volumes with their grids and metadata.
 
 #include <span>
 #include <string>
@@ -27,7 +27,7 @@ struct SampleKind {
 /// All kinds, in the order of --help.
 [[nodiscard]] std::span<const SampleKind> sampleKinds();
 
-/// \throws UsageError  no such kind (lists those there are)
+/// \throws UsageError  the name is unknown; the text lists the known names
 [[nodiscard]] const SampleKind& sampleKind(const std::string& name);
 
 }  // namespace esvr::samples

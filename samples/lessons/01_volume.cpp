@@ -4,8 +4,8 @@
 // brick the volume has its background value. Inside a brick every voxel has a value, and a bit says
 // whether it is active: part of the object, as opposed to padding of the brick.
 //
-// Nothing in this library is ever as large as the box around the object: its size follows the
-// bricks.
+// No data structure of this library is as large as the bounding box of the object: sizes depend on
+// the number of bricks.
 
 #include <cstdio>
 
@@ -14,7 +14,7 @@
 #include "ring.h"
 
 int main() {
-  // One brick by hand. Its corner is given in index coordinates, the grid's own integers.
+  // Makes one brick. Its corner is given in index coordinates, the integer coordinates of the grid.
   esvr::BrickInput brick{.corner = {-8, 0, 16}, .values = {}, .active = {}};
   const esvr::Coord local{1, 2, 3};
   brick.values[std::size_t(esvr::voxelOffset(local))] = 0.5f;
@@ -22,8 +22,8 @@ int main() {
 
   // Bricks may come in any order; makeVolume sorts them.
   const esvr::SparseVolume small = esvr::makeVolume({brick}, 0.0f);
-  check(esvr::valueAt(small, {-7, 2, 19}) == 0.5f, "a voxel is found at corner + local");
-  check(esvr::valueAt(small, {1000000, 0, 0}) == 0.0f, "elsewhere is background");
+  check(esvr::valueAt(small, {-7, 2, 19}) == 0.5f, "a voxel lies at corner + local");
+  check(esvr::valueAt(small, {1000000, 0, 0}) == 0.0f, "a voxel outside all bricks is background");
   check(esvr::activeVoxelCount(small) == 1, "one voxel is active");
 
   // ring.h fills bricks from a formula in the same way. The other lessons work on this ring.

@@ -1,7 +1,6 @@
 // Lesson 3: .esvr files.
 //
-// A file holds grids: the ellipsoids, and all that makes the grid what it was, its name, class,
-// transform and metadata.
+// A file holds grids: the ellipsoids, and the name, class, transform and metadata of each grid.
 
 #include <cstdio>
 #include <filesystem>
@@ -20,13 +19,13 @@ int main() {
   options.count = 40;
   options.preset = esvr::Preset::kDraft;
 
-  // A grid read by readGrid() has a descriptor already; this one is made from scratch.
+  // readGrid() returns a descriptor with each grid; this one is made from scratch.
   esvr::GridDescriptor descriptor;
   descriptor.name = "density";
   descriptor.gridClass = esvr::GridClass::kFogVolume;
   descriptor.transform = esvr::uniformTransform(0.1);
 
-  // makeStoredGrid adds what is needed to find the active voxels again.
+  // makeStoredGrid adds the rule by which a reader determines the active voxels.
   esvr::EsvrFile file;
   file.metadata.push_back(esvr::stringItem("creator", "lesson 3"));
   file.grids.push_back(esvr::makeStoredGrid(descriptor, ring, esvr::fit(ring, options).field));
@@ -35,7 +34,7 @@ int main() {
   const auto bytes = esvr::writeEsvr(path, file, {.overwrite = true});
   std::printf("%llu bytes\n", static_cast<unsigned long long>(bytes));
 
-  // Writers never replace a file unasked, and every error says what it is about.
+  // Writers do not replace a file by default, and every error text names the file.
   bool refused = false;
   try {
     esvr::writeEsvr(path, file);
@@ -46,9 +45,9 @@ int main() {
   check(refused, "an existing file is kept");
 
   const esvr::EsvrFile read = esvr::readEsvr(path);
-  check(read.grids.size() == 1, "one grid comes back");
-  check(read.grids[0].descriptor == descriptor, "it is what it was");
+  check(read.grids.size() == 1, "the file has one grid");
+  check(read.grids[0].descriptor == descriptor, "its descriptor is unchanged");
   check(read.grids[0].field.ellipsoidCount() == file.grids[0].field.ellipsoidCount(),
-        "with all its ellipsoids");
+        "it has all its ellipsoids");
   std::filesystem::remove(path);
 }

@@ -1,7 +1,7 @@
 // Lesson 4: from ellipsoids back to voxels.
 //
-// The field is defined everywhere. One can ask for its values in any bricks, or have it turned into
-// a volume again.
+// The field is defined everywhere. The library evaluates it in any bricks, or converts it to a
+// volume.
 
 #include <cmath>
 #include <cstdio>
@@ -27,18 +27,19 @@ int main() {
   const float value = values[std::size_t(esvr::voxelOffset(onTheCircle - corner))];
   std::printf("at %s: %.3f, the ring has %.3f\n", esvr::toString(onTheCircle).c_str(),
               double(value), double(esvr::valueAt(ring, onTheCircle)));
-  check(std::abs(value - esvr::valueAt(ring, onTheCircle)) < 0.1f, "close to the ring's value");
+  check(std::abs(value - esvr::valueAt(ring, onTheCircle)) < 0.1f,
+        "the value is close to the ring's");
 
-  // The same by the definition, in float64: slow, and what the fast one is tested against.
+  // evaluateReference evaluates the definition in float64. It is slow; tests compare with it.
   const double reference = esvr::evaluateReference(field, onTheCircle);
-  check(std::abs(double(value) - reference) < 1e-4, "and closer still to the definition");
+  check(std::abs(double(value) - reference) < 1e-4, "it is even closer to the definition");
 
-  // The whole volume. What is fainter than the threshold is not active.
+  // Converts the whole field. Voxels below the threshold are not active.
   esvr::RevoxeliseOptions revoxelise;
   revoxelise.threshold = 0.05f;
   revoxelise.range = esvr::ValueRange{0.0f, 1.0f};  // no voxel of the ring lies beyond
   const esvr::SparseVolume back = esvr::revoxelise(field, revoxelise);
   std::printf("%zu bricks, the ring has %zu\n", back.brickCount(), ring.brickCount());
-  check(esvr::activeVoxelCount(back) > 0, "there are voxels again");
+  check(esvr::activeVoxelCount(back) > 0, "the volume has active voxels");
   check(esvr::valueAt(back, {0, 0, 0}) == 0.0f, "the ring's hole is still empty");
 }

@@ -1,7 +1,7 @@
-// Lesson 5: how good is it?
+// Lesson 5: measuring errors.
 //
-// compareVolumes() measures one volume against another. Both are sparse, and so is the work: empty
-// space counts, but costs nothing.
+// compareVolumes() measures the errors of a volume against a reference. Empty space counts, but
+// takes no time.
 
 #include <cstdio>
 
@@ -20,8 +20,8 @@ esvr::VolumeMetrics qualityOf(const esvr::SparseVolume& ring, std::size_t count)
   const esvr::StoredGrid encoded = esvr::makeStoredGrid({}, ring, esvr::fit(ring, options).field);
   const esvr::SparseVolume back = esvr::decodeGrid(encoded);
 
-  // PSNR over a box counts its empty space, which flatters sparse volumes; over active voxels it
-  // does not. Say which one you mean, and give both.
+  // PSNR over a box includes empty space, which has no error in sparse volumes; PSNR over the
+  // active voxels does not. State which one you mean, and give both.
   const esvr::VolumeMetrics m = esvr::compareVolumes(ring, back, {.ssim = true});
   std::printf(
       "%4zu ellipsoids: %.1f dB over the box, %.1f dB over active voxels, largest error "
@@ -37,8 +37,8 @@ int main() {
   const esvr::SparseVolume ring = makeRing();
   const esvr::VolumeMetrics few = qualityOf(ring, 10);
   const esvr::VolumeMetrics many = qualityOf(ring, 80);
-  check(many.psnrBox > few.psnrBox, "more ellipsoids come closer");
-  check(few.psnrBox > few.psnrActive, "the box is the kinder measure");
+  check(many.psnrBox > few.psnrBox, "more ellipsoids have a smaller error");
+  check(few.psnrBox > few.psnrActive, "PSNR over the box is higher than over the active voxels");
   check(many.iou > 0.7, "the active voxels are mostly the same");
   check(esvr::compareVolumes(ring, ring).maxError == 0.0, "a volume is equal to itself");
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Lessons are tests as well: what they claim is checked.
+// The lessons are tests as well: each of their claims is checked.
 
 #include <cstdio>
 #include <cstdlib>

@@ -1,5 +1,5 @@
 #pragma once
-// The volume that the lessons work on: a soft ring, built as lesson 1 explains.
+// The volume of the lessons: a soft ring, built as lesson 1 explains.
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-// Writes a generated sample to a VDB file.
+// esvr-sample: writes a generated sample to a VDB file.
 
 #include <limits>
 #include <string>
@@ -34,11 +34,12 @@ std::string listOfKinds() {
 cli::CommandLine commandLine() {
   cli::CommandLine line(
       {.name = kName,
-       .purpose = "Makes a sparse volume and writes it as VDB. The same kind, resolution and seed\n"
-                  "give the same voxels on every machine.",
+       .purpose = "Generates a sparse volume and writes it as VDB. The same kind, resolution and\n"
+                  "seed give the same voxels on every machine.",
        .usage = "  esvr-sample KIND OUT.vdb [--resolution N] [--seed N] [-f]",
        .notes = "KIND is one of\n" + listOfKinds() +
-                "Time and memory follow the active voxels, so that resolutions of thousands work.",
+                "Time and memory are proportional to the active voxels, so resolutions of several\n"
+                "thousand are possible.",
        .examples = "  esvr-sample tree tree.vdb\n"
                    "  esvr-sample plume smoke.vdb --resolution 512 --seed 7"});
   line.argument("kind", "KIND");
@@ -48,7 +49,7 @@ cli::CommandLine commandLine() {
     ("resolution", cli::po::value<int>()->value_name("N")->default_value(kDefaultResolution),
      "voxels along the longest side")
     ("seed", cli::po::value<std::int64_t>()->value_name("N")->default_value(1),
-     "another seed gives another volume of its kind")
+     "random seed; each seed gives another volume of the kind")
     ("force,f", cli::po::bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
   return line;

@@ -6,11 +6,11 @@
 
 namespace esvr::samples {
 
-/// A brick on its way into a file: 2124 bytes as SparseVolume and its search, and as much again for
-/// OpenVDB's leaf and its compressed form.
+/// Memory of a brick until it is written: 2124 bytes in the SparseVolume and the search for it, and
+/// the same amount for OpenVDB's leaf and its compressed form.
 inline constexpr std::uint64_t kBytesPerBrick = 4500;
 
-/// Bricks that fit into three quarters of the machine's memory.
+/// The number of bricks that fit into three quarters of the machine's memory.
 inline std::uint64_t bricksThatFit() { return cli::physicalMemory() / 4 * 3 / kBytesPerBrick; }
 
 }  // namespace esvr::samples

@@ -1,4 +1,4 @@
-// Brings in dense images: RAW and NRRD.
+// raw2vdb: converts dense images (RAW and NRRD) to VDB.
 
 #include <charconv>
 #include <limits>
@@ -29,13 +29,13 @@ constexpr const char* kRawOptions[] = {"dims", "type", "endian", "skip", "voxel-
 cli::CommandLine commandLine() {
   cli::CommandLine line(
       {.name = kName,
-       .purpose = "Turns a dense image, RAW or NRRD, into a sparse VDB grid.",
+       .purpose = "Converts a dense image, RAW or NRRD, to a sparse VDB grid.",
        .usage = "  raw2vdb IN.raw OUT.vdb --dims X,Y,Z --type TYPE [options]\n"
                 "  raw2vdb IN.nrrd|IN.nhdr OUT.vdb [options]",
        .notes =
            "TYPE is uint8, int8, uint16, int16, uint32, int32, float32 or float64. x is fastest.\n"
-           "The grid has 32-bit floats. A voxel is active where it is not below the threshold,\n"
-           "or, without one, where it differs from the background. An NRRD's space directions,\n"
+           "The grid has 32-bit floats. A voxel is active if it is not below the threshold, or,\n"
+           "without a threshold, if it differs from the background. An NRRD's space directions,\n"
            "origin and spacings become the grid's transform.",
        .examples = "  raw2vdb aneurism_256x256x256_uint8.raw aneurism.vdb --dims 256,256,256 \\\n"
                    "      --type uint8 --threshold 32 --normalise\n"
@@ -49,21 +49,22 @@ cli::CommandLine commandLine() {
     ("endian", po::value<std::string>()->value_name("little|big"), "RAW: byte order (little)")
     ("skip", po::value<std::int64_t>()->value_name("BYTES"), "RAW: length of a header (0)")
     ("voxel-size", po::value<double>()->value_name("S"), "RAW: edge of a voxel in world units (1)")
-    ("threshold", po::value<double>()->value_name("T"), "in the image's units: less is empty")
+    ("threshold", po::value<double>()->value_name("T"),
+     "smallest value of active voxels, in the image's units")
     ("background", po::value<double>()->value_name("B")->default_value(0.0),
-     "in the image's units: the value of what is empty")
+     "value of inactive voxels, in the image's units")
     ("normalise", po::bool_switch(),
-     "divide by the type's largest value; float images: by their largest")
+     "divide by the type's largest value, or by the largest value of a float image")
     ("nonfinite", po::value<std::string>()->value_name("refuse|zero")->default_value("refuse"),
-     "what to do with NaN and infinite voxels")
+     "refuse: fail on NaN or infinite voxels; zero: replace them by 0")
     ("name", po::value<std::string>()->value_name("NAME")->default_value("density"),
-     "of the grid")
+     "name of the grid")
     ("force,f", po::bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
   return line;
 }
 
-/// "256,256,128": three positive numbers.
+/// Reads three positive numbers like "256,256,128".
 Coord parseDims(const std::string& text) {
   std::int32_t dims[3] = {};
   const char* at = text.data();
@@ -72,18 +73,20 @@ Coord parseDims(const std::string& text) {
     const auto [next, error] = std::from_chars(at, end, dims[axis]);
     const bool separated = axis < 2 ? next != end && *next == ',' : next == end;
     if (error != std::errc() || !separated || dims[axis] < 1)
-      throw UsageError("--dims takes three positive numbers as in 256,256,128, not '" + text + "'");
+      throw UsageError("--dims must be three positive numbers like 256,256,128, not '" + text +
+                       "'");
     at = next + 1;
   }
   return {dims[0], dims[1], dims[2]};
 }
 
-/// True for the second of two words. \throws UsageError  neither
+/// True for the second of two words. \throws UsageError  the value is neither
 bool isSecond(const cli::Arguments& arguments, const std::string& option, const char* first,
               const char* second) {
   const auto given = arguments.find<std::string>(option).value_or(first);
   if (given != first && given != second)
-    throw UsageError("--" + option + " is " + first + " or " + second + ", not '" + given + "'");
+    throw UsageError("--" + option + " must be " + first + " or " + second + ", not '" + given +
+                     "'");
   return given == second;
 }
 
@@ -91,7 +94,7 @@ samples::RawLayout layoutFrom(const cli::Arguments& arguments) {
   if (!arguments.has("dims") || !arguments.has("type"))
     throw UsageError(
         "a RAW image needs --dims and --type (a file ending in .nrrd or .nhdr does not)");
-  constexpr double kSmallest = 1e-4, kLargest = 1e30;  // OpenVDB takes cubes of 1e-15 for 0
+  constexpr double kSmallest = 1e-4, kLargest = 1e30;  // OpenVDB treats volumes of 1e-15 as 0
   const auto skip = arguments.find<std::int64_t>("skip").value_or(0);
   cli::requireRange("skip", skip, std::int64_t{0}, std::numeric_limits<std::int64_t>::max());
   samples::RawLayout layout{.size = parseDims(arguments.get<std::string>("dims")),
@@ -109,7 +112,8 @@ std::unique_ptr<samples::ImageSource> openImage(const cli::Arguments& arguments)
     return samples::openRaw(path, layoutFrom(arguments));
   for (const char* option : kRawOptions)
     if (arguments.has(option))
-      throw UsageError("--" + std::string(option) + " is for RAW images: an NRRD says it itself");
+      throw UsageError("--" + std::string(option) +
+                       " is for RAW images only; an NRRD has its own header");
   return samples::openNrrd(path);
 }
 
@@ -129,7 +133,7 @@ Transform transformOf(const samples::ImageSource& image, const std::string& inpu
   try {
     return affineTransform(image.indexToWorld());
   } catch (const UsageError& error) {
-    throw BadInput(input + ": its axes do not span space: " + error.what());
+    throw BadInput(input + ": the axes are linearly dependent: " + error.what());
   }
 }
 

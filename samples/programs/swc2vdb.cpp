@@ -1,4 +1,4 @@
-// Turns a neuron skeleton into a volume.
+// swc2vdb: converts a neuron skeleton to a volume.
 
 #include <cmath>
 #include <limits>
@@ -25,18 +25,18 @@ using namespace esvr;
 constexpr const char* kName = "swc2vdb";
 constexpr int kDefaultResolution = 512;
 constexpr int kLargestResolution = 1 << 16;
-constexpr double kWidest = 1000.0;  // voxels, of radius and edge
-constexpr double kSharpest = 1e-3;  // voxels: sharper edges are steps
+constexpr double kWidest = 1000.0;  // largest radius and edge, voxels
+constexpr double kSharpest = 1e-3;  // narrowest edge, voxels
 
 cli::CommandLine commandLine() {
   cli::CommandLine line(
       {.name = kName,
        .purpose =
-           "Turns a neuron skeleton (SWC) into a VDB of soft-edged tubes: 1 inside, 0 outside.",
+           "Converts a neuron skeleton (SWC) to a VDB of soft-edged tubes: 1 inside, 0 outside.",
        .usage = "  swc2vdb IN.swc OUT.vdb [--resolution N] [--min-radius R] [--longest K]",
        .notes =
-           "The grid 'density' lies where the skeleton lies, in its units. Between two nodes the\n"
-           "radius changes evenly. Time and memory follow the active voxels.",
+           "The grid 'density' has the position and the units of the skeleton. The radius changes\n"
+           "linearly between two nodes. Time and memory are proportional to the active voxels.",
        .examples = "  swc2vdb neuron.swc neuron.vdb --resolution 1024\n"
                    "  swc2vdb neuron.swc large.vdb --resolution 8192 --min-radius 2"});
   line.argument("input", "IN.swc");
@@ -46,9 +46,9 @@ cli::CommandLine commandLine() {
     ("resolution", cli::po::value<int>()->value_name("N")->default_value(kDefaultResolution),
      "voxels along the skeleton's longest side")
     ("min-radius", cli::po::value<double>()->value_name("R")->default_value(samples::kThinnestTube),
-     "in voxels: thinner tubes are thickened to it")
+     "smallest radius of a tube in voxels; thinner tubes are thickened")
     ("edge", cli::po::value<double>()->value_name("E")->default_value(samples::kDefaultEdge),
-     "voxels over which the surface fades")
+     "width of the soft edge in voxels")
     ("longest", cli::po::value<std::int64_t>()->value_name("K"),
      "keep the K connected pieces with the longest cable only")
     ("force,f", cli::po::bool_switch(), "replace OUT.vdb if it exists");

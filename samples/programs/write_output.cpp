@@ -10,7 +10,8 @@ void writeOutput(const Output& output, std::span<const MetaItem> metadata,
                  std::span<const VolumeGrid> grids, const cli::Log& log) {
   for (const VolumeGrid& grid : grids)
     if (grid.volume.brickCount() == 0)
-      throw BadInput("no voxel of grid '" + grid.descriptor.name + "' is active: nothing to write");
+      throw BadInput("grid '" + grid.descriptor.name +
+                     "' has no active voxel; nothing was written");
   writeGrids(output.path, metadata, grids, {.overwrite = output.overwrite});
   for (const VolumeGrid& grid : grids) {
     const Box box = activeBox(grid.volume);

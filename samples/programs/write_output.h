@@ -1,5 +1,5 @@
 #pragma once
-/// The last step of every sample program.
+/// Writes the output of the sample programs.
 
 #include <filesystem>
 #include <span>
@@ -14,7 +14,7 @@ struct Output {
   bool overwrite = false;
 };
 
-/// Writes the grids and says what was written. \throws BadInput  a grid has no active voxel
+/// Writes the grids and logs them. \throws BadInput  a grid has no active voxel
 void writeOutput(const Output& output, std::span<const MetaItem> metadata,
                  std::span<const VolumeGrid> grids, const cli::Log& log);
 

@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kColumns = 7;
 constexpr std::int64_t kNoParent = -1;
 
-/// A node as its line has it.
+/// A node with the numbers of its line.
 struct SwcLine {
   std::size_t number = 0;  ///< of the line, from 1
   std::int64_t id = 0, parent = 0;
@@ -31,8 +31,8 @@ class SwcParser {
   Skeleton parse(std::istream& text) {
     std::string line;
     for (std::size_t number = 1; std::getline(text, line); ++number) addLine(line, number);
-    if (text.bad()) throw BadInput(name_ + ": cannot be read to its end");
-    if (lines_.empty()) throw BadInput(name_ + ": has no node: not an SWC file?");
+    if (text.bad()) throw BadInput(name_ + ": reading failed before the end of the file");
+    if (lines_.empty()) throw BadInput(name_ + ": the file has no node; it may not be an SWC file");
     return link();
   }
 
@@ -50,11 +50,11 @@ class SwcParser {
     if (line.node.radius < 0.0) refuse(number, "the radius is negative");
     if (line.id < 0) refuse(number, "the node's id is negative");
     if (!byId_.emplace(line.id, lines_.size()).second)
-      refuse(number, "node " + std::to_string(line.id) + " is there twice");
+      refuse(number, "node " + std::to_string(line.id) + " is defined twice");
     lines_.push_back(line);
   }
 
-  /// Parents may come after their children: linked when all are known.
+  /// Links the nodes after all are read, since parents may come after their children.
   Skeleton link() const {
     Skeleton skeleton;
     skeleton.reserve(lines_.size());
@@ -69,7 +69,7 @@ class SwcParser {
     if (line.parent == line.id) refuse(line.number, "the node is its own parent");
     const auto found = byId_.find(line.parent);
     if (found == byId_.end())
-      refuse(line.number, "its parent " + std::to_string(line.parent) + " is not there");
+      refuse(line.number, "its parent " + std::to_string(line.parent) + " does not exist");
     return found->second;
   }
 
@@ -82,7 +82,7 @@ class SwcParser {
       at = text.find_first_not_of(kBlank, end);
     }
     if (!columns.empty() && columns.size() < kColumns)
-      refuse(number, "a node has 7 columns, here are " + std::to_string(columns.size()));
+      refuse(number, "a node needs 7 columns, but the line has " + std::to_string(columns.size()));
     return columns;
   }
 
@@ -92,7 +92,7 @@ class SwcParser {
     Number value{};
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size())
-      refuse(line, "'" + std::string(text) + "' is not a number of the kind that stands here");
+      refuse(line, "'" + std::string(text) + "' is not a number of the type of this column");
     return value;
   }
   std::int64_t integer(std::string_view text, std::size_t line) const {

@@ -26,7 +26,7 @@ double cableTo(const Skeleton& skeleton, const SkeletonNode& node) {
   return node.parent ? length(node.position - skeleton[*node.parent].position) : 0.0;
 }
 
-/// Length of cable of every piece, at the index of the node that stands for it.
+/// Length of cable of every piece, at the index of the piece's representative node.
 std::vector<double> cableOf(const Skeleton& skeleton, Pieces& pieces) {
   std::vector<double> cable(skeleton.size(), 0.0);
   for (std::size_t i = 0; i < skeleton.size(); ++i)
@@ -34,7 +34,7 @@ std::vector<double> cableOf(const Skeleton& skeleton, Pieces& pieces) {
   return cable;
 }
 
-/// The nodes that are kept, with their parents' new places.
+/// The kept nodes with the new indices of their parents.
 Skeleton selected(const Skeleton& skeleton, const std::vector<bool>& keep) {
   std::vector<std::size_t> place(skeleton.size(), 0);
   for (std::size_t i = 1; i < skeleton.size(); ++i) place[i] = place[i - 1] + (keep[i - 1] ? 1 : 0);

@@ -1,6 +1,7 @@
 #pragma once
-/// Neuron skeletons in SWC: one node a line, "id type x y z radius parent", '#' begins a comment.
-/// (Cannon et al. 1998; http://www.neuronland.org/NLMorphologyConverter/MorphologyFormats/SWC)
+/// Neuron skeletons in SWC: a line "id type x y z radius parent" for each node; '#' begins a
+/// comment (Cannon et al. 1998;
+/// http://www.neuronland.org/NLMorphologyConverter/MorphologyFormats/SWC)
 
 #include <cstdint>
 #include <filesystem>
@@ -22,18 +23,20 @@ struct SkeletonNode {
 
 using Skeleton = std::vector<SkeletonNode>;
 
-/// \throws BadInput  missing or not readable; no node; a line that is not a node, with its number;
-///                   an id twice, a parent that is not there, a node that is its own parent
+/// Reads a skeleton.
+/// \throws BadInput  the file is missing, not readable or without nodes; a line is not a node (the
+///                   text gives its number); an id is defined twice; a parent does not exist or is
+///                   the node itself
 [[nodiscard]] Skeleton readSwc(const std::filesystem::path& path);
 
-/// \param name  of the source, for messages
+/// \param name  name of the source for messages
 [[nodiscard]] Skeleton parseSwc(std::istream& text, const std::string& name);
 
-/// A round cone from every node to its parent, a ball for a node without links, in the file's
-/// units.
+/// Makes a round cone from every node to its parent, and a ball for each node without links, in the
+/// file's units.
 [[nodiscard]] std::vector<Tube> tubesOf(const Skeleton& skeleton);
 
-/// The `count` connected pieces of a skeleton with the longest cable: fragments are left out.
+/// Keeps the `count` connected pieces of a skeleton that have the longest cable.
 [[nodiscard]] Skeleton longestPieces(const Skeleton& skeleton, std::size_t count);
 
 }  // namespace esvr::samples

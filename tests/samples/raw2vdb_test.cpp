@@ -103,7 +103,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"a.raw", ramp(), rampAnd({"--voxel-size", "0"}), 2, "--voxel-size"},
         Refusal{"a.raw", kNan, {"--dims", "1,1,1", "--type", "float32"}, 3, "(0, 0, 0)"},
         Refusal{"a.nrrd", "NRRD0004\n", {}, 3, "a.nrrd"},
-        Refusal{"a.nrrd", kFlatNrrd, {}, 3, "span space"},
+        Refusal{"a.nrrd", kFlatNrrd, {}, 3, "linearly dependent"},
         Refusal{"a.nrrd", kFlatNrrd, {"--dims", "1,1,1"}, 2, "--dims is for RAW"}));
 
 TEST(Raw2Vdb, refusesAnImageThatIsNotThere) {

@@ -56,7 +56,7 @@ TEST_P(RefusedSwc, namesFileLineAndReason) {
 INSTANTIATE_TEST_SUITE_P(
     All, RefusedSwc,
     testing::Values(BadSwc{"", "", "no node"}, BadSwc{"# nothing\n", "", "no node"},
-                    BadSwc{"1 0 0 0 0 1\n", "line 1", "7 columns, here are 6"},
+                    BadSwc{"1 0 0 0 0 1\n", "line 1", "7 columns, but the line has 6"},
                     BadSwc{"#\n1 0 zero 0 0 1 -1\n", "line 2", "'zero'"},
                     BadSwc{"1 0 0 0 0 nan -1\n", "line 1", "not finite"},
                     BadSwc{"1 0 0 inf 0 1 -1\n", "line 1", "not finite"},
@@ -64,9 +64,9 @@ INSTANTIATE_TEST_SUITE_P(
                     BadSwc{"1 0 0 0 0 -2 -1\n", "line 1", "radius is negative"},
                     BadSwc{"1.5 0 0 0 0 1 -1\n", "line 1", "'1.5'"},
                     BadSwc{"-4 0 0 0 0 1 -1\n", "line 1", "id is negative"},
-                    BadSwc{"1 0 0 0 0 1 -1\n1 0 1 0 0 1 -1\n", "line 2", "there twice"},
+                    BadSwc{"1 0 0 0 0 1 -1\n1 0 1 0 0 1 -1\n", "line 2", "defined twice"},
                     BadSwc{"1 0 0 0 0 1 1\n", "line 1", "its own parent"},
-                    BadSwc{"1 0 0 0 0 1 -1\n2 0 1 0 0 1 5\n", "line 2", "parent 5 is not there"},
+                    BadSwc{"1 0 0 0 0 1 -1\n2 0 1 0 0 1 5\n", "line 2", "parent 5 does not exist"},
                     BadSwc{"\x7f"
                            "ELF\x02\x01 binary\n",
                            "line 1", "7 columns"}));
