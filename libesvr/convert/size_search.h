@@ -10,7 +10,7 @@ namespace esvr::convert {
 
 struct SizeResult {
   std::optional<Conversion> conversion;  ///< missing if even the smallest grid is too large
-  std::uint64_t needed = 0;              ///< if so, bytes of the smallest grid that was tried
+  std::uint64_t needed = 0;  ///< bytes of the smallest grid that was tried, if it is too large
 };
 
 /// Makes a short fit to measure the bytes per ellipsoid, and then a full fit with as many

@@ -10,7 +10,7 @@ namespace esvr::metrics {
 
 /// A position at which at least one of two volumes has a brick.
 struct BrickPair {
-  Coord brick;                       ///< in bricks of index space: corner / 8
+  Coord brick;                       ///< brick coordinates in index space: corner / 8
   const float* reference = nullptr;  ///< null where only the candidate has a brick here
   const float* candidate = nullptr;  ///< null where only the reference has one
   const BrickMask* referenceActive = nullptr;

@@ -32,7 +32,7 @@ class Axis {
   [[nodiscard]] std::vector<double> logarithmicTicks() const;
 
   bool logarithmic_;
-  double low_ = 0.0, high_ = 1.0;  ///< of what scaled() gives
+  double low_ = 0.0, high_ = 1.0;  ///< range of the results of scaled()
 };
 
 }  // namespace esvr::report

@@ -19,8 +19,8 @@ enum class Kind {
 };
 
 struct Column {
-  std::string key;     ///< in CSV and JSON: "psnr_box"
-  std::string header;  ///< for people: "PSNR box"
+  std::string key;     ///< name in CSV and JSON: "psnr_box"
+  std::string header;  ///< name in tables for people: "PSNR box"
   Kind kind = Kind::kNumber;
 };
 

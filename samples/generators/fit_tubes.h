@@ -16,8 +16,8 @@ struct TubeScale {
 
 struct ScaledTubes {
   std::vector<Tube> tubes;  ///< index coordinates, smallest corner at `margin`
-  double voxelSize = 1.0;   ///< in the units given
-  Vec3 origin;              ///< where index (0, 0, 0) lies, in the units given
+  double voxelSize = 1.0;   ///< side of a voxel in the units of the tubes
+  Vec3 origin;              ///< position of index (0, 0, 0) in the units of the tubes
 };
 
 /// \throws BadInput  the tubes have no extent

@@ -16,7 +16,7 @@ class Random {
  public:
   explicit Random(std::uint64_t seed) : seed_(seed) {}
 
-  [[nodiscard]] double uniform();  ///< in [0, 1)
+  [[nodiscard]] double uniform();  ///< the next number, uniform in [0, 1)
   [[nodiscard]] double uniform(double low, double high) { return low + (high - low) * uniform(); }
   [[nodiscard]] Vec3 inCube(double low, double high);
   [[nodiscard]] Vec3 direction();  ///< uniform on the unit sphere

@@ -61,7 +61,7 @@ inline Vec3 toVec(Coord c) { return {double(c.x), double(c.y), double(c.z)}; }
 
 /// A cube with a side of 2^level bricks at multiples of its size.
 struct Cell {
-  Coord place;  ///< in units of the cell's side
+  Coord place;  ///< position in units of the cell's side
   int level = 0;
 
   [[nodiscard]] Ball ball() const {

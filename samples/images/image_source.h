@@ -39,7 +39,7 @@ struct RawLayout {
   std::string
       type;  ///< "uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"
   bool bigEndian = false;
-  std::uint64_t headerBytes = 0;  ///< to skip
+  std::uint64_t headerBytes = 0;  ///< bytes to skip at the beginning
   double voxelSize = 1.0;
 };
 

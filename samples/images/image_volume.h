@@ -14,7 +14,7 @@ struct ImageOptions {
   /// Threshold in the image's units: voxels with value >= threshold are active. Without it, voxels
   /// with value != background are active.
   std::optional<double> threshold{};
-  double background = 0.0;  ///< in the image's units: the value of what is not active
+  double background = 0.0;  ///< value of inactive voxels, in the image's units
   /// Whether values are divided by the largest value of an integer type, or by the largest |value|
   /// of other types.
   bool normalise = false;

@@ -19,7 +19,7 @@ constexpr std::int64_t kNoParent = -1;
 
 /// A node with the numbers of its line.
 struct SwcLine {
-  std::size_t number = 0;  ///< of the line, from 1
+  std::size_t number = 0;  ///< number of the line, from 1
   std::int64_t id = 0, parent = 0;
   SkeletonNode node;
 };

@@ -99,7 +99,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"a.raw", ramp(), rampAnd({"--skip", "-1"}), 2, "--skip"},
         Refusal{"a.raw", ramp(), rampAnd({"--endian", "middle"}), 2, "little or big"},
         Refusal{"a.raw", ramp(), rampAnd({"--nonfinite", "keep"}), 2, "refuse or zero"},
-        Refusal{"a.raw", ramp(), rampAnd({"--threshold", "999"}), 3, "no voxel"},
+        Refusal{"a.raw", ramp(), rampAnd({"--threshold", "999"}), 3, "no active voxel"},
         Refusal{"a.raw", ramp(), rampAnd({"--voxel-size", "0"}), 2, "--voxel-size"},
         Refusal{"a.raw", kNan, {"--dims", "1,1,1", "--type", "float32"}, 3, "(0, 0, 0)"},
         Refusal{"a.nrrd", "NRRD0004\n", {}, 3, "a.nrrd"},

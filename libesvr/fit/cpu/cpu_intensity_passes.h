@@ -39,7 +39,7 @@ class CpuIntensityPasses final : public IntensityPasses {
   std::vector<Coord> corners_;        ///< corners of known bricks, then of others in reach
   std::vector<const float*> wanted_;  ///< source's values of known bricks; null: background
   EvaluatePlan plan_;
-  bool keeps_ = false, kept_ = false;  ///< whether tapes shall be kept; whether they are valid
+  bool keeps_ = false, kept_ = false;  ///< whether tapes shall be kept, and are
   std::vector<KeptTapes> tapes_;       ///< tapes of each brick
   std::vector<PairProjection> projections_;
   std::vector<StoredError> brickError_;
