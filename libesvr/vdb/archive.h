@@ -18,6 +18,7 @@ struct ArchiveEntry {
   bool savedAsHalf = false;
   std::string parent;  ///< storedName of the grid whose tree this one shares; else empty
   std::uint64_t gridAt = 0;
+  std::uint64_t gridBytes = 0;
 
   [[nodiscard]] std::string name() const;       ///< without the number
   [[nodiscard]] std::string valueType() const;  ///< "float", "vec3s", "ptdataidx32", ...

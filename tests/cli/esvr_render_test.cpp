@@ -24,6 +24,7 @@
 namespace esvr::test {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -363,6 +364,14 @@ TEST_F(EsvrRender, InputThatCannotBeDrawnIsRefused) {
   writeText(folder_ / "bad.esvr", "nothing of the kind");
   EXPECT_EQ(draw("bad.esvr", "refused.png").exitCode, 3);
   EXPECT_EQ(draw("in.esvr", "refused.jpg").exitCode, 2);
+}
+
+TEST_F(EsvrRender, PicturesBeyondTheMemoryAllowedAreRefused) {
+  const auto large =
+      draw("in.esvr", "large.png", {"--resolution", "30000x30000", "--max-memory", "1GB"});
+  EXPECT_EQ(large.exitCode, 5);
+  EXPECT_THAT(large.err, AllOf(HasSubstr("30000 x 30000"), HasSubstr("43.2 GB")));
+  EXPECT_EQ(draw("in.esvr", "large.png", {"--resolution", "100000x100000"}).exitCode, 2);
 }
 
 TEST_F(EsvrRender, HelpNamesEveryBuiltInFunction) {

@@ -26,6 +26,7 @@ struct GridSummary {
   GridClass gridClass = GridClass::kUnknown;
   std::uint64_t activeVoxels = 0;
   Box activeBox;
+  std::uint64_t storedBytes = 0;  ///< of the file; a grid that shares another's tree has few
   std::string skipReason;  ///< empty where the grid can be fitted; else why not, for the user
   bool isScalar = false;   ///< of floats that readGrid takes, be the grid empty or not
 };
