@@ -1,28 +1,37 @@
 #pragma once
-/// How far a fit is, on a terminal.
+/// Shows how far a fit is: a bar on a terminal, lines in a log.
 
+#include <chrono>
 #include <string>
 
+#include "cli/log.h"
 #include "esvr/fit.h"
 
 namespace esvr::vdb2esvr {
 
-/// One line on stderr that is redrawn and gone when the bar is. Where stderr is no terminal,
-/// nothing is drawn.
+/// On a terminal, one line on stderr that is redrawn, and erased when the bar goes out of scope.
+/// Where stderr is no terminal: a line every few seconds with --verbose, nothing otherwise.
 class ProgressBar {
  public:
-  /// \param grid   begins the line
-  /// \param shown  false: draws nothing (--quiet)
-  ProgressBar(std::string grid, bool shown);
+  /// \param grid       begins the line
+  /// \param verbosity  kQuiet: nothing is shown
+  ProgressBar(std::string grid, cli::Verbosity verbosity);
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  void show(const FitProgress& progress) const;
+  void show(const FitProgress& progress);
 
  private:
+  enum class Form { kNone, kBar, kLines };
+  using Clock = std::chrono::steady_clock;
+
+  void redraw(const FitProgress& progress) const;
+  void printLine(const FitProgress& progress);
+
   std::string grid_;
-  bool shown_;
+  Form form_;
+  Clock::time_point lastLine_ = Clock::now();
 };
 
 /// "density  45 % [#########-----------]  51.20 dB  12000 ellipsoids  1:23 left", cut to a width.

@@ -397,6 +397,20 @@ TEST_F(Vdb2Esvr, triesNoEllipsoidsForABoundWhereTold) {
   EXPECT_TRUE(readEsvr(out()).grids[0].voxels.has_value());
 }
 
+TEST_F(Vdb2Esvr, dividesByTheGridsThatWereConverted) {
+  test::writeInput(in(), {{.name = "density", .voxels = softBall({})},
+                          {.name = "heat", .voxels = softBall({40, 0, 0})}});
+  const std::string path = folder_ / "r.json";
+  const auto run = quickFit(in(), out(), {"-g", "heat", "--report", path});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("1 of 2 grids"));
+  const Json report = Json::parse(test::readText(path));
+  const double converted = report["input"]["bytes_converted"], all = report["input"]["bytes"];
+  EXPECT_LT(converted, 0.6 * all);  // two grids alike
+  EXPECT_GT(converted, 0.2 * all);
+  EXPECT_DOUBLE_EQ(report["ratio"], converted / double(report["output"]["bytes"]));
+}
+
 TEST_F(Vdb2Esvr, reportsAFailureToo) {
   const std::string report = folder_ / "r.json";
   const auto run = vdb2esvr({in(), out(), "--size", "99", "--report", report});
