@@ -6,6 +6,7 @@
 #include "cli/byte_size.h"
 #include "cli/choice.h"
 #include "cli/command_line.h"
+#include "cli/memory_limit.h"
 #include "compare/program.h"
 #include "compare/report_options.h"
 #include "esvr/error.h"
@@ -72,6 +73,7 @@ cli::CommandLine makeCommandLine() {
     ("report", value<std::string>()->value_name("FILE.json"), "all that was measured; - for stdout")
     ("force,f", bool_switch(), "replace the report if it exists");
   // clang-format on
+  cli::addMaxMemory(line);
   return line;
 }
 
@@ -140,6 +142,7 @@ std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv)
   options.ssim = a.get<bool>("ssim");
   options.report = a.find<std::string>("report").value_or("");
   options.overwrite = a.get<bool>("force");
+  options.maxMemory = cli::maxMemoryOf(a);
   options.threads = a.threads;
   options.verbosity = a.verbosity;
   options.commandLine = commandLine(argc, argv);

@@ -30,6 +30,7 @@ struct CheckOptions {
   bool ssim = false;   ///< though no limit asks for it
   std::string report;  ///< a file, "-", or empty
   bool overwrite = false;
+  std::uint64_t maxMemory = 0;  ///< bytes that input may take
   int threads = 0;
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;

@@ -185,9 +185,9 @@ class RawReader {
   std::vector<std::byte> row_;
 };
 
-SparseVolume readVdb(const External& external, const std::string& grid) {
-  const GridFile file(external.file);
-  return file.read(file.grids().size() == 1 ? 0 : file.find(grid)).volume;
+SparseVolume readVdb(const External& external, const ExternalPlace& place) {
+  const GridFile file(external.file, place.maxMemory);
+  return file.read(file.grids().size() == 1 ? 0 : file.find(place.grid)).volume;
 }
 
 }  // namespace
@@ -209,7 +209,7 @@ External parseExternal(const std::string& text) {
 }
 
 SparseVolume readExternal(const External& external, const ExternalPlace& place) {
-  if (!external.dims) return readVdb(external, place.grid);
+  if (!external.dims) return readVdb(external, place);
   checkRaw(external, place.box);
   return RawReader(external, place).read();
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "esvr/coord.h"
+#include "esvr/memory_limit.h"
 #include "esvr/sparse_volume.h"
 
 namespace esvr::compare {
@@ -31,6 +32,7 @@ struct ExternalPlace {
   std::string grid;  ///< of a VDB file; where it has only one grid, that one
   Box box;           ///< of a raw file
   float background = 0.0f;
+  std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes that reading may take
 };
 
 /// The voxels that came back. Of a raw file, those that differ from the background are active.

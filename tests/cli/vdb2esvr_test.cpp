@@ -411,6 +411,13 @@ TEST_F(Vdb2Esvr, dividesByTheGridsThatWereConverted) {
   EXPECT_DOUBLE_EQ(report["ratio"], converted / double(report["output"]["bytes"]));
 }
 
+TEST_F(Vdb2Esvr, refusesWhatTakesMoreMemoryThanAllowed) {
+  const auto run = quickFit(in(), out(), {"--max-memory", "1KB"});
+  EXPECT_EQ(run.exitCode, 5);
+  EXPECT_THAT(run.err, HasSubstr("density"));
+  EXPECT_FALSE(outIsThere());
+}
+
 TEST_F(Vdb2Esvr, reportsAFailureToo) {
   const std::string report = folder_ / "r.json";
   const auto run = vdb2esvr({in(), out(), "--size", "99", "--report", report});
