@@ -7,6 +7,7 @@
 #include "cli/choice.h"
 #include "cli/command_line.h"
 #include "cli/memory_limit.h"
+#include "cli/number.h"
 #include "compare/program.h"
 #include "compare/report_options.h"
 #include "esvr/error.h"
@@ -93,22 +94,17 @@ std::set<DifferenceKind> kindsOf(const std::string& word) {
 
 std::set<DifferenceKind> parseKinds(const std::string& list) {
   std::set<DifferenceKind> kinds;
-  for (const auto& word : splitAtCommas(list)) kinds.merge(kindsOf(word));
+  for (const auto& word : cli::splitText(list, ',')) kinds.merge(kindsOf(word));
   return kinds;
 }
 
 /// A limit on what is not an error in value units may be 0, and PSNR and SSIM below that.
 cli::ErrorBound limitOf(const Figure& figure, const std::string& text) {
   if (figure.inValueUnits && text != "0") return cli::parseErrorBound(figure.option, text);
-  std::size_t end = 0;
-  double amount = std::numeric_limits<double>::quiet_NaN();
-  try {
-    amount = std::stod(text, &end);
-  } catch (const std::exception&) {
-  }
-  if (end != text.size() || !(std::abs(amount) < std::numeric_limits<double>::infinity()))
+  const auto amount = cli::parseNumber(text);
+  if (!amount)
     throw UsageError("--" + std::string(figure.option) + " must be a number, not '" + text + "'");
-  return {.amount = amount};
+  return {.amount = *amount};
 }
 
 void readLimits(const Arguments& a, CheckOptions& options) {
