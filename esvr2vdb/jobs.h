@@ -1,5 +1,5 @@
 #pragma once
-/// What esvr2vdb does. Each throws esvr::Error where it cannot.
+/// The jobs of esvr2vdb. Each throws esvr::Error where it cannot be done.
 
 #include "esvr2vdb/options.h"
 

@@ -98,10 +98,7 @@ std::vector<float> ofFirstLayers(const Trial& trial, std::size_t layers) {
 }  // namespace
 
 TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
-    : target_{target.source,
-              format::ruleOf(grid),
-              target.box,
-              grid.leaves,
+    : target_{target.source, format::ruleOf(grid), target.box, grid.leaves,
               grid.topology != TopologyKind::kThreshold},
       sampleBricks_(sampleOf(knownCorners(target_))),
       sampleTarget_{target.source, target_.rule, target.box, sampleBricks_, true},

@@ -3,8 +3,8 @@
 
 #include <span>
 
-#include "esvr/sparse_volume.h"
 #include "core/brick_index.h"
+#include "esvr/sparse_volume.h"
 
 namespace esvr {
 

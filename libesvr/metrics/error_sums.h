@@ -19,12 +19,12 @@ struct ErrorSums {
   Coord maxErrorAt;
 
   // over the whole lattice
-  double squaredErrorActive = 0.0;  ///< where the reference is active
+  double squaredErrorActive = 0.0;  ///< over the reference's active voxels
   std::uint64_t activeReference = 0, activeUnion = 0, activeIntersection = 0;
   std::optional<Coord> nonFinite;  ///< the first voxel whose error is not a number or infinite
 };
 
-/// What is summed over which part of space.
+/// The sums, and the parts of space that they go over.
 struct ErrorDomain {
   Box box;
   Backgrounds backgrounds;

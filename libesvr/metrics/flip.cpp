@@ -55,7 +55,7 @@ Planes ycxczOf(const Image& image) {
   return planes;
 }
 
-/// What the eye sees of a picture, in a space where distances are differences.
+/// Turns a picture into what the eye sees, in a space where distances are differences.
 std::vector<Color> perceivedColors(const Planes& ycxcz, const metrics::EyeFilters& eye) {
   const Planes seen{blurred(ycxcz[0], eye.achromatic), blurred(ycxcz[1], eye.redGreen),
                     blurred(ycxcz[2], eye.blueYellow)};

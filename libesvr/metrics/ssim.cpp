@@ -39,7 +39,7 @@ class SsimFormula {
         (2.0 * m.meanA * m.meanB + c_.c1) / (square(m.meanA) + square(m.meanB) + c_.c1);
     return luminance * (2.0 * m.covariance + c_.c2) / (m.varianceA + m.varianceB + c_.c2);
   }
-  /// Of a window that sees the backgrounds only; exactly 1 where they are equal.
+  /// The SSIM of a window that sees the backgrounds only. It is exactly 1 where they are equal.
   [[nodiscard]] double ofBackgrounds(const Backgrounds& b) const {
     return (*this)({b.reference, b.candidate, 0.0, 0.0, 0.0});
   }
@@ -49,7 +49,7 @@ class SsimFormula {
   SsimConstants c_;
 };
 
-/// What all bricks of one comparison share.
+/// The parameters that all bricks of one comparison share.
 struct SsimScene {
   std::span<const BrickPair> pairs;
   Box box;
@@ -67,7 +67,8 @@ class SsimBrick {
   double excess(Coord brick);
 
  private:
-  /// Of the windows around a brick's voxels, along one axis: less than 1 where the box clips them.
+  /// The weights of the windows around a brick's voxels along one axis, less than 1 where the box
+  /// clips them.
   using AxisWeights = std::array<double, kBrickSide>;
 
   void gather(Coord brick);

@@ -24,12 +24,12 @@ struct ArchiveEntry {
   [[nodiscard]] std::string valueType() const;  ///< "float", "vec3s", "ptdataidx32", ...
 };
 
-/// What stands before a grid's tree.
+/// The part of a grid before its tree.
 struct GridHead {
   std::vector<MetaItem> metadata;  ///< file statistics included
   Transform transform;
   std::uint32_t compression = 0;  ///< OpenVDB's flags
-  std::uint64_t treeAt = 0;       ///< where the tree begins; a grid with a parent has none
+  std::uint64_t treeAt = 0;       ///< begin of the tree; a grid with a parent has none
 };
 
 class Archive {

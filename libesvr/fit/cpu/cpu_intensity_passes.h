@@ -4,9 +4,9 @@
 #include "core/brick_index.h"
 #include "field/brick_kernels.h"
 #include "field/evaluate_plan.h"
+#include "field/voxel_rule.h"
 #include "fit/cpu/pair_tapes.h"
 #include "fit/intensity_passes.h"
-#include "field/voxel_rule.h"
 
 namespace esvr {
 

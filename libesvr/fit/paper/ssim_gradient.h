@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "field/brick_halo.h"
 #include "core/brick_index.h"
+#include "field/brick_halo.h"
 #include "field/ssim_window.h"
 
 namespace esvr {

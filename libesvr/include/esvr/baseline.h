@@ -1,6 +1,7 @@
 #pragma once
-/// What people store volumes in today, at a setting: lossless and quantised VDB files, and ZFP
-/// where the library was built with it. A comparison runs them on the same voxels as an .esvr.
+/// The forms that people store volumes in today, at a setting: lossless and quantised VDB files,
+/// and ZFP where the library was built with it. A comparison runs them on the same voxels as an
+/// .esvr.
 
 #include <cstdint>
 #include <filesystem>
@@ -16,7 +17,7 @@
 
 namespace esvr {
 
-/// Of ZFP's lossy modes those whose size follows the data.
+/// The lossy modes of ZFP whose size follows the data.
 enum class ZfpMode {
   kAccuracy,  ///< largest error of a voxel; ZFP works in powers of two at or below it
   kPrecision  ///< bit planes of each block of 4^3
@@ -45,10 +46,10 @@ struct BaselineSetting {
 
 struct BaselineSource {
   const VolumeGrid& grid;
-  Box box;                          ///< of the PSNR; ZFP stores its voxels and no others
-  double peak = 1.0;                ///< of the PSNR
+  Box box;                          ///< PSNR is taken over it; ZFP stores its voxels and no others
+  double peak = 1.0;                ///< the PSNR's peak
   std::filesystem::path folder;     ///< for files that come and go
-  std::uint64_t maxDenseBytes = 0;  ///< of the box as an array of floats; 0: no bound
+  std::uint64_t maxDenseBytes = 0;  ///< bound on the box as an array of floats; 0: none
   const CancelToken* cancel = nullptr;
 };
 

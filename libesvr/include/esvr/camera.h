@@ -1,6 +1,6 @@
 #pragma once
-/// Where a picture is taken from. Everything is in voxels of the grid's index space: voxel (i, j,
-/// k) lies at (i, j, k), and the grid's transform takes no part.
+/// The place that a picture is taken from. Everything is in voxels of the grid's index space: voxel
+/// (i, j, k) lies at (i, j, k), and the grid's transform takes no part.
 
 #include <array>
 #include <optional>
@@ -28,7 +28,7 @@ struct Resolution {
   int width = 800, height = 800;  ///< pixels
 };
 
-/// What is known of a camera; the rest is chosen so that a box fills the picture.
+/// The known part of a camera; the rest is chosen so that a box fills the picture.
 struct CameraWish {
   std::optional<Vec3> eye{}, center{}, up{};
   std::optional<double> fov{}, height{};
@@ -44,7 +44,8 @@ struct CameraWish {
 [[nodiscard]] Camera turned(const Camera& camera, double degrees);
 
 /// \throws UsageError  not finite; eye and center in one place; up of no length or along the view;
-///                     fov not between 0 and 180; height not positive; fewer pixels than one, or a side above kMaxSide
+///                     fov not between 0 and 180; height not positive; fewer pixels than one, or a
+///                     side above kMaxSide
 void checkCamera(const Camera& camera, Resolution resolution);
 
 }  // namespace esvr

@@ -31,7 +31,7 @@ enum class TopologyKind {
   kMask = 2,  ///< the voxels of `mask`, whatever their values
 };
 
-/// What the first importance layers of every chunk come to, against the source. A row of a grid's
+/// The error of the first importance layers of every chunk, against the source. A row of a grid's
 /// table, one for each layer.
 struct LayerError {
   float psnrBox = 0.0f;   ///< dB, over the box of the conversion; infinite where there is no error
@@ -49,8 +49,8 @@ struct StoredGrid {
       leaves;  ///< kLeaves, kMask: index corners of the source's bricks, increasing; else empty
   std::vector<BrickMask> mask;             ///< kMask: active voxels of each of the leaves
   bool withinRange = true;                 ///< values come back within that of the source, below
-  Box activeBox;                           ///< of the source, index coordinates
-  std::uint64_t activeVoxels = 0;          ///< of the source
+  Box activeBox;                           ///< the source's, index coordinates
+  std::uint64_t activeVoxels = 0;          ///< the source's
   float valueMin = 0.0f, valueMax = 0.0f;  ///< over the source's active voxels
   std::vector<CurvePoint> curve;
   /// Empty: the ellipsoids are stored as float32. Else one for every chunk of the field, whose
@@ -74,7 +74,7 @@ struct StreamBytes {
 /// without ellipsoids.
 [[nodiscard]] std::size_t layerCount(const StoredGrid& grid);
 
-/// What each layer adds to a grid whose ellipsoids are quantised; nothing where they are not.
+/// The size of each layer of a grid whose ellipsoids are quantised; empty where they are not.
 struct LayerSize {
   std::uint64_t ellipsoids = 0, bytes = 0;
 };
@@ -96,8 +96,8 @@ struct ContainerWriteOptions {
 std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
                         const ContainerWriteOptions& options = {});
 
-/// What reading may take. Few bytes of a file may stand for many: a section may be compressed, and
-/// equal ellipsoids or voxels cost next to nothing.
+/// Bounds on what reading takes. Few bytes of a file may stand for many: a section may be
+/// compressed, and equal ellipsoids or voxels cost next to nothing.
 struct ReadLimits {
   std::uint64_t maxBytes = kNoMemoryLimit;
 };
@@ -108,14 +108,14 @@ struct ReadLimits {
 /// where); MemoryExceeded: its content takes more memory than the limits allow
 [[nodiscard]] EsvrFile readEsvr(const std::filesystem::path& path, const ReadLimits& limits = {});
 
-/// Which part of a file is wanted: that it is needed at all is told from the section table, chunk
-/// records and directories of blocks. A grid that is stored as voxels is read whole.
+/// The part of a file that is wanted. Whether a section is needed follows from the section table,
+/// chunk records and directories of blocks. A grid that is stored as voxels is read whole.
 struct ReadPart {
   /// Only what can reach these voxels: every ellipsoid whose support meets the box is there, others
   /// may be.
   std::optional<Box> box{};
   std::optional<std::size_t> layers{};  ///< at most so many importance layers, from the heaviest
-  /// Of these, as many as it takes for so many ellipsoids: whole layers, so there may be more.
+  /// As many of these as it takes for so many ellipsoids: whole layers, so there may be more.
   std::optional<std::size_t> ellipsoids{};
   ReadLimits limits{};
 };
@@ -130,7 +130,8 @@ struct PartOfFile {
 [[nodiscard]] PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part);
 
 /// Bytes that a grid adds to a file at most: its sections, the padding before and behind them, and
-/// its rows of the section table. A file takes no more than bytesBesideGrids() and the sum of these.
+/// its rows of the section table. A file takes no more than bytesBesideGrids() and the sum of
+/// these.
 /// \throws RuntimeFailure  as encodeEsvr
 [[nodiscard]] std::uint64_t bytesAdded(const StoredGrid& grid);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Which device computes.
+/// The device that computes.
 
 #include <string>
 #include <vector>
@@ -10,7 +10,7 @@ enum class DeviceKind { kCpu, kCuda };
 
 struct Device {
   DeviceKind kind = DeviceKind::kCpu;
-  int index = 0;  ///< of the CUDA device
+  int index = 0;  ///< the CUDA device's number
 };
 
 /// True where the library was built with CUDA (which says nothing of a GPU being there).

@@ -8,7 +8,7 @@
 
 namespace esvr {
 
-/// What went wrong; the value is the exit code of the programs.
+/// The kind of a failure; the value is the exit code of the programs.
 enum class ErrorKind {
   kRuntime = 1,       ///< the run failed: output not writable, disk full, cancelled
   kUsage = 2,         ///< options that make no sense

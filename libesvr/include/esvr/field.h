@@ -28,7 +28,7 @@ namespace esvr {
 void evaluateBricks(const Field& field, std::span<const Coord> corners, std::span<float> out);
 
 struct EllipsoidHits {
-  std::uint64_t pairs = 0;   ///< of an ellipsoid and a voxel that its support holds
+  std::uint64_t pairs = 0;   ///< an ellipsoid and a voxel that its support holds make a pair
   std::uint64_t voxels = 0;  ///< that any support holds
 };
 /// \param corners  index corners of the bricks whose voxels count, multiples of 8

@@ -10,7 +10,7 @@
 
 namespace esvr {
 
-/// Of someone 0.7 m from a screen of 0.7 m and 3840 pixels: about 67.
+/// Pixels a degree for someone 0.7 m from a screen of 0.7 m and 3840 pixels: about 67.
 inline constexpr double kFlipPixelsPerDegree = 0.7 * 3840 / 0.7 * std::numbers::pi / 180;
 
 struct Flip {

@@ -27,9 +27,9 @@ namespace esvr {
                                         const SparseVolume& source, Field field,
                                         Activity activity = Activity::kByValue);
 
-/// True for a level set with a half width that none of its active voxels exceeds: what makeStoredGrid
-/// stores as a narrow band, and FitOptions::narrowBand is meant for. A level set that is active
-/// beyond its half width, or has none, is fitted and stored like any other grid.
+/// True for a level set with a half width that none of its active voxels exceeds: what
+/// makeStoredGrid stores as a narrow band, and FitOptions::narrowBand is meant for. A level set
+/// that is active beyond its half width, or has none, is fitted and stored like any other grid.
 [[nodiscard]] bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source);
 
 /// A grid that holds its voxels and no ellipsoids. \param layer  of `source` (voxel_layer.h)
@@ -44,11 +44,11 @@ struct DecodeOptions {
   std::optional<float> threshold{};  ///< instead of the grid's own; 0 or above
   /// Voxels elsewhere come back inactive; bricks elsewhere are not evaluated.
   std::optional<Box> box{};
-  /// What evaluating and keeping the voxels may take.
+  /// Bound on the memory that evaluating and keeping the voxels takes.
   std::uint64_t maxBytes = kNoMemoryLimit;
 };
 
-/// What decodeGrid() takes at most. Nothing is evaluated.
+/// Bounds the work and memory of decodeGrid(). Nothing is evaluated.
 [[nodiscard]] WorkEstimate estimateDecode(const StoredGrid& grid,
                                           const DecodeOptions& options = {});
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What a grid is besides its voxels: all that a VDB must get back to be the grid it was.
+/// A grid without its voxels: all that a VDB must get back to be the grid it was.
 
 #include <array>
 #include <cstddef>
@@ -19,7 +19,7 @@ struct MetaItem {
 
 enum class GridClass { kUnknown = 0, kLevelSet = 1, kFogVolume = 2, kStaggered = 3 };
 
-/// What the source's voxels were; the fit works in float.
+/// The type of the source's voxels; the fit works in float.
 enum class ValueType {
   kFloat = 0,
   kHalf = 1,    ///< FloatGrid saved as half

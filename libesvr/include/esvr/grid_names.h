@@ -9,8 +9,8 @@
 
 namespace esvr {
 
-/// What --grid takes for each grid: its name, with "[i]" (from 0, in file order) where several
-/// share it. \param names  of the grids, in file order
+/// The name that --grid takes for each grid: its own, with "[i]" (from 0, in file order) where
+/// several share it. \param names  of the grids, in file order
 [[nodiscard]] std::vector<std::string> uniqueNames(std::span<const std::string> names);
 
 /// Place in `names` of the grid asked for: by its unique name, by its name (the first so called) or

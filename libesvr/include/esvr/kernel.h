@@ -55,7 +55,7 @@ struct KernelConstants {
   Real expNegS;    ///< e^-s
 };
 
-/// What phi of the paper's kernel ends at.
+/// The value at which phi of the paper's kernel ends.
 ESVR_HD inline double paperEnd() {
   const double k = Kernel::kPaperK, q = double(Kernel::kPaperCutoff) * Kernel::kPaperCutoff;
   return (1.0 + std::exp(-k)) / (1.0 + std::exp(k * (q - 1.0)));
@@ -106,7 +106,7 @@ ESVR_HD inline KernelValue<Real> kernelValue(const KernelConstants<Real>& c, Rea
   return {quotient - c.base, -quotient * y * inv, norm * c.plateau * (y - c.expNegS) * inv * inv};
 }
 
-/// Where phi = 1/2: the half width of every ellipsoid, squared, in units of its scales.
+/// The place where phi = 1/2: the half width of every ellipsoid, squared, in units of its scales.
 struct KernelWidth {
   double m;            ///< phi(m) = 1/2
   double logMByKappa;  ///< d ln m / d kappa

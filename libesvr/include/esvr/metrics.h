@@ -12,7 +12,7 @@ namespace esvr {
 
 struct CompareOptions {
   std::optional<Box>
-      box{};  ///< of 'PSNR over the box'; default: the reference's active bounding box
+      box{};  ///< 'PSNR over the box' is taken over it; default: the reference's active bounding box
   std::optional<double> peak{};  ///< default: peakOf(reference)
   bool ssim = false;             ///< 3D SSIM is the one metric that is not nearly free
 };
@@ -20,7 +20,7 @@ struct CompareOptions {
 struct VolumeMetrics {
   double peak = 0.0;
   double boxVoxels = 0.0;
-  std::uint64_t activeVoxels = 0;  ///< of the reference
+  std::uint64_t activeVoxels = 0;  ///< the reference's
   double mseBox = 0.0, mseActive = 0.0;
   double psnrBox = 0.0, psnrActive = 0.0;  ///< dB; +inf where the error is zero
   double maxError = 0.0;                   ///< over the box

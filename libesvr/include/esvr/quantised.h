@@ -24,7 +24,7 @@ namespace esvr {
 struct Lattice {
   static constexpr int kMaxPrecision = 15;
   static constexpr int kMaxCellBits = 20;
-  static constexpr int kMaxPositionBits = 22;  ///< of cell and place in it: float32 holds them
+  static constexpr int kMaxPositionBits = 22;  ///< bits of cell and place in it: float32 holds them
   static constexpr int kMaxRotationBits = 14;
   static constexpr int kMaxScaleBits = 16;
   static constexpr int kMaxIntensityShift = 24;
@@ -33,14 +33,14 @@ struct Lattice {
 
   double cell = 1.0;  ///< side of the cells that centers are sorted by, voxels
   Coord lowestCell;   ///< cells count from here
-  int cellBits = 0;   ///< of a cell's number along an axis
+  int cellBits = 0;   ///< bits of a cell's number along an axis
   int positionBase = 0, positionSlope = 0;    ///< 1/256 bit; slope by a coarse step of the scale
   double scaleStep = 1.0;                     ///< coarse step of the logarithm of a scale
   std::int32_t lowestScale = 0;               ///< smallest logarithm, in coarse steps
   int scaleOffset = 0;                        ///< precision at which the coarse step is enough
   int rotationOffset = 0;                     ///< bits at precision 0 and equal scales
   std::vector<std::uint8_t> rotationFrom;     ///< ratio, in coarse steps, from which one bit more
-  double intensityStep = 1.0;                 ///< of the smallest volume
+  double intensityStep = 1.0;                 ///< step for ellipsoids of the smallest volume
   int intensityBase = 0, intensitySlope = 0;  ///< 1/256 octave; slope by a coarse step of a scale
   bool signedIntensity = false;
 
@@ -58,7 +58,7 @@ struct QuantisedEllipsoids {
   std::array<std::vector<std::uint32_t>, 3> scale;
   std::array<std::vector<std::uint16_t>, 3> rotation;  ///< x, y, z of the quaternion
   std::vector<std::int32_t> intensity;                 ///< magnitude m as m, negative as -1 - m
-  /// Where the importance layers end, increasing, the last of two or more at size(). Empty: one
+  /// The ends of the importance layers, increasing, the last of two or more at size(). Empty: one
   /// layer.
   std::vector<std::size_t> layerEnds;
 
@@ -67,8 +67,8 @@ struct QuantisedEllipsoids {
   friend bool operator==(const QuantisedEllipsoids&, const QuantisedEllipsoids&) = default;
 };
 
-/// What a step may cost: the error of V, as root of the sum of squares over voxels, that half a
-/// step's rounding leaves behind on average is about 0.29 times this, in the grid's values.
+/// The error that a step may cost: that of V, as root of the sum of squares over voxels, that half
+/// a step's rounding leaves behind on average is about 0.29 times this, in the grid's values.
 struct QuantiserSteps {
   double position = 0.0, scale = 0.0, rotation = 0.0, intensity = 0.0;
 };
@@ -97,7 +97,7 @@ struct LatticeChoice {
 /// Rounds intensities anew, on the lattice that the scales have. \param intensities  file order
 void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids& q);
 
-/// What the integers stand for. Exact: the same bits everywhere.
+/// The ellipsoids that the integers stand for. Exact: the same bits everywhere.
 [[nodiscard]] Ellipsoids dequantise(const QuantisedEllipsoids& q);
 
 }  // namespace esvr

@@ -19,7 +19,7 @@
 
 namespace esvr {
 
-/// What becomes of the samples along a ray.
+/// The way in which the samples along a ray become a pixel.
 enum class RenderMode {
   kComposite,  ///< put over each other from front to back
   kMaximum,    ///< the largest value, with its color and its opacity as it is
@@ -29,7 +29,7 @@ enum class RenderMode {
   kDepth
 };
 
-/// What a field is between its voxels.
+/// The values of a field between its voxels.
 enum class Between {
   kVoxels,  ///< interpolated trilinearly from the voxels that revoxelise() has: as renderVolume
   kSum      ///< the sum of ellipsoids itself, which a fit that looks at voxels leaves open there
@@ -52,7 +52,7 @@ struct RenderOptions {
   /// that costs a 16th of a level of 255.
   double minTransmittance = 1.0 / 4096;
   RenderMode mode = RenderMode::kComposite;
-  Between between = Between::kVoxels;   ///< of a field
+  Between between = Between::kVoxels;   ///< the values of a field between its voxels
   std::optional<PlaceBox> clip{};       ///< samples outside of it count as empty space
   const CancelToken* cancel = nullptr;  ///< looked at before each row of tiles
 };
@@ -66,7 +66,8 @@ struct RenderOptions {
 /// \param voxels  how sums become voxels; its bricks are not looked at. Of a narrow band, voxels
 ///                inside are -background wherever an ellipsoid reaches
 /// \throws UsageError  as checkCamera and checkTransferFunction; step, opacityLength or
-///                     minTransmittance out of range; a clip box that is no box; rays of more than 2^24 samples
+///                     minTransmittance out of range; a clip box that is no box; rays of more than
+/// 2^24 samples
 ///                     through the supports; Cancelled
 [[nodiscard]] Image renderField(const Field& field, const RenderOptions& options,
                                 const RevoxeliseOptions& voxels = {});

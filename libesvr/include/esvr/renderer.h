@@ -12,7 +12,7 @@
 
 namespace esvr {
 
-/// What the last picture took.
+/// The cost of the last picture.
 struct FrameStats {
   double listMs = 0.0;  ///< CUDA: ellipsoids looked at and listed by tiles
   double drawMs = 0.0;  ///< CUDA: samples summed and composited. CPU: all
@@ -20,7 +20,7 @@ struct FrameStats {
   /// reach. Of a field on CUDA; else 0.
   std::uint64_t pairs = 0;
   double occupancy = 0.0;  ///< share of the tiles that have a list; of a field on CUDA
-  int depthParts = 1;      ///< of a tile, drawn at once
+  int depthParts = 1;      ///< parts of a tile's depth that were drawn at once
   /// Most that the renderer held on its device so far, frame buffers included; CUDA only.
   std::uint64_t deviceBytes = 0;
 };
@@ -30,7 +30,7 @@ struct RendererLimits {
   /// tiles have most of the work, and stop later where little shines through. 0: by the lists of
   /// the first picture. At most 16.
   int depthParts = 0;
-  /// Of memory on the device; pictures are drawn in bands where it asks for that. 0: no bound.
+  /// Bound on the memory on the device; pictures are drawn in bands to keep it. 0: no bound.
   std::uint64_t maxBytes = 0;
 };
 

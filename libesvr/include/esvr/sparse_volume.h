@@ -56,7 +56,7 @@ struct SparseVolume {
   float background = 0.0f;    ///< value outside the bricks
   std::vector<Coord> bricks;  ///< brick positions relative to `origin`, in bricks, each >= 0
   std::vector<float> values;  ///< kBrickVoxels a brick, the grid's values (background included)
-  std::vector<BrickMask> active;  ///< which voxels are active
+  std::vector<BrickMask> active;  ///< the active voxels
 
   [[nodiscard]] std::size_t brickCount() const { return bricks.size(); }
   [[nodiscard]] std::span<const float> brickValues(std::size_t b) const {

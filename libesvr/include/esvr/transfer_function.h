@@ -36,7 +36,7 @@ struct ColorPoint {
 struct ColorMap {
   ColorSpace space = ColorSpace::kRgb;
   std::vector<ColorPoint> points;
-  Rgb nan{0.5, 0.0, 0.0};  ///< of values that are no number
+  Rgb nan{0.5, 0.0, 0.0};  ///< color of values that are not a number
   friend bool operator==(const ColorMap&, const ColorMap&) = default;
 };
 

@@ -16,19 +16,19 @@
 
 namespace esvr {
 
-/// What a file says of one of its grids.
+/// A file's description of one of its grids.
 struct GridSummary {
   std::string name;  ///< as stored; may be empty or shared by several grids
   std::string
-      uniqueName;  ///< what --grid takes: the name, with "[i]" where several share it (i from 0)
+      uniqueName;  ///< --grid takes it: the name, with "[i]" where several share it (i from 0)
   std::string valueType;  ///< OpenVDB's: "float", "double", "vec3s", "int32", "ptdataidx32", ...
   bool savedAsHalf = false;
   GridClass gridClass = GridClass::kUnknown;
   std::uint64_t activeVoxels = 0;
   Box activeBox;
-  std::uint64_t storedBytes = 0;  ///< of the file; a grid that shares another's tree has few
+  std::uint64_t storedBytes = 0;  ///< in the file; a grid that shares another's tree has few
   std::string skipReason;  ///< empty where the grid can be fitted; else why not, for the user
-  bool isScalar = false;   ///< of floats that readGrid takes, be the grid empty or not
+  bool isScalar = false;   ///< holds floats that readGrid takes, be the grid empty or not
 };
 
 struct VdbSummary {
@@ -42,7 +42,7 @@ struct VdbSummary {
 /// \throws BadInput  missing, a directory, empty, truncated, not a VDB (the text names the file)
 [[nodiscard]] VdbSummary inspectVdb(const std::filesystem::path& path);
 
-/// What to do with NaN and infinite voxels.
+/// The treatment of NaN and infinite voxels.
 enum class NonFinite { kRefuse, kZero };
 
 struct ReadOptions {

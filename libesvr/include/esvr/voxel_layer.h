@@ -11,7 +11,7 @@
 
 namespace esvr {
 
-/// What an integer n stands for.
+/// The value that an integer n stands for.
 enum class VoxelForm {
   kLattice = 0,  ///< float32(n / divisor), the division in float64
   kHalf = 1,     ///< half floats in their order: n >= 0 has the bits n, n < 0 the bits of -(-1 - n)
@@ -21,8 +21,8 @@ enum class VoxelForm {
 
 struct VoxelLayer {
   VoxelForm form = VoxelForm::kFloat;
-  double divisor = 1.0;             ///< of kLattice
-  std::vector<float> palette;       ///< of kPalette, in the order of kFloat
+  double divisor = 1.0;             ///< for kLattice
+  std::vector<float> palette;       ///< for kPalette, in the order of kFloat
   Coord origin;                     ///< as SparseVolume's
   float background = 0.0f;          ///< exact
   std::vector<Coord> bricks;        ///< as SparseVolume's
@@ -38,7 +38,7 @@ struct VoxelLayer {
 /// are, else as floats.
 [[nodiscard]] VoxelLayer exactLayer(const SparseVolume& volume);
 
-/// What a layer keeps of which voxels are active.
+/// The part of the activity of voxels that a layer keeps.
 enum class Activity {
   kExact,   ///< all of it
   kByValue  ///< active are those that cannot be the background within the bound

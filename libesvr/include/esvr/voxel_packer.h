@@ -31,7 +31,7 @@ struct VoxelPacking {
 };
 
 [[nodiscard]] bool isNanoVdb(PackedForm form);
-/// What a NanoVDB grid of the form holds; kFloat of OpenVDB's.
+/// The values that a NanoVDB grid of the form holds; kFloat for OpenVDB's forms.
 [[nodiscard]] NanoValues nanoValues(PackedForm form);
 
 class VoxelPacker {
