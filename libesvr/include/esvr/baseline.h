@@ -1,7 +1,6 @@
 #pragma once
-/// The forms that people store volumes in today, at a setting: lossless and quantised VDB files,
-/// and ZFP where the library was built with it. A comparison runs them on the same voxels as an
-/// .esvr.
+/// Other ways to store a volume, which ESVR is compared with on the same voxels: lossless and
+/// quantised VDB files, and ZFP if the library was built with it.
 
 #include <cstdint>
 #include <filesystem>
@@ -17,10 +16,10 @@
 
 namespace esvr {
 
-/// The lossy modes of ZFP whose size follows the data.
+/// The lossy modes of ZFP whose size depends on the data.
 enum class ZfpMode {
-  kAccuracy,  ///< largest error of a voxel; ZFP works in powers of two at or below it
-  kPrecision  ///< bit planes of each block of 4^3
+  kAccuracy,  ///< largest error of a voxel, which ZFP rounds down to a power of two
+  kPrecision  ///< number of bit planes that each block of 4^3 voxels keeps
 };
 
 struct ZfpSetting {
@@ -28,32 +27,34 @@ struct ZfpSetting {
   double amount = 0.0;
 };
 
-/// "ZFP 1.0.0"; empty where the library was built without it.
+/// Version of ZFP, for example "ZFP 1.0.0"; empty if the library was built without it.
 [[nodiscard]] std::string zfpVersion();
 
 struct BaselineSetting {
   std::variant<VoxelPacking, ZfpSetting> how;
-  /// VDB files: where above 0, voxels that are not further from the background are made inactive
-  /// first (in a level set, those within this of the band's edge), and empty leaves pruned.
+  /// For VDB files only. If it is above 0, voxels that differ from the background by no more than
+  /// this are made inactive before encoding, and empty leaves are removed. In a level set these are
+  /// the voxels within this distance of the band's edge.
   double threshold = 0.0;
 };
 
-/// "nvdb-fpn-zip,tolerance=0.35,threshold=0.6", "vdb-half-blosc", "zfp,accuracy=0.25": what a
-/// setting is called on a command line, exactly.
+/// The name of a setting on a command line, without loss of digits. Examples:
+/// "nvdb-fpn-zip,tolerance=0.35,threshold=0.6", "vdb-half-blosc", "zfp,accuracy=0.25".
 [[nodiscard]] std::string toString(const BaselineSetting& setting);
-/// \throws UsageError  not such a text; lists what there is
+/// The inverse of toString.
+/// \throws UsageError  the text names no setting; the message lists the possible ones
 [[nodiscard]] BaselineSetting parseBaseline(const std::string& text);
 
 struct BaselineSource {
   const VolumeGrid& grid;
-  Box box;                          ///< PSNR is taken over it; ZFP stores its voxels and no others
-  double peak = 1.0;                ///< the PSNR's peak
-  std::filesystem::path folder;     ///< for files that come and go
-  std::uint64_t maxDenseBytes = 0;  ///< bound on the box as an array of floats; 0: none
+  Box box;                          ///< box over which PSNR is measured; ZFP stores its voxels only
+  double peak = 1.0;                ///< peak value of the PSNR
+  std::filesystem::path folder;     ///< folder for temporary files
+  std::uint64_t maxDenseBytes = 0;  ///< limit on the box as an array of floats; 0: no limit
   const CancelToken* cancel = nullptr;
 };
 
-/// Encodes one grid at one setting after the other.
+/// Encodes one grid at various settings, one after the other.
 class BaselineEncoder {
  public:
   explicit BaselineEncoder(const BaselineSource& source);
@@ -63,16 +64,17 @@ class BaselineEncoder {
 
   struct Encoded {
     std::uint64_t bytes = 0;
-    double seconds = 0.0;  ///< from the method's own form in memory to the file
+    double seconds = 0.0;  ///< time from the method's own form in memory to the file
   };
-  /// \throws UsageError  a setting that this grid does not allow (says why), or of a method that
-  /// the
-  ///                     library was built without; Cancelled
+  /// \throws UsageError  the grid does not allow the setting (the text says why), or the library
+  ///                     was built without the method
+  /// \throws Cancelled   BaselineSource::cancel was set
   Encoded encode(const BaselineSetting& setting);
-  /// Seconds that the method takes to have what was encoded last in memory.
+  /// Seconds that the method takes to read the last encoded file into memory.
   [[nodiscard]] double secondsToDecode() const;
-  /// The voxels of what was encoded last. Of ZFP's, which has no active mask, those are active that
-  /// differ from the background by more than half of what any active voxel of the source does.
+  /// The voxels of the last encoded file. ZFP stores no active mask: a voxel of it is active if it
+  /// differs from the background by more than half of the smallest difference that an active voxel
+  /// of the source has.
   [[nodiscard]] SparseVolume decode() const;
 
   [[nodiscard]] const BaselineSource& source() const;
@@ -82,27 +84,29 @@ class BaselineEncoder {
   std::unique_ptr<State> state_;
 };
 
-/// One attempt of a search.
+/// One trial of a search.
 struct MatchStep {
   BaselineSetting setting;
   std::uint64_t bytes = 0;
-  double psnr = 0.0;  ///< dB over the box; NaN where it was not needed
+  double psnr = 0.0;  ///< dB over the box; NaN if the search did not need it
 };
 
 struct Match {
   bool found = false;
   MatchStep best;
-  std::vector<MatchStep> steps;  ///< all that was tried, in order
+  std::vector<MatchStep> steps;  ///< all trials, in order
 };
 
-/// The setting of the highest PSNR that takes at most so many bytes. The form and codec are those
-/// of `like`; FpN's tolerance, ZFP's amount and, for VDB files, the threshold are searched: the
-/// latter by bisection until the bytes are at most 2 % below.
+/// Searches the setting of the highest PSNR that takes at most `bytes`. The form and the codec are
+/// those of `like`. The search varies FpN's tolerance, ZFP's amount and, for VDB files, the
+/// threshold; it bisects the threshold until the size is at most 2 % below the limit.
 [[nodiscard]] Match matchSize(BaselineEncoder& encoder, const BaselineSetting& like,
                               std::uint64_t bytes);
 
-/// The setting of the fewest bytes that reaches a PSNR: of FpN's tolerance or ZFP's amount.
-/// \throws UsageError  another form
+/// Searches the setting of the fewest bytes that reaches a PSNR, by varying FpN's tolerance or
+/// ZFP's amount.
+/// \param psnr  dB over the box
+/// \throws UsageError  the form has neither a tolerance nor an amount
 [[nodiscard]] Match matchPsnr(BaselineEncoder& encoder, const BaselineSetting& like, double psnr);
 
 }  // namespace esvr

@@ -1,6 +1,6 @@
 #pragma once
-/// Makes a fitted grid small: quantises its ellipsoids, with bits chosen by what they cost and
-/// bring, and solves for the intensities anew.
+/// Compacts a fitted grid: chooses the quantisation steps by rate control, quantises the ellipsoids
+/// and solves for their intensities again.
 
 #include <cstdint>
 #include <optional>
@@ -16,25 +16,29 @@ namespace esvr {
 struct CompactOptions {
   static constexpr double kDefaultLoss = 0.1;
 
-  /// dB of PSNR over the box that quantising may cost, against the same ellipsoids in float32.
+  /// PSNR over the box, in dB, that quantising may lose against the same ellipsoids in float32.
   double loss = kDefaultLoss;
-  std::optional<double> psnr{};  ///< dB over the box: instead of `loss`, as small as reaches this
-  std::optional<std::uint64_t> bytes{};  ///< of the ellipsoids: instead of both, as good as fits
-  std::optional<Box> box{};              ///< default: the active bounding box
-  Device device{};                       ///< that tries the bits out
+  /// PSNR over the box, in dB, that the smallest result must reach. It replaces `loss`.
+  std::optional<double> psnr{};
+  /// Bytes that the ellipsoids of the best result may take. It replaces `loss` and `psnr`.
+  std::optional<std::uint64_t> bytes{};
+  std::optional<Box> box{};  ///< box of the PSNR; default: the active bounding box
+  Device device{};           ///< device that evaluates the trials
 };
 
 struct CompactResult {
-  StoredGrid grid;  ///< `quantised` is set, its field is what a reader gets
+  StoredGrid grid;  ///< the quantised grid; its field is the one that a reader gets
   QuantiserSteps steps;
-  double loss = 0.0;        ///< dB; below 0 where solving for the intensities gained more
-  std::uint64_t bytes = 0;  ///< of the ellipsoids
+  double loss = 0.0;        ///< dB; negative if solving for the intensities gained more
+  std::uint64_t bytes = 0;  ///< bytes of the ellipsoids
 };
 
-/// Deterministic; devices round differently, and may come to other bits. Where the PSNR or the size
-/// asked for is out of reach, the result is as near as rounding comes.
-/// \param grid  as makeStoredGrid made it from `source`; without kappas of each ellipsoid
-/// \throws RuntimeFailure  ellipsoids that no lattice holds; DeviceError  the GPU cannot be used
+/// Compacts a grid. The result is deterministic on one device; devices round differently and may
+/// choose different steps. If the wanted PSNR or size is out of reach, the result is the nearest
+/// one found.
+/// \param grid  a grid that makeStoredGrid made from `source`; Ellipsoids::kappa must be empty
+/// \throws RuntimeFailure  no lattice can hold the ellipsoids, or they have kappas of their own
+/// \throws DeviceError  the GPU cannot be used
 [[nodiscard]] CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                                         const CompactOptions& options = {});
 

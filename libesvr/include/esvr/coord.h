@@ -27,12 +27,12 @@ constexpr Coord maxCoord(Coord a, Coord b) {
   return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
 }
 
-/// "(x, y, z)", for messages.
+/// The text "(x, y, z)", for messages.
 inline std::string toString(Coord c) {
   return "(" + std::to_string(c.x) + ", " + std::to_string(c.y) + ", " + std::to_string(c.z) + ")";
 }
 
-/// A box of voxels; both corners belong to it. Default: empty.
+/// A box of voxels that includes both corners. The default is an empty box.
 struct Box {
   static constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
   static constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
@@ -40,7 +40,7 @@ struct Box {
   Coord min{kMax, kMax, kMax};
   Coord max{kMin, kMin, kMin};
 
-  /// All voxels that there can be.
+  /// The box of all possible voxels.
   [[nodiscard]] static constexpr Box whole() { return {{kMin, kMin, kMin}, {kMax, kMax, kMax}}; }
 
   friend constexpr bool operator==(const Box&, const Box&) = default;
@@ -59,14 +59,14 @@ struct Box {
     min = minCoord(min, b.min);
     max = maxCoord(max, b.max);
   }
-  /// Number of voxels, as a double: 1e7 cubed exceeds 64 bits.
+  /// Number of voxels. It is a double because it may exceed 64 bits.
   [[nodiscard]] constexpr double volume() const {
     if (empty()) return 0.0;
     return (double(max.x) - min.x + 1) * (double(max.y) - min.y + 1) * (double(max.z) - min.z + 1);
   }
 };
 
-/// The voxels of both boxes.
+/// The intersection of two boxes.
 [[nodiscard]] constexpr Box common(const Box& a, const Box& b) {
   return {maxCoord(a.min, b.min), minCoord(a.max, b.max)};
 }

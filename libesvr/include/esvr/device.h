@@ -1,5 +1,5 @@
 #pragma once
-/// The device that computes.
+/// Selection of the device that computes.
 
 #include <string>
 #include <vector>
@@ -10,23 +10,25 @@ enum class DeviceKind { kCpu, kCuda };
 
 struct Device {
   DeviceKind kind = DeviceKind::kCpu;
-  int index = 0;  ///< the CUDA device's number
+  int index = 0;  ///< number of the CUDA device
 };
 
-/// True where the library was built with CUDA (which says nothing of a GPU being there).
+/// True if the library was built with CUDA, whether or not the machine has a GPU.
 [[nodiscard]] bool builtWithCuda() noexcept;
 
-/// Names of the usable CUDA devices; empty without CUDA, driver or GPU.
+/// Names of the usable CUDA devices; empty without CUDA, a driver or a GPU.
 [[nodiscard]] std::vector<std::string> cudaDevices();
 
-/// "auto", "cpu", "cuda", "cuda:N". auto takes a CUDA device where one is usable, else the CPU.
-/// \throws UsageError  another text; DeviceError: CUDA asked for and not there (says why)
+/// Selects a device by name: "auto", "cpu", "cuda" or "cuda:N". "auto" selects a CUDA device if one
+/// is usable, otherwise the CPU.
+/// \throws UsageError   the text is none of these names
+/// \throws DeviceError  the CUDA device cannot be used (the text says why)
 [[nodiscard]] Device selectDevice(const std::string& text);
 
-/// "CPU", or the GPU's name and place: "NVIDIA H200 (cuda:0)".
+/// The name of a device: "CPU", or the GPU's name and number, "NVIDIA H200 (cuda:0)".
 [[nodiscard]] std::string deviceName(const Device& device);
 
-/// "CUDA 13.0, driver 580.159" or "no CUDA": for --version.
+/// Versions for --version: "CUDA 13.0, driver 580.159", or "no CUDA".
 [[nodiscard]] std::string cudaVersions();
 
 }  // namespace esvr

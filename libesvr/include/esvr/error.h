@@ -1,20 +1,20 @@
 #pragma once
-/// Errors of the library. Every failure is thrown as esvr::Error or a class derived from it and is
-/// caught once, in a program's main(), where kind() becomes the exit code. Texts name the file, the
-/// grid and the voxel as far as they are known.
+/// Errors of the library. Every failure is thrown as esvr::Error or a class derived from it. A
+/// program catches it once, in main(), where kind() becomes the exit code. The text names the file,
+/// the grid and the voxel if they are known.
 
 #include <stdexcept>
 #include <string>
 
 namespace esvr {
 
-/// The kind of a failure; the value is the exit code of the programs.
+/// The kind of a failure; its value is the exit code of the programs.
 enum class ErrorKind {
   kRuntime = 1,       ///< the run failed: output not writable, disk full, cancelled
-  kUsage = 2,         ///< options that make no sense
-  kBadInput = 3,      ///< the input cannot be used: missing, damaged, nothing to fit
+  kUsage = 2,         ///< invalid options
+  kBadInput = 3,      ///< unusable input: missing, damaged, nothing to fit
   kTargetMissed = 4,  ///< a quality target was not reached, or a comparison failed
-  kDevice = 5         ///< the device is missing, or memory is not enough
+  kDevice = 5         ///< the device is missing, or memory is insufficient
 };
 
 class Error : public std::runtime_error {
@@ -42,11 +42,11 @@ struct TargetMissed : Error {
 struct DeviceError : Error {
   explicit DeviceError(const std::string& what) : Error(ErrorKind::kDevice, what) {}
 };
-/// The input asks for more memory than is allowed. The text says how much it needs.
+/// The input needs more memory than is allowed. The text says how much it needs.
 struct MemoryExceeded : Error {
   explicit MemoryExceeded(const std::string& what) : Error(ErrorKind::kDevice, what) {}
 };
-/// Thrown where a CancelToken (progress.h) was set and no partial result was asked for.
+/// A CancelToken (progress.h) was set, and there is no partial result to return.
 struct Cancelled : Error {
   Cancelled() : Error(ErrorKind::kRuntime, "cancelled") {}
 };

@@ -17,39 +17,39 @@
 
 namespace esvr {
 
-/// Chooses the number of ellipsoids and the length of the schedule where they are not given.
+/// A preset determines the number of ellipsoids and the length of the schedule if they are not
+/// given.
 enum class Preset { kDraft, kStandard, kHigh };
 
 /// The state of a running fit. It is reported about four times a second.
 struct FitProgress {
   TimedCurvePoint point;
-  double fraction = 0.0;     ///< share of the run that is done, 0..1
-  double secondsLeft = 0.0;  ///< estimate
+  double fraction = 0.0;     ///< share of the run that is done, 0 to 1
+  double secondsLeft = 0.0;  ///< estimated time to the end of the run
 };
 
-/// What every fit takes, by our method or by the paper's: when it ends, where it runs and who
-/// watches it.
+/// The options that our method and the paper's have in common.
 struct CommonFitOptions {
-  std::optional<std::size_t> count;  ///< ellipsoids; default: the method's own number
-  std::optional<double> psnr;        ///< dB over the box: the fit ends as soon as it is reached
-  std::optional<double> seconds;     ///< the fit ends after this time, with the best it has then
-  std::optional<Box> box;            ///< box over which PSNR is taken; default: the active voxels'
+  std::optional<std::size_t> count;  ///< number of ellipsoids; default: the method's own number
+  std::optional<double> psnr;        ///< dB over the box; the fit ends as soon as it is reached
+  std::optional<double> seconds;     ///< time limit; the fit then ends with its best state
+  std::optional<Box> box;            ///< box over which PSNR is measured; default: the active box
   std::uint64_t seed = 1;
-  Device device;                              ///< the CPU, or a GPU (selectDevice)
-  std::optional<std::size_t> maxDeviceBytes;  ///< GPU memory to use; default: what is free
-  const CancelToken* cancel = nullptr;  ///< a cancelled fit returns the best so far, marked so
+  Device device;                              ///< the CPU or a GPU (selectDevice)
+  std::optional<std::size_t> maxDeviceBytes;  ///< GPU memory to use; default: all free memory
+  const CancelToken* cancel = nullptr;  ///< a cancelled fit returns its best state as kCancelled
   std::function<void(const FitProgress&)> progress;
 };
 
-/// The options of our method. Targets combine: the run ends at the first of psnr, seconds and
-/// iterations that is met. What is not given follows from the preset and the data.
+/// The options of our method. The run ends as soon as one of psnr, seconds and iterations is
+/// reached. Options that are not given follow from the preset and the data.
 struct FitOptions : CommonFitOptions {
   std::optional<std::uint32_t> iterations;  ///< length of the schedule
   Preset preset = Preset::kStandard;
-  std::optional<float> kappa;  ///< the scene's edge; default: it is fitted with the ellipsoids
-  /// The volume is a level set: values beyond its range count as the range's ends, because they
-  /// saturate when the grid is revoxelised as a narrow band, and what lies outside the volume's
-  /// bricks does not count.
+  std::optional<float> kappa;  ///< edge of the kernel; default: it is fitted with the ellipsoids
+  /// The volume is a level set. Values beyond its range then count as the ends of the range,
+  /// because they are clamped when the grid is revoxelised as a narrow band. Voxels outside the
+  /// volume's bricks do not count.
   bool narrowBand = false;
 };
 
@@ -59,22 +59,26 @@ struct FitResult {
   Field field;
   std::vector<TimedCurvePoint> curve;
   FitEnd end = FitEnd::kScheduleDone;
-  bool kappaLearned = false;  ///< true where kappa was fitted, false where it was given
-  /// Wall clock by phase; seeding (at the start, growth, relocation) is not in secondsOptimise.
+  bool kappaLearned = false;  ///< true if kappa was fitted, false if it was given
+  /// Wall-clock times. secondsSeed covers the seeding at the start, growth and relocation, and is
+  /// not part of secondsOptimise.
   double secondsSeed = 0.0, secondsOptimise = 0.0;
-  std::size_t deviceBytes = 0;     ///< the most GPU memory that was held; 0 on the CPU
+  std::size_t deviceBytes = 0;     ///< largest GPU memory held; 0 on the CPU
   std::uint64_t pairs = 0;         ///< (ellipsoid, brick) pairs that the final field evaluates
-  bool signedIntensities = false;  ///< some intensity is negative
+  bool signedIntensities = false;  ///< true if an intensity is negative
 };
 
-/// Deterministic: the same volume, options and seed give the same bits on any number of threads and
-/// in every run on a GPU of one kind, unless `seconds` ends the run. CPU and GPU follow the same
-/// method and the same math, but round differently, so that their fits differ in detail.
-/// \return  a fit that was given a PSNR and ended without reaching it is marked kPsnrMissed; the
-///          search for the smallest number of ellipsoids that reaches a PSNR is convert.h's
-/// \throws BadInput  no active voxel; UsageError: count 0, options that contradict each other;
-///         Cancelled: before there was anything to return; DeviceError: the GPU cannot be used or
-///         has too little memory; RuntimeFailure: the fit diverged
+/// Fits ellipsoids to a volume. The result is deterministic: the same volume, options and seed give
+/// the same bits on any number of threads, and in every run on GPUs of one kind, unless `seconds`
+/// ends the run. CPU and GPU use the same method and formulas but round differently, so that their
+/// fits differ in detail.
+/// \return a result whose end is kPsnrMissed if options.psnr was given and not reached;
+///         convertVolume (convert.h) searches for the smallest grid that reaches a PSNR
+/// \throws BadInput    the volume has no active voxel
+/// \throws UsageError  count is 0, or options contradict each other
+/// \throws Cancelled   the fit was cancelled before it had a result
+/// \throws DeviceError  the GPU cannot be used or has too little memory
+/// \throws RuntimeFailure  the fit diverged
 [[nodiscard]] FitResult fit(const SparseVolume& volume, const FitOptions& options);
 
 }  // namespace esvr

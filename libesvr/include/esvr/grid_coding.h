@@ -1,5 +1,5 @@
 #pragma once
-/// From a fitted field to what a file stores of a grid, and from there back to voxels.
+/// Turns a fitted field into a stored grid, and a stored grid back into voxels.
 
 #include <optional>
 
@@ -14,46 +14,47 @@
 
 namespace esvr {
 
-/// Completes a fitted field with what the file says of its source, and chooses the rule by which
-/// active voxels are found again:
-///  - usually a threshold, the one whose active voxels overlap best with the source's (intersection
-///    over union) among those that add no squared error worth telling (0.004 dB);
-///  - in a narrow band, the band itself in the source's bricks;
-///  - where no threshold brings a voxel back, since all values equal the background, and where it
-///  is
-///    asked for (`activity`), the source's mask.
+/// Makes a stored grid from a fitted field and the properties of its source. It chooses the rule by
+/// which a reader determines the active voxels:
+///  - usually a threshold: among those that increase the squared error by at most 0.004 dB, the one
+///    whose active voxels have the largest intersection over union with the source's;
+///  - for a narrow band, the band itself within the source's bricks;
+///  - the source's active mask, if `activity` asks for it, or if no threshold restores a voxel
+///    because all values equal the background.
 /// The curve is left empty.
 [[nodiscard]] StoredGrid makeStoredGrid(const GridDescriptor& descriptor,
                                         const SparseVolume& source, Field field,
                                         Activity activity = Activity::kByValue);
 
-/// True for a level set with a half width that none of its active voxels exceeds: what
-/// makeStoredGrid stores as a narrow band, and FitOptions::narrowBand is meant for. A level set
-/// that is active beyond its half width, or has none, is fitted and stored like any other grid.
+/// True for a level set whose background (the half width of its band) is above 0 and not exceeded
+/// by an active voxel. makeStoredGrid stores such a grid as a narrow band, and
+/// FitOptions::narrowBand is meant for it. Any other level set is fitted and stored like other
+/// grids.
 [[nodiscard]] bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source);
 
-/// A grid that holds its voxels and no ellipsoids. \param layer  of `source` (voxel_layer.h)
+/// Makes a stored grid that holds voxels and no ellipsoids.
+/// \param layer  the voxels of `source` (voxel_layer.h)
 [[nodiscard]] StoredGrid makeStoredVoxels(const GridDescriptor& descriptor,
                                           const SparseVolume& source, VoxelLayer layer);
 
-/// By what rule decodeGrid() makes voxels of the sum: the grid's threshold, range and band, without
-/// its bricks, mask and residual.
+/// The rule by which decodeGrid() turns the sum into voxels: the grid's threshold, range and band,
+/// without its bricks, mask and residual.
 [[nodiscard]] RevoxeliseOptions voxelRule(const StoredGrid& grid);
 
 struct DecodeOptions {
-  std::optional<float> threshold{};  ///< instead of the grid's own; 0 or above
-  /// Voxels elsewhere come back inactive; bricks elsewhere are not evaluated.
+  std::optional<float> threshold{};  ///< replaces the grid's own threshold; 0 or above
+  /// Voxels outside the box come back inactive, and bricks outside are not evaluated.
   std::optional<Box> box{};
-  /// Bound on the memory that evaluating and keeping the voxels takes.
-  std::uint64_t maxBytes = kNoMemoryLimit;
+  std::uint64_t maxBytes = kNoMemoryLimit;  ///< memory limit of the evaluation and its result
 };
 
-/// Bounds the work and memory of decodeGrid(). Nothing is evaluated.
+/// Estimates the work and memory that decodeGrid() takes at most. Nothing is evaluated.
 [[nodiscard]] WorkEstimate estimateDecode(const StoredGrid& grid,
                                           const DecodeOptions& options = {});
 
-/// The voxels that a file gives back. \throws UsageError  threshold negative or not finite;
-/// MemoryExceeded: the estimate is above options.maxBytes, and nothing was begun
+/// The voxels that a stored grid represents.
+/// \throws UsageError  the threshold is negative or not finite
+/// \throws MemoryExceeded  the estimate is above options.maxBytes; nothing was evaluated
 [[nodiscard]] SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options = {});
 
 }  // namespace esvr

@@ -1,5 +1,6 @@
 #pragma once
-/// A file's grids by the names a user gives them. Several grids may share a name, or have none.
+/// Finds the grids of a file by the names that users give. Several grids may share a name or have
+/// none.
 
 #include <cstddef>
 #include <filesystem>
@@ -9,14 +10,15 @@
 
 namespace esvr {
 
-/// The name that --grid takes for each grid: its own, with "[i]" (from 0, in file order) where
-/// several share it. \param names  of the grids, in file order
+/// The names that --grid takes: each grid's name, with "[i]" (i from 0, in file order) if several
+/// grids share it.
+/// \param names  names of the grids, in file order
 [[nodiscard]] std::vector<std::string> uniqueNames(std::span<const std::string> names);
 
-/// Place in `names` of the grid asked for: by its unique name, by its name (the first so called) or
-/// as "name[i]".
-/// \param file  for the error; empty where the caller names it
-/// \throws BadInput  no such grid; the text lists those there are
+/// Index in `names` of a grid that is given by its unique name, its name (the first grid of that
+/// name) or "name[i]".
+/// \param file  file name for the error's text; empty if the caller adds it
+/// \throws BadInput  there is no such grid; the text lists the grids
 [[nodiscard]] std::size_t findGrid(std::span<const std::string> names, const std::string& wanted,
                                    const std::filesystem::path& file = {});
 

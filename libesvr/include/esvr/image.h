@@ -5,8 +5,8 @@
 
 namespace esvr {
 
-/// Red, green, blue, alpha a pixel, row after row from the top. Premultiplied: the colors are those
-/// in front of black.
+/// Pixels of red, green, blue and alpha, row by row from the top. Colors are premultiplied by
+/// alpha: they are the colors in front of black.
 struct Image {
   int width = 0, height = 0;
   std::vector<float> rgba;

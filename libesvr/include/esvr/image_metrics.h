@@ -1,6 +1,6 @@
 #pragma once
-/// How far a picture is from its reference. Compared are the colors in front of black, each channel
-/// from 0 to 1; alpha takes no part, since two pictures of one look may differ in it.
+/// Errors of a picture against a reference. The colors in front of black are compared, each channel
+/// between 0 and 1. Alpha is ignored, since pictures that look the same may differ in it.
 
 #include <span>
 
@@ -9,24 +9,25 @@
 namespace esvr {
 
 struct ImageMetrics {
-  double psnr = 0.0;      ///< dB, of a peak of 1, over all channels; +inf where nothing differs
+  double psnr = 0.0;      ///< dB over all channels, with a peak of 1; +inf for equal pictures
   double ssim = 1.0;      ///< mean over pixels and channels
   double maxError = 0.0;  ///< largest difference of a channel
 };
 
-/// Colors outside 0 to 1 count as the nearer end: nothing shows them. SSIM: Gaussian window of
-/// 11^2, sigma 1.5, C1 = 0.01^2, C2 = 0.03^2 (Wang et al. 2004); windows are clipped at the
-/// picture's border and renormalised. The same bits for any number of threads.
-/// \throws UsageError  pictures of different sizes or without a pixel; BadInput: a color is no
-///                     number
+/// Compares two pictures. Channels are clamped to 0 to 1. SSIM uses a Gaussian window of 11^2
+/// pixels, sigma 1.5, C1 = 0.01^2, C2 = 0.03^2 (Wang et al. 2004); windows are clipped at the
+/// picture's border and renormalised. The result is bit-identical for any number of threads.
+/// \throws UsageError  the pictures differ in size or have no pixels
+/// \throws BadInput    a color is NaN
 [[nodiscard]] ImageMetrics compareImages(const Image& reference, const Image& candidate);
 
-/// Gray, opaque: of each pixel the largest difference of a channel, times `gain`, at most 1.
-/// \throws UsageError  pictures of different sizes
+/// An opaque gray picture of the errors: the largest difference of a pixel's channels times `gain`,
+/// at most 1.
+/// \throws UsageError  the pictures differ in size
 [[nodiscard]] Image errorMap(const Image& reference, const Image& candidate, double gain);
 
-/// Pictures of one size beside each other, from left to right.
-/// \throws UsageError  none, or of different sizes
+/// Places pictures of one size side by side, from left to right.
+/// \throws UsageError  there are no pictures, or they differ in size
 [[nodiscard]] Image sideBySide(std::span<const Image> images);
 
 }  // namespace esvr

@@ -1,18 +1,21 @@
 #pragma once
-/// The kernel family phi of an ellipsoid, with its derivatives, written once for host and device.
+/// The kernel family phi of an ellipsoid with its derivatives, in one source for host and device.
 ///
-///     phi(m) = ((1 + E) / (E + e^m) - eps) / (1 - eps)     for m < cutoff = ln((1 + E) / eps - E),
-///     else 0 E = e^kappa,   m = | S^-1 R^T (x - mu) |^2
+///     phi(m) = ((1 + E) / (E + e^m) - eps) / (1 - eps)   for m < cutoff = ln((1 + E) / eps - E)
+///     phi(m) = 0                                         otherwise
 ///
-/// kappa is the edge. kappa = k is the paper's sigmoid ellipsoid sigma(k (1 - q)) / sigma(k) with
-/// m = k q (paper, eq. 5, section 3.1), that is with our scales sqrt(k) times smaller than the
-/// paper's; kappa -> -inf is the Gaussian e^-m. The shift by eps makes phi continuous where its
-/// support ends; the paper's own kernel jumps there and is kept for reproduction
-/// (KernelForm::kPaper).
+///     E = e^kappa,   m = | S^-1 R^T (x - mu) |^2
 ///
-/// Everything is evaluated with e^-s taken out, s = max(kappa, 0), so that no kappa from -1e4 to
-/// 1e4 overflows:  (1 + E) / (E + e^m) = A / (B + e^(m - s)),  A = e^-s + e^(kappa - s),  B =
-/// e^(kappa - s).
+/// kappa is the edge of the kernel. kappa = k gives the paper's sigmoid ellipsoid
+/// sigma(k (1 - q)) / sigma(k) with m = k q (paper, eq. 5, section 3.1); our scales are then
+/// sqrt(k) times smaller than the paper's. kappa -> -inf gives the Gaussian e^-m. The shift by eps
+/// makes phi continuous at the end of its support. The paper's own kernel jumps there;
+/// KernelForm::kPaper keeps it for reproduction.
+///
+/// The evaluation takes out e^-s with s = max(kappa, 0), so that no kappa from -1e4 to 1e4
+/// overflows:
+///
+///     (1 + E) / (E + e^m) = A / (B + e^(m - s)),   A = e^-s + e^(kappa - s),   B = e^(kappa - s)
 
 #include <cmath>
 
@@ -25,17 +28,17 @@
 namespace esvr {
 
 enum class KernelForm {
-  kContinuous = 0,  ///< shifted by eps, zero at the end of its support
-  /// No shift. For k = 5 the support ends at q = 1.42^2 (paper, section 5), for others where phi
-  /// has the value that it has there: the paper adjusts the cutoff too, and does not say how.
+  kContinuous = 0,  ///< shifted by eps; phi is zero at the end of its support
+  /// No shift. For k = 5 the support ends at q = 1.42^2 (paper, section 5). For another k it ends
+  /// where phi has the same value; the paper adjusts its cutoff too, but does not say how.
   kPaper = 1
 };
 
-/// A kernel as a file names it.
+/// The parameters of a kernel that a file stores.
 struct Kernel {
   static constexpr float kDefaultEpsilon = 0.006f;  ///< the paper's kernel at its cutoff, rounded
-  static constexpr float kPaperK = 5.0f;            ///< sharpness in the paper
-  static constexpr float kPaperCutoff = 1.42f;      ///< support radius there, in the paper's scales
+  static constexpr float kPaperK = 5.0f;            ///< the paper's sharpness k
+  static constexpr float kPaperCutoff = 1.42f;      ///< its support radius, in the paper's scales
 
   KernelForm form = KernelForm::kContinuous;
   float kappa = 2.0f;
@@ -49,13 +52,13 @@ struct KernelConstants {
   Real shift;      ///< s
   Real numerator;  ///< A / (1 - eps)
   Real plateau;    ///< B
-  Real base;       ///< eps / (1 - eps): subtracted from the quotient
-  Real slope;      ///< (1 - eps) B / A: turns the quotient into B / (B + y)
-  Real cutoff;     ///< m at which the support ends
+  Real base;       ///< eps / (1 - eps), which is subtracted from the quotient
+  Real slope;      ///< (1 - eps) B / A; times the quotient it is B / (B + y)
+  Real cutoff;     ///< m at the end of the support
   Real expNegS;    ///< e^-s
 };
 
-/// The value at which phi of the paper's kernel ends.
+/// The value of the paper's kernel at the end of its support.
 ESVR_HD inline double paperEnd() {
   const double k = Kernel::kPaperK, q = double(Kernel::kPaperCutoff) * Kernel::kPaperCutoff;
   return (1.0 + std::exp(-k)) / (1.0 + std::exp(k * (q - 1.0)));
@@ -83,11 +86,11 @@ ESVR_HD KernelConstants<Real> kernelConstants(const Kernel& kernel) {
 template <class Real>
 struct KernelValue {
   Real phi;
-  Real dPhiDm;      ///< by m
-  Real dPhiDkappa;  ///< by kappa, the support's end held fixed
+  Real dPhiDm;      ///< derivative by m
+  Real dPhiDkappa;  ///< derivative by kappa, with the end of the support held fixed
 };
 
-/// phi at m = c.cutoff and beyond is 0; m >= 0.
+/// The value of phi, which is 0 for m >= c.cutoff. \param m  not negative
 template <class Real>
 ESVR_HD inline Real kernelPhi(const KernelConstants<Real>& c, Real m) {
   if (!(m < c.cutoff)) return Real(0);
@@ -100,29 +103,29 @@ ESVR_HD inline KernelValue<Real> kernelValue(const KernelConstants<Real>& c, Rea
   const Real y = std::exp(m - c.shift);
   const Real inv = Real(1) / (c.plateau + y);
   const Real quotient = c.numerator * inv;
-  // d/dE ((1 + E) / (E + e^m)) * E, scaled: B (y - e^-s) / (B + y)^2, over (1 - eps) = numerator /
-  // A
+  // d phi / d kappa = B (y - e^-s) / (B + y)^2 / (1 - eps), and 1 / (1 - eps) = 1 + base
   const Real norm = c.base + Real(1);
   return {quotient - c.base, -quotient * y * inv, norm * c.plateau * (y - c.expNegS) * inv * inv};
 }
 
-/// The place where phi = 1/2: the half width of every ellipsoid, squared, in units of its scales.
+/// The half width of an ellipsoid: the radius at which phi is 1/2, in units of the scales.
 struct KernelWidth {
-  double m;            ///< phi(m) = 1/2
+  double m;            ///< the half width squared: phi(m) = 1/2
   double logMByKappa;  ///< d ln m / d kappa
 };
 
-/// \param c  of a continuous kernel
+/// \param c  constants of a continuous kernel
 inline KernelWidth kernelWidth(const KernelConstants<double>& c) {
   const double half = 0.5 + c.base;  // the quotient where phi is 1/2
   const double y = c.numerator / half - c.plateau;
   const double m = c.shift + std::log(y);
-  // m = ln((1 + E) / h - E), h = half (1 - eps): dm / dkappa = E (1 / h - 1) / (...)
+  // m = ln((1 + E) / h - E) with h = half (1 - eps), so
+  // dm / dkappa = E (1 / h - 1) / ((1 + E) / h - E)
   const double h = half / (1.0 + c.base);
   return {m, c.plateau * (1.0 / h - 1.0) / y / m};
 }
 
-/// Radius of the support in units of the scales: x is inside where |S^-1 R^T (x - mu)| < radius.
+/// Radius of the support in units of the scales: x is inside if |S^-1 R^T (x - mu)| < radius.
 template <class Real>
 ESVR_HD inline Real supportRadius(const KernelConstants<Real>& c) {
   return std::sqrt(c.cutoff);

@@ -1,5 +1,5 @@
 #pragma once
-/// Coarser forms of a grid: fewer of its ellipsoids, the ones that matter most.
+/// Coarser levels of detail of a grid: the most important of its ellipsoids.
 
 #include <cstddef>
 
@@ -7,13 +7,14 @@
 
 namespace esvr {
 
-/// The grid of its first importance layers, without a residual; itself where it has no more.
+/// Keeps the first importance layers of a grid and drops its residual. A grid that has no more
+/// layers is returned unchanged.
 [[nodiscard]] StoredGrid firstLayers(StoredGrid grid, std::size_t layers);
 
-/// The grid of its `count` heaviest ellipsoids, in their order; itself where it has no more. The
-/// weight is |I| sqrt(s1 s2 s3), the root of the sum of squares over voxels up to a factor that all
-/// ellipsoids of a kappa share. Fewer than all are no longer quantised, have no layers and no
-/// residual.
+/// Keeps the `count` heaviest ellipsoids of a grid, in their order. The weight is
+/// |I| sqrt(s1 s2 s3): the root of the ellipsoid's sum of squares over voxels, up to a factor that
+/// depends on kappa only. The result has no quantised form, no layers and no residual. A grid that
+/// has no more ellipsoids is returned unchanged.
 [[nodiscard]] StoredGrid heaviest(StoredGrid grid, std::size_t count);
 
 }  // namespace esvr

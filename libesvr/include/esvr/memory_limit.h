@@ -1,5 +1,5 @@
 #pragma once
-/// Limits on the memory that an input may ask for.
+/// Limits on the memory that an input may need.
 
 #include <cstdint>
 #include <limits>
@@ -7,11 +7,12 @@
 
 namespace esvr {
 
-/// The limit that refuses nothing.
+/// The limit that allows everything.
 inline constexpr std::uint64_t kNoMemoryLimit = std::numeric_limits<std::uint64_t>::max();
 
-/// \param what  begins the message: "grid 'density'"
-/// \throws MemoryExceeded  neededBytes are more than maxBytes; names both
+/// Checks a need of memory against a limit.
+/// \param what  subject of the message, for example "grid 'density'"
+/// \throws MemoryExceeded  neededBytes is more than maxBytes; the text gives both numbers
 void requireWithinMemory(double neededBytes, std::uint64_t maxBytes, const std::string& what);
 
 }  // namespace esvr

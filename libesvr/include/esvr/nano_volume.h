@@ -1,5 +1,5 @@
 #pragma once
-/// NanoVDB grids in memory: the voxels that the reference renderer marches.
+/// NanoVDB grids in memory, for the reference renderer (renderNano).
 
 #include <cstddef>
 #include <memory>
@@ -8,24 +8,22 @@
 
 namespace esvr {
 
-/// How a NanoVDB grid holds its values. The quantised ones have for each leaf its own range, FpN
-/// its own number of bits too; within a leaf their background may be off by half a step, and is
-/// then drawn as any value.
+/// The value type of a NanoVDB grid. Quantised types have a range of values for each leaf; FpN also
+/// has a number of bits for each leaf. The background within a leaf may be off by half a step, and
+/// is then drawn like any other value.
 enum class NanoValues { kFloat, kFp4, kFp8, kFp16, kFpN };
 
-/// A NanoVDB grid whose index space is the volume's. Its voxels lie in leaves; what no leaf holds
-/// is the background.
+/// A NanoVDB grid in the index space of the volume. Voxels outside its leaves are the background.
 struct NanoVolume {
   NanoValues values = NanoValues::kFloat;
-  std::shared_ptr<const std::byte[]>
-      data;  ///< the grid as NanoVDB lays it out, aligned to 32 bytes
+  std::shared_ptr<const std::byte[]> data;  ///< NanoVDB's grid buffer, aligned to 32 bytes
   std::size_t bytes = 0;
   float background = 0.0f;
-  Box voxels;  ///< around the leaves; empty where there are none
+  Box voxels;  ///< bounding box of the leaves; empty if there are none
 };
 
-/// Without dithering. Level sets lose the sign of what is not active, as SparseVolume has it.
-/// \throws std::logic_error  the volume's arrays do not fit each other
+/// Makes a NanoVDB grid without dithering. Level sets lose the sign of their inactive voxels.
+/// \throws std::logic_error  the volume violates its invariants (checkInvariants)
 [[nodiscard]] NanoVolume makeNanoVolume(const VolumeGrid& grid, NanoValues values);
 
 }  // namespace esvr

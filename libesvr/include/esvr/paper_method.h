@@ -1,16 +1,18 @@
 #pragma once
 /// The paper's own method (section 3.2, appendix 'Structure-aware Ellipsoid Learning' and 'Training
-/// Implementation Details'), for comparison with it. Not the default: fit.h chooses better.
+/// Implementation Details'), for comparison. The method of fit.h is the default and gives better
+/// results.
 ///
-/// L1 + D-SSIM by Adam on position, scales, rotation and intensity; subvolumes one after the other,
-/// an epoch being a round of all; ellipsoids with large gradients are cloned or split while it goes
-/// up, and the ones of least score removed once or a few times. Every part can be switched, so that
-/// the paper's ablations can be rerun.
+/// The loss is L1 + D-SSIM. Adam minimises it over position, scales, rotation and intensity. An
+/// iteration visits one subvolume; an epoch visits each subvolume once. In the first part of the
+/// run, ellipsoids with large gradients are cloned or split; the ellipsoids of lowest score are
+/// pruned once or a few times. Every part can be switched off, so that the paper's ablations can be
+/// repeated.
 ///
-/// What the paper leaves open is as in the framework it builds on (3D Gaussian Splatting, Kerbl et
-/// al. 2023: the rules of cloning and splitting, dense Adam, exponential decay) and in the
-/// voxeliser (R2-Gaussian, Zha et al. 2024: learning rates); an ellipsoid and its clone share the
-/// intensity, since the field is a sum.
+/// Where the paper gives no details, the method follows the framework it builds on (3D Gaussian
+/// Splatting, Kerbl et al. 2023: the rules of cloning and splitting, dense Adam, exponential decay)
+/// and the voxeliser R2-Gaussian (Zha et al. 2024: learning rates). An ellipsoid and its clone
+/// share the intensity, since the field is a sum.
 
 #include <cstddef>
 #include <cstdint>
@@ -22,86 +24,88 @@
 
 namespace esvr {
 
-/// What pruning ranks ellipsoids by. Omega are the voxels of the volume where |I| phi is at least a
-/// 255th of the range of values, FA the fractional anisotropy of Sigma.
+/// The score by which pruning ranks ellipsoids. Omega is the set of voxels of the volume where
+/// |I| phi is at least 1/255 of the range of values; FA is the fractional anisotropy of Sigma.
 enum class PruneScore {
-  kFull,         ///< |Omega| |I| FA (eq. score)
+  kFull,         ///< |Omega| |I| FA, the paper's score
   kWithoutFa,    ///< |Omega| |I|
   kOnlyFa,       ///< FA
-  kContribution  ///< sum over Omega of |I| phi, times a tenth power of the volume (LightGaussian)
+  kContribution  ///< sum over Omega of |I| phi, times volume^0.1 (LightGaussian)
 };
 
 struct PrunePass {
-  std::uint32_t epoch;  ///< after which it comes
-  double share;         ///< of the ellipsoids, removed
+  std::uint32_t epoch;  ///< epoch after which the pass takes place
+  double share;         ///< share of the ellipsoids that is removed
 };
 
-/// First learning rates; all decay to a tenth over the run. The paper has none.
+/// Learning rates at the start; all decay to a tenth over the run. The paper does not give them.
 struct PaperRates {
-  double position = 2e-4;   ///< half the volume's longest axis
-  double scale = 5e-3;      ///< of its logarithm
-  double rotation = 1e-3;   ///< of the quaternion
-  double intensity = 1e-2;  ///< of the range of values
-  double k = 1e-2;
+  double position = 2e-4;   ///< rate of the position, in half lengths of the volume's longest axis
+  double scale = 5e-3;      ///< rate of the scales' logarithms
+  double rotation = 1e-3;   ///< rate of the quaternion
+  double intensity = 1e-2;  ///< rate of the intensity, in ranges of values
+  double k = 1e-2;          ///< rate of the sharpness
 };
 
 /// The defaults are the paper's for small and medium volumes.
 struct PaperMethod {
-  bool gaussian = false;         ///< Gaussians of 3 sigma in the place of ellipsoids
+  bool gaussian = false;         ///< Gaussians that end at 3 sigma instead of ellipsoids
   double beta = 0.2;             ///< share of L1 in the loss; the rest is D-SSIM (eq. 7)
   double k = 5.0;                ///< sharpness of the ellipsoids
-  bool learnK = false;           ///< k of each ellipsoid is learned, beginning there
-  std::size_t points = 100'000;  ///< at the start, on voxels that differ from the background
+  bool learnK = false;           ///< k is learned for each ellipsoid, starting from `k`
+  std::size_t points = 100'000;  ///< seeds at the start, on voxels that differ from the background
   std::uint32_t epochs = 2800;
-  /// Side of the subvolumes, voxels, made a multiple of 8; 0: half the longest axis, or the
-  /// shortest where that is less.
+  /// Side of the subvolumes in voxels, rounded to a multiple of 8. 0: half the longest axis, or the
+  /// shortest axis if that is less.
   int subvolume = 0;
 
   bool densify = true;
   std::uint32_t densifyFrom = 16, densifyUntil = 400, densifyEvery = 4;  ///< epochs
-  /// Mean length of the loss's derivative by position, in units of half the longest axis, from
-  /// which an ellipsoid is cloned or split. The paper's 2.5e-9 is in units that it does not give:
-  /// here nearly all ellipsoids exceed it. With this one Aneurysm's number stays about that of the
-  /// points, as in the paper.
+  /// An ellipsoid is cloned or split if the mean length of the loss's gradient by position exceeds
+  /// this. Positions are in half lengths of the longest axis. The paper's value, 2.5e-9, is in
+  /// units that it does not give; here nearly all ellipsoids exceed it. With this value the number
+  /// of ellipsoids of Aneurysm stays near the number of seeds, as in the paper.
   double gradientThreshold = 1e-3;
-  double percentDense = 0.008;            ///< of half the longest axis: larger scales are split
-  std::size_t maxEllipsoids = 1'000'000;  ///< ellipsoids: no more are added
+  /// Ellipsoids with a larger scale are split, others are cloned; in half lengths of the longest
+  /// axis.
+  double percentDense = 0.008;
+  std::size_t maxEllipsoids = 1'000'000;  ///< number of ellipsoids at which densification ends
 
   PruneScore score = PruneScore::kFull;
   std::vector<PrunePass> prunes = {{1200, 0.66}};
-  std::optional<std::size_t> keep;  ///< the last pass leaves so many, whatever its share
+  std::optional<std::size_t> keep;  ///< number that the last pass keeps, instead of its share
 
   PaperRates rates;
-  bool countHits = false;  ///< average numbers of ellipsoids a voxel before each pruning
+  bool countHits = false;  ///< average ellipsoid hits are counted before each pruning
 };
 
-/// The same run in fewer or more epochs: all that is said in epochs is scaled.
+/// The same method with another number of epochs: everything that is given in epochs is scaled.
 [[nodiscard]] PaperMethod scaledTo(const PaperMethod& method, std::uint32_t epochs);
 
-/// With the schedule of three passes that the paper has for BigBrain.
+/// The method with the three pruning passes that the paper uses for BigBrain.
 [[nodiscard]] PaperMethod withThreePasses(PaperMethod method);
 
-/// What a pruning pass did.
+/// The outcome of a pruning pass.
 struct PruneRecord {
   std::uint32_t epoch = 0;
-  std::size_t before = 0, after = 0;               ///< ellipsoids
-  double psnrBoxBefore = 0.0, psnrBoxAfter = 0.0;  ///< dB over the box, of the sum
-  double hitsBefore = 0.0;                         ///< average ellipsoids a voxel; 0: not counted
+  std::size_t before = 0, after = 0;               ///< numbers of ellipsoids
+  double psnrBoxBefore = 0.0, psnrBoxAfter = 0.0;  ///< PSNR of the sum over the box, dB
+  double hitsBefore = 0.0;                         ///< average ellipsoid hits; 0: not counted
 };
 
-/// What a run did.
+/// The outcome of a run.
 struct PaperRecord {
-  PaperMethod method;                      ///< as it was used
+  PaperMethod method;                      ///< the method with all defaults resolved
   int subvolumeSide = 0;                   ///< voxels
-  std::size_t subvolumes = 0, points = 0;  ///< placed at the start
-  std::uint32_t iterations = 0;            ///< steps: subvolumes that were visited
+  std::size_t subvolumes = 0, points = 0;  ///< numbers of subvolumes and of seeds at the start
+  std::uint32_t iterations = 0;            ///< iterations, each on one subvolume
   std::size_t cloned = 0, split = 0;
-  double firstGradient = 0.0;  ///< median of what gradientThreshold was first compared with
+  double firstGradient = 0.0;  ///< median gradient of the first densification
   std::vector<PruneRecord> prunes;
 };
 
-/// The options of a fit by the paper's method. `count` is the number that the last pruning pass
-/// leaves; without pruning, the number up to which ellipsoids are added.
+/// The options of a fit by the paper's method. `count` is the number of ellipsoids that the last
+/// pruning pass keeps; without pruning it is the number at which densification ends.
 struct PaperFitOptions : CommonFitOptions {
   PaperMethod method;
 };
@@ -111,8 +115,9 @@ struct PaperFitResult {
   PaperRecord record;
 };
 
-/// Fits by the paper's method, on the CPU or a GPU. Deterministic as fit() is.
-/// \throws UsageError  a method that makes no sense; else as fit
+/// Fits by the paper's method on the CPU or a GPU. The result is as deterministic as that of fit().
+/// \throws UsageError  a parameter of the method is invalid
+/// Other exceptions are those of fit.
 [[nodiscard]] PaperFitResult fitByPaper(const SparseVolume& volume, const PaperFitOptions& options);
 
 }  // namespace esvr

@@ -1,12 +1,13 @@
 #pragma once
-/// Progress and cancellation. Both are handed in by the caller; the library keeps neither.
+/// Cancellation of long calls.
 
 #include <atomic>
 #include <functional>
 
 namespace esvr {
 
-/// Set from another thread or a signal handler to stop a long call at its next safe point.
+/// A flag that another thread or a signal handler sets to stop a long call at its next safe point.
+/// It belongs to the caller.
 class CancelToken {
  public:
   void cancel() noexcept { flag_.store(true, std::memory_order_relaxed); }

@@ -1,12 +1,12 @@
 #pragma once
-/// Pictures of a field or of a volume, by one rule. Along the ray of a pixel, values are sampled at
-/// the distances 0, step, 2 step, ... from the eye (orthographic: from the plane of the eye). A
-/// sample's value, and nothing else, says its color and opacity (post-classification); samples are
-/// put over each other from front to back. A sample that is exactly the background is empty space:
-/// transparent, whatever the transfer function has there.
+/// Draws pictures of a field or of a volume. Both follow one rule. The values along the ray of a
+/// pixel are sampled at the distances 0, step, 2 step, ... from the eye (orthographic: from the
+/// plane of the eye). The color and opacity of a sample depend on its value only
+/// (post-classification); samples are composited from front to back. A sample that is exactly the
+/// background is empty space: it is transparent, whatever the transfer function has there.
 ///
-/// The same input and options give the same bits on any number of threads (the calling TBB
-/// arena's).
+/// The same input and options give a bit-identical picture on any number of threads (those of the
+/// calling TBB arena).
 
 #include <optional>
 
@@ -19,23 +19,23 @@
 
 namespace esvr {
 
-/// The way in which the samples along a ray become a pixel.
+/// The rule that makes a pixel from the samples along its ray.
 enum class RenderMode {
-  kComposite,  ///< put over each other from front to back
-  kMaximum,    ///< the largest value, with its color and its opacity as it is
-  kAverage,    ///< the mean value, likewise; empty space does not count
-  /// Red: how far away half of the light is stopped, in voxels (orthographic: from the plane of the
-  /// eye). Alpha: 1, or 0 where more comes through, and red is 0 too.
+  kComposite,  ///< samples are composited from front to back
+  kMaximum,    ///< the color and opacity of the largest value
+  kAverage,    ///< the color and opacity of the mean value; empty space does not count
+  /// Red is the distance in voxels at which half of the light is absorbed (orthographic: from the
+  /// plane of the eye), and alpha is 1. Both are 0 if the ray absorbs less than half.
   kDepth
 };
 
 /// The values of a field between its voxels.
 enum class Between {
-  kVoxels,  ///< interpolated trilinearly from the voxels that revoxelise() has: as renderVolume
-  kSum      ///< the sum of ellipsoids itself, which a fit that looks at voxels leaves open there
+  kVoxels,  ///< trilinear interpolation of the voxels of revoxelise(), as in renderVolume
+  kSum      ///< the sum of ellipsoids itself, which a fit determines at voxels only
 };
 
-/// A box of places. Voxel (i, j, k) reaches half a voxel to each side of (i, j, k).
+/// A box with real-valued corners. Voxel (i, j, k) extends half a voxel to each side of (i, j, k).
 struct PlaceBox {
   Vec3 low, high;
 };
@@ -43,37 +43,37 @@ struct PlaceBox {
 struct RenderOptions {
   Camera camera;
   Resolution resolution;
-  TransferFunction transfer;  ///< taken at 4097 places from its first point to its last
-  double step = 1.0;          ///< voxels between samples
-  /// Voxels that an opacity of the transfer function holds for: a sample's is 1 - (1 - opacity) ^
-  /// (step / opacityLength).
+  TransferFunction transfer;  ///< sampled at 4097 values from its first point to its last
+  double step = 1.0;          ///< distance between samples, voxels
+  /// The length, in voxels, over which the transfer function's opacities are reached. The opacity
+  /// of a sample is 1 - (1 - opacity)^(step / opacityLength).
   double opacityLength = 1.0;
-  /// A ray ends where less than this part of the light behind would come through. At the default
-  /// that costs a 16th of a level of 255.
+  /// A ray ends when its transmittance falls below this. The default changes a channel by at most
+  /// 1/16 of 1/255.
   double minTransmittance = 1.0 / 4096;
   RenderMode mode = RenderMode::kComposite;
-  Between between = Between::kVoxels;   ///< the values of a field between its voxels
-  std::optional<PlaceBox> clip{};       ///< samples outside of it count as empty space
-  const CancelToken* cancel = nullptr;  ///< looked at before each row of tiles
+  Between between = Between::kVoxels;   ///< used for fields only
+  std::optional<PlaceBox> clip{};       ///< samples outside this box count as empty space
+  const CancelToken* cancel = nullptr;  ///< checked before each row of tiles
 };
 
-/// Draws the sum of ellipsoids without keeping voxels of it (paper, section "Per-ellipsoid ray
-/// sampling", algorithm 2), by tiles of pixels and bins of samples. Between::kSum: each ellipsoid
-/// adds to those samples of each ray that lie in its support, found by solving for entry and exit.
-/// Between::kVoxels: each adds to those voxels of its support that a tile's samples in a bin lie
-/// between; the samples are interpolated from these. That is the picture of
-/// renderVolume(revoxelise(field, voxels)), but for rounding.
-/// \param voxels  how sums become voxels; its bricks are not looked at. Of a narrow band, voxels
-///                inside are -background wherever an ellipsoid reaches
-/// \throws UsageError  as checkCamera and checkTransferFunction; step, opacityLength or
-///                     minTransmittance out of range; a clip box that is no box; rays of more than
-/// 2^24 samples
-///                     through the supports; Cancelled
+/// Draws a field without storing its voxels (paper, section "Per-ellipsoid ray sampling",
+/// algorithm 2), by tiles of pixels and bins of samples. With Between::kSum, each ellipsoid adds to
+/// the samples of each ray that lie in its support, between the ray's entry and its exit. With
+/// Between::kVoxels, each ellipsoid adds to the voxels of its support that surround the samples of
+/// a tile and bin, and the samples are interpolated from these voxels. The result is the picture of
+/// renderVolume(revoxelise(field, voxels)) up to rounding.
+/// \param voxels  rule by which sums become voxels; its bricks are ignored. In a narrow band, the
+///                voxels inside the surface are -background wherever an ellipsoid reaches
+/// \throws UsageError  as for checkCamera and checkTransferFunction; step, opacityLength or
+///                     minTransmittance is out of range; the clip box is invalid; a ray has more
+///                     than 2^24 samples in the supports
+/// \throws Cancelled   RenderOptions::cancel was set
 [[nodiscard]] Image renderField(const Field& field, const RenderOptions& options,
                                 const RevoxeliseOptions& voxels = {});
 
-/// Marches rays through voxels with trilinear interpolation and jumps over bricks that are not
-/// there. \throws  as renderField
+/// Draws a volume by marching rays with trilinear interpolation. Empty space between bricks is
+/// skipped. The exceptions are those of renderField.
 [[nodiscard]] Image renderVolume(const SparseVolume& volume, const RenderOptions& options);
 
 }  // namespace esvr

@@ -1,7 +1,7 @@
 #pragma once
-/// Renderers that draw many pictures of one thing, on the CPU or on a CUDA device: what is prepared
-/// once stays where it is needed. The pictures are those of render.h; the two devices' are within
-/// 1/255 of each other a channel.
+/// Renderers draw many pictures of one field or volume, on the CPU or on a CUDA device. They
+/// prepare their data once and keep them on the device. The pictures are those of render.h; the
+/// channels of CPU and CUDA pictures differ by at most 1/255.
 
 #include <cstdint>
 #include <memory>
@@ -12,29 +12,29 @@
 
 namespace esvr {
 
-/// The cost of the last picture.
+/// Time and memory of the last picture.
 struct FrameStats {
-  double listMs = 0.0;  ///< CUDA: ellipsoids looked at and listed by tiles
-  double drawMs = 0.0;  ///< CUDA: samples summed and composited. CPU: all
-  /// Ellipsoids in lists: one entry for each tile of pixels and 32 samples of depth that it may
-  /// reach. Of a field on CUDA; else 0.
+  double listMs = 0.0;  ///< CUDA: time to project the ellipsoids and list them by tile
+  double drawMs = 0.0;  ///< CUDA: time to sum and composite the samples; CPU: whole time
+  /// Entries of all lists: one for each ellipsoid and each bin (a tile of pixels, 32 samples deep)
+  /// that it may reach. 0 unless a field is drawn with CUDA.
   std::uint64_t pairs = 0;
-  double occupancy = 0.0;  ///< share of the tiles that have a list; of a field on CUDA
-  int depthParts = 1;      ///< parts of a tile's depth that were drawn at once
-  /// Most that the renderer held on its device so far, frame buffers included; CUDA only.
+  double occupancy = 0.0;  ///< share of the tiles that have a list; for a field with CUDA
+  int depthParts = 1;      ///< parts of a tile's depth that are drawn in parallel
+  /// Largest device memory that the renderer has held, including frame buffers; CUDA only.
   std::uint64_t deviceBytes = 0;
 };
 
 struct RendererLimits {
-  /// Parts of the depth of a tile that a CUDA device draws at once: more keep it busy where few
-  /// tiles have most of the work, and stop later where little shines through. 0: by the lists of
-  /// the first picture. At most 16.
+  /// Parts of a tile's depth that a CUDA device draws in parallel, at most 16. More parts keep the
+  /// device busy if few tiles have most of the work, but a ray then ends later in opaque volumes.
+  /// 0: the number is chosen by the lists of the first picture.
   int depthParts = 0;
-  /// Bound on the memory on the device; pictures are drawn in bands to keep it. 0: no bound.
+  /// Limit on device memory; 0: no limit. If necessary, pictures are drawn in bands.
   std::uint64_t maxBytes = 0;
 };
 
-/// Used from one thread. What it was made of must outlive it.
+/// A renderer is used from one thread. The field or volume that it draws must outlive it.
 class Renderer {
  public:
   Renderer() = default;
@@ -42,35 +42,38 @@ class Renderer {
   Renderer& operator=(const Renderer&) = delete;
   virtual ~Renderer() = default;
 
-  /// \throws UsageError, Cancelled  as renderField; DeviceError: the device fails, or maxBytes are
-  ///                                too few
+  /// \throws UsageError, Cancelled  as for renderField
+  /// \throws DeviceError  the device fails, or maxBytes is too small
   [[nodiscard]] virtual Image draw(const RenderOptions& options) = 0;
-  /// The same work without bringing the picture to the host: to be measured.
+  /// Draws without a copy of the picture to the host, for measurements of speed.
   virtual void drawOnDevice(const RenderOptions& options) = 0;
   [[nodiscard]] virtual FrameStats stats() const = 0;
 };
 
-/// Draws as renderField. \throws DeviceError  no such device, a build without CUDA, out of memory;
-///                                             UsageError: limits out of range
+/// Makes a renderer that draws as renderField.
+/// \throws DeviceError  the device does not exist, the build has no CUDA, or memory is exhausted
+/// \throws UsageError   the limits are out of range
 [[nodiscard]] std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& device,
                                                           const RendererLimits& limits = {},
                                                           const RevoxeliseOptions& voxels = {});
 
-/// Draws as renderVolume. On a CUDA device from bricks of 8^3 cells with the 9^3 voxels at their
-/// corners, 2.9 KB each, where any is not the background; it does not need the volume any more.
-/// \throws DeviceError  as makeFieldRenderer; UsageError: on a CUDA device, voxels so far apart
-/// that
-///                      there are more than 2^28 blocks of 64^3 between them
+/// Makes a renderer that draws as renderVolume. A CUDA renderer makes its own bricks of 8^3 cells,
+/// with the 9^3 voxels at the cells' corners (2.9 KB), wherever a voxel is not the background. It
+/// does not need the volume after that.
+/// \throws DeviceError  as for makeFieldRenderer
+/// \throws UsageError   on a CUDA device: the bounding box of the voxels has more than 2^28 blocks
+///                      of 64^3 voxels
 [[nodiscard]] std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume,
                                                            const Device& device,
                                                            const RendererLimits& limits = {});
 
-/// The picture of renderVolume, marched through a NanoVDB grid: the reference that others are
-/// compared with. Places are float32 relative to where a ray enters. \throws  as
-/// renderField
+/// Draws a NanoVDB grid by the rule of renderVolume. It is the reference that other renderers are
+/// compared with. Positions along a ray are float32, relative to the point where the ray enters the
+/// grid. The exceptions are those of renderField.
 [[nodiscard]] Image renderNano(const NanoVolume& volume, const RenderOptions& options);
 
-/// Draws as renderNano. Does not need the volume any more once it is made on a CUDA device.
+/// Makes a renderer that draws as renderNano. A CUDA renderer does not need the volume after it was
+/// made.
 [[nodiscard]] std::unique_ptr<Renderer> makeNanoRenderer(const NanoVolume& volume,
                                                          const Device& device,
                                                          const RendererLimits& limits = {});

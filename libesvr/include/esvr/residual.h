@@ -1,6 +1,6 @@
 #pragma once
-/// Keeps a bound on the error of every voxel beside ellipsoids: a residual holds what their sum
-/// misses by more.
+/// Residuals bound the error of every voxel: they correct the sum of ellipsoids wherever its error
+/// exceeds the bound.
 
 #include <cstdint>
 #include <optional>
@@ -10,13 +10,13 @@
 
 namespace esvr {
 
-/// Adds the residual that keeps every voxel of decodeGrid() within `bound` of the source's, wherever
-/// the file is read. Evaluations differ by rounding between machines (field.h); the residual keeps a
-/// margin for that. Where voxels are active by their values, the grid's threshold becomes half the
+/// Adds a residual to a grid, so that every voxel of decodeGrid() is within `bound` of the source
+/// on every machine. Evaluations on different machines differ by rounding (field.h); the residual
+/// includes a margin for that. If the grid's topology is kThreshold, its threshold becomes half the
 /// bound.
-/// \param grid   as makeStoredGrid made it from `source`, no narrow band
-/// \param bound  above 0
-/// \return       nothing where the margin would take too much of the bound
+/// \param grid   a grid that makeStoredGrid made from `source`
+/// \param bound  largest absolute error, above 0
+/// \return nothing if the grid is a narrow band, or if the margin takes too much of the bound
 [[nodiscard]] std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& source,
                                                      double bound);
 

@@ -1,8 +1,7 @@
 #pragma once
-/// A sparse scalar field on the integer lattice: 8^3 bricks where there are voxels, one background
-/// value elsewhere. The library's only voxel container: OpenVDB and NanoVDB grids are turned into
-/// it at the border (vdb_io.h), everything above works on it. Its size follows the bricks, never
-/// the bounding box.
+/// A sparse scalar field on the integer lattice: bricks of 8^3 voxels, and one background value
+/// elsewhere. It is the library's only container for voxels; vdb_io.h converts OpenVDB and NanoVDB
+/// grids to it and back. Its size depends on the number of bricks and not on the bounding box.
 
 #include <array>
 #include <bit>
@@ -17,15 +16,16 @@
 namespace esvr {
 
 inline constexpr int kBrickLog2 = 3;
-inline constexpr int kBrickSide = 1 << kBrickLog2;                         ///< voxels along a side
+inline constexpr int kBrickSide = 1 << kBrickLog2;                         ///< voxels along an edge
 inline constexpr int kBrickVoxels = kBrickSide * kBrickSide * kBrickSide;  ///< 512
 
-/// Offset of a voxel in its brick: x * 64 + y * 8 + z, z fastest, as in an OpenVDB leaf.
-/// \param local  coordinates in the brick, each 0..7
+/// Offset of a voxel in its brick: x * 64 + y * 8 + z, as in an OpenVDB leaf.
+/// \param local  coordinates in the brick, each 0 to 7
 constexpr int voxelOffset(Coord local) { return (local.x << 6) | (local.y << 3) | local.z; }
 constexpr Coord voxelLocal(int offset) { return {offset >> 6, (offset >> 3) & 7, offset & 7}; }
 
-/// Brick that holds a voxel (floor division, right for negative coordinates) and the voxel's place.
+/// The brick that contains a voxel (by floor division, also for negative coordinates), and the
+/// voxel's coordinates in the brick.
 constexpr Coord brickOf(Coord v) {
   return {v.x >> kBrickLog2, v.y >> kBrickLog2, v.z >> kBrickLog2};
 }
@@ -33,7 +33,7 @@ constexpr Coord localOf(Coord v) {
   return {v.x & (kBrickSide - 1), v.y & (kBrickSide - 1), v.z & (kBrickSide - 1)};
 }
 
-/// One bit a voxel of a brick; word x holds the 64 voxels of slice x, bit y * 8 + z.
+/// A bit for each voxel of a brick; word x holds the 64 voxels of slice x, at bit y * 8 + z.
 struct BrickMask {
   std::array<std::uint64_t, kBrickSide> words{};
 
@@ -50,13 +50,14 @@ struct BrickMask {
   }
 };
 
-/// Bricks in strictly increasing order of Coord; arrays run parallel to `bricks`.
+/// A volume as a structure of arrays. The bricks are in strictly increasing order of Coord, and the
+/// other arrays have entries for each of them.
 struct SparseVolume {
   Coord origin;               ///< index coordinates of brick (0,0,0)'s first voxel; multiples of 8
   float background = 0.0f;    ///< value outside the bricks
   std::vector<Coord> bricks;  ///< brick positions relative to `origin`, in bricks, each >= 0
-  std::vector<float> values;  ///< kBrickVoxels a brick, the grid's values (background included)
-  std::vector<BrickMask> active;  ///< the active voxels
+  std::vector<float> values;  ///< kBrickVoxels values for each brick, active or not
+  std::vector<BrickMask> active;  ///< active voxels of each brick
 
   [[nodiscard]] std::size_t brickCount() const { return bricks.size(); }
   [[nodiscard]] std::span<const float> brickValues(std::size_t b) const {
@@ -69,37 +70,38 @@ struct SparseVolume {
   [[nodiscard]] Coord brickCorner(std::size_t b) const { return origin + bricks[b] * kBrickSide; }
 };
 
-/// Position of a brick (relative to the volume's origin) in `bricks`; nothing where there is none.
+/// Index in `bricks` of the brick at a position relative to the volume's origin, if it exists.
 [[nodiscard]] std::optional<std::size_t> findBrick(const SparseVolume& volume, Coord brick);
 
-/// Value at an index coordinate: the background outside the bricks.
+/// Value at an index coordinate, which is the background outside the bricks.
 [[nodiscard]] float valueAt(const SparseVolume& volume, Coord voxel);
 
 [[nodiscard]] std::uint64_t activeVoxelCount(const SparseVolume& volume);
 
-/// Smallest box around the active voxels, in index coordinates; empty where none is active.
+/// Bounding box of the active voxels, in index coordinates; empty if there are none.
 [[nodiscard]] Box activeBox(const SparseVolume& volume);
 
 struct ValueRange {
   float min = 0.0f, max = 0.0f;
 };
-/// Smallest and largest value over the active voxels. \throws BadInput  no active voxel
+/// Smallest and largest value of the active voxels.
+/// \throws BadInput  there is no active voxel
 [[nodiscard]] ValueRange activeRange(const SparseVolume& volume);
 
-/// Throws std::logic_error where the arrays do not fit each other or the bricks are not in order.
+/// \throws std::logic_error  the arrays differ in length, or the bricks are not in order
 void checkInvariants(const SparseVolume& volume);
 
-/// A single brick on its way into a volume, at any order and place.
+/// A brick as input of makeVolume.
 struct BrickInput {
-  Coord corner;  ///< index coordinates of its first voxel, multiples of 8
+  Coord corner;  ///< index coordinates of the first voxel, multiples of 8
   std::array<float, kBrickVoxels> values;
   BrickMask active;
 };
 
-/// Builds a volume from bricks in any order: sorts them, drops those without an active voxel and
-/// puts the origin at the smallest corner, so that the result does not depend on where the grid
-/// lies nor on empty bricks around it. \throws BadInput  two bricks of one corner, or bricks
-/// further apart than 2^31 voxels
+/// Builds a volume from bricks in any order. Bricks are sorted, bricks without an active voxel are
+/// dropped, and the origin is the smallest corner. A fit therefore does not depend on the position
+/// of the grid or on empty bricks around it.
+/// \throws BadInput  two bricks have the same corner, or bricks are more than 2^31 voxels apart
 [[nodiscard]] SparseVolume makeVolume(std::vector<BrickInput> bricks, float background);
 
 }  // namespace esvr

@@ -1,6 +1,7 @@
 #pragma once
-/// From values to colors and opacities. A transfer function is points along an axis of values; what
-/// lies between them is interpolated as ParaView and VTK do, so that a preset looks the same here.
+/// Transfer functions map values to colors and opacities. They are given as points on an axis of
+/// values and are interpolated between the points as in ParaView and VTK, so that a preset looks
+/// the same here as there.
 
 #include <filesystem>
 #include <string>
@@ -10,20 +11,20 @@
 
 namespace esvr {
 
-/// Red, green, blue as a screen takes them (sRGB), 0 to 1.
+/// An sRGB color; each channel is between 0 and 1.
 struct Rgb {
   double r = 0.0, g = 0.0, b = 0.0;
   friend bool operator==(const Rgb&, const Rgb&) = default;
 };
 
-/// In which space colors are mixed.
+/// The color space in which colors are interpolated.
 enum class ColorSpace {
   kRgb,
-  kHsv,        ///< hue as a number: from 0.9 to 0.1 it passes 0.5
-  kHsvWrap,    ///< hue as an angle: from 0.9 to 0.1 it passes 0
+  kHsv,        ///< the hue is a number: from 0.9 to 0.1 it passes through 0.5
+  kHsvWrap,    ///< the hue is an angle: from 0.9 to 0.1 it passes through 0
   kLab,        ///< CIE L*a*b*, white D65
   kDiverging,  ///< through white between two hues (Moreland, "Diverging color maps", 2009)
-  kStep        ///< not at all: between two points the color of the upper one
+  kStep        ///< no interpolation: the upper point's color holds between two points
 };
 
 struct ColorPoint {
@@ -32,26 +33,28 @@ struct ColorPoint {
   friend bool operator==(const ColorPoint&, const ColorPoint&) = default;
 };
 
-/// At least one point, x not decreasing; before the first and behind the last, their colors.
+/// A color map has at least one point, and x does not decrease. Values below the first point have
+/// its color, values above the last point have that one's.
 struct ColorMap {
   ColorSpace space = ColorSpace::kRgb;
   std::vector<ColorPoint> points;
-  Rgb nan{0.5, 0.0, 0.0};  ///< color of values that are not a number
+  Rgb nan{0.5, 0.0, 0.0};  ///< color of NaN values
   friend bool operator==(const ColorMap&, const ColorMap&) = default;
 };
 
-/// The curve from a point to the next one is bent by the point's midpoint (where, of the way, it
-/// has half of the change) and sharpness (0: straight lines, 1: a step at the midpoint), as in
-/// vtkPiecewiseFunction.
+/// The midpoint and the sharpness shape the curve from a point to the next one, as in
+/// vtkPiecewiseFunction. At the midpoint, a share of the interval, half of the change is reached. A
+/// sharpness of 0 gives straight lines, 1 gives a step at the midpoint.
 struct OpacityPoint {
   double x = 0.0;
-  double opacity = 0.0;  ///< 0 to 1, over the length that RenderOptions::opacityLength says
+  double opacity = 0.0;  ///< 0 to 1, over a length of RenderOptions::opacityLength voxels
   double midpoint = 0.5;
   double sharpness = 0.0;
   friend bool operator==(const OpacityPoint&, const OpacityPoint&) = default;
 };
 
-/// At least one point, x not decreasing; before the first and behind the last, their opacities.
+/// An opacity curve has at least one point, and x does not decrease. It is constant before the
+/// first point and behind the last.
 using OpacityCurve = std::vector<OpacityPoint>;
 
 struct TransferFunction {
@@ -60,42 +63,48 @@ struct TransferFunction {
   friend bool operator==(const TransferFunction&, const TransferFunction&) = default;
 };
 
-/// \throws UsageError  no points, or not in order, or not finite; opacities, midpoints or
-///                     sharpnesses outside 0 to 1; colors outside 0 to 1
+/// Validates a transfer function.
+/// \throws UsageError  there are no points, or they are not in order or not finite; opacities,
+///                     midpoints, sharpnesses or colors are outside 0 to 1
 void checkTransferFunction(const TransferFunction& function);
 
 [[nodiscard]] Rgb colorAt(const ColorMap& map, double x);
 [[nodiscard]] double opacityAt(const OpacityCurve& curve, double x);
 
-/// The points moved so that the first and last of the colors, and those of the opacities, lie at
-/// the ends of `range`. A range or function without extent has all points at range.min.
+/// Maps the points linearly, so that the first and last color point, and the first and last opacity
+/// point, lie at the ends of `range`. If the range or the function has no extent, all points lie at
+/// range.min.
 [[nodiscard]] TransferFunction rescaled(TransferFunction function, ValueRange range);
 
-/// Names for builtInColorMap, in the order of a help text.
+/// Names that builtInColorMap takes, in the order of a help text.
 [[nodiscard]] std::vector<std::string> builtInColorMaps();
-/// A color map from 0 to 1. \throws UsageError  no such map; lists those there are
+/// A color map over the values 0 to 1.
+/// \throws UsageError  the name is unknown; the text lists the known names
 [[nodiscard]] ColorMap builtInColorMap(const std::string& name);
 
+/// Names that builtInOpacity takes, in the order of a help text.
 [[nodiscard]] std::vector<std::string> builtInOpacities();
-/// A curve from 0 to 1: "linear" rises, "inverse" falls, "tent" rises to the middle and falls,
-/// "step" is 0 below the middle and 1 above; "smoke", "ct-bone" and "ct-soft-tissue" go with the
-/// color maps of these names. \throws UsageError  no such curve
+/// An opacity curve over the values 0 to 1: "linear" rises, "inverse" falls, "tent" rises to the
+/// middle and falls again, "step" is 0 below the middle and 1 above; "smoke", "ct-bone" and
+/// "ct-soft-tissue" belong to the color maps of these names.
+/// \throws UsageError  the name is unknown
 [[nodiscard]] OpacityCurve builtInOpacity(const std::string& name);
 
-/// Reads a ParaView preset: a JSON array of objects, or one object, with "RGBPoints" [x r g b ...],
-/// and optionally "Name", "ColorSpace" (RGB, HSV, Lab, CIELAB, Diverging, Step), "HSVWrap",
-/// "Points" [x opacity midpoint sharpness ...] and "NanColor" [r g b]. Points need no order.
-/// Without "Points" the opacity is linear over the range of the colors. Older ParaView's XML, too:
-/// <ColorMap name space> with <Point x o r g b> and <NaN r g b>; opacities o that are all 1 are
-/// those of a map of colors only, and count as none.
-/// \param name  of the preset in the file; empty for the first that has colors
-/// \throws BadInput  missing, not JSON, not XML, no such preset (lists those there are), not a
-///                   transfer function (says why)
+/// Reads a ParaView preset in one of two formats:
+///  - JSON: an object, or an array of objects, with "RGBPoints" [x r g b ...] and optionally
+///    "Name", "ColorSpace" (RGB, HSV, Lab, CIELAB, Diverging, Step), "HSVWrap", "Points"
+///    [x opacity midpoint sharpness ...] and "NanColor" [r g b]. The points may be in any order.
+///  - the XML of older versions: <ColorMap name space> with <Point x o r g b> and <NaN r g b>. If
+///    all opacities o are 1, the map has colors only, and the opacities are ignored.
+/// A preset without opacities gets a linear one over the range of its colors.
+/// \param name  name of the preset in the file; empty: the first preset that has colors
+/// \throws BadInput  the file is missing, neither JSON nor XML, or has no such preset (the text
+///                   lists the presets); the preset is no transfer function (the text says why)
 [[nodiscard]] TransferFunction readParaViewPreset(const std::filesystem::path& path,
                                                   const std::string& name = {});
 
-/// The JSON text of a file with one preset, which readParaViewPreset and ParaView read.
-/// \throws UsageError  as checkTransferFunction
+/// The JSON text of a file with one preset. readParaViewPreset and ParaView can read it.
+/// \throws UsageError  see checkTransferFunction
 [[nodiscard]] std::string paraViewPreset(const TransferFunction& function, const std::string& name);
 
 }  // namespace esvr

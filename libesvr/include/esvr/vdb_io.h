@@ -1,6 +1,6 @@
 #pragma once
-/// OpenVDB (.vdb) and NanoVDB (.nvdb) files in and out. The format is told by the file's first
-/// bytes when reading and by the extension when writing.
+/// Reads and writes OpenVDB (.vdb) and NanoVDB (.nvdb) files. A reader recognises the format by the
+/// file's first bytes; a writer chooses it by the extension.
 
 #include <array>
 #include <cstdint>
@@ -16,40 +16,40 @@
 
 namespace esvr {
 
-/// A file's description of one of its grids.
+/// Properties of one grid of a file.
 struct GridSummary {
-  std::string name;  ///< as stored; may be empty or shared by several grids
-  std::string
-      uniqueName;  ///< --grid takes it: the name, with "[i]" where several share it (i from 0)
-  std::string valueType;  ///< OpenVDB's: "float", "double", "vec3s", "int32", "ptdataidx32", ...
+  std::string name;  ///< stored name; may be empty or shared by several grids
+  /// The name that --grid takes: `name`, with "[i]" (i from 0) if several grids share it.
+  std::string uniqueName;
+  std::string valueType;  ///< OpenVDB's name: "float", "double", "vec3s", "ptdataidx32", ...
   bool savedAsHalf = false;
   GridClass gridClass = GridClass::kUnknown;
   std::uint64_t activeVoxels = 0;
   Box activeBox;
-  std::uint64_t storedBytes = 0;  ///< in the file; a grid that shares another's tree has few
-  std::string skipReason;  ///< empty where the grid can be fitted; else why not, for the user
-  bool isScalar = false;   ///< holds floats that readGrid takes, be the grid empty or not
+  std::string skipReason;  ///< reason, for the user, why the grid cannot be fitted; else empty
+  bool isScalar = false;   ///< true if readGrid can read the value type, even of an empty grid
 };
 
 struct VdbSummary {
   std::string format;  ///< "OpenVDB" or "NanoVDB"
   std::uint64_t fileBytes = 0;
-  std::vector<MetaItem> metadata;  ///< file level, `creator` among it
-  std::vector<GridSummary> grids;  ///< in file order
+  std::vector<MetaItem> metadata;  ///< file-level metadata, which includes `creator`
+  std::vector<GridSummary> grids;  ///< grids in file order
 };
 
-/// Lists a file's grids without reading their voxels where the format allows.
-/// \throws BadInput  missing, a directory, empty, truncated, not a VDB (the text names the file)
+/// Lists a file's grids; where the format allows it, without reading their voxels.
+/// \throws BadInput  the file is missing, a directory, empty, truncated or not a VDB (the text
+///                   names the file)
 [[nodiscard]] VdbSummary inspectVdb(const std::filesystem::path& path);
 
-/// The treatment of NaN and infinite voxels.
+/// Treatment of NaN and infinite voxels: an error, or replacement by 0.
 enum class NonFinite { kRefuse, kZero };
 
 struct ReadOptions {
   NonFinite nonFinite = NonFinite::kRefuse;
-  bool allowEmpty = false;  ///< a grid without an active voxel is a volume without bricks
-  /// Bound on the memory of the file's tree and of the bricks that are made from it. Active tiles
-  /// become bricks; a tile may stand for 2^27 of them.
+  bool allowEmpty = false;  ///< a grid without active voxels becomes a volume without bricks
+  /// Limit on the memory of the file's tree and of the bricks that are made from it. Active tiles
+  /// become bricks; one tile may become 2^27 bricks.
   std::uint64_t maxBytes = std::uint64_t{16} << 30;
 };
 
@@ -60,48 +60,52 @@ struct VolumeGrid {
   std::uint64_t nonFiniteReplaced = 0;  ///< voxels replaced under NonFinite::kZero
 };
 
-/// Reads one grid, its active tiles included. In the volume, active voxels hold the grid's values,
-/// narrowed to float. Inactive voxels hold the background, whatever the file has there; in a level
-/// set, the background with the sign that the file has, which tells inside from outside.
-/// \param name  "density" (the first of that name), or "density[1]" for the second.
-/// \throws BadInput  as inspectVdb; no such grid (lists those there are); a type that cannot be
-/// fitted;
-///                   no active voxel (without allowEmpty); non-finite voxels (first coordinate and
-///                   count); MemoryExceeded: more than maxBytes
+/// Reads one grid with its active tiles. Active voxels of the volume hold the grid's values,
+/// rounded to float32. Inactive voxels hold the background, whatever the file has there; in a level
+/// set they hold the background with the file's sign, which distinguishes inside from outside.
+/// \param name  "density" (the first grid of that name) or "density[1]" (the second)
+/// \throws BadInput  as for inspectVdb; the grid does not exist (the text lists the grids); its
+///                   type cannot be fitted; it has no active voxel (without allowEmpty); voxels are
+///                   not finite (the text gives the first coordinate and the number)
+/// \throws MemoryExceeded  the grid needs more than maxBytes
 [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                                   const ReadOptions& options = {});
 
-enum class HalfMode { kAuto, kOn, kOff };  ///< kAuto: half where the source was saved as half
+/// Choice of half floats for a written file; kAuto: half if the source was saved as half.
+enum class HalfMode { kAuto, kOn, kOff };
 
 struct WriteOptions {
   HalfMode half = HalfMode::kAuto;
   bool overwrite = false;     ///< replace an existing file
-  bool constantTiles = true;  ///< leaves that are active and constant throughout become tiles
+  bool constantTiles = true;  ///< leaves whose voxels are all active and equal become tiles
 };
 
-/// Writes grids to .vdb (Blosc + active mask) or .nvdb, to a temporary file that is renamed when
-/// complete. A level set gets its background as half width and a signed flood fill. Voxels that are
-/// not active hold the background; leaves without active voxels are not written.
-/// \param fileMetadata  verbatim; Blender reads a file as Y-up only if `creator` begins "Houdini"
-/// \throws RuntimeFailure  exists (without overwrite), not writable, disk full; UsageError:
-/// extension
+/// Writes grids to a .vdb (with Blosc and active masks) or .nvdb file. The data go to a temporary
+/// file, which is renamed when it is complete. The background of a level set is its half width, and
+/// its inactive values are set by a signed flood fill. Inactive voxels hold the background; leaves
+/// without active voxels are not written.
+/// \param fileMetadata  metadata that are written verbatim; Blender reads a file as Y-up only if
+///                      `creator` begins with "Houdini"
+/// \throws RuntimeFailure  the file exists (without overwrite) or is not writable; the disk is full
+/// \throws UsageError  the extension is neither .vdb nor .nvdb
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const VolumeGrid> grids, const WriteOptions& options = {});
 
-/// The file-level metadata item in which writeGrids leaves its name, unless the source has one.
+/// Name of the file-level metadata item that names the writer. writeGrids adds it if
+/// `fileMetadata` has no item of this name.
 inline constexpr const char* kWriterKey = "esvr_writer";
 
 /// A file-level metadata item of type "string".
 [[nodiscard]] MetaItem stringItem(const std::string& name, const std::string& value);
 
-/// A uniform-scale transform, as openvdb::math::Transform::createLinearTransform(voxelSize) makes
-/// it.
+/// A uniform-scale transform, as openvdb::math::Transform::createLinearTransform makes it.
 [[nodiscard]] Transform uniformTransform(double voxelSize);
 
-/// A transform from a row-vector affine 4x4, row major. \throws UsageError  singular
+/// A transform from an affine 4x4 matrix for row vectors, in row-major order.
+/// \throws UsageError  the matrix is singular
 [[nodiscard]] Transform affineTransform(const std::array<double, 16>& matrix);
 
-/// "OpenVDB 10.0.1, NanoVDB 32.4.2": the libraries compiled in, for --version.
+/// Versions of the libraries compiled in, for --version: "OpenVDB 10.0.1, NanoVDB 32.4.2".
 [[nodiscard]] std::string vdbVersions();
 
 }  // namespace esvr

@@ -1,6 +1,6 @@
 #pragma once
-/// A grid's voxels as integers, exact or within a bound: what a file holds where ellipsoids are not
-/// near enough.
+/// A grid's voxels as integer codes, exact or within a bound. A file holds such a layer if
+/// ellipsoids do not reach the wanted accuracy.
 
 #include <cstdint>
 #include <optional>
@@ -11,50 +11,50 @@
 
 namespace esvr {
 
-/// The value that an integer n stands for.
+/// The meaning of an integer code n.
 enum class VoxelForm {
-  kLattice = 0,  ///< float32(n / divisor), the division in float64
-  kHalf = 1,     ///< half floats in their order: n >= 0 has the bits n, n < 0 the bits of -(-1 - n)
+  kLattice = 0,  ///< the value float32(n / divisor), divided in float64
+  kHalf = 1,     ///< half floats in increasing order: n >= 0 has the bits n, n < 0 is -(-1 - n)
   kFloat = 2,    ///< float32 in the same way
-  kPalette = 3   ///< the n-th of the values that there are
+  kPalette = 3   ///< palette entry n
 };
 
 struct VoxelLayer {
   VoxelForm form = VoxelForm::kFloat;
-  double divisor = 1.0;             ///< for kLattice
-  std::vector<float> palette;       ///< for kPalette, in the order of kFloat
-  Coord origin;                     ///< as SparseVolume's
-  float background = 0.0f;          ///< exact
-  std::vector<Coord> bricks;        ///< as SparseVolume's
-  std::vector<std::int32_t> codes;  ///< kBrickVoxels a brick; at a vacant voxel the background's
+  double divisor = 1.0;             ///< divisor of kLattice
+  std::vector<float> palette;       ///< values of kPalette, in the order of kFloat
+  Coord origin;                     ///< see SparseVolume
+  float background = 0.0f;          ///< exact background
+  std::vector<Coord> bricks;        ///< see SparseVolume
+  std::vector<std::int32_t> codes;  ///< kBrickVoxels per brick; vacant voxels have the background's
   std::vector<BrickMask> active;
-  std::vector<BrickMask> vacant;  ///< not active, and exactly the background
+  std::vector<BrickMask> vacant;  ///< inactive voxels that are exactly the background
 
   friend bool operator==(const VoxelLayer&, const VoxelLayer&) = default;
 };
 
-/// Every voxel, its activity and the background bit for bit: as a palette where there are few
-/// values (those of an 8-bit volume, whatever they were multiplied with), else as halves where all
-/// are, else as floats.
+/// Makes a layer that holds every voxel, the active mask and the background bit for bit. The form
+/// is kPalette if there are few distinct values (as in a scaled 8-bit volume), else kHalf if half
+/// floats can hold all values, else kFloat.
 [[nodiscard]] VoxelLayer exactLayer(const SparseVolume& volume);
 
-/// The part of the activity of voxels that a layer keeps.
+/// Storage of the active mask.
 enum class Activity {
-  kExact,   ///< all of it
-  kByValue  ///< active are those that cannot be the background within the bound
+  kExact,   ///< the exact active mask
+  kByValue  ///< a voxel is active if its value cannot be the background within the bound
 };
 
-/// Every voxel within `bound` of the volume's. Where rounding to float32 would break the bound,
-/// exactLayer().
-/// \throws UsageError  bound not positive and finite
+/// Makes a layer whose voxels are within `bound` of the volume's. If rounding to float32 would
+/// break the bound, the layer is exactLayer().
+/// \throws UsageError  the bound is not positive and finite
 [[nodiscard]] VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity);
 
 [[nodiscard]] SparseVolume volumeOf(const VoxelLayer& layer);
 
-/// Largest |difference| of two volumes' voxels, over the bricks of both, active or not.
+/// Largest absolute difference of two volumes' voxels over the bricks of both, active or not.
 [[nodiscard]] double largestDifference(const SparseVolume& a, const SparseVolume& b);
 
-/// That of a layer's voxels from its volume's.
+/// Largest absolute difference of a layer's voxels from the volume's.
 [[nodiscard]] double largestError(const SparseVolume& volume, const VoxelLayer& layer);
 
 }  // namespace esvr

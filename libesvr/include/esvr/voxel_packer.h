@@ -1,7 +1,7 @@
 #pragma once
-/// A grid's voxels as OpenVDB's and NanoVDB's own files hold them, in every form that those offer:
-/// what an .esvr is measured against. Written and read by the two libraries themselves, and timed;
-/// for files that are meant to be kept there is writeGrids (vdb_io.h).
+/// Writes a grid in every form that OpenVDB's and NanoVDB's own files offer, as a baseline for
+/// .esvr files. The two libraries themselves write and read the files, and the times are measured.
+/// To write files for users, call writeGrids (vdb_io.h).
 
 #include <filesystem>
 #include <memory>
@@ -16,10 +16,10 @@ enum class PackedForm {
   kOpenVdbFloat,
   kOpenVdbHalf,
   kNanoFloat,
-  kNanoFp16,  ///< 16 bits a voxel between a leaf's smallest and largest value
+  kNanoFp16,  ///< 16 bits per voxel between the smallest and the largest value of a leaf
   kNanoFp8,
   kNanoFp4,
-  kNanoFpN,  ///< as many bits a leaf as VoxelPacking::tolerance needs
+  kNanoFpN,  ///< the number of bits of a leaf follows from VoxelPacking::tolerance
 };
 
 enum class PackedCodec { kNone, kZip, kBlosc };
@@ -27,27 +27,28 @@ enum class PackedCodec { kNone, kZip, kBlosc };
 struct VoxelPacking {
   PackedForm form = PackedForm::kOpenVdbFloat;
   PackedCodec codec = PackedCodec::kBlosc;
-  double tolerance = 0.0;  ///< kNanoFpN: largest error of a voxel, in value units; above 0
+  double tolerance = 0.0;  ///< largest error of a voxel for kNanoFpN, in value units; above 0
 };
 
 [[nodiscard]] bool isNanoVdb(PackedForm form);
-/// The values that a NanoVDB grid of the form holds; kFloat for OpenVDB's forms.
+/// The value type of a NanoVDB grid of this form; kFloat for OpenVDB's forms.
 [[nodiscard]] NanoValues nanoValues(PackedForm form);
 
 class VoxelPacker {
  public:
-  /// Builds the OpenVDB grid that files are made of. Constant leaves become tiles.
+  /// Builds the OpenVDB grid that the files are written from. Constant leaves become tiles.
   explicit VoxelPacker(const VolumeGrid& grid);
   ~VoxelPacker();
   VoxelPacker(const VoxelPacker&) = delete;
   VoxelPacker& operator=(const VoxelPacker&) = delete;
 
-  /// Writes a file and replaces what is there. OpenVDB packs no level sets and fog volumes by zip,
-  /// so that for kZip such a grid's class is written as unknown. Every OpenVDB file leaves out
+  /// Writes a file and replaces an existing one. OpenVDB does not zip level sets and fog volumes;
+  /// with kZip the class of such a grid is therefore written as unknown. OpenVDB files do not hold
   /// inactive values.
   /// \return seconds from OpenVDB's grid to the written file
-  /// \throws UsageError  values that half cannot hold; a transform that NanoVDB cannot; no
-  ///                     tolerance; RuntimeFailure: not writable
+  /// \throws UsageError  half floats cannot hold a value, NanoVDB cannot hold the transform, or the
+  ///                     tolerance is missing
+  /// \throws RuntimeFailure  the file is not writable
   double write(const std::filesystem::path& path, const VoxelPacking& packing) const;
 
  private:
@@ -55,8 +56,9 @@ class VoxelPacker {
   std::unique_ptr<Source> source_;
 };
 
-/// Seconds that the form's own library takes to have a file's grid in memory, as OpenVDB's tree or
-/// NanoVDB's buffer. \throws BadInput  not such a file
+/// Seconds that the form's own library takes to read a file's grid into memory, as OpenVDB's tree
+/// or NanoVDB's buffer.
+/// \throws BadInput  the file is not of this form
 [[nodiscard]] double secondsToRead(const std::filesystem::path& path, PackedForm form);
 
 }  // namespace esvr

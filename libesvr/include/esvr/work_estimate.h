@@ -1,6 +1,7 @@
 #pragma once
-/// How much work and memory it takes to turn a field into voxels. It is known from the supports of
-/// the ellipsoids before anything is evaluated, so that a program can refuse what it cannot finish.
+/// Estimates the work and memory that evaluating a field takes. The estimate follows from the
+/// supports of the ellipsoids and needs no evaluation, so that a program can refuse work that it
+/// could not finish.
 
 #include <limits>
 
@@ -12,22 +13,22 @@ namespace esvr {
 /// All figures are upper bounds.
 struct WorkEstimate {
   double ellipsoids = 0.0;
-  double pairs = 0.0;   ///< an ellipsoid and a brick that it reaches make a pair
+  double pairs = 0.0;   ///< pairs of an ellipsoid and a brick that its support reaches
   double bricks = 0.0;  ///< bricks that are evaluated and kept
   [[nodiscard]] double bytes() const;
 };
 
 struct EstimateOptions {
-  /// Only these voxels are wanted.
+  /// Only these voxels are evaluated.
   Box within = Box::whole();
-  /// No more bricks than these are evaluated.
+  /// At most this many bricks are evaluated.
   double maxBricks = std::numeric_limits<double>::infinity();
-  /// An estimate of more bytes than these is made again with more care: bricks that several
-  /// ellipsoids reach are then counted once.
+  /// If the estimate exceeds this number of bytes, a slower and tighter one is made, which counts
+  /// a brick once even if several ellipsoids reach it.
   double enough = std::numeric_limits<double>::infinity();
 };
 
-/// Estimates what evaluating a field takes on the bricks that its ellipsoids reach.
+/// Estimates the evaluation of a field on the bricks that its ellipsoids reach.
 [[nodiscard]] WorkEstimate estimateWork(const Field& field, const EstimateOptions& options = {});
 
 }  // namespace esvr
