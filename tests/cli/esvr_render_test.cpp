@@ -313,7 +313,7 @@ TEST_F(EsvrRender, KeepsAPictureThatIsThere) {
 TEST_F(EsvrRender, OptionsThatMakeNoSenseAreRefused) {
   expectRefused({"--resolution", "64"}, 2, "--resolution");
   expectRefused({"--resolution", "0x4"}, 2, "--resolution");
-  expectRefused({"--resolution", "20000x4"}, 2, "16384");
+  expectRefused({"--resolution", "40000x4"}, 2, "32767");
   expectRefused({"--step", "0"}, 2, "--step");
   expectRefused({"--step", "-1"}, 2, "--step");
   expectRefused({"--step", "nan"}, 2, "--step");
