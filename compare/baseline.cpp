@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kSchema = "esvr-baseline";
 constexpr int kSchemaVersion = 1;
-constexpr double kBytesSlack = 0.01;  // of the file's size
+constexpr double kBytesTolerance = 0.01;  // default tolerance of the size, as a share of it
 
 [[noreturn]] void notABaseline(const std::filesystem::path& path, const std::string& why) {
   throw BadInput(path.string() + ": not a baseline: " + why);
@@ -39,12 +39,12 @@ struct Entry {
   double value = 0.0, tolerance = 0.0;
 };
 
-/// \param json  {"value", "tolerance"}
+/// \param json  object with "value" and "tolerance"
 Entry entryOf(const std::filesystem::path& path, const std::string& what, const Json& json) {
   const auto number = [&](const char* key) {
     if (!json.is_object() || !json.contains(key)) notABaseline(path, what + " has no " + key);
     if (json[key].is_null()) return std::numeric_limits<double>::infinity();
-    if (!json[key].is_number()) notABaseline(path, what + ": " + key + " is no number");
+    if (!json[key].is_number()) notABaseline(path, what + ": " + key + " is not a number");
     return json[key].get<double>();
   };
   return {number("value"), number("tolerance")};
@@ -88,7 +88,7 @@ void judgeBytes(const std::filesystem::path& path, const Json& baseline, CheckRe
        record);
 }
 
-/// JSON has no infinity.
+/// A number, or null if it is infinite, since JSON has no infinity.
 Json numberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 double toleranceOf(const Json& old, const char* key, double fallback) {
@@ -151,7 +151,7 @@ void updateBaseline(const std::filesystem::path& path, const CheckRecord& record
       {"schema_version", kSchemaVersion},
       {"bytes",
        {{"value", record.candidateBytes},
-        {"tolerance", toleranceOf(old, "bytes", kBytesSlack * double(record.candidateBytes))}}},
+        {"tolerance", toleranceOf(old, "bytes", kBytesTolerance * double(record.candidateBytes))}}},
       {"grids", std::move(grids)}};
   cli::writeJson({path.string(), true}, json);
 }

@@ -1,11 +1,11 @@
 #pragma once
-/// Figures kept from an earlier run, in a JSON file:
+/// Baselines of esvr-compare check: figures of an earlier run in a JSON file, for example
 ///
 ///     {"schema": "esvr-baseline", "schema_version": 1,
 ///      "bytes": {"value": 21704, "tolerance": 217},
 ///      "grids": {"density": {"psnr_box": {"value": 58.3, "tolerance": 0.05}, ...}}}
 ///
-/// null in place of a PSNR's value means that there was no error at all. Figures may be left out.
+/// A PSNR of null means that there was no error. Figures may be left out.
 
 #include <filesystem>
 
@@ -13,17 +13,17 @@
 
 namespace esvr::compare {
 
-/// Appends failures for what is worse by more than its tolerance, and notes for what is better and
-/// for grids that the baseline does not know.
-/// \throws BadInput  missing, not such a file
+/// Appends failures for figures that are worse by more than their tolerance, and notes for figures
+/// that are better and for grids that the baseline does not have.
+/// \throws BadInput  the file is missing or is not a baseline
 void judgeBaseline(const std::filesystem::path& path, CheckRecord& record);
 
-/// True where the baseline has an SSIM, which is then to be measured. A file that is not there has
-/// none.
+/// True if the file exists and has an SSIM, which must then be measured.
 [[nodiscard]] bool baselineHasSsim(const std::filesystem::path& path);
 
-/// Writes the record's figures; tolerances of a file that is there stay.
-/// \throws BadInput  what is there is no baseline; RuntimeFailure: not writable
+/// Writes the record's figures. Tolerances of an existing file are kept.
+/// \throws BadInput  the existing file is not a baseline
+/// \throws RuntimeFailure  the file is not writable
 void updateBaseline(const std::filesystem::path& path, const CheckRecord& record);
 
 }  // namespace esvr::compare

@@ -19,7 +19,7 @@
 namespace esvr::compare {
 namespace {
 
-/// Places of a grid in either file; nothing where the candidate lacks it.
+/// Indices of a grid in the two files; nothing if the candidate does not have it.
 struct Pair {
   std::size_t reference = 0;
   std::optional<std::size_t> candidate;
@@ -47,7 +47,7 @@ std::optional<std::size_t> counterpart(const GridFile& file, const std::string& 
   return std::size_t(it - grids.begin());
 }
 
-/// All grids of the reference that can be compared; the others are told of.
+/// Pairs all grids of the reference that can be compared; the others are recorded as skipped.
 std::vector<Pair> pairAll(const GridFile& reference, const GridFile& candidate,
                           CheckRecord& record) {
   std::vector<Pair> pairs;
@@ -67,7 +67,7 @@ std::vector<Pair> pairAll(const GridFile& reference, const GridFile& candidate,
   return pairs;
 }
 
-/// "NAME" or "NAME=OTHER". A name with "=" in it is taken whole where there is such a grid.
+/// Pairs a grid by "NAME" or "NAME=OTHER". If a grid's name contains "=", the whole text is a name.
 Pair pairNamed(const GridFile& reference, const GridFile& candidate, const std::string& wanted) {
   const std::size_t split = counterpart(reference, wanted) ? std::string::npos : wanted.find('=');
   const std::string name = wanted.substr(0, split);
@@ -93,7 +93,7 @@ std::string joinedNames(const GridFile& file) {
 void requirePairs(const std::vector<Pair>& pairs, const GridFile& reference,
                   const GridFile& candidate, const CheckRecord& record) {
   if (pairs.empty()) {
-    std::string text = reference.path().string() + ": nothing to compare";
+    std::string text = reference.path().string() + ": no grid can be compared";
     for (const auto& line : record.skipped) text += "\n  " + line;
     throw BadInput(text);
   }
@@ -107,7 +107,7 @@ bool disjoint(const Box& a, const Box& b) {
   return common.empty();
 }
 
-/// Compares one pair of grids after the other: two volumes are in memory at a time.
+/// Compares one pair of grids after the other, so that only two volumes are in memory at a time.
 class Comparison {
  public:
   Comparison(const CheckOptions& options, const GridFile& reference, const GridFile& candidate)
@@ -147,14 +147,14 @@ class Comparison {
     return grid;
   }
 
-  /// There must be something to compare with; and PSNR and SSIM say nothing of a reference that is
-  /// zero throughout.
+  /// Checks that the reference has an active voxel and a peak, without which PSNR and SSIM are not
+  /// defined.
   void requireRange(const SparseVolume& reference, const std::string& name) const {
     const std::string grid = reference_.path().string() + ": grid \"" + name + "\": ";
     if (activeVoxelCount(reference) == 0) throw BadInput(grid + "it has no active voxel");
     const ValueRange range = activeRange(reference);
     if (!options_.peak && range.min == 0.0f && range.max == 0.0f)
-      throw BadInput(grid + "every active voxel is 0, so that PSNR has no peak; give --peak");
+      throw BadInput(grid + "every active voxel is 0, so PSNR has no peak; set it with --peak");
   }
 
   const CheckOptions& options_;

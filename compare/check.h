@@ -1,12 +1,13 @@
 #pragma once
-/// The gate: is a file still what its reference says?
+/// esvr-compare check: compares a file with its reference and fails if it differs too much.
 
 #include "compare/check_options.h"
 
 namespace esvr::compare {
 
-/// Prints the figures and differences. \throws TargetMissed  a limit, with every failure in its
-/// text; BadInput: what cannot be compared
+/// Compares the files and prints figures and differences.
+/// \throws TargetMissed  a limit is missed; the text lists every failure
+/// \throws BadInput  the files cannot be compared
 void check(const CheckOptions& options);
 
 }  // namespace esvr::compare

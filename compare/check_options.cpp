@@ -23,23 +23,23 @@ cli::ProgramText programText() {
   return {
       .name = std::string(kProgram) + " check",
       .purpose =
-          "Compares the grids of a file with those of a reference, by name, and fails where\n"
-          "one of them has drifted further than the limits given.",
+          "Compares the grids of a file with the grids of the same names of a reference, and\n"
+          "fails if a grid exceeds the given limits.",
       .usage =
           "  esvr-compare check REF CAND [--min-psnr DB] [--max-error E] [--max-bytes SIZE] ...\n"
           "  esvr-compare check REF CAND --baseline FILE.json [--update]",
       .notes =
-          "REF and CAND may each be .vdb, .nvdb or .esvr. What is compared are grids and never\n"
-          "files: bytes of a .vdb differ from one writing to the next. Voxels are compared in\n"
-          "index space; transforms, names, classes, value types, backgrounds and metadata that\n"
-          "differ are listed, and fail where --fail-on names them. A grid that CAND lacks, or\n"
-          "whose active voxels lie wholly elsewhere, always fails.\n"
+          "REF and CAND may each be .vdb, .nvdb or .esvr. Grids are compared, not bytes of files,\n"
+          "since the bytes of a .vdb differ whenever it is written. Voxels are compared in index\n"
+          "space. Different transforms, names, classes, value types, backgrounds and metadata are\n"
+          "listed; they fail if --fail-on names them. A grid always fails if CAND does not have\n"
+          "it, or if the active voxels of the two grids have no voxel in common.\n"
           "\n"
-          "A baseline holds figures and how much worse each may become; --update writes those of\n"
-          "this run and keeps the tolerances that the file has.\n"
+          "A baseline holds figures and their tolerances. --update writes the figures of this\n"
+          "run and keeps the tolerances of the file.\n"
           "\n"
-          "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 input that cannot be\n"
-          "used, 4 a limit was missed, 5 memory.",
+          "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 unusable input,\n"
+          "4 a limit was missed, 5 memory.",
       .examples =
           "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45 --min-iou 0.98\n"
           "  esvr-compare check smoke.vdb back.vdb --max-error 1% --fail-on transform,metadata\n"
@@ -54,24 +54,26 @@ cli::CommandLine makeCommandLine() {
   auto& options = line.options();
   options.add_options()(
       "grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
-      "compare this grid only; may be repeated; NAME=OTHER where it is called OTHER in CAND");
+      "compare this grid only; may be repeated; NAME=OTHER if its name in CAND is OTHER");
   for (const Figure& figure : allFigures())
     options.add_options()(figure.option, value<std::string>()->value_name("X"), figure.unit);
   // clang-format off
   options.add_options()
-    ("max-bytes", value<std::string>()->value_name("SIZE"), "of the file CAND: 200KB")
+    ("max-bytes", value<std::string>()->value_name("SIZE"), "largest size of the file CAND: 200KB")
     ("fail-on", value<std::string>()->value_name("KINDS"),
      "differences that fail: name, class, type, background, transform, metadata, all; "
      "separated by commas")
-    ("ssim", bool_switch(), "print the SSIM, though no limit asks for it")
+    ("ssim", bool_switch(), "measure and print the SSIM even without a limit on it")
     ("baseline", value<std::string>()->value_name("FILE.json"),
-     "compare with the figures stored there")
+     "compare with the figures of this file")
     ("update", bool_switch(), "write this run's figures to --baseline instead")
     ("box", value<std::string>()->value_name("BOX"),
-     "x0,y0,z0,x1,y1,z1 of the figures (default: the reference's active bounding box)")
+     "box x0,y0,z0,x1,y1,z1 over which figures are measured (default: the reference's active "
+     "bounding box)")
     ("peak", value<double>()->value_name("P"),
-     "of the PSNR (default: the reference's largest value)")
-    ("report", value<std::string>()->value_name("FILE.json"), "all that was measured; - for stdout")
+     "peak of the PSNR (default: the reference's largest value)")
+    ("report", value<std::string>()->value_name("FILE.json"),
+     "write all results as JSON; '-' is stdout")
     ("force,f", bool_switch(), "replace the report if it exists");
   // clang-format on
   cli::addMaxMemory(line);
@@ -98,7 +100,7 @@ std::set<DifferenceKind> parseKinds(const std::string& list) {
   return kinds;
 }
 
-/// A limit on what is not an error in value units may be 0, and PSNR and SSIM below that.
+/// Reads a limit. Limits on errors in value units must be positive or 0; others are any number.
 cli::ErrorBound limitOf(const Figure& figure, const std::string& text) {
   if (figure.inValueUnits && text != "0") return cli::parseErrorBound(figure.option, text);
   const auto amount = cli::parseNumber(text);

@@ -1,5 +1,5 @@
 #pragma once
-/// What `esvr-compare check` is asked to do.
+/// The options of `esvr-compare check`.
 
 #include <array>
 #include <cstdint>
@@ -19,16 +19,16 @@ namespace esvr::compare {
 
 struct CheckOptions {
   std::filesystem::path reference, candidate;
-  std::vector<std::string> grids;  ///< NAME or NAME=CANDIDATE'S; empty: all
+  std::vector<std::string> grids;  ///< NAME or NAME=NAME IN CAND; empty: all
   std::array<std::optional<cli::ErrorBound>, kFigureCount> limits;
   std::optional<std::uint64_t> maxBytes;
   std::set<DifferenceKind> failOn;
   std::optional<std::filesystem::path> baseline;
-  bool update = false;  ///< write the baseline
+  bool update = false;  ///< whether the baseline is written
   std::optional<Box> box;
   std::optional<double> peak;
-  bool ssim = false;   ///< though no limit asks for it
-  std::string report;  ///< a file, "-", or empty
+  bool ssim = false;   ///< whether SSIM is measured without a limit on it
+  std::string report;  ///< file name or "-"; empty: no report
   bool overwrite = false;
   std::uint64_t maxMemory = 0;  ///< bytes that input may take
   int threads = 0;
@@ -36,9 +36,9 @@ struct CheckOptions {
   std::vector<std::string> commandLine;
 };
 
-/// \param argv  the job's word first
-/// \return nothing where --help or --version was printed
-/// \throws UsageError
+/// \param argv  arguments, beginning with the command ("check")
+/// \return nothing if --help or --version was printed
+/// \throws UsageError  an option is invalid
 [[nodiscard]] std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv);
 
 }  // namespace esvr::compare

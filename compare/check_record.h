@@ -1,5 +1,5 @@
 #pragma once
-/// What a check found.
+/// The results of a check.
 
 #include <cstdint>
 #include <string>
@@ -12,7 +12,7 @@
 namespace esvr::compare {
 
 struct CheckedGrid {
-  std::string name, candidateName;  ///< unique names in either file
+  std::string name, candidateName;  ///< unique names in the two files
   VolumeMetrics metrics{};
   FigureValues figures{};
   std::vector<Difference> differences{};
@@ -22,10 +22,10 @@ struct CheckRecord {
   std::uint64_t candidateBytes = 0;
   std::vector<CheckedGrid> grids;
   std::vector<Difference> fileDifferences;
-  std::vector<std::string> skipped;   ///< grids that hold nothing to compare, and why
-  std::vector<std::string> extra;     ///< grids of the candidate that the reference lacks
-  std::vector<std::string> failures;  ///< a line each
-  std::vector<std::string> notes;     ///< what is worth telling and no failure
+  std::vector<std::string> skipped;   ///< grids that cannot be compared, with the reason
+  std::vector<std::string> extra;     ///< grids of the candidate that the reference does not have
+  std::vector<std::string> failures;  ///< one line for each failure
+  std::vector<std::string> notes;     ///< remarks that are not failures
 };
 
 }  // namespace esvr::compare

@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kSchema = "esvr-check";
 constexpr int kSchemaVersion = 1;
 
-/// The columns that every grid has a figure for.
+/// The figures that all grids have.
 std::vector<Figure> columns(const CheckRecord& record) {
   std::vector<Figure> shown;
   for (const Figure& figure : allFigures())

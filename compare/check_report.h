@@ -1,5 +1,5 @@
 #pragma once
-/// What a check found, for people and for programs.
+/// The results of a check as text and as JSON.
 
 #include <iosfwd>
 #include <nlohmann/json_fwd.hpp>

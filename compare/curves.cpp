@@ -14,7 +14,7 @@
 namespace esvr::compare {
 namespace {
 
-/// The half-float Blosc VDB over so much, where no size is given.
+/// Default sizes of fits: the size of the half-float Blosc VDB divided by these numbers.
 constexpr std::uint64_t kParts[] = {10, 20, 50, 100, 200, 400};
 
 void checkFiles(const CurvesOptions& options) {
@@ -25,7 +25,7 @@ void checkFiles(const CurvesOptions& options) {
   }
 }
 
-/// Makes the rows that the curves go through; what was made stays when a run is interrupted.
+/// Makes the rows of the curves. Finished rows are kept if the run is interrupted.
 class CurvesRun {
  public:
   CurvesRun(const TableScene& scene, TableRecord& record, const cli::Log& log)
@@ -47,13 +47,13 @@ class CurvesRun {
     const TableOptions& options = scene_.options;
     if (!options.fits.empty() || !options.candidates.empty()) return options.fits;
     const TableRow half = maker_.baseline("", halfBlosc(), "");
-    if (!half.bytes) throw UsageError(half.note + "; name sizes by --fit");
+    if (!half.bytes) throw UsageError(half.note + "; set sizes with --fit");
     std::vector<std::uint64_t> sizes;
     for (const std::uint64_t part : kParts) sizes.push_back(*half.bytes / part);
     return sizes;
   }
 
-  /// A size that was asked for must do; of our own choice, one may prove too small.
+  /// Adds a fit of a size. A default size may be too small and is then skipped with a warning.
   void addFit(std::uint64_t bytes) try {
     add(maker_.fitted({.bytes = bytes}));
   } catch (const UsageError& error) {

@@ -1,12 +1,13 @@
 #pragma once
-/// Error over run time, error over bytes, pictures a second over bytes.
+/// esvr-compare curves: error over run time, error over bytes, pictures per second over bytes.
 
 #include "compare/curves_options.h"
 
 namespace esvr::compare {
 
-/// \throws BadInput  what cannot be compared; RuntimeFailure: interrupted, with the points already
-/// made written
+/// Measures the points and writes all files.
+/// \throws BadInput  the files cannot be compared
+/// \throws RuntimeFailure  the run was interrupted; finished points were written
 void curves(const CurvesOptions& options);
 
 }  // namespace esvr::compare

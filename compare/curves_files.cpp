@@ -29,10 +29,10 @@ constexpr int kSchemaVersion = 1;
 constexpr const char* kOurs = "ESVR";
 constexpr const char* kFile = "file";
 
-/// All rows of one name belong to one curve; ours are one curve whatever they are called.
+/// The curve of a row: rows of the same name form a curve, and all rows of ESVR form one.
 std::string seriesOf(const TableRow& row) { return row.group == kOurs ? kOurs : row.name; }
 
-/// The rows that have bytes and figures, by series and then by bytes.
+/// The rows with bytes and figures, sorted by series and by bytes.
 std::map<std::string, std::vector<const TableRow*>> rowsBySeries(const TableRecord& record) {
   std::map<std::string, std::vector<const TableRow*>> series;
   for (const auto& row : record.rows)
@@ -45,7 +45,7 @@ std::map<std::string, std::vector<const TableRow*>> rowsBySeries(const TableReco
 
 Cell number(std::optional<double> value) { return value ? Cell(*value) : Cell(); }
 
-/// "fit": a point of a fit's own curve; "file": what a file came to.
+/// All points: those of kind "fit" are points of a fit's curve, those of kind "file" are files.
 report::DataTable points(const TableRecord& record) {
   report::DataTable table{{},
                           {{"kind", "kind", Kind::kText},
@@ -83,7 +83,7 @@ Plot overBytes(const TableRecord& record, const std::string& title, const std::s
   return plot;
 }
 
-/// A curve for each fit that has one, and one through the ends: from voxels to file.
+/// The curves of the fits, and a curve through the end-to-end times from voxels to file.
 Plot overSeconds(const TableRecord& record) {
   Plot plot{.title = "Error over run time",
             .xLabel = "seconds",
@@ -135,7 +135,7 @@ bool hasFps(const TableRecord& record) {
                      [](const TableRow& row) { return row.fps.has_value(); });
 }
 
-/// A picture, and the end of its file's name.
+/// A plot and the suffix of its file's name.
 struct NamedPlot {
   std::string ending;
   Plot plot;
@@ -154,7 +154,7 @@ std::vector<NamedPlot> plotsOf(const TableRecord& record) {
   return plots;
 }
 
-/// Of files alone: the points of fits are in the pictures.
+/// The points of kind "file"; the points of fits are in the plots.
 report::DataTable filesOf(report::DataTable points) {
   std::erase_if(points.rows,
                 [](const report::Row& row) { return row.front() != Cell(std::string(kFile)); });

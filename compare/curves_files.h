@@ -1,5 +1,5 @@
 #pragma once
-/// Points of curves as data and as pictures.
+/// The points of curves as data files and as pictures.
 
 #include <filesystem>
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace esvr::compare {
 
-/// Files that begin with a prefix.
+/// The output files, whose names begin with a prefix.
 [[nodiscard]] std::vector<std::filesystem::path> curveFiles(const std::string& prefix, bool fps);
 
 struct CurvesReport {
@@ -17,7 +17,7 @@ struct CurvesReport {
   const std::vector<std::string>& commandLine;
 };
 
-/// Writes them all. \throws RuntimeFailure  not writable
+/// Writes all files. \throws RuntimeFailure  a file is not writable
 void writeCurves(const std::string& prefix, const CurvesReport& report, bool overwrite);
 
 }  // namespace esvr::compare

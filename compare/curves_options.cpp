@@ -20,19 +20,20 @@ cli::ProgramText programText() {
   return {
       .name = std::string(kProgram) + " curves",
       .purpose =
-          "Draws error over run time, error over bytes and pictures a second over bytes, of\n"
+          "Draws error over run time, error over bytes and pictures per second over bytes for\n"
           ".esvr files and of VDB and ZFP files of the same sizes.",
       .usage = "  esvr-compare curves REF.vdb [CAND.esvr ...] --output PREFIX [--fit BYTES]...",
       .notes =
-          "Writes PREFIX.csv and PREFIX.json with every point, PREFIX-seconds, -bytes and, with\n"
-          "--fps, -fps as .svg and .png, and PREFIX.html with all of it.\n"
+          "Writes every point to PREFIX.csv and PREFIX.json, the plots to PREFIX-seconds,\n"
+          "PREFIX-bytes and, with --fps, PREFIX-fps as .svg and .png, and all of it to\n"
+          "PREFIX.html.\n"
           "\n"
-          "Without CAND and --fit, ellipsoids are fitted here to six sizes: the half-float Blosc\n"
-          "VDB's over 10, 20, 50, 100, 200 and 400. Seconds are those of the optimisation, which\n"
-          "an .esvr may hold itself; of fits made here also end to end, from voxels to file.\n"
+          "Without CAND and --fit, the program fits ellipsoids for six sizes: the size of the\n"
+          "half-float Blosc VDB divided by 10, 20, 50, 100, 200 and 400. PREFIX-seconds shows the\n"
+          "fits that this run makes: the optimisation, and the whole time from voxels to file.\n"
           "\n"
-          "Exit codes: 0 done, 1 failure or interrupted (points already made are written), 2\n"
-          "wrong options, 3 input that cannot be used, 5 memory.",
+          "Exit codes: 0 done, 1 failure or interrupted (finished points are written), 2 wrong\n"
+          "options, 3 unusable input, 5 memory.",
       .examples =
           "  esvr-compare curves smoke.vdb --output smoke\n"
           "  esvr-compare curves smoke.vdb 20k.esvr 40k.esvr 80k.esvr --output smoke --fps 400"};
@@ -42,11 +43,12 @@ cli::CommandLine makeCommandLine() {
   cli::CommandLine line(programText());
   // clang-format off
   line.options().add_options()
-    ("output,o", value<std::string>()->value_name("PREFIX"), "of the files to write")
+    ("output,o", value<std::string>()->value_name("PREFIX"),
+     "prefix of the names of the written files")
     ("fit", value<Words>()->value_name("BYTES")->composing(),
-     "fit ellipsoids to this size, here; may be repeated")
-    ("no-baselines", bool_switch(), "no VDB and ZFP files of the same sizes")
-    ("fps", value<int>()->value_name("PX"), "draw a picture of so many pixels a side, and time it")
+     "fit ellipsoids for a file of this size; may be repeated")
+    ("no-baselines", bool_switch(), "do not compare with VDB and ZFP files of the same sizes")
+    ("fps", value<int>()->value_name("PX"), "measure drawing of pictures of PX x PX pixels")
     ("force,f", bool_switch(), "replace files that exist");
   // clang-format on
   addSceneOptions(line);
@@ -57,7 +59,7 @@ void readImages(const Arguments& a, TableOptions& options) {
   const auto side = a.find<int>("fps");
   if (!side) return;
   cli::requireRange("fps", *side, 1, kMaxPixels);
-  options.images.views = 3;  // of which the median counts
+  options.images.views = 3;  // the median time counts
   options.images.resolution = {*side, *side};
   options.images.transfers = {
       {"viridis:linear", {builtInColorMap("viridis"), builtInOpacity("linear")}}};

@@ -1,5 +1,5 @@
 #pragma once
-/// What `esvr-compare curves` is asked to do.
+/// The options of `esvr-compare curves`.
 
 #include <optional>
 #include <string>
@@ -10,13 +10,13 @@ namespace esvr::compare {
 
 struct CurvesOptions {
   TableOptions table;  ///< the files, sizes and baselines
-  std::string prefix;  ///< of the files that are written
+  std::string prefix;  ///< prefix of the names of the written files
   bool overwrite = false;
 };
 
-/// \param argv  the job's word first
-/// \return nothing where --help or --version was printed
-/// \throws UsageError
+/// \param argv  arguments, beginning with the command ("curves")
+/// \return nothing if --help or --version was printed
+/// \throws UsageError  an option is invalid
 [[nodiscard]] std::optional<CurvesOptions> parseCurvesOptions(int argc, const char* const* argv);
 
 }  // namespace esvr::compare

@@ -11,10 +11,10 @@
 namespace esvr::compare {
 namespace {
 
-/// OpenVDB's items that a descriptor's own members say too.
+/// OpenVDB's metadata items that repeat members of a descriptor.
 const std::array<std::string, 3> kRepeated{"name", "class", "is_saved_as_half_float"};
 
-constexpr double kSameEntry = 1e-12;  // of the largest: a few roundings of float64
+constexpr double kEntryTolerance = 1e-12;  // relative to the largest entry: float64 rounding
 
 using Matrix = std::array<double, 16>;
 
@@ -48,7 +48,7 @@ void Differences::addTransform(const Transform& a, const Transform& b) {
   std::string how;
   if (a.affine && b.affine) {
     const double by = largestDifference(*a.affine, *b.affine);
-    if (by <= kSameEntry * std::max(largestEntry(*a.affine), largestEntry(*b.affine))) return;
+    if (by <= kEntryTolerance * std::max(largestEntry(*a.affine), largestEntry(*b.affine))) return;
     how = " (matrices differ by up to " + cli::shortNumber(by) + ")";
   }
   list_.push_back(

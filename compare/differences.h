@@ -1,5 +1,5 @@
 #pragma once
-/// What two grids differ in besides their voxels.
+/// Differences of two grids besides their voxels.
 
 #include <span>
 #include <string>
@@ -13,17 +13,17 @@ enum class DifferenceKind { kName, kClass, kValueType, kBackground, kTransform, 
 
 struct Difference {
   DifferenceKind kind = DifferenceKind::kName;
-  std::string text;  ///< for the user, the reference first: "class: level set, fog volume"
+  std::string text;  ///< text with the reference first: "class: level set, fog volume"
 };
 
-/// Transforms are equal where their maps are, byte for byte, or where both are affine and no entry
-/// of the matrices differs by more than 1e-12 of the largest: NanoVDB keeps a map in another form,
-/// and what it rounds is no difference. Metadata that name, class and value type repeat are not
-/// listed twice.
+/// Lists the differences of two descriptors. Transforms are equal if the bytes of their maps are,
+/// or if both are affine and no entry of the matrices differs by more than 1e-12 of the largest,
+/// since NanoVDB stores maps in another form with rounding. Metadata items that repeat the name,
+/// the class or the value type are ignored.
 [[nodiscard]] std::vector<Difference> compareDescriptors(const GridDescriptor& reference,
                                                          const GridDescriptor& candidate);
 
-/// Items that are on one side only or have another value, by name; `ignored` is passed over.
+/// Lists the items that only one side has or that have different values, except for `ignored`.
 [[nodiscard]] std::vector<Difference> compareMetadata(std::span<const MetaItem> reference,
                                                       std::span<const MetaItem> candidate,
                                                       std::span<const std::string> ignored);

@@ -23,7 +23,7 @@ constexpr std::array kTypes{TypeWord{"float32", 4}, TypeWord{"float64", 8}, Type
 
 [[noreturn]] void refuse(const std::string& text, const std::string& why) {
   throw UsageError("--external '" + text + "': " + why +
-                   "; the form is NAME=FILE:BYTES, with :NXxNYxNZ:TYPE where FILE is raw, and any "
+                   "; the form is NAME=FILE:BYTES, with :NXxNYxNZ:TYPE if FILE is raw, and any "
                    "of :encode=S, :decode=S, :fps=N");
 }
 
@@ -44,7 +44,7 @@ bool isType(const std::string& word) {
   return false;
 }
 
-/// "encode=4.2" and its like. \return false where the part is none of them
+/// Reads a part like "encode=4.2". \return false if it is not of this form
 bool readFigure(const std::string& part, External& external) {
   const std::size_t equals = part.find('=');
   if (equals == std::string::npos) return false;
@@ -93,7 +93,7 @@ float valueOf(const std::string& type, const std::byte* from) {
   return valueAt<float>(from);
 }
 
-/// A raw file's size against what it should hold.
+/// Checks the size of a raw file.
 void checkRaw(const External& external, const Box& box) {
   const std::string file = external.file.string() + ": ";
   const Coord side = box.max - box.min + Coord{1, 1, 1};
@@ -109,7 +109,7 @@ void checkRaw(const External& external, const Box& box) {
                    external.type + " take " + std::to_string(std::uint64_t(wanted)));
 }
 
-/// Reads slice after slice, z slowest, into bricks.
+/// Reads a raw file slice by slice (z is slowest) into bricks.
 class RawReader {
  public:
   RawReader(const External& external, const ExternalPlace& place)
@@ -123,7 +123,7 @@ class RawReader {
   }
 
  private:
-  /// The bricks of one layer along z.
+  /// Appends the bricks of one layer along z.
   void appendLayer(int brickZ, std::vector<BrickInput>& bricks) {
     const Coord first = brickOf(place_.box.min), last = brickOf(place_.box.max);
     const auto [nx, ny] = std::array{last.x - first.x + 1, last.y - first.y + 1};

@@ -1,5 +1,5 @@
 #pragma once
-/// --external: another system's result gets its row without that system being here.
+/// The option --external: rows for the results of other systems, which need not be installed.
 
 #include <cstdint>
 #include <filesystem>
@@ -13,30 +13,32 @@
 
 namespace esvr::compare {
 
-/// NAME=FILE:BYTES, with :DIMS:TYPE where FILE is raw, and any of :encode=S, :decode=S, :fps=N.
+/// An external result: NAME=FILE:BYTES, with :DIMS:TYPE if FILE is raw, and any of :encode=S,
+/// :decode=S, :fps=N.
 struct External {
-  std::string text;  ///< as given
+  std::string text;  ///< text of the option
   std::string name;
   std::filesystem::path file;
   std::uint64_t bytes = 0;
-  std::optional<Coord> dims;  ///< of a raw file, x fastest
-  std::string type;           ///< "float32", "float64", "uint8", "uint16"; little-endian
+  std::optional<Coord> dims;  ///< size of a raw file in voxels, x fastest
+  std::string type;           ///< "float32", "float64", "uint8" or "uint16", little-endian
   std::optional<double> encodeSeconds, decodeSeconds, fps;
 };
 
-/// \throws UsageError  not of that form
+/// \throws UsageError  the text is not of this form
 [[nodiscard]] External parseExternal(const std::string& text);
 
-/// Where an external's voxels belong.
+/// The place of an external result's voxels.
 struct ExternalPlace {
-  std::string grid;  ///< of a VDB file; where it has only one grid, that one
-  Box box;           ///< of a raw file
+  std::string grid;  ///< grid of a VDB file; a file's only grid may have another name
+  Box box;           ///< box of the voxels of a raw file
   float background = 0.0f;
   std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes that reading may take
 };
 
-/// The voxels that came back. Of a raw file, those that differ from the background are active.
-/// \throws BadInput  missing, of another size than it says, not a number at a voxel, not a VDB
+/// Reads the voxels. In a raw file, voxels that differ from the background are active.
+/// \throws BadInput  the file is missing, is not a VDB or does not have its stated size; a value is
+///                   not finite
 [[nodiscard]] SparseVolume readExternal(const External& external, const ExternalPlace& place);
 
 }  // namespace esvr::compare

@@ -1,5 +1,5 @@
 #pragma once
-/// The figures that a gate looks at, one table for options, reports, limits and baselines.
+/// The figures of a check: one table for options, reports, limits and baselines.
 
 #include <array>
 #include <optional>
@@ -13,36 +13,36 @@ namespace esvr::compare {
 enum class FigureId { kPsnrBox, kPsnrActive, kMaxError, kP999Error, kIou, kSsim, kMassError };
 inline constexpr std::size_t kFigureCount = 7;
 
-/// How far a figure may be worse than a baseline's before that is a regression.
+/// The default tolerance of a figure against a baseline.
 struct Slack {
   double absolute = 0.0;
-  double relative = 0.0;  ///< of the baseline's value
+  double relative = 0.0;  ///< share of the baseline's value
 };
 
 struct Figure {
   FigureId id;
-  const char* key;     ///< in JSON: "psnr_box"
-  const char* option;  ///< of the limit: "min-psnr"
-  const char* header;  ///< of the table's column
-  const char* unit;    ///< for the limit's help
+  const char* key;     ///< name in JSON: "psnr_box"
+  const char* option;  ///< option of the limit: "min-psnr"
+  const char* header;  ///< header of the table's column
+  const char* unit;    ///< help text of the limit
   bool higherIsBetter;
-  bool inValueUnits;  ///< a limit may be a share of the reference's range: "1%"
+  bool inValueUnits;  ///< whether a limit may be a share of the reference's range: "1%"
   Slack slack;
 };
 
 [[nodiscard]] std::span<const Figure> allFigures();
 
-/// Of one grid; nothing where a figure was not asked for.
+/// The figures of one grid; nothing for figures that were not measured.
 using FigureValues = std::array<std::optional<double>, kFigureCount>;
 
 [[nodiscard]] FigureValues figuresOf(const VolumeMetrics& metrics);
 [[nodiscard]] std::optional<double> valueOf(const FigureValues& values, const Figure& figure);
 
-/// |mass - reference's| / |reference's|; 0 where both are 0, infinite where only the reference's
-/// is.
+/// |mass - reference's mass| / |reference's mass|; 0 if both are 0, infinite if only the
+/// reference's is 0.
 [[nodiscard]] double massError(const VolumeMetrics& metrics);
 
-/// As a table prints it: "51.54", "exact", "0.01234".
+/// A figure as a table prints it: "51.54", "exact", "0.01234".
 [[nodiscard]] std::string textOf(const Figure& figure, double value);
 
 }  // namespace esvr::compare

@@ -12,7 +12,7 @@
 namespace esvr::compare {
 namespace {
 
-constexpr double kErrorGain = 8.0;  // of error maps: an eighth of the range is white
+constexpr double kErrorGain = 8.0;  // gain of error maps; an error of 1/8 is white
 
 ValueRange rangeOf(const SparseVolume& volume) {
   const ValueRange range = activeRange(volume);
@@ -42,8 +42,8 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Draws pictures and keeps the time: on a CUDA device that of drawing without bringing the picture
-/// to the host, which is the same for all.
+/// Draws pictures and measures the time. On a CUDA device the copy of the picture to the host does
+/// not count.
 class Clock {
  public:
   Clock(Renderer& renderer, const Device& device)
@@ -85,7 +85,7 @@ struct Sums {
     flip += esvr::flip(reference, candidate).mean;
     if (metric) lpips += metric->of(reference, candidate);
   }
-  /// \param cost  fps and deviceBytes
+  /// \param cost  figures whose fps and deviceBytes are used
   [[nodiscard]] ImageFigures over(double pictures, ImageFigures cost) const {
     constexpr double kPeak = 1.0;
     cost.psnr = psnr(squares / pictures, kPeak);
@@ -99,7 +99,7 @@ struct Sums {
 
 TransferFunction withEmptySpace(const TransferFunction& function, double background,
                                 double threshold) {
-  constexpr int kPlaces = 4096;  // the steps at which a renderer looks a function up
+  constexpr int kPlaces = 4096;  // resolution of a renderer's table of the function
   TransferFunction result = function;
   const double low = function.colors.points.front().x, high = function.colors.points.back().x;
   result.opacity.clear();

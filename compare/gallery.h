@@ -1,5 +1,6 @@
 #pragma once
-/// --images: pictures of every row from the same views, against pictures of the reference.
+/// The option --images: compares pictures of every row with pictures of the reference from the same
+/// views.
 
 #include <functional>
 #include <optional>
@@ -17,42 +18,43 @@ namespace esvr::compare {
 
 struct NamedTransfer {
   std::string name;
-  TransferFunction function;  ///< to be laid over the reference's values
+  TransferFunction function;  ///< function that is rescaled to the range of the reference's values
 };
 
 struct GalleryOptions {
-  int views = 0;  ///< of a full turn; 0: no pictures
+  int views = 0;  ///< number of views of a full turn; 0: no pictures
   Resolution resolution{400, 400};
   double step = 1.0;
   std::vector<NamedTransfer> transfers;
-  std::string lpips;  ///< a command, as PictureMetric takes it; empty: none
+  std::string lpips;  ///< command for PictureMetric; empty: none
 };
 
-/// The function with values no further than `threshold` from the background transparent: what an
-/// .esvr counts as inactive is empty space, and not a haze of the ellipsoids' ends.
+/// Makes values that differ from the background by at most `threshold` transparent, so that the
+/// inactive voxels of an .esvr file are empty space.
 [[nodiscard]] TransferFunction withEmptySpace(const TransferFunction& function, double background,
                                               double threshold);
 
-/// Means over all pictures; the PSNR is that of the mean squared error.
+/// Mean figures over all pictures; the PSNR is that of the mean squared error.
 struct ImageFigures {
   double psnr = 0.0, ssim = 0.0, flip = 0.0;
-  double fps = 0.0;  ///< pictures in a second of drawing, by the median picture
-  std::optional<std::uint64_t> deviceBytes{};  ///< that the renderer held; of a CUDA device
-  std::optional<double> lpips{};               ///< where a command was given
+  double fps = 0.0;                            ///< pictures per second by the median drawing time
+  std::optional<std::uint64_t> deviceBytes{};  ///< CUDA memory of the renderer
+  std::optional<double> lpips{};               ///< LPIPS if a command was given
 };
 
-/// The first picture of a row, and where it errs.
+/// The first picture of a row and its map of errors.
 struct Shown {
   std::string picturePng, errorPng;
 };
 
-/// What of a view is a row's own; nothing: the view as it is.
+/// The changes that a row makes to a view; nothing: no changes.
 using OwnView = std::function<RenderOptions(const RenderOptions&)>;
 
 class Gallery {
  public:
-  /// Draws the reference on a device. \throws UsageError  as renderVolume; Cancelled; DeviceError
-  /// \param folder  for files that come and go
+  /// Draws the reference on a device.
+  /// \param folder  folder for temporary files
+  /// \throws UsageError, Cancelled, DeviceError  as for renderVolume and makeVolumeRenderer
   Gallery(const GalleryOptions& options, const SparseVolume& reference, const Device& device,
           const std::filesystem::path& folder, const CancelToken& cancel);
 
@@ -60,10 +62,10 @@ class Gallery {
     ImageFigures figures;
     Shown shown;
   };
-  /// \throws  as Renderer::draw, PictureMetric
+  /// The exceptions are those of Renderer::draw and PictureMetric.
   [[nodiscard]] Compared compare(Renderer& renderer, const OwnView& own = {}) const;
   [[nodiscard]] const std::string& referencePng() const { return referencePng_; }
-  /// Of drawing the reference: fps and deviceBytes only.
+  /// The cost of drawing the reference; only fps and deviceBytes are set.
   [[nodiscard]] const ImageFigures& referenceCost() const { return referenceCost_; }
   [[nodiscard]] const Device& device() const { return device_; }
 

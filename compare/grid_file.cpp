@@ -54,12 +54,12 @@ std::size_t GridFile::find(const std::string& name) const {
 std::size_t GridFile::firstWithVoxels() const {
   for (std::size_t g = 0; g < grids_.size(); ++g)
     if (grids_[g].comparable && !grids_[g].empty) return g;
-  throw BadInput(path_.string() + ": no grid of floats has an active voxel");
+  throw BadInput(path_.string() + ": no grid of type float or double has an active voxel");
 }
 
 VolumeGrid GridFile::read(std::size_t g) const {
   if (!esvr_)
-    return readGrid(path_, grids_[g].uniqueName, {.maxBytes = maxMemory_, .allowEmpty = true});
+    return readGrid(path_, grids_[g].uniqueName, {.allowEmpty = true, .maxBytes = maxMemory_});
   VolumeGrid grid;
   grid.descriptor = esvr_->grids[g].descriptor;
   grid.volume = decodeGrid(esvr_->grids[g], {.maxBytes = maxMemory_});

@@ -1,5 +1,5 @@
 #pragma once
-/// A file of grids, whatever its kind.
+/// A file of grids in any format.
 
 #include <cstdint>
 #include <filesystem>
@@ -12,16 +12,16 @@
 
 namespace esvr::compare {
 
-/// A grid as its file lists it.
+/// An entry of a file's list of grids.
 struct ListedGrid {
-  std::string name{};        ///< as stored
-  std::string uniqueName{};  ///< with "[i]" where several share the name
-  bool comparable = true;    ///< of floats
-  bool empty = false;        ///< without an active voxel
+  std::string name{};        ///< stored name
+  std::string uniqueName{};  ///< name with "[i]" if several grids share it
+  bool comparable = true;    ///< true if the values are floats or doubles
+  bool empty = false;        ///< true if there is no active voxel
   std::string valueType;
 };
 
-/// A .esvr by its ending, else a .vdb or .nvdb by its first bytes.
+/// An .esvr file is recognised by its extension, a .vdb or .nvdb file by its first bytes.
 class GridFile {
  public:
   /// \throws BadInput, MemoryExceeded  as readEsvr and inspectVdb
@@ -32,14 +32,15 @@ class GridFile {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] const std::vector<ListedGrid>& grids() const { return grids_; }
   [[nodiscard]] const std::vector<MetaItem>& metadata() const { return metadata_; }
-  /// Null but for an .esvr.
+  /// The content of an .esvr file; null for other files.
   [[nodiscard]] const EsvrFile* esvr() const { return esvr_.get(); }
 
-  /// Place of a grid by the name that a user gives. \throws BadInput  as findGrid
+  /// Index of a grid by the name that a user gives. \throws BadInput  as for findGrid
   [[nodiscard]] std::size_t find(const std::string& name) const;
-  /// The first grid that holds voxels of floats. \throws BadInput  there is none
+  /// Index of the first comparable grid with an active voxel. \throws BadInput  there is none
   [[nodiscard]] std::size_t firstWithVoxels() const;
-  /// The voxels; none where the grid is empty. \throws BadInput  not of floats; as readGrid
+  /// The voxels of a grid, which may be empty.
+  /// \throws BadInput  the values are not floats or doubles; else as for readGrid
   [[nodiscard]] VolumeGrid read(std::size_t grid) const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-/// Figures against limits.
+/// Checks figures against limits.
 
 #include "compare/check_options.h"
 #include "compare/check_record.h"
@@ -7,10 +7,10 @@
 namespace esvr::compare {
 
 /// Appends a line to the record's failures for every limit that a grid or the file misses.
-/// \param ranges  of the reference's values, by grid: for limits that are shares of it
+/// \param ranges  range of the reference's values by grid, for limits that are shares of it
 void judgeLimits(const CheckOptions& options, std::span<const double> ranges, CheckRecord& record);
 
-/// The same for differences that were to fail.
+/// Appends a line for every difference of the kinds that fail.
 void judgeDifferences(const CheckOptions& options, CheckRecord& record);
 
 }  // namespace esvr::compare

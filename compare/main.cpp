@@ -1,4 +1,4 @@
-// esvr-compare: how good is an ESVR, against its source and against what else could hold it.
+// esvr-compare: compares .esvr files with their source and with other ways to store it.
 
 #include <string_view>
 
@@ -13,38 +13,40 @@ namespace {
 
 using namespace esvr::compare;
 
-/// For --help and --version without a job, and for a word that is none.
+/// The command line without a command, for --help and --version.
 esvr::cli::CommandLine overview() {
   esvr::cli::CommandLine line(
       {.name = kProgram,
-       .purpose = "Measures how far grids are from a reference.",
+       .purpose = "Compares grids with a reference.",
        .usage =
-           "  esvr-compare check REF CAND            fails where a grid has drifted\n"
-           "  esvr-compare table REF [CAND.esvr ...]   against what else could hold the volume\n"
-           "  esvr-compare curves REF [CAND.esvr ...]  error over run time and over bytes",
-       .notes = "esvr-compare JOB --help says more of each job.",
+           "  esvr-compare check REF CAND              fail if a grid differs too much\n"
+           "  esvr-compare table REF [CAND.esvr ...]   compare with other ways to store the "
+           "volume\n"
+           "  esvr-compare curves REF [CAND.esvr ...]  plot error over run time and over bytes",
+       .notes = "esvr-compare COMMAND --help describes each command.",
        .examples = "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45"});
-  line.argument("job", "JOB: check, table or curves");
+  line.argument("command", "COMMAND: check, table or curves");
   return line;
 }
 
 void run(int argc, const char* const* argv) {
-  const std::string_view job = argc > 1 ? argv[1] : "";
-  if (job == "check") {
+  const std::string_view command = argc > 1 ? argv[1] : "";
+  if (command == "check") {
     if (const auto options = parseCheckOptions(argc - 1, argv + 1)) check(*options);
     return;
   }
-  if (job == "table") {
+  if (command == "table") {
     if (const auto options = parseTableOptions(argc - 1, argv + 1)) table(*options);
     return;
   }
-  if (job == "curves") {
+  if (command == "curves") {
     if (const auto options = parseCurvesOptions(argc - 1, argv + 1)) curves(*options);
     return;
   }
-  if (const auto arguments = overview().parse(argc, argv))
-    throw esvr::UsageError("no job is called '" + arguments->get<std::string>("job") +
-                           "'; there are: check, table, curves");
+  if (!command.empty() && command.front() != '-')
+    throw esvr::UsageError("unknown command '" + std::string(command) +
+                           "'; the commands are check, table and curves");
+  (void)overview().parse(argc, argv);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@
 namespace esvr::compare {
 namespace {
 
-/// Runs once to warm up, then so often, and gives each run's seconds.
+/// Runs once to warm up and then `runs` times; returns the seconds of each of these.
 template <class Run>
 Timing timed(int runs, const Run& run) {
   (void)run();
@@ -75,7 +75,8 @@ StoredGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::s
   return std::move(file.grids[place]);
 }
 
-/// A grid of an .esvr by the reference's name of it; where the file has one grid, that one.
+/// Index of the grid of an .esvr file that has the reference's name; the only grid of a file is
+/// always taken.
 std::size_t placeOf(const GridFile& file, const std::string& name) {
   return file.grids().size() == 1 ? 0 : file.find(name);
 }
@@ -87,7 +88,7 @@ void requireOverlap(const std::filesystem::path& path, const Box& a, const Box& 
                    ": its active voxels and the reference's lie in boxes that do not meet");
 }
 
-/// How NanoVDB holds a row's voxels while they are drawn.
+/// The NanoVDB value type with which a row's voxels are drawn.
 NanoValues valuesOf(const BaselineSetting& setting) {
   const auto* packing = std::get_if<VoxelPacking>(&setting.how);
   return packing ? nanoValues(packing->form) : NanoValues::kFloat;
@@ -95,7 +96,7 @@ NanoValues valuesOf(const BaselineSetting& setting) {
 
 Timing once(double seconds) { return {seconds, seconds, seconds, 1}; }
 
-/// As --fit takes it.
+/// The value of --fit.
 std::string wordOf(const FitWish& wish) {
   if (wish.paper) return "paper";
   return wish.bytes ? std::to_string(*wish.bytes) : "default";
@@ -164,7 +165,7 @@ std::string RowMaker::command(const std::string& arguments) const {
 void RowMaker::measure(const BaselineSetting& setting, TableRow& row) {
   row.setting = toString(setting);
   row.command = command("--row " + shellWord(row.setting));
-  row.bytes = encoder_.encode(setting).bytes;  // builds what the method starts from, too
+  row.bytes = encoder_.encode(setting).bytes;  // also builds the method's input, not timed below
   const cli::MemoryMeter encoding;
   row.encode = timed(scene_.options.runs, [&] { return encoder_.encode(setting).seconds; });
   row.memory = encoding.peakRise();
@@ -258,7 +259,8 @@ TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing)
   TableRow row{.name = path.filename().string() + how, .group = "ESVR"};
   const GridFile file(path, scene_.options.maxMemory);
   if (!file.esvr())
-    throw BadInput(path.string() + ": a candidate is an .esvr file; see --external");
+    throw BadInput(path.string() +
+                   ": candidates must be .esvr files; --external takes other results");
   const std::size_t place = placeOf(file, scene_.gridName);
   row.bytes = bytesOf(file, path, place);
   row.command = command(shellWord(path.string()) + " --rows none");
@@ -290,7 +292,7 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   file.metadata = scene_.metadata;
   const std::uint64_t head = bytesBesideGrids(file.metadata);
   if (wish.bytes && *wish.bytes <= head)
-    throw UsageError("--fit " + word + " has no room for a grid");
+    throw UsageError("--fit " + word + " is too small for a grid");
   Conversion conversion = convert(wish, head);
   row.curve = std::move(conversion.fit.curve);
   file.grids.push_back(std::move(conversion.grid));

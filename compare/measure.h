@@ -1,5 +1,5 @@
 #pragma once
-/// Makes the rows of a table, one after the other, all of them from the same voxels.
+/// Makes the rows of a table, one after the other, from the same voxels.
 
 #include <functional>
 #include <optional>
@@ -13,55 +13,55 @@
 
 namespace esvr::compare {
 
-/// The reference, and what every row shares.
+/// The reference and the settings that all rows share.
 struct TableScene {
   const TableOptions& options;
   std::string gridName;  ///< unique name in the reference
   const VolumeGrid& reference;
-  std::vector<MetaItem> metadata;  ///< the reference file's
+  std::vector<MetaItem> metadata;  ///< metadata of the reference file
   Box box;
   double peak = 1.0;
-  std::filesystem::path folder;  ///< for files that come and go
+  std::filesystem::path folder;  ///< folder for temporary files
   const CancelToken& cancel;
   const Gallery* gallery = nullptr;  ///< null: no pictures
 };
 
-/// How an .esvr is drawn, in esvr-render's words.
+/// The way an .esvr file is drawn, with the names of esvr-render --method.
 enum class Drawing {
-  kEllipsoids,  ///< its ellipsoids, where they say all: not of a narrow band or a stored mask
-  kBricks       ///< the voxels that it decodes to
+  kEllipsoids,  ///< ellipsoids, if they represent the whole grid (see row_renderer.h)
+  kBricks       ///< decoded voxels
 };
 
 struct FitWish {
-  std::optional<std::uint64_t> bytes{};  ///< of the file; nothing: whatever the defaults take
-  bool paper = false;                    ///< by the paper's method, stored as float32
+  std::optional<std::uint64_t> bytes{};  ///< size of the file; nothing: default options
+  bool paper = false;                    ///< whether the paper's method is used, stored as float32
 };
 
 class RowMaker {
  public:
   explicit RowMaker(const TableScene& scene);
 
-  /// Each leaves its reason in the row's note where it cannot be made; \throws Cancelled.
+  /// If a row cannot be made, its note has the reason. \throws Cancelled  the run was interrupted
   TableRow baseline(const std::string& group, const BaselineSetting& setting,
                     const std::string& name);
-  /// The best setting of `like`'s form for a size or a PSNR.
+  /// Searches the best setting of the form of `like` for a size or a PSNR.
   TableRow sizeMatched(const BaselineSetting& like, std::uint64_t bytes);
   TableRow psnrMatched(const BaselineSetting& like, double psnr);
   TableRow external(const External& external);
-  /// \throws BadInput  a candidate that cannot be compared: no such grid, nothing in common
+  /// \throws BadInput  the candidate does not have the grid, or its voxels lie elsewhere
   TableRow candidate(const std::filesystem::path& path, Drawing drawing = Drawing::kEllipsoids);
-  /// Ellipsoids fitted here.
+  /// Fits ellipsoids.
   TableRow fitted(const FitWish& wish);
 
  private:
   void measure(const BaselineSetting& setting, TableRow& row);
   TableRow matched(const BaselineSetting& like, const std::string& group,
                    const std::function<Match()>& search);
-  /// \param head  bytes of a file without grids
+  /// \param head  size of a file without grids, bytes
   [[nodiscard]] Conversion convert(const FitWish& wish, std::uint64_t head) const;
   void measureEsvr(const std::filesystem::path& path, Drawing drawing, TableRow& row);
   [[nodiscard]] VolumeMetrics compare(const SparseVolume& volume) const;
-  /// Figures of the voxels and, where pictures were asked for, of what they look like.
+  /// Measures the voxels and, if wanted, their pictures.
   void measureVoxels(const SparseVolume& volume, NanoValues values, TableRow& row) const;
   void measurePictures(Renderer& renderer, const OwnView& own, TableRow& row) const;
   void drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Drawing drawing,
@@ -72,7 +72,7 @@ class RowMaker {
   BaselineEncoder encoder_;
 };
 
-/// "NanoVDB FpN Zip", "ZFP accuracy".
+/// The name of a row: "NanoVDB FpN Zip", "ZFP accuracy".
 [[nodiscard]] std::string displayName(const BaselineSetting& setting);
 
 }  // namespace esvr::compare

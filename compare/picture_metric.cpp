@@ -25,7 +25,7 @@ std::filesystem::path written(const Image& image, const std::filesystem::path& p
   return path;
 }
 
-/// What a shell's command prints. \throws RuntimeFailure  it ends with another code than 0
+/// The output of a shell command. \throws RuntimeFailure  its exit code is not 0
 std::string outputOf(const std::string& command) {
   FILE* pipe = popen(command.c_str(), "r");
   if (!pipe) throw RuntimeFailure("--lpips: cannot run " + command);

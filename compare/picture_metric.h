@@ -1,5 +1,5 @@
 #pragma once
-/// A figure of two pictures from a program of the user's: LPIPS, by the model and runtime at hand.
+/// A metric of two pictures that a program of the user computes, for example LPIPS.
 
 #include <filesystem>
 #include <string>
@@ -10,12 +10,12 @@ namespace esvr::compare {
 
 class PictureMetric {
  public:
-  /// \param command  words for a shell, run with the reference's and the picture's file after them;
-  ///                 what it prints last is the figure
-  /// \param folder   for the two files, PNG of 8 bits in front of black
+  /// \param command  shell command that gets the files of the reference and the picture as
+  ///                 arguments; the last word of its output is the figure
+  /// \param folder   folder for the two files, which are 8-bit PNG in front of black
   PictureMetric(std::string command, std::filesystem::path folder);
 
-  /// \throws RuntimeFailure  the command fails, or prints no number
+  /// \throws RuntimeFailure  the command fails, or its last word is not a number
   [[nodiscard]] double of(const Image& reference, const Image& picture) const;
 
  private:

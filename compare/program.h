@@ -1,5 +1,5 @@
 #pragma once
-/// What the jobs of esvr-compare share.
+/// Common parts of the commands of esvr-compare.
 
 #include <string>
 #include <vector>
@@ -8,7 +8,7 @@ namespace esvr::compare {
 
 inline constexpr const char* kProgram = "esvr-compare";
 
-/// The command line as given. \param argv  the job's word first
+/// The whole command line as words. \param argv  arguments, beginning with the command
 [[nodiscard]] inline std::vector<std::string> commandLine(int argc, const char* const* argv) {
   std::vector<std::string> words{kProgram};
   words.insert(words.end(), argv, argv + argc);

@@ -12,10 +12,11 @@ void addReportOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("report", value<std::string>()->value_name("FILE.json"),
-     "all that was measured; - for stdout")
-    ("markdown", value<std::string>()->value_name("FILE.md"), "the tables as Markdown")
-    ("csv", value<std::string>()->value_name("FILE.csv"), "the figures in all digits")
-    ("html", value<std::string>()->value_name("FILE.html"), "a page that needs no other file")
+     "write all results as JSON; '-' is stdout")
+    ("markdown", value<std::string>()->value_name("FILE.md"), "write the tables as Markdown")
+    ("csv", value<std::string>()->value_name("FILE.csv"),
+     "write the figures with all digits as CSV")
+    ("html", value<std::string>()->value_name("FILE.html"), "write a self-contained HTML page")
     ("force,f", bool_switch(), "replace reports that exist");
   // clang-format on
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// Options for reports, which several jobs have.
+/// Options for reports, which several commands have.
 
 #include <filesystem>
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace esvr::compare {
 
-/// Files that a report goes into; empty where not asked for.
+/// The files of a report; empty for those that are not written.
 struct ReportFiles {
   std::string json, markdown, csv, html;
   bool overwrite = false;
@@ -18,7 +18,8 @@ struct ReportFiles {
 void addReportOptions(cli::po::options_description& options);
 [[nodiscard]] ReportFiles reportFiles(const cli::Arguments& arguments);
 
-/// Fails before the work where writing would fail after it. \throws UsageError, RuntimeFailure
+/// Checks before the work that the files can be written.
+/// \throws UsageError, RuntimeFailure  a file cannot be written
 void checkReportFiles(const ReportFiles& files, const std::vector<std::filesystem::path>& inputs);
 
 [[nodiscard]] std::vector<std::string> splitAtCommas(const std::string& text);

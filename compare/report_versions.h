@@ -1,15 +1,15 @@
 #pragma once
-/// What a report says of the programs that made it.
+/// The programs and versions that a report names.
 
 #include <string>
 #include <vector>
 
 namespace esvr::compare {
 
-/// Words as one line.
+/// Joins words to one line.
 [[nodiscard]] std::string joined(const std::vector<std::string>& words);
 
-/// A line for the program, the format and each library.
+/// One line for the program, the format and each library.
 [[nodiscard]] std::vector<std::string> versions();
 
 }  // namespace esvr::compare

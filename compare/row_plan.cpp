@@ -7,7 +7,7 @@ namespace {
 
 constexpr PackedCodec kNone = PackedCodec::kNone, kZip = PackedCodec::kZip,
                       kBlosc = PackedCodec::kBlosc;
-/// FpN's largest errors that a table shows: the peak over so much.
+/// The tolerances of FpN in a table: the peak divided by these numbers.
 constexpr int kTolerances[] = {1024, 256, 64};
 
 BaselineSetting packed(PackedForm form, PackedCodec codec, double tolerance = 0.0) {

@@ -1,5 +1,5 @@
 #pragma once
-/// Which baselines a comparison has.
+/// The baselines of a comparison.
 
 #include <string>
 #include <vector>
@@ -9,19 +9,19 @@
 
 namespace esvr::compare {
 
-/// What ratios are to.
+/// The baseline to which ratios refer.
 [[nodiscard]] BaselineSetting halfBlosc();
 
 [[nodiscard]] std::vector<BaselineSetting> losslessSettings();
 
-/// A setting, and what its row is called.
+/// A setting and the name of its row.
 struct NamedSetting {
   BaselineSetting setting;
   std::string name;
 };
 [[nodiscard]] std::vector<NamedSetting> quantisedSettings(double peak);
 
-/// Forms of which the best setting for a size, or for a PSNR, is looked for.
+/// The forms for which the best setting for a size, or for a PSNR, is searched.
 [[nodiscard]] std::vector<BaselineSetting> sizeForms(const TableOptions& options);
 [[nodiscard]] std::vector<BaselineSetting> psnrForms(const TableOptions& options);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What draws the pictures of a row, on the device that was asked for.
+/// Makes the renderer of a row's pictures on the selected device.
 
 #include <memory>
 
@@ -8,13 +8,14 @@
 
 namespace esvr::compare {
 
-/// Voxels as others hold them: on a CUDA device a NanoVDB grid of these values, which is marched;
-/// on the CPU the voxels themselves, whose pictures are those of floats. \throws DeviceError
+/// A renderer of voxels: of a NanoVDB grid of this value type on a CUDA device, of the volume
+/// itself on the CPU.
+/// \throws DeviceError  as for makeNanoRenderer
 [[nodiscard]] std::unique_ptr<Renderer> makeVoxelRenderer(const SparseVolume& volume,
                                                           NanoValues values, const Device& device);
 
-/// True where a grid's ellipsoids say all: not of a narrow band, of which they say nothing beyond
-/// it, nor where voxels, a residual or a mask are stored.
+/// True if a grid's ellipsoids represent the whole grid. This is not so for a narrow band, and if
+/// voxels, a residual or a mask are stored.
 [[nodiscard]] bool saysAll(const StoredGrid& grid);
 
 }  // namespace esvr::compare

@@ -18,7 +18,7 @@ double choosePeak(const TableOptions& options, const VolumeGrid& reference) {
   const ValueRange range = activeRange(reference.volume);
   if (range.min == 0.0f && range.max == 0.0f)
     throw BadInput(options.reference.string() +
-                   ": every active voxel is 0, so that PSNR has no peak; give --peak");
+                   ": every active voxel is 0, so PSNR has no peak; set it with --peak");
   return peakOf(reference.volume);
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What `table` and `curves` begin with: the reference, read and looked at.
+/// Reads and checks the reference of `table` and `curves`.
 
 #include <filesystem>
 #include <optional>
@@ -12,10 +12,10 @@
 
 namespace esvr::compare {
 
-/// Owns all that a TableScene points to.
+/// Owns the objects that a TableScene points to.
 class SceneFiles {
  public:
-  /// \throws BadInput  no voxels to compare with; no peak; as readGrid
+  /// \throws BadInput  the reference has no active voxel or no peak; else as for readGrid
   SceneFiles(const TableOptions& options, const CancelToken& cancel);
 
   [[nodiscard]] TableScene scene() const;

@@ -18,12 +18,14 @@ void addSceneOptions(cli::CommandLine& line) {
     ("grid,g", value<std::string>()->value_name("NAME"),
      "the grid to compare, in every file (default: the first with voxels)")
     ("box", value<std::string>()->value_name("BOX"),
-     "x0,y0,z0,x1,y1,z1 of the figures (default: the reference's active bounding box)")
-    ("peak", value<double>()->value_name("P"), "of the PSNR (default: the reference's largest value)")
+     "box x0,y0,z0,x1,y1,z1 over which figures are measured (default: the reference's active "
+     "bounding box)")
+    ("peak", value<double>()->value_name("P"),
+     "peak of the PSNR (default: the reference's largest value)")
     ("max-dense", value<std::string>()->value_name("BYTES")->default_value("1GB"),
-     "skip ZFP where the box as an array of floats takes more")
+     "skip ZFP if the box as an array of floats takes more than this")
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
-     "of fits and pictures: auto, cpu, cuda or cuda:N");
+     "device for fits and pictures: auto, cpu, cuda or cuda:N");
   // clang-format on
   cli::addMaxMemory(line);
 }

@@ -1,14 +1,14 @@
 #pragma once
-/// Options of what is compared, and where, which `table` and `curves` share.
+/// The options that `table` and `curves` share.
 
 #include "cli/command_line.h"
 #include "compare/table_options.h"
 
 namespace esvr::compare {
 
-/// The reference and candidates too.
+/// Adds the options and the arguments for the reference and the candidates.
 void addSceneOptions(cli::CommandLine& line);
-/// \throws UsageError  a value out of range
+/// \throws UsageError  a value is out of range
 void readSceneOptions(const cli::Arguments& arguments, TableOptions& options);
 
 }  // namespace esvr::compare

@@ -11,7 +11,7 @@ namespace esvr::compare {
 ScratchFolder::ScratchFolder() {
   std::string pattern = std::filesystem::temp_directory_path() / "esvr-compare-XXXXXX";
   if (mkdtemp(pattern.data()) == nullptr)
-    throw RuntimeFailure("cannot make a folder like " + pattern);
+    throw RuntimeFailure("cannot make a temporary folder with the pattern " + pattern);
   path_ = pattern;
 }
 

@@ -1,14 +1,14 @@
 #pragma once
-/// A folder for files that come and go.
+/// A folder for temporary files.
 
 #include <filesystem>
 
 namespace esvr::compare {
 
-/// In the system's place for temporary files; gone with all that is in it at the end.
+/// Makes a folder in the system's temporary folder; the destructor removes it with its content.
 class ScratchFolder {
  public:
-  /// \throws RuntimeFailure  cannot be made
+  /// \throws RuntimeFailure  the folder cannot be made
   ScratchFolder();
   ~ScratchFolder();
   ScratchFolder(const ScratchFolder&) = delete;

@@ -3,7 +3,7 @@
 
 namespace esvr::compare {
 
-/// A word as a shell takes it, in quotes where it needs them.
+/// A word for a shell, with quotes if it needs them.
 [[nodiscard]] std::string shellWord(const std::string& word);
 
 }  // namespace esvr::compare

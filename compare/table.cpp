@@ -16,7 +16,7 @@
 namespace esvr::compare {
 namespace {
 
-/// Makes row after row; what was made stays when a run is interrupted.
+/// Makes one row after the other. Finished rows are kept if the run is interrupted.
 class TableRun {
  public:
   TableRun(const TableScene& scene, TableRecord& record, const cli::Log& log)
@@ -103,7 +103,7 @@ void table(const TableOptions& options) {
   const SceneFiles files(options, interrupts.token());
   TableRecord record = files.record();
   if (options.zfp && zfpVersion().empty())
-    log.warning("built without ZFP: the table has no row of it");
+    log.warning("this build has no ZFP; the table has no rows for it");
   const TableScene scene = files.scene();
   TableRun(scene, record, log).run();
   tell(options, record);

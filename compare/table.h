@@ -1,12 +1,13 @@
 #pragma once
-/// The paper's tables, for any volume.
+/// esvr-compare table: the paper's tables for any volume.
 
 #include "compare/table_options.h"
 
 namespace esvr::compare {
 
-/// Prints the rows and writes the reports. \throws BadInput  what cannot be compared;
-/// RuntimeFailure: interrupted, with the rows already made printed and written
+/// Makes the rows, prints them and writes the reports.
+/// \throws BadInput  the files cannot be compared
+/// \throws RuntimeFailure  the run was interrupted; finished rows were printed and written
 void table(const TableOptions& options);
 
 }  // namespace esvr::compare

@@ -21,27 +21,29 @@ cli::ProgramText programText() {
   return {
       .name = std::string(kProgram) + " table",
       .purpose =
-          "Compares .esvr files with what else could hold the volume: OpenVDB and NanoVDB files,\n"
-          "lossless, quantised, and cut to the same size, and ZFP. Every row is of the same\n"
-          "voxels, box and peak, is timed alike, and has the command that makes it alone.",
+          "Compares .esvr files with other ways to store the volume: OpenVDB and NanoVDB files,\n"
+          "lossless, quantised or reduced to the same size, and ZFP. All rows have the same\n"
+          "voxels, box and peak, are timed in the same way, and name the command that makes the\n"
+          "row alone.",
       .usage =
           "  esvr-compare table REF.vdb [CAND.esvr ...] [--size 50KB]... [--external X]...\n"
           "  esvr-compare table REF.vdb --row SETTING",
       .notes =
-          "Sizes are matched to each CAND and each --size: the best file that is not larger. For\n"
-          "VDB files voxels near the background are dropped, empty leaves pruned and the rest\n"
-          "quantised; the threshold is searched until the bytes are within 2 %, FpN's tolerance\n"
-          "and ZFP's settings for the highest PSNR. -v shows the search, --report has all of it.\n"
-          "PSNR is matched with FpN's tolerance and ZFP's settings.\n"
+          "For each CAND and each --size, the best baseline that is not larger is searched. For\n"
+          "VDB files, voxels near the background are dropped, empty leaves are removed, and the\n"
+          "other voxels are quantised. The threshold is searched until the size is at most 2 %\n"
+          "smaller, FpN's tolerance and ZFP's settings for the highest PSNR. For the PSNR of each\n"
+          "CAND, FpN's tolerance and ZFP's settings are searched. -v shows the searches, and\n"
+          "--report includes them.\n"
           "\n"
-          "The ratio is to the half-float Blosc VDB of the same grid. Seconds to encode and "
-          "decode\n"
-          "are medians of --runs after one that warms up, between memory and file: the grid in\n"
-          "OpenVDB's tree to the file, and the file to OpenVDB's tree, NanoVDB's buffer, an array\n"
-          "(ZFP) or a sparse volume (.esvr). Memory is what the slower of the two adds.\n"
+          "The ratio is the size of the half-float Blosc VDB of the same grid divided by that of\n"
+          "the row. Times of encoding and decoding are medians of --runs after a warm-up run:\n"
+          "from the grid in OpenVDB's tree to the file, and from the file to OpenVDB's tree,\n"
+          "NanoVDB's buffer, an array (ZFP) or a sparse volume (.esvr). Memory is the larger of\n"
+          "what encoding and decoding allocate.\n"
           "\n"
-          "Exit codes: 0 done, 1 failure or interrupted (rows already made are printed), 2 wrong\n"
-          "options, 3 input that cannot be used, 5 memory.",
+          "Exit codes: 0 done, 1 failure or interrupted (finished rows are printed), 2 wrong\n"
+          "options, 3 unusable input, 5 memory.",
       .examples =
           "  esvr-compare table smoke.vdb smoke.esvr\n"
           "  esvr-compare table smoke.vdb smoke.esvr --html page.html --markdown table.md\n"
@@ -53,32 +55,34 @@ cli::CommandLine makeCommandLine() {
   cli::CommandLine line(programText());
   // clang-format off
   line.options().add_options()
-    ("rows", value<std::string>()->value_name("KINDS")->default_value("lossless,quantised,matched,zfp"),
-     "which baselines, separated by commas")
+    ("rows",
+     value<std::string>()->value_name("KINDS")->default_value("lossless,quantised,matched,zfp"),
+     "kinds of baselines, separated by commas, or none")
     ("row", value<Words>()->value_name("SETTING")->composing(),
-     "this baseline instead, as a row's command names it; may be repeated")
+     "use this baseline instead, with the name in a row's command; may be repeated")
     ("size", value<Words>()->value_name("BYTES")->composing(),
-     "match this size too; may be repeated")
+     "also match this size; may be repeated")
     ("fit", value<Words>()->value_name("BYTES")->composing(),
-     "fit ellipsoids to this size, here; --fit default takes what size the defaults give, --fit paper "
-     "the paper's method; may be repeated")
+     "fit ellipsoids for a file of this size; --fit default fits with the default options, "
+     "--fit paper by the paper's method; may be repeated")
     ("external", value<Words>()->value_name("X")->composing(),
-     "a row for another system's result: NAME=FILE:BYTES, FILE a VDB, or raw with :NXxNYxNZ:TYPE; "
-     "and any of :encode=S, :decode=S, :fps=N; may be repeated")
+     "add a row for another system's result: NAME=FILE:BYTES, where FILE is a VDB, or raw with "
+     ":NXxNYxNZ:TYPE; and any of :encode=S, :decode=S, :fps=N; may be repeated")
     ("runs", value<int>()->value_name("N")->default_value(TableOptions{}.runs),
-     "of which times are medians")
+     "number of runs, of which times are medians")
     ("images", value<int>()->value_name("N"),
-     "pictures of each row from N views of a full turn, and how far they are from the reference's")
+     "draw pictures of each row from N views of a full turn, and compare them with the "
+     "reference's")
     ("image-size", value<int>()->value_name("PX")->default_value(GalleryOptions{}.resolution.width),
-     "of a picture's side")
+     "side of a picture in pixels")
     ("image-step", value<double>()->value_name("S")->default_value(GalleryOptions{}.step),
-     "voxels between samples, the same for every row")
+     "distance of samples along a ray in voxels, the same for every row")
     ("lpips", value<std::string>()->value_name("COMMAND"),
-     "LPIPS too, by a program of yours: COMMAND REFERENCE.png PICTURE.png prints it last")
+     "also report LPIPS by a program of yours: COMMAND REFERENCE.png PICTURE.png prints it last")
     ("colors", value<Words>()->value_name("MAP[:CURVE]")->composing(),
-     "a transfer function, as esvr-render names them (default: viridis:linear); may be repeated")
+     "transfer function, with the names of esvr-render (default: viridis:linear); may be repeated")
     ("tf", value<Words>()->value_name("FILE")->composing(),
-     "a transfer function from a ParaView preset; may be repeated");
+     "transfer function from a ParaView preset; may be repeated");
   // clang-format on
   addSceneOptions(line);
   addReportOptions(line.options());
@@ -117,7 +121,7 @@ void readSizes(const Arguments& a, TableOptions& options) {
   }
 }
 
-/// "viridis" or "viridis:tent".
+/// Reads a text like "viridis" or "viridis:tent".
 NamedTransfer builtInTransfer(const std::string& text) {
   const std::size_t colon = std::min(text.find(':'), text.size());
   const std::string curve = colon < text.size() ? text.substr(colon + 1) : "linear";
@@ -135,7 +139,7 @@ void readImages(const Arguments& a, TableOptions& options) {
   images.lpips = a.find<std::string>("lpips").value_or("");
   if (!a.has("images")) {
     if (!images.transfers.empty() || !images.lpips.empty())
-      throw UsageError("--colors, --tf and --lpips say nothing without --images");
+      throw UsageError("--colors, --tf and --lpips need --images");
     return;
   }
   images.views = a.get<int>("images");

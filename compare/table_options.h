@@ -1,5 +1,5 @@
 #pragma once
-/// What `esvr-compare table` is asked to do.
+/// The options of `esvr-compare table`.
 
 #include <cstdint>
 #include <filesystem>
@@ -19,13 +19,13 @@ namespace esvr::compare {
 struct TableOptions {
   std::filesystem::path reference;
   std::vector<std::filesystem::path> candidates;
-  std::optional<std::string> grid;  ///< default: the first with voxels
+  std::optional<std::string> grid;  ///< default: the first grid with voxels
   bool lossless = true, quantised = true, matched = true, zfp = true;
-  std::vector<BaselineSetting> settings;  ///< these baselines and no others
-  std::vector<std::uint64_t> sizes;       ///< to match beside the candidates'
-  std::vector<std::uint64_t> fits;        ///< sizes to fit ellipsoids to, here
-  bool fitDefault = false;                ///< fit with the defaults, whatever size that takes
-  bool fitPaper = false;                  ///< fit by the paper's method
+  std::vector<BaselineSetting> settings;  ///< baselines of --row, which replace the others
+  std::vector<std::uint64_t> sizes;       ///< sizes to match besides the candidates'
+  std::vector<std::uint64_t> fits;        ///< sizes for which ellipsoids are fitted
+  bool fitDefault = false;                ///< whether a fit with the default options is made
+  bool fitPaper = false;                  ///< whether a fit by the paper's method is made
   std::vector<External> externals;
   int runs = 3;
   std::uint64_t maxDense = 0;
@@ -40,9 +40,9 @@ struct TableOptions {
   std::vector<std::string> commandLine;
 };
 
-/// \param argv  the job's word first
-/// \return nothing where --help or --version was printed
-/// \throws UsageError
+/// \param argv  arguments, beginning with the command ("table")
+/// \return nothing if --help or --version was printed
+/// \throws UsageError  an option is invalid
 [[nodiscard]] std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv);
 
 }  // namespace esvr::compare

@@ -1,5 +1,5 @@
 #pragma once
-/// What a table is made of.
+/// The data of a table.
 
 #include <cstdint>
 #include <optional>
@@ -12,15 +12,15 @@
 
 namespace esvr::compare {
 
-/// Of several runs, in seconds.
+/// Statistics of the times of several runs, seconds.
 struct Timing {
   double median = 0.0, min = 0.0, max = 0.0;
   int runs = 0;
 };
-/// \param seconds  at least one
+/// \param seconds  times of the runs, at least one
 [[nodiscard]] Timing timingOf(std::vector<double> seconds);
 
-/// An attempt of the search that led to a row.
+/// A trial of the search for a row's setting.
 struct SearchStep {
   std::string setting;
   std::uint64_t bytes = 0;
@@ -28,10 +28,10 @@ struct SearchStep {
 };
 
 struct TableRow {
-  std::string name;  ///< "NanoVDB FpN Zip"
+  std::string name;  ///< name, for example "NanoVDB FpN Zip"
   std::string
       group;  ///< "lossless", "quantised", "at 48214 bytes", "at 44.70 dB", "ESVR", "external"
-  std::string setting{};  ///< as --row takes it; empty where the row is no baseline
+  std::string setting{};  ///< value for --row; empty if the row is no baseline
   std::string command{};
   std::optional<std::uint64_t> bytes{};
   std::optional<VolumeMetrics> metrics{};
@@ -39,24 +39,24 @@ struct TableRow {
   std::optional<std::uint64_t> memory{};
   std::optional<double> fps{};
   std::optional<ImageFigures> images{};
-  Shown shown{};                    ///< of `images`
-  std::vector<TimedCurvePoint> curve{};  ///< of a fit
-  bool fittedHere = false;          ///< so that `encode` is from voxels to file
-  std::string note{};               ///< why there are no figures, or what to know of them
+  Shown shown{};                         ///< pictures that `images` measures
+  std::vector<TimedCurvePoint> curve{};  ///< curve of a fit
+  bool fittedHere = false;               ///< true if `encode` includes the fit
+  std::string note{};  ///< remark on the figures, or the reason why there are none
   std::vector<SearchStep> search{};
 };
 
 struct TableRecord {
   std::string grid;
-  std::uint64_t referenceBytes = 0;  ///< of the reference's file
+  std::uint64_t referenceBytes = 0;  ///< size of the reference's file
   std::optional<std::uint64_t> halfBlosc;
   Box box;
   double peak = 0.0;
   std::uint64_t activeVoxels = 0;
   std::vector<TableRow> rows;
-  std::string referencePng{};                   ///< with pictures
-  std::optional<ImageFigures> referenceCost{};  ///< with pictures, as Gallery has it
-  std::string drawnOn{};                        ///< with pictures: the device's name
+  std::string referencePng{};                   ///< picture of the reference, if there are pictures
+  std::optional<ImageFigures> referenceCost{};  ///< cost of drawing the reference
+  std::string drawnOn{};                        ///< name of the device that draws
   bool interrupted = false;
 };
 

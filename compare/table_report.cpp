@@ -27,7 +27,7 @@ using report::Kind;
 constexpr const char* kSchema = "esvr-table";
 constexpr int kSchemaVersion = 1;
 
-/// A column, and where its figure stands in a row.
+/// A column and the function that gets its figure from a row.
 struct TableColumn {
   Column column;
   Cell (*of)(const TableRow&, const TableRecord&);
@@ -127,7 +127,7 @@ const std::vector<std::string> kCost{"name",     "encode_s",     "encode_min_s",
 const std::vector<std::string> kLooks{"name",  "image_psnr", "image_ssim", "flip",
                                       "lpips", "fps",        "vram_bytes"};
 
-/// Rows of one group that follow each other.
+/// The consecutive rows of each group.
 std::vector<std::span<const TableRow>> groups(const TableRecord& record) {
   std::vector<std::span<const TableRow>> found;
   const std::span<const TableRow> rows(record.rows);
@@ -159,12 +159,12 @@ std::string sceneLine(const TableRecord& record) {
          ", peak " + cli::shortNumber(record.peak);
 }
 
-/// Where pictures were drawn, and what the reference's took.
+/// A line about the device that drew the pictures and the cost of the reference's.
 std::string pictureLine(const TableRecord& record) {
   if (!record.referenceCost) return {};
   const ImageFigures& cost = *record.referenceCost;
   std::string text = "Pictures drawn on " + record.drawnOn + ", the reference's at " +
-                     cli::shortNumber(cost.fps) + " a second";
+                     cli::shortNumber(cost.fps) + " pictures per second";
   if (cost.deviceBytes)
     text += ", as a NanoVDB float grid in " + cli::shortNumber(double(*cost.deviceBytes) / 1e6) +
             " MB of the device";
@@ -175,7 +175,7 @@ void printNotes(std::span<const TableRow> rows, bool search, std::ostream& out) 
   for (const auto& row : rows) {
     if (!row.note.empty()) out << cli::printable(row.name + ": " + row.note) << '\n';
     if (!row.search.empty())
-      out << cli::printable(row.name + ": " + std::to_string(row.search.size()) + " tries" +
+      out << cli::printable(row.name + ": " + std::to_string(row.search.size()) + " trials" +
                             (row.setting.empty() ? "" : ", " + row.setting))
           << '\n';
     if (!search) continue;
@@ -185,7 +185,7 @@ void printNotes(std::span<const TableRow> rows, bool search, std::ostream& out) 
   }
 }
 
-/// All columns that some row has a figure for.
+/// The columns for which at least one row has a figure.
 DataTable withoutEmptyColumns(const DataTable& table) {
   std::vector<std::string> keys;
   for (std::size_t c = 0; c < table.columns.size(); ++c)
@@ -216,7 +216,7 @@ std::string markdown(const TableOptions& options, const TableRecord& record) {
   return text;
 }
 
-/// A contact sheet of the rows that are comparable by size, and a slider for each of ours.
+/// Adds a contact sheet of the rows of similar size, and a slider for each row of ESVR.
 void addPictures(const TableRecord& record, report::HtmlPage& page) {
   if (record.referencePng.empty()) return;
   const auto png = [](const std::string& caption, const std::string& bytes) {

@@ -1,5 +1,5 @@
 #pragma once
-/// A table's rows for a terminal, as Markdown, CSV, JSON and a page.
+/// The rows of a table as text, Markdown, CSV, JSON and HTML.
 
 #include <iosfwd>
 
@@ -8,10 +8,11 @@
 
 namespace esvr::compare {
 
-/// Lines of 100 characters at most, names that long excepted. \param search  print it too
+/// Prints the table with at most 100 characters in a line, unless a name is longer.
+/// \param search  whether the trials of the searches are printed
 void printTable(const TableRecord& record, bool search, std::ostream& out);
 
-/// All files that were asked for. \throws RuntimeFailure  not writable
+/// Writes all wanted files. \throws RuntimeFailure  a file is not writable
 void writeReports(const TableOptions& options, const TableRecord& record);
 
 }  // namespace esvr::compare

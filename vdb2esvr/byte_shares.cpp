@@ -15,7 +15,7 @@ std::optional<std::uint64_t> sizeOf(const Options& options, const VdbSummary& in
   return std::uint64_t(double(input.fileBytes) / *options.ratio);
 }
 
-/// A grid without voxels still needs its record.
+/// The weight of a grid in the division, which is above 0 for empty grids.
 double weightOf(const GridSummary& grid) { return double(grid.activeVoxels) + 1.0; }
 
 }  // namespace
@@ -28,7 +28,7 @@ ByteShares::ByteShares(const Options& options, const VdbSummary& input,
   const std::uint64_t fixed = bytesBesideGrids(input.metadata);
   if (fixed >= *left_)
     throw UsageError("the file takes " + std::to_string(fixed) +
-                     " bytes without a grid; there are " + std::to_string(*left_));
+                     " bytes without any grid; the size allows " + std::to_string(*left_));
   *left_ -= fixed;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// How the grids of a file share the bytes that it may have.
+/// Divides the wanted size of a file among its grids.
 
 #include <cstdint>
 #include <optional>
@@ -11,16 +11,16 @@
 
 namespace esvr::vdb2esvr {
 
-/// By active voxels; what one grid leaves goes to those after it.
+/// Grids share the bytes by their active voxels. Bytes that a grid does not use go to later grids.
 class ByteShares {
  public:
   ByteShares(const Options& options, const VdbSummary& input,
              const std::vector<GridSummary>& grids);
 
-  /// For a grid that comes next; nothing where no size was asked for.
+  /// Bytes for the next grid; nothing if no size is wanted.
   [[nodiscard]] std::optional<std::uint64_t> of(const GridSummary& grid) const;
 
-  /// A grid has been encoded.
+  /// Subtracts the bytes of a converted grid.
   void take(const GridSummary& grid, const StoredGrid& stored);
 
  private:

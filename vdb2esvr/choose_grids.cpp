@@ -13,7 +13,7 @@ GridChoice allThatCanBeFitted(const std::filesystem::path& file, const VdbSummar
   for (const auto& grid : summary.grids)
     (grid.skipReason.empty() ? choice.fitted : choice.skipped).push_back(grid);
   if (!choice.fitted.empty()) return choice;
-  std::string text = file.string() + ": nothing to fit";
+  std::string text = file.string() + ": the file has no grid that can be fitted";
   for (const auto& grid : choice.skipped)
     text += "\n  grid \"" + grid.uniqueName + "\" " + grid.skipReason;
   throw BadInput(text);
@@ -23,7 +23,7 @@ GridChoice named(const std::filesystem::path& file, const VdbSummary& summary,
                  const std::vector<std::string>& names) {
   std::vector<std::string> stored;
   for (const auto& grid : summary.grids) stored.push_back(grid.name);
-  std::set<std::size_t> places;  // ordered as in the file; a grid asked for twice is fitted once
+  std::set<std::size_t> places;  // a set, so that a grid that is named twice is fitted once
   for (const auto& name : names) places.insert(findGrid(stored, name, file));
   GridChoice choice;
   for (const std::size_t i : places) {

@@ -1,5 +1,5 @@
 #pragma once
-/// Which grids of a file are fitted.
+/// Chooses the grids of a file that are fitted.
 
 #include <string>
 #include <vector>
@@ -9,13 +9,13 @@
 namespace esvr::vdb2esvr {
 
 struct GridChoice {
-  std::vector<GridSummary> fitted;   ///< in file order
-  std::vector<GridSummary> skipped;  ///< with the reason in each; empty where grids were named
+  std::vector<GridSummary> fitted;   ///< grids in file order
+  std::vector<GridSummary> skipped;  ///< grids that cannot be fitted; empty if grids were named
 };
 
-/// \param names  as --grid takes them; none: all grids
-/// \throws BadInput  a named grid is not there (lists those that are) or cannot be fitted, or none
-///                   of all grids can
+/// \param names  names for --grid; empty: all grids
+/// \throws BadInput  a named grid does not exist (the text lists the grids) or cannot be fitted; or
+///                   no grid of the file can be fitted
 [[nodiscard]] GridChoice chooseGrids(const std::filesystem::path& file, const VdbSummary& summary,
                                      const std::vector<std::string>& names);
 

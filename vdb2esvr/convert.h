@@ -1,5 +1,5 @@
 #pragma once
-/// One grid on its way from the input to what the file holds, with all that is told of it.
+/// Reads, converts and measures one grid.
 
 #include <cstdint>
 #include <optional>
@@ -18,23 +18,22 @@ struct PhaseSeconds {
 };
 
 struct ConvertedGrid {
-  std::string uniqueName;  ///< in the input
+  std::string uniqueName;  ///< name in the input (GridSummary::uniqueName)
   Conversion conversion;
-  VolumeMetrics metrics;   ///< of the voxels that the stored grid gives back
-  std::size_t bricks = 0;  ///< of the source
+  VolumeMetrics metrics;   ///< errors of the decoded grid
+  std::size_t bricks = 0;  ///< bricks of the source
   std::uint64_t nonFiniteReplaced = 0;
-  std::string device;                       ///< that fitted it
-  std::optional<double> hits;               ///< averageHits, where it was asked for
-  std::optional<std::uint64_t> voxelPairs;  ///< countHits in the source's bricks, likewise
-  std::optional<PaperRecord> paper;         ///< where the paper's method was asked for
+  std::string device;                       ///< name of the device that fitted the grid
+  std::optional<double> hits;               ///< averageHits, with --hits
+  std::optional<std::uint64_t> voxelPairs;  ///< pairs of countHits in the source's bricks, --hits
+  std::optional<PaperRecord> paper;         ///< record of the paper's method, with --paper
   PhaseSeconds seconds;
 
   [[nodiscard]] const StoredGrid& stored() const { return conversion.grid; }
 };
 
-/// Reads, converts and measures a grid. The fit's progress and cancellation are those of
-/// `options.convert.fit`.
-/// \param bytes  that the grid may add to the file, where a size was asked for
+/// Reads, converts and measures a grid.
+/// \param bytes  bytes that the grid may add to the file, if a size is wanted
 [[nodiscard]] ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
                                         std::optional<std::uint64_t> bytes);
 

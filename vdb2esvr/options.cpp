@@ -21,7 +21,7 @@ using cli::po::value;
 
 constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max();
 constexpr std::int64_t kMaxIterations = 10'000'000;
-constexpr double kHighestPsnr = 300.0;  // dB; float32 ends at about 150
+constexpr double kHighestPsnr = 300.0;  // dB; float32 reaches about 150
 constexpr double kLongestRun = 1e9;     // seconds
 constexpr double kLargestRatio = 1e9;
 constexpr double kMaxLoss = 20.0;                  // dB
@@ -32,29 +32,30 @@ cli::ProgramText programText() {
   return {
       .name = kProgram,
       .purpose =
-          "Fits ellipsoids to the sparse grids of a VDB file and writes them as .esvr, which\n"
-          "esvr2vdb turns back into the VDB: transforms, names and metadata exactly, voxels\n"
-          "as close as asked.",
+          "Fits ellipsoids to the sparse grids of a VDB file and writes them to an .esvr file.\n"
+          "esvr2vdb converts it back to VDB: transforms, names and metadata are restored\n"
+          "exactly, voxels with the chosen accuracy.",
       .usage = "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]",
       .notes =
-          "Without -g all float and double grids are fitted, the others are listed and skipped.\n"
-          "--size and --ratio choose the number of ellipsoids and of bits, for the best file\n"
-          "that is not larger (and at most 2 % smaller). Several grids share the bytes by their\n"
-          "active voxels. --psnr looks for the smallest file that reaches it; --count bounds the\n"
-          "number of ellipsoids then, and with --seconds there is one fit, which ends as soon as\n"
-          "it reaches the PSNR.\n"
-          "The program prints a table on stdout. PSNR and the largest error are those of the\n"
-          "voxels that the written file gives back.\n"
+          "Without -g, all float and double grids are fitted; other grids are listed and skipped.\n"
+          "--size and --ratio choose the number of ellipsoids and the quantisation for the best\n"
+          "file that is not larger (and at most 2 % smaller). Several grids share the bytes by\n"
+          "their active voxels. --psnr searches the smallest file that reaches the PSNR; --count\n"
+          "then limits the number of ellipsoids. With --psnr and --seconds there is a single fit,\n"
+          "which ends as soon as it reaches the PSNR.\n"
+          "The program prints a table on stdout. Its PSNR and largest error are measured on the\n"
+          "voxels that are decoded from the written file.\n"
           "\n"
-          "Ctrl-C ends the fit. --on-cancel says whether the best so far is written; the exit\n"
-          "code is 1. A second Ctrl-C ends the program at once. OUT.esvr is never half a file.\n"
+          "Ctrl-C ends the fit with exit code 1. --on-cancel chooses whether the best result so\n"
+          "far is written. A second Ctrl-C ends the program at once. OUT.esvr is never "
+          "incomplete.\n"
           "\n"
-          "Exit codes: 0 done, 1 failure or interrupted, 2 wrong options, 3 input that cannot be\n"
-          "used, 4 --psnr not reached (the file is written), 5 device or memory.",
+          "Exit codes: 0 done, 1 failure or interrupted, 2 wrong options, 3 unusable input,\n"
+          "4 --psnr not reached (the file is written), 5 device or memory.",
       .examples =
           "  vdb2esvr smoke.vdb smoke.esvr                       choose everything from the data\n"
-          "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          the best of 100 KB\n"
-          "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             the smallest of 45 dB\n"
+          "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          the best file of 100 KB\n"
+          "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             the smallest file with 45 dB\n"
           "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report smoke.json\n"
           "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            every voxel within the bound\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255"};
@@ -65,41 +66,41 @@ void addFitOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("count", value<std::int64_t>()->value_name("N"),
-     "number of ellipsoids; with --psnr, at most so many")
+     "number of ellipsoids; with --psnr, the largest number")
     ("size", value<std::string>()->value_name("BYTES"),
-     "write the best file of at most so many bytes: 50000, 50KB, 2.6MB")
+     "write the best file of at most this size: 50000, 50KB, 2.6MB")
     ("ratio", value<double>()->value_name("R"),
-     "write the best file of at most the size of IN.vdb over R")
+     "write the best file of at most the size of IN.vdb divided by R")
     ("psnr", value<double>()->value_name("DB"),
      "write the smallest file that reaches this PSNR over the box")
     ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
     ("max-error", value<std::string>()->value_name("E"),
-     "keep every voxel within E of the source, or within E% of its range: as voxels, or as "
-     "ellipsoids with a residual where these are smaller")
-    ("voxels-only", bool_switch(), "with --max-error, do not try ellipsoids")
+     "keep every voxel within E of the source, or within E% of its range; the file holds voxels, "
+     "or ellipsoids with a residual if these are smaller")
+    ("voxels-only", bool_switch(), "with --max-error, store voxels without trying ellipsoids")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
-     "threshold: voxels are active by their values; exact: store the source's active mask")
+     "threshold: a voxel's value decides whether it is active; exact: store the active mask")
     ("seconds", value<double>()->value_name("S"), "end the fit of each grid after this time")
     ("iterations", value<std::int64_t>()->value_name("N"), "number of iterations of a fit")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
-     "draft, standard or high: sets the count and the iterations that are not given")
+     "draft, standard or high: chooses the count and the iterations if they are not given")
     ("kappa", value<float>()->value_name("K"),
      "edge of the kernel (default: it is fitted with the ellipsoids)")
     ("box", value<std::string>()->value_name("BOX"),
-     "box of voxels x0,y0,z0,x1,y1,z1 over which PSNR is taken (default: the bounding box of the "
-     "active voxels)")
+     "box of voxels x0,y0,z0,x1,y1,z1 over which PSNR is measured (default: the bounding box of "
+     "the active voxels)")
     ("seed", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(FitOptions{}.seed)),
      "seed of the random choices; the same seed gives the same file")
     ("storage", value<std::string>()->value_name("S")->default_value("compact"),
-     "compact (quantised, about 9 bytes an ellipsoid) or float32 (about 34)")
+     "compact (quantised, about 9 bytes per ellipsoid) or float32 (about 34)")
     ("storage-loss",
      value<double>()->value_name("DB")->default_value(defaultLoss, cli::shortNumber(defaultLoss)),
-     "PSNR that --storage compact may cost; --size and --psnr choose it themselves")
+     "PSNR that --storage compact may lose; --size and --psnr ignore this option")
     ("paper", value<std::vector<std::string>>()->value_name("KEY=VALUE,...")->composing(),
      "fit by the paper's method, for comparison; --help paper lists the keys")
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
-     "auto (a GPU where there is one), cpu, cuda or cuda:N")
-    ("max-vram", value<double>()->value_name("GB"), "GPU memory to use (default: what is free)");
+     "auto (a GPU if one is usable), cpu, cuda or cuda:N")
+    ("max-vram", value<double>()->value_name("GB"), "GPU memory to use (default: all free memory)");
   // clang-format on
 }
 
@@ -107,14 +108,14 @@ void addFileOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
-     "fit this grid only; may be repeated; 'density[1]' is the second of that name")
+     "fit this grid only; may be repeated; 'density[1]' is the second grid of that name")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
-     "refuse grids with NaN or infinite voxels, or read these as zero")
+     "refuse: fail on NaN or infinite voxels; zero: replace them by 0")
     ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
-     "keep or discard the best so far when interrupted")
+     "keep or discard the best result so far if the run is interrupted")
     ("report", value<std::string>()->value_name("FILE"),
      "write a JSON report to FILE.json; '-' is stdout")
-    ("hits", bool_switch(), "report how many ellipsoids a voxel meets on average")
+    ("hits", bool_switch(), "report the average number of ellipsoids that reach a voxel")
     ("force,f", bool_switch(), "replace OUT.esvr and the report if they exist");
   // clang-format on
 }
@@ -130,7 +131,7 @@ cli::CommandLine commandLine() {
   return line;
 }
 
-/// A number within [low, high], as the type that takes it.
+/// An option's number, which must be within [low, high], converted to another type.
 template <class To, class From>
 std::optional<To> bounded(const Arguments& arguments, const std::string& option, From low,
                           From high) {
@@ -173,12 +174,12 @@ StorageOptions storageOptions(const Arguments& a) {
           .activity = activity(a)};
 }
 
-/// \throws UsageError  one of the options was given although `given` leaves it no meaning
+/// \throws UsageError  one of the options was given, which `given` excludes
 void refuseWith(const Arguments& a, const std::string& given,
                 std::initializer_list<const char*> options) {
   for (const char* option : options)
     if (a.has(option) && !a.values[option].defaulted())
-      throw UsageError("--" + given + " does not go together with --" + option);
+      throw UsageError("--" + given + " cannot be combined with --" + option);
 }
 
 Goal losslessGoal(const Arguments& a) {
@@ -192,10 +193,10 @@ Goal boundGoal(const Arguments& a) {
   return BoundGoal{bound.amount, bound.relative, a.get<bool>("voxels-only")};
 }
 
-/// The goal of each grid, where no size was asked for.
+/// The goal of each grid; a size replaces it later.
 Goal goalOf(const Arguments& a, const Options& options) {
   if (a.get<bool>("voxels-only") && !a.has("max-error"))
-    throw UsageError("--voxels-only says how --max-error is met; give that too");
+    throw UsageError("--voxels-only needs --max-error");
   if (a.get<bool>("lossless")) return losslessGoal(a);
   if (a.has("max-error")) return boundGoal(a);
   if (options.psnr && !options.convert.fit.seconds && !options.paper)
@@ -209,13 +210,13 @@ void readSize(const Arguments& a, Options& options) {
   options.ratio = bounded<double>(a, "ratio", 1.0, kLargestRatio);
   if (!options.size && !options.ratio) return;
   const std::string given = options.size ? "size" : "ratio";
-  if (options.size && options.ratio) throw UsageError("--size and --ratio are two sizes; give one");
+  if (options.size && options.ratio) throw UsageError("--size cannot be combined with --ratio");
   refuseWith(a, given, {"count", "psnr", "seconds", "paper"});
   if (options.convert.storage.form != Storage::kCompact)
-    throw UsageError("--" + given + " needs --storage compact, where bits can be chosen");
+    throw UsageError("--" + given + " needs --storage compact");
 }
 
-/// The paper stores float32; --storage says otherwise.
+/// Reads --paper. The default storage of the paper's method is float32.
 void readPaper(const Arguments& a, Options& options) {
   const auto given = a.find<std::vector<std::string>>("paper");
   if (!given) return;
@@ -225,7 +226,9 @@ void readPaper(const Arguments& a, Options& options) {
   StorageOptions& storage = options.convert.storage;
   if (a.values["storage"].defaulted()) storage.form = Storage::kFloat32;
   if (options.paper->learnK && storage.form == Storage::kCompact)
-    throw UsageError("--paper k=learned needs --storage float32: the compact form has one edge");
+    throw UsageError(
+        "--paper k=learned needs --storage float32; compact storage has one edge for all "
+        "ellipsoids");
 }
 
 NonFinite nonFinite(const Arguments& a) {

@@ -1,5 +1,5 @@
 #pragma once
-/// What vdb2esvr is asked to do.
+/// The options of vdb2esvr.
 
 #include <filesystem>
 #include <optional>
@@ -14,30 +14,30 @@ namespace esvr::vdb2esvr {
 
 inline constexpr const char* kProgram = "vdb2esvr";
 
-/// What becomes of an interrupted run's best so far.
+/// Whether an interrupted run writes its best state.
 enum class OnCancel { kKeep, kDiscard };
 
 struct Options {
   std::filesystem::path input, output;
-  std::vector<std::string> grids;     ///< empty: all that can be fitted
-  ConvertOptions convert;             ///< the goal of every grid, where no size was asked for
-  std::optional<double> psnr;         ///< dB over the box that every grid was asked to reach
-  std::optional<std::uint64_t> size;  ///< bytes of the file
-  std::optional<double> ratio;        ///< bytes of the input for each byte of the file
-  std::optional<PaperMethod> paper;   ///< in the place of our method
+  std::vector<std::string> grids;     ///< names of the grids; empty: all that can be fitted
+  ConvertOptions convert;             ///< options of every grid; a size replaces the goal
+  std::optional<double> psnr;         ///< PSNR that every grid should reach, dB over the box
+  std::optional<std::uint64_t> size;  ///< largest size of the file, bytes
+  std::optional<double> ratio;        ///< size of the input relative to that of the file
+  std::optional<PaperMethod> paper;   ///< the paper's method, if it replaces ours
   ReadOptions read;
   std::string device = "auto";
   OnCancel onCancel = OnCancel::kKeep;
-  std::string report;      ///< empty: none; cli::kStandardOutput
-  bool countHits = false;  ///< for the report
+  std::string report;      ///< file name, or cli::kStandardOutput; empty: no report
+  bool countHits = false;  ///< whether the report has the average ellipsoid hits
   bool overwrite = false;
-  int threads = 0;  ///< 0: all
+  int threads = 0;  ///< number of threads; 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;
 };
 
-/// \return nothing where --help or --version was printed
-/// \throws UsageError
+/// \return nothing if --help or --version was printed
+/// \throws UsageError  an option is invalid
 [[nodiscard]] std::optional<Options> parseOptions(int argc, const char* const* argv);
 
 }  // namespace esvr::vdb2esvr

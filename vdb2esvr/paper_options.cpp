@@ -19,7 +19,7 @@ constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max(
 constexpr double kMinK = 0.5, kMaxK = 1e4, kMaxNumber = 1e30;
 constexpr const char* kDefault = "default";
 
-/// One setting as it was given.
+/// A given setting.
 struct Setting {
   std::string key, value;
 
@@ -41,7 +41,7 @@ struct Setting {
   [[nodiscard]] std::uint32_t epochs() const { return std::uint32_t(whole(kMaxEpochs)); }
 };
 
-/// Four rates with colons between: position, scale, rotation, intensity.
+/// Reads four rates that are separated by colons: position, scale, rotation, intensity.
 void readRates(const Setting& setting, PaperMethod& method) {
   PaperRates& rates = method.rates;
   std::string_view left = setting.value;
@@ -50,7 +50,7 @@ void readRates(const Setting& setting, PaperMethod& method) {
     const auto number = cli::parseNumber(left.substr(0, colon));
     const bool last = rate == &rates.intensity;
     if (!number || *number < 0.0 || (colon == std::string_view::npos) != last)
-      setting.refuse("four rates from 0 on, as in 2e-4:5e-3:1e-3:1e-2");
+      setting.refuse("four rates of 0 or above, for example 2e-4:5e-3:1e-3:1e-2");
     *rate = *number;
     left.remove_prefix(last ? left.size() : colon + 1);
   }
@@ -70,7 +70,7 @@ void readPasses(const Setting& setting, PaperMethod& method) {
     setting.refuse("0, 1 or 3");
 }
 
-/// One of the words. \throws UsageError  another
+/// \throws UsageError  the value is none of the choices
 template <class T>
 T wordOf(const Setting& setting, std::initializer_list<cli::Choice<T>> choices) {
   return cli::choose<T>("paper " + setting.key, setting.value, choices);
@@ -85,20 +85,21 @@ std::string ratesText(const PaperRates& rates) {
 
 struct Key {
   const char* name;
-  std::string value;  ///< its default, as it would be given; empty: it follows from the volume
+  std::string value;  ///< default value as a text; empty: it follows from the volume
   const char* help;
   std::function<void(const Setting&, PaperMethod&)> read;
 };
 
-/// The keys in the order in which they are applied: the schedules come before what changes a part
-/// of them.
+/// The keys in the order in which they are applied. Keys that set a whole schedule come before
+/// those that change a part of it.
 std::vector<Key> keys() {
   const PaperMethod m;
   const auto text = [](auto number) { return cli::shortNumber(double(number)); };
   return {
       {"prunes", "1", "pruning passes: 0, 1, or 3 (the paper's schedule for BigBrain)", readPasses},
       {"epochs", std::to_string(m.epochs),
-       "rounds through all subvolumes; what is counted in epochs is scaled with it",
+       "number of epochs; an epoch visits every subvolume once. All numbers of epochs\n"
+       "are scaled with it",
        [](const Setting& s, PaperMethod& p) { p = scaledTo(p, s.epochs()); }},
       {"kernel", "ellipsoid", "ellipsoid, or gaussian (Gaussians that end at 3 sigma)",
        [](const Setting& s, PaperMethod& p) {
@@ -107,37 +108,41 @@ std::vector<Key> keys() {
       {"k", text(m.k), "sharpness of the ellipsoids, or 'learned' for each one", readK},
       {"beta", text(m.beta), "share of L1 in the loss; the rest is D-SSIM",
        [](const Setting& s, PaperMethod& p) { p.beta = s.number(0.0, 1.0); }},
-      {"points", std::to_string(m.points), "ellipsoids at the start",
+      {"points", std::to_string(m.points), "number of ellipsoids at the start",
        [](const Setting& s, PaperMethod& p) { p.points = std::size_t(s.whole(kMaxEllipsoids)); }},
-      {"max", std::to_string(m.maxEllipsoids), "ellipsoids at which cloning and splitting end",
+      {"max", std::to_string(m.maxEllipsoids),
+       "number of ellipsoids at which cloning and splitting end",
        [](const Setting& s, PaperMethod& p) {
          p.maxEllipsoids = std::size_t(s.whole(kMaxEllipsoids));
        }},
       {"subvolume", "",
-       "side in voxels of the cubes that are fitted in turn (default: half the\n"
-       "longest axis, or the shortest axis where that is less)",
+       "side of the subvolumes in voxels (default: half the longest axis, or the\n"
+       "shortest axis if that is less)",
        [](const Setting& s, PaperMethod& p) { p.subvolume = int(s.whole(kMaxSide)); }},
       {"rates", ratesText(m.rates),
-       "first learning rates of position, scale, rotation and intensity; all end\nat a tenth",
+       "learning rates of position, scale, rotation and intensity at the start; all\n"
+       "decay to a tenth",
        readRates},
-      {"densify", "on", "on, or off: ellipsoids are neither cloned nor split",
+      {"densify", "on", "densification: on, or off (ellipsoids are neither cloned nor split)",
        [](const Setting& s, PaperMethod& p) {
          p.densify = wordOf<bool>(s, {{"on", true}, {"off", false}});
        }},
-      {"densify-from", std::to_string(m.densifyFrom), "epoch after which they are",
+      {"densify-from", std::to_string(m.densifyFrom), "epoch of the first densification",
        [](const Setting& s, PaperMethod& p) { p.densifyFrom = s.epochs(); }},
-      {"densify-until", std::to_string(m.densifyUntil), "last epoch after which they are",
+      {"densify-until", std::to_string(m.densifyUntil), "last epoch of densification",
        [](const Setting& s, PaperMethod& p) { p.densifyUntil = s.epochs(); }},
-      {"densify-every", std::to_string(m.densifyEvery), "epochs from one time to the next",
+      {"densify-every", std::to_string(m.densifyEvery), "epochs between densifications",
        [](const Setting& s, PaperMethod& p) { p.densifyEvery = s.epochs(); }},
       {"densify-threshold", text(m.gradientThreshold),
-       "length of the gradient by position from which they are",
+       "length of the gradient by position from which an ellipsoid is cloned or split",
        [](const Setting& s, PaperMethod& p) { p.gradientThreshold = s.number(0.0, kMaxNumber); }},
       {"percent-dense", text(m.percentDense),
-       "share of half the longest axis: larger scales are split, smaller cloned",
+       "scale, as a share of half the longest axis, above which ellipsoids are split\n"
+       "instead of cloned",
        [](const Setting& s, PaperMethod& p) { p.percentDense = s.number(1e-9, 1.0); }},
       {"prune-score", "full",
-       "full (coverage * intensity * FA), no-fa, only-fa, or contribution (as\nLightGaussian)",
+       "full (coverage * intensity * FA), no-fa, only-fa, or contribution (the score of\n"
+       "LightGaussian)",
        [](const Setting& s, PaperMethod& p) {
          p.score = wordOf<PruneScore>(s, {{"full", PruneScore::kFull},
                                           {"no-fa", PruneScore::kWithoutFa},
@@ -177,7 +182,7 @@ std::map<std::string, Setting> settingsIn(const std::vector<std::string>& given)
   return settings;
 }
 
-/// A description of several lines, each of them indented.
+/// Indents the lines of a description.
 std::string indented(const std::string& text) {
   std::string result;
   for (const char c : text)
@@ -189,10 +194,10 @@ std::string indented(const std::string& text) {
 
 std::string paperHelp() {
   std::ostringstream out;
-  out << "--paper KEY=VALUE[,KEY=VALUE...] fits by the paper's method, for comparison with it, in\n"
-         "the place of ours. '--paper default' changes no setting. --count is the number of\n"
-         "ellipsoids that the last pruning pass leaves. The file stores float32 unless --storage\n"
-         "is given.\n\nKeys:\n";
+  out << "--paper KEY=VALUE[,KEY=VALUE...] fits by the paper's method instead of ours, for\n"
+         "comparison. '--paper default' changes no setting. --count is the number of ellipsoids\n"
+         "that the last pruning pass keeps. The file stores float32 unless --storage is given.\n"
+         "\nKeys:\n";
   for (const Key& key : keys()) {
     out << "  " << key.name;
     if (!key.value.empty()) out << " (=" << key.value << ")";

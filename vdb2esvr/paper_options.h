@@ -1,5 +1,5 @@
 #pragma once
-/// The option --paper: the paper's method in the place of ours, and its settings as KEY=VALUE.
+/// The option --paper, which replaces our method by the paper's, with settings KEY=VALUE.
 
 #include <string>
 #include <vector>
@@ -11,8 +11,8 @@ namespace esvr::vdb2esvr {
 /// The text of `--help paper`: every key with its default.
 [[nodiscard]] std::string paperHelp();
 
-/// \param given  values of --paper, each a list KEY=VALUE[,KEY=VALUE...], or "default"
-/// \throws UsageError  a key that is not there, twice or with a value that makes no sense
+/// \param given  values of --paper: each is a list KEY=VALUE[,KEY=VALUE...] or "default"
+/// \throws UsageError  a key is unknown, given twice or has an invalid value
 [[nodiscard]] PaperMethod readPaperMethod(const std::vector<std::string>& given);
 
 }  // namespace esvr::vdb2esvr

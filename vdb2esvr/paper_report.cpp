@@ -21,7 +21,7 @@ const char* nameOf(PruneScore score) {
   return "full";
 }
 
-/// Hits are counted only where that was asked for, and some are then above 0.
+/// The average hits, or null if they were not counted (with --hits, they are above 0).
 Json orNull(double hits) { return hits > 0.0 ? Json(hits) : Json(nullptr); }
 
 Json ratesOf(const PaperRates& rates) {

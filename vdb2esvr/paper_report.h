@@ -1,5 +1,5 @@
 #pragma once
-/// What the report says of a run of the paper's method.
+/// The part of the report for a run of the paper's method.
 
 #include <nlohmann/json_fwd.hpp>
 

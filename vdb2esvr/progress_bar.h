@@ -34,7 +34,8 @@ class ProgressBar {
   Clock::time_point lastLine_ = Clock::now();
 };
 
-/// "density  45 % [#########-----------]  51.20 dB  12000 ellipsoids  1:23 left", cut to a width.
+/// The text of the line, cut to a width, for example
+/// "density  45 % [#########-----------]  51.20 dB  12000 ellipsoids  1:23 left".
 [[nodiscard]] std::string progressLine(const std::string& grid, const FitProgress& progress,
                                        std::size_t width);
 

@@ -15,7 +15,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kSchema = "esvr-report";
-constexpr int kSchemaVersion = 1;  // docs/report.md: when it changes
+constexpr int kSchemaVersion = 1;  // docs/report.md says when it changes
 
 const char* nameOf(FitEnd end) {
   switch (end) {
@@ -62,7 +62,7 @@ Json versions() {
           {"cuda", cudaVersions()}};
 }
 
-/// The bound on the error that was asked for, as JSON has it.
+/// The wanted bound on the error.
 Json maxErrorOf(const Goal& goal) {
   const auto* within = std::get_if<BoundGoal>(&goal);
   return within ? Json(within->bound) : Json(nullptr);
@@ -157,7 +157,7 @@ Json compactOf(const ConvertedGrid& grid) {
             {"intensities", bytes.intensities}}}};
 }
 
-/// What a reader gets of the first layers.
+/// The errors of the first importance layers.
 Json layersOf(const StoredGrid& grid) {
   Json layers = Json::array();
   const auto sizes = layerSizes(grid);
@@ -296,7 +296,7 @@ const char* nameOf(ErrorKind kind) {
   return "failure";
 }
 
-/// What every report begins with, whether the run succeeded or not.
+/// The first items of every report, also of a failed run.
 Json head(const Options& options) {
   return {{"schema", kSchema},      {"schema_version", kSchemaVersion},
           {"program", kProgram},    {"command_line", options.commandLine},

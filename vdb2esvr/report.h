@@ -1,5 +1,5 @@
 #pragma once
-/// --report: docs/report.md is its manual.
+/// The JSON report of --report, which docs/report.md describes.
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -11,7 +11,7 @@ namespace esvr::vdb2esvr {
 
 [[nodiscard]] nlohmann::ordered_json makeReport(const Options& options, const RunRecord& record);
 
-/// The report of a run that wrote no file: what was asked, and the error that ended it.
+/// The report of a run that failed: its options and the error.
 [[nodiscard]] nlohmann::ordered_json makeFailureReport(const Options& options, const Error& error);
 
 }  // namespace esvr::vdb2esvr

@@ -52,14 +52,14 @@ void tellSkipped(const std::vector<GridSummary>& skipped, const cli::Log& log) {
 void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
   if (grid.nonFiniteReplaced > 0)
     log.warning("grid \"" + grid.uniqueName + "\": " + std::to_string(grid.nonFiniteReplaced) +
-                " NaN or infinite voxels taken as zero");
+                " NaN or infinite voxels were replaced by 0");
   log.detail("grid \"" + grid.uniqueName + "\": kappa " +
              cli::shortNumber(grid.stored().field.kernel.kappa) + ", threshold " +
              cli::shortNumber(grid.stored().activeThreshold) + ", overlap of active voxels " +
              cli::shortNumber(grid.metrics.iou));
 }
 
-/// Fits one grid after the other until all are done or the run is interrupted.
+/// Converts one grid after the other until all are done or the run is interrupted.
 class FileConversion {
  public:
   FileConversion(const Options& options, const CancelToken& cancel, const cli::Log& log)
@@ -82,7 +82,7 @@ class FileConversion {
  private:
   [[nodiscard]] bool cancelled() const { return options_.convert.fit.cancel->cancelled(); }
 
-  /// \return false where the run was interrupted before the fit had anything
+  /// \return false if the run was interrupted before the fit had a result
   bool convert(const GridSummary& grid, ByteShares& shares, RunRecord& record) try {
     ProgressBar bar(grid.uniqueName, options_.verbosity);
     options_.convert.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
@@ -93,14 +93,15 @@ class FileConversion {
     return false;
   }
 
-  /// A GPU that "auto" took may prove too small: the CPU then does what is left.
+  /// Converts a grid. If the GPU that "auto" selected fails, for example because its memory is too
+  /// small, the CPU converts this grid and all later ones.
   ConvertedGrid convertWhereItFits(const std::string& name, std::optional<std::uint64_t> bytes) {
     if (options_.device != kAuto || options_.convert.fit.device.kind == DeviceKind::kCpu)
       return convertGrid(options_, name, bytes);
     try {
       return convertGrid(options_, name, bytes);
     } catch (const DeviceError& error) {
-      log_.warning(std::string(error.what()) + "; going on with the CPU");
+      log_.warning(std::string(error.what()) + "; continuing on the CPU");
       options_.convert.fit.device = {};
       return convertGrid(options_, name, bytes);
     }
@@ -127,18 +128,19 @@ void tellResult(const Options& options, const RunRecord& record) {
     printSummary(options, record, std::cout);
 }
 
-/// What the user must know though the file is written, by way of the exit code.
+/// Throws the error that gives the exit code of a run that wrote its file but was interrupted or
+/// missed the PSNR.
 void throwWhatIsAmiss(const Options& options, const RunRecord& record) {
   if (record.interrupted) {
-    std::string text = "interrupted; " + options.output.string() + " holds the best so far";
+    std::string text = "interrupted; " + options.output.string() + " has the best result so far";
     for (const auto& name : record.notFitted) text += ", without grid \"" + name + "\"";
     throw RuntimeFailure(text);
   }
   if (const ConvertedGrid* grid = firstBelow(record, options.psnr))
     throw TargetMissed("grid \"" + grid->uniqueName + "\" reached " +
-                       cli::decibels(grid->metrics.psnrBox) + " dB of the " +
-                       cli::decibels(*options.psnr) + " dB asked for; " + options.output.string() +
-                       " is written");
+                       cli::decibels(grid->metrics.psnrBox) + " dB instead of " +
+                       cli::decibels(*options.psnr) + " dB; " + options.output.string() +
+                       " was written");
 }
 
 RunRecord convertFile(const Options& options, const cli::Interrupts& interrupts,
@@ -156,7 +158,7 @@ RunRecord convertFile(const Options& options, const cli::Interrupts& interrupts,
   return record;
 }
 
-/// A failure has a report too.
+/// Converts the file; if that fails, writes a report of the failure.
 RunRecord convertOrReport(const Options& options, const cli::Interrupts& interrupts,
                           const cli::Log& log) try {
   return convertFile(options, interrupts, log);

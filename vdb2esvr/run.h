@@ -1,13 +1,14 @@
 #pragma once
-/// vdb2esvr's job.
+/// The main function of vdb2esvr after its options are read.
 
 #include "vdb2esvr/options.h"
 
 namespace esvr::vdb2esvr {
 
-/// Fits, writes, measures, tells. \return 0
-/// \throws Error  as the parts do; TargetMissed and RuntimeFailure (interrupted) after the file was
-///                written
+/// Reads, fits and measures the grids, writes the file and the report, and prints the summary.
+/// \return 0
+/// \throws Error  any error of its parts; TargetMissed and RuntimeFailure (interrupted) may be
+///                thrown after the file was written
 int run(const Options& options);
 
 }  // namespace esvr::vdb2esvr

@@ -1,5 +1,5 @@
 #pragma once
-/// All that a run can tell: what the summary and the report are made from.
+/// The record of a run, from which the summary and the report are made.
 
 #include <cstdint>
 #include <optional>
@@ -14,8 +14,8 @@ namespace esvr::vdb2esvr {
 
 struct RunRecord {
   VdbSummary input;
-  std::vector<GridSummary> skipped;    ///< they cannot be fitted
-  std::vector<std::string> notFitted;  ///< the run was interrupted before
+  std::vector<GridSummary> skipped;    ///< grids that cannot be fitted
+  std::vector<std::string> notFitted;  ///< grids that an interrupted run did not convert
   std::vector<ConvertedGrid> grids;
   EsvrSummary output;
   bool interrupted = false;
@@ -36,10 +36,10 @@ struct Ratio {
 /// True where the file holds a section of this kind for the grid.
 [[nodiscard]] bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& kind);
 
-/// The first grid that stays below the PSNR asked for; nothing where all reach it.
+/// The first grid below the wanted PSNR; null if all grids reach it.
 [[nodiscard]] const ConvertedGrid* firstBelow(const RunRecord& record, std::optional<double> psnr);
 
-/// The exit code that the run ends with.
+/// The exit code of the run.
 [[nodiscard]] int exitCodeOf(const RunRecord& record, std::optional<double> psnr);
 
 }  // namespace esvr::vdb2esvr

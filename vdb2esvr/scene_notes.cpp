@@ -16,33 +16,33 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   const auto lacks = [&](const char* kind) { return !hasSection(record.output, g, kind); };
 
   if (grid.stored().voxels && grid.conversion.bound && grid.conversion.bound->ellipsoidBytes > 0)
-    return {{"ellipsoids", "voxels alone keep the bound in fewer bytes",
+    return {{"ellipsoids", "voxels keep the bound in fewer bytes",
              grid.conversion.bound->ellipsoidBytes - grid.conversion.bound->voxelBytes}};
-  if (grid.stored().voxels)
-    return {{"ellipsoids", "every voxel was asked for, exactly or within a bound"}};
+  if (grid.stored().voxels) return {{"ellipsoids", "voxels are stored, exactly or within a bound"}};
 
   std::vector<LeftOut> notes;
   const bool compact = grid.conversion.compact.has_value();
   if (!grid.conversion.fit.signedIntensities)
-    notes.push_back({"signs", "no ellipsoid needed an intensity below 0",
+    notes.push_back({"signs", "no ellipsoid has a negative intensity",
                      compact ? ellipsoids / kBitsPerByte : 0});
   if (!compact && lacks("rotations"))
     notes.push_back(
-        {"rotations", "every ellipsoid lies along the axes", ellipsoids * kRotationBytes});
+        {"rotations", "every ellipsoid is aligned with the axes", ellipsoids * kRotationBytes});
   if (lacks("kappas"))
     notes.push_back(
-        {"an edge for each ellipsoid", "one kappa serves the scene", ellipsoids * kFloatBytes});
+        {"an edge for each ellipsoid", "all ellipsoids share one kappa", ellipsoids * kFloatBytes});
   if (lacks("chunks")) notes.push_back({"chunk table", "the grid fits in one chunk"});
   if (grid.stored().topology != TopologyKind::kMask)
     notes.push_back({"voxel masks",
-                     lacks("leaves") ? "a threshold finds the active voxels"
-                                     : "the rule of activity finds them in the stored bricks",
+                     lacks("leaves")
+                         ? "a threshold determines the active voxels"
+                         : "the values determine the active voxels in the stored bricks",
                      grid.bricks * kMaskBytes});
   if (lacks("curve") && !grid.conversion.fit.curve.empty())
-    notes.push_back({"curve", "a size or a PSNR was asked for; the report has it",
+    notes.push_back({"curve", "files with a wanted size or PSNR do not store it; the report has it",
                      grid.conversion.fit.curve.size() * sizeof(TimedCurvePoint)});
   if (!grid.stored().residual)
-    notes.push_back({"residual", "no bound on the largest error was asked for"});
+    notes.push_back({"residual", "no bound on the largest error was given"});
   return notes;
 }
 

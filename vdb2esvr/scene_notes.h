@@ -1,5 +1,5 @@
 #pragma once
-/// What the written file does without, since the scene does not need it.
+/// Lists the parts that a written file does not need to have.
 
 #include <cstdint>
 #include <string>
@@ -11,7 +11,7 @@ namespace esvr::vdb2esvr {
 
 struct LeftOut {
   std::string part, why;
-  std::uint64_t bytesSaved = 0;  ///< before compression; 0 where it cannot be said
+  std::uint64_t bytesSaved = 0;  ///< bytes before compression; 0 if unknown
 };
 
 [[nodiscard]] std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t grid);

@@ -1,5 +1,5 @@
 #pragma once
-/// What a run prints for people.
+/// The table that a run prints.
 
 #include <iosfwd>
 

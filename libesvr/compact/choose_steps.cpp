@@ -8,22 +8,38 @@
 namespace esvr {
 namespace {
 
+constexpr double kParametersPerEllipsoid = 10.0;
+
+// The numbers below were measured on the volumes of docs/lab-notes.md. The budget is the error that
+// rounding may add: the allowed error less the error without rounding.
+
+/// Trials of approach() and of scaleTo().
 constexpr int kFirstTrials = 3, kMaxTrials = 10;
-constexpr double kNear = 1.6;          // a factor of the steps: slopes are alike within
-constexpr double kParameters = 10.0;   // of an ellipsoid
-constexpr double kEnough = 0.93;       // of the budget: the next scaling would gain little
-constexpr double kAim = 0.965;         // of the budget: between that and all of it
-constexpr double kErrorNarrow = 1.05;  // a factor of the steps: less is a hundredth of the bytes
-constexpr double kSizeNarrow = 1.01;
-constexpr double kFullEnough = 0.994;     // of the bytes
-constexpr double kFull = 0.985;           // of the bytes: less was not asked for
-constexpr double kProbe = 1.41421356237;  // half a bit
-constexpr double kMaxChange = 2.0;        // of one stream's step against the others
-constexpr double kMinAdded = 0.02;        // of the budget: below, scale boldly
-constexpr double kMinGuess = 0.02;        // of the error allowed
-constexpr double kLeft = 0.75;            // of the error of rounding, by solving for intensities
-constexpr double kFirstLoss = 0.2;        // of the error: usual where bytes are short
-constexpr double kFine = 0.1;             // of the first guess: adds a hundredth of the budget
+
+/// Streams are balanced at steps within this factor of the goal's; their costs change little there.
+constexpr double kBalanceRange = 1.6;
+/// Factor of the steps of a probe, which removes half a bit of each parameter of a stream.
+constexpr double kProbeFactor = 1.41421356237;
+/// Largest factor by which balancing changes the step of one stream.
+constexpr double kMaxBalanceFactor = 2.0;
+
+/// Share of the budget that a result must use, and the share that scaling aims at.
+constexpr double kSufficientShareOfBudget = 0.93, kAimedShareOfBudget = 0.965;
+/// Share of the bytes that a result should use at least, and the share that ends the search.
+constexpr double kMinShareOfBytes = 0.985, kSufficientShareOfBytes = 0.994;
+/// Factor between met and missed steps at which a search ends; 1.05 is a hundredth of the bytes.
+constexpr double kErrorBracket = 1.05, kSizeBracket = 1.01;
+
+/// Smallest added error, as a share of the budget, from which a correction is computed.
+constexpr double kMinAddedShareOfBudget = 0.02;
+/// Smallest budget for the first guess, as a share of the allowed error.
+constexpr double kMinBudgetShareOfAllowed = 0.02;
+/// Share of the rounding error that remains after solving for the intensities.
+constexpr double kErrorShareAfterSolve = 0.75;
+/// Error that rounding usually adds when bytes are short, as a share of the fit's error.
+constexpr double kUsualAddedShareOfError = 0.2;
+/// Factor of the first guess if no error may be added; it adds a hundredth of the guess's error.
+constexpr double kFinestFactor = 0.1;
 
 constexpr std::array kStreams{&QuantiserSteps::position, &QuantiserSteps::scale,
                               &QuantiserSteps::rotation, &QuantiserSteps::intensity};
@@ -33,41 +49,42 @@ QuantiserSteps scaled(QuantiserSteps steps, double factor) {
   return steps;
 }
 
-/// What a search is for.
+/// The goal of a search.
 class Goal {
  public:
   virtual ~Goal() = default;
   [[nodiscard]] virtual bool met(const Trial& trial) const = 0;
   [[nodiscard]] virtual bool metByFinerSteps() const = 0;
+  /// True if a trial that meets the goal uses enough of the limit.
   [[nodiscard]] virtual bool nearlyMissed(const Trial& trial) const = 0;
-  /// Factor between steps that meet it and steps that do not: less would gain little. Errors jump
-  /// where the lattice does.
-  [[nodiscard]] virtual double narrow() const = 0;
-  /// Of two that meet it, or of two that do not.
+  /// Factor between met and missed steps at which the search ends. Errors are not continuous in the
+  /// steps, so the search need not converge further.
+  [[nodiscard]] virtual double bracket() const = 0;
+  /// Compares two trials that both meet the goal or both miss it.
   [[nodiscard]] virtual bool better(const Trial& a, const Trial& b) const = 0;
-  /// Factor of the steps that should bring a trial to the goal's edge.
+  /// Factor of the steps that should bring a trial to the limit.
   /// \param before  another trial, its steps in the same proportions; may be the trial itself
   [[nodiscard]] virtual double correction(const Trial& trial, const Trial& before) const = 0;
 };
 
-/// An error that is not to be exceeded. What rounding adds grows with the square of the steps.
+/// A limit on the error. The error that rounding adds grows with the square of the steps.
 class ErrorGoal : public Goal {
  public:
-  /// \param base  the error that is there without rounding
+  /// \param base  error without rounding
   ErrorGoal(double allowed, double base) : allowed_(allowed), base_(base) {}
 
   [[nodiscard]] bool met(const Trial& trial) const override { return trial.error <= allowed_; }
   [[nodiscard]] bool metByFinerSteps() const override { return true; }
-  [[nodiscard]] double narrow() const override { return kErrorNarrow; }
+  [[nodiscard]] double bracket() const override { return kErrorBracket; }
   [[nodiscard]] bool nearlyMissed(const Trial& trial) const override {
-    return trial.error >= allowed_ - (1.0 - kEnough) * budget();
+    return trial.error >= allowed_ - (1.0 - kSufficientShareOfBudget) * budget();
   }
   [[nodiscard]] bool better(const Trial& a, const Trial& b) const override {
     return met(a) ? a.bytes < b.bytes : a.error < b.error;
   }
   [[nodiscard]] double correction(const Trial& trial, const Trial&) const override {
-    const double added = std::max(trial.error - base_, kMinAdded * budget());
-    return std::clamp(std::sqrt(kAim * budget() / added), 0.25, 4.0);
+    const double added = std::max(trial.error - base_, kMinAddedShareOfBudget * budget());
+    return std::clamp(std::sqrt(kAimedShareOfBudget * budget() / added), 0.25, 4.0);
   }
 
  private:
@@ -76,69 +93,72 @@ class ErrorGoal : public Goal {
   double allowed_, base_;
 };
 
-/// Bytes that are not to be exceeded. Twice the step saves a bit of every parameter.
+/// A limit on the bytes. Doubling the steps saves one bit of every parameter.
 class SizeGoal : public Goal {
  public:
   SizeGoal(std::uint64_t bytes, std::size_t ellipsoids)
-      : bytes_(bytes), bytesAnOctave_(kParameters / 8.0 * double(ellipsoids)) {}
+      : bytes_(bytes), bytesPerOctave_(kParametersPerEllipsoid / 8.0 * double(ellipsoids)) {}
 
   [[nodiscard]] bool met(const Trial& trial) const override { return trial.bytes <= bytes_; }
   [[nodiscard]] bool metByFinerSteps() const override { return false; }
-  [[nodiscard]] double narrow() const override { return kSizeNarrow; }
+  [[nodiscard]] double bracket() const override { return kSizeBracket; }
   [[nodiscard]] bool nearlyMissed(const Trial& trial) const override {
-    return double(trial.bytes) >= kFullEnough * double(bytes_);
+    return double(trial.bytes) >= kSufficientShareOfBytes * double(bytes_);
   }
   [[nodiscard]] bool better(const Trial& a, const Trial& b) const override {
     if (!met(a)) return a.bytes < b.bytes;
     return fills(a) != fills(b) ? fills(a) : a.error < b.error;
   }
   [[nodiscard]] double correction(const Trial& trial, const Trial& before) const override {
-    const double aim = 0.5 * (1.0 + kFullEnough) * double(bytes_);
+    const double aim = 0.5 * (1.0 + kSufficientShareOfBytes) * double(bytes_);
     const double octaves = (double(trial.bytes) - aim) / slope(trial, before);
     return std::clamp(std::exp2(octaves), 0.05, 20.0);
   }
 
  private:
   [[nodiscard]] bool fills(const Trial& trial) const {
-    return double(trial.bytes) >= kFull * double(bytes_);
+    return double(trial.bytes) >= kMinShareOfBytes * double(bytes_);
   }
 
-  /// Bytes an octave, as far as two trials tell: less where parameters have no bits left to lose.
+  /// Bytes saved by doubling the steps, measured from two trials. It is less than bytesPerOctave_
+  /// if some parameters have no bits left.
   [[nodiscard]] double slope(const Trial& a, const Trial& b) const {
     const double octaves = std::log2(a.steps.scale / b.steps.scale);
-    if (octaves == 0.0) return bytesAnOctave_;
+    if (octaves == 0.0) return bytesPerOctave_;
     const double measured = (double(b.bytes) - double(a.bytes)) / octaves;
-    return std::clamp(measured, 0.2 * bytesAnOctave_, 1.5 * bytesAnOctave_);
+    return std::clamp(measured, 0.2 * bytesPerOctave_, 1.5 * bytesPerOctave_);
   }
 
   std::uint64_t bytes_;
-  double bytesAnOctave_;
+  double bytesPerOctave_;
 };
 
-/// Independent roundings, each with a variance of a twelfth of its step's square.
+/// Equal steps that should add an error. Rounding errors are taken as independent, each with a
+/// variance of step^2 / 12.
 QuantiserSteps stepsThatAdd(double error, std::size_t ellipsoids) {
-  const double step = std::sqrt(12.0 * error / (kLeft * kParameters * double(ellipsoids)));
+  const double roundings = kParametersPerEllipsoid * double(ellipsoids);
+  const double step = std::sqrt(12.0 * error / (kErrorShareAfterSolve * roundings));
   return {step, step, step, step};
 }
 
-/// Steps scaled together until a goal is near.
+/// Scales all steps together until they are within kBalanceRange of the goal's.
 Trial approach(TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps) {
   Trial trial = maker.make(steps);
   for (int n = 1; n < kFirstTrials; ++n) {
     const double factor = goal.correction(trial, trial);
-    if (factor < kNear && factor > 1.0 / kNear) break;
+    if (factor < kBalanceRange && factor > 1.0 / kBalanceRange) break;
     trial = maker.make(scaled(trial.steps, factor));
   }
   return trial;
 }
 
-/// Steps scaled together until a goal is all but missed.
+/// Scales all steps together until the limit is used well.
 Trial scaleTo(TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps) {
   Trial best = maker.make(steps);
   Trial last = best, before = best;
-  double high = HUGE_VAL, low = 0.0, factor = 1.0;  // factors known to lie beyond and short of it
+  double high = HUGE_VAL, low = 0.0, factor = 1.0;  // the bracket of the wanted factor
   for (int n = 1; n < kMaxTrials; ++n) {
-    if (goal.met(best) && (goal.nearlyMissed(best) || high < goal.narrow() * low)) break;
+    if (goal.met(best) && (goal.nearlyMissed(best) || high < goal.bracket() * low)) break;
     (goal.met(last) == goal.metByFinerSteps() ? low : high) = factor;
     factor *= goal.correction(last, before);
     if (factor <= low || factor >= high)
@@ -150,20 +170,21 @@ Trial scaleTo(TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps) 
   return best;
 }
 
-/// What half a bit less of one stream does.
+/// The effect of removing half a bit from each parameter of one stream.
 struct Probe {
-  double added = 0.0;  ///< error of a sample: no unit
-  double saved = 0.0;  ///< bytes
+  double added = 0.0;  ///< added error on the sampled bricks
+  double saved = 0.0;  ///< saved bytes
 
-  /// Error added by a byte saved: 0 where coarser costs nothing, infinite where it saves nothing.
+  /// Added error per saved byte: 0 if coarser steps add no error, infinite if they save nothing.
   [[nodiscard]] double slope() const { return saved > 0.0 ? added / saved : HUGE_VAL; }
 };
 using Probes = std::array<Probe, kStreams.size()>;
 
 Probes probe(TrialMaker& maker, const QuantiserSteps& steps) {
-  std::array<QuantiserSteps, 1 + kStreams.size()> tried;  // as they are, then one coarser each
+  // the given steps, then for each stream the same with a coarser step of this stream
+  std::array<QuantiserSteps, 1 + kStreams.size()> tried;
   tried.fill(steps);
-  for (std::size_t k = 0; k < kStreams.size(); ++k) tried[1 + k].*kStreams[k] *= kProbe;
+  for (std::size_t k = 0; k < kStreams.size(); ++k) tried[1 + k].*kStreams[k] *= kProbeFactor;
   const auto trials = maker.sample(tried);
   Probes probes;
   for (std::size_t k = 0; k < probes.size(); ++k)
@@ -172,7 +193,7 @@ Probes probe(TrialMaker& maker, const QuantiserSteps& steps) {
   return probes;
 }
 
-/// The geometric mean of slopes that are neither 0 nor infinite; 0 where there are none.
+/// The geometric mean of the slopes that are neither 0 nor infinite; 0 if there are none.
 double meanSlope(const Probes& probes) {
   double sum = 0.0;
   int counted = 0;
@@ -181,15 +202,15 @@ double meanSlope(const Probes& probes) {
   return counted > 0 ? std::exp(sum / counted) : 0.0;
 }
 
-/// Factor of a stream's step that makes its slope the mean one: a stream's cost grows with the
-/// square of its step.
+/// The factor of a stream's step that makes its slope equal to the mean. The added error grows with
+/// the square of the step.
 double changeOf(const Probe& probe, double mean) {
-  const double change = probe.slope() > 0.0 ? std::sqrt(mean / probe.slope()) : kMaxChange;
-  return std::clamp(change, 1.0 / kMaxChange, kMaxChange);
+  const double change = probe.slope() > 0.0 ? std::sqrt(mean / probe.slope()) : kMaxBalanceFactor;
+  return std::clamp(change, 1.0 / kMaxBalanceFactor, kMaxBalanceFactor);
 }
 
-/// What a saved byte costs must be the same in every stream.
-/// \return  steps, and the error and the bytes to expect of them
+/// Changes the steps so that a saved byte adds the same error in every stream.
+/// \return the new steps, with the expected error and bytes
 Trial balanced(TrialMaker& maker, const Trial& here) {
   const Probes probes = probe(maker, here.steps);
   const double mean = meanSlope(probes);
@@ -198,9 +219,9 @@ Trial balanced(TrialMaker& maker, const Trial& here) {
   for (std::size_t k = 0; k < probes.size(); ++k) {
     const double change = changeOf(probes[k], mean);
     steps.*kStreams[k] *= change;
-    // twice the square of a step adds as much error as there is of it
+    // the probe doubles the square of the step, so it adds as much error as there was before
     before += probes[k].added, after += probes[k].added * change * change;
-    saved += probes[k].saved * std::log(change) / std::log(kProbe);
+    saved += probes[k].saved * std::log(change) / std::log(kProbeFactor);
   }
   const double added = std::max(here.error - maker.leastError(), 0.0);
   return {steps,
@@ -211,23 +232,22 @@ Trial balanced(TrialMaker& maker, const Trial& here) {
 }
 
 Trial search(TrialMaker& maker, const Goal& goal, const QuantiserSteps& guess) {
-  const Trial near = approach(maker, goal, guess);
-  const Trial expected = balanced(maker, near);
+  const Trial expected = balanced(maker, approach(maker, goal, guess));
   return scaleTo(maker, goal, scaled(expected.steps, goal.correction(expected, expected)));
 }
 
 }  // namespace
 
 Trial chooseStepsWithin(TrialMaker& maker, double allowed) {
-  const double left = std::max(allowed - maker.leastError(), kMinGuess * allowed);
-  const QuantiserSteps guess = stepsThatAdd(left, maker.count());
-  if (maker.leastError() >= allowed) return maker.make(scaled(guess, kFine));
+  const double budget = std::max(allowed - maker.leastError(), kMinBudgetShareOfAllowed * allowed);
+  const QuantiserSteps guess = stepsThatAdd(budget, maker.count());
+  if (maker.leastError() >= allowed) return maker.make(scaled(guess, kFinestFactor));
   return search(maker, ErrorGoal(allowed, maker.leastError()), guess);
 }
 
 Trial chooseStepsFor(TrialMaker& maker, std::uint64_t bytes) {
-  const double likely = kFirstLoss * std::max(maker.error(), maker.invisibleError());
-  return search(maker, SizeGoal(bytes, maker.count()), stepsThatAdd(likely, maker.count()));
+  const double added = kUsualAddedShareOfError * std::max(maker.error(), maker.negligibleError());
+  return search(maker, SizeGoal(bytes, maker.count()), stepsThatAdd(added, maker.count()));
 }
 
 }  // namespace esvr

@@ -1,5 +1,5 @@
 #pragma once
-/// Which parameter gets how many bits.
+/// Rate control: chooses the quantisation steps of the four parameter streams.
 
 #include <cstdint>
 
@@ -7,14 +7,14 @@
 
 namespace esvr {
 
-/// The smallest of the trials that stay within an error: what a bit of each stream costs and brings
-/// is measured and made equal, then all steps are scaled together. Where no trial stays within the
-/// error, the one with the smallest error.
-/// \param allowed  sum of squares over the box
+/// Searches the smallest trial whose error does not exceed a limit. It measures the error that each
+/// stream adds for a saved byte, changes the steps so that these costs become equal, and then
+/// scales all steps together. If no trial keeps the limit, the result is the one of smallest error.
+/// \param allowed  largest sum of squares over the box
 [[nodiscard]] Trial chooseStepsWithin(TrialMaker& maker, double allowed);
 
-/// The other way round: the smallest error of the trials of at most so many bytes; where none is,
-/// the smallest.
+/// Searches the trial of smallest error that takes at most `bytes`, in the same way. If no trial is
+/// that small, the result is the smallest one.
 [[nodiscard]] Trial chooseStepsFor(TrialMaker& maker, std::uint64_t bytes);
 
 }  // namespace esvr

@@ -25,7 +25,7 @@ double weightOf(const Ellipsoids& e, std::size_t i) {
   return std::abs(double(e.intensity[i])) * std::exp(0.5 * volume);
 }
 
-/// Heaviest first; of equals those that come first.
+/// All ellipsoids, the heaviest first; ellipsoids of equal weight keep their order.
 std::vector<Weighed> weigh(const Field& field) {
   std::vector<Weighed> all;
   for (std::size_t c = 0; c < field.chunks.size(); ++c)
@@ -42,7 +42,7 @@ void keep(const std::vector<std::size_t>& places, std::vector<float>& values) {
   values.resize(places.size());
 }
 
-/// \param places  increasing
+/// \param places  increasing indices
 void keep(const std::vector<std::size_t>& places, Ellipsoids& e) {
   for (auto& plane : e.center) keep(places, plane);
   for (auto& plane : e.logScale) keep(places, plane);

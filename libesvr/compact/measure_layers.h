@@ -1,5 +1,5 @@
 #pragma once
-/// How far off the first layers of a grid are.
+/// Errors of the importance layers of a grid.
 
 #include <vector>
 
@@ -9,8 +9,9 @@
 
 namespace esvr {
 
-/// For each prefix of the layers, the voxels that a reader gets of it against the source; nothing
-/// where there is but one layer. \param box  of the PSNR
+/// Compares the voxels that a reader gets from the first k layers with the source, for each k.
+/// \param box  box over which PSNR is measured
+/// \return a row for each k; empty if there is only one layer
 [[nodiscard]] std::vector<LayerError> measureLayers(const StoredGrid& grid,
                                                     const SparseVolume& source, const Box& box);
 

@@ -15,38 +15,41 @@
 namespace esvr {
 namespace {
 
-// What evaluateBricks may be off by, of the sum of |I| (field.h); two machines twice that.
-constexpr double kOff = 2.0 * 4e-6, kOffStretched = 2.0 * 2e-4;
-constexpr double kStretched = 4.6;        // logarithm of an aspect of 100
-constexpr double kMaxMargin = 1.0 / 6.0;  // of the bound
+/// Largest difference of evaluateBricks between two machines, as a share of the sum of |I|: twice
+/// the error that field.h states, for aspect ratios up to 100 and up to 1000.
+constexpr double kDifference = 2.0 * 4e-6, kDifferenceStretched = 2.0 * 2e-4;
+constexpr double kStretchedLog = 4.6;  // natural logarithm of an aspect ratio of 100
+/// Largest margin, as a share of the bound; with more, voxels alone take fewer bytes.
+constexpr double kMaxMarginShare = 1.0 / 6.0;
 
-// By value, a voxel within half the bound of the background becomes it.
-constexpr double kThreshold = 0.5;
-constexpr double kRoundedOff = 0.99;  // of a step: for what rounding to float32 adds
+/// Activity threshold as a share of the bound, for grids whose voxels are active by value.
+constexpr double kThresholdShare = 0.5;
+/// Factor of the quantisation step that leaves room for the rounding to float32.
+constexpr double kRoundingFactor = 0.99;
 
-/// What every voxel has room for: where it may become the background and must not, a part of two
-/// bounds is lost to the threshold, and margins at either end.
+/// The largest quantisation step with which every voxel has a code that keeps the bound. By value,
+/// the threshold takes a part of the interval, and the margin counts once more.
 double stepOf(bool byValue, double bound, double margin) {
-  return kRoundedOff *
-         (byValue ? (2.0 - kThreshold) * bound - 3.0 * margin : 2.0 * bound - 2.0 * margin);
+  return kRoundingFactor *
+         (byValue ? (2.0 - kThresholdShare) * bound - 3.0 * margin : 2.0 * bound - 2.0 * margin);
 }
 
-/// How far apart two evaluations of each brick may be.
+/// The largest difference between two machines' evaluations of each brick.
 std::vector<double> marginsOf(const Field& field, std::span<const Coord> corners) {
-  std::vector<double> off;
+  std::vector<double> differences;
   for (const Chunk& chunk : field.chunks) {
     const Ellipsoids& e = chunk.ellipsoids;
     for (std::size_t i = 0; i < e.size(); ++i) {
       const auto [low, high] = std::minmax({e.logScale[0][i], e.logScale[1][i], e.logScale[2][i]});
-      off.push_back(std::abs(double(e.intensity[i])) *
-                    (high - low < kStretched ? kOff : kOffStretched));
+      differences.push_back(std::abs(double(e.intensity[i])) *
+                            (high - low < kStretchedLog ? kDifference : kDifferenceStretched));
     }
   }
   const BrickPairs pairs = planEvaluation(field, corners).pairs;
-  std::vector<double> margins(corners.size(), kOff * std::abs(double(field.background)));
+  std::vector<double> margins(corners.size(), kDifference * std::abs(double(field.background)));
   for (std::size_t b = 0; b < corners.size(); ++b)
     for (std::uint32_t p = pairs.brickBegin[b]; p < pairs.brickBegin[b + 1]; ++p)
-      margins[b] += off[pairs.ellipsoid[p]];
+      margins[b] += differences[pairs.ellipsoid[p]];
   return margins;
 }
 
@@ -56,7 +59,7 @@ std::vector<Coord> cornersOf(const SparseVolume& volume) {
   return corners;
 }
 
-/// All bricks that may hold an active voxel, of the source or of the sum.
+/// All bricks that may contain an active voxel of the source or of the sum.
 std::vector<Coord> bricksOfEither(const StoredGrid& grid, const SparseVolume& source) {
   if (grid.topology != TopologyKind::kThreshold) return grid.leaves;
   const auto own = cornersOf(source), reached = reachedBricks(grid.field);
@@ -65,32 +68,34 @@ std::vector<Coord> bricksOfEither(const StoredGrid& grid, const SparseVolume& so
   return all;
 }
 
-/// Chooses codes.
+/// Chooses the codes of a residual that keeps a bound.
 class Bounded {
  public:
-  /// \param margin  the largest of a brick
+  /// \param margin  largest margin of a brick
   Bounded(const StoredGrid& grid, double bound, double margin)
       : bound_(bound),
         background_(grid.field.background),
         byValue_(grid.topology == TopologyKind::kThreshold),
-        threshold_(byValue_ ? kThreshold * bound : 0.0),
+        threshold_(byValue_ ? kThresholdShare * bound : 0.0),
         divisor_(1.0 / stepOf(byValue_, bound, margin)) {}
 
   [[nodiscard]] float threshold() const { return float(threshold_); }
   [[nodiscard]] double divisor() const { return divisor_; }
 
-  /// The smallest code that serves; nothing where none does. \param sum  the value without it
+  /// A code that keeps the bound, 0 if possible; nothing if there is none.
+  /// \param sum  value of the voxel without a residual
   [[nodiscard]] std::optional<std::int32_t> codeFor(float wanted, float sum, double margin) const {
-    if (serves(wanted, sum, margin)) return 0;
-    const auto near = std::int32_t(std::lround((double(wanted) - sum) * divisor_));
-    for (const std::int32_t code : {near, near - 1, near + 1})
-      if (serves(wanted, format::corrected(sum, code, divisor_), margin)) return code;
+    if (keepsBound(wanted, sum, margin)) return 0;
+    const auto nearest = std::int32_t(std::lround((double(wanted) - sum) * divisor_));
+    for (const std::int32_t code : {nearest, nearest - 1, nearest + 1})
+      if (keepsBound(wanted, format::corrected(sum, code, divisor_), margin)) return code;
     return std::nullopt;
   }
 
  private:
-  /// A voxel that may come back as `value` or, near the threshold, as the background.
-  [[nodiscard]] bool serves(float wanted, float value, double margin) const {
+  /// True if a voxel of this decoded value keeps the bound. Near the threshold, it must be kept
+  /// both by the value and by the background, since another machine may decode either.
+  [[nodiscard]] bool keepsBound(float wanted, float value, double margin) const {
     const double activity = std::abs(double(value) - background_);
     const bool mayStay = !byValue_ || activity > threshold_ - margin;
     const bool mayGo = byValue_ && activity <= threshold_ + margin;
@@ -109,7 +114,7 @@ struct BrickCodes {
   std::array<std::int32_t, kBrickVoxels> codes{};
 };
 
-/// The codes of one brick. \return false where a voxel has none
+/// Fills the codes of one brick. \return false if a voxel has no code that keeps the bound
 bool fillCodes(const Bounded& bounded, std::span<const float> wanted, const BrickMask* mask,
                std::span<const float> sum, double margin, BrickCodes& out) {
   for (std::size_t v = 0; v < kBrickVoxels; ++v) {
@@ -137,7 +142,7 @@ VoxelLayer layerOf(const std::vector<BrickCodes>& bricks, double divisor) {
   return layer;
 }
 
-/// The sum in bricks, every voxel active.
+/// The sum in the given bricks, with all voxels active.
 SparseVolume sumIn(const StoredGrid& grid, std::span<const Coord> corners) {
   return revoxelise(grid.field, {.threshold = -std::numeric_limits<float>::max(),
                                  .range = voxelRule(grid).range,
@@ -152,16 +157,16 @@ std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& sour
   const auto corners = bricksOfEither(grid, source);
   const auto margins = marginsOf(grid.field, corners);
   const double margin = margins.empty() ? 0.0 : *std::max_element(margins.begin(), margins.end());
-  if (margin > kMaxMargin * bound) return std::nullopt;
+  if (margin > kMaxMarginShare * bound) return std::nullopt;
   const Bounded bounded(grid, bound, margin);
   const SparseVolume sum = sumIn(grid, corners);
-  const std::vector<float> nothing(kBrickVoxels, source.background);
+  const std::vector<float> emptyBrick(kBrickVoxels, source.background);
   std::vector<BrickCodes> bricks;
   for (std::size_t b = 0; b < corners.size(); ++b) {
     const auto at = findBrick(source, brickOf(corners[b]) - brickOf(source.origin));
     BrickCodes brick{corners[b], {}};
     const BrickMask* mask = grid.mask.empty() ? nullptr : &grid.mask[b];
-    if (!fillCodes(bounded, at ? source.brickValues(*at) : std::span<const float>(nothing), mask,
+    if (!fillCodes(bounded, at ? source.brickValues(*at) : std::span<const float>(emptyBrick), mask,
                    sum.brickValues(b), margins[b], brick))
       return std::nullopt;
     if (std::any_of(brick.codes.begin(), brick.codes.end(), [](auto code) { return code != 0; }))

@@ -13,16 +13,18 @@
 namespace esvr {
 namespace {
 
-constexpr double kInvisiblePsnr = 110.0;
+/// PSNR, dB, above which a loss by quantising does not matter.
+constexpr double kNegligiblePsnr = 110.0;
 
-/// Of the solver. Rounded shapes begin with the intensities of the float32 ones: what three
-/// iterations leave is a thousandth of the error.
+/// Iterations of the solver: for the float32 shapes, and for rounded shapes, which start from the
+/// intensities of the float32 ones. Further iterations would change the error of a trial by a
+/// thousandth (measured on the volumes of docs/lab-notes.md).
 constexpr int kFirstIterations = 8, kIterations = 3;
 
-/// One of so many cubes of bricks is a sample, where there are bricks enough to tell.
-constexpr std::int32_t kSampled = 4;
-constexpr int kCubeLog2 = 2;  // of its side, in bricks
-constexpr std::size_t kMinSampled = 1024;
+/// A sample takes one of kCubesPerSample cubes of 4^3 bricks. Smaller volumes are not sampled.
+constexpr std::int32_t kCubesPerSample = 4;
+constexpr int kCubeSideLog2 = 2;  // in bricks
+constexpr std::size_t kMinBricksToSample = 1024;
 
 std::vector<std::vector<double>> byChunk(const Field& field, const std::vector<double>& all) {
   std::vector<std::vector<double>> result;
@@ -35,7 +37,8 @@ std::vector<std::vector<double>> byChunk(const Field& field, const std::vector<d
   return result;
 }
 
-/// Intensities become what is stored of them. \param intensities  of all chunks
+/// Quantises new intensities of a trial and dequantises its field.
+/// \param intensities  intensities of all chunks, in the file's order
 void storeIntensities(std::span<const float> intensities, Trial& trial) {
   for (std::size_t c = 0; c < trial.quantised.size(); ++c) {
     QuantisedEllipsoids& q = trial.quantised[c];
@@ -45,7 +48,7 @@ void storeIntensities(std::span<const float> intensities, Trial& trial) {
   }
 }
 
-/// Fits the intensities to the shapes of the trial's field, and rounds them.
+/// Solves for the intensities with the shapes of the trial's field, and rounds them.
 void solveIntensities(IntensityProblem& problem, Trial& trial) {
   problem.setShapes(trial.field);
   const auto before = intensitiesOf(trial.field);
@@ -54,20 +57,20 @@ void solveIntensities(IntensityProblem& problem, Trial& trial) {
   storeIntensities(intensities, trial);
   trial.error = problem.error(intensitiesOf(trial.field)).squares;
   if (trial.error <= least) return;
-  intensities = before;  // a shorter step, if there is one that serves
+  intensities = before;  // the solver may find a shorter step that reduces the error
   (void)problem.solve(intensities, kIterations);
   storeIntensities(intensities, trial);
   trial.error = problem.error(intensitiesOf(trial.field)).squares;
 }
 
-/// Empty where there are too few.
+/// A sample of the bricks; empty if there are too few bricks.
 std::vector<Coord> sampleOf(std::vector<Coord> corners) {
-  if (corners.size() < kMinSampled) return {};
+  if (corners.size() < kMinBricksToSample) return {};
   std::erase_if(corners, [](Coord corner) {
     const Coord brick = brickOf(corner);
     const std::int32_t cube =
-        (brick.x >> kCubeLog2) + (brick.y >> kCubeLog2) + (brick.z >> kCubeLog2);
-    return (cube & (kSampled - 1)) != 0;
+        (brick.x >> kCubeSideLog2) + (brick.y >> kCubeSideLog2) + (brick.z >> kCubeSideLog2);
+    return (cube & (kCubesPerSample - 1)) != 0;
   });
   return corners;
 }
@@ -82,8 +85,8 @@ std::size_t layersOf(const Trial& trial) {
   return layers;
 }
 
-/// A trial's intensities, zero beyond the first layers.
-std::vector<float> ofFirstLayers(const Trial& trial, std::size_t layers) {
+/// The intensities of a trial's first layers; those of the other layers are zero.
+std::vector<float> intensitiesOfFirstLayers(const Trial& trial, std::size_t layers) {
   std::vector<float> all = intensitiesOf(trial.field);
   auto chunk = all.begin();
   for (const auto& q : trial.quantised) {
@@ -118,9 +121,10 @@ double TrialMaker::squaresOf(double psnr) const {
   return peak_ * peak_ * target_.box.volume() * std::pow(10.0, -psnr / 10.0);
 }
 
-double TrialMaker::invisibleError() const { return squaresOf(kInvisiblePsnr); }
+double TrialMaker::negligibleError() const { return squaresOf(kNegligiblePsnr); }
 
-/// The field then has rounded shapes and its old intensities, in the file's order.
+/// Quantises each chunk. The trial's field then has rounded shapes and its old intensities, in the
+/// file's order.
 void TrialMaker::quantiseChunks(Trial& trial) const {
   trial.quantised.resize(field_.chunks.size());
   tbb::parallel_for(std::size_t{0}, field_.chunks.size(), [&](std::size_t c) {
@@ -152,7 +156,8 @@ std::vector<Trial> TrialMaker::make(std::span<const QuantiserSteps> steps,
     trials[k] = {steps[k], field_, {}, 0.0, 0};
     quantiseChunks(trials[k]);
   });
-  for (Trial& trial : trials) solveIntensities(problem, trial);  // with all threads, or the GPU
+  // one after the other, since each solution takes all threads or the GPU
+  for (Trial& trial : trials) solveIntensities(problem, trial);
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t k) { countBytes(trials[k]); });
   return trials;
 }
@@ -163,7 +168,7 @@ std::vector<LayerError> TrialMaker::layerErrors(const Trial& trial) {
   if (layers < 2) return errors;
   problem_.setShapes(trial.field);
   for (std::size_t k = 1; k <= layers; ++k) {
-    const StoredError error = problem_.error(ofFirstLayers(trial, k));
+    const StoredError error = problem_.error(intensitiesOfFirstLayers(trial, k));
     errors.push_back(
         {float(psnr(error.squares / target_.box.volume(), peak_)), float(error.largest)});
   }

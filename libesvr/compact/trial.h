@@ -1,5 +1,5 @@
 #pragma once
-/// A grid quantised with given steps: what it costs and how far it is off.
+/// Quantises a grid with given steps and measures its size and error.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,13 +16,13 @@ namespace esvr {
 
 struct Trial {
   QuantiserSteps steps;
-  Field field;  ///< what a reader gets
+  Field field;  ///< dequantised field, which a reader gets
   std::vector<QuantisedEllipsoids> quantised;
-  double error = 0.0;       ///< sum of squares over the box
-  std::uint64_t bytes = 0;  ///< of the ellipsoids
+  double error = 0.0;       ///< sum of squared errors over the box
+  std::uint64_t bytes = 0;  ///< bytes of the ellipsoids' sections
 };
 
-/// What is measured against: where it counts, and where the work is done.
+/// The reference of the measurements, the box that counts and the device that computes.
 struct TrialTarget {
   const SparseVolume& source;
   Box box;
@@ -34,29 +34,29 @@ class TrialMaker {
   /// Grid and source must outlive the maker. \throws DeviceError  the GPU cannot be used
   TrialMaker(const StoredGrid& grid, const TrialTarget& target);
 
-  /// Sum of squares over the box of a PSNR.
+  /// The sum of squares over the box that corresponds to a PSNR in dB.
   [[nodiscard]] double squaresOf(double psnr) const;
 
-  /// Where the fit is exact, or nearly, there is nothing to compare a loss with: an error that no
-  /// one sees.
-  [[nodiscard]] double invisibleError() const;
+  /// A sum of squares that is always allowed. It takes the place of a relative loss if the fit is
+  /// exact or nearly exact.
+  [[nodiscard]] double negligibleError() const;
 
   /// Error of the float32 field.
   [[nodiscard]] double error() const { return error_; }
-  /// The same with the intensities that serve its shapes best: what finer steps come near to.
+  /// Error of the float32 field with optimal intensities, which is the limit of fine steps.
   [[nodiscard]] double leastError() const { return leastError_; }
   [[nodiscard]] std::size_t count() const { return field_.ellipsoidCount(); }
 
-  /// Rounds the shapes, fits the intensities to what became of them, and rounds these.
+  /// Rounds the shapes, solves for the intensities with the rounded shapes, and rounds these.
   [[nodiscard]] Trial make(const QuantiserSteps& steps);
-  /// Several at once, each as it would be alone.
+  /// Makes several trials at once, each with the same result as alone.
   [[nodiscard]] std::vector<Trial> make(std::span<const QuantiserSteps> steps);
-  /// The same to compare with one another: their errors are of a part of the bricks, and so is the
-  /// fit of their intensities. Bytes are of all.
+  /// Makes trials for comparison with each other. The intensities are solved and the errors are
+  /// measured on a sample of the bricks only; the bytes are those of all ellipsoids.
   [[nodiscard]] std::vector<Trial> sample(std::span<const QuantiserSteps> steps);
 
-  /// How far off each prefix of the layers is, the last the trial itself; nothing where there is
-  /// but one layer.
+  /// The error of the first k layers for each k; the last row is the trial itself. Empty if there
+  /// is only one layer.
   [[nodiscard]] std::vector<LayerError> layerErrors(const Trial& trial);
 
  private:
@@ -68,8 +68,8 @@ class TrialMaker {
   std::vector<Coord> sampleBricks_;
   IntensityTarget sampleTarget_;
   IntensityProblem problem_, sampleProblem_;
-  Field field_;  ///< float32, with its best intensities: those of rounded shapes are not far
-  std::vector<std::vector<double>> curvature_;  ///< by chunk
+  Field field_;  ///< float32 field with optimal intensities, from which the trials' solver starts
+  std::vector<std::vector<double>> curvature_;  ///< sum of phi^2 of each ellipsoid, by chunk
   double peak_, error_ = 0.0, leastError_ = 0.0;
 };
 

@@ -10,7 +10,7 @@
 namespace esvr::convert {
 namespace {
 
-constexpr std::uint32_t kShortShare = 4;  // a short fit has one of so many iterations
+constexpr std::uint32_t kShortFitDivisor = 4;  // a full fit has 4 times the iterations
 
 FitOptions optionsFor(const Job& job, std::size_t count, FitLength length) {
   FitOptions options = job.options.fit;
@@ -34,7 +34,7 @@ double psnrOf(const Job& job, const StoredGrid& grid) {
 
 FitOptions shortened(FitOptions options) {
   if (options.iterations)
-    options.iterations = std::max(*options.iterations / kShortShare, 1u);
+    options.iterations = std::max(*options.iterations / kShortFitDivisor, 1u);
   else
     options.preset = Preset::kDraft;
   return options;

@@ -1,5 +1,5 @@
 #pragma once
-/// One fit of a search, stored as float32: what searches for a size and for a PSNR are made of.
+/// Attempts of the searches for a size and for a PSNR: a fit, and its stored grid.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,47 +10,47 @@
 
 namespace esvr::convert {
 
-/// What a search converts, and how. It borrows both.
+/// The input and the options of a search. A job does not own them.
 struct Job {
   const ConvertInput& input;
   const ConvertOptions& options;
 };
 
-/// The same fit, shorter: a draft, or a quarter of the iterations where their number is given.
+/// Options of a short fit: a quarter of the iterations if their number is given, else a draft.
 [[nodiscard]] FitOptions shortened(FitOptions options);
 
 enum class FitLength { kShort, kWhole };
 
 struct Attempt {
-  FitResult fit;    ///< without its field
-  StoredGrid grid;  ///< float32
-  double psnr = 0.0;
-  std::size_t asked = 0;  ///< ellipsoids; the grid may hold fewer
+  FitResult fit;          ///< its field was moved to the grid
+  StoredGrid grid;        ///< grid in float32
+  double psnr = 0.0;      ///< dB over the box
+  std::size_t asked = 0;  ///< wanted number of ellipsoids; the grid may have fewer
 
   [[nodiscard]] std::size_t count() const { return grid.field.ellipsoidCount(); }
   [[nodiscard]] bool cancelled() const { return fit.end == FitEnd::kCancelled; }
 };
 
-/// Fits about so many ellipsoids: at least one, at most as many as there are active voxels.
+/// Fits about `count` ellipsoids: at least one, and at most the number of active voxels.
 [[nodiscard]] Attempt attempt(const Job& job, double count, FitLength length);
 
-/// PSNR that quantising costs where bytes are short, dB: there the same bytes do as much in more
-/// ellipsoids as in more bits. Measured on six volumes of docs/benchmarks.md.
+/// Loss of PSNR by quantising, dB, at which further bytes gain as much in more ellipsoids as in
+/// more bits. Measured on six volumes of docs/benchmarks.md.
 inline constexpr double kUsualLoss = 0.9;
 
-/// How an attempt is to be stored: at most this loss, unless a PSNR or a number of bytes is given.
+/// The goal of storing an attempt: `loss`, unless a PSNR or a number of bytes is given.
 struct StorageTarget {
   double loss = kUsualLoss;
   std::optional<double> psnr{};          ///< dB over the box
-  std::optional<std::uint64_t> bytes{};  ///< of the ellipsoids' section
+  std::optional<std::uint64_t> bytes{};  ///< bytes of the ellipsoids' sections
 };
 [[nodiscard]] CompactResult compacted(const Job& job, const Attempt& attempt,
                                       const StorageTarget& target);
 
-/// The conversion that consists of a fit and its compact form.
+/// Makes a conversion from a fit and its compact grid.
 [[nodiscard]] Conversion conversionOf(FitResult fit, CompactResult compact);
 
-/// The conversion that consists of a fit and its float32 form.
+/// Makes a conversion from a fit and its grid in float32.
 [[nodiscard]] Conversion conversionOf(Attempt attempt);
 
 }  // namespace esvr::convert

@@ -14,8 +14,10 @@ namespace esvr::convert {
 namespace {
 
 // Measured on the volumes of docs/benchmarks.md.
-constexpr std::uint64_t kEllipsoidShare = 4;  // ellipsoids get one of so many bytes of the voxels
-constexpr double kPromising = 1.15;  // bytes of a short fit, to the voxels', for a whole one
+/// The ellipsoids of a grid with a residual get this fraction (1/4) of the voxels' bytes.
+constexpr std::uint64_t kEllipsoidBytesDivisor = 4;
+/// Largest size of a short fit's grid, relative to the voxels', at which a full fit is tried.
+constexpr double kMaxPromisingRatio = 1.15;
 
 Conversion asVoxels(const Job& job, VoxelLayer layer) {
   Conversion conversion;
@@ -23,7 +25,8 @@ Conversion asVoxels(const Job& job, VoxelLayer layer) {
   return conversion;
 }
 
-/// Nothing where there is no grid of so few bytes, or no residual to it.
+/// A grid of ellipsoids with a residual; nothing if no grid is small enough or there is no residual
+/// that keeps the bound.
 std::optional<Conversion> withEllipsoids(const Job& job, double bound, std::uint64_t bytes) {
   auto conversion = searchSize(job, bytes).conversion;
   if (!conversion) return std::nullopt;
@@ -35,7 +38,7 @@ std::optional<Conversion> withEllipsoids(const Job& job, double bound, std::uint
   return conversion;
 }
 
-/// The smallest form that was found, and what it was chosen from.
+/// The smallest conversion so far, and the sizes that were compared.
 struct Smallest {
   Conversion conversion;
   BoundRecord record;
@@ -48,16 +51,16 @@ struct Smallest {
   }
 };
 
-/// Tries a short fit, then a whole one where the short one came near to the voxels.
+/// Tries a short fit, and a full one if the size of the short fit's grid is near the voxels'.
 void tryEllipsoids(const Job& job, double bound, Smallest& best) {
   ConvertOptions shortFit = job.options;
   shortFit.fit = shortened(shortFit.fit);
   for (const ConvertOptions* options : {&std::as_const(shortFit), &job.options}) {
-    auto now =
-        withEllipsoids({job.input, *options}, bound, best.record.voxelBytes / kEllipsoidShare);
+    auto now = withEllipsoids({job.input, *options}, bound,
+                              best.record.voxelBytes / kEllipsoidBytesDivisor);
     if (!now) return;
     const bool promising =
-        double(bytesAdded(now->grid)) <= kPromising * double(best.record.voxelBytes);
+        double(bytesAdded(now->grid)) <= kMaxPromisingRatio * double(best.record.voxelBytes);
     best.take(std::move(*now));
     if (!promising) return;
   }
@@ -75,7 +78,7 @@ Conversion convertLossless(const Job& job) {
   if (job.input.descriptor.valueType == ValueType::kDouble)
     throw UsageError(
         "grid '" + job.input.descriptor.name +
-        "' is of doubles, which are read as float32: a lossless file cannot hold them");
+        "' has values of type double, which are read as float32; a lossless file cannot hold them");
   return asVoxels(job, exactLayer(job.input.source));
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// A bound on the error of every voxel: voxels, or ellipsoids with a residual.
+/// Conversions that bound the error of every voxel: voxels, or ellipsoids with a residual.
 
 #include "convert/attempt.h"
 
@@ -8,12 +8,14 @@ namespace esvr::convert {
 /// The largest absolute error that a goal allows.
 [[nodiscard]] double boundOf(const BoundGoal& goal, const SparseVolume& source);
 
-/// The smaller of the two. Ellipsoids are tried with a quarter of the bytes that voxels alone take:
-/// a short fit first, a whole one where that comes near. Where values are noise to ellipsoids they
-/// do not pay, where values are smooth they do (docs/benchmarks.md).
+/// The smaller of two grids: voxels, or ellipsoids with a residual. The ellipsoids get a quarter of
+/// the bytes of the voxels. A short fit is tried first, and a full one if the short fit promises to
+/// be smaller than the voxels. Ellipsoids are smaller for smooth values and larger for noisy ones
+/// (docs/benchmarks.md).
 [[nodiscard]] Conversion convertWithin(const Job& job, const BoundGoal& goal);
 
-/// Voxels and mask as they are. \throws UsageError  doubles, which are read as float32
+/// A grid that holds the exact voxels and the exact active mask.
+/// \throws UsageError  the values are doubles, which were rounded to float32
 [[nodiscard]] Conversion convertLossless(const Job& job);
 
 }  // namespace esvr::convert

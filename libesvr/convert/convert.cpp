@@ -16,7 +16,7 @@ namespace {
 
 using convert::Job;
 
-/// A fit that was made, as `storage` has it.
+/// Stores a fit in the form that `storage` determines.
 Conversion stored(const ConvertInput& input, FitResult fit, const CommonFitOptions& options,
                   const StorageOptions& storage) {
   StoredGrid grid =
@@ -35,7 +35,7 @@ Conversion stored(const ConvertInput& input, FitResult fit, const CommonFitOptio
                                                             .device = options.device}));
 }
 
-/// What a goal asks for is made by the function of its name.
+/// Calls the conversion that belongs to a goal.
 class Converter {
  public:
   explicit Converter(Job job) : job_(job) {}
@@ -46,11 +46,11 @@ class Converter {
   }
   Conversion operator()(const SizeGoal& goal) const {
     if (job_.options.storage.form != Storage::kCompact)
-      throw UsageError("a size needs the compact storage, where bits can be chosen");
+      throw UsageError("a size needs compact storage; the size of float32 storage is fixed");
     auto result = convert::searchSize(job_, goal.bytes);
     if (result.conversion) return std::move(*result.conversion);
     throw UsageError("grid '" + job_.input.descriptor.name + "' takes at least " +
-                     std::to_string(result.needed) + " bytes; there are " +
+                     std::to_string(result.needed) + " bytes; the size allows " +
                      std::to_string(goal.bytes));
   }
   Conversion operator()(const PsnrGoal& goal) const { return convert::searchPsnr(job_, goal.psnr); }
@@ -61,7 +61,7 @@ class Converter {
   Job job_;
 };
 
-/// What a reader gets: through the file's own bytes, so that what is measured is what is stored.
+/// Encodes and decodes a grid, so that the caller gets the same grid as a reader of the file.
 StoredGrid throughTheFormat(StoredGrid grid) {
   EsvrFile file;
   file.grids.push_back(std::move(grid));
@@ -75,7 +75,7 @@ std::optional<double> boundOf(const Goal& goal, const SparseVolume& source) {
   return std::nullopt;
 }
 
-/// A bound is checked on what the file holds.
+/// Checks the decoded grid against the bound.
 void requireBound(const ConvertInput& input, const StoredGrid& grid, double bound) {
   const double error = largestDifference(input.source, decodeGrid(grid));
   if (error > bound)
@@ -98,12 +98,13 @@ Conversion convertVolume(const ConvertInput& input, const ConvertOptions& option
 PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions& options,
                                const StorageOptions& storage) {
   if (options.method.learnK && storage.form == Storage::kCompact)
-    throw UsageError("a k for each ellipsoid needs float32: the compact form has one edge");
+    throw UsageError(
+        "a k for each ellipsoid needs float32 storage; compact storage has one edge for all");
   if (isNarrowBand(input.descriptor, input.source))
     throw UsageError(
         "grid '" + input.descriptor.name +
-        "' is a level set: the paper's loss compares windows, which a narrow band does "
-        "not fill");
+        "' is a level set; the paper's method cannot fit it, because its loss compares windows "
+        "that a narrow band does not fill");
   PaperFitResult made = fitByPaper(input.source, options);
   Conversion conversion = stored(input, std::move(made.fit), options, storage);
   conversion.grid = throughTheFormat(std::move(conversion.grid));

@@ -10,14 +10,14 @@ namespace esvr::convert {
 namespace {
 
 // Measured on the volumes of docs/benchmarks.md.
-constexpr double kDbPerDoubling = 4.5;        // PSNR that twice the ellipsoids gain
-constexpr double kShortFitBehind = 2.5;       // dB that a short fit stays behind a whole one
-constexpr double kVoxelsPerEllipsoid = 35.0;  // the first guess
-constexpr double kMaxGrowth = 8.0;            // factor of the number, from fit to fit
-constexpr std::size_t kMaxFits = 3;           // and more until one reaches the PSNR
+constexpr double kDbPerDoubling = 4.5;        // gain of PSNR by twice the ellipsoids
+constexpr double kShortFitBehind = 2.5;       // PSNR of a full fit less that of a short one, dB
+constexpr double kVoxelsPerEllipsoid = 35.0;  // active voxels per ellipsoid of the first guess
+constexpr double kMaxGrowth = 8.0;            // largest factor of the number between two fits
+constexpr std::size_t kMaxFits = 3;           // the search continues if none reached the PSNR
 
-/// dB by which an attempt may exceed the PSNR: more ellipsoids or more bits would cost as much.
-/// The optimum is flat.
+/// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
+/// the size hardly differs.
 struct Margin {
   double aim, min, max;
 };
@@ -65,14 +65,14 @@ class PsnrSearch {
     return nearAim(a) || (a.psnr < psnr_ + margin_.min && allThereIs);
   }
 
-  /// The number that should reach a PSNR, from what an attempt reached.
+  /// The number of ellipsoids that should reach a PSNR, extrapolated from an attempt.
   [[nodiscard]] static double scaledCount(const Attempt& from, double psnr) {
     const double factor = std::exp2((psnr - from.psnr) / kDbPerDoubling);
     return double(std::max<std::size_t>(from.count(), 1)) *
            std::clamp(factor, 1.0 / kMaxGrowth, kMaxGrowth);
   }
 
-  /// The nearest attempt below the aim, or above it; null where there is none.
+  /// The attempt nearest to the aim, on the given side of it; null if there is none.
   [[nodiscard]] const Attempt* nearest(bool above) const {
     const Attempt* found = nullptr;
     for (const Attempt& a : attempts_)
@@ -80,7 +80,8 @@ class PsnrSearch {
     return found;
   }
 
-  /// Interpolated between the nearest attempts on either side; else scaled from the last.
+  /// The next number of ellipsoids: interpolated between the nearest attempts on both sides of the
+  /// aim, otherwise extrapolated from the last attempt.
   [[nodiscard]] double nextCount() const {
     const Attempt *below = nearest(false), *above = nearest(true);
     if (!below || !above) return scaledCount(attempts_.back(), aim());
@@ -89,12 +90,12 @@ class PsnrSearch {
            std::pow(double(above->count()) / double(below->count()), share);
   }
 
-  /// Whether an attempt that reached the PSNR may be the smallest: where some are near the aim,
-  /// only these; else the one that exceeds the PSNR least.
+  /// True for attempts that may be the smallest: those near the aim, or, if there are none, the one
+  /// that exceeds the PSNR least.
   [[nodiscard]] bool candidate(const Attempt& a) const {
     if (!reached(a)) return false;
-    const auto near = [&](const Attempt& other) { return nearAim(other); };
-    if (std::any_of(attempts_.begin(), attempts_.end(), near)) return nearAim(a);
+    const auto isNearAim = [&](const Attempt& other) { return nearAim(other); };
+    if (std::any_of(attempts_.begin(), attempts_.end(), isNearAim)) return nearAim(a);
     return std::none_of(attempts_.begin(), attempts_.end(), [&](const Attempt& other) {
       return reached(other) && other.psnr < a.psnr;
     });

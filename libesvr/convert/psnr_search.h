@@ -1,12 +1,13 @@
 #pragma once
-/// The smallest grid of a PSNR.
+/// The search for the smallest grid that reaches a PSNR.
 
 #include "convert/attempt.h"
 
 namespace esvr::convert {
 
-/// After a short fit, whole ones whose numbers of ellipsoids follow from what the ones before
-/// reached. Where the PSNR is out of reach the best of them, marked kPsnrMissed.
+/// Makes a short fit and then full fits, each with a number of ellipsoids that follows from the
+/// PSNR of the fits before. If the PSNR is out of reach, the result is the best of them with
+/// FitEnd::kPsnrMissed.
 /// \param psnr  dB over the box
 [[nodiscard]] Conversion searchPsnr(const Job& job, double psnr);
 

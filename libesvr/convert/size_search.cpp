@@ -9,20 +9,19 @@ namespace esvr::convert {
 namespace {
 
 // Measured on the volumes of docs/benchmarks.md.
-constexpr double kBytesPerEllipsoid = 8.0;  // the first guess
-constexpr double kShortFitPrice =
-    0.94;                               // bytes an ellipsoid of a short fit takes, to a whole one's
-constexpr double kMaxUsefulLoss = 2.5;  // dB: beyond it, fewer ellipsoids are better
-constexpr double kRepairFactor = 1.25;  // bytes an ellipsoid grow by at least, repair by repair
+constexpr double kBytesPerEllipsoid = 8.0;  // first guess
+constexpr double kShortFitPrice = 0.94;     // bytes per ellipsoid of a short fit / of a full fit
+constexpr double kMaxUsefulLoss = 2.5;      // loss, dB, above which fewer ellipsoids are better
+constexpr double kRepairFactor = 1.25;  // smallest growth of the bytes per ellipsoid by a repair
 constexpr int kMaxRepairs = 3;
-constexpr std::uint64_t kWorthRefilling = 100;  // one of so many bytes unused is worth a search
+constexpr std::uint64_t kRefillDivisor = 100;  // a hundredth of the bytes unused: search again
 
-/// Sections of ellipsoids begin at multiples of kAlignment, one a chunk.
+/// Largest padding of the ellipsoids' sections, of which each chunk has one.
 std::uint64_t paddingOf(const StoredGrid& grid) {
   return grid.field.chunks.size() * (format::kAlignment - 1);
 }
 
-/// What a grid adds to a file besides its ellipsoids, padding included.
+/// Bytes that a grid adds to a file besides its ellipsoids, including padding.
 std::uint64_t bytesBesides(const CompactResult& compact) {
   return bytesAdded(compact.grid) - compact.bytes + paddingOf(compact.grid);
 }
@@ -51,9 +50,9 @@ class SizeSearch {
   }
 
  private:
-  /// What an attempt's ellipsoids cost at the usual loss.
+  /// The bytes of an attempt at the usual loss.
   struct Price {
-    double each = 0.0;          ///< bytes an ellipsoid
+    double each = 0.0;          ///< bytes per ellipsoid
     std::uint64_t besides = 0;  ///< bytes of the grid's other sections
   };
   [[nodiscard]] Price priceOf(const Attempt& attempt) const {
@@ -62,7 +61,7 @@ class SizeSearch {
     return {std::max(double(compact.bytes) / count, 1.0), bytesBesides(compact)};
   }
 
-  /// Keeps room for the grid's other sections. \return false where they take all there is
+  /// Reserves bytes for the grid's other sections. \return false if no bytes remain
   bool reserve(std::uint64_t besides) {
     besides_ = besides;
     left_ = besides < bytes_ ? bytes_ - besides : 0;
@@ -75,12 +74,13 @@ class SizeSearch {
     return compacted(job_, attempt, {.bytes = left_});
   }
 
-  /// The whole fit's grid may have other sections than the short one's, larger or smaller.
+  /// Compacts an attempt to the bytes that remain. The other sections of a full fit's grid may be
+  /// larger or smaller than the short fit's; the bytes are then reserved again.
   CompactResult filled(const Attempt& attempt) {
     CompactResult now = compactFor(attempt);
     const std::uint64_t besides = bytesBesides(now), padding = paddingOf(now.grid);
     const bool larger = besides > besides_ + padding;
-    const bool muchSmaller = besides_ > besides + padding + bytes_ / kWorthRefilling;
+    const bool muchSmaller = besides_ > besides + padding + bytes_ / kRefillDivisor;
     if ((larger || muchSmaller) && reserve(besides)) now = compactFor(attempt);
     return now;
   }

@@ -1,5 +1,5 @@
 #pragma once
-/// The best grid of so many bytes.
+/// The search for the best grid of a given size.
 
 #include <cstdint>
 #include <optional>
@@ -9,13 +9,14 @@
 namespace esvr::convert {
 
 struct SizeResult {
-  std::optional<Conversion> conversion;  ///< nothing where even the smallest grid is larger
-  std::uint64_t needed = 0;              ///< bytes of the smallest grid that was tried, then
+  std::optional<Conversion> conversion;  ///< missing if even the smallest grid is too large
+  std::uint64_t needed = 0;              ///< if so, bytes of the smallest grid that was tried
 };
 
-/// A short fit tells what an ellipsoid costs, and a whole one has as many as fit. Where the short
-/// fit promised too much, the whole one is repeated with fewer.
-/// \param bytes  the grid may add so many to a file (bytesAdded)
+/// Makes a short fit to measure the bytes per ellipsoid, and then a full fit with as many
+/// ellipsoids as the size allows. If the ellipsoids of the full fit take more bytes than expected,
+/// it is repeated with fewer.
+/// \param bytes  largest number of bytes that the grid may add to a file (bytesAdded)
 [[nodiscard]] SizeResult searchSize(const Job& job, std::uint64_t bytes);
 
 }  // namespace esvr::convert

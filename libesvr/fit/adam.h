@@ -1,5 +1,5 @@
 #pragma once
-/// Adam (Kingma and Ba 2015) on ellipsoids, in each one's own frame.
+/// Adam (Kingma and Ba 2015) on the parameters of ellipsoids, each in its own frame.
 
 #include <array>
 #include <span>
@@ -10,11 +10,11 @@
 
 namespace esvr {
 
-/// Largest step a parameter takes in one iteration.
+/// Largest steps of the parameters in one iteration.
 struct StepSizes {
-  double position = 0.1;   ///< of the semi-axis's scale
-  double shape = 0.1;      ///< relative change of a scale; the same for shears
-  double intensity = 0.1;  ///< of the intensity, at least of kIntensityFloor
+  double position = 0.1;   ///< motion along an axis, in its scale
+  double shape = 0.1;      ///< relative change of a scale, and shear
+  double intensity = 0.1;  ///< relative change of the intensity (see largestStep)
   [[nodiscard]] ESVR_HD StepSizes scaled(double f) const {
     return {position * f, shape * f, intensity * f};
   }
@@ -22,29 +22,29 @@ struct StepSizes {
 
 struct AdamOptions {
   double beta1 = 0.9;
-  double beta2 = 0.95;  ///< short: the loss has no noise to average out
+  double beta2 = 0.95;  ///< a short average, since the loss has no noise
 };
 
 /// First and second moments of one ellipsoid's gradient.
 struct AdamState {
   std::array<float, kParameters> m{}, v{};
-  std::uint32_t steps = 0;  ///< since the ellipsoid was placed
+  std::uint32_t steps = 0;  ///< steps since the ellipsoid was placed
 };
 
-/// What a step may lead to.
+/// Limits of the parameters.
 struct EllipsoidLimits {
   double smallestScale, largestScale;        ///< voxels
-  double lowestIntensity, highestIntensity;  ///< in units of the target
+  double lowestIntensity, highestIntensity;  ///< units of the target
 };
 
-/// What a pass tells of one ellipsoid.
+/// The derivatives of one ellipsoid.
 struct EllipsoidGradient {
-  ParameterVector byParameter;  ///< of half the sum of squared residuals, or of the given loss
-  double phi2;                  ///< sum over voxels of phi^2: the curvature by intensity
-  double byKappa;               ///< the kernel's edge, the scales held
+  ParameterVector byParameter;  ///< gradient of half the sum of squares, or of a given loss
+  double phi2;                  ///< sum over voxels of phi^2: second derivative by the intensity
+  double byKappa;               ///< derivative by the kernel's edge at fixed scales
 };
 
-/// One step of every ellipsoid.
+/// Takes one step with every ellipsoid.
 void adamStep(std::span<Ellipsoid> ellipsoids, std::span<AdamState> states,
               std::span<const EllipsoidGradient> gradients, const StepSizes& sizes,
               const AdamOptions& options, const EllipsoidLimits& limits);

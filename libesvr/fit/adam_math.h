@@ -9,9 +9,9 @@
 
 namespace esvr {
 
-/// What every parameter's direction, which is about 1 at most, is multiplied by.
+/// The factors of Adam's direction, whose components are about 1 at most.
 ESVR_HD inline ParameterVector largestStep(const Ellipsoid& p, const StepSizes& s) {
-  // Intensities near zero still move: in units of the target, whose largest magnitude is 1.
+  // lets intensities near zero move; units of the target, whose largest magnitude is 1
   constexpr double kIntensityFloor = 0.01;
   const double magnitude = std::abs(p.intensity);
   const double i = s.intensity * (magnitude > kIntensityFloor ? magnitude : kIntensityFloor);
@@ -22,8 +22,7 @@ ESVR_HD inline ParameterVector largestStep(const Ellipsoid& p, const StepSizes& 
 /// Updates the moments and returns the step, `largest` times Adam's direction.
 ESVR_HD inline ParameterVector adamDirection(AdamState& state, const ParameterVector& gradient,
                                              const AdamOptions& o, const ParameterVector& largest) {
-  // Gradients are of any size, but the squares of those below it vanish in float32: without it a
-  // quotient of nothing by less would move an ellipsoid out of sight.
+  // The squares of smaller gradients vanish in float32; this avoids a division by zero.
   constexpr double kEpsilon = 1e-18;
   ++state.steps;
   const double c1 = 1.0 / (1.0 - std::pow(o.beta1, double(state.steps)));
@@ -38,7 +37,7 @@ ESVR_HD inline ParameterVector adamDirection(AdamState& state, const ParameterVe
   return d;
 }
 
-/// Takes a step and keeps to the limits.
+/// Takes a step and clamps the parameters to the limits.
 ESVR_HD inline void moveWithin(Ellipsoid& p, const ParameterVector& step,
                                const EllipsoidLimits& limits) {
   applyStep(p, step);

@@ -12,7 +12,7 @@ using ellipsoid_math::asEigen;
 PrincipalAxes principalAxes(const Matrix3& L) {
   const Eigen::JacobiSVD<Matrix3d> svd(asEigen(L), Eigen::ComputeFullV);
   const Eigen::Vector3d s = svd.singularValues();
-  // Singular values of L decrease, so scales increase: reverse for the longest axis first.
+  // The singular values of L decrease and the scales increase; the longest axis must come first.
   Matrix3d R = svd.matrixV().rowwise().reverse();
   if (R.determinant() < 0.0) R.col(2) = -R.col(2);
   Eigen::Quaterniond q(R);

@@ -1,5 +1,5 @@
 #pragma once
-/// The moves of one ellipsoid, for host and device. ellipsoid.h says what they mean.
+/// Steps of one ellipsoid (ellipsoid.h), for host and device.
 
 #include <algorithm>
 #include <cmath>
@@ -22,7 +22,7 @@ ESVR_HD inline void assign(Matrix3& to, const Matrix3d& from) {
   values = from;
 }
 
-/// exp(-A) to second order: steps are a few hundredths, and any L is a valid shape.
+/// exp(-A) to second order, which suffices since steps are a few hundredths and any L is valid.
 ESVR_HD inline Matrix3d shrink(const ParameterVector& s) {
   Matrix3d A;
   A(0, 0) = s[3], A(1, 1) = s[4], A(2, 2) = s[5];
@@ -32,7 +32,7 @@ ESVR_HD inline Matrix3d shrink(const ParameterVector& s) {
   return Matrix3d::Identity() - A + 0.5 * A * A;
 }
 
-/// Squared Frobenius norm: bounds the largest singular value from above.
+/// Squared Frobenius norm, an upper bound of the largest singular value's square.
 ESVR_HD inline double norm2(const Matrix3& m) { return asEigen(m).squaredNorm(); }
 
 }  // namespace ellipsoid_math
@@ -53,14 +53,14 @@ ESVR_HD inline void shrinkBy(Ellipsoid& p, double factor) {
   for (double& l : p.L) l *= factor;
 }
 
-/// Keeps every semi-axis's scale within [smallest, largest] voxels; the frame is kept.
+/// Clamps every scale to [smallest, largest] voxels and keeps the frame.
 ESVR_HD inline void clampScales(Ellipsoid& p, double smallest, double largest) {
   using namespace ellipsoid_math;
   const bool noneTooSmall = norm2(p.L) <= 1.0 / (smallest * smallest);
   if (noneTooSmall && norm2(inverse(p.L)) <= largest * largest) return;
   // L = U D V^T: the eigenvectors of L^T L are V, and L V diag(f) V^T scales D by f. The
-  // closed-form solver is quick and keeps six digits of the longest scale at an aspect of 1000: a
-  // limit needs less.
+  // closed-form solver is fast; at an aspect ratio of 1000 the longest scale has six correct
+  // digits, which is enough for a limit.
   const Matrix3d L = asEigen(p.L);
   Eigen::SelfAdjointEigenSolver<Matrix3d> axes;
   axes.computeDirect(L.transpose() * L);

@@ -1,5 +1,5 @@
 #pragma once
-/// The fit of a volume that nowhere differs from its background: the empty sum is exact.
+/// The fit of a volume whose values all equal its background: the empty sum is exact.
 
 #include "esvr/fit.h"
 #include "fit/recorder.h"

@@ -1,5 +1,5 @@
 #pragma once
-/// From the fit's own form to what files store.
+/// Converts the fit's ellipsoids to a Field.
 
 #include <span>
 
@@ -9,14 +9,15 @@
 namespace esvr {
 
 struct ExportFrame {
-  Coord origin;        ///< of the volume, index coordinates
-  double scale = 1.0;  ///< FitTarget::scale
+  Coord origin;        ///< origin of the volume, index coordinates
+  double scale = 1.0;  ///< see FitTarget::scale
   float background = 0.0f;
   Kernel kernel;
-  std::span<const double> kappas{};  ///< of the ellipsoids, where they differ
+  std::span<const double> kappas{};  ///< kappa of each ellipsoid; empty if all share the kernel's
 };
 
-/// Principal axes, log scales and intensities in the grid's units; chunks of kChunkExtent.
+/// Computes principal axes, log scales and intensities in the grid's units, and sorts the
+/// ellipsoids into chunks of kChunkExtent.
 [[nodiscard]] Field exportField(std::span<const Ellipsoid> ellipsoids, const ExportFrame& frame);
 
 }  // namespace esvr

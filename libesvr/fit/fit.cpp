@@ -11,10 +11,9 @@
 namespace esvr {
 namespace {
 
-/// What a preset stands for.
 struct PresetValues {
-  double voxelsPerEllipsoid;  ///< active voxels
-  std::uint32_t iterations;   ///< on the CPU
+  double voxelsPerEllipsoid;  ///< active voxels per ellipsoid
+  std::uint32_t iterations;   ///< iterations on the CPU
 };
 PresetValues valuesOf(Preset preset) {
   switch (preset) {
@@ -28,7 +27,7 @@ PresetValues valuesOf(Preset preset) {
   return {35.0, 1500};
 }
 
-/// A GPU's iterations cost little: a third more of them.
+/// A GPU makes a third more iterations, since they take little time.
 std::uint32_t iterationsOf(const PresetValues& preset, DeviceKind device) {
   return device == DeviceKind::kCuda ? preset.iterations * 4 / 3 : preset.iterations;
 }

@@ -1,5 +1,6 @@
 #pragma once
-/// Float32 positions are kept near an integer frame, so that a grid's extent costs no precision.
+/// Integer frames: float32 positions are relative to a near frame, so that their precision does not
+/// depend on the extent of the grid.
 
 #include <array>
 #include <cmath>
@@ -9,7 +10,7 @@
 
 namespace esvr {
 
-/// Origin of the chunk that holds a position.
+/// Origin of the chunk that contains a position.
 ESVR_HD inline Coord frameOf(const std::array<double, 3>& center) {
   const auto snap = [](double v) {
     return std::int32_t(std::floor(v / kChunkExtent)) * kChunkExtent;

@@ -1,5 +1,5 @@
 #pragma once
-/// The way back from what files store to the fit's own form (export_field.h).
+/// Converts a Field to the fit's ellipsoids, the inverse of export_field.h.
 
 #include <vector>
 
@@ -8,8 +8,9 @@
 
 namespace esvr {
 
-/// The ellipsoids of all chunks, one behind the other. \param origin  of the volume, index
-/// coordinates \param scale  FitTarget::scale
+/// The ellipsoids of all chunks, in their order.
+/// \param origin  origin of the volume, index coordinates
+/// \param scale   see FitTarget::scale
 [[nodiscard]] std::vector<Ellipsoid> importField(const Field& field, Coord origin, double scale);
 
 }  // namespace esvr

@@ -1,6 +1,7 @@
 #pragma once
-/// What solving for intensities asks of a device: passes over the bricks, from intensities to the
-/// sum and back to ellipsoids. A is the matrix of phi, a row a voxel, a column an ellipsoid.
+/// Passes over the bricks that a solve of intensities needs: from intensities to the sum, and from
+/// residuals back to ellipsoids. A is the matrix of phi, with a row for each voxel and a column for
+/// each ellipsoid.
 
 #include <memory>
 #include <span>
@@ -13,55 +14,59 @@
 
 namespace esvr {
 
-/// What the sum is to be, and how it becomes voxels.
+/// The values that the sum is to reach, and the rule by which the sum becomes voxels.
 struct IntensityTarget {
   const SparseVolume& source;
   VoxelRule rule;
-  Box box;                          ///< errors count here
-  std::span<const Coord> bricks{};  ///< index corners of all bricks that can hold an active voxel
-  bool restrictToBricks = false;    ///< else those of the source and those supports reach as well
+  Box box;                          ///< box over which errors are measured
+  std::span<const Coord> bricks{};  ///< index corners of the stored bricks, see restrictToBricks
+  /// True if only `bricks` can have an active voxel. Otherwise the source's bricks and the bricks
+  /// that supports reach can as well.
+  bool restrictToBricks = false;
 };
 
-/// Of the voxels that a reader gets, over the target's box.
+/// The error of the voxels that a reader gets, over the target's box.
 struct StoredError {
-  double squares = 0.0;  ///< sum
-  double largest = 0.0;  ///< magnitude
+  double squares = 0.0;  ///< sum of squared errors
+  double largest = 0.0;  ///< largest absolute error
 };
 
-/// Both in one order, whatever the number of threads.
+/// Sums are formed in one order for any number of threads.
 struct IntensityGradient {
   std::vector<double> byIntensity;  ///< A^T r, r = V - target
   std::vector<double> curvature;    ///< sum phi^2
 };
 
-/// Intensities and directions are those of all chunks, one behind the other. Sums over a brick are
-/// float32, beyond it float64, in a fixed order.
+/// Intensities and directions are those of all chunks, in their order. Sums over a brick are
+/// float32, sums over bricks are float64 in a fixed order.
 class IntensityPasses {
  public:
   virtual ~IntensityPasses() = default;
 
-  /// All that follows is of this field's shapes and background; intensities do not matter.
-  /// \throws RuntimeFailure  kappas of each ellipsoid, on a GPU
+  /// Sets the shapes and the background for all later calls; the field's intensities are ignored.
+  /// \throws RuntimeFailure  the ellipsoids have kappas of their own, on a GPU
   virtual void setShapes(const Field& field) = 0;
 
   [[nodiscard]] virtual StoredError error(std::span<const float> intensities) = 0;
 
-  /// Voxels that come back exactly, as those below the threshold do, have no residual, and take no
-  /// part in applyNormal from then on.
+  /// Computes the gradient of half the sum of squares. Voxels that a reader gets exactly, for
+  /// example those below the threshold, have a residual of 0; applyNormal leaves them out until the
+  /// next gradient.
   virtual StoredError gradient(std::span<const float> intensities, IntensityGradient& out) = 0;
 
-  /// A^T A of a direction, over the voxels that the last gradient left.
+  /// Multiplies a direction by A^T A, without the voxels that the last gradient left out.
   virtual void applyNormal(std::span<const double> direction, std::vector<double>& out) = 0;
 };
 
-/// \param target  must outlive the passes \throws DeviceError  the GPU cannot be used
+/// Makes the passes of a device. The target must outlive them.
+/// \throws DeviceError  the GPU cannot be used
 [[nodiscard]] std::unique_ptr<IntensityPasses> makeIntensityPasses(const IntensityTarget& target,
                                                                    const Device& device);
 
-/// Index corners of the bricks that are there whatever the field, in increasing order.
+/// Index corners of the bricks that do not depend on the field, in increasing order.
 [[nodiscard]] std::vector<Coord> knownCorners(const IntensityTarget& target);
 
-/// A brick's values in the source; null where it has none.
+/// The values of a brick in the source; null if the source does not have the brick.
 [[nodiscard]] const float* sourceValues(const SparseVolume& source, Coord corner);
 
 }  // namespace esvr

@@ -7,7 +7,8 @@
 namespace esvr {
 namespace {
 
-constexpr double kEnough = 1e-10;  // of the gradient's square, preconditioned
+/// Reduction of the preconditioned gradient's squared norm at which the iterations end.
+constexpr double kConvergedRatio = 1e-10;
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   double sum = 0.0;
@@ -19,7 +20,7 @@ void addScaled(std::vector<double>& a, double scale, const std::vector<double>& 
   for (std::size_t i = 0; i < a.size(); ++i) a[i] += scale * b[i];
 }
 
-/// A share of a step further; none changes its sign where there is but one.
+/// Intensities after a share of a step. If no intensity was negative, none becomes negative.
 std::vector<float> moved(const std::vector<float>& intensities, const std::vector<double>& step,
                          double share) {
   const bool signs = std::any_of(intensities.begin(), intensities.end(),
@@ -33,7 +34,7 @@ std::vector<float> moved(const std::vector<float>& intensities, const std::vecto
 
 }  // namespace
 
-/// The step x that lowers |A x + r|^2, from A^T r.
+/// The step x that reduces |A x + r|^2, computed from A^T r.
 std::vector<double> IntensityProblem::conjugateGradients(int iterations) {
   const std::vector<double>& curvature = gradient_.curvature;
   std::vector<double> residual = gradient_.byIntensity;
@@ -47,8 +48,8 @@ std::vector<double> IntensityProblem::conjugateGradients(int iterations) {
   precondition();
   p = z;
   double rho = dot(residual, z);
-  const double enough = rho * kEnough;
-  for (int k = 0; k < iterations && rho > enough; ++k) {
+  const double converged = rho * kConvergedRatio;
+  for (int k = 0; k < iterations && rho > converged; ++k) {
     passes_->applyNormal(p, q);
     const double alpha = rho / dot(p, q);
     if (!std::isfinite(alpha)) break;

@@ -1,6 +1,6 @@
 #pragma once
-/// The intensities that serve a field best when all its shapes are given: a sparse linear least
-/// squares problem, solved without its matrix.
+/// Finds the optimal intensities of a field whose shapes are given: a sparse linear least-squares
+/// problem that is solved without forming its matrix.
 
 #include <memory>
 #include <span>
@@ -10,33 +10,32 @@
 
 namespace esvr {
 
-/// Fields are taken one after the other, against one target: what both devices keep of it, and
-/// their memory, serves all.
+/// Solves for one field after the other against the same target, whose data stay on the device.
 class IntensityProblem {
  public:
-  /// \param target  must outlive the problem \throws DeviceError  the GPU cannot be used
+  /// The target must outlive the problem. \throws DeviceError  the GPU cannot be used
   explicit IntensityProblem(const IntensityTarget& target, const Device& device = {})
       : passes_(makeIntensityPasses(target, device)) {}
 
-  /// All that follows is of this field; only its shapes and its background matter here.
+  /// Sets the field of all later calls, of which the shapes and the background are used.
   void setShapes(const Field& field) { passes_->setShapes(field); }
 
-  /// \param intensities  of all chunks, one behind the other
+  /// \param intensities  intensities of all chunks, in their order
   [[nodiscard]] StoredError error(std::span<const float> intensities) {
     return passes_->error(intensities);
   }
 
-  /// Lowers the error by conjugate gradients on the normal equations with Jacobi's preconditioner.
-  /// Voxels that come back exactly, as those below the threshold do, take no part; where no
-  /// intensity is negative, none becomes so. \return the sum of squared errors reached, never above
-  /// the one before
+  /// Reduces the error by conjugate gradients on the normal equations with a Jacobi preconditioner.
+  /// Voxels that a reader gets exactly are left out. If no intensity is negative, none becomes
+  /// negative.
+  /// \return the sum of squared errors afterwards, which is never larger than before
   double solve(std::vector<float>& intensities, int iterations);
 
-  /// The step of solve() in full length, whatever becomes of the error: a pass less.
-  /// \return the sum of squared errors before it
+  /// Takes the full step of solve() without checking the error, which saves a pass.
+  /// \return the sum of squared errors before the step
   double step(std::vector<float>& intensities, int iterations);
 
-  /// sum phi^2 over voxels, for each ellipsoid; of the last field solved for.
+  /// Sum of phi^2 over voxels for each ellipsoid of the last field that was solved for.
   [[nodiscard]] const std::vector<double>& curvature() const { return gradient_.curvature; }
 
  private:
@@ -46,7 +45,7 @@ class IntensityProblem {
   IntensityGradient gradient_;
 };
 
-/// Intensities of all chunks, one behind the other, and back.
+/// Gets and sets the intensities of all chunks, in their order.
 [[nodiscard]] std::vector<float> intensitiesOf(const Field& field);
 void setIntensities(std::span<const float> intensities, Field& field);
 

@@ -6,7 +6,7 @@
 namespace esvr {
 namespace {
 
-// Steps are few, and the slope changes with every relocation.
+// The averages are short, because there are few steps and every relocation changes the slope.
 constexpr double kBeta1 = 0.7, kBeta2 = 0.9;
 
 }  // namespace

@@ -1,22 +1,22 @@
 #pragma once
-/// Descends on the kernel's edge, which all ellipsoids share.
+/// Gradient descent on the kernel's edge, which all ellipsoids share.
 
 #include "esvr/kernel.h"
 
 namespace esvr {
 
-/// Adam on one number whose gradient is of any size.
+/// Adam on a single parameter.
 class KappaDescent {
  public:
-  /// \param largestStep  of one call
+  /// \param largestStep  largest change of kappa by one call
   explicit KappaDescent(double largestStep) : largestStep_(largestStep) {}
 
   /// \param slope   dL/dkappa at `kappa`
-  /// \param factor  of the step's size
+  /// \param factor  factor of the step's size
   /// \return the next kappa, within [kSmoothest, kHardest]
   [[nodiscard]] float next(float kappa, double slope, double factor);
 
-  /// Beyond the first a kernel is a Gaussian to float32's eye, beyond the second a step.
+  /// Below the first limit the kernel is a Gaussian in float32, above the second it is a step.
   static constexpr double kSmoothest = -8.0, kHardest = 30.0;
 
  private:

@@ -1,6 +1,5 @@
 #pragma once
-/// The state of a fit and the moves it is made of, wherever it is computed; run.h decides which
-/// comes when.
+/// The interface of a fit's state and its operations on any device; run.h decides their order.
 
 #include <cstdint>
 #include <memory>
@@ -20,17 +19,17 @@ struct OptimiserOptions {
   Kernel kernel;
   std::uint64_t seed = 1;
   Device device;
-  std::optional<std::size_t> maxDeviceBytes;  ///< FitOptions::maxDeviceBytes
+  std::optional<std::size_t> maxDeviceBytes;  ///< see CommonFitOptions
 };
 
-/// Errors of a fit as its curve reports them, in units of the target.
+/// Errors of a fit for its curve, in units of the target.
 struct FitErrors {
-  double squaredSum = 0.0;        ///< over all bricks
-  double squaredSumBox = 0.0;     ///< over the target's box
-  double squaredSumActive = 0.0;  ///< over the active voxels
-  double largest = 0.0;
+  double squaredSum = 0.0;        ///< sum of squares over all bricks
+  double squaredSumBox = 0.0;     ///< sum of squares over the target's box
+  double squaredSumActive = 0.0;  ///< sum of squares over the active voxels
+  double largest = 0.0;           ///< largest absolute error
 
-  /// Of two parts of a volume.
+  /// Adds the errors of another part of the volume.
   void add(const FitErrors& part) {
     squaredSum += part.squaredSum;
     squaredSumBox += part.squaredSumBox;
@@ -43,46 +42,48 @@ class Optimiser {
  public:
   virtual ~Optimiser() = default;
 
-  /// Adds ellipsoids where the error is, until there are `count`, or no error is left to mend.
+  /// Adds seeds at voxels of large error until there are `count` ellipsoids or no error is left.
   virtual void growTo(std::size_t count) = 0;
 
-  /// Moves `count` ellipsoids whose removal costs least to where the error is.
+  /// Replaces the `count` ellipsoids whose removal adds the least error by seeds at voxels of large
+  /// error.
   virtual void relocate(std::size_t count) = 0;
 
-  /// Gradients and a step of factor times the tuned sizes, for each of the factors.
+  /// Makes an iteration (gradients and a step) for each factor of the tuned step sizes.
   /// \return sum of r^2 before the last step
   /// \throws RuntimeFailure  the loss is not finite
   virtual double iterate(std::span<const double> factors) = 0;
 
-  /// How many iterations a call of iterate() should be given, where nothing else comes between.
+  /// The best number of iterations for one call of iterate().
   [[nodiscard]] virtual std::uint32_t batchSize() const = 0;
 
   [[nodiscard]] virtual FitErrors measure() = 0;
 
-  /// The kernel as it is now.
+  /// The current kernel.
   [[nodiscard]] virtual const Kernel& kernel() const = 0;
 
-  /// Sum over the ellipsoids of dL/dkappa at the last gradients, half widths held; 0 before any.
+  /// Sum over the ellipsoids of dL/dkappa at fixed half widths, by the last gradients; 0 before the
+  /// first iteration.
   [[nodiscard]] virtual double kappaSlope() = 0;
 
-  /// Gives all ellipsoids another edge; scales change so that their half widths stay.
+  /// Changes the edge of all ellipsoids, and their scales so that their half widths stay the same.
   virtual void setKappa(float kappa) = 0;
 
-  /// Drops ellipsoids that no voxel sees. They cost bytes and change nothing.
+  /// Drops ellipsoids that contribute to no voxel.
   virtual void dropUnseen() = 0;
 
   [[nodiscard]] virtual std::size_t ellipsoidCount() const = 0;
   [[nodiscard]] virtual std::vector<Ellipsoid> ellipsoids() const = 0;
-  /// Of the lists last built.
+  /// Pairs in the lists that were built last.
   [[nodiscard]] virtual std::uint64_t pairCount() const = 0;
-  /// The most that has been held so far; 0 on the CPU.
+  /// Largest GPU memory held so far; 0 on the CPU.
   [[nodiscard]] virtual std::size_t deviceBytes() const = 0;
-  /// Spent so far on finding where ellipsoids are missing and shaping them.
+  /// Seconds spent so far on making seeds.
   [[nodiscard]] virtual double secondsSeeding() const = 0;
 };
 
-/// An optimiser on the device of the options. The target must outlive it.
-/// \throws DeviceError  that device cannot be used
+/// Makes an optimiser on the device of the options. The target must outlive it.
+/// \throws DeviceError  the device cannot be used
 [[nodiscard]] std::unique_ptr<Optimiser> makeOptimiser(const FitTarget& target,
                                                        const OptimiserOptions& options,
                                                        const Tuning& tuning);

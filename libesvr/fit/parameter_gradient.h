@@ -1,5 +1,5 @@
 #pragma once
-/// From a pair's moments to the gradient by an ellipsoid's parameters: the chain rule, once.
+/// Computes the gradient by an ellipsoid's parameters from the moments of its pairs.
 
 #include "field/brick_kernels.h"
 #include "fit/adam.h"
@@ -18,9 +18,11 @@ struct PairSums {
   }
 };
 
-/// With u = px dx + pz dz + ly t the position in the unit frame,
-///   dL/d delta = -2 I sum r phi' u,   dL/dA_jk = -2 I sum r phi' u_j u_k (twice that off the
-///   diagonal), dL/dI = sum r phi.
+/// With the position u = px dx + pz dz + ly t in the unit frame,
+///
+///     dL/d delta = -2 I sum r phi' u
+///     dL/d A_jj  = -2 I sum r phi' u_j^2,   dL/d A_jk = -4 I sum r phi' u_j u_k   (j != k)
+///     dL/d I     = sum r phi
 [[nodiscard]] ESVR_HD inline ParameterVector parameterGradient(const LineForm& f,
                                                                const PairSums& s) {
   const auto first = [&](int j) {
@@ -40,23 +42,24 @@ struct PairSums {
           2 * c * second(1, 2), s.rPhi};
 }
 
-/// All that a pass tells of an ellipsoid. \param slope  KernelConstants::slope of its kernel
+/// All derivatives of an ellipsoid. \param slope  KernelConstants::slope of its kernel
 [[nodiscard]] ESVR_HD inline EllipsoidGradient ellipsoidGradient(const LineForm& f,
                                                                  const PairSums& s, double slope) {
   return {parameterGradient(f, s), s.phi2, double(f.intensity) * slope * s.rEdge};
 }
 
-/// dL/dkappa where half widths stay: what a wider or narrower kernel would do is the scales'
-/// affair, which shrink by d ln m / 2 as kappa grows, the direction of the three diagonal
-/// parameters. \param logMByKappa  KernelWidth's
+/// dL/dkappa at a fixed half width. As kappa grows, the logarithms of the scales shrink by
+/// d ln m / 2, which is the direction of the three diagonal parameters of A.
+/// \param logMByKappa  see KernelWidth
 [[nodiscard]] ESVR_HD inline double edgeGradient(const EllipsoidGradient& gradient,
                                                  double logMByKappa) {
   const ParameterVector& g = gradient.byParameter;
   return gradient.byKappa - 0.5 * logMByKappa * (g[3] + g[4] + g[5]);
 }
 
-/// How much the sum of squares would grow if the ellipsoid vanished:
-/// sum (r - I phi)^2 - r^2 = I^2 sum phi^2 - 2 I sum r phi.
+/// Growth of the sum of squares if the ellipsoid is removed:
+///
+///     sum (r - I phi)^2 - r^2 = I^2 sum phi^2 - 2 I sum r phi
 [[nodiscard]] ESVR_HD inline double removalError(double intensity, double phi2, double rPhi) {
   return intensity * (intensity * phi2 - 2.0 * rPhi);
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// A fit's clock, curve and progress reports.
+/// The clock, the curve and the progress reports of a fit.
 
 #include <chrono>
 #include <functional>
@@ -10,7 +10,7 @@
 
 namespace esvr {
 
-/// 10 log10(peak^2 N / sum of squares); a perfect fit gives kPerfect, so that curves stay finite.
+/// 10 log10(peak^2 N / sum of squares), at most kPerfectPsnr, so that curves are finite.
 [[nodiscard]] double psnrOf(double squaredSum, double voxels, double peak);
 inline constexpr double kPerfectPsnr = 999.0;
 
@@ -25,10 +25,10 @@ class Recorder {
   /// Appends a point to the curve.
   const TimedCurvePoint& record(const FitErrors& errors, std::size_t ellipsoids,
                                 std::uint32_t iteration);
-  /// The same, measured exactly.
+  /// Measures the errors and appends a point to the curve.
   const TimedCurvePoint& record(Optimiser& optimiser, std::uint32_t iteration);
 
-  /// Reports progress if the last report is long enough ago.
+  /// Reports progress about four times a second.
   void report(const TimedCurvePoint& now, double fraction);
 
   [[nodiscard]] const std::vector<TimedCurvePoint>& curve() const { return curve_; }

@@ -1,5 +1,5 @@
 #pragma once
-/// Residuals of a pass, read by voxel.
+/// Residuals of a pass by voxel.
 
 #include <span>
 
@@ -8,10 +8,10 @@
 
 namespace esvr {
 
-/// r = V - target over an engine's bricks; zero elsewhere, where both are background.
+/// The residuals r = V - target in the bricks of a pass; they are zero elsewhere.
 struct ResidualField {
   const BrickIndex& index;
-  std::span<const float> values;  ///< kBrickVoxels a brick
+  std::span<const float> values;  ///< kBrickVoxels values for each brick
 
   [[nodiscard]] std::span<const float> brick(std::size_t b) const {
     return values.subspan(b * kBrickVoxels, kBrickVoxels);

@@ -10,7 +10,7 @@ namespace esvr {
 namespace {
 
 constexpr std::uint32_t kCurvePoints = 32;
-constexpr double kReachedMargin = 1e-3;  // dB: float32 storage must not undo it
+constexpr double kReachedMargin = 1e-3;  // dB, more than the rounding to float32 can cost
 
 std::size_t firstCount(const RunPlan& plan, const Tuning& tuning) {
   const auto share = std::size_t(std::llround(tuning.firstShare * double(plan.count)));
@@ -49,7 +49,7 @@ class Run {
     return reachedExactly() ? FitEnd::kPsnrReached : FitEnd::kPsnrMissed;
   }
 
-  /// \param ahead  iterations that are not done yet
+  /// The fraction of the run that is done after `ahead` more iterations.
   [[nodiscard]] double fractionDone(std::uint32_t ahead = 0) const {
     if (!plan_.seconds) return double(done_ + ahead) / schedule_.iterations;
     return std::min(1.0, recorder_.seconds() / *plan_.seconds);
@@ -61,7 +61,7 @@ class Run {
     return std::max(schedule_.eventInterval(), schedule_.iterations / kCurvePoints);
   }
 
-  /// Iterates until something else is due. \return sum of r^2 before the last step
+  /// Iterates until the next event or record. \return sum of r^2 before the last step
   double iterate() {
     const auto until = [&](std::uint32_t interval) { return interval - done_ % interval; };
     std::uint32_t count = std::min(
@@ -97,7 +97,7 @@ class Run {
     recorder_.report(now, fractionDone());
   }
 
-  /// The loss was that before the step: measure what there is now.
+  /// Measures the errors now; the loss of an iteration is that before its step.
   bool reachedExactly() {
     return recorder_.record(optimiser_, done_).psnrBox > *plan_.psnr + kReachedMargin;
   }

@@ -1,5 +1,5 @@
 #pragma once
-/// Runs an optimiser to what the user asked for.
+/// Runs an optimiser until the goal of the fit is reached.
 
 #include <cstdint>
 #include <optional>
@@ -9,19 +9,18 @@
 
 namespace esvr {
 
-/// What a run is to reach, every choice made.
+/// The parameters of a run, with all defaults resolved.
 struct RunPlan {
-  std::size_t count = 0;         ///< ellipsoids at the end of growth
-  std::uint32_t iterations = 0;  ///< length of the schedule
-  std::optional<double> psnr;    ///< dB over the box: the run ends as soon as it is reached
-  std::optional<double>
-      seconds;              ///< since the recorder's start; replaces `iterations` as the clock
-  bool learnKappa = false;  ///< else the kernel stays as it is
+  std::size_t count = 0;          ///< ellipsoids at the end of growth
+  std::uint32_t iterations = 0;   ///< length of the schedule
+  std::optional<double> psnr;     ///< dB over the box; the run ends as soon as it is reached
+  std::optional<double> seconds;  ///< time limit; replaces `iterations` as length of the schedule
+  bool learnKappa = false;        ///< whether kappa is fitted or stays the same
 };
 
 struct RunEnd {
   FitEnd end;
-  std::uint32_t iterations;  ///< that were done
+  std::uint32_t iterations;  ///< number of iterations done
 };
 
 RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,

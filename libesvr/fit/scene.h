@@ -1,5 +1,5 @@
 #pragma once
-/// What a fit derives from its target, whatever device it runs on.
+/// Values that a fit derives from its target on any device.
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 
 namespace esvr {
 
-/// The kernel's constants as inner loops use them.
+/// The kernel's constants in float32, for inner loops.
 [[nodiscard]] ESVR_HD inline KernelConstants<float> narrowed(const KernelConstants<double>& k) {
   return {float(k.shift), float(k.numerator), float(k.plateau), float(k.base),
           float(k.slope), float(k.cutoff),    float(k.expNegS)};
@@ -26,8 +26,8 @@ namespace esvr {
           tuning.intensityHeadroom * target.highest};
 }
 
-/// Half width of a seed's neighbourhood: a share of the distance of neighbours if the ellipsoids
-/// were spread evenly over the active voxels.
+/// Half width of a seed's window: Tuning::seedWindow times the distance that the ellipsoids would
+/// have if they were spread evenly over the active voxels.
 [[nodiscard]] inline int seedWindow(const FitTarget& target, std::size_t ellipsoids,
                                     const Tuning& tuning) {
   constexpr int kSmallest = 2, kLargest = 6;  // voxels

@@ -1,5 +1,5 @@
 #pragma once
-/// When a run adds, moves and steps, as functions of the fraction of the run that is done.
+/// The schedule of growth, relocation and step sizes, as functions of the fraction of a run.
 
 #include <algorithm>
 #include <cmath>
@@ -9,19 +9,19 @@
 
 namespace esvr {
 
-/// A run: from `from` to `to` ellipsoids over `iterations`.
+/// A run that grows from `from` to `to` ellipsoids and has a length of `iterations`.
 struct Schedule {
   std::size_t from = 0, to = 0;
   std::uint32_t iterations = 0;
   const Tuning& tuning;
 
-  /// Ellipsoids wanted at a fraction of the run: linear from `from` to `to` until growUntil.
+  /// The number of ellipsoids, which grows linearly until Tuning::growUntil.
   [[nodiscard]] std::size_t countAt(double fraction) const {
     const double share = std::min(1.0, fraction / tuning.growUntil);
     return from + std::size_t(std::llround(share * double(to - from)));
   }
-  /// Factor of the step sizes: exponential decay after a warm-up, and to nothing at the very end,
-  /// where steps of a fixed size would leave their own noise.
+  /// The factor of the step sizes. It rises in the warm-up, decays exponentially, and goes to zero
+  /// at the end, so that the steps leave no noise.
   [[nodiscard]] double stepAt(double fraction, std::uint32_t iteration) const {
     const double warm = std::min(1.0, double(iteration + 1) / tuning.warmUp);
     const double tail = std::min(1.0, (1.0 - fraction) / tuning.tail);

@@ -1,5 +1,5 @@
 #pragma once
-/// From the residual around a voxel to an ellipsoid, for host and device.
+/// Makes a seed from the residual around a voxel, for host and device.
 
 #include <cmath>
 
@@ -9,14 +9,15 @@
 
 namespace esvr {
 
-/// Moments of the residual of one sign about a voxel.
+/// Moments about a voxel of the residual of one sign.
 struct SeedMoments {
   double mass = 0.0;
   double energy = 0.0;  ///< sum of squares
   double x = 0.0, y = 0.0, z = 0.0;
   double xx = 0.0, yy = 0.0, zz = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
 
-  /// \param d  from the voxel  \param r  magnitude of the residual there
+  /// \param d  offset from the voxel
+  /// \param r  magnitude of the residual at this offset
   ESVR_HD void add(Coord d, double r) {
     mass += r;
     energy += r * r;
@@ -26,28 +27,28 @@ struct SeedMoments {
   }
 };
 
-/// The window is a ball of half width w, its poles thickened to more than one voxel.
+/// The window is a ball of radius w. The + 1 makes its poles wider than one voxel.
 ESVR_HD inline bool inSeedWindow(Coord d, int w) {
   return d.x * d.x + d.y * d.y + d.z * d.z <= w * w + 1;
 }
 
 struct SeedShape {
-  double unitVariance;  ///< SeedOptions::unitVariance
-  double intensity;     ///< SeedOptions::intensity
-  double share;         ///< energy that each draw stands for
+  double unitVariance;  ///< see SeedOptions
+  double intensity;     ///< see SeedOptions
+  double share;         ///< energy for each draw (SampledVoxels::share)
 };
 
-/// Height of a seed where the residual is r. Where little is left to mend but in a few places, many
-/// draws fall close together, and all of them would fill the same gap: they share it.
+/// The intensity of a seed at a voxel with the residual r. If several draws fall into the window,
+/// they share the residual.
 ESVR_HD inline double seedHeight(double r, const SeedMoments& m, const SeedShape& shape) {
-  const double countsAround = m.energy / shape.share;
-  return -r * shape.intensity / (countsAround > 1.0 ? countsAround : 1.0);
+  const double drawsInWindow = m.energy / shape.share;
+  return -r * shape.intensity / (drawsInWindow > 1.0 ? drawsInWindow : 1.0);
 }
 
-/// An ellipsoid of the moments' place and spread. \param r  the residual at the voxel
+/// A seed with the mean and the covariance of the moments. \param r  residual at the voxel
 ESVR_HD inline Ellipsoid seedFromMoments(Coord voxel, double r, const SeedMoments& m,
                                          const SeedShape& shape) {
-  constexpr double kSmallestVariance = 0.25;  // voxels^2: a seed of one voxel still has a shape
+  constexpr double kSmallestVariance = 0.25;  // voxels^2, for seeds on a single voxel
   const Eigen::Vector3d mean(m.x / m.mass, m.y / m.mass, m.z / m.mass);
   Eigen::Matrix3d covariance;
   covariance(0, 0) = m.xx / m.mass - mean[0] * mean[0];

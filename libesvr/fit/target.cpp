@@ -16,7 +16,7 @@ double largestMagnitude(const SparseVolume& volume) {
   return largest;
 }
 
-/// The power of two that brings `largest` into [0.5, 1].
+/// The power of two that scales `largest` to [0.5, 1).
 double powerOfTwoScale(double largest) {
   if (largest == 0.0) return 1.0;
   int exponent = 0;

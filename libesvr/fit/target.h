@@ -1,5 +1,5 @@
 #pragma once
-/// What a fit aims at: the volume less its background, scaled by a power of two.
+/// The target of a fit: the volume less its background, scaled by a power of two.
 
 #include <cstdint>
 #include <optional>
@@ -10,20 +10,21 @@
 namespace esvr {
 
 struct FitTarget {
-  std::vector<Coord> bricks;  ///< as SparseVolume::bricks
+  std::vector<Coord> bricks;  ///< see SparseVolume::bricks
   std::vector<float> values;  ///< (value - background) * scale, at most 1 in magnitude
-  double scale = 1.0;         ///< a power of two: scaling by it is exact
-  Box box;                    ///< of 'PSNR over the box', relative to the volume's origin
+  double scale = 1.0;         ///< a power of two, so that scaling is exact
+  Box box;                    ///< box of the PSNR, relative to the volume's origin
   double boxVoxels = 0.0;
   std::uint64_t activeVoxels = 0;
-  double peak = 1.0;                               ///< peakOf(volume), scaled
-  double lowest = 0.0, highest = 0.0;              ///< range of `values`, zero included
-  bool narrowBand = false;                         ///< FitOptions::narrowBand
-  const std::vector<BrickMask>* active = nullptr;  ///< of the volume the target was made from
-  std::optional<Box> within{};  ///< bricks: what lies elsewhere counts for nothing; default: all
+  double peak = 1.0;                               ///< scaled peakOf(volume)
+  double lowest = 0.0, highest = 0.0;              ///< range of `values` and 0
+  bool narrowBand = false;                         ///< see FitOptions
+  const std::vector<BrickMask>* active = nullptr;  ///< active masks of the volume's bricks
+  std::optional<Box> within{};  ///< box of bricks outside which errors do not count; default: none
 };
 
-/// The volume must outlive the target. \throws BadInput  no active voxel
+/// Makes the target of a volume, which must outlive it.
+/// \throws BadInput  the volume has no active voxel
 [[nodiscard]] FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box);
 
 }  // namespace esvr

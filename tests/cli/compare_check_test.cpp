@@ -303,15 +303,17 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"DIR/ref.vdb", "DIR/broken.vdb"}, 3, "broken.vdb"},
         Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "-g", "smoke"}, 3, "\"density\""},
         Refusal{{"DIR/ref.vdb", "DIR/else.vdb"}, 3, "\"fuel\""},
-        Refusal{{"DIR/none.vdb", "DIR/ref.vdb"}, 3, "nothing to compare"},
+        Refusal{{"DIR/none.vdb", "DIR/ref.vdb"}, 3, "no grid can be compared"},
         Refusal{{"DIR/none.vdb", "DIR/ref.vdb", "-g", "density"}, 3, "no active voxel"},
         Refusal{{"DIR/zero.vdb", "DIR/zero.vdb"}, 3, "--peak"},
         Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--baseline", "DIR/no.json"}, 3, "no.json"},
         Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--baseline", "DIR/notes.json"}, 3, "baseline"}));
 
-TEST(CompareProgram, namesItsJobs) {
+TEST(CompareProgram, namesItsCommands) {
   const auto run = test::runProgram(ESVR_COMPARE, {"chekc", "a", "b"});
   EXPECT_EQ(run.exitCode, 2);
+  EXPECT_THAT(run.err, HasSubstr("unknown command 'chekc'; the commands are check"));
+  EXPECT_EQ(test::runProgram(ESVR_COMPARE, {}).exitCode, 2);
   EXPECT_EQ(test::runProgram(ESVR_COMPARE, {"--help"}).exitCode, 0);
   EXPECT_THAT(test::runProgram(ESVR_COMPARE, {"check", "--help"}).out, HasSubstr("--min-psnr"));
 }

@@ -105,7 +105,7 @@ TEST_F(CompareTable, matchesACandidatesSizeAndShowsTheSearch) {
     }
   EXPECT_TRUE(rows > 0 || bytes < 1500) << "the smallest VDB has some 1500 bytes";
   EXPECT_THAT(table({at("ref.vdb"), at("fit.esvr"), "--runs", "1", "-v"}).out,
-              AllOf(HasSubstr("tries"), HasSubstr(" bytes,")));
+              AllOf(HasSubstr("trials"), HasSubstr(" bytes,")));
 }
 
 TEST_F(CompareTable, namesACommandThatMakesTheSameRow) {
@@ -204,7 +204,7 @@ TEST_F(CompareTable, takesLpipsFromAProgramOfTheUsers) {
   EXPECT_EQ(failed.exitCode, 1);
   EXPECT_THAT(failed.err, HasSubstr("ended with code 1"));
   EXPECT_EQ(wordy.exitCode, 1);
-  EXPECT_THAT(wordy.err, HasSubstr("no number"));
+  EXPECT_THAT(wordy.err, HasSubstr("not a number"));
 }
 
 TEST_F(CompareTable, SlowPutsPicturesOnThePage) {

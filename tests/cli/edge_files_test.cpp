@@ -37,7 +37,8 @@ class EdgeFile : public testing::Test {
   void expectRefused(const std::string& name, const std::string& type) const {
     const auto run = fit(name);
     EXPECT_EQ(run.exitCode, 3);
-    EXPECT_THAT(run.err, AllOf(HasSubstr(name), HasSubstr("nothing to fit"), HasSubstr(type)));
+    EXPECT_THAT(run.err,
+                AllOf(HasSubstr(name), HasSubstr("no grid that can be fitted"), HasSubstr(type)));
     EXPECT_THAT(folder_.names(), IsEmpty());
   }
 

@@ -98,7 +98,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"text", [](const auto& path) { test::writeText(path, "density 1 2 3\n"); },
                 "neither an OpenVDB nor a NanoVDB"},
         BadFile{"truncated", truncated, "in.vdb"},
-        BadFile{"no grid", [](const auto& path) { test::writeInput(path, {}); }, "nothing to fit"},
+        BadFile{"no grid", [](const auto& path) { test::writeInput(path, {}); },
+                "no grid that can be fitted"},
         BadFile{"no active voxel", [](const auto& path) { test::writeInput(path, {InputGrid{}}); },
                 "has no active voxel"},
         BadFile{"only grids of other types",
@@ -135,7 +136,7 @@ TEST_F(Vdb2Esvr, takesNonFiniteVoxelsAsZeroWhereAskedAndSaysHowMany) {
   test::writeInput(in(), {withNonFinite()});
   const auto run = quickFit(in(), out(), {"--nonfinite", "zero"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.err, HasSubstr("2 NaN or infinite voxels taken as zero"));
+  EXPECT_THAT(run.err, HasSubstr("2 NaN or infinite voxels were replaced by 0"));
   EXPECT_TRUE(outIsThere());
 }
 
@@ -210,7 +211,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST_F(Vdb2Esvr, endsWithCodeFourWhereThePsnrIsMissedAndWritesTheFile) {
   const auto run = quickFit(in(), out(), {"--psnr", "200"});
   EXPECT_EQ(run.exitCode, 4);
-  EXPECT_THAT(run.err, AllOf(HasSubstr("of the 200.00 dB"), HasSubstr("is written")));
+  EXPECT_THAT(run.err, AllOf(HasSubstr("instead of 200.00 dB"), HasSubstr("was written")));
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
 }
 
@@ -473,7 +474,7 @@ class Interrupted : public Vdb2Esvr {
 TEST_F(Interrupted, writesTheBestSoFarAndEndsWithCodeOne) {
   const auto run = interrupted("keep");
   EXPECT_EQ(run.exitCode, 1);
-  EXPECT_THAT(run.err, HasSubstr("out.esvr holds the best so far, without grid \"heat\""));
+  EXPECT_THAT(run.err, HasSubstr("out.esvr has the best result so far, without grid \"heat\""));
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
   EXPECT_THAT(folder_.names(), ElementsAre("in.vdb", "out.esvr"));
 }

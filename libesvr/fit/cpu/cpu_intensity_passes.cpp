@@ -13,15 +13,16 @@ namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
 constexpr std::size_t kBrickGrain = 4, kEllipsoidGrain = 256;
-/// Pairs whose tapes are kept from pass to pass: some 200 MB. More are worked out anew each time.
-constexpr std::size_t kMaxKept = 400'000;
+/// Largest number of pairs whose tapes are kept between passes, which is about 200 MB. With more
+/// pairs, every pass computes the tapes again.
+constexpr std::size_t kMaxKeptPairs = 400'000;
 
 std::vector<Coord> asBricks(std::vector<Coord> corners) {
   for (Coord& c : corners) c = brickOf(c);
   return corners;
 }
 
-/// Sets the voxels of a mask to 0; most words of it are all ones or none.
+/// Sets the voxels of a mask to 0. Most words of a mask are all ones or all zeros.
 void clearVoxels(const BrickMask& mask, float* values) {
   for (const std::uint64_t word : mask.words) {
     if (word == ~std::uint64_t{0}) {
@@ -61,7 +62,7 @@ void CpuIntensityPasses::setShapes(const Field& field) {
   corners_.clear();
   for (const Coord brick : index.bricks()) corners_.push_back(brick * kBrickSide);
   projections_.resize(plan_.pairs.pairCount());
-  keeps_ = plan_.pairs.pairCount() <= kMaxKept;
+  keeps_ = plan_.pairs.pairCount() <= kMaxKeptPairs;
   kept_ = false;
   tapes_.resize(keeps_ ? corners_.size() : 0);
   brickError_.resize(corners_.size());
@@ -74,7 +75,7 @@ void CpuIntensityPasses::setForms(std::span<const Number> intensities) {
     plan_.field.forms[i].intensity = float(intensities[i]);
 }
 
-/// The sum of a brick's ellipsoids, and their phi on the tapes.
+/// Adds up a brick's ellipsoids and records their phi on the tapes.
 std::span<const PairTape> CpuIntensityPasses::forward(std::size_t brick, PairTapes& scratch,
                                                       float* sum) {
   const BrickKernels& kernels = brickKernels();
@@ -100,8 +101,8 @@ std::span<const PairTape> CpuIntensityPasses::forward(std::size_t brick, PairTap
   return scratch.tapes;
 }
 
-/// Forward over every brick, middle(brick, sum), which makes the sum what is to be projected on
-/// the ellipsoids, and, where asked, backward.
+/// For every brick: a forward pass, middle(brick, sum), which turns the sum into the values that
+/// are projected on the ellipsoids, and, if wanted, a backward pass.
 template <class Middle>
 void CpuIntensityPasses::pass(bool backward, const Middle& middle) {
   tbb::enumerable_thread_specific<PairTapes> scratches;

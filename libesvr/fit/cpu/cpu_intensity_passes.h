@@ -22,7 +22,7 @@ class CpuIntensityPasses final : public IntensityPasses {
  private:
   template <class Number>
   void setForms(std::span<const Number> intensities);
-  /// Residuals of one brick, zero where the stored voxel is exact. \return the stored error
+  /// Residuals of one brick; they are zero at voxels that a reader gets exactly.
   StoredError residualOf(std::size_t brick, float* sum, BrickMask* exact) const;
   std::span<const PairTape> forward(std::size_t brick, PairTapes& scratch, float* sum);
   template <class Middle>
@@ -34,13 +34,13 @@ class CpuIntensityPasses final : public IntensityPasses {
   VoxelRule stored_;
   Box box_;
   bool restricted_;
-  BrickIndex known_;  ///< bricks that are there whatever the field
+  BrickIndex known_;  ///< bricks that do not depend on the field
   float background_ = 0.0f;
-  std::vector<Coord> corners_;        ///< of the known bricks, then of others that supports reach
-  std::vector<const float*> wanted_;  ///< values of the known bricks, null: the background
+  std::vector<Coord> corners_;        ///< corners of known bricks, then of others in reach
+  std::vector<const float*> wanted_;  ///< source's values of known bricks; null: background
   EvaluatePlan plan_;
-  bool keeps_ = false, kept_ = false;  ///< tapes: are to be kept, and are
-  std::vector<KeptTapes> tapes_;       ///< a brick's
+  bool keeps_ = false, kept_ = false;  ///< whether tapes shall be kept; whether they are valid
+  std::vector<KeptTapes> tapes_;       ///< tapes of each brick
   std::vector<PairProjection> projections_;
   std::vector<StoredError> brickError_;
   std::vector<BrickMask> exact_;

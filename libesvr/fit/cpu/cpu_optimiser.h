@@ -1,5 +1,5 @@
 #pragma once
-/// A fit on the CPU.
+/// The optimiser on the CPU.
 
 #include <cstdint>
 #include <span>
@@ -52,8 +52,8 @@ class CpuOptimiser final : public Optimiser {
   std::vector<EllipsoidGradient> gradients_;
   std::vector<float> residuals_;
   double secondsSeeding_ = 0.0;
-  std::uint64_t samplings_ = 0;      ///< events so far: each draws from its own random stream
-  int iterationsSinceRebuild_ = -1;  ///< -1: lists are stale
+  std::uint64_t samplings_ = 0;      ///< number of samplings, each with its own random numbers
+  int iterationsSinceRebuild_ = -1;  ///< -1: the lists are outdated
 };
 
 }  // namespace esvr

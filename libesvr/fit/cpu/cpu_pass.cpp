@@ -6,7 +6,7 @@ namespace esvr {
 namespace {
 
 double sumOfSquares(const float* r) {
-  // Eight partial sums in float32 over 64 terms each, then float64: enough for any loss, and SIMD.
+  // Eight partial float32 sums of 64 terms each are precise enough and allow SIMD.
   float part[8] = {};
   for (int v = 0; v < kBrickVoxels; v += 8)
     for (int l = 0; l < 8; ++l) part[l] += r[v + l] * r[v + l];

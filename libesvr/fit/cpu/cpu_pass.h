@@ -1,5 +1,5 @@
 #pragma once
-/// The pass of a fit on the CPU: squared errors, all ellipsoids with the scene's kernel.
+/// The pass of the default fit on the CPU: squared errors, and one kernel for all ellipsoids.
 
 #include <span>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace esvr {
 
-/// One kernel for all ellipsoids.
+/// A kernel that all ellipsoids share.
 class SceneKernel {
  public:
   explicit SceneKernel(const KernelConstants<double>& kernel);
@@ -29,11 +29,11 @@ class CpuPass : public PairPass<SceneKernel> {
   CpuPass(const FitTarget& target, const KernelConstants<double>& kernel)
       : PairPass(target, SceneKernel(kernel)) {}
 
-  /// Gradients of 1/2 sum r^2, r = V - target, over all bricks of the lists.
+  /// Computes the gradients of 1/2 sum r^2 with r = V - target over all bricks of the lists.
   /// \return sum of r^2
   double gradients(std::span<const Ellipsoid> ellipsoids, std::span<EllipsoidGradient> out);
 
-  /// Lists must be built anew after it.
+  /// Sets the kernel; the lists must then be rebuilt.
   void setKernel(const KernelConstants<double>& kernel) { setKernels(SceneKernel(kernel)); }
   [[nodiscard]] const KernelConstants<double>& kernel() const { return kernels().exact(); }
 

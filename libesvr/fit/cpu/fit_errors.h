@@ -6,7 +6,7 @@
 
 namespace esvr {
 
-/// \param residual  the target's bricks first
+/// \param residual  residuals whose first bricks are the target's
 [[nodiscard]] FitErrors errorsOf(const FitTarget& target, const ResidualField& residual);
 
 }  // namespace esvr

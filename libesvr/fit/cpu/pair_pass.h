@@ -1,7 +1,7 @@
 #pragma once
-/// The parts that every pass of a fit over its bricks is made of, on the CPU: lists of the pairs of
-/// ellipsoids and bricks, forward and backward over one brick, and the sum of an ellipsoid's pairs.
-/// Passes differ in the loss that they descend (cpu_pass.h, paper/cpu_paper_pass.h).
+/// The common part of the fits' passes on the CPU: lists of (ellipsoid, brick) pairs, the forward
+/// and the backward pass over one brick, and the sum over an ellipsoid's pairs. Derived passes
+/// differ in their loss (cpu_pass.h, paper/cpu_paper_pass.h).
 
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
@@ -22,10 +22,10 @@
 
 namespace esvr {
 
-/// Keeps the pair lists and the prepared forms. Lists hold while no support has moved by more than
-/// the slack they were built with; the caller says when to rebuild.
-/// \tparam Kernels  has constants(i) and radius(i): the kernel of ellipsoid i, and the radius of its
-///                  support in the unit frame
+/// Holds the pair lists and the prepared forms. The lists are valid until a support has moved by
+/// more than the slack they were built with; the caller decides when to rebuild them.
+/// \tparam Kernels  a type with constants(i) and radius(i): the kernel of ellipsoid i, and the
+///                  radius of its support in the unit frame
 template <class Kernels>
 class PairPass {
  public:
@@ -33,11 +33,11 @@ class PairPass {
   PairPass(const FitTarget& target, const Kernels& kernels)
       : target_(target), kernels_(kernels), index_(target.bricks) {}
 
-  /// Lists must be rebuilt after it.
+  /// Sets the kernels; the lists must then be rebuilt.
   void setKernels(const Kernels& kernels) { kernels_ = kernels; }
   [[nodiscard]] const Kernels& kernels() const { return kernels_; }
 
-  /// Builds the lists anew, with supports widened by `slack` voxels.
+  /// Rebuilds the lists with supports that are widened by `slack` voxels.
   void rebuild(std::span<const Ellipsoid> ellipsoids, double slack) {
     std::vector<Support> reach(ellipsoids.size());
     forEachEllipsoid(ellipsoids.size(), [&](std::size_t i) {
@@ -50,7 +50,7 @@ class PairPass {
     moments_.resize(pairs_.pairCount());
   }
 
-  /// Writes r = V - target for every brick: those of the target first, then those that only
+  /// Writes r = V - target for every brick: the target's bricks first, then other bricks that
   /// supports reach.
   void residuals(std::span<const Ellipsoid> ellipsoids, std::vector<float>& out) {
     prepare(ellipsoids);
@@ -93,7 +93,7 @@ class PairPass {
     });
   }
 
-  /// Forms of the ellipsoids as they are now.
+  /// Computes the forms of the current ellipsoids.
   void prepare(std::span<const Ellipsoid> ellipsoids) {
     forms_.resize(ellipsoids.size());
     frames_.resize(ellipsoids.size());
@@ -113,14 +113,14 @@ class PairPass {
     for (int v = 0; v < kBrickVoxels; ++v) r[v] = -t[v];
   }
 
-  /// r = clamp(V, lowest, highest) - target: a narrow band's ends stand for all that is beyond.
+  /// Sets r = clamp(V, lowest, highest) - target, since a narrow band is clamped when revoxelised.
   void saturate(std::size_t brick, float* r) const {
     const float* t = target_.values.data() + brick * kBrickVoxels;
     const auto low = float(target_.lowest), high = float(target_.highest);
     for (int v = 0; v < kBrickVoxels; ++v) r[v] = std::clamp(r[v], low - t[v], high - t[v]);
   }
 
-  /// Adds the sum to r and keeps phi on the tapes.
+  /// Adds the sum to r and records phi on the tapes.
   void forwardBrick(std::size_t brick, PairTapes& scratch, float* r) const {
     const auto begin = pairs_.brickBegin[brick], end = pairs_.brickBegin[brick + 1];
     const Coord corner = index_.bricks()[brick] * kBrickSide;
@@ -137,7 +137,7 @@ class PairPass {
     }
   }
 
-  /// Moments of the brick's pairs. \param byValue  the loss's derivative by V
+  /// Computes the moments of the brick's pairs. \param byValue  derivative of the loss by V
   void backwardBrick(std::size_t brick, const PairTapes& scratch, const float* byValue) {
     const auto begin = pairs_.brickBegin[brick], end = pairs_.brickBegin[brick + 1];
     const Coord corner = index_.bricks()[brick] * kBrickSide;
@@ -150,7 +150,7 @@ class PairPass {
     }
   }
 
-  /// Gradients from the moments of all pairs.
+  /// Computes the gradients from the moments of all pairs.
   void reduce(std::span<EllipsoidGradient> out) const {
     forEachEllipsoid(forms_.size(), [&](std::size_t i) {
       PairSums sums{};
@@ -176,7 +176,7 @@ class PairPass {
   BrickIndex index_;
   BrickPairs pairs_;
   std::vector<LineForm> forms_;
-  std::vector<Coord> frames_;  ///< origin of a form's center: near it, so that float32 holds
+  std::vector<Coord> frames_;  ///< origin of each form's center, near it for float32 precision
   std::vector<PairMoments> moments_;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Room for what a forward pass over a brick leaves for the backward one.
+/// Memory for the tapes that a forward pass over a brick leaves for the backward pass.
 
 #include <algorithm>
 #include <cstddef>
@@ -13,7 +13,7 @@
 
 namespace esvr {
 
-/// Floats aligned for the widest vectors, uninitialised.
+/// Uninitialised floats with the alignment of the widest SIMD vectors.
 class AlignedFloats {
  public:
   AlignedFloats() = default;
@@ -31,10 +31,10 @@ class AlignedFloats {
   std::unique_ptr<float[], Delete> floats_;
 };
 
-/// A thread's tapes of the pairs of one brick, used again for the next.
+/// A thread's tapes for the pairs of one brick. The memory is reused for the next brick.
 struct PairTapes {
   std::vector<PairTape> tapes;
-  AlignedFloats phi;  ///< kBrickVoxels a pair at most
+  AlignedFloats phi;  ///< at most kBrickVoxels values for each pair
   std::size_t capacity = 0;
 
   void reserve(std::size_t pairs) {
@@ -45,7 +45,7 @@ struct PairTapes {
   }
 };
 
-/// Tapes of one brick that stay, as short as they are; their memory is used again for the next.
+/// Tapes of one brick that are kept between passes without gaps. The memory is reused.
 class KeptTapes {
  public:
   void keep(std::span<const PairTape> from) {
@@ -66,7 +66,7 @@ class KeptTapes {
   [[nodiscard]] std::span<const PairTape> tapes() const { return tapes_; }
 
  private:
-  static constexpr std::size_t kSpare = 8;  ///< one part in so many: shapes change a little
+  static constexpr std::size_t kSpare = 8;  ///< 1/8 more is allocated, since shapes change a little
   std::vector<PairTape> tapes_;
   AlignedFloats phi_;
   std::size_t capacity_ = 0;

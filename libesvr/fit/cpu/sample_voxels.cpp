@@ -13,7 +13,7 @@ double energy(std::span<const float> values, SignsAllowed signs) {
   return sum;
 }
 
-/// Running sum of r^2 over bricks; brick b covers [sums[b], sums[b + 1]).
+/// Cumulative energy of the bricks; brick b covers [sums[b], sums[b + 1]).
 std::vector<double> energySums(const ResidualField& residual, const SamplingOptions& options) {
   std::vector<double> sums(options.targetBricks + 1, 0.0);
   tbb::parallel_for(std::size_t(0), options.targetBricks,
@@ -22,8 +22,8 @@ std::vector<double> energySums(const ResidualField& residual, const SamplingOpti
   return sums;
 }
 
-/// The voxel at which the running energy passes `target`; the last with energy where rounding hides
-/// it.
+/// The voxel at which the cumulative energy exceeds `target`; because of rounding this may be the
+/// last voxel with energy.
 int voxelAt(std::span<const float> values, SignsAllowed signs, double target) {
   double sum = 0.0;
   int last = 0;
@@ -50,7 +50,7 @@ SampledVoxels sampleVoxels(const ResidualField& residual, const SamplingOptions&
     if (options.signs.mends(residual.brick(b)[v]) && residual.brick(b)[v] != 0.0f)
       drawn.voxels.push_back(residual.index.bricks()[b] * kBrickSide + voxelLocal(v));
   }
-  // Draws of one voxel follow each other.
+  // repeated draws of a voxel are adjacent
   drawn.voxels.erase(std::unique(drawn.voxels.begin(), drawn.voxels.end()), drawn.voxels.end());
   return drawn;
 }

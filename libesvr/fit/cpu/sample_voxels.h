@@ -1,5 +1,5 @@
 #pragma once
-/// Draws voxels in proportion to their squared residual.
+/// Samples voxels in proportion to their squared residual.
 
 #include <vector>
 
@@ -9,13 +9,13 @@
 namespace esvr {
 
 struct SampledVoxels {
-  std::vector<Coord> voxels;  ///< each once
-  double share = 0.0;         ///< energy that each draw stood for
+  std::vector<Coord> voxels;  ///< distinct voxels
+  double share = 0.0;         ///< energy for each draw
 };
 
-/// Systematic sampling along the bricks' order: `count` equal shares of the total energy, one voxel
-/// from each, so that draws spread evenly. A voxel that holds several shares is drawn once; none is
-/// where no residual can be mended.
+/// Systematic sampling in the order of the bricks: the total energy is divided into `count` equal
+/// shares, and one voxel is drawn from each. A voxel that covers several shares is drawn once. The
+/// result is empty if seeds cannot reduce any residual.
 [[nodiscard]] SampledVoxels sampleVoxels(const ResidualField& residual,
                                          const SamplingOptions& options);
 

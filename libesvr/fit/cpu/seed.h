@@ -1,5 +1,5 @@
 #pragma once
-/// New ellipsoids where the error is.
+/// Makes seeds, which are new ellipsoids at voxels of large error.
 
 #include <vector>
 
@@ -10,17 +10,17 @@ namespace esvr {
 
 struct SeedOptions {
   SamplingOptions draw;
-  int window = 2;             ///< half width of the neighbourhood that shapes a seed, voxels
-  double unitVariance = 0.5;  ///< of the kernel (kernelVariance)
-  double intensity = 1.0;     ///< of the residual at the seed
+  int window = 2;             ///< half width of the window that shapes a seed, voxels
+  double unitVariance = 0.5;  ///< variance of the kernel (kernelVariance)
+  double intensity = 1.0;     ///< intensity of a seed, relative to the residual
 };
 
-/// Voxels drawn by sampleVoxels, each made an ellipsoid with the place, spread and height of the
-/// residual of one sign around it.
+/// Makes a seed at each voxel that sampleVoxels draws. Its position, shape and intensity follow
+/// from the residual of one sign around the voxel.
 [[nodiscard]] std::vector<Ellipsoid> seedsFromResidual(const ResidualField& residual,
                                                        const SeedOptions& options);
 
-/// Variance along an axis of phi taken as a density over the unit frame.
+/// Variance along an axis of the density that is proportional to phi in the unit frame.
 [[nodiscard]] double kernelVariance(const KernelConstants<double>& kernel);
 
 }  // namespace esvr

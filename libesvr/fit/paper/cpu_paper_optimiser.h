@@ -1,5 +1,5 @@
 #pragma once
-/// The paper's method on the CPU.
+/// The optimiser of the paper's method on the CPU.
 
 #include <vector>
 
@@ -27,7 +27,7 @@ class CpuPaperOptimiser final : public PaperOptimiser {
   struct Part {
     std::unique_ptr<Subvolume> volume;
     CpuPaperPass pass;
-    double motionLeft = -1.0;  ///< voxels that supports may still move by; below 0: lists are stale
+    double motionLeft = -1.0;  ///< voxels by which supports may still move; < 0: lists are outdated
   };
 
   void resizeKernels(std::size_t count);
@@ -41,7 +41,7 @@ class CpuPaperOptimiser final : public PaperOptimiser {
   PopulationKernels kernels_;
   std::vector<Part> parts_;
   Population population_;
-  std::vector<Ellipsoid> ellipsoids_;  ///< the same in the form that passes take
+  std::vector<Ellipsoid> ellipsoids_;  ///< the population in the form of the passes
   std::vector<EllipsoidGradient> gradients_;
   std::vector<float> residuals_, lossByValue_;
   PaperLoss loss_;

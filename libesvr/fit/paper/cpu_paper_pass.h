@@ -1,6 +1,6 @@
 #pragma once
 /// The pass of the paper's method on the CPU: the derivative of the loss by every voxel is given,
-/// and ellipsoids may each have a kernel of their own.
+/// and each ellipsoid may have its own kernel.
 
 #include <span>
 #include <vector>
@@ -9,10 +9,10 @@
 
 namespace esvr::paper {
 
-/// The kernels of a population: one for all, or one for each ellipsoid where k is learned.
+/// The kernels of a population: one for all, or one for each ellipsoid if k is learned.
 struct PopulationKernels {
   std::vector<KernelConstants<float>> all;
-  std::vector<double> radii;  ///< of the supports, in the unit frames
+  std::vector<double> radii;  ///< radii of the supports in the unit frame
 
   [[nodiscard]] const KernelConstants<float>& constants(std::size_t i) const {
     return all[all.size() == 1 ? 0 : i];
@@ -20,7 +20,7 @@ struct PopulationKernels {
   [[nodiscard]] double radius(std::size_t i) const { return radii[radii.size() == 1 ? 0 : i]; }
 };
 
-/// Borrows the kernels, which change with every step.
+/// A reference to kernels, which change with every step.
 class BorrowedKernels {
  public:
   explicit BorrowedKernels(const PopulationKernels& kernels) : kernels_(&kernels) {}
@@ -35,11 +35,12 @@ class BorrowedKernels {
 
 class CpuPaperPass : public PairPass<BorrowedKernels> {
  public:
-  /// Target and kernels must outlive the pass.
+  /// The target and the kernels must outlive the pass.
   CpuPaperPass(const FitTarget& target, const PopulationKernels& kernels)
       : PairPass(target, BorrowedKernels(kernels)) {}
 
-  /// Gradients of a loss whose derivative by V is given, kBrickVoxels a brick in residuals' order.
+  /// Computes the gradients of a loss from its derivative by V.
+  /// \param lossByValue  kBrickVoxels values for each brick, in the order of residuals()
   void gradients(std::span<const Ellipsoid> ellipsoids, std::span<const float> lossByValue,
                  std::span<EllipsoidGradient> out);
 };

@@ -11,10 +11,10 @@
 namespace esvr::paper {
 namespace {
 
-constexpr double kShrink = 1.6;  // of a split's scales: 0.8 times the number of parts
+constexpr double kShrink = 1.6;  // divisor of a split ellipsoid's scales: 0.8 times kParts
 constexpr int kParts = 2;
 
-/// The population's places whose gradients reach the threshold, in increasing order.
+/// Indices of the ellipsoids whose gradients reach the threshold, in increasing order.
 std::vector<std::size_t> chosen(const Population& population, const DensifyRule& rule) {
   std::vector<std::pair<double, std::size_t>> candidates;
   for (std::size_t i = 0; i < population.size(); ++i)
@@ -36,7 +36,7 @@ double largestScale(const PaperEllipsoid& p) {
   return std::exp(*std::max_element(p.logScale.begin(), p.logScale.end()));
 }
 
-/// Normal numbers of a seed (Box and Muller 1958).
+/// Normally distributed numbers of a random seed (Box and Muller 1958).
 class Normals {
  public:
   explicit Normals(std::uint64_t seed) : seed_(seed) {}
@@ -61,7 +61,7 @@ PaperEllipsoid partOf(const PaperEllipsoid& whole, Normals& normal) {
   return part;
 }
 
-/// Keeps those that are not split, in their order.
+/// Removes the ellipsoids that were split; the others keep their order.
 void removeSplit(Population& population, const std::vector<bool>& split) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < population.size(); ++i) {

@@ -25,7 +25,8 @@ void checkPrunes(const PaperMethod& method) {
   }
 }
 
-/// The count is what the last pass leaves, or where there is none what may be added.
+/// Applies CommonFitOptions::count: the number that the last pruning pass keeps, or, without
+/// pruning, the largest number of ellipsoids.
 PaperMethod methodFor(const PaperFitOptions& options) {
   PaperMethod method = options.method;
   if (!options.count) return method;

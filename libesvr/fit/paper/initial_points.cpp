@@ -14,7 +14,7 @@ std::uint64_t voxelsToDrawFrom(const FitTarget& target) {
          std::uint64_t(std::count(target.values.begin(), target.values.end(), 0.0f));
 }
 
-/// Integral over the unit frame of phi.
+/// Integral of phi over the unit frame.
 double massOf(const KernelConstants<double>& kernel) {
   constexpr int kSteps = 400;
   const double step = supportRadius(kernel) / kSteps;

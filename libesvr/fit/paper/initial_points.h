@@ -1,15 +1,15 @@
 #pragma once
-/// Where the paper's method begins.
+/// The seeds of the paper's method.
 
 #include "fit/paper/paper_ellipsoid.h"
 #include "fit/target.h"
 
 namespace esvr::paper {
 
-/// Spheres on voxels that differ from the background, drawn evenly from all of them in the bricks'
-/// order and none twice: as many as asked for, or as there are such voxels. Their scale is the
-/// distance of neighbours if they were spread evenly, their intensity the voxel's share where so
-/// many overlap.
+/// Makes spheres on distinct voxels that differ from the background, drawn evenly in the order of
+/// the bricks: `points` of them, or one for each such voxel if there are fewer. Their scale is the
+/// distance that they would have if they were spread evenly. Their intensity is the voxel's value
+/// divided by the overlap of the spheres.
 [[nodiscard]] std::vector<PaperEllipsoid> initialPoints(const FitTarget& target, std::size_t points,
                                                         const KernelKind& kind, std::uint64_t seed);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// An ellipsoid as the paper's method moves it, and what is remembered of it.
+/// An ellipsoid in the parameters of the paper's method, and the state of its optimisation.
 
 #include <array>
 #include <cmath>
@@ -13,21 +13,21 @@ namespace esvr::paper {
 
 struct PaperEllipsoid {
   std::array<double, 3> center;    ///< voxels relative to the volume's origin
-  std::array<double, 3> logScale;  ///< of the paper's scales (Sigma = R S S^T R^T), voxels
-  std::array<double, 4> rotation;  ///< quaternion w, x, y, z of any length but 0
-  double intensity;                ///< in units of FitTarget::scale
-  double k;                        ///< of this ellipsoid, where it is learned
+  std::array<double, 3> logScale;  ///< logarithms of the paper's scales (Sigma = R S S^T R^T)
+  std::array<double, 4> rotation;  ///< quaternion w, x, y, z of any length above 0
+  double intensity;                ///< units of the target (FitTarget::scale)
+  double k;                        ///< sharpness of this ellipsoid if it is learned
 };
 
-/// Order: center (3), logScale (3), rotation (4), intensity, k.
+/// The order of a gradient: center (3), logScale (3), rotation (4), intensity, k.
 inline constexpr int kPaperParameters = 12;
 using PaperVector = std::array<double, kPaperParameters>;
 
 /// Adam's moments, and the gradients by position since the last densification.
 struct PaperState {
   std::array<float, kPaperParameters> m{}, v{};
-  double gradientSum = 0.0;  ///< of lengths
-  std::uint32_t seen = 0;    ///< visits to subvolumes that the ellipsoid reaches
+  double gradientSum = 0.0;  ///< sum of the gradients' lengths
+  std::uint32_t seen = 0;    ///< number of visits to subvolumes that the ellipsoid reaches
 };
 
 struct Population {
@@ -37,21 +37,21 @@ struct Population {
   [[nodiscard]] std::size_t size() const { return ellipsoids.size(); }
 };
 
-/// Which kernel the paper's scales are meant for.
+/// The kernel of the paper's ellipsoids.
 struct KernelKind {
   bool gaussian = false, learnK = false;
   double k = 5.0;
 
-  /// Scales of the unit frame (ellipsoid.h) go so many times into the paper's: with m = k q for
-  /// ellipsoids and m = q / 2 for Gaussians, q = d^T Sigma^-1 d.
+  /// The paper's scale divided by that of the unit frame (ellipsoid.h): m = k q for ellipsoids and
+  /// m = q / 2 for Gaussians, with q = d^T Sigma^-1 d.
   [[nodiscard]] ESVR_HD double unitsPerScale(double ofEllipsoid) const {
     return std::sqrt(gaussian ? 0.5 : (learnK ? ofEllipsoid : k));
   }
 };
 
-/// The scene's kernel: the paper's ellipsoid, or a Gaussian that ends at 3 sigma.
+/// The kernel of the field: the paper's ellipsoid, or a Gaussian that ends at 3 sigma.
 [[nodiscard]] inline Kernel kernelOf(const KernelKind& kind) {
-  constexpr float kGaussian = -30.0f;  // e^-30 from the limit
+  constexpr float kGaussian = -30.0f;  // kappa, for which the kernel is a Gaussian to within e^-30
   constexpr double kSigmas = 3.0;
   if (kind.gaussian)
     return {KernelForm::kContinuous, kGaussian, float(std::exp(-0.5 * kSigmas * kSigmas))};

@@ -1,5 +1,5 @@
 #pragma once
-/// From the paper's ellipsoids to what files store.
+/// Converts the paper's ellipsoids to a Field.
 
 #include "esvr/ellipsoids.h"
 #include "fit/export_field.h"
@@ -7,11 +7,11 @@
 
 namespace esvr::paper {
 
-/// \param frame  its kernel and kappas are those of `kind`
+/// \param frame  a frame whose kernel and kappas are replaced by those of `kind`
 [[nodiscard]] Field fieldOf(const Population& population, const KernelKind& kind,
                             ExportFrame frame);
 
-/// Drops ellipsoids that no voxel of a box sees. They cost bytes and change nothing.
+/// Drops ellipsoids that contribute to no voxel of a box.
 void dropUnseen(Population& population, const KernelKind& kind, const Box& box);
 
 }  // namespace esvr::paper

@@ -34,14 +34,14 @@ void check(const PaperLossInput& in) {
     throw std::logic_error("residual or target do not fit the bricks");
 }
 
-/// All bricks with a window that sees one of the index, in increasing order.
+/// All bricks with a window that overlaps a brick of the index, in increasing order.
 std::vector<Coord> dilated(const BrickIndex& index) {
   std::vector<Coord> bricks = index.bricks();
   std::sort(bricks.begin(), bricks.end());
   return dilateBricks(bricks);
 }
 
-/// Drops the bricks whose boxes are empty, and these.
+/// Drops empty boxes and their bricks.
 void keepNonEmpty(std::vector<Coord>& bricks, std::vector<Box>& boxes) {
   std::size_t kept = 0;
   for (std::size_t b = 0; b < bricks.size(); ++b) {
@@ -53,7 +53,7 @@ void keepNonEmpty(std::vector<Coord>& bricks, std::vector<Box>& boxes) {
   boxes.resize(kept);
 }
 
-/// The voxels whose windows see a support, in whole rows along z.
+/// The voxels whose windows overlap a support, extended to whole rows along z.
 Box rowsThatSee(const Box& support) {
   Box voxels = windowsThatSee(support);
   voxels.min.z = kWholeBrick.min.z;
@@ -73,7 +73,7 @@ double sign(float v) { return double((v > 0.0f) - (v < 0.0f)); }
 }  // namespace
 
 double PaperLoss::sumOfBricks() const {
-  // One after the other: bricks of zeros do not change where others are rounded.
+  // a sequential sum, whose rounding does not change if bricks of zeros are added
   return std::accumulate(brickSums_.begin(), brickSums_.end(), 0.0);
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The paper's loss, beta * L1 + (1 - beta) * D-SSIM (eq. recon_loss), and its derivative by every
-/// voxel of the prediction. D-SSIM is 1 - the mean of 3D SSIM, with the window of ssim_window.h.
+/// The paper's loss, beta * L1 + (1 - beta) * D-SSIM (paper, eq. 7), and its derivative by every
+/// voxel of the prediction. D-SSIM is 1 - mean 3D SSIM with the window of ssim_window.h.
 
 #include <optional>
 #include <span>
@@ -11,27 +11,28 @@
 
 namespace esvr {
 
-/// Prediction and target are zero outside the bricks, and no window is clipped: those of the voxels
-/// of all space count, or those of a box.
+/// The prediction and the target are zero outside the bricks. Windows are not clipped. The windows
+/// around all voxels of space count, or those around the voxels of a box.
 struct PaperLossInput {
   const BrickIndex& index;          ///< every brick where prediction or target may be non-zero
-  std::span<const float> residual;  ///< prediction - target, kBrickVoxels a brick of the index
-  std::span<const float> target;    ///< of the index's first bricks; zero in the others
-  double voxels;                    ///< of the box that the means are taken over
-  double beta;                      ///< 0..1
-  double peak;                      ///< range L of the values; L1 is taken of values divided by it
-  std::optional<Box> within{};      ///< in bricks: only the windows of its voxels count
+  std::span<const float> residual;  ///< prediction - target, kBrickVoxels values for each brick
+  std::span<const float> target;    ///< target in the index's first bricks; it is zero in others
+  double voxels;                    ///< number of voxels over which the means are taken
+  double beta;                      ///< share of L1 in the loss, 0 to 1
+  double peak;                      ///< range L of the values, by which they are divided for L1
+  std::optional<Box> within{};      ///< box of bricks whose voxels' windows count; default: all
 };
 
-/// Costs follow the bricks and those next to them: windows that see no brick count as SSIM 1, which
-/// is exact. The same bits for any number of threads, and for bricks of zeros added to the index.
-/// Keeps its buffers from one call to the next.
+/// Evaluates the loss. The time is proportional to the number of bricks and their neighbours:
+/// windows that cover no brick have an SSIM of exactly 1. The result is bit-identical for any
+/// number of threads, and does not change if bricks of zeros are added to the index. Buffers are
+/// kept between calls.
 class PaperLoss {
  public:
-  /// \param lossByValue  out: the loss's derivative by the prediction, laid out as the residual;
-  ///                     0 by L1 where the residual is 0
-  /// \return the loss. NaN where a residual is NaN.
-  /// \throws UsageError  beta outside [0, 1], peak or number of voxels not positive
+  /// \param lossByValue  output: derivative of the loss by the prediction, in the layout of the
+  ///                     residual; the derivative of L1 is 0 if the residual is 0
+  /// \return the loss, which is NaN if a residual is NaN
+  /// \throws UsageError  beta is outside [0, 1], or the peak or number of voxels is not positive
   double evaluate(const PaperLossInput& input, std::vector<float>& lossByValue);
 
  private:
@@ -41,7 +42,7 @@ class PaperLoss {
   void addGradient(const SsimValues& values, double scale, std::vector<float>& lossByValue);
   [[nodiscard]] double sumOfBricks() const;
 
-  std::vector<Box> nonZero_;  // of the index's bricks
+  std::vector<Box> nonZero_;  // nonZeroBox of each brick of the index
   Windows windows_{BrickIndex(std::span<const Coord>{}), {}, {}, {}};
   std::vector<double> brickSums_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// One ellipsoid's frame, gradient and step, for host and device.
+/// The frame, the gradient and the step of one ellipsoid, for host and device.
 
 #include <cmath>
 
@@ -10,20 +10,21 @@
 
 namespace esvr::paper {
 
-/// A step of one iteration.
+/// The parameters of a step.
 struct PaperStep {
-  PaperVector rates{};                    ///< by parameter; of the position in voxels
-  double positionUnit = 1.0;              ///< voxels: half the longest axis
+  PaperVector rates{};                    ///< rate of each parameter; voxels for the position
+  double positionUnit = 1.0;              ///< half the longest axis, voxels
   double correct1 = 1.0, correct2 = 1.0;  ///< 1 / (1 - beta^steps)
   double smallestLogScale = 0.0, largestLogScale = 0.0;
 };
 
-/// As 3D Gaussian Splatting sets them.
+/// Adam's constants in 3D Gaussian Splatting.
 inline constexpr double kBeta1 = 0.9, kBeta2 = 0.999, kAdamEpsilon = 1e-15;
-/// Learned k stays within: below, an ellipsoid has no edge, beyond, no slope that a voxel sees.
+/// Limits of a learned k. Below, an ellipsoid has no edge; above, its edge is far thinner than a
+/// voxel.
 inline constexpr double kSmallestK = 0.5, kLargestK = 50.0;
 
-/// L = units S^-1 R^T: the same ellipsoid in the form that passes take.
+/// Converts an ellipsoid to the form of the passes: L = units S^-1 R^T.
 ESVR_HD inline Ellipsoid ellipsoidOf(const PaperEllipsoid& p, const KernelKind& kind) {
   const Matrix3 R = rotationOf(normalised(p.rotation));
   const double units = kind.unitsPerScale(p.k);
@@ -37,8 +38,8 @@ ESVR_HD inline Ellipsoid ellipsoidOf(const PaperEllipsoid& p, const KernelKind& 
 
 namespace paper_math {
 
-/// By the angles of a turn about the own axes: with W its generator, A = S^-1 W S changes L as
-/// exp(-A) L, of which the loss sees the symmetric part.
+/// The derivatives by the angles of a turn about the ellipsoid's own axes. With the generator W of
+/// the turn, A = S^-1 W S changes L to exp(-A) L, and the loss depends on the symmetric part of A.
 ESVR_HD inline std::array<double, 3> byTurn(const PaperEllipsoid& p, const ParameterVector& g) {
   const auto skew = [&](int j, int k) {
     return 0.5 *
@@ -47,8 +48,8 @@ ESVR_HD inline std::array<double, 3> byTurn(const PaperEllipsoid& p, const Param
   return {-g[8] * skew(1, 2), g[7] * skew(0, 2), -g[6] * skew(0, 1)};
 }
 
-/// By a quaternion's components: a turn by t about own axis j adds t/2 (q e_j) to a unit
-/// quaternion.
+/// The derivatives by a quaternion's components. A turn by t about the ellipsoid's axis j adds
+/// t/2 (q e_j) to a unit quaternion.
 ESVR_HD inline std::array<double, 4> byQuaternion(const PaperEllipsoid& p,
                                                   const std::array<double, 3>& turn) {
   const std::array<double, 4> q = normalised(p.rotation);
@@ -61,13 +62,14 @@ ESVR_HD inline std::array<double, 4> byQuaternion(const PaperEllipsoid& p,
 
 }  // namespace paper_math
 
-/// From the gradient in the ellipsoid's own frame (ellipsoid.h) to that by the paper's parameters.
+/// Converts the gradient in the ellipsoid's own frame (ellipsoid.h) to that by the paper's
+/// parameters.
 /// \param unit  ellipsoidOf(p)
 ESVR_HD inline PaperVector byPaperParameters(const PaperEllipsoid& p, const Ellipsoid& unit,
                                              const EllipsoidGradient& gradient) {
   const ParameterVector& g = gradient.byParameter;
   PaperVector out{};
-  // center = F delta, so that d/d center = L^T d/d delta.
+  // center = F delta, hence d/d center = L^T d/d delta
   for (int i = 0; i < 3; ++i)
     out[i] = unit.L[i] * g[0] + unit.L[3 + i] * g[1] + unit.L[6 + i] * g[2];
   for (int j = 0; j < 3; ++j) out[3 + j] = g[3 + j];
@@ -75,13 +77,13 @@ ESVR_HD inline PaperVector byPaperParameters(const PaperEllipsoid& p, const Elli
   const auto quaternion = paper_math::byQuaternion(p, turn);
   for (int j = 0; j < 4; ++j) out[6 + j] = quaternion[j];
   out[10] = g[9];
-  // At fixed q = m / k, so that m grows with k.
+  // the derivative is taken at fixed q = m / k, so m grows with k
   out[11] = edgeGradient(gradient, 1.0 / p.k);
   return out;
 }
 
-/// Remembers the gradient's length and takes Adam's step.
-/// \param reached  the subvolume just visited holds voxels that the ellipsoid reaches
+/// Adds the gradient's length to the state's sum and takes Adam's step.
+/// \param reached  true if the visited subvolume contains voxels that the ellipsoid reaches
 ESVR_HD inline void takeStep(PaperEllipsoid& p, PaperState& state, const PaperVector& gradient,
                              bool reached, const PaperStep& step) {
   if (reached) {

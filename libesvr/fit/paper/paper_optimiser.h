@@ -1,6 +1,6 @@
 #pragma once
-/// The state of a run of the paper's method and its iteration, wherever it is computed; paper_run.h
-/// decides what comes when.
+/// The interface of the paper's method on any device: the state of a run and its iteration.
+/// paper_run.h decides the order of the operations.
 
 #include <cstddef>
 #include <memory>
@@ -20,7 +20,7 @@ struct PaperOptions {
   int subvolumeSide = 0;  ///< voxels
   Device device;
   std::optional<std::size_t> maxDeviceBytes;
-  /// On a GPU: only the subvolume that is visited is there. So it is, too, where all do not fit.
+  /// On a GPU: only the visited subvolume is in GPU memory, even if all subvolumes would fit.
   bool visitOnly = false;
 };
 
@@ -35,30 +35,30 @@ class PaperOptimiser {
 
   [[nodiscard]] virtual std::size_t subvolumeCount() const = 0;
 
-  /// Gradients of the loss over one subvolume, and a step of every ellipsoid: those that it does
-  /// not reach go on by their momentum.
+  /// Computes the gradients of the loss over one subvolume and takes a step with every ellipsoid.
+  /// Ellipsoids that do not reach the subvolume move by their momentum.
   virtual void iterate(std::size_t subvolume, const PaperStep& step) = 0;
 
-  /// What iterate() would step by.
+  /// The gradients of iterate().
   [[nodiscard]] virtual LossGradients gradients(std::size_t subvolume) = 0;
 
-  /// Takes over ellipsoids as they are.
+  /// Replaces the population.
   virtual void put(const Population& population) = 0;
   [[nodiscard]] virtual Population population() const = 0;
   [[nodiscard]] virtual std::size_t ellipsoidCount() const = 0;
 
-  /// Over all subvolumes; an ellipsoid beyond all of them counts for nothing.
+  /// Measures the errors over all subvolumes. Ellipsoids outside all of them do not count.
   /// \throws RuntimeFailure  an ellipsoid is not finite
   [[nodiscard]] virtual FitErrors measure() = 0;
 
-  /// Of the lists last built.
+  /// Pairs in the lists that were built last.
   [[nodiscard]] virtual std::uint64_t pairCount() const = 0;
-  /// The most that has been held so far; 0 on the CPU.
+  /// Largest GPU memory held so far; 0 on the CPU.
   [[nodiscard]] virtual std::size_t deviceBytes() const = 0;
 };
 
-/// The largest distance, in voxels, that a support's border of the usual size moves by in a step:
-/// lists serve as long as the sum stays below their slack.
+/// The largest distance, in voxels, by which the border of a support of usual size moves in a step.
+/// Lists are valid while the sum of these distances is below their slack.
 [[nodiscard]] inline double motionOf(const PaperStep& step) {
   constexpr double kUsualRadius = 3.0;  // voxels
   return step.rates[0] + kUsualRadius * (step.rates[3] + step.rates[6]);
@@ -66,8 +66,8 @@ class PaperOptimiser {
 /// Voxels by which supports are widened in the lists.
 inline constexpr double kListSlack = 0.5;
 
-/// An optimiser on the device of the options. The target must outlive it.
-/// \throws DeviceError  that device cannot be used
+/// Makes an optimiser on the device of the options. The target must outlive it.
+/// \throws DeviceError  the device cannot be used
 [[nodiscard]] std::unique_ptr<PaperOptimiser> makePaperOptimiser(const FitTarget& target,
                                                                  const PaperOptions& options);
 

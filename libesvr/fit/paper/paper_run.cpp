@@ -15,9 +15,9 @@ namespace esvr::paper {
 namespace {
 
 constexpr std::uint32_t kCurvePoints = 64;
-constexpr double kLastRate = 0.1;          // of the first
-constexpr double kSmallestScale = 0.05;    // voxels; nothing smaller reaches a voxel for long
-constexpr double kFloorShare = 1.0 / 255;  // of the range: what covers a voxel
+constexpr double kLastRate = 0.1;          // learning rates at the end, relative to the start
+constexpr double kSmallestScale = 0.05;    // voxels; smaller ellipsoids hardly reach a voxel
+constexpr double kFloorShare = 1.0 / 255;  // |I| phi that covers a voxel, in ranges of values
 
 class Epochs {
  public:
@@ -118,7 +118,7 @@ class Epochs {
     optimiser_.put(population);
   }
 
-  /// How many a pass leaves.
+  /// The number of ellipsoids that a pruning pass keeps.
   [[nodiscard]] std::size_t keptBy(const PrunePass& pass, std::size_t count) const {
     if (run_.method.keep && pass.epoch == run_.method.prunes.back().epoch)
       return std::min(*run_.method.keep, count);
@@ -147,7 +147,7 @@ class Epochs {
     return recorder_.record(optimiser_.measure(), optimiser_.ellipsoidCount(), record_.iterations);
   }
 
-  /// Looks at the clock after every epoch, and at the error now and then.
+  /// Checks the time limit after every epoch, and the error after some epochs.
   [[nodiscard]] std::optional<FitEnd> checkEnd(std::uint32_t epoch) {
     const auto& options = run_.options;
     const std::uint32_t epochs = run_.method.epochs;
@@ -166,8 +166,8 @@ class Epochs {
   Recorder& recorder_;
   PaperRecord& record_;
   Space space_;
-  double range_;  ///< of values
-  double unit_;   ///< voxels: half the longest axis
+  double range_;  ///< range of the target's values
+  double unit_;   ///< half the longest axis, voxels
 };
 
 }  // namespace

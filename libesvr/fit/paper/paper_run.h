@@ -1,5 +1,5 @@
 #pragma once
-/// Epochs, densification and pruning: the paper's algorithm (appendix, 'Structure-aware ellipsoid
+/// The paper's algorithm: epochs, densification and pruning (appendix, 'Structure-aware ellipsoid
 /// learning').
 
 #include "esvr/paper_method.h"
@@ -8,17 +8,17 @@
 
 namespace esvr::paper {
 
-/// What a run is given.
+/// The input of a run.
 struct PaperRun {
   const FitTarget& target;
   const PaperMethod& method;
-  const CommonFitOptions& options;  ///< seed, and psnr and seconds, at which it ends too
+  const CommonFitOptions& options;  ///< the seed, psnr and seconds are used
 };
 
 [[nodiscard]] KernelKind kindOf(const PaperMethod& method);
 
-/// Places the points and goes through the epochs.
-/// \param record  out: what was done
+/// Places the seeds and runs all epochs.
+/// \param record  output: the outcome of the run
 FitEnd runPaper(PaperOptimiser& optimiser, const PaperRun& run, Recorder& recorder,
                 PaperRecord& record);
 

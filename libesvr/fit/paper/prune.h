@@ -1,5 +1,5 @@
 #pragma once
-/// Scores ellipsoids and removes the least (paper, section 3.2.2).
+/// Pruning: scores ellipsoids and removes those of lowest score (paper, section 3.2.2).
 
 #include <span>
 #include <vector>
@@ -10,29 +10,30 @@
 
 namespace esvr::paper {
 
-/// Fractional anisotropy of Sigma (paper, eq. fa): 0 for a sphere, 1 for a line.
+/// Fractional anisotropy of Sigma: 0 for a sphere, 1 for a line.
 [[nodiscard]] double fractionalAnisotropy(const std::array<double, 3>& logScale);
 
-/// What an ellipsoid covers of a volume.
+/// The part of a volume that an ellipsoid covers.
 struct Coverage {
-  double voxels = 0.0;        ///< where |I| phi is at least the floor
-  double contribution = 0.0;  ///< sum of |I| phi there
+  double voxels = 0.0;        ///< number of voxels at which |I| phi is at least the floor
+  double contribution = 0.0;  ///< sum of |I| phi over these voxels
 };
 
 struct CoverageOptions {
   KernelKind kind;
   Box box;             ///< voxels of the volume, relative to its origin
-  double floor = 0.0;  ///< in units of the intensities
+  double floor = 0.0;  ///< smallest |I| phi that covers a voxel, units of the intensities
 };
 
-/// By the definition, in float64 at every voxel.
+/// Evaluates the definition in float64 at every voxel.
 [[nodiscard]] Coverage coverageOf(const PaperEllipsoid& ellipsoid, const CoverageOptions& options);
 
-/// Scores of all, in their order.
+/// The scores of all ellipsoids, in their order.
 [[nodiscard]] std::vector<double> pruneScores(std::span<const PaperEllipsoid> ellipsoids,
                                               PruneScore score, const CoverageOptions& options);
 
-/// Keeps the `keep` ellipsoids of the highest scores, the earlier of equal ones, in their order.
+/// Keeps the `keep` ellipsoids of highest score, in their order. Of equal scores, the first ones
+/// are kept.
 void keepHighest(Population& population, std::span<const double> scores, std::size_t keep);
 
 }  // namespace esvr::paper

@@ -8,7 +8,7 @@
 namespace esvr {
 namespace {
 
-/// Null for bricks beyond the array's end and where there is none.
+/// The values of the bricks around a brick; null for missing bricks and beyond the array's end.
 ValuesAround<float> valuesAround(std::span<const float> values, const BricksAround& around) {
   ValuesAround<float> result;
   std::transform(around.begin(), around.end(), result.begin(), [&](std::uint32_t brick) {
@@ -29,7 +29,7 @@ ValuesAround<Value> gradientsAround(const std::vector<WindowGradients>& gradient
   return result;
 }
 
-/// Offsets of the first voxels of a box's rows along z.
+/// Visits the offsets of the first voxels of a box's rows along z.
 template <class Visit>
 void forEachRow(const Box& voxels, Visit&& visit) {
   for (int x = voxels.min.x; x <= voxels.max.x; ++x)
@@ -41,7 +41,7 @@ void forEachRow(const Box& voxels, Visit&& visit) {
 Box nonZeroBox(const SsimValues& values, std::size_t brick) {
   const std::size_t at = brick * kBrickVoxels;
   const float* r = &values.residual[at];
-  const float* t = at < values.target.size() ? &values.target[at] : r;  // none: r alone decides
+  const float* t = at < values.target.size() ? &values.target[at] : r;  // r if there is no target
   Box box;
   for (int v = 0; v < kBrickVoxels; ++v)
     if (r[v] != 0.0f || t[v] != 0.0f) box.expand(voxelLocal(v));
@@ -64,7 +64,7 @@ double WindowSide::evaluate(const SsimValues& values, Coord brick, const SsimWin
 double WindowSide::differentiate(const SsimConstants& constants, const Box& voxels,
                                  WindowGradients& out) const {
   out = {};
-  std::array<double, kBrickSide> sums{};  // of a row's voxels each, so that rows are vectors
+  std::array<double, kBrickSide> sums{};  // one sum for each z, which allows SIMD over a row
   forEachRow(voxels, [&](int row) {
     for (int z = 0; z < kBrickSide; ++z) {
       const int v = row + z;

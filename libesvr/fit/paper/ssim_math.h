@@ -1,24 +1,24 @@
 #pragma once
-/// 1 - SSIM of one window and its derivatives, for host and device. ssim_gradient.h has the
-/// formula.
+/// 1 - SSIM of one window and its derivatives (ssim_gradient.h), for host and device.
 
 #include "esvr/kernel.h"
 #include "field/ssim_window.h"
 
 namespace esvr {
 
-/// Weighted means over one window: t the target, r = prediction - target.
+/// Weighted means over one window of the target t and the residual r = prediction - target.
 struct WindowMoments {
   double t, tt, r, rr, tr;
 };
 
-/// 1 - SSIM of one window, in [0, 2] and exactly 0 where r is zero, and its WindowGradients.
+/// 1 - SSIM of one window, which is in [0, 2] and exactly 0 if r is zero, and its derivatives (see
+/// WindowGradients).
 struct Dissimilarity {
   double value, byR;
   float byRr, byTr;
 };
 
-/// Variances are not below zero; what is not a number stays so.
+/// Clamps a variance to 0 from below; NaN stays NaN.
 ESVR_HD inline double notNegative(double variance) { return variance < 0.0 ? 0.0 : variance; }
 
 ESVR_HD inline Dissimilarity dissimilarity(const WindowMoments& m, const SsimConstants& constants) {
@@ -36,7 +36,7 @@ ESVR_HD inline Dissimilarity dissimilarity(const WindowMoments& m, const SsimCon
   d.value = l + c - l * c;
   d.byRr = float((1.0 - l) * (1.0 - c) * byVariances * constants.c2);
   d.byTr = float(-2.0 * (1.0 - l) * c * byVariances * constants.c2);
-  // With byRr and byTr as rounded, so that what cancels in a flat region's sums still does.
+  // uses the rounded byRr and byTr, so that the sums of a flat region still cancel
   d.byR = 2.0 * (1.0 - c) * (m.r - l * meanP) * byMeans -
           (2.0 * m.r * double(d.byRr) + m.t * double(d.byTr)) * (1.0 / constants.c2);
   return d;

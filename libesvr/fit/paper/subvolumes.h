@@ -1,5 +1,5 @@
 #pragma once
-/// The cubes that the paper's method visits one after the other.
+/// The subvolumes of the paper's method, which are cubes.
 
 #include <memory>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace esvr::paper {
 
-/// The volume that is cut: its own box and the target's bricks, whole bricks of them.
+/// The volume that is divided: whole bricks around the target's box and bricks.
 struct Space {
   Box bricks;
   [[nodiscard]] int longestAxis() const;   ///< voxels
@@ -17,19 +17,19 @@ struct Space {
 };
 [[nodiscard]] Space spaceOf(const FitTarget& target);
 
-/// Half the longest axis, or the shortest where that is less, in whole bricks (paper, appendix
-/// 'Subvolume configuration').
-/// \param asked  voxels; 0: as said
+/// The side of the subvolumes, which is a multiple of 8 voxels.
+/// \param asked  wanted side in voxels; 0: half the longest axis, or the shortest axis if that is
+///               less (paper, appendix 'Subvolume configuration')
 [[nodiscard]] int subvolumeSide(const Space& space, int asked);
 
-/// One of them: its bricks of the target, and a box beyond which nothing counts.
+/// A subvolume: its part of the target, whose `within` is the box of the subvolume.
 struct Subvolume {
   FitTarget target;
   std::vector<BrickMask> active;
 };
 
-/// In the order of their coordinates, those without target bricks too. Each on its own place in
-/// memory: targets point to their masks.
+/// Divides a target into subvolumes in the order of their coordinates, including those without
+/// target bricks. They are allocated one by one, because each target points to its masks.
 [[nodiscard]] std::vector<std::unique_ptr<Subvolume>> cutSubvolumes(const FitTarget& target,
                                                                     const Space& space, int side);
 
