@@ -361,8 +361,8 @@ TEST_F(Vdb2Esvr, reportsWhatThePapersMethodUsed) {
 bool storesEllipsoidsWithinABound(const std::string& in, const std::string& out,
                                   const std::vector<test::InputVoxel>& voxels) {
   test::writeInput(in, {{.voxels = voxels}});
-  const auto run = vdb2esvr({in, out, "--max-error", "5%", "--kappa", "0", "--iterations", "200",
-                             "--report", "-"});
+  const auto run = vdb2esvr(
+      {in, out, "--max-error", "5%", "--kappa", "0", "--iterations", "200", "--report", "-"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
   const Json bound = Json::parse(run.out)["grids"][0]["bound"];
   const StoredGrid grid = readEsvr(out).grids[0];

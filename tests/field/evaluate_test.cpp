@@ -166,8 +166,7 @@ TEST(PaperKernel, AgreesWithTheFloat64SumOnBothSidesOfItsJump) {
       ++onAnEnd;
       continue;
     }
-    ASSERT_NEAR(values[v], evaluateReference(field, voxel),
-                4e-7 * 5.0 * test::intensitySum(field))
+    ASSERT_NEAR(values[v], evaluateReference(field, voxel), 4e-7 * 5.0 * test::intensitySum(field))
         << toString(voxel);
   }
   EXPECT_LE(onAnEnd, 8u) << "supports have some thousand voxels near their ends";
