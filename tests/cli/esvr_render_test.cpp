@@ -14,6 +14,8 @@
 
 #include "cli/run_program.h"
 #include "esvr/container.h"
+#include "esvr/device.h"
+#include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "esvr/transfer_function.h"
@@ -250,6 +252,47 @@ TEST_F(EsvrRender, ModesAndBoxesChangeThePicture) {
   EXPECT_EQ(picture("in.esvr", {"--slice", "y=15"}).rgba,
             picture("in.esvr", {"--clip", "-99,14.5,-99,99,15.5,99"}).rgba);
   for (const png_byte v : picture("in.esvr", {"--clip", "500,0,0,501,1,1"}).rgba) ASSERT_EQ(v, 0);
+}
+
+TEST_F(EsvrRender, TheSamplingOfRaysChangesThePicture) {
+  const auto usual = picture("in.esvr");
+  EXPECT_NE(picture("in.esvr", {"--step", "4"}).rgba, usual.rgba);
+  EXPECT_NE(picture("in.esvr", {"--opacity-length", "6"}).rgba, usual.rgba);
+  EXPECT_NE(picture("in.esvr", {"--min-transmittance", "0.6"}).rgba, usual.rgba);
+  // A ray that ends at 1/4096 of the light lacks less than a step of 8 bits.
+  EXPECT_GE(psnrOf(picture("in.esvr", {"--min-transmittance", "0"}), usual), 48.0);
+}
+
+TEST_F(EsvrRender, TheGridThatIsNamedIsDrawn) {
+  const auto stored = readEsvr(folder_ / "in.esvr").grids[0];
+  auto other = stored;
+  other.descriptor.name = "heat";
+  for (float& i : other.field.chunks[0].ellipsoids.intensity) i *= -1.0f;
+  writeEsvr(folder_ / "two.esvr", {{}, {stored, other}});
+  const auto first = picture("in.esvr");
+  EXPECT_EQ(picture("two.esvr").rgba, first.rgba);
+  EXPECT_EQ(picture("two.esvr", {"--grid", "density"}).rgba, first.rgba);
+  EXPECT_NE(picture("two.esvr", {"--grid", "heat"}).rgba, first.rgba);
+}
+
+TEST_F(EsvrRender, ValuesOfFewerBitsChangeThePictureALittle) {
+  const auto floats = picture("in.vdb", {"--values", "float"});
+  const auto fp4 = picture("in.vdb", {"--values", "fp4"});
+  EXPECT_NE(fp4.rgba, floats.rgba);
+  EXPECT_GT(psnrOf(fp4, floats), 20.0);
+}
+
+TEST_F(EsvrRender, PartsOfTheDepthAndMemoryChangeNothingOnGpu) {
+  try {
+    (void)selectDevice("cuda");
+  } catch (const DeviceError& error) {
+    GTEST_SKIP() << error.what();
+  }
+  const auto usual = picture("in.esvr", {"--device", "cuda"});
+  EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--bins", "3"}), usual), 48.0);
+  EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--max-vram", "1"}), usual), 48.0);
+  EXPECT_EQ(draw("in.esvr", "none.png", {"--device", "cuda", "--max-vram", "0.000001"}).exitCode,
+            5);
 }
 
 TEST_F(EsvrRender, SomeFramesOfATurntableAreThoseOfTheWhole) {
