@@ -131,8 +131,7 @@ TEST_P(DocumentedCommands, run) {
   EXPECT_GE(ran, 3u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Documents, DocumentedCommands,
-                         testing::Values("README.md"),
+INSTANTIATE_TEST_SUITE_P(Documents, DocumentedCommands, testing::Values("README.md"),
                          [](const auto&) { return std::string("readme"); });
 
 }  // namespace
