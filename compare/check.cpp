@@ -183,7 +183,8 @@ void check(const CheckOptions& options) {
   const cli::ThreadLimit threads(options.threads);
   const cli::Interrupts interrupts;
   checkFiles(options);
-  const GridFile reference(options.reference), candidate(options.candidate);
+  const GridFile reference(options.reference, options.maxMemory),
+      candidate(options.candidate, options.maxMemory);
 
   CheckRecord record;
   record.candidateBytes = candidate.bytes();

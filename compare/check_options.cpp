@@ -6,6 +6,8 @@
 #include "cli/byte_size.h"
 #include "cli/choice.h"
 #include "cli/command_line.h"
+#include "cli/memory_limit.h"
+#include "cli/number.h"
 #include "compare/program.h"
 #include "compare/report_options.h"
 #include "esvr/error.h"
@@ -74,6 +76,7 @@ cli::CommandLine makeCommandLine() {
      "write all results as JSON; '-' is stdout")
     ("force,f", bool_switch(), "replace the report if it exists");
   // clang-format on
+  cli::addMaxMemory(line);
   return line;
 }
 
@@ -93,22 +96,17 @@ std::set<DifferenceKind> kindsOf(const std::string& word) {
 
 std::set<DifferenceKind> parseKinds(const std::string& list) {
   std::set<DifferenceKind> kinds;
-  for (const auto& word : splitAtCommas(list)) kinds.merge(kindsOf(word));
+  for (const auto& word : cli::splitText(list, ',')) kinds.merge(kindsOf(word));
   return kinds;
 }
 
 /// Reads a limit. Limits on errors in value units must be positive or 0; others are any number.
 cli::ErrorBound limitOf(const Figure& figure, const std::string& text) {
   if (figure.inValueUnits && text != "0") return cli::parseErrorBound(figure.option, text);
-  std::size_t end = 0;
-  double amount = std::numeric_limits<double>::quiet_NaN();
-  try {
-    amount = std::stod(text, &end);
-  } catch (const std::exception&) {
-  }
-  if (end != text.size() || !(std::abs(amount) < std::numeric_limits<double>::infinity()))
+  const auto amount = cli::parseNumber(text);
+  if (!amount)
     throw UsageError("--" + std::string(figure.option) + " must be a number, not '" + text + "'");
-  return {.amount = amount};
+  return {.amount = *amount};
 }
 
 void readLimits(const Arguments& a, CheckOptions& options) {
@@ -142,6 +140,7 @@ std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv)
   options.ssim = a.get<bool>("ssim");
   options.report = a.find<std::string>("report").value_or("");
   options.overwrite = a.get<bool>("force");
+  options.maxMemory = cli::maxMemoryOf(a);
   options.threads = a.threads;
   options.verbosity = a.verbosity;
   options.commandLine = commandLine(argc, argv);

@@ -30,6 +30,7 @@ struct CheckOptions {
   bool ssim = false;   ///< whether SSIM is measured without a limit on it
   std::string report;  ///< file name or "-"; empty: no report
   bool overwrite = false;
+  std::uint64_t maxMemory = 0;  ///< bytes that input may take
   int threads = 0;
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;

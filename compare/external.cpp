@@ -2,12 +2,12 @@
 
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 
 #include "cli/byte_size.h"
+#include "cli/number.h"
 #include "compare/grid_file.h"
 #include "esvr/error.h"
 
@@ -21,35 +21,21 @@ struct TypeWord {
 constexpr std::array kTypes{TypeWord{"float32", 4}, TypeWord{"float64", 8}, TypeWord{"uint8", 1},
                             TypeWord{"uint16", 2}};
 
-std::vector<std::string> split(const std::string& text, char at) {
-  std::vector<std::string> parts;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(at, begin), text.size());
-    parts.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return parts;
-}
-
 [[noreturn]] void refuse(const std::string& text, const std::string& why) {
   throw UsageError("--external '" + text + "': " + why +
                    "; the form is NAME=FILE:BYTES, with :NXxNYxNZ:TYPE if FILE is raw, and any "
                    "of :encode=S, :decode=S, :fps=N");
 }
 
-template <class T>
-bool parseNumber(const std::string& text, T& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
 std::optional<Coord> parseDims(const std::string& text) {
-  const auto parts = split(text, 'x');
-  Coord dims;
-  const bool whole = parts.size() == 3 && parseNumber(parts[0], dims.x) &&
-                     parseNumber(parts[1], dims.y) && parseNumber(parts[2], dims.z);
-  if (!whole || dims.x < 1 || dims.y < 1 || dims.z < 1) return std::nullopt;
-  return dims;
+  std::vector<std::int32_t> sides;
+  for (const std::string& part : cli::splitText(text, 'x')) {
+    const auto side = cli::parseWhole(part);
+    if (!side || *side < 1 || *side > Box::kMax) return std::nullopt;
+    sides.push_back(std::int32_t(*side));
+  }
+  if (sides.size() != 3) return std::nullopt;
+  return Coord{sides[0], sides[1], sides[2]};
 }
 
 bool isType(const std::string& word) {
@@ -63,8 +49,8 @@ bool readFigure(const std::string& part, External& external) {
   const std::size_t equals = part.find('=');
   if (equals == std::string::npos) return false;
   const std::string key = part.substr(0, equals);
-  double value = 0.0;
-  if (!parseNumber(part.substr(equals + 1), value) || !(value >= 0.0)) return false;
+  const auto value = cli::parseNumber(part.substr(equals + 1));
+  if (!value || *value < 0.0) return false;
   if (key == "encode")
     external.encodeSeconds = value;
   else if (key == "decode")
@@ -185,9 +171,9 @@ class RawReader {
   std::vector<std::byte> row_;
 };
 
-SparseVolume readVdb(const External& external, const std::string& grid) {
-  const GridFile file(external.file);
-  return file.read(file.grids().size() == 1 ? 0 : file.find(grid)).volume;
+SparseVolume readVdb(const External& external, const ExternalPlace& place) {
+  const GridFile file(external.file, place.maxMemory);
+  return file.read(file.grids().size() == 1 ? 0 : file.find(place.grid)).volume;
 }
 
 }  // namespace
@@ -198,7 +184,7 @@ External parseExternal(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) refuse(text, "it has no name");
   external.name = text.substr(0, equals);
-  const auto parts = split(text.substr(equals + 1), ':');
+  const auto parts = cli::splitText(text.substr(equals + 1), ':');
   if (parts.size() < 2 || parts[0].empty()) refuse(text, "it has no file and bytes");
   external.file = parts[0];
   external.bytes = cli::parseByteSize("external", parts[1]);
@@ -209,7 +195,7 @@ External parseExternal(const std::string& text) {
 }
 
 SparseVolume readExternal(const External& external, const ExternalPlace& place) {
-  if (!external.dims) return readVdb(external, place.grid);
+  if (!external.dims) return readVdb(external, place);
   checkRaw(external, place.box);
   return RawReader(external, place).read();
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "esvr/coord.h"
+#include "esvr/memory_limit.h"
 #include "esvr/sparse_volume.h"
 
 namespace esvr::compare {
@@ -32,6 +33,7 @@ struct ExternalPlace {
   std::string grid;  ///< grid of a VDB file; a file's only grid may have another name
   Box box;           ///< box of the voxels of a raw file
   float background = 0.0f;
+  std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes that reading may take
 };
 
 /// Reads the voxels. In a raw file, voxels that differ from the background are active.

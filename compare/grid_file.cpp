@@ -18,7 +18,8 @@ std::vector<std::string> storedNames(const std::vector<ListedGrid>& grids) {
 
 }  // namespace
 
-GridFile::GridFile(std::filesystem::path path) : path_(std::move(path)) {
+GridFile::GridFile(std::filesystem::path path, std::uint64_t maxMemory)
+    : path_(std::move(path)), maxMemory_(maxMemory) {
   if (path_.extension() == ".esvr")
     listEsvr();
   else
@@ -26,7 +27,7 @@ GridFile::GridFile(std::filesystem::path path) : path_(std::move(path)) {
 }
 
 void GridFile::listEsvr() {
-  esvr_ = std::make_unique<EsvrFile>(readEsvr(path_));
+  esvr_ = std::make_unique<EsvrFile>(readEsvr(path_, {maxMemory_}));
   bytes_ = inspectEsvr(path_).fileBytes;
   metadata_ = esvr_->metadata;
   for (const auto& grid : esvr_->grids)
@@ -57,10 +58,11 @@ std::size_t GridFile::firstWithVoxels() const {
 }
 
 VolumeGrid GridFile::read(std::size_t g) const {
-  if (!esvr_) return readGrid(path_, grids_[g].uniqueName, {.allowEmpty = true});
+  if (!esvr_)
+    return readGrid(path_, grids_[g].uniqueName, {.allowEmpty = true, .maxBytes = maxMemory_});
   VolumeGrid grid;
   grid.descriptor = esvr_->grids[g].descriptor;
-  grid.volume = decodeGrid(esvr_->grids[g]);
+  grid.volume = decodeGrid(esvr_->grids[g], {.maxBytes = maxMemory_});
   return grid;
 }
 

@@ -24,8 +24,9 @@ struct ListedGrid {
 /// An .esvr file is recognised by its extension, a .vdb or .nvdb file by its first bytes.
 class GridFile {
  public:
-  /// \throws BadInput  as for readEsvr and inspectVdb
-  explicit GridFile(std::filesystem::path path);
+  /// \throws BadInput, MemoryExceeded  as readEsvr and inspectVdb
+  /// \param maxMemory  bytes that reading it may take
+  GridFile(std::filesystem::path path, std::uint64_t maxMemory);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
@@ -47,6 +48,7 @@ class GridFile {
   void listVdb();
 
   std::filesystem::path path_;
+  std::uint64_t maxMemory_;
   std::uint64_t bytes_ = 0;
   std::vector<ListedGrid> grids_;
   std::vector<MetaItem> metadata_;

@@ -3,7 +3,6 @@
 #include <sys/wait.h>
 
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <span>
@@ -11,6 +10,7 @@
 #include <utility>
 
 #include "cli/bytes_file.h"
+#include "cli/number.h"
 #include "compare/shell_word.h"
 #include "esvr/error.h"
 #include "report/png_image.h"
@@ -43,15 +43,10 @@ double lastNumber(const std::string& command, const std::string& text) {
   std::istringstream words(text);
   std::string word, last;
   while (words >> word) last = word;
-  std::size_t used = 0;
-  double value = NAN;
-  try {
-    value = std::stod(last, &used);
-  } catch (const std::logic_error&) {  // not a number, or out of the range of double
-  }
-  if (used != last.size() || !std::isfinite(value))
-    throw RuntimeFailure("--lpips: " + command + " printed '" + last + "', which is not a number");
-  return value;
+  const auto value = cli::parseNumber(last);
+  if (!value)
+    throw RuntimeFailure("--lpips: " + command + " printed '" + last + "', which is no number");
+  return *value;
 }
 
 }  // namespace

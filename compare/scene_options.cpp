@@ -4,6 +4,7 @@
 
 #include "cli/box_option.h"
 #include "cli/byte_size.h"
+#include "cli/memory_limit.h"
 
 namespace esvr::compare {
 
@@ -26,6 +27,7 @@ void addSceneOptions(cli::CommandLine& line) {
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
      "device for fits and pictures: auto, cpu, cuda or cuda:N");
   // clang-format on
+  cli::addMaxMemory(line);
 }
 
 void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
@@ -41,6 +43,7 @@ void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
                       std::numeric_limits<double>::max());
   options.maxDense = cli::parseByteSize("max-dense", a.get<std::string>("max-dense"));
   options.device = a.get<std::string>("device");
+  options.maxMemory = cli::maxMemoryOf(a);
   options.threads = a.threads;
   options.verbosity = a.verbosity;
 }

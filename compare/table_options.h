@@ -34,6 +34,7 @@ struct TableOptions {
   std::string device;
   GalleryOptions images;
   ReportFiles files;
+  std::uint64_t maxMemory = 0;  ///< bytes that input may take
   int threads = 0;
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;

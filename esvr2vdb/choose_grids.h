@@ -9,7 +9,8 @@
 
 namespace esvr::esvr2vdb {
 
-/// What --grid takes for each grid, in file order: its name, with "[i]" where several share it.
+/// The name that --grid takes for each grid, in file order: its own, with "[i]" where several share
+/// it.
 [[nodiscard]] std::vector<std::string> uniqueNames(const EsvrFile& file);
 
 /// Places of the named grids in the file, increasing; all of them where none is named.

@@ -66,7 +66,18 @@ std::vector<VolumeGrid> decodeAll(const EsvrFile& file, const std::vector<std::s
   return grids;
 }
 
-/// Who is who. The reference is looked through before anything is written.
+/// A NanoVDB file has no place for metadata.
+void tellLostMetadata(const EsvrFile& file, const std::vector<VolumeGrid>& grids,
+                      const Options& options, const cli::Log& log) {
+  if (options.output.extension() != ".nvdb") return;
+  std::size_t items = file.metadata.size();
+  for (const auto& grid : grids) items += grid.descriptor.metadata.size();
+  if (items == 0) return;
+  log.warning(options.output.string() + ": a NanoVDB file holds no metadata; " +
+              std::to_string(items) + " items of " + options.input.string() + " are left out");
+}
+
+/// Finds each grid in the reference, which is looked through before anything is written.
 std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<std::size_t>& chosen,
                                        const Options& options) {
   const auto names = uniqueNames(file);
@@ -96,6 +107,7 @@ void convert(const Options& options) {
   if (options.reference) compared = counterparts(file, chosen, options);
   const auto grids = decodeAll(file, chosen, options, log);
   if (interrupts.token().cancelled()) throw Cancelled();
+  tellLostMetadata(file, grids, options, log);
   writeGrids(options.output, file.metadata, grids, options.write);
   if (options.reference) printErrors(options, compared, std::cout);
 }

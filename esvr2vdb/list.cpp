@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <iostream>
 
+#include "cli/listing.h"
 #include "cli/names.h"
 #include "cli/printable.h"
 #include "cli/table.h"
@@ -13,10 +14,6 @@ namespace {
 
 std::string textOf(const Kernel& kernel) {
   return cli::nameOf(kernel.form) + " " + cli::shortNumber(kernel.kappa);
-}
-
-std::string textOf(const Box& box) {
-  return box.empty() ? "empty" : toString(box.min) + " to " + toString(box.max);
 }
 
 std::string bytesPerEllipsoid(std::uint64_t bytes, std::size_t ellipsoids) {
@@ -57,7 +54,7 @@ void addStream(cli::Table& table, const std::string& grid, const char* stream, s
   table.add({grid, stream, std::to_string(bytes), bytesPerEllipsoid(bytes, ellipsoids)});
 }
 
-/// What the quantised ellipsoids are made of.
+/// The bytes of the quantised ellipsoids, by stream.
 void printStreams(const Listing& listing) {
   cli::Table table({"grid", "stream", "bytes", "bytes each"});
   for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
@@ -73,7 +70,7 @@ void printStreams(const Listing& listing) {
   table.print(std::cout);
 }
 
-/// What a reader gets of the first layers, and what it takes.
+/// The error of the first layers, and the bytes that they take.
 void printLayers(const Listing& listing) {
   cli::Table table({"grid", "layers", "ellipsoids", "bytes", "PSNR box", "max error"});
   for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
@@ -92,13 +89,8 @@ void printLayers(const Listing& listing) {
   table.print(std::cout);
 }
 
-void printMetadata(const std::string& title, const std::vector<MetaItem>& items) {
-  for (const auto& item : items)
-    std::cout << cli::printable(title + ": " + item.name + " (" + item.type + ")") << '\n';
-}
-
 void printDetails(const Listing& listing) {
-  printMetadata("file metadata", listing.file.metadata);
+  cli::printMetadata("file metadata", listing.file.metadata, std::cout);
   for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
     const StoredGrid& grid = listing.file.grids[g];
     const std::string name = cli::printable(listing.names[g]);
@@ -106,14 +98,16 @@ void printDetails(const Listing& listing) {
               << ", background " << cli::shortNumber(grid.descriptor.background) << ", values "
               << cli::shortNumber(grid.valueMin) << " to " << cli::shortNumber(grid.valueMax)
               << ", threshold " << cli::shortNumber(grid.activeThreshold) << ", active box "
-              << textOf(grid.activeBox) << ", chunks " << grid.field.chunks.size() << '\n';
-    printMetadata(listing.names[g] + " metadata", grid.descriptor.metadata);
+              << cli::textOf(grid.activeBox) << ", chunks " << grid.field.chunks.size() << '\n';
+    cli::printMetadata(listing.names[g] + " metadata", grid.descriptor.metadata, std::cout);
   }
 }
 
 }  // namespace
 
 void list(const Options& options) {
+  const auto extension = options.input.extension();
+  if (extension == ".vdb" || extension == ".nvdb") return listVdb(options);
   Listing listing{readEsvr(options.input, {options.maxMemory}), inspectEsvr(options.input), {}};
   listing.names = uniqueNames(listing.file);
   std::cout << cli::printable(options.input.string()) << ": .esvr format "

@@ -17,28 +17,30 @@ using cli::po::value;
 cli::ProgramText programText() {
   return {.name = kProgram,
           .purpose =
-              "Turns the ellipsoids of an .esvr file back into the VDB that they were fitted to:\n"
-              "names, transforms, metadata and background exactly, voxels as close as fitted.\n"
-              "With --list or --check it tells what is in a file.",
+              "Turns an .esvr file back into the VDB that it was made from. Names, transforms,\n"
+              "metadata and background are exactly those of the source; voxels are as close to\n"
+              "it as the file was asked to be. --list and --check tell what a file holds.",
           .usage =
               "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
-              "  esvr2vdb --list IN.esvr\n"
+              "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
               "  esvr2vdb --check IN.esvr",
           .notes =
-              "OUT may end in .nvdb: it is then a NanoVDB file.\n"
+              "OUT may end in .nvdb: then a NanoVDB file is written. It has no place for the\n"
+              "metadata of the file and of its grids.\n"
               "\n"
-              "Active are the voxels that differ from the background by more than a threshold\n"
-              "that was chosen when the file was made; in a level set, those of the narrow band.\n"
+              "A voxel is active where it differs from the background by more than a threshold,\n"
+              "which was chosen when the file was made. In a level set, the voxels of the narrow\n"
+              "band are active. A file made with --topology exact stores which voxels are active.\n"
               "\n"
               "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
-              "be used, 5 memory.",
+              "be used, 5 not enough memory.",
           .examples =
               "  esvr2vdb smoke.esvr smoke.vdb\n"
-              "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   with a table of errors\n"
-              "  esvr2vdb smoke.esvr density.nvdb -g density --half on\n"
+              "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   also print the errors\n"
+              "  esvr2vdb smoke.esvr density.nvdb -g density\n"
               "  esvr2vdb smoke.esvr coarse.vdb --lod 1               a preview\n"
-              "  esvr2vdb smoke.esvr part.vdb --bbox 0,0,0,63,63,63   a part\n"
-              "  esvr2vdb --list smoke.esvr"};
+              "  esvr2vdb smoke.esvr part.vdb --bbox 0,0,0,63,63,63   a part of the voxels\n"
+              "  esvr2vdb --list smoke.vdb"};
 }
 
 cli::CommandLine commandLine() {
@@ -47,25 +49,27 @@ cli::CommandLine commandLine() {
   line.optionalArgument("output", "OUT.vdb");
   // clang-format off
   line.options().add_options()
-    ("list", bool_switch(), "print the grids and sections of IN.esvr")
-    ("check", bool_switch(), "read all of IN.esvr and say whether it is whole")
+    ("list", bool_switch(), "print the grids of IN, which may be a VDB, and the sections of an .esvr")
+    ("check", bool_switch(), "read all of IN.esvr, compare its checksums and print OK")
     ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
      "write this grid only; may be repeated; 'density[1]' is the second of that name")
     ("threshold", value<float>()->value_name("T"),
-     "active where the value differs from the background by more (default: as stored)")
+     "make those voxels active that differ from the background by more (default: as stored)")
     ("lod", value<std::int64_t>()->value_name("N"),
-     "the N heaviest layers of ellipsoids only (--list -v tells how far off each is)")
+     "use the N heaviest layers of ellipsoids only; --list -v prints the error of each layer")
     ("max-ellipsoids", value<std::int64_t>()->value_name("N"),
-     "the N heaviest ellipsoids of each grid only")
+     "use the N heaviest ellipsoids of each grid only")
     ("bbox", value<std::string>()->value_name("BOX"),
-     "x0,y0,z0,x1,y1,z1: these voxels only; what cannot reach them is not read")
+     "write the voxels of the box x0,y0,z0,x1,y1,z1 only; parts of IN that cannot reach them are "
+     "not read")
     ("half", value<std::string>()->value_name("W")->default_value("auto"),
-     "save as half: on, off, or auto (as the source was)")
-    ("no-tiles", bool_switch(), "keep leaves whose voxels are all equal")
+     "save values as half floats: on, off, or auto (as the source did)")
+    ("no-tiles", bool_switch(), "write leaves whose voxels are all equal as leaves, not as tiles")
     ("reference", value<std::string>()->value_name("REF.vdb"),
-     "print how far the written grids are from this file's")
+     "print the errors of the written grids against the grids of this file")
     ("box", value<std::string>()->value_name("BOX"),
-     "x0,y0,z0,x1,y1,z1 of the PSNR (default: the reference's active bounding box)")
+     "box of voxels x0,y0,z0,x1,y1,z1 over which PSNR is taken (default: the bounding box of the "
+     "reference's active voxels)")
     ("force,f", bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
   cli::addMaxMemory(line);
@@ -79,8 +83,7 @@ Job jobOf(const Arguments& a) {
   for (const char* option :
        {"output", "grid", "threshold", "lod", "max-ellipsoids", "bbox", "reference", "box"})
     if (a.has(option))
-      throw UsageError(std::string(list ? "--list" : "--check") + " takes IN.esvr only, no " +
-                       option);
+      throw UsageError(std::string(list ? "--list" : "--check") + " takes IN only, no " + option);
   return list ? Job::kList : Job::kCheck;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What esvr2vdb is asked to do.
+/// The options of esvr2vdb.
 
 #include <filesystem>
 #include <optional>
@@ -23,11 +23,11 @@ struct Options {
   std::filesystem::path input, output;
   std::vector<std::string> grids;  ///< empty: all
   DecodeOptions decode;
-  ReadPart part;                             ///< of the file
-  std::optional<std::size_t> maxEllipsoids;  ///< of each grid
+  ReadPart part;                             ///< the part of the file that is read
+  std::optional<std::size_t> maxEllipsoids;  ///< the heaviest of each grid
   WriteOptions write;
   std::optional<std::filesystem::path> reference;
-  std::optional<Box> box;       ///< of the reference's PSNR
+  std::optional<Box> box;       ///< PSNR against the reference is taken over it
   std::uint64_t maxMemory = 0;  ///< bytes
   int threads = 0;              ///< 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;

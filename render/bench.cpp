@@ -21,7 +21,7 @@ constexpr int kWarmUp = 5;
 constexpr int kCompared = 36;
 constexpr double kSlowest = 0.01;  // share of frames that "1 % low" is of
 
-/// Of all counted frames.
+/// The times of all counted frames.
 struct Times {
   std::vector<double> frameMs, listMs, drawMs;
   double pairs = 0.0, occupancy = 0.0;  ///< means

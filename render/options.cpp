@@ -21,47 +21,62 @@ constexpr double kMinStep = 1e-3;  // voxels
 constexpr int kMaxBins = 16;
 constexpr double kMinVram = 0.001, kMaxVram = 1e4;  // GB
 
+/// "title: one, two, three." in lines of a help text.
+std::string listOf(const std::string& title, const std::vector<std::string>& names) {
+  constexpr std::size_t kLine = 80;
+  std::string text, line = title + ":";
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string word = " " + names[i] + (i + 1 < names.size() ? "," : ".");
+    if (line.size() + word.size() > kLine) text += line + "\n", line = " ";
+    line += word;
+  }
+  return text + line + "\n";
+}
+
+std::string notes() {
+  return "IN may be an .esvr, a .vdb or an .nvdb. All are drawn with the same camera, samples,\n"
+         "transfer function and compositing. Voxels are interpolated trilinearly.\n"
+         "An .esvr that stores voxels, or ellipsoids with a residual, is drawn from voxels.\n"
+         "\n"
+         "Places and lengths are in voxels of the grid's index space; its transform is not\n"
+         "applied. By default the camera sees all active voxels. Places where the value is\n"
+         "exactly the background are transparent.\n"
+         "\n" +
+         listOf("Color maps", builtInColorMaps()) + listOf("Opacity curves", builtInOpacities()) +
+         "\n"
+         "CAM.json holds what the camera options say: {\"eye\": [1, 2, 3], \"center\": [...],\n"
+         "\"up\": [...], \"fov\": 30}, or \"height\" for an orthographic camera.\n"
+         "\n"
+         "--ref draws the voxels of a VDB beside every picture, on the same device, and prints\n"
+         "how far apart the two pictures are. OUT.error.png shows the error ten times as\n"
+         "bright. --bench draws a full turn, keeps no picture, and reports the frames a second\n"
+         "and the time of each step, with --ref for both files.\n"
+         "\n"
+         "A PNG holds the colors of a screen, not premultiplied. An EXR holds floats in linear\n"
+         "light, premultiplied. Both hold this command line in their metadata.\n"
+         "\n"
+         "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot be\n"
+         "used, 5 no such device or not enough memory.";
+}
+
 cli::ProgramText programText() {
   return {.name = kProgram,
           .purpose =
-              "Draws an .esvr file, or for comparison a VDB, through a transfer function. The\n"
-              "ellipsoids of an .esvr are drawn as they are: no voxels are kept of them.",
+              "Draws a picture of an .esvr file, or of a VDB for comparison, through a transfer\n"
+              "function. The ellipsoids of an .esvr are drawn directly, without decoding the\n"
+              "grid to voxels first.",
           .usage =
               "  esvr-render IN.esvr OUT.png|OUT.exr [OPTION]...\n"
               "  esvr-render IN.vdb OUT.png|OUT.exr [OPTION]...\n"
               "  esvr-render IN.esvr --bench [--ref IN.vdb] [--report FILE.json] [OPTION]...",
-          .notes =
-              "IN may be an .nvdb too. Both kinds are drawn with the same camera, samples,\n"
-              "transfer function and compositing. Voxels are interpolated trilinearly, and so\n"
-              "are those of an .esvr made with --lossless or --max-error.\n"
-              "\n"
-              "Places and lengths are in voxels of the grid's index space; its transform takes\n"
-              "no part. By default the camera sees all active voxels. Space that is exactly\n"
-              "the background is transparent.\n"
-              "\n"
-              "Color maps: viridis, inferno, magma, plasma, cividis, turbo, cool-to-warm,\n"
-              "grayscale, x-ray, black-body, smoke, ct-bone, ct-soft-tissue. Opacities: linear,\n"
-              "inverse, tent, step; smoke, ct-bone, ct-soft-tissue for the maps of these names.\n"
-              "CAM.json is what the camera options say: {\"eye\": [1, 2, 3], \"center\": [...],\n"
-              "\"up\": [...], \"fov\": 30}, or \"height\" for an orthographic one.\n"
-              "\n"
-              "On a GPU, voxels are marched in a NanoVDB grid. --ref draws its voxels beside\n"
-              "every picture, on the same device, and says how far apart the two are;\n"
-              "OUT.error.png shows where, ten times as bright. --bench draws a full turn, keeps\n"
-              "no picture and reports frames a second and where the time goes; with --ref, of\n"
-              "both.\n"
-              "\n"
-              "A PNG has the colors of a screen, not premultiplied; an EXR has floats in linear\n"
-              "light, premultiplied. Both have this command line in their metadata. Exit codes:\n"
-              "0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot be used,\n"
-              "5 device or memory.",
+          .notes = notes(),
           .examples =
-              "  esvr-render smoke.esvr --bench --ref smoke.vdb    speed, memory, quality\n"
               "  esvr-render smoke.esvr smoke.png\n"
               "  esvr-render smoke.vdb reference.png              the original, to compare\n"
               "  esvr-render smoke.esvr smoke.png --colors inferno --opacity-length 4\n"
               "  esvr-render smoke.esvr smoke.png --tf presets.json --preset Smoke\n"
-              "  esvr-render smoke.esvr turn.png --turntable 36   to turn.0035.png"};
+              "  esvr-render smoke.esvr turn.png --turntable 36   turn.0000.png to turn.0035.png\n"
+              "  esvr-render smoke.esvr --bench --ref smoke.vdb   speed, memory, quality"};
 }
 
 cli::CommandLine commandLine() {
@@ -73,70 +88,79 @@ cli::CommandLine commandLine() {
     ("grid,g", value<std::string>()->value_name("NAME"),
      "draw this grid; 'density[1]' is the second of that name (default: the first that can be drawn)")
     ("colors", value<std::string>()->value_name("MAP"),
-     "color map (default: viridis)")
+     "color map, see the notes (default: viridis)")
     ("opacity", value<std::string>()->value_name("CURVE"),
-     "opacity over the range (default: linear)")
+     "opacity curve, see the notes (default: linear)")
     ("tf", value<std::string>()->value_name("FILE"),
-     "colors and opacities from a ParaView preset, JSON or the XML of old; --opacity replaces the "
-     "latter")
+     "read colors and opacities from a ParaView preset, in JSON or in the older XML; --opacity "
+     "replaces the opacities of the file")
     ("preset", value<std::string>()->value_name("NAME"),
-     "which preset of FILE (default: the first)")
+     "name of the preset in FILE (default: the first)")
     ("tf-save", value<std::string>()->value_name("FILE.json"),
-     "write the transfer function, laid over its range, as a ParaView preset")
+     "write the transfer function, over its range of values, as a ParaView preset")
     ("range", value<std::string>()->value_name("R")->default_value("auto"),
-     "values that the transfer function is laid over: data (the active voxels'), auto (these and "
-     "the background), own (as FILE has them), or LO,HI")
+     "range of values that the transfer function covers: data (the values of the active voxels), "
+     "auto (these and the background), own (the range in FILE), or LO,HI")
     ("opacity-length", value<double>()->value_name("L")->default_value(1.0),
-     "voxels that an opacity holds for: more makes the volume clearer")
-    ("step", value<double>()->value_name("S")->default_value(1.0), "voxels between samples")
+     "length in voxels over which a material of constant value has the opacity that the curve "
+     "says; a larger length makes the volume more transparent")
+    ("step", value<double>()->value_name("S")->default_value(1.0),
+     "distance between the samples of a ray, in voxels")
     ("min-transmittance", value<double>()->value_name("T"),
-     "a ray ends where less than this part of the light behind shows (default: 1/4096; 0: never)")
-    ("resolution", value<std::string>()->value_name("WxH")->default_value("800x800"), "pixels")
+     "end a ray where less than this part of the light behind it comes through (default: 1/4096; "
+     "0: never)")
+    ("resolution", value<std::string>()->value_name("WxH")->default_value("800x800"),
+     "width and height of the picture in pixels")
     ("background", value<std::string>()->value_name("R,G,B"),
-     "0 to 1 each (default: a transparent picture)")
-    ("bits", value<int>()->value_name("B")->default_value(8), "8 or 16 a channel of a PNG")
+     "color behind the volume, each channel from 0 to 1 (default: transparent)")
+    ("bits", value<int>()->value_name("B")->default_value(8), "bits of a PNG's channel, 8 or 16")
     ("mode", value<std::string>()->value_name("M")->default_value("composite"),
-     "composite, or one value of a ray: maximum, average")
+     "composite: put the samples of a ray over each other; maximum or average: show this value of "
+     "the samples")
     ("clip", value<std::string>()->value_name("BOX"),
-     "draw only what lies in x0,y0,z0,x1,y1,z1")
+     "draw only what lies in the box x0,y0,z0,x1,y1,z1")
     ("slice", value<std::string>()->value_name("A=P"),
-     "draw only a slab of one voxel: 'z=12.5' lies across z")
+     "draw only a slab of one voxel's thickness; 'z=12.5' is perpendicular to z")
     ("depth", value<std::string>()->value_name("FILE.exr"),
-     "write how far away half of the light is stopped, in voxels")
+     "write for each pixel the distance, in voxels, at which half of the light is absorbed")
     ("camera", value<std::string>()->value_name("CAM.json"),
-     "the camera; options of their own replace what it says")
-    ("eye", value<std::string>()->value_name("X,Y,Z"), "where the camera is")
-    ("center", value<std::string>()->value_name("X,Y,Z"), "what it looks at")
-    ("up", value<std::string>()->value_name("X,Y,Z"), "upwards in the picture (default: y)")
-    ("fov", value<double>()->value_name("DEGREES"), "angle from the lower to the upper edge (30)")
-    ("orthographic", bool_switch(), "parallel rays")
+     "read the camera from a file; the options below replace what the file says")
+    ("eye", value<std::string>()->value_name("X,Y,Z"), "position of the camera")
+    ("center", value<std::string>()->value_name("X,Y,Z"), "point that the camera looks at")
+    ("up", value<std::string>()->value_name("X,Y,Z"),
+     "direction that points upwards in the picture (default: y)")
+    ("fov", value<double>()->value_name("DEGREES"),
+     "angle between the lower and the upper edge of the picture (default: 30)")
+    ("orthographic", bool_switch(), "use parallel rays")
     ("height", value<double>()->value_name("H"),
-     "voxels from the lower to the upper edge of an orthographic picture")
+     "height of an orthographic picture in voxels")
     ("turntable", value<int>()->value_name("N"),
-     "N pictures of a full turn about the up axis")
+     "draw N pictures of a full turn about the up axis")
+    ("frames", value<std::string>()->value_name("A-B"),
+     "draw only the pictures A to B of a turntable, counted from 0")
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
      "auto (a GPU where there is one), cpu, cuda or cuda:N")
     ("max-vram", value<double>()->value_name("GB"),
-     "GPU memory to use: less draws large pictures in bands (default: what is free)")
+     "GPU memory to use; where it is small, large pictures are drawn in bands (default: what is "
+     "free)")
     ("bins", value<int>()->value_name("N"),
-     "parts of the depth, 1 to 16, that a GPU draws at once (default: by the first picture's lists)")
+     "number of parts, 1 to 16, into which a GPU divides the depth of the scene to draw them in "
+     "parallel (default: chosen from the first picture)")
     ("method", value<std::string>()->value_name("M")->default_value("ellipsoids"),
-     "of an .esvr: ellipsoids; bricks, which draws its voxels, decoded once; or auto, whichever is "
-     "faster for the first picture and fits")
+     "how to draw an .esvr: ellipsoids draws them directly; bricks decodes all voxels once and "
+     "draws them; auto tries both and takes the faster one that fits into memory")
     ("between", value<std::string>()->value_name("B")->default_value("voxels"),
-     "what ellipsoids show between voxels: voxels, their trilinear interpolation; or sum, the sum "
-     "of ellipsoids itself, faster where a pixel holds many voxels")
+     "value of ellipsoids between voxels: voxels interpolates the decoded voxels; sum takes the "
+     "sum of ellipsoids itself, which is faster where a pixel covers many voxels")
     ("values", value<std::string>()->value_name("T"),
-     "march voxels in a NanoVDB grid of float, fp4, fp8, fp16 or fpn")
-    ("ref", value<std::string>()->value_name("FILE"), "compare with the voxels of a VDB")
+     "draw voxels from a NanoVDB grid of this type: float, fp4, fp8, fp16 or fpn")
+    ("ref", value<std::string>()->value_name("FILE"), "compare each picture with one of this VDB")
     ("sheet", value<std::string>()->value_name("FILE.png"),
-     "write the picture, that of --ref and their error beside each other")
+     "write the picture, the picture of --ref and their error side by side")
     ("bench", bool_switch(),
-     "measure: 720 views of a full turn, or as many as --turntable says")
+     "measure the speed over 720 views of a full turn, or as many as --turntable says")
     ("report", value<std::string>()->value_name("FILE.json"),
-     "what --bench or --ref found; '-' is the standard output")
-    ("frames", value<std::string>()->value_name("A-B"),
-     "of a turntable, only the pictures from number A to B")
+     "write the results of --bench or --ref; '-' is the standard output")
     ("force,f", bool_switch(), "replace OUT.png if it exists");
   // clang-format on
   cli::addMaxMemory(line);

@@ -1,5 +1,5 @@
 #pragma once
-/// What esvr-render is asked to do.
+/// The options of esvr-render.
 
 #include <filesystem>
 #include <optional>
@@ -13,7 +13,7 @@ namespace esvr::render {
 
 inline constexpr const char* kProgram = "esvr-render";
 
-/// Which values the transfer function is laid over.
+/// The range of values that the transfer function covers.
 enum class RangeKind {
   kAuto,  ///< those of the active voxels and the background
   kData,  ///< those of the active voxels
@@ -33,19 +33,19 @@ struct Options {
   double step = 1.0, opacityLength = 1.0;
   std::optional<double> minTransmittance;  ///< none: as RenderOptions has it
   std::optional<Rgb> background;           ///< none: the picture is transparent
-  int bits = 8;                            ///< of a PNG's channel
+  int bits = 8;                            ///< bits of a PNG's channel
   Between between = Between::kVoxels;
   RenderMode mode = RenderMode::kComposite;
   std::optional<PlaceBox> clip;
   int turntable = 0;             ///< pictures of a full turn; 0: one picture
-  int firstFrame = 0;            ///< of those, the first and
-  std::optional<int> lastFrame;  ///< the last to draw; none: all
-  std::filesystem::path depth;   ///< where distances go; empty: nowhere
+  int firstFrame = 0;            ///< the first of those to draw
+  std::optional<int> lastFrame;  ///< the last of those to draw; none: all
+  std::filesystem::path depth;   ///< file of distances; empty: none
   std::filesystem::path saveTransfer;
   std::string device = "auto";
   RendererLimits limits;
   Method method = Method::kEllipsoids;
-  std::optional<NanoValues> values;  ///< of the NanoVDB grid that voxels are marched in
+  std::optional<NanoValues> values;  ///< form of the NanoVDB grid that voxels are marched in
   std::filesystem::path reference;   ///< empty: none
   std::filesystem::path sheet;       ///< empty: none
   bool bench = false;

@@ -42,8 +42,8 @@ std::vector<png_byte> pixelsOf(const Image& image, const PngForm& form) {
   return pixels;
 }
 
-/// What libpng is given and gives back. It is C and leaves by longjmp: nothing on its way may need
-/// a destructor, so everything that does lives here.
+/// The data that libpng is given and gives back. It is C and leaves by longjmp: nothing on its way
+/// may need a destructor, so everything that does lives here.
 struct Writing {
   std::vector<png_byte> pixels;
   std::vector<png_bytep> rows;
@@ -86,7 +86,7 @@ png_text textChunk(const char* key, const std::string& text) {
   return chunk;
 }
 
-/// Of the file's header.
+/// Writes the file's header.
 struct PngHeader {
   int width, height, bits;
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// What there is to draw in a file.
+/// The content of a file, to be drawn.
 
 #include <filesystem>
 #include <optional>
@@ -15,10 +15,10 @@ namespace esvr::render {
 struct Scene {
   std::variant<Field, VolumeGrid> content;
   std::string grid;  ///< its name
-  Box box;           ///< of the active voxels
+  Box box;           ///< around the active voxels
   ValueRange data;   ///< over the active voxels
   float background = 0.0f;
-  std::optional<StoredGrid> encoded{};  ///< what a field was read from
+  std::optional<StoredGrid> encoded{};  ///< the grid that a field was read from
 };
 
 struct SceneFile {
@@ -31,12 +31,12 @@ struct SceneFile {
 ///                   MemoryExceeded
 [[nodiscard]] Scene readScene(const SceneFile& file);
 
-/// Where and how to draw.
+/// The device and the way of drawing.
 enum class Method { kEllipsoids, kBricks, kAuto };
 
 struct DrawSettings {
   Device device;
-  Method method = Method::kEllipsoids;  ///< of a field
+  Method method = Method::kEllipsoids;  ///< the way to draw a field
   RendererLimits limits;
   std::optional<NanoValues> values;          ///< march voxels as a NanoVDB grid of these
   std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes that decoding may take

@@ -7,6 +7,7 @@
 #include "cli/choice.h"
 #include "cli/command_line.h"
 #include "cli/error_bound.h"
+#include "cli/memory_limit.h"
 #include "cli/table.h"
 #include "vdb2esvr/paper_options.h"
 
@@ -125,6 +126,7 @@ cli::CommandLine commandLine() {
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
   addFitOptions(line.options());
+  cli::addMaxMemory(line);
   line.helpTopic("paper", paperHelp());
   return line;
 }
@@ -257,6 +259,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   readSize(a, options);
   options.convert.goal = goalOf(a, options);
   options.read.nonFinite = nonFinite(a);
+  options.read.maxBytes = cli::maxMemoryOf(a);
   options.device = a.get<std::string>("device");
   options.onCancel = onCancel(a);
   options.report = a.find<std::string>("report").value_or("");

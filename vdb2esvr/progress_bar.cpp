@@ -15,6 +15,8 @@ namespace {
 
 constexpr const char* kBackAndClear = "\r\x1b[K";
 constexpr std::size_t kBarCells = 20;
+constexpr std::size_t kLogWidth = 200;
+constexpr std::chrono::seconds kLineInterval{5};
 
 std::size_t terminalWidth() {
   constexpr std::size_t kUnknown = 80;
@@ -49,17 +51,34 @@ std::string progressLine(const std::string& grid, const FitProgress& progress, s
   return line;
 }
 
-ProgressBar::ProgressBar(std::string grid, bool shown)
-    : grid_(std::move(grid)), shown_(shown && isatty(STDERR_FILENO) == 1) {}
-
-ProgressBar::~ProgressBar() {
-  if (shown_) std::cerr << kBackAndClear << std::flush;
+ProgressBar::ProgressBar(std::string grid, cli::Verbosity verbosity)
+    : grid_(std::move(grid)), form_(Form::kNone) {
+  if (verbosity == cli::Verbosity::kQuiet) return;
+  if (isatty(STDERR_FILENO) == 1)
+    form_ = Form::kBar;
+  else if (verbosity == cli::Verbosity::kVerbose)
+    form_ = Form::kLines;
 }
 
-void ProgressBar::show(const FitProgress& progress) const {
-  if (!shown_) return;
+ProgressBar::~ProgressBar() {
+  if (form_ == Form::kBar) std::cerr << kBackAndClear << std::flush;
+}
+
+void ProgressBar::redraw(const FitProgress& progress) const {
   const std::size_t width = terminalWidth() - 1;  // a full line would wrap
   std::cerr << kBackAndClear << progressLine(grid_, progress, width) << std::flush;
+}
+
+void ProgressBar::printLine(const FitProgress& progress) {
+  const auto now = Clock::now();
+  if (now - lastLine_ < kLineInterval) return;
+  lastLine_ = now;
+  std::cerr << progressLine(grid_, progress, kLogWidth) << std::endl;
+}
+
+void ProgressBar::show(const FitProgress& progress) {
+  if (form_ == Form::kBar) redraw(progress);
+  if (form_ == Form::kLines) printLine(progress);
 }
 
 }  // namespace esvr::vdb2esvr

@@ -1,28 +1,37 @@
 #pragma once
-/// Shows the progress of a fit on a terminal.
+/// Shows how far a fit is: a bar on a terminal, lines in a log.
 
+#include <chrono>
 #include <string>
 
+#include "cli/log.h"
 #include "esvr/fit.h"
 
 namespace esvr::vdb2esvr {
 
-/// A line on stderr that is redrawn, and removed by the destructor. Nothing is drawn if stderr is
-/// not a terminal.
+/// On a terminal, one line on stderr that is redrawn, and erased when the bar goes out of scope.
+/// Where stderr is no terminal: a line every few seconds with --verbose, nothing otherwise.
 class ProgressBar {
  public:
-  /// \param grid   name of the grid, with which the line begins
-  /// \param shown  false with --quiet: nothing is drawn
-  ProgressBar(std::string grid, bool shown);
+  /// \param grid       begins the line
+  /// \param verbosity  kQuiet: nothing is shown
+  ProgressBar(std::string grid, cli::Verbosity verbosity);
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  void show(const FitProgress& progress) const;
+  void show(const FitProgress& progress);
 
  private:
+  enum class Form { kNone, kBar, kLines };
+  using Clock = std::chrono::steady_clock;
+
+  void redraw(const FitProgress& progress) const;
+  void printLine(const FitProgress& progress);
+
   std::string grid_;
-  bool shown_;
+  Form form_;
+  Clock::time_point lastLine_ = Clock::now();
 };
 
 /// The text of the line, cut to a width, for example

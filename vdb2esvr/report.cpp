@@ -306,20 +306,22 @@ Json head(const Options& options) {
 }  // namespace
 
 Json makeReport(const Options& options, const RunRecord& record) {
-  const std::uint64_t bytesIn = record.input.fileBytes, bytesOut = record.output.fileBytes;
+  const Ratio ratio = ratioOf(record);
   Json report = head(options);
-  report.update(
-      {{"input",
-        {{"path", options.input.string()}, {"format", record.input.format}, {"bytes", bytesIn}}},
-       {"output", {{"path", options.output.string()}, {"bytes", bytesOut}}},
-       {"ratio", double(bytesIn) / double(bytesOut)},
-       {"grids", gridsOf(record)},
-       {"skipped", skippedOf(record)},
-       {"seconds", totalSeconds(record)},
-       {"peak_memory_bytes", cli::peakMemory()},
-       {"interrupted", record.interrupted},
-       {"error", nullptr},
-       {"exit_code", exitCodeOf(record, options.psnr)}});
+  report.update({{"input",
+                  {{"path", options.input.string()},
+                   {"format", record.input.format},
+                   {"bytes", record.input.fileBytes},
+                   {"bytes_converted", ratio.bytesIn}}},
+                 {"output", {{"path", options.output.string()}, {"bytes", ratio.bytesOut}}},
+                 {"ratio", ratio.value()},
+                 {"grids", gridsOf(record)},
+                 {"skipped", skippedOf(record)},
+                 {"seconds", totalSeconds(record)},
+                 {"peak_memory_bytes", cli::peakMemory()},
+                 {"interrupted", record.interrupted},
+                 {"error", nullptr},
+                 {"exit_code", exitCodeOf(record, options.psnr)}});
   return report;
 }
 

@@ -84,7 +84,7 @@ class FileConversion {
 
   /// \return false if the run was interrupted before the fit had a result
   bool convert(const GridSummary& grid, ByteShares& shares, RunRecord& record) try {
-    const ProgressBar bar(grid.uniqueName, options_.verbosity != cli::Verbosity::kQuiet);
+    ProgressBar bar(grid.uniqueName, options_.verbosity);
     options_.convert.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
     record.grids.push_back(convertWhereItFits(grid.uniqueName, shares.of(grid)));
     shares.take(grid, record.grids.back().stored());

@@ -11,6 +11,21 @@ bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& ki
                      [&](const SectionSummary& s) { return s.grid == grid && s.kind == kind; });
 }
 
+Ratio ratioOf(const RunRecord& record) {
+  Ratio ratio{0, record.output.fileBytes, record.grids.size(), record.input.grids.size()};
+  if (ratio.wholeInput()) {
+    ratio.bytesIn = record.input.fileBytes;
+    return ratio;
+  }
+  const auto converted = [&](const GridSummary& summary) {
+    return std::any_of(record.grids.begin(), record.grids.end(),
+                       [&](const auto& grid) { return grid.uniqueName == summary.uniqueName; });
+  };
+  for (const GridSummary& grid : record.input.grids)
+    if (converted(grid)) ratio.bytesIn += grid.storedBytes;
+  return ratio;
+}
+
 const ConvertedGrid* firstBelow(const RunRecord& record, std::optional<double> psnr) {
   if (!psnr) return nullptr;
   const auto below = std::find_if(record.grids.begin(), record.grids.end(), [&](const auto& grid) {

@@ -22,7 +22,18 @@ struct RunRecord {
   double secondsWrite = 0.0, secondsTotal = 0.0;
 };
 
-/// True if the file has a section of this kind for the grid.
+/// What went in and came out: bytes of the converted grids in the input, and of the output.
+struct Ratio {
+  std::uint64_t bytesIn = 0, bytesOut = 0;
+  std::size_t grids = 0, gridsOfInput = 0;
+  [[nodiscard]] bool wholeInput() const { return grids == gridsOfInput; }
+  [[nodiscard]] double value() const { return double(bytesIn) / double(bytesOut); }
+};
+
+/// The grids that were converted against the output; the whole file where all were.
+[[nodiscard]] Ratio ratioOf(const RunRecord& record);
+
+/// True where the file holds a section of this kind for the grid.
 [[nodiscard]] bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& kind);
 
 /// The first grid below the wanted PSNR; null if all grids reach it.

@@ -18,10 +18,11 @@ void printSummary(const Options& options, const RunRecord& record, std::ostream&
                cli::shortNumber(grid.metrics.maxError), cli::seconds(grid.seconds.total())});
   }
   table.print(out);
-  const std::uint64_t bytesIn = record.input.fileBytes, bytesOut = record.output.fileBytes;
-  out << cli::printable(options.input.string()) << ' ' << bytesIn << " bytes -> "
-      << cli::printable(options.output.string()) << ' ' << bytesOut
-      << " bytes, 1 : " << cli::shortNumber(double(bytesIn) / double(bytesOut)) << '\n';
+  const Ratio ratio = ratioOf(record);
+  out << cli::printable(options.input.string());
+  if (!ratio.wholeInput()) out << ", " << ratio.grids << " of " << ratio.gridsOfInput << " grids:";
+  out << ' ' << ratio.bytesIn << " bytes -> " << cli::printable(options.output.string()) << ' '
+      << ratio.bytesOut << " bytes, 1 : " << cli::shortNumber(ratio.value()) << '\n';
 }
 
 }  // namespace esvr::vdb2esvr

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 
+#include "core/parse_text.h"
 #include "esvr/baseline.h"
 #include "esvr/error.h"
 
@@ -57,27 +58,14 @@ std::optional<VoxelPacking> packingOf(const std::string& word) {
   return std::nullopt;
 }
 
-std::vector<std::string> split(const std::string& text, char at) {
-  std::vector<std::string> parts;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(at, begin), text.size());
-    parts.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return parts;
-}
-
 [[noreturn]] void refuse(const std::string& text, const std::string& why) {
   throw UsageError("'" + text + "' is not a baseline: " + why);
 }
 
 double numberOf(const std::string& text, const std::string& number) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
-  if (error != std::errc() || end != number.data() + number.size() || !(value > 0.0) ||
-      !std::isfinite(value))
-    refuse(text, "'" + number + "' is not a number above 0");
-  return value;
+  const auto value = parseNumber(number);
+  if (!value || !(*value > 0.0)) refuse(text, "'" + number + "' is not a number above 0");
+  return *value;
 }
 
 void applyParameter(const std::string& text, const std::string& key, double value,
@@ -128,7 +116,7 @@ std::string toString(const BaselineSetting& setting) {
 }
 
 BaselineSetting parseBaseline(const std::string& text) {
-  const auto parts = split(text, ',');
+  const auto parts = splitText(text, ',');
   BaselineSetting setting;
   if (parts.front() == kZfp)
     setting.how = ZfpSetting{};

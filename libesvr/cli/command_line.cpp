@@ -19,9 +19,9 @@ po::options_description commonOptions() {
   po::options_description common("Common options", kLineLength, kMinDescriptionLength);
   // clang-format off
   common.add_options()
-    ("threads", po::value<int>()->value_name("N"), "threads to use (default: all)")
+    ("threads", po::value<int>()->value_name("N"), "number of threads (default: as many as the machine has)")
     ("quiet,q", po::bool_switch(), "print errors only")
-    ("verbose,v", po::bool_switch(), "say more of what is done")
+    ("verbose,v", po::bool_switch(), "print more messages")
     ("help,h", po::bool_switch(), "print this text and exit")
     ("version", po::bool_switch(), "print the versions of all parts and exit");
   // clang-format on

@@ -23,16 +23,16 @@ namespace esvr::cli {
 
 namespace po = boost::program_options;
 
-/// What a program says of itself in --help. Texts are printed as they are, lines of 80 at most.
+/// The texts of a program's --help. They are printed as they are, lines of 80 at most.
 struct ProgramText {
   std::string name;      ///< "esvr-sample"
-  std::string purpose;   ///< which job it does
+  std::string purpose;   ///< the job that it does
   std::string usage;     ///< command lines, one a line, each beginning with the name
-  std::string notes;     ///< where data comes from and goes to, exit codes of its own; may be empty
+  std::string notes;     ///< input, output, exit codes of its own; may be empty
   std::string examples;  ///< commands with a word on each
 };
 
-/// What was given, with the options that all programs share.
+/// The arguments that were given, with the options that all programs share.
 struct Arguments {
   po::variables_map values;
   Verbosity verbosity = Verbosity::kNormal;

@@ -12,7 +12,7 @@ class Log {
   Log(std::string program, Verbosity verbosity)
       : program_(std::move(program)), verbosity_(verbosity) {}
 
-  /// What someone at a terminal wants to know; not under --quiet.
+  /// Prints what someone at a terminal wants to know; not under --quiet.
   void info(const std::string& message) const;
   /// Only under --verbose.
   void detail(const std::string& message) const;

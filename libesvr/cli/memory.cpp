@@ -39,7 +39,7 @@ std::uint64_t difference(std::uint64_t limit, std::uint64_t held) {
   return limit > held ? limit - held : 0;
 }
 
-/// What the control group of a container leaves.
+/// The memory that the control group of a container leaves.
 std::uint64_t leftInGroup() {
   const auto limit = numberIn("/sys/fs/cgroup/memory.max");
   if (!limit) return std::numeric_limits<std::uint64_t>::max();

@@ -12,10 +12,10 @@ constexpr double kShare = 0.75;  // the rest is for what other programs need mea
 }  // namespace
 
 void addMaxMemory(CommandLine& line) {
-  line.options().add_options()(
-      kOption, po::value<std::string>()->value_name("SIZE"),
-      "Refuse input that needs more memory than this, such as 8GB. The need is estimated before "
-      "any work is done. (default: 3/4 of the memory that is available)");
+  line.options().add_options()(kOption, po::value<std::string>()->value_name("SIZE"),
+                               "refuse input that needs more memory than this, for example 8GB; "
+                               "the need is estimated before "
+                               "any work begins (default: 3/4 of the memory that is available)");
 }
 
 std::uint64_t maxMemoryOf(const Arguments& arguments) {

@@ -1,23 +1,14 @@
 #pragma once
-/// Numbers as people write them, the same in every locale.
+/// The library's parsing of text (core/parse_text.h), under the programs' names.
 
-#include <cstdint>
-#include <optional>
-#include <string_view>
+#include "core/parse_text.h"
 
 namespace esvr::cli {
 
-/// A finite number that takes the whole text: "3", "-0.5", "2e-4". Nothing for anything else.
-[[nodiscard]] std::optional<double> parseNumber(std::string_view text);
-
-/// A whole number that takes the whole text. Nothing for anything else.
-[[nodiscard]] std::optional<std::int64_t> parseWhole(std::string_view text);
-
-/// A number, and the text behind it: "50KB" is 50 and "KB". Nothing where no number begins the text.
-struct LeadingNumber {
-  double value = 0.0;
-  std::string_view rest;
-};
-[[nodiscard]] std::optional<LeadingNumber> parseLeadingNumber(std::string_view text);
+using esvr::LeadingNumber;
+using esvr::parseLeadingNumber;
+using esvr::parseNumber;
+using esvr::parseWhole;
+using esvr::splitText;
 
 }  // namespace esvr::cli

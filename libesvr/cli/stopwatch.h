@@ -1,5 +1,5 @@
 #pragma once
-/// What a run's phases take.
+/// The time that a run's phases take.
 
 #include <chrono>
 

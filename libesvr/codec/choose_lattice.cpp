@@ -23,7 +23,8 @@ constexpr int kLastRatio = 255;
 constexpr std::size_t kMinLayered = 2048;  // ellipsoids: layers of fewer cost more than they bring
 constexpr std::size_t kFirstLayers = 8;    // the first has an eighth at least, then a quarter, half
 
-/// Of the largest weight: float32 does not show finer steps, and coarser ones leave nothing.
+/// Bounds for the largest weight: float32 does not show finer steps, and coarser ones leave
+/// nothing.
 constexpr double kFinestStep = 0x1p-20, kCoarsestStep = 1.0;
 
 QuantiserSteps within(const QuantiserSteps& steps, double low, double high) {

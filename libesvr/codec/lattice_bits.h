@@ -38,7 +38,7 @@ inline int intensityShift(const Lattice& lattice, const CoarseScales& s) {
   return std::clamp(shift, 0, Lattice::kMaxIntensityShift);
 }
 
-/// Of ellipsoid i.
+/// The coarse scales of ellipsoid i.
 inline CoarseScales coarseScales(const QuantisedEllipsoids& q, std::size_t i) {
   const int bits = scaleBits(q.lattice, q.precision[i]);
   return {q.scale[0][i] >> bits, q.scale[1][i] >> bits, q.scale[2][i] >> bits};

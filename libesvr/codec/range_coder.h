@@ -17,7 +17,7 @@ class BitModel {
   static constexpr int kBits = 16;
   static constexpr std::uint32_t kOne = 1u << kBits;
 
-  /// Of a zero, in 1/kOne; neither 0 nor 1.
+  /// The probability of a zero in units of 1/kOne. It is neither 0 nor 1.
   [[nodiscard]] std::uint32_t zero() const { return zero_; }
 
   void learn(bool bit) {
@@ -65,7 +65,7 @@ class RangeEncoder {
     }
   }
 
-  /// What was encoded; zeros at its end are left out, a decoder finds them there anyway.
+  /// The encoded bytes. Zeros at the end are left out; a decoder finds them there anyway.
   [[nodiscard]] std::vector<std::byte> finish() {
     for (int i = 0; i < 5; ++i) shiftLow();
     bytes_.erase(bytes_.begin());  // the first is always 0

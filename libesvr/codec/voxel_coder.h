@@ -12,12 +12,12 @@
 
 namespace esvr::codec {
 
-/// What both sides must know before the first voxel.
+/// Both sides must know this before the first voxel.
 struct VoxelModel {
   static constexpr std::int32_t kNoMirror = -1;
   static constexpr std::size_t kMaxCommon = 15;
 
-  std::int32_t vacantCode = 0;  ///< what a voxel counts as where there is none
+  std::int32_t vacantCode = 0;  ///< the code that a missing voxel counts as
   /// Along each axis a voxel at p has its image at mirror - p, in voxels from the layer's origin.
   std::array<std::int32_t, 3> mirror{kNoMirror, kNoMirror, kNoMirror};
   std::vector<std::int32_t> common;  ///< codes that many voxels have, the most frequent first

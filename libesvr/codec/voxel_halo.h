@@ -4,8 +4,8 @@
 #include <array>
 #include <cstdint>
 
-#include "esvr/voxel_layer.h"
 #include "core/brick_index.h"
+#include "esvr/voxel_layer.h"
 
 namespace esvr::codec {
 
@@ -21,7 +21,8 @@ struct Halo {
     return (local.x + 1) * kStepX + (local.y + 1) * kStepY + local.z + 1;
   }
 
-  /// What lies before brick b; nothing within it is changed: each voxel is set before it is read.
+  /// Copies the voxels that lie before brick b. Nothing within it is changed: each voxel is set
+  /// before it is read.
   /// \param vacantCode  of voxels where no brick is
   void fill(const VoxelLayer& layer, const BrickIndex& index, std::size_t b,
             std::int32_t vacantCode) {
@@ -31,7 +32,7 @@ struct Halo {
     }
   }
 
-  /// Which of the seven voxels before one are active, as bits from the highest: A, B, C, AB, AC,
+  /// The activity of the seven voxels before one, as bits from the highest: A, B, C, AB, AC,
   /// BC, ABC, those before it along x, y, z, x and y, ...
   [[nodiscard]] std::size_t activityAround(int cell) const {
     std::size_t bits = 0;

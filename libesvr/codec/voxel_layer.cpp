@@ -46,7 +46,7 @@ float halfAt(std::int32_t n) {
                     : std::ldexp(mantissa + kHalfOne, exponent - kHalfHighest - kHalfMantissa);
   return std::copysign(float(magnitude), n < 0 ? -1.0f : 1.0f);
 }
-/// Of the nearest half below in magnitude; halfAt() tells whether it is the value.
+/// The code of the nearest half below in magnitude; halfAt() tells whether it is the value.
 std::int32_t orderOfHalf(float v) {
   const double magnitude = std::abs(double(v));
   int exponent = magnitude > 0.0 ? std::ilogb(magnitude) : kHalfLowest;

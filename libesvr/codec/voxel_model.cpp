@@ -22,7 +22,8 @@ bool vacantAt(const VoxelLayer& layer, std::size_t i) {
   return layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels));
 }
 
-/// What the coder takes vacant voxels for. Any would do: a code near the background serves best.
+/// The coder takes vacant voxels for this code. Any would do: a code near the background serves
+/// best.
 std::int32_t vacantCodeOf(const VoxelLayer& layer) {
   for (std::size_t i = 0; i < layer.codes.size(); ++i)
     if (vacantAt(layer, i)) return layer.codes[i];

@@ -1,5 +1,5 @@
 #pragma once
-/// What a layer's voxels have in common, found before they are coded.
+/// Finds the properties that a layer's voxels share, before they are coded.
 
 #include "codec/voxel_coder.h"
 #include "esvr/voxel_layer.h"

@@ -68,7 +68,7 @@ class VoxelPredictor {
 
   std::array<std::int64_t, kGuesses> guesses_{}, errors_{};
   std::int64_t spread_ = 0;
-  std::ptrdiff_t first_ = 0;  ///< of the guesses that there are
+  std::ptrdiff_t first_ = 0;  ///< offset of the first guess that exists
   std::size_t best_ = 0;
 };
 

@@ -5,8 +5,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdio>
-#include <random>
 #include <string>
 #include <system_error>
 
@@ -25,13 +23,6 @@ fs::path followLinks(const fs::path& target) {
   std::error_code ignored;  // a path that cannot be resolved fails at open, with its own reason
   const fs::path resolved = fs::weakly_canonical(target, ignored);
   return resolved.empty() ? target : resolved;
-}
-
-std::string randomSuffix() {
-  std::random_device device;
-  char text[9];
-  std::snprintf(text, sizeof text, "%08x", unsigned(device()));
-  return text;
 }
 
 /// Makes the new name survive a power cut. Not every file system can, and the file is complete
@@ -53,26 +44,21 @@ AtomicFile::AtomicFile(const fs::path& target, bool overwrite)
     throw RuntimeFailure("cannot write " + target_.string() + ": it is not a regular file");
   if (exists && !overwrite)
     throw RuntimeFailure("cannot write " + target_.string() + ": it exists already");
-  createTemporary(exists ? status.st_mode & kPermissionBits : kNewFileMode);
+  const fs::path directory = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
+  removeLeftOvers(directory);
+  temporary_ = createTemporary(directory, exists ? status.st_mode & kPermissionBits : kNewFileMode);
+  if (temporary_.fd < 0) fail("cannot write ", errno);
 }
 
 AtomicFile::~AtomicFile() {
-  if (fd_ >= 0) ::close(fd_);
-  if (!committed_) ::unlink(temporary_.c_str());
-}
-
-void AtomicFile::createTemporary(mode_t mode) {
-  const fs::path directory = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-  do {
-    temporary_ = directory / (".esvr-" + randomSuffix() + ".tmp");
-    fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
-  } while (fd_ < 0 && errno == EEXIST);
-  if (fd_ < 0) fail("cannot write ", errno);
+  // Without its lock the file may be another process's to remove: it goes first.
+  if (!committed_) ::unlink(temporary_.path.c_str());
+  if (temporary_.fd >= 0) ::close(temporary_.fd);
 }
 
 void AtomicFile::write(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
-    const ssize_t n = ::write(fd_, bytes.data(), bytes.size());
+    const ssize_t n = ::write(temporary_.fd, bytes.data(), bytes.size());
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) fail("cannot write ", errno);
     bytes = bytes.subspan(std::size_t(n));
@@ -80,23 +66,20 @@ void AtomicFile::write(std::span<const std::byte> bytes) {
 }
 
 void AtomicFile::commit() {
-  if (::fsync(fd_) != 0) fail("cannot flush ", errno);
-  const int closed = ::close(fd_);
-  fd_ = -1;
-  if (closed != 0) fail("cannot flush ", errno);
-  rename();
+  if (::fsync(temporary_.fd) != 0) fail("cannot flush ", errno);
+  rename();  // while the file is open, and so locked
   committed_ = true;
-  flushDirectory(temporary_.parent_path());
+  flushDirectory(temporary_.path.parent_path());
 }
 
 void AtomicFile::rename() {
   const unsigned flags = overwrite_ ? 0u : unsigned(RENAME_NOREPLACE);
-  if (::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(), flags) == 0) return;
+  if (::renameat2(AT_FDCWD, temporary_.path.c_str(), AT_FDCWD, target_.c_str(), flags) == 0) return;
   // A file system without RENAME_NOREPLACE: a hard link refuses an existing name as well.
   const bool unsupported = errno == EINVAL || errno == ENOSYS;
   if (overwrite_ || !unsupported) fail("cannot name ", errno);
-  if (::link(temporary_.c_str(), target_.c_str()) != 0) fail("cannot name ", errno);
-  ::unlink(temporary_.c_str());
+  if (::link(temporary_.path.c_str(), target_.c_str()) != 0) fail("cannot name ", errno);
+  ::unlink(temporary_.path.c_str());
 }
 
 void AtomicFile::fail(const char* what, int error) const {

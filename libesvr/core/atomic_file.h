@@ -2,15 +2,16 @@
 /// A file that appears under its name only when it is complete: written beside the target under a
 /// temporary name, flushed to the disk and renamed.
 
-#include <sys/types.h>
-
 #include <cstddef>
 #include <filesystem>
 #include <span>
 
+#include "core/temporary_files.h"
+
 namespace esvr {
 
-/// One file on its way. Destroyed before commit(), it leaves nothing behind.
+/// One file on its way. Destroyed before commit(), it leaves nothing behind. What a process that was
+/// killed left behind is removed by the next AtomicFile in the same directory.
 /// Every failure is thrown as RuntimeFailure that names the target.
 class AtomicFile {
  public:
@@ -22,7 +23,7 @@ class AtomicFile {
   AtomicFile& operator=(const AtomicFile&) = delete;
 
   /// The temporary file: for libraries that write by name.
-  [[nodiscard]] const std::filesystem::path& path() const noexcept { return temporary_; }
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return temporary_.path; }
 
   /// Appends to the temporary file.
   void write(std::span<const std::byte> bytes);
@@ -33,12 +34,11 @@ class AtomicFile {
 
  private:
   [[noreturn]] void fail(const char* what, int error) const;
-  void createTemporary(mode_t mode);
   void rename();
 
-  std::filesystem::path target_, temporary_;
+  std::filesystem::path target_;
+  TemporaryFile temporary_;
   bool overwrite_;
-  int fd_ = -1;
   bool committed_ = false;
 };
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "esvr/coord.h"
 #include "core/brick_hash.h"
+#include "esvr/coord.h"
 
 namespace esvr {
 

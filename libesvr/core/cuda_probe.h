@@ -1,6 +1,6 @@
 #pragma once
-/// What the CUDA runtime says of this machine. Implemented by cuda/probe.cu, and by no_cuda.cpp in
-/// a build without CUDA, as builtWithCuda() is; device.cpp knows only this.
+/// The CUDA runtime's view of this machine. It is implemented by cuda/probe.cu, and by no_cuda.cpp
+/// in a build without CUDA, as builtWithCuda() is; device.cpp knows only this.
 
 #include <string>
 #include <vector>

@@ -1,11 +1,12 @@
 #include "esvr/device.h"
 
 #include <algorithm>
-#include <charconv>
+#include <limits>
 #include <optional>
 #include <string_view>
 
 #include "core/device_choice.h"
+#include "core/parse_text.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -16,12 +17,9 @@ constexpr std::string_view kCudaPrefix = "cuda:";
 /// The N of "cuda:N"; nothing where the text is another.
 std::optional<int> cudaIndex(std::string_view text) {
   if (!text.starts_with(kCudaPrefix)) return std::nullopt;
-  text.remove_prefix(kCudaPrefix.size());
-  if (text.starts_with('-')) return std::nullopt;
-  int index = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), index);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return index;
+  const auto index = parseWhole(text.substr(kCudaPrefix.size()));
+  if (!index || *index < 0 || *index > std::numeric_limits<int>::max()) return std::nullopt;
+  return int(*index);
 }
 
 const CudaDevice* firstUsable(const CudaProbe& probe) {

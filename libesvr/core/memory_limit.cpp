@@ -7,9 +7,13 @@
 namespace esvr {
 namespace {
 
-std::string gigabytes(double bytes) {
+std::string sizeText(double bytes) {
+  constexpr double kMega = 1e6, kGiga = 1e9;
   char text[32];
-  std::snprintf(text, sizeof text, "%.3g GB", bytes / 1e9);
+  if (bytes < kGiga)
+    std::snprintf(text, sizeof text, "%.3g MB", bytes / kMega);
+  else
+    std::snprintf(text, sizeof text, "%.3g GB", bytes / kGiga);
   return text;
 }
 
@@ -17,8 +21,8 @@ std::string gigabytes(double bytes) {
 
 void requireWithinMemory(double neededBytes, std::uint64_t maxBytes, const std::string& what) {
   if (neededBytes <= double(maxBytes)) return;
-  throw MemoryExceeded(what + " asks for up to " + gigabytes(neededBytes) + " of memory, and " +
-                       gigabytes(double(maxBytes)) + " are allowed");
+  throw MemoryExceeded(what + " asks for up to " + sizeText(neededBytes) + " of memory, and " +
+                       sizeText(double(maxBytes)) + " are allowed");
 }
 
 }  // namespace esvr

@@ -1,5 +1,5 @@
 #pragma once
-/// What the CUDA entry points do in a build without CUDA.
+/// The CUDA entry points refuse in a build without CUDA.
 
 #include <string>
 

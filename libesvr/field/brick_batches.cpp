@@ -7,17 +7,11 @@
 #include "field/brick_evaluator.h"
 
 namespace esvr {
-namespace {
-
-constexpr std::size_t kBatch = 16384;  // bricks evaluated at once: 32 MB
-
-}  // namespace
-
 void forEachBrick(const Field& field, std::span<const Coord> corners, const BrickVisitor& visit) {
   const BrickEvaluator evaluator(field, corners);
-  std::vector<float> values(std::min(kBatch, corners.size()) * kBrickVoxels);
-  for (std::size_t first = 0; first < corners.size(); first += kBatch) {
-    const auto batch = corners.subspan(first, std::min(kBatch, corners.size() - first));
+  std::vector<float> values(std::min(kBatchBricks, corners.size()) * kBrickVoxels);
+  for (std::size_t first = 0; first < corners.size(); first += kBatchBricks) {
+    const auto batch = corners.subspan(first, std::min(kBatchBricks, corners.size() - first));
     evaluator.evaluate(first, std::span(values).first(batch.size() * kBrickVoxels));
     for (std::size_t b = 0; b < batch.size(); ++b)
       visit(batch[b], std::span(values).subspan(b * kBrickVoxels, kBrickVoxels));

@@ -1,6 +1,7 @@
 #pragma once
 /// Evaluates a field over any number of bricks with a bounded buffer.
 
+#include <cstddef>
 #include <functional>
 #include <span>
 
@@ -8,6 +9,9 @@
 #include "esvr/ellipsoids.h"
 
 namespace esvr {
+
+/// Bricks that are evaluated at once: 32 MB.
+inline constexpr std::size_t kBatchBricks = 16384;
 
 /// Takes a brick's index corner and its kBrickVoxels values, which it may change.
 using BrickVisitor = std::function<void(Coord, std::span<float>)>;

@@ -9,7 +9,7 @@ namespace {
 struct Segment {
   int first, last, local;
 };
-/// Of the bricks at -1, 0 and 1.
+/// The segments of the bricks at -1, 0 and 1.
 constexpr Segment kSegments[3] = {{0, kSsimRadius - 1, kBrickSide - kSsimRadius},
                                   {kSsimRadius, kSsimRadius + kBrickSide - 1, 0},
                                   {kSsimRadius + kBrickSide, kHaloSide - 1, 0}};

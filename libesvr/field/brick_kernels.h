@@ -10,7 +10,7 @@
 
 namespace esvr {
 
-/// What one pair left behind for its backward pass.
+/// The values that one pair left behind for its backward pass.
 struct PairTape {
   float* phi;             ///< rows of phi, in loop order; 64-byte aligned
   int xBegin, xEnd;       ///< slices visited

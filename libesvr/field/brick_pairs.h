@@ -1,5 +1,5 @@
 #pragma once
-/// Which ellipsoids reach which bricks, listed both ways.
+/// Lists of the bricks that each ellipsoid reaches, and of the ellipsoids that reach each brick.
 
 #include <cstdint>
 #include <functional>

@@ -36,7 +36,7 @@ EllipsoidHits totalOf(const Counts& counts) {
   return total;
 }
 
-/// What the ellipsoids of a brick's list do in it.
+/// Counts the hits of a brick's ellipsoids in its voxels.
 EllipsoidHits hitsInBrick(const EvaluatePlan& plan, std::size_t b, Coord brickCorner) {
   Counts counts{};
   for (auto pair = plan.pairs.brickBegin[b]; pair != plan.pairs.brickBegin[b + 1]; ++pair) {

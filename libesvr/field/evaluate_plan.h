@@ -1,5 +1,5 @@
 #pragma once
-/// What evaluating a field on bricks needs, whatever device does it.
+/// Everything that the evaluation of a field on bricks needs, whatever device does it.
 
 #include <span>
 

@@ -11,13 +11,14 @@ namespace esvr {
 struct GatheredField {
   std::vector<LineForm> forms;                  ///< centers relative to their chunk's origin
   std::vector<KernelConstants<float>> kernels;  ///< one, or one an ellipsoid
-  std::vector<Coord> origins;                   ///< of the chunks
-  std::vector<std::uint32_t> chunkOf;           ///< of an ellipsoid
+  std::vector<Coord> origins;                   ///< the chunks' origins
+  std::vector<std::uint32_t> chunkOf;           ///< each ellipsoid's chunk
 
   [[nodiscard]] const KernelConstants<float>& kernel(std::size_t i) const {
     return kernels[kernels.size() == 1 ? 0 : i];
   }
-  /// Where a voxel lies from the origin of ellipsoid i's chunk. The difference may have 33 bits.
+  /// A voxel's place relative to the origin of ellipsoid i's chunk. The difference may have 33
+  /// bits.
   [[nodiscard]] std::array<float, 3> fromOrigin(std::size_t i, Coord voxel) const {
     const Coord o = origins[chunkOf[i]];
     return {float(double(voxel.x) - o.x), float(double(voxel.y) - o.y),

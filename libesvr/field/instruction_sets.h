@@ -1,5 +1,5 @@
 #pragma once
-/// What this processor runs beyond the baseline that everything is compiled for.
+/// The instruction sets of this processor beyond the baseline that everything is compiled for.
 
 namespace esvr {
 

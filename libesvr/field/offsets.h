@@ -1,5 +1,5 @@
 #pragma once
-/// Where lists begin that lie one behind the other.
+/// Offsets of lists that lie one behind the other.
 
 #include <cstdint>
 #include <vector>

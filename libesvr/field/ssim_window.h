@@ -14,7 +14,8 @@ inline constexpr int kSsimRadius = 5;
 inline constexpr int kSsimTaps = 2 * kSsimRadius + 1;
 inline constexpr double kSsimSigma = 1.5;
 
-/// What SSIM adds to its quotients' terms: (K1 L)^2 and (K2 L)^2 for values of the range L.
+/// SSIM adds these constants to its quotients' terms: (K1 L)^2 and (K2 L)^2 for values of the range
+/// L.
 struct SsimConstants {
   double c1, c2;
 };
@@ -43,10 +44,10 @@ class SsimWindow {
  public:
   SsimWindow() : weights_(ssimWeights()) {}
 
-  /// What there is to sum, so that the rest costs nothing.
+  /// Bounds what is summed, so that the rest costs nothing.
   struct Extent {
     Box support;  ///< halo coordinates outside which every value is zero
-    Box voxels;   ///< of the brick: those whose sums are wanted; rows along z are summed whole
+    Box voxels;   ///< the brick's voxels whose sums are wanted; rows along z are summed whole
 
     /// The values that are read, in whole rows along z: all of them must be given.
     [[nodiscard]] Box read() const;

@@ -18,7 +18,7 @@ const TimedCurvePoint& Recorder::record(Optimiser& optimiser, std::uint32_t iter
 }
 
 const TimedCurvePoint& Recorder::record(const FitErrors& errors, std::size_t ellipsoids,
-                                   std::uint32_t iteration) {
+                                        std::uint32_t iteration) {
   TimedCurvePoint point;
   point.seconds = seconds();
   point.iteration = iteration;

@@ -75,7 +75,7 @@ class Histogram {
     return sum;
   }
 
-  double error_ = 0.0;  ///< where every voxel is active
+  double error_ = 0.0;  ///< the squared error if every voxel is active
   std::vector<Tally> bins_ = std::vector<Tally>(kBins);
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Where a container's bytes come from: read piece by piece, so that nothing is read that is not
-/// needed and nothing is allocated for what is not there.
+/// Sources of a container's bytes, which are read piece by piece, so that nothing is read that is
+/// not needed and nothing is allocated for what is not there.
 
 #include <cstddef>
 #include <cstdint>

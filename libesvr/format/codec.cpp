@@ -10,8 +10,7 @@
 namespace esvr::format {
 namespace {
 
-// The smallest of what is fast (docs/format.md, "Blosc", has the table): at level 9, 60 times the
-// time saves 0.8 % more.
+// Zstandard at this level gives the smallest sections among the fast settings.
 constexpr const char* kCompressor = BLOSC_ZSTD_COMPNAME;
 constexpr int kLevel = 5;
 constexpr std::size_t kBlockBytes = 256 * 1024;

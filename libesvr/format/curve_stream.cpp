@@ -15,8 +15,7 @@ constexpr std::size_t kPointBytes = 4 * sizeof(std::uint64_t) + sizeof(std::uint
 
 /// A PSNR is infinite where the error is zero.
 bool valid(const CurvePoint& p) {
-  return std::isfinite(p.maxError) && !std::isnan(p.psnrBox) &&
-         !std::isnan(p.psnrActive);
+  return std::isfinite(p.maxError) && !std::isnan(p.psnrBox) && !std::isnan(p.psnrActive);
 }
 constexpr const char* kInvalid = "a point of the curve is not a number";
 

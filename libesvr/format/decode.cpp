@@ -239,7 +239,7 @@ class GridDecoder {
       grid.voxels = getVoxels(sections_.get(section), sections_.place(section), sections_.budget());
   }
 
-  /// Of all layers: some of them alone have none.
+  /// A residual belongs to all layers together: it is left out where only some are read.
   void readResidual(StoredGrid& grid) {
     const auto section = id(SectionKind::kResidual);
     if (!sections_.has(section) || layers_ != kAllLayers) return;
@@ -268,7 +268,7 @@ class GridDecoder {
   std::uint32_t g_;
   const ReadPart* part_;
   std::size_t layers_ = kAllLayers;  ///< to be read
-  std::size_t layersInFile_ = 0;     ///< of the chunks that were opened
+  std::size_t layersInFile_ = 0;     ///< the largest number of layers of a chunk that was opened
 };
 
 std::vector<MetaItem> readFileMetadata(SectionReader& sections) {

@@ -201,7 +201,7 @@ std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
     grids.push_back(sorted(grid));
   }
 
-  // What describes comes first: one read at the file's beginning lists it.
+  // Descriptions come first, so that one read at the file's beginning can list it.
   Sections out;
   addFileMetadata(out, file);
   for (std::uint32_t g = 0; g < grids.size(); ++g) addGrid(out, g, grids[g]);

@@ -36,7 +36,7 @@ std::vector<Coord> brickCorners(const SparseVolume& volume) {
   return corners;
 }
 
-/// What no value of the source lies beyond, active or not.
+/// The range that holds every value of the source, active or not.
 ValueRange rangeOf(const StoredGrid& grid) {
   const float background = grid.field.background;
   return {std::min(grid.valueMin, background), std::max(grid.valueMax, background)};
@@ -131,7 +131,7 @@ bool meets(const Box& box, Coord corner) {
          last.x >= box.min.x && last.y >= box.min.y && last.z >= box.min.z;
 }
 
-/// Where the field is to be evaluated; nothing where it is wherever supports reach.
+/// The bricks on which the field is evaluated; nothing stands for all that supports reach.
 std::optional<std::vector<Coord>> bricksWanted(const StoredGrid& grid,
                                                const DecodeOptions& options) {
   const bool stored = grid.topology != TopologyKind::kThreshold;

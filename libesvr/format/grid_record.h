@@ -10,7 +10,7 @@
 
 namespace esvr::format {
 
-/// What a file says of a chunk before its ellipsoids are read.
+/// The description of a chunk, which is read before its ellipsoids.
 struct ChunkRecord {
   Coord origin;
   Box box;  ///< index coordinates: every support lies in it

@@ -1,5 +1,5 @@
 #pragma once
-/// What each importance layer comes to, as bytes of a section.
+/// The errors of the importance layers as bytes of a section.
 
 #include <cstddef>
 #include <span>

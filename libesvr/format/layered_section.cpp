@@ -138,7 +138,7 @@ void decodeInto(std::span<const std::byte> bytes, const BlockEntry& entry, Run r
   decodeBlock(streams, run, q);
 }
 
-/// Where the layers of some of the blocks end; nothing where it is but one.
+/// The ends of the layers of some of the blocks; empty where there is but one layer.
 std::vector<std::size_t> endsOf(const BlockDirectory& directory,
                                 std::span<const std::size_t> chosen) {
   std::vector<std::size_t> ends;

@@ -20,7 +20,7 @@ struct BlockEntry {
   Run run;
   std::size_t layer = 0;
   Box box;  ///< index coordinates: every support of the block lies in it, and it in the chunk's
-  std::array<std::uint32_t, kStreams> bytes{};  ///< of its streams
+  std::array<std::uint32_t, kStreams> bytes{};  ///< lengths of its streams
   std::uint64_t offset = 0;                     ///< in the section
   std::uint64_t checksum = 0;
 

@@ -20,7 +20,7 @@ inline constexpr std::uint16_t kVersionMinor = 0;
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
 inline constexpr std::uint64_t kEntryBytes = 56;
-inline constexpr std::uint64_t kAlignment = 8;  ///< of the table and of every section
+inline constexpr std::uint64_t kAlignment = 8;  ///< the table and every section begin at a multiple
 
 /// Grid or chunk of a section that belongs to the whole file or to a whole grid.
 inline constexpr std::uint32_t kNone = 0xffffffff;

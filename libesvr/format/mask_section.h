@@ -1,5 +1,5 @@
 #pragma once
-/// Which voxels are active, exactly, as the content of a section.
+/// The exact mask of active voxels as the content of a section.
 
 #include <cstddef>
 #include <span>

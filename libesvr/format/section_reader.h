@@ -28,7 +28,7 @@ class SectionReader {
 
   [[nodiscard]] bool has(const SectionId& id) const { return unread_.contains(id); }
 
-  /// What is left for content, from which get() takes.
+  /// The memory that is left for content. get() takes from it.
   [[nodiscard]] MemoryBudget& budget() { return budget_; }
 
   /// A section's content; each can be had once.

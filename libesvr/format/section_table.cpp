@@ -12,7 +12,7 @@
 namespace esvr::format {
 namespace {
 
-/// What the header says besides the version.
+/// The header's content.
 struct Header {
   std::uint16_t versionMajor = 0, versionMinor = 0;
   std::uint32_t sections = 0;

@@ -13,7 +13,7 @@
 
 namespace esvr::format {
 
-/// What a section is of. Unique in a file.
+/// Identifies a section. It is unique in a file.
 struct SectionId {
   SectionKind kind{};
   std::uint32_t grid = kNone;

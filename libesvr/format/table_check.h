@@ -1,5 +1,5 @@
 #pragma once
-/// What must hold between header, section table and the bytes around the sections.
+/// Checks that header, section table and the bytes around the sections agree.
 
 #include <string>
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What a grid must hold to be written and to be believed: the same rules both ways.
+/// The rules that a grid must obey to be written and to be believed. They are the same both ways.
 
 #include <optional>
 #include <string>

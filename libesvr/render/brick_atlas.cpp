@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 
-#include "esvr/error.h"
 #include "core/brick_index.h"
+#include "esvr/error.h"
 
 namespace esvr {
 namespace {

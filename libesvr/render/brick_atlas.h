@@ -22,7 +22,7 @@ struct BrickAtlas {
 
 [[nodiscard]] BrickAtlas makeBrickAtlas(const SparseVolume& volume);
 
-/// Of an atlas' cells, relative to its origin; for an atlas without bricks, none.
+/// The box of an atlas' cells, relative to its origin. It is empty for an atlas without bricks.
 [[nodiscard]] PlaceBox cellsOf(const BrickAtlas& atlas);
 
 }  // namespace esvr

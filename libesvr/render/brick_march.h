@@ -28,10 +28,10 @@ struct BrickAtlasView {
 
 namespace brick_march {
 
-/// What is at a cell: a brick, or a cube without any.
+/// The content at a cell: a brick, or a cube without any.
 struct Found {
   std::uint32_t brick;
-  Coord low;  ///< of the cube
+  Coord low;  ///< the cube's
   int side;
 };
 

@@ -20,9 +20,9 @@ struct VisibleEllipsoids {
 [[nodiscard]] VisibleEllipsoids visibleEllipsoids(const Field& field, const View& view,
                                                   Resolution resolution, Between between);
 
-/// What a camera is shown of a field's ellipsoids; `chunk` counts the field's chunks.
+/// A field's ellipsoids as they are handed to a camera; `chunk` counts the field's chunks.
 [[nodiscard]] std::vector<PackedEllipsoid> packed(const Field& field);
-/// Where a chunk's centers are relative to.
+/// The origins that the chunks' centers are relative to.
 [[nodiscard]] std::vector<Vec3> chunkOrigins(const Field& field);
 /// One kernel for all ellipsoids, or one for each, in the order of `packed`.
 [[nodiscard]] std::vector<RayKernel> rayKernels(const Field& field);

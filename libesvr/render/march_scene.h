@@ -1,12 +1,12 @@
 #pragma once
-/// What marching through voxels needs, whatever holds them; for host and device.
+/// Everything that marching through voxels needs, whatever holds them; for host and device.
 
 #include "render/ray_box.h"
 #include "render/sample_rule.h"
 
 namespace esvr {
 
-/// What all rays of a picture share.
+/// The parameters that all rays of a picture share.
 struct MarchScene {
   View view;
   PlaceBox box;  ///< outside of it every sample is the background
@@ -22,7 +22,7 @@ struct FloatPlace {
 /// A ray's samples in the box: `first` is where the first one lies, so that float32 will do.
 struct MarchSamples {
   FloatPlace first, apart;
-  float number;  ///< of the first, from the eye
+  float number;  ///< the first sample's number, from the eye
   int count;
 
   [[nodiscard]] ESVR_HD FloatPlace at(int i) const {

@@ -1,5 +1,5 @@
 #pragma once
-/// Which samples of a NanoVDB grid can be other than its background.
+/// Bounds the samples of a NanoVDB grid that can differ from its background.
 
 #include "esvr/nano_volume.h"
 #include "render/ray_box.h"

@@ -1,5 +1,5 @@
 #pragma once
-/// What both renderers share: checked options and the picture on its way.
+/// Both renderers share this: checked options and the picture in the making.
 
 #include "esvr/render.h"
 #include "render/sample_rule.h"

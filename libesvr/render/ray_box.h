@@ -1,5 +1,5 @@
 #pragma once
-/// Where a ray lies in a box; for host and device.
+/// The part of a ray that lies in a box, for host and device.
 
 #include <cmath>
 #include <limits>
@@ -14,7 +14,7 @@ struct RayInterval {
   double begin, end;
 };
 
-/// Where a ray lies between two planes perpendicular to an axis.
+/// The part of a ray between two planes perpendicular to an axis.
 ESVR_HD inline RayInterval slab(double origin, double direction, double low, double high) {
   constexpr double kAll = std::numeric_limits<double>::infinity();
   if (direction == 0.0)
@@ -34,7 +34,7 @@ ESVR_HD inline RayInterval within(const Ray& ray, const PlaceBox& box) {
   return t;
 }
 
-/// Of a ray's samples, counted from the eye: those from first to last.
+/// A ray's samples from first to last, counted from the eye.
 struct SampleRange {
   double first, last;
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What an ellipsoid adds to the samples of a ray: the math of the innermost loop, written once for
+/// Adds an ellipsoid to the samples of a ray: the math of the innermost loop, written once for
 /// host and device.
 ///
 /// In the unit frame of an ellipsoid, u = S^-1 R^T (p - center), a ray runs as o + tau v, tau
@@ -29,7 +29,7 @@ struct RayForm {
   float beside[3], besideX[3], besideY[3];  ///< o x v likewise
   float offX, offY;      ///< closest approach to the center, along v, as far as v does not turn
   float gain, base;      ///< numerator and base of the kernel, times the intensity
-  float plateau, shift;  ///< of the kernel
+  float plateau, shift;  ///< the kernel's
   float cutoff;
 };
 
@@ -39,8 +39,8 @@ struct RayScale {
   float pastTile;  ///< unit less that of the middle of the tile
 };
 
-/// Where the support meets a ray, in samples of a bin: from `first` to `last`, none where last is
-/// less. In base 2 the exponent at sample i is `nearest` + `speed` (i - `middle`)^2.
+/// The samples of a bin at which the support meets a ray: from `first` to `last`, none where last
+/// is less. In base 2 the exponent at sample i is `nearest` + `speed` (i - `middle`)^2.
 struct RaySpan {
   int first, last;
   float middle, nearest, speed;

@@ -1,12 +1,12 @@
 #pragma once
-/// What becomes of a ray's samples, for host and device.
+/// The rule that combines a ray's samples, for host and device.
 
 #include "esvr/render.h"
 #include "render/transfer_table.h"
 
 namespace esvr {
 
-/// What a ray has gathered on its way. What the first three are depends on the mode: a color; the
+/// The state of a ray on its way. The first three depend on the mode: a color; the
 /// largest value and how many there were; their sum and number; a distance and whether there is
 /// one.
 struct alignas(16) RayState {
@@ -14,19 +14,19 @@ struct alignas(16) RayState {
   float transmittance = 1.0f;
 };
 
-/// Of a pixel: premultiplied, but for RenderMode::kDepth. Of a sample: as SampleRule::prepared
-/// says.
+/// A color. A pixel's is premultiplied, but for RenderMode::kDepth; a sample's is as
+/// SampleRule::prepared says.
 struct alignas(16) PixelColor {
   float r, g, b, alpha;
 };
 
-/// What all rays of a picture share.
+/// The parameters that all rays of a picture share.
 struct SampleRule {
-  static constexpr float kHalf = 0.5f;  ///< of the light: how deep RenderMode::kDepth looks
+  static constexpr float kHalf = 0.5f;  ///< share of the light at which RenderMode::kDepth stops
 
   TransferTableView table;
   RenderMode mode;
-  float background;  ///< of the field
+  float background;  ///< the field's
   float minTransmittance;
   float step;
 
@@ -35,7 +35,7 @@ struct SampleRule {
     return !(ray.transmittance < minTransmittance) && !(mode == RenderMode::kDepth && ray.g > 0.0f);
   }
 
-  /// What a ray needs of a value: its color, not premultiplied, or where modes keep values, the
+  /// Prepares a value for a ray: its color, not premultiplied, or where modes keep values, the
   /// value and an alpha of 1. Where alpha is 0 there is nothing to add.
   [[nodiscard]] ESVR_HD PixelColor prepared(float value) const {
     if (mode == RenderMode::kMaximum || mode == RenderMode::kAverage)
@@ -67,7 +67,7 @@ struct SampleRule {
     add(ray, prepared(value), number);
   }
 
-  /// What a ray gathered behind. Not for RenderMode::kDepth, which has no parts.
+  /// Joins what a ray gathered behind. Not for RenderMode::kDepth, which has no parts.
   ESVR_HD void join(RayState& ray, const RayState& behind) const {
     if (mode == RenderMode::kComposite) {
       ray.r += ray.transmittance * behind.r;

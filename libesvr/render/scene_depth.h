@@ -12,7 +12,8 @@ namespace esvr {
 /// Around the supports of all ellipsoids; nothing where there are none.
 [[nodiscard]] std::optional<PlaceBox> supportBox(const Field& field);
 
-/// What shows of a support's box: with the cells around its voxels, where they are interpolated.
+/// The part of a support's box that shows: with the cells around its voxels, where these are
+/// interpolated.
 [[nodiscard]] PlaceBox shownBox(const PlaceBox& support, Between between);
 
 /// The bins of the rays' samples that may lie in a box; last < first where none does.

@@ -29,11 +29,11 @@ ESVR_HD inline Matrix3 unitRotation(const PackedEllipsoid& e) {
 /// In the view's coordinates: right, up, forward.
 struct SeenEllipsoid {
   Vec3 center;
-  std::array<Vec3, 3> axes;  ///< of unit length
-  Vec3 scale;                ///< of the axes
+  std::array<Vec3, 3> axes;  ///< have unit length
+  Vec3 scale;                ///< the scales along the axes
 };
 
-/// What a ray needs of an ellipsoid.
+/// An ellipsoid in the form that rays need.
 struct alignas(16) EllipsoidView {
   double column, row;  ///< the pixel that dx and dy of `form` are counted from
   double depth;        ///< tau of the closest approach there
@@ -54,7 +54,7 @@ struct ScreenBounds {
   double nearest, farthest;                                 ///< along forward, not below 0
 };
 
-/// Of pixels' middles.
+/// A range of columns, counted by the middles of pixels.
 struct PixelSpan {
   double low, high;
 };
@@ -176,7 +176,7 @@ ESVR_HD inline bool visible(const ScreenBounds& b) {
   return b.farthest >= 0.0 && b.firstColumn <= b.lastColumn && b.firstRow <= b.lastRow;
 }
 
-/// Where an ellipsoid shows.
+/// The part of the picture in which an ellipsoid shows.
 struct ScreenExtent {
   ScreenEllipse outline;
   ScreenBounds bounds;

@@ -13,7 +13,7 @@ std::uint32_t samplesFrom(int first, int last) {
   return last < first ? 0u : std::uint32_t((kOne << (last + 1)) - (kOne << first));
 }
 
-/// Of the ray through the middle of a whole tile.
+/// Samples for each unit along forward, on the ray through the middle of a whole tile.
 double middleUnit(const TileScene& scene, TilePlace place) {
   constexpr double kMiddle = (kTileSide - 1) / 2.0;
   const View& view = scene.view;

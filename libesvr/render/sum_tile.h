@@ -24,7 +24,8 @@ class SumTile final : public Tile {
   double middleUnit_;  ///< samples for each unit along forward, on the ray of the tile's middle
   std::vector<RayScale> scales_;
   std::vector<float> sums_;  ///< kBinSamples a pixel
-  /// Which of a pixel's sums something was added to: a bit each, the first sample's the lowest.
+  /// A bit for each of a pixel's sums, set where something was added; the first sample's is the
+  /// lowest.
   std::vector<std::uint32_t> touched_;
   static_assert(kBinSamples == 32, "one bit a sample");
 };

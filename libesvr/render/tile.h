@@ -15,15 +15,15 @@ namespace esvr {
 inline constexpr int kTileSide = 16;  ///< pixels
 
 struct TilePlace {
-  int column, row;  ///< of its first pixel
+  int column, row;  ///< its first pixel's
 };
 
-/// What tiles need of the picture.
+/// Everything that tiles need to know about the picture.
 struct TileScene {
   const RenderOptions& options;
   const View& view;
   const VisibleEllipsoids& ellipsoids;
-  const std::vector<Vec3>& origins;  ///< of the chunks
+  const std::vector<Vec3>& origins;  ///< the chunks' origins
   SampleRule rule;
   VoxelRule voxelRule;
 };

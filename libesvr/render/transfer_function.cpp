@@ -21,7 +21,7 @@ double fraction(const Point& a, const Point& b, double x) {
   return (x - a.x) / (b.x - a.x);
 }
 
-/// Of the way, so that the midpoint has half of it.
+/// Bends the way between two points so that the midpoint has half of it.
 double bentAtMidpoint(double s, double midpoint) {
   if (s < midpoint) return 0.5 * s / midpoint;
   return midpoint < 1.0 ? 0.5 + 0.5 * (s - midpoint) / (1.0 - midpoint) : 1.0;

@@ -18,16 +18,16 @@ struct View {
   Vec3 eye, right, up, forward;
   bool perspective;
   double pixel;      ///< side of a pixel in the plane
-  double left, top;  ///< of the picture in the plane
+  double left, top;  ///< the picture's edges in the plane
 
-  /// Of the middle of a pixel; pixel 3.5 is half-way from the third to the fourth.
+  /// The place of a pixel's middle; pixel 3.5 is half-way from the third to the fourth.
   [[nodiscard]] ESVR_HD double planeX(double column) const { return left + (column + 0.5) * pixel; }
   [[nodiscard]] ESVR_HD double planeY(double row) const { return top - (row + 0.5) * pixel; }
   /// The pixel whose middle lies at a place in the plane, with its fraction.
   [[nodiscard]] ESVR_HD double columnAt(double x) const { return (x - left) / pixel - 0.5; }
   [[nodiscard]] ESVR_HD double rowAt(double y) const { return (top - y) / pixel - 0.5; }
 
-  /// Of a direction or of a displacement from the eye.
+  /// The coordinates of a direction or of a displacement from the eye.
   [[nodiscard]] ESVR_HD Vec3 coordinates(const Vec3& v) const {
     return {inner(right, v), inner(up, v), inner(forward, v)};
   }

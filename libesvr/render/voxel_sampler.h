@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
+#include "core/brick_index.h"
 #include "esvr/camera.h"
 #include "esvr/sparse_volume.h"
-#include "core/brick_index.h"
 
 namespace esvr {
 
@@ -26,7 +26,8 @@ struct Cell {
 /// Coordinates are relative to the volume's origin. Keeps a reference to the volume.
 class VoxelSampler {
  public:
-  /// Of a brick and its neighbours above along x (4), y (2) and z (1): kNone where there is none.
+  /// Positions of a brick and of its neighbours above along x (4), y (2) and z (1); kNone where
+  /// there is none.
   using Corners = std::array<std::uint32_t, 8>;
 
   explicit VoxelSampler(const SparseVolume& volume);

@@ -41,7 +41,7 @@ struct RayBundle {
 
   WindowAxes axes;
   CornerRay corners[kCorners];
-  UnitRange unit;  ///< of the rays
+  UnitRange unit;  ///< the rays' range
   bool together;   ///< false: their directions are too different for one window
 };
 
@@ -62,8 +62,8 @@ namespace voxel_window {
 
 /// Voxels, for rounding: samples are found in float32, relative to the window.
 inline constexpr double kSlack = 1e-3;
-/// Of a ray's length, that its way along the slabs' axis must have: a ray that is taken alone has
-/// 0.57.
+/// The share of a ray's length that it must go along the slabs' axis. A ray that is taken alone
+/// goes 0.57.
 inline constexpr double kMinAlong = 0.3;
 
 ESVR_HD inline int maxAlong(const Vec3& d) {
@@ -71,7 +71,7 @@ ESVR_HD inline int maxAlong(const Vec3& d) {
   return x >= y && x >= z ? 0 : (y >= z ? 1 : 2);
 }
 
-/// What no voxel has as a coordinate is as good as any other such.
+/// Rounds down, within the integers. No voxel lies at the ends, so any bound there will do.
 ESVR_HD inline std::int32_t whole(double v) {
   constexpr double kFar = double(1 << 30);
   return std::int32_t(std::floor(ellipsoid_math::clampedTo(v, -2.0 * kFar, 1.99 * kFar)));
@@ -92,7 +92,7 @@ ESVR_HD inline CornerRay cornerRay(const WindowAxes& axes, const Vec3& origin, c
           column};
 }
 
-/// Where rays may be between the slabs before and behind: the planes of voxels at a slab serve
+/// The extent of rays between the slabs before and behind: the planes of voxels at a slab serve
 /// both.
 struct Extent {
   double low, high;
@@ -190,7 +190,7 @@ ESVR_HD inline std::int32_t firstColumnAt(const RayBundle& b, double slab) {
   return voxel_window::whole(voxel_window::columnsAt(b, slab).low - voxel_window::kSlack);
 }
 
-/// Where a slab of a window lies, in voxels from its first slab's first voxel, and where it is
+/// The place of a slab of a window, in voxels from its first slab's first voxel, and where it is
 /// kept: voxel (row, column) of it at start + row * columns + column.
 struct WindowSlab {
   std::int32_t row, column, start;

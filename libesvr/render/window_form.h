@@ -1,5 +1,5 @@
 #pragma once
-/// What an ellipsoid adds to voxels, line by line of them; written once for host and device.
+/// Adds an ellipsoid to voxels, line by line; written once for host and device.
 ///
 /// Voxels are counted in slabs across one axis, rows across a second, columns along the third. With
 /// d = x - center and L = S^-1 R^T = Q U, U upper triangular in the order column, row, slab,
@@ -53,7 +53,7 @@ struct WindowRun {
   float middle, nearest, speed;
 };
 
-/// Where a row lies, and which of its columns are wanted. All from one voxel, as `center` is.
+/// A row's place and the columns that are wanted. All count from one voxel, as `center` does.
 struct WindowRow {
   float slab, row;  ///< from the center
   float centerColumn;

@@ -41,6 +41,7 @@ DirectoryRow readRow(InputFile& file) {
   if (gridAt < std::int64_t(file.position()) || row.next < gridAt)
     throw BadInput("is damaged: grid \"" + row.entry.name() + "\" has no valid place in the file");
   row.entry.gridAt = std::uint64_t(gridAt);
+  row.entry.gridBytes = std::uint64_t(row.next - gridAt);
   return row;
 }
 

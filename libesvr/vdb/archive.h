@@ -18,17 +18,18 @@ struct ArchiveEntry {
   bool savedAsHalf = false;
   std::string parent;  ///< storedName of the grid whose tree this one shares; else empty
   std::uint64_t gridAt = 0;
+  std::uint64_t gridBytes = 0;
 
   [[nodiscard]] std::string name() const;       ///< without the number
   [[nodiscard]] std::string valueType() const;  ///< "float", "vec3s", "ptdataidx32", ...
 };
 
-/// What stands before a grid's tree.
+/// The part of a grid before its tree.
 struct GridHead {
   std::vector<MetaItem> metadata;  ///< file statistics included
   Transform transform;
   std::uint32_t compression = 0;  ///< OpenVDB's flags
-  std::uint64_t treeAt = 0;       ///< where the tree begins; a grid with a parent has none
+  std::uint64_t treeAt = 0;       ///< begin of the tree; a grid with a parent has none
 };
 
 class Archive {

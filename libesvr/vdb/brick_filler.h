@@ -2,7 +2,7 @@
 /// Builds a SparseVolume from the leaves and tiles of a tree, of OpenVDB or NanoVDB, without a copy
 /// in between.
 ///
-/// What the voxels become: active voxels keep their value, narrowed to float. Inactive voxels
+/// Active voxels keep their value, narrowed to float. Inactive voxels
 /// become the background, since hosts leave anything there; in a level set, the background with the
 /// sign they had, which says inside or outside.
 
@@ -43,7 +43,7 @@ struct NonFiniteTally {
 /// \throws BadInput  there are some and they are not to be replaced
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite);
 
-/// What a brick is filled from.
+/// The source that a brick is filled from.
 template <class Leaf>
 struct BrickSource {
   Coord corner;

@@ -22,6 +22,7 @@ GridSummary summarise(const NanoEntry& entry) {
   grid.gridClass = gridClassOf(entry.gridClass);
   grid.activeVoxels = entry.activeVoxels;
   grid.activeBox = entry.activeBox;
+  grid.storedBytes = entry.storedBytes;
   grid.isScalar = isScalarFloatNano(entry.gridType);
   grid.skipReason = grid.isScalar ? "" : notAFloatType(grid.valueType);
   if (grid.skipReason.empty() && entry.activeVoxels == 0) grid.skipReason = "has no active voxel";

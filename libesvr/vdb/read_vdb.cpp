@@ -70,6 +70,7 @@ GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHea
   grid.name = stringValue(head.metadata, GridBase::META_GRID_NAME);
   grid.valueType = entry.valueType();
   grid.savedAsHalf = entry.savedAsHalf;
+  grid.storedBytes = entry.gridBytes;
   grid.gridClass = gridClassOf(stringValue(head.metadata, GridBase::META_GRID_CLASS));
   if (!countFromStatistics(head.metadata, grid)) countFromTree(archive, entry, grid);
   grid.isScalar = isScalarFloatTree(entry);

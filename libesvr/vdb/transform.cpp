@@ -13,7 +13,7 @@ namespace {
 
 namespace math = openvdb::math;
 
-/// What a frustum's bytes hold before the name of its second map: a box, taper and depth.
+/// A frustum's bytes before the name of its second map: a box, taper and depth.
 constexpr std::uint64_t kFrustumHead = 8 * sizeof(double);
 
 bool isFrustum(const std::string& mapType) {

@@ -26,7 +26,7 @@ struct LeafAccess {
 
 Coord toCoord(const openvdb::Coord& c) { return {c.x(), c.y(), c.z()}; }
 
-/// Where an entry's tree lies and what it holds.
+/// The place and the content of an entry's tree.
 struct LocatedTree {
   const ArchiveEntry& owner;
   GridHead head;

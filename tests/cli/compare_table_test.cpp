@@ -63,6 +63,17 @@ const json* rowOf(const json& report, const std::string& name, const std::string
   return nullptr;
 }
 
+/// How many rows of the group were made, none of which may have more than `bytes`.
+int rowsWithin(const json& report, const std::string& group, std::uint64_t bytes) {
+  int rows = 0;
+  for (const auto& row : report["rows"])
+    if (row["group"] == group && row.contains("bytes")) {
+      EXPECT_LE(row["bytes"].get<std::uint64_t>(), bytes) << row["name"];
+      ++rows;
+    }
+  return rows;
+}
+
 TEST_F(CompareTable, hasLosslessRowsWithoutError) {
   const auto report = reportOf({"--rows", "lossless"});
   for (const char* name : {"OpenVDB float Blosc", "OpenVDB float Zip", "NanoVDB float raw",
@@ -88,22 +99,24 @@ TEST_F(CompareTable, hasQuantisedRowsWithinTheirBounds) {
 }
 
 TEST_F(CompareTable, matchesACandidatesSizeAndShowsTheSearch) {
-  const auto report = reportOf({at("fit.esvr"), "--rows", "matched,zfp", "--size", "2KB"});
-  const json* candidate = rowOf(report, "fit.esvr");
+  // The smallest VDB has some 1500 bytes: a candidate must be larger for other rows to match it.
+  ASSERT_EQ(test::vdb2esvr({at("ref.vdb"), at("large.esvr"), "--count", "60", "--iterations", "60",
+                            "--kappa", "0", "--storage", "float32"})
+                .exitCode,
+            0);
+  const auto report = reportOf({at("large.esvr"), "--rows", "matched,zfp", "--size", "2KB"});
+  const json* candidate = rowOf(report, "large.esvr");
   ASSERT_NE(candidate, nullptr);
   const auto bytes = (*candidate)["bytes"].get<std::uint64_t>();
-  EXPECT_EQ(bytes, std::filesystem::file_size(at("fit.esvr")));
-  const json* matched = rowOf(report, "OpenVDB half Blosc", "at 2000 bytes");
-  ASSERT_NE(matched, nullptr);
-  EXPECT_FALSE((*matched)["search"].empty());
-  int rows = 0;
-  for (const auto& row : report["rows"])
-    if (row["group"].get<std::string>().starts_with("at ") && row.contains("bytes") &&
-        row["group"] == "at " + std::to_string(bytes) + " bytes") {
-      EXPECT_LE(row["bytes"].get<std::uint64_t>(), bytes);
-      ++rows;
-    }
-  EXPECT_TRUE(rows > 0 || bytes < 1500) << "the smallest VDB has some 1500 bytes";
+  EXPECT_EQ(bytes, std::filesystem::file_size(at("large.esvr")));
+  EXPECT_GT(bytes, 1800u);
+  for (const std::uint64_t size : {bytes, std::uint64_t{2000}}) {
+    const std::string group = "at " + std::to_string(size) + " bytes";
+    const json* matched = rowOf(report, "OpenVDB half Blosc", group);
+    ASSERT_NE(matched, nullptr) << group;
+    EXPECT_FALSE((*matched)["search"].empty());
+    EXPECT_GT(rowsWithin(report, group, size), 3) << group;
+  }
   EXPECT_THAT(table({at("ref.vdb"), at("fit.esvr"), "--runs", "1", "-v"}).out,
               AllOf(HasSubstr("trials"), HasSubstr(" bytes,")));
 }
@@ -190,12 +203,17 @@ TEST_F(CompareTable, SlowComparesPictures) {
 }
 
 TEST_F(CompareTable, takesLpipsFromAProgramOfTheUsers) {
-  // In its place the bytes of two files, so that the reference's picture, compared with itself, has
-  // twice its own.
-  const std::string command = "sh -c 'echo two files; cat \"$@\" | wc -c' sizes";
+  // It stands for LPIPS: 0 for equal pictures and 0.25 for others, after a line that is no figure.
+  // It takes PNG files only, and the reference's first.
+  test::writeText(at("metric.sh"),
+                  "for f; do [ \"$(head -c 4 \"$f\" | tail -c 3)\" = PNG ] || exit 9; done\n"
+                  "echo \"$# files\"; echo \"$1\" >> \"$0.references\"\n"
+                  "if cmp -s \"$1\" \"$2\"; then echo 0; else echo 0.25; fi\n");
   const auto report = reportOf({at("fit.esvr"), "--row", "nvdb-float", "--images", "1",
-                                "--image-size", "16", "--lpips", command});
-  EXPECT_GT((*rowOf(report, "fit.esvr"))["lpips"].get<double>(), 100.0);
+                                "--image-size", "16", "--lpips", "sh " + at("metric.sh")});
+  EXPECT_EQ((*rowOf(report, "fit.esvr"))["lpips"], 0.25);
+  EXPECT_EQ((*rowOf(report, "NanoVDB float raw"))["lpips"], 0.0);
+  EXPECT_THAT(test::readText(at("metric.sh.references")), Not(HasSubstr("picture.png\n")));
   const auto run = [&](const std::string& program) {
     return table({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--images", "1", "--image-size",
                   "16", "--lpips", program});

@@ -9,6 +9,7 @@
 
 #include "cli/converters.h"
 #include "cli/vdb_inputs.h"
+#include "esvr/container.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr {
@@ -20,6 +21,7 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 /// A folder with a fit of two grids and its source.
 class Esvr2Vdb : public testing::Test {
@@ -148,10 +150,68 @@ TEST_F(Esvr2Vdb, listsGridsAndSections) {
   EXPECT_THAT(esvr2vdb({"--list", in(), "-v"}).out, HasSubstr("creator"));
 }
 
+TEST_F(Esvr2Vdb, listsTheGridsOfAVdb) {
+  ASSERT_EQ(esvr2vdb({in(), folder_ / "out.nvdb"}).exitCode, 0);
+  for (const std::string& file : {source(), std::string(folder_ / "out.nvdb")}) {
+    const auto run = esvr2vdb({"--list", file});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    for (const char* word : {"density", "heat", "fog volume", "float", "active voxels", "bytes"})
+      EXPECT_THAT(run.out, HasSubstr(word)) << file;
+  }
+  const auto details = esvr2vdb({"--list", source(), "-v"});
+  EXPECT_THAT(details.out, AllOf(HasSubstr("creator"), HasSubstr("active box (")));
+  const auto grids = inspectVdb(source()).grids;
+  EXPECT_THAT(details.out, HasSubstr(std::to_string(grids[0].activeVoxels)));
+  EXPECT_GT(grids[0].storedBytes, 100u);
+  EXPECT_LT(grids[0].storedBytes + grids[1].storedBytes, std::filesystem::file_size(source()));
+}
+
+TEST_F(Esvr2Vdb, saysThatNanoVdbHoldsNoMetadata) {
+  const auto nano = esvr2vdb({in(), folder_ / "out.nvdb"});
+  EXPECT_EQ(nano.exitCode, 0);
+  EXPECT_THAT(nano.err, AllOf(HasSubstr("warning"), HasSubstr("metadata")));
+  EXPECT_THAT(esvr2vdb({in(), out()}).err, Not(HasSubstr("metadata")));
+}
+
+/// An .esvr file whose one ellipsoid reaches thousands of voxels.
+void writeHugeScale(const std::string& path) {
+  StoredGrid grid;
+  grid.descriptor.name = "smoke";
+  grid.descriptor.transform = uniformTransform(1.0);
+  grid.activeBox = {{0, 0, 0}, {7, 7, 7}};
+  grid.valueMax = 1.0f;
+  grid.field.chunks.resize(1);
+  Ellipsoids& e = grid.field.chunks[0].ellipsoids;
+  e.resize(1);
+  for (auto& scale : e.logScale) scale[0] = 8.0f;
+  e.rotation[0][0] = e.intensity[0] = 1.0f;
+  EsvrFile file;
+  file.grids.push_back(grid);
+  writeEsvr(path, file);
+}
+
+TEST_F(Esvr2Vdb, refusesWhatNeedsMoreMemoryThanAllowed) {
+  const std::string huge = folder_ / "huge.esvr";
+  writeHugeScale(huge);
+  for (const char* limit : {"1GB", "20MB"}) {
+    const auto run = esvr2vdb({huge, out(), "--max-memory", limit});
+    EXPECT_EQ(run.exitCode, 5);
+    EXPECT_THAT(run.err,
+                AllOf(HasSubstr("smoke"), HasSubstr("GB of memory"), HasSubstr("--max-memory")));
+  }
+  EXPECT_FALSE(outIsThere());
+  EXPECT_EQ(esvr2vdb({in(), out(), "--max-memory", "1KB"}).exitCode, 5);
+  EXPECT_EQ(esvr2vdb({in(), out(), "--max-memory", "few"}).exitCode, 2);
+  EXPECT_EQ(esvr2vdb({in(), out(), "--max-memory", "1GB"}).exitCode, 0);
+  const auto part =
+      esvr2vdb({huge, folder_ / "part.vdb", "--bbox", "0,0,0,31,31,31", "--max-memory", "100MB"});
+  EXPECT_EQ(part.exitCode, 0) << part.err;
+}
+
 TEST_F(Esvr2Vdb, checksAFile) {
-  const auto whole = esvr2vdb({"--check", in()});
-  EXPECT_EQ(whole.exitCode, 0);
-  EXPECT_THAT(whole.out, HasSubstr("whole"));
+  const auto good = esvr2vdb({"--check", in()});
+  EXPECT_EQ(good.exitCode, 0);
+  EXPECT_THAT(good.out, HasSubstr("in.esvr: OK\n"));
   std::string bytes = test::readText(in());
   bytes[bytes.size() / 2] ^= 1;
   test::writeText(in(), bytes);

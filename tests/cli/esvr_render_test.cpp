@@ -14,6 +14,8 @@
 
 #include "cli/run_program.h"
 #include "esvr/container.h"
+#include "esvr/device.h"
+#include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "esvr/transfer_function.h"
@@ -24,6 +26,7 @@
 namespace esvr::test {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -251,6 +254,47 @@ TEST_F(EsvrRender, ModesAndBoxesChangeThePicture) {
   for (const png_byte v : picture("in.esvr", {"--clip", "500,0,0,501,1,1"}).rgba) ASSERT_EQ(v, 0);
 }
 
+TEST_F(EsvrRender, TheSamplingOfRaysChangesThePicture) {
+  const auto usual = picture("in.esvr");
+  EXPECT_NE(picture("in.esvr", {"--step", "4"}).rgba, usual.rgba);
+  EXPECT_NE(picture("in.esvr", {"--opacity-length", "6"}).rgba, usual.rgba);
+  EXPECT_NE(picture("in.esvr", {"--min-transmittance", "0.6"}).rgba, usual.rgba);
+  // A ray that ends at 1/4096 of the light lacks less than a step of 8 bits.
+  EXPECT_GE(psnrOf(picture("in.esvr", {"--min-transmittance", "0"}), usual), 48.0);
+}
+
+TEST_F(EsvrRender, TheGridThatIsNamedIsDrawn) {
+  const auto stored = readEsvr(folder_ / "in.esvr").grids[0];
+  auto other = stored;
+  other.descriptor.name = "heat";
+  for (float& i : other.field.chunks[0].ellipsoids.intensity) i *= -1.0f;
+  writeEsvr(folder_ / "two.esvr", {{}, {stored, other}});
+  const auto first = picture("in.esvr");
+  EXPECT_EQ(picture("two.esvr").rgba, first.rgba);
+  EXPECT_EQ(picture("two.esvr", {"--grid", "density"}).rgba, first.rgba);
+  EXPECT_NE(picture("two.esvr", {"--grid", "heat"}).rgba, first.rgba);
+}
+
+TEST_F(EsvrRender, ValuesOfFewerBitsChangeThePictureALittle) {
+  const auto floats = picture("in.vdb", {"--values", "float"});
+  const auto fp4 = picture("in.vdb", {"--values", "fp4"});
+  EXPECT_NE(fp4.rgba, floats.rgba);
+  EXPECT_GT(psnrOf(fp4, floats), 20.0);
+}
+
+TEST_F(EsvrRender, PartsOfTheDepthAndMemoryChangeNothingOnGpu) {
+  try {
+    (void)selectDevice("cuda");
+  } catch (const DeviceError& error) {
+    GTEST_SKIP() << error.what();
+  }
+  const auto usual = picture("in.esvr", {"--device", "cuda"});
+  EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--bins", "3"}), usual), 48.0);
+  EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--max-vram", "1"}), usual), 48.0);
+  EXPECT_EQ(draw("in.esvr", "none.png", {"--device", "cuda", "--max-vram", "0.000001"}).exitCode,
+            5);
+}
+
 TEST_F(EsvrRender, SomeFramesOfATurntableAreThoseOfTheWhole) {
   ASSERT_EQ(draw("in.esvr", "all.png", {"--turntable", "3"}).exitCode, 0);
   ASSERT_EQ(draw("in.esvr", "part.png", {"--turntable", "3", "--frames", "1-1"}).exitCode, 0);
@@ -312,7 +356,7 @@ TEST_F(EsvrRender, KeepsAPictureThatIsThere) {
 TEST_F(EsvrRender, OptionsThatMakeNoSenseAreRefused) {
   expectRefused({"--resolution", "64"}, 2, "--resolution");
   expectRefused({"--resolution", "0x4"}, 2, "--resolution");
-  expectRefused({"--resolution", "20000x4"}, 2, "16384");
+  expectRefused({"--resolution", "40000x4"}, 2, "32767");
   expectRefused({"--step", "0"}, 2, "--step");
   expectRefused({"--step", "-1"}, 2, "--step");
   expectRefused({"--step", "nan"}, 2, "--step");
@@ -363,6 +407,14 @@ TEST_F(EsvrRender, InputThatCannotBeDrawnIsRefused) {
   writeText(folder_ / "bad.esvr", "nothing of the kind");
   EXPECT_EQ(draw("bad.esvr", "refused.png").exitCode, 3);
   EXPECT_EQ(draw("in.esvr", "refused.jpg").exitCode, 2);
+}
+
+TEST_F(EsvrRender, PicturesBeyondTheMemoryAllowedAreRefused) {
+  const auto large =
+      draw("in.esvr", "large.png", {"--resolution", "30000x30000", "--max-memory", "1GB"});
+  EXPECT_EQ(large.exitCode, 5);
+  EXPECT_THAT(large.err, AllOf(HasSubstr("30000 x 30000"), HasSubstr("43.2 GB")));
+  EXPECT_EQ(draw("in.esvr", "large.png", {"--resolution", "100000x100000"}).exitCode, 2);
 }
 
 TEST_F(EsvrRender, HelpNamesEveryBuiltInFunction) {

@@ -89,6 +89,18 @@ std::vector<InputVoxel> softBall(Coord center, float peak, float background) {
   return ball;
 }
 
+std::vector<InputVoxel> cloud(int reach) {
+  const float deviation = float(reach) / 3.0f;
+  std::vector<InputVoxel> inside;
+  for (const auto& [at, height] : cube(reach, [&](float distance) {
+         return distance < float(reach)
+                    ? std::exp(-distance * distance / (2.0f * deviation * deviation))
+                    : 0.0f;
+       }))
+    if (height > 0.0f) inside.push_back({at, height});
+  return inside;
+}
+
 std::vector<InputVoxel> distances(int reach) {
   constexpr float kRadius = 8.0f;
   return cube(reach, [](float distance) { return distance - kRadius; });

@@ -36,6 +36,10 @@ void writeMixedInput(const std::filesystem::path& path, const std::vector<InputG
 [[nodiscard]] std::vector<InputVoxel> softBall(Coord center, float peak = 1.0f,
                                                float background = 0.0f);
 
+/// A Gaussian of standard deviation `reach` / 3 about the origin, cut off at the distance `reach`:
+/// smooth and large, so that ellipsoids are much smaller than voxels.
+[[nodiscard]] std::vector<InputVoxel> cloud(int reach);
+
 /// The distance from the surface of a sphere of radius 8 about the origin, in the cube of `reach`.
 [[nodiscard]] std::vector<InputVoxel> distances(int reach);
 

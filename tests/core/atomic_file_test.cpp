@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -137,6 +139,56 @@ TEST_F(AtomicFileTest, AFullDiskIsAFailureAndLeavesTheOldFile) {
   }
   EXPECT_EQ(contentOf(target()), "old");
   EXPECT_EQ(entries(), 1u);
+}
+
+/// A process that writes a file of a megabyte over and over.
+pid_t startWriter(const fs::path& target) {
+  const pid_t child = ::fork();
+  if (child != 0) return child;
+  const std::string content(1 << 20, 'n');
+  for (;;) {
+    AtomicFile file(target, true);
+    for (std::size_t at = 0; at < content.size(); at += 1 << 16)
+      file.write(bytesOf(std::string_view(content).substr(at, 1 << 16)));
+    file.commit();
+  }
+}
+
+// Killed at a hundred moments, a write leaves the old file or the whole new one, and the next write
+// removes what is left over.
+TEST_F(AtomicFileTest, SurvivesBeingKilled) {
+  const std::string oldContent(1 << 20, 'o'), newContent(1 << 20, 'n');
+  int leftOver = 0;
+  for (int round = 0; round < 100; ++round) {
+    {
+      AtomicFile file(target(), true);
+      EXPECT_LE(entries(), 2u);
+      file.write(bytesOf(oldContent));
+      file.commit();
+    }
+    const pid_t writer = startWriter(target());
+    ::usleep(useconds_t(500 + 97 * round));
+    ::kill(writer, SIGKILL);
+    ASSERT_EQ(::waitpid(writer, nullptr, 0), writer);
+    const std::string content = contentOf(target());
+    ASSERT_TRUE(content == oldContent || content == newContent) << content.size();
+    leftOver += entries() > 1 ? 1 : 0;
+  }
+  EXPECT_GT(leftOver, 0) << "no write was interrupted";
+  AtomicFile(target(), true).commit();
+  EXPECT_EQ(entries(), 1u);
+}
+
+TEST_F(AtomicFileTest, LeavesTheTemporaryFilesOfOthersAlone) {
+  AtomicFile alive(target(), false);
+  put(directory_ / ".esvr-12345678.tmp.keep", "not ours");
+  put(directory_ / ".esvr-0badcafe.tmp", "left over");
+  AtomicFile other(directory_ / "other.esvr", false);
+  EXPECT_TRUE(fs::exists(alive.path()));
+  EXPECT_TRUE(fs::exists(directory_ / ".esvr-12345678.tmp.keep"));
+  EXPECT_FALSE(fs::exists(directory_ / ".esvr-0badcafe.tmp"));
+  alive.commit();
+  EXPECT_TRUE(fs::exists(target()));
 }
 
 }  // namespace

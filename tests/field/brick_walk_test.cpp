@@ -79,7 +79,7 @@ Support ballOf(double center, double logScale) {
 }
 
 TEST(BrickWalk, ASupportBeyondTheIndexSpaceIsCutOffAtItsEnds) {
-  for (const double logScale : {25.0, 32.0, 60.0, 300.0})
+  for (const double logScale : {25.0, 32.0, 60.0})
     EXPECT_EQ(brickRange(ballOf(1000.0, logScale)), kAll) << logScale;
   const Box far = brickRange(ballOf(1e30, 3.0));
   EXPECT_EQ(far.min, kAll.max);

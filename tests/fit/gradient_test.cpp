@@ -1,7 +1,9 @@
-// Plan: the engine's gradients of 1/2 sum r^2, by every parameter of every ellipsoid, against
-// central differences of a float64 loss summed over all voxels of a dense box, for kernels from the
-// Gaussian limit to a hard edge; gradientsOf against gradients with r handed in; and the adjoint
-// identity <g, dV> = <dL, dtheta> for a random g.
+// Plan: the gradients of 1/2 sum r^2, by every parameter of every ellipsoid and by kappa, against
+// central differences of a float64 sum over all voxels of a dense box: over a whole random field
+// with its bricks that only supports reach, and over ellipsoids of every shape and kernel
+// (gradient_cases.h), which gradient_cases_cuda_test.cpp gives to a GPU. For the same shapes the
+// adjoint identity <g, dV> = <dL, dtheta> for a random g, in the pass of a fit, where g is what a
+// random target leaves, and in the pass of the paper's method, which is given g.
 
 #include <gtest/gtest.h>
 
@@ -9,7 +11,9 @@
 
 #include "fit/cpu/cpu_pass.h"
 #include "fit/ellipsoid_math.h"
+#include "fit/paper/cpu_paper_pass.h"
 #include "fit/parameter_gradient.h"
+#include "gradient_cases.h"
 #include "random_ellipsoids.h"
 
 namespace esvr {
@@ -112,6 +116,50 @@ TEST_P(GradientKappa, AgreesWithCentralDifferencesByKappa) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, GradientKappa, testing::Values(-30.f, -3.f, 2.f, 5.f));
+
+class GradientCases : public testing::TestWithParam<test::GradientCase> {
+ protected:
+  [[nodiscard]] std::vector<EllipsoidGradient> gradients() const {
+    CpuPass pass(target_.get(), kernel_);
+    pass.rebuild(ellipsoids_, 0.1);
+    std::vector<EllipsoidGradient> found(ellipsoids_.size());
+    pass.gradients(ellipsoids_, found);
+    return found;
+  }
+  [[nodiscard]] std::vector<EllipsoidGradient> gradientsOf(const std::vector<double>& g) const {
+    const paper::PopulationKernels kernels{{kernelConstants<float>({.kappa = GetParam().kappa})},
+                                           {supportRadius(kernel_)}};
+    paper::CpuPaperPass pass(target_.get(), kernels);
+    pass.rebuild(ellipsoids_, 0.1);
+    std::vector<EllipsoidGradient> found(ellipsoids_.size());
+    pass.gradients(ellipsoids_, std::vector<float>(g.begin(), g.end()), found);
+    return found;
+  }
+
+  const test::SmallTarget target_;
+  const std::vector<Ellipsoid> ellipsoids_ = test::ellipsoidsOf(GetParam(), target_);
+  const KernelConstants<double> kernel_ = kernelConstants<double>({.kappa = GetParam().kappa});
+};
+
+TEST_P(GradientCases, AgreeWithDifferences) {
+  const auto g = test::residualsOf(target_, GetParam(), ellipsoids_);
+  test::expectDifferences(target_, GetParam(), ellipsoids_, g, gradients());
+}
+
+TEST_P(GradientCases, SatisfyTheAdjointIdentity) {
+  const auto g = test::residualsOf(target_, GetParam(), ellipsoids_);
+  test::expectAdjointIdentity(target_, GetParam(), ellipsoids_, g, gradients());
+}
+
+TEST_P(GradientCases, OfAGivenDerivativeSatisfyTheAdjointIdentity) {
+  test::Random random(13);
+  std::vector<double> g(target_.get().values.size());
+  for (double& v : g) v = double(float(random(-1.0, 1.0)));
+  test::expectAdjointIdentity(target_, GetParam(), ellipsoids_, g, gradientsOf(g));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, GradientCases, testing::ValuesIn(test::gradientCases()),
+                         [](const auto& c) { return test::nameOf(c.param); });
 
 }  // namespace
 }  // namespace esvr

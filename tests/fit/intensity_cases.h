@@ -31,7 +31,7 @@ inline Field someField() {
 
 /// Every voxel active.
 inline IntensityTarget targetOf(const SparseVolume& volume) {
-  return {volume, {{}, -1.0f}, activeBox(volume)};
+  return {volume, {.threshold = -1.0f}, activeBox(volume)};
 }
 
 TEST_P(Intensities, ThatMadeTheVolumeAreFound) {

@@ -107,11 +107,11 @@ std::vector<GoldenFile> goldenFiles() {
       {"compressed", fileOf(fogGrid(60))},
       {"quantised", fileOf(quantisedGrid(20))},
       {"layered", fileOf(layeredGrid(20))},
-      {"voxels", fileOf(fewValues()), false},
+      {"voxels", fileOf(fewValues())},
       {"mirrored_voxels", fileOf(mirroredValues())},
       {"mask", fileOf(masked())},
       {"residual", fileOf(corrected())},
-      {"unknown_section", fileOf(oneEllipsoid()), true, true},
+      {"unknown_section", fileOf(oneEllipsoid()), true},
   };
 }
 

@@ -1,6 +1,5 @@
 #pragma once
-/// The files in tests/format/golden: what is in them, and how version 1 wrote them. They stay as
-/// they are: whoever changes the format must still read them.
+/// The files in tests/format/golden: their content, and how this version of the format writes it.
 
 #include <cstddef>
 #include <string>
@@ -13,7 +12,6 @@ namespace esvr::test {
 struct GoldenFile {
   std::string name;
   EsvrFile content;
-  bool written = true;          ///< else an older version did: it is only read
   bool unknownSection = false;  ///< followed by an optional section of a kind nobody knows
 };
 

@@ -45,10 +45,6 @@ TEST(LayeredFile, EncodingAgainGivesTheSameBytes) {
   EXPECT_EQ(encodeEsvr(decodeEsvr(bytes, "memory")), bytes);
 }
 
-TEST(LayeredFile, IsOfVersionOneTwo) {
-  EXPECT_EQ(std::to_integer<int>(encodeEsvr(layeredFile(5))[10]), 2);
-}
-
 TEST(LayeredFile, HasTheHeavierEllipsoidsInTheFirstLayers) {
   const StoredGrid grid = test::layeredGrid(500);
   const QuantisedEllipsoids& q = grid.quantised[1];

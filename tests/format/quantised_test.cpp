@@ -49,11 +49,6 @@ TEST(QuantisedFile, SaysWhereItsBytesAre) {
   EXPECT_NEAR(double(total), double(encodeEsvr(file).size()), 800.0);  // header, tables, records
 }
 
-TEST(QuantisedFile, IsOfVersionOneOneAndOthersAreNot) {
-  EXPECT_EQ(std::to_integer<int>(encodeEsvr(quantisedFile(1))[10]), 1);
-  EXPECT_EQ(std::to_integer<int>(encodeEsvr(test::fileOf(test::fogGrid(1)))[10]), 0);
-}
-
 TEST(QuantisedFile, IsRefusedWhereItsFieldIsAnother) {
   EsvrFile file = quantisedFile(3);
   file.grids[0].field.chunks[1].ellipsoids.intensity[2] *= 2.0f;

@@ -15,9 +15,9 @@ MASK = (1 << 64) - 1
 PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 9650029242287828579,
           2870177450012600261)
 NONE = 0xFFFFFFFF
-KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 7: "curve", 16: "centers",
-         17: "scales", 18: "rotations", 19: "intensities", 20: "kappas", 32: "ellipsoids",
-         33: "voxels of 1.1", 6: "layer errors", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
+KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 6: "layer errors",
+         7: "curve", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
+         20: "kappas", 32: "ellipsoids", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
          37: "residual"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
@@ -296,6 +296,15 @@ def layer_errors(data):
     return [struct.unpack_from("<2f", data, at) for at in range(0, len(data), 8)]
 
 
+def curve(data):
+    """A row for each point: ellipsoids, PSNR of box and active voxels, largest error, iteration."""
+    n = len(data) // 36
+    r = Record(data)
+    columns = [[r.get(form) for _ in range(n)] for form in "QdddI"]
+    r.end()
+    return list(zip(*columns))
+
+
 def toward_zero(value, divisor):
     return abs(value) // divisor * (1 if value >= 0 else -1)
 
@@ -319,7 +328,7 @@ def header_of_voxels(r):
 class Voxels:
     """What has been read of a grid's voxels."""
 
-    def __init__(self, head, stream, mirrors=(-1, -1, -1), common=()):
+    def __init__(self, head, stream, mirrors, common):
         self.head, self.stream, self.mirrors, self.common = head, stream, mirrors, common
         self.codes, self.active, self.held = {}, set(), {}
 
@@ -353,36 +362,9 @@ def spread_of(a, b, c, ab, ac, bc):
     return (abs(a - ab) + abs(b - bc) + abs(c - ac) + abs(a - ac) + abs(b - ab) + abs(c - bc))
 
 
-def half_octaves(number, most):
+def half_octaves(number, maximum):
     width = number.bit_length()
-    return min(2 * width + (number >> (width - 2) & 1 if width > 1 else 0), most)
-
-
-def old_voxels(data):
-    """{voxel: (code, active)} of those that are not vacant, and the header."""
-    r = Record(data)
-    head = header_of_voxels(r)
-    stream = Decoder(data[r.at:])
-    v = Voxels(head, stream)
-    errors, negative = [0] * 5, 0
-    for p, before in v.each():
-        around = sum((q in v.active) << (6 - i) for i, q in enumerate(before))
-        if stream.decision("active", around):
-            v.active.add(p)
-        elif stream.decision("vacant"):
-            v.codes[p] = head["vacant"]
-            continue
-        codes = [v.code(q) for q in before]
-        rules = guesses(*codes)
-        best = errors.index(min(errors))
-        context = half_octaves(spread_of(*codes[:6]) + 2 * (errors[best] >> 3), 23)
-        far = stream.number("far", context, bits=6)
-        if far:
-            negative = stream.decision("negative", context, negative)
-        code = rules[best] + (-far if negative else far)
-        errors = [e + min(abs(code - g), 1 << 34) - (e >> 3) for e, g in zip(errors, rules)]
-        v.put(p, code)
-    return head, v.held
+    return min(2 * width + (number >> (width - 2) & 1 if width > 1 else 0), maximum)
 
 
 def voxels(data):
@@ -433,8 +415,8 @@ def content(name, data):
         values = struct.unpack(f"<{n * PLANES[name]}f", data)
         return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
     readers = {"grid": grid, "chunks": chunks, "leaves": leaves, "ellipsoids": ellipsoids,
-               "voxels of 1.1": old_voxels, "voxels": voxels, "mask": voxels, "residual": voxels,
-               "layered ellipsoids": layered, "layer errors": layer_errors}
+               "voxels": voxels, "mask": voxels, "residual": voxels,
+               "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve}
     return readers[name](data) if name in readers else data
 
 
@@ -463,7 +445,8 @@ def read(path):
         if name is None:
             assert flags == 0, "an unknown kind is optional here"
             continue
-        assert flags == (0 if name in ("curve", "layer errors") else 1) and frame == layer == 0, "flags"
+        optional = name in ("curve", "layer errors")
+        assert flags == (0 if optional else 1) and frame == layer == 0, "flags"
         assert codec in (0, 1) and (codec == 1 or raw == stored), "codec"
         sections[name, g, c] = content(name, part) if codec == 0 else None
     assert not any(b for b, o in zip(data, owned) if not o), "padding"
@@ -591,7 +574,7 @@ def check_mirrored(sections):
 
 
 def check_voxels(sections):
-    head, held = sections["voxels of 1.1", 0, NONE]
+    head, held = sections["voxels", 0, NONE]
     assert (head["form"], head["origin"], head["background"]) == (3, (-8, 16, 0), 0.125)
     values = 0
     for x in range(-8, 0):
@@ -608,9 +591,15 @@ def check_voxels(sections):
     assert values == len(held) > 800
 
 
+def check_two_grids(sections):
+    assert sections["curve", 0, NONE] == [(100, 31.25, 20.5, 0.25, 10), (200, 41.25, 30.5, 0.125, 30)]
+
+
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
-          "voxels": check_voxels, "mask": check_mask, "residual": check_residual, "mirrored_voxels": check_mirrored, "kappas_and_chunks": check_kappas_and_chunks}
+          "voxels": check_voxels, "mask": check_mask, "residual": check_residual,
+          "mirrored_voxels": check_mirrored, "two_grids": check_two_grids,
+          "kappas_and_chunks": check_kappas_and_chunks}
 
 
 def main():

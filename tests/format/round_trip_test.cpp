@@ -49,7 +49,7 @@ TEST(RoundTrip, AnyFiniteFloat) {
   const std::size_t n = std::size(extremes);
   Ellipsoids e = test::sampleEllipsoids(n, 1, {.kappas = true});
   for (std::size_t i = 0; i < n; ++i) {
-    for (auto& scale : e.logScale) scale[i] = extremes[i];
+    for (auto& scale : e.logScale) scale[i] = std::clamp(extremes[i], -kMaxLogScale, kMaxLogScale);
     e.intensity[i] = e.kappa[i] = extremes[i];
     e.center[0][i] = extremes[(i + 3) % n];
   }

@@ -1,5 +1,6 @@
-// Decodes whatever comes, as it is and with its checksums made right. A file that is accepted must
-// be written again to bytes that decode to the same.
+// Decodes whatever comes, as it is and with its checksums made right, within a bound on memory. A
+// file that is accepted must be written again to bytes that decode to the same, and its grids become
+// voxels or are refused.
 
 #include <cstdint>
 #include <cstdlib>
@@ -7,15 +8,33 @@
 
 #include "esvr/container.h"
 #include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "format/byte_source.h"
+#include "format/decode.h"
 #include "fuzz/repair.h"
 
 namespace {
 
+constexpr std::uint64_t kMaxContent = std::uint64_t{256} << 20, kMaxVoxels = std::uint64_t{8} << 20;
+
+void decodeVoxels(const esvr::StoredGrid& grid) {
+  try {
+    esvr::checkInvariants(esvr::decodeGrid(grid, {.maxBytes = kMaxVoxels}));
+  } catch (const esvr::MemoryExceeded&) {
+  } catch (const esvr::RuntimeFailure&) {  // supports that are 2^31 voxels apart
+  }
+}
+
 void decodeAndEncode(std::span<const std::byte> bytes) {
   std::vector<std::byte> once;
   try {
-    once = esvr::encodeEsvr(esvr::decodeEsvr(bytes, "fuzz"));
+    const esvr::EsvrFile file =
+        esvr::format::decode(esvr::format::MemorySource(bytes, "fuzz"), {kMaxContent});
+    for (const auto& grid : file.grids) decodeVoxels(grid);
+    once = esvr::encodeEsvr(file);
   } catch (const esvr::BadInput&) {
+    return;
+  } catch (const esvr::MemoryExceeded&) {
     return;
   }
   if (esvr::encodeEsvr(esvr::decodeEsvr(once, "again")) != once) std::abort();

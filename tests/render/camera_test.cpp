@@ -105,6 +105,10 @@ TEST(Camera, WhatMakesNoSenseIsRefused) {
   refused([](Camera& c) { c.height = -1.0; });
   refused([](Camera& c) { c.eye[1] = std::numeric_limits<double>::infinity(); });
   refused([](Camera&) {}, {0, 10});
+  // The renderers keep the numbers of pixels in 16 bits.
+  refused([](Camera&) {}, {32768, 10});
+  refused([](Camera&) {}, {10, 100'000});
+  EXPECT_NO_THROW(checkCamera(good, {Resolution::kMaxSide, 1}));
 }
 
 }  // namespace

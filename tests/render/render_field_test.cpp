@@ -217,5 +217,17 @@ TEST(RenderField, StopsWhereAsked) {
   EXPECT_THROW((void)renderField(randomField({}), o), Cancelled);
 }
 
+// A file may say so; without a limit the rays would be followed for ever.
+TEST(RenderField, RaysThroughASupportOfAnySizeAreRefused) {
+  for (const Between between : {Between::kSum, Between::kVoxels})
+    for (const float logScale : {18.0f, 32.0f}) {
+      Field field = randomField({.count = 3});
+      for (auto& scale : field.chunks[0].ellipsoids.logScale) scale[1] = logScale;
+      RenderOptions o = optionsFor({}, {4, 4});
+      o.between = between;
+      EXPECT_THROW((void)renderField(field, o), UsageError) << logScale;
+    }
+}
+
 }  // namespace
 }  // namespace esvr::test

@@ -96,7 +96,7 @@ TEST(Swc2Vdb, refusesASkeletonThatIsNotThere) {
   EXPECT_THAT(run.err, HasSubstr("No such file"));
 }
 
-TEST(Swc2Vdb, turnsRealSkeletonsIntoThinTubes) {
+TEST(Swc2Vdb, RealFilesOfSkeletonsBecomeThinTubes) {
   if (std::string(ESVR_DATA_DIR).empty()) GTEST_SKIP() << "ESVR_DATA_DIR is not set";
   for (const char* name : {"m207", "hemibrain_754538881"}) {
     const TemporaryFolder folder;

@@ -5,9 +5,9 @@
 #include <cuda_runtime_api.h>
 
 #include "field/brick_kernels.h"
+#include "field/voxel_rule.h"
 #include "fit/cuda/pass_scene.h"
 #include "fit/intensity_passes.h"
-#include "field/voxel_rule.h"
 
 namespace esvr::cuda {
 

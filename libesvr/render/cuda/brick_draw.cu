@@ -18,7 +18,7 @@ __global__ void clearRanges(int2* ranges, int tiles) {
   if (tile < tiles) ranges[tile] = make_int2(INT_MAX, INT_MIN);
 }
 
-/// What a brick of cells covers of the picture.
+/// The part of the picture that a brick of cells covers.
 struct Cover {
   double firstColumn, lastColumn, firstRow, lastRow;  ///< pixels
   double nearest, farthest;                           ///< distances
@@ -55,7 +55,7 @@ __device__ void add(const View& view, const Vec3& corner, Cover& c) {
   c.lastRow = fmax(c.lastRow, before ? row : kAll);
 }
 
-/// Where a corner lies behind the eye, nothing is known but the whole picture.
+/// If a corner lies behind the eye, nothing is known but the whole picture.
 __device__ Cover coverOf(const View& view, const Coord& brick) {
   constexpr double kAll = 1e9;
   Cover c{kAll, -kAll, kAll, -kAll, view.perspective ? distanceTo(brick, view.eye) : 1e300, -1e300};

@@ -18,10 +18,10 @@ struct BrickDrawArguments {
   std::uint32_t count;
   MarchScene scene;  ///< relative to the atlas
   Resolution resolution;
-  int firstTileRow, tileRows;  ///< of the band
+  int firstTileRow, tileRows;  ///< the band's
   int2* ranges;                ///< tiles: first and last sample, counted from `firstSample`
-  double firstSample;          ///< of the scene
-  float4* pixels;              ///< of the band, zero before
+  double firstSample;          ///< the scene's
+  float4* pixels;              ///< the band's, zero before
 };
 
 void launchBricks(const BrickDrawArguments& arguments, int multiprocessors, cudaStream_t stream);

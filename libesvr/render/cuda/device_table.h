@@ -1,5 +1,5 @@
 #pragma once
-/// What renderers on a CUDA device share: memory that grows, and a transfer function's table.
+/// Renderers on a CUDA device share this: memory that grows, and a transfer function's table.
 
 #include <optional>
 
@@ -8,7 +8,7 @@
 
 namespace esvr::cuda {
 
-/// What was there is lost where it has to grow.
+/// The content is lost where the memory has to grow.
 template <class T>
 void atLeast(DeviceBuffer<T>& buffer, std::size_t n, cudaStream_t stream) {
   if (buffer.size() >= n) return;

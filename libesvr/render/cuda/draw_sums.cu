@@ -21,7 +21,7 @@ static_assert(sizeof(Staged) == sizeof(EllipsoidView) &&
 
 /// The groups share a list's ellipsoids among them.
 struct Shared : WorkShared {
-  /// Of a sample the partial sums of each group for all rays; then, in the same place, of each ray
+  /// The partial sums of a sample by each group for all rays; then, in the same place, of each ray
   /// what the rule made of the whole sum. A warp's rays meet no bank twice.
   alignas(16) float sums[kBinSamples][kGroups][kRays];
   Staged staged[kStage];
@@ -29,7 +29,7 @@ struct Shared : WorkShared {
   std::uint32_t touched;  ///< a bit a sample
 };
 
-/// What a thread knows besides of its ray.
+/// A thread's further knowledge of its ray.
 struct SumWork : Work {
   double middleUnit;  ///< samples for each unit along forward, on the tile's middle ray
   RayScale scale;
@@ -195,7 +195,7 @@ __device__ void addBin(const SumArguments& a, Shared& s, const Place& place, con
   __syncthreads();
 }
 
-/// What the rule makes of each sum, by all threads: a warp takes whole samples, so that it alone
+/// Applies the rule to each sum, by all threads: a warp takes whole samples, so that it alone
 /// overwrites what it has read.
 __device__ void classify(const SamplingArguments& a, Shared& s) {
   const int warp = int(threadIdx.x) / kWarp, lane = int(threadIdx.x) % kWarp;

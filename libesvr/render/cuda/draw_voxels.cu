@@ -15,14 +15,14 @@ struct Block {
   int firstSample, samples;
 };
 
-/// What ellipsoids reach of a tile and a bin, first and last: pixels of the picture, and depths
-/// along forward as the bits of floats, which are none of them negative.
+/// The part of a tile and a bin that ellipsoids reach, first and last: pixels of the picture, and
+/// depths along forward as the bits of floats, which are none of them negative.
 struct Reach {
   int firstColumn, lastColumn, firstRow, lastRow;
   int nearest, farthest;
 };
 
-/// What is drawn at once: a block's samples, and the voxels that they lie between.
+/// A block is drawn at once: its samples, and the voxels that they lie between.
 struct Pass {
   Block block;
   const RayBundle* bundle;
@@ -36,16 +36,16 @@ struct Tile {
 };
 
 struct SampledRay {
-  Vec3 origin, apart;  ///< of its samples
+  Vec3 origin, apart;  ///< the first sample and the distance between samples
 };
 
 struct Shared : WorkShared {
-  /// Of the window's voxels first sums, in units so fine that the sum of all intensities just fits:
-  /// sums of whole numbers have no order. Then what voxels they are, as float.
+  /// First the sums of the window's voxels, in units so fine that the sum of all intensities just
+  /// fits: sums of whole numbers have no order. Then what voxels they are, as float.
   int values[DrawTuning::kWindowVoxels];
   WindowSlab slabs[DrawTuning::kWindowSlabs];
   SampledRay rays[kRays];
-  RayState behind[kGroups - 1][kRays];  ///< of the groups but the first
+  RayState behind[kGroups - 1][kRays];  ///< the rays of all groups but the first
   unsigned long long filled;            ///< a bit a slab that something was added to
   RayBundle ofTile, ofBlock;
   Block blocks[kMaxBlocks];  ///< that are left, the next one last
@@ -221,7 +221,7 @@ __device__ void addForm(Shared& s, const Placed& p, int lane) {
   if (filled != 0) atomicOr(&s.filled, filled);
 }
 
-/// What revoxelise() makes of the sums, near slabs that have any.
+/// Turns the sums into voxels as revoxelise() does, near slabs that have any.
 __device__ void finishVoxels(const VoxelArguments& a, Shared& s, float one) {
   const VoxelWindow& w = s.pass.window;
   const unsigned long long near = s.filled | s.filled << 1 | s.filled >> 1;
@@ -325,7 +325,7 @@ __device__ void addList(const VoxelArguments& a, Shared& s, const std::uint32_t*
     addForm(s, placedIn(a, s.pass, ids[i], unitsOfOne), lane);
 }
 
-/// What a list's ellipsoids reach, into s.reach.
+/// Bounds the part that a list's ellipsoids reach, into s.reach.
 __device__ void findReach(const VoxelArguments& a, Shared& s, const std::uint32_t* ids,
                           std::uint32_t n) {
   constexpr int kMaxInt = 0x7fffffff;

@@ -15,7 +15,7 @@ inline constexpr int kGroups = DrawTuning::kGroups, kThreads = DrawTuning::kDraw
 inline constexpr int kWarps = kThreads / kWarp, kHalves = kRays / kWarp;
 static_assert(kRays == 64, "two halves of a tile");
 
-/// What a block's threads share to go through the work.
+/// The state that a block's threads share while they go through the work.
 struct WorkShared {
   std::uint32_t openRays[kHalves];  ///< a bit a ray
   TilePart item;
@@ -35,7 +35,7 @@ struct Place {
   }
 };
 
-/// What a thread knows of its tile and of its ray.
+/// A thread's knowledge of its tile and of its ray.
 struct Work {
   int firstColumn, firstRow;  ///< pixels of the picture
   bool inPicture;

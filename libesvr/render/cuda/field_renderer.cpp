@@ -169,7 +169,8 @@ TileFrame FieldRenderer::frameOf(const Scene& scene, Band band) const {
           .between = scene.options.between};
 }
 
-/// What `reserve` makes, without lists and results, whose sizes the scene decides.
+/// Counts the memory that `reserve` makes, without lists and results, whose sizes the scene
+/// decides.
 std::size_t FieldRenderer::bandBytes(const TileFrame& f) const {
   const std::size_t tiles = std::size_t(f.tiles());
   const std::size_t ofParts =

@@ -14,11 +14,11 @@
 
 namespace esvr::cuda {
 
-/// What of the scene lies on the device for good.
+/// The part of the scene that stays on the device.
 struct SceneMemory {
   SceneMemory(const Field& field, cudaStream_t stream);
 
-  /// What only one kind of picture needs is made for the first of that kind.
+  /// Makes what only one kind of picture needs, for the first of that kind.
   void prepare(const Field& field, Between between, cudaStream_t stream);
 
   DeviceBuffer<PackedEllipsoid> ellipsoids;
@@ -34,7 +34,7 @@ struct SceneMemory {
   [[nodiscard]] SeenEllipsoids seen();
 };
 
-/// What a band of a picture takes; grows where a band needs more.
+/// The memory of a band of a picture. It grows where a band needs more.
 struct BandMemory {
   DeviceBuffer<FrameCounters> counters;
   DeviceBuffer<std::uint32_t> counts, ends, entries, sorted;
@@ -61,7 +61,7 @@ class FieldRenderer final : public Renderer {
   struct Band {
     int first, count;
   };
-  struct Scene;  ///< what all bands of a picture share
+  struct Scene;  ///< shared by all bands of a picture
 
   void drawFrame(const RenderOptions& options, Image* image);
   [[nodiscard]] std::size_t fixedBytes() const { return scene_.bytes() + table_.bytes(); }

@@ -1,5 +1,5 @@
 #pragma once
-/// What renderers that march through voxels on a CUDA device share: bands, pixels, times.
+/// Renderers that march through voxels on a CUDA device share this: bands, pixels, times.
 
 #include "core/cuda/event.h"
 #include "core/cuda/stream.h"
@@ -25,9 +25,9 @@ class MarchRenderer : public Renderer {
 
   /// \param pixels  of the band, zero
   virtual void launch(const RenderOptions& options, Band band, float4* pixels) = 0;
-  /// Of device memory, beside the pixels and the table.
+  /// Bytes of device memory beside the pixels and the table.
   [[nodiscard]] virtual std::size_t contentBytes() const = 0;
-  /// What each row of pixels takes beside them.
+  /// Bytes that each row of pixels takes beside them.
   [[nodiscard]] virtual std::size_t bytesOfRow(Resolution) const { return 0; }
 
   [[nodiscard]] cudaStream_t stream() const { return stream_.get(); }

@@ -10,7 +10,7 @@ namespace {
 
 constexpr unsigned kColumns = 8, kRows = 16;  // of a block
 
-/// Where a band's pixels go.
+/// The destination of a band's pixels.
 struct BandPixels {
   int width, firstRow, rows;
   float4* pixels;

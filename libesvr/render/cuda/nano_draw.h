@@ -20,8 +20,8 @@ struct NanoDrawArguments {
   const std::byte* grid;  ///< on the device
   NanoValues values;
   Resolution resolution;
-  int firstRow, rows;  ///< of the band
-  float4* pixels;      ///< of the band
+  int firstRow, rows;  ///< the band's
+  float4* pixels;      ///< the band's
 };
 
 void launchNano(const NanoDrawArguments& arguments, cudaStream_t stream);

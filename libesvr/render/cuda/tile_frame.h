@@ -19,10 +19,11 @@ namespace esvr::cuda {
 struct DrawTuning {
   static constexpr int kTileSide = 8;  ///< pixels
   static constexpr int kTilePixels = kTileSide * kTileSide;
-  static constexpr int kGroups = 4;  ///< of threads that share a tile's ellipsoids among them
+  static constexpr int kGroups =
+      4;  ///< groups of threads that share a tile's ellipsoids among them
   static constexpr int kDrawThreads = kTilePixels * kGroups;
   static constexpr int kBlocksPerMultiprocessor = 4;
-  /// Of a window of voxels: as much as a block of threads can have in shared memory.
+  /// The size of a window of voxels: as much as a block of threads can have in shared memory.
   static constexpr int kWindowVoxels = 8192, kWindowSlabs = 64;
   static constexpr int kLanesOfForm = 8;  ///< threads that share an ellipsoid's voxels
   /// Fewer samples at once only where the window of a single ray is too large.
@@ -33,13 +34,13 @@ struct DrawTuning {
   static constexpr int kListBlocksPerMultiprocessor = 8;
   /// Work begins with the tiles of the longest lists; their lengths are told apart by powers of 2.
   static constexpr int kLengthClasses = 12;
-  static constexpr int kMaxParts = 16;  ///< of the depth
+  static constexpr int kMaxParts = 16;  ///< into which the depth is divided at most
 };
 
-/// Where an ellipsoid lies in the picture.
+/// The place of an ellipsoid in the picture.
 struct Footprint {
-  double column, row;                                       ///< of its outline's middle
-  float xx, xy, yy;                                         ///< of the outline, slightly widened
+  double column, row;                                       ///< its outline's middle
+  float xx, xy, yy;                                         ///< its outline, slightly widened
   float nearest, farthest;                                  ///< along forward, slightly widened
   std::int16_t firstColumn, lastColumn, firstRow, lastRow;  ///< firstRow > lastRow: not seen
   std::int32_t everywhere;
@@ -49,10 +50,10 @@ struct TileFrame {
   View view;
   Resolution resolution;
   double step;
-  int tileColumns, firstTileRow, tileRows;  ///< of the band
+  int tileColumns, firstTileRow, tileRows;  ///< the band's
   std::int64_t firstBin;                    ///< counted from the eye
   int bins;
-  int parts;       ///< of the depth, drawn at once
+  int parts;       ///< parts of the depth that are drawn at once
   int binsOfPart;  ///< the last part may have less
   Between between;
 
@@ -64,11 +65,11 @@ struct TilePart {
   std::uint32_t tile, part;
 };
 
-/// What a frame counts while it is drawn.
+/// Counters of a frame while it is drawn.
 struct FrameCounters {
   unsigned long long pairs;                         ///< entries of all lists
   std::uint32_t items[DrawTuning::kLengthClasses];  ///< parts of tiles that have lists
-  std::uint32_t results;                            ///< of parts of tiles that have several
+  std::uint32_t results;  ///< results of parts, in tiles that have several
   std::uint32_t occupiedTiles;
   std::uint32_t longestTile;  ///< entries of a tile's lists, at most
   std::uint32_t longestBin;
@@ -109,7 +110,7 @@ ESVR_HD inline bool listsFit(const FrameCounters& c, const TileLists& lists, Bet
 struct DeviceEllipsoids {
   const PackedEllipsoid* ellipsoids;
   std::uint32_t count;
-  const Vec3* origins;       ///< of the chunks
+  const Vec3* origins;       ///< the chunks' origins
   const RayKernel* kernels;  ///< one, or an ellipsoid's each
   std::int32_t ownKernels;
 };
@@ -133,13 +134,13 @@ void launchPlan(const TileFrame& frame, const TileLists& lists, cudaStream_t str
 void launchFill(const TileFrame& frame, std::uint32_t count, const SeenEllipsoids& seen,
                 const TileLists& lists, int multiprocessors, cudaStream_t stream);
 
-/// What drawing needs, whatever is between voxels.
+/// The arguments of drawing that do not depend on what is between voxels.
 struct SamplingArguments {
   TileFrame frame;
   TileLists lists;
   SampleRule rule;
   ClipBox clip;
-  float4* pixels;  ///< of the band, row after row: red, green, blue, alpha
+  float4* pixels;  ///< the band's, row after row: red, green, blue, alpha
 };
 
 struct SumArguments {
@@ -152,8 +153,8 @@ struct VoxelArguments {
   SamplingArguments draw;
   const WindowForm* forms;
   const Footprint* footprints;
-  const Vec3* origins;  ///< of the chunks
-  float bound;          ///< of all intensities: what sums are exact by
+  const Vec3* origins;  ///< the chunks' origins
+  float bound;          ///< no intensity is larger; sums are exact in a fixed fraction of it
   VoxelRule rule;
 };
 

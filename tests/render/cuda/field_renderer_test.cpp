@@ -32,6 +32,20 @@ double largestDifference(const Image& a, const Image& b) {
   return largest;
 }
 
+/// Rounding decides about a voxel where m is within some 1e-7 of the end of a support: hardly one
+/// voxel of the 64,000 in these scenes. The default camera shows a voxel's samples, which lie up to
+/// one voxel to each side of it, on at most 5 x 5 pixels of four channels.
+constexpr std::size_t kVoxelsOnAnEnd = 2;
+constexpr std::size_t kChannelsOnAnEnd = kVoxelsOnAnEnd * 25 * 4;
+
+std::size_t channelsThatDiffer(const Image& a, const Image& b) {
+  if (a.rgba.size() != b.rgba.size()) return std::max(a.rgba.size(), b.rgba.size());
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.rgba.size(); ++i)
+    count += std::abs(double(a.rgba[i]) - double(b.rgba[i])) > kAsked;
+  return count;
+}
+
 TEST(FieldRenderer, SaysWhichDeviceIsNotThere) {
   const Field field = randomField({});
   EXPECT_THROW((void)makeFieldRenderer(field, {DeviceKind::kCuda, 12345}), DeviceError);
@@ -54,8 +68,8 @@ class FieldOnGpu : public testing::TestWithParam<Between> {
     o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
     o.opacityLength = 8.0;
     o.between = GetParam();
-    // Whether a voxel at the end of a support is exactly the background is up to rounding; its
-    // samples must not be opaque for that.
+    // Whether a voxel at the end of a support is exactly the background is up to rounding. Here its
+    // samples are transparent either way; the linear curve has a test of its own.
     if (o.between == Between::kVoxels) o.transfer.opacity = {{-1.0, 1.0}, {0.0, 0.0}, {1.0, 1.0}};
     return o;
   }
@@ -131,6 +145,14 @@ TEST_P(FieldOnGpu, AgreesForOtherStepsSizesAndOpacities) {
   }
 }
 
+TEST_P(FieldOnGpu, AgreesWhereTheBackgroundsValueIsOpaque) {
+  const Field field = randomField({.count = 300});
+  RenderOptions o = optionsFor();
+  o.transfer = rescaled({o.transfer.colors, builtInOpacity("linear")}, {-1.0f, 1.0f});
+  const Image expected = renderField(field, o);
+  EXPECT_LE(channelsThatDiffer(drawn(field, o), expected), kChannelsOnAnEnd);
+}
+
 TEST_P(FieldOnGpu, DrawsThePartsOfTheDepthAsOne) {
   const Field field = randomField({.count = 2000, .extent = 200.0, .smallest = 3.0});
   RenderOptions o = optionsFor();
@@ -150,10 +172,7 @@ TEST_P(FieldOnGpu, AgreesInEachModeAndClipped) {
       const Image expected = renderField(field, o);
       const Image image = drawn(field, o, {.depthParts = parts});
       // A sample on the end of a support, of value 0, may count for one and not for the other.
-      int off = 0;
-      for (std::size_t i = 0; i < image.rgba.size(); ++i)
-        off += std::abs(double(image.rgba[i]) - double(expected.rgba[i])) > kAsked;
-      EXPECT_LE(off, int(image.rgba.size() / 50));
+      EXPECT_LE(channelsThatDiffer(image, expected), kChannelsOnAnEnd) << int(mode) << parts;
     }
   RenderOptions o = optionsFor();
   o.clip = PlaceBox{{5.3, 0.1, -100}, {22.2, 31.7, 100}};

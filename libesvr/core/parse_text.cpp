@@ -1,9 +1,10 @@
-#include "cli/number.h"
+#include "core/parse_text.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
-namespace esvr::cli {
+namespace esvr {
 namespace {
 
 /// A number of type T at the beginning of a text, and what is left behind it.
@@ -16,6 +17,16 @@ bool takeNumber(std::string_view& text, T& value) {
 }
 
 }  // namespace
+
+std::vector<std::string> splitText(const std::string& text, char separator) {
+  std::vector<std::string> parts;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(separator, begin), text.size());
+    parts.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return parts;
+}
 
 std::optional<LeadingNumber> parseLeadingNumber(std::string_view text) {
   LeadingNumber number;
@@ -34,4 +45,4 @@ std::optional<std::int64_t> parseWhole(std::string_view text) {
   return takeNumber(text, value) && text.empty() ? std::optional(value) : std::nullopt;
 }
 
-}  // namespace esvr::cli
+}  // namespace esvr

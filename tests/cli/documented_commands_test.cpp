@@ -1,0 +1,138 @@
+// Plan: the commands that README.md shows run, in the order in which they are
+// shown and in one folder, so that a later one finds the files of those before. They are made quick
+// first: small volumes and pictures, few iterations. Commands of other programs (./setup, cmake) are
+// not run, nor those on smoke1.vdb where ESVR_DATA_DIR does not have it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <sstream>
+
+#include "cli/run_program.h"
+
+namespace esvr {
+namespace {
+
+namespace fs = std::filesystem;
+using Words = std::vector<std::string>;
+
+const std::map<std::string, std::string>& programs() {
+  static const std::map<std::string, std::string> kPrograms{{"vdb2esvr", VDB2ESVR},
+                                                            {"esvr2vdb", ESVR2VDB},
+                                                            {"esvr-render", ESVR_RENDER},
+                                                            {"esvr-compare", ESVR_COMPARE},
+                                                            {"esvr-sample", ESVR_SAMPLE}};
+  return kPrograms;
+}
+
+/// The words of a line up to a comment.
+Words wordsOf(const std::string& line) {
+  Words words;
+  std::istringstream stream(line);
+  for (std::string word; stream >> word && !word.starts_with("#");) words.push_back(word);
+  return words;
+}
+
+/// The commands of a document's indented blocks that begin with a program of ours; "$ " before a
+/// command and a backslash at the end of its line are as in a shell.
+std::vector<Words> commandsOf(const std::string& document) {
+  std::vector<Words> commands;
+  std::istringstream lines(document);
+  bool goesOn = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("    ")) continue;
+    Words words = wordsOf(line);
+    if (!words.empty() && words[0] == "$") words.erase(words.begin());
+    if (words.empty() || (!goesOn && !programs().contains(words[0]))) continue;
+    if (!goesOn) commands.emplace_back();
+    goesOn = words.back() == "\\";
+    if (goesOn) words.pop_back();
+    commands.back().insert(commands.back().end(), words.begin(), words.end());
+  }
+  return commands;
+}
+
+bool has(const Words& words, const std::string& word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+/// Gives an option a value, whether it is there or not.
+void set(Words& words, const std::string& option, const std::string& value) {
+  const auto it = std::find(words.begin(), words.end(), option);
+  if (it != words.end())
+    *std::next(it) = value;
+  else
+    words.insert(words.end(), {option, value});
+}
+
+/// The same command on less.
+Words quickened(Words words) {
+  if (words[0] == "esvr-sample") set(words, "--resolution", "40");
+  if (words[0] == "vdb2esvr" && !has(words, "--lossless")) set(words, "--iterations", "60");
+  if (words[0] == "esvr-render" && !has(words, "--orthographic"))
+    set(words, "--resolution", "48x48");
+  if (words[0] == "esvr-compare" && words[1] == "table") {
+    set(words, "--runs", "1");
+    set(words, "--image-size", "32");
+  }
+  if (words[0] == "esvr-compare" && words[1] == "curves") set(words, "--fit", "3KB");
+  if (words[0] != "esvr2vdb" || !has(words, "--list"))
+    if (words[0] != "esvr-compare" || words[1] != "check") words.emplace_back("--force");
+  return words;
+}
+
+bool isInput(const std::string& word) {
+  return word.ends_with(".vdb") || word.ends_with(".nvdb") || word.ends_with(".esvr");
+}
+
+class DocumentedCommands : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    const fs::path data = ESVR_DATA_DIR;
+    if (fs::exists(data / "smoke1.vdb"))
+      fs::create_symlink(data / "smoke1.vdb", folder_ / "smoke1.vdb");
+    before_ = fs::current_path();
+    fs::current_path(folder_ / "");
+  }
+  void TearDown() override { fs::current_path(before_); }
+
+  /// The first file that a command takes is there, or it makes it.
+  [[nodiscard]] static bool canRun(const Words& words) {
+    if (words[0] == "esvr-sample") return true;
+    const auto input = std::find_if(words.begin(), words.end(), isInput);
+    return input == words.end() || fs::exists(*input);
+  }
+  static void run(const Words& words) {
+    const Words quick = quickened(words);
+    const auto result =
+        test::runProgram(programs().at(quick[0]), Words(quick.begin() + 1, quick.end()));
+    EXPECT_EQ(result.exitCode, 0) << testing::PrintToString(quick) << "\n" << result.err;
+  }
+
+  test::TemporaryFolder folder_;
+  fs::path before_;
+};
+
+TEST_P(DocumentedCommands, run) {
+  const auto commands = commandsOf(test::readText(std::string(ESVR_SOURCE_DIR "/") + GetParam()));
+  std::size_t ran = 0;
+  for (const Words& words : commands)
+    if (canRun(words)) {
+      run(words);
+      ++ran;
+    } else {
+      EXPECT_TRUE(has(words, "smoke1.vdb") || has(words, "smoke1.esvr"))
+          << "no command makes the input of " << testing::PrintToString(words);
+    }
+  EXPECT_GE(ran, 3u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Documents, DocumentedCommands, testing::Values("README.md"),
+                         [](const auto&) { return std::string("readme"); });
+
+}  // namespace
+}  // namespace esvr

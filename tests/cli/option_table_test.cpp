@@ -1,0 +1,261 @@
+// Plan: every option of every program has a test that shows its effect. The table names it; the
+// test reads --help and fails where an option is not in the table, or no longer in --help, and where
+// the test that the table names is not there or does not use the option.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "cli/run_program.h"
+
+namespace esvr {
+namespace {
+
+using Table = std::map<std::string, std::string>;  // "Suite.test" by option
+
+struct Program {
+  const char* name;
+  const char* path;
+  const char* job;  ///< of esvr-compare
+  Table tests;
+};
+std::ostream& operator<<(std::ostream& out, const Program& program) { return out << program.name; }
+
+/// Options that all programs share.
+Table withCommon(Table tests) {
+  for (const char* option : {"--help", "--version"})
+    tests.try_emplace(option, "EveryProgram.helpAndVersionNeedNoFiles");
+  for (const char* option : {"--quiet", "--verbose"})
+    tests.try_emplace(option, "EveryProgram.saysNothingWhereQuietAndMoreWhereVerbose");
+  tests.try_emplace("--threads", "EveryProgram.takesANumberOfThreads");
+  return tests;
+}
+
+std::vector<Program> programs() {
+  return {{"vdb2esvr",
+           VDB2ESVR,
+           "",
+           {{"--box", "Vdb2EsvrOption.boxIsWherePsnrIsTaken"},
+            {"--count", "Vdb2EsvrOption.countIsTheNumberOfEllipsoids"},
+            {"--device", "Vdb2EsvrOption.devicesAreTakenAsNamed"},
+            {"--force", "Vdb2Esvr.keepsAnExistingFileUnlessForced"},
+            {"--grid", "Vdb2Esvr.fitsTheGridsThatAreNamedOnly"},
+            {"--help", "Vdb2Esvr.listsTheKeysOfThePapersMethod"},
+            {"--hits", "Vdb2Esvr.reportsWhatThePapersMethodUsed"},
+            {"--iterations", "Vdb2EsvrOption.iterationsEndTheFit"},
+            {"--kappa", "Vdb2EsvrOption.kappaIsThatOfTheKernel"},
+            {"--lossless", "Vdb2Esvr.losslessGivesBackEveryBit"},
+            {"--max-error", "Vdb2Esvr.keepsEveryVoxelWithinTheBound"},
+            {"--max-memory", "Vdb2Esvr.refusesWhatTakesMoreMemoryThanAllowed"},
+            {"--max-vram", "Vdb2EsvrOption.maxVramBoundsTheDevicesMemoryOnGpu"},
+            {"--nonfinite", "Vdb2Esvr.takesNonFiniteVoxelsAsZeroWhereAskedAndSaysHowMany"},
+            {"--on-cancel", "Interrupted.writesNothingWhereAskedTo"},
+            {"--paper", "Vdb2Esvr.reportsWhatThePapersMethodUsed"},
+            {"--preset", "Vdb2EsvrOption.presetsTakeMoreAndMoreIterations"},
+            {"--psnr", "Vdb2EsvrOption.psnrIsReached"},
+            {"--ratio", "Vdb2EsvrOption.ratioBoundsTheFile"},
+            {"--report", "Vdb2Esvr.reportsWhatTheFileHolds"},
+            {"--seconds", "Vdb2EsvrOption.secondsEndTheFit"},
+            {"--seed", "Vdb2EsvrOption.seedsGiveOtherFiles"},
+            {"--size", "Vdb2Esvr.keepsToTheSizeAskedFor"},
+            {"--storage", "Vdb2EsvrOption.storageIsCompactOrFloat32"},
+            {"--storage-loss", "Vdb2EsvrOption.storageLossBuysBytes"},
+            {"--threads", "Vdb2Esvr.givesTheSameBytesInEveryRunOnAnyNumberOfThreads"},
+            {"--topology", "Vdb2Esvr.storesTheMaskWhereAsked"},
+            {"--voxels-only", "Vdb2Esvr.triesNoEllipsoidsForABoundWhereTold"}}},
+          {"esvr2vdb",
+           ESVR2VDB,
+           "",
+           {{"--bbox", "Esvr2Vdb.writesAPartOfTheVoxelsWithoutReadingTheRest"},
+            {"--box", "Esvr2VdbOption.boxIsWherePsnrIsTaken"},
+            {"--check", "Esvr2Vdb.checksAFile"},
+            {"--force", "Esvr2Vdb.keepsAnExistingFileUnlessForced"},
+            {"--grid", "Esvr2Vdb.writesTheGridsThatAreNamedOnly"},
+            {"--half", "Esvr2Vdb.savesAsHalfWhereAsked"},
+            {"--list", "Esvr2Vdb.listsGridsAndSections"},
+            {"--lod", "Esvr2Vdb.writesTheHeaviestEllipsoidsOnly"},
+            {"--max-ellipsoids", "Esvr2Vdb.writesTheHeaviestEllipsoidsOnly"},
+            {"--max-memory", "Esvr2Vdb.refusesWhatNeedsMoreMemoryThanAllowed"},
+            {"--no-tiles", "Esvr2VdbOption.noTilesWritesLeaves"},
+            {"--reference", "Esvr2Vdb.printsTheErrorAgainstAReference"},
+            {"--threshold", "Esvr2Vdb.hasFewerActiveVoxelsAtAHigherThreshold"}}},
+          {"render",
+           ESVR_RENDER,
+           "",
+           {{"--background", "EsvrRender.IsTransparentAroundTheVolumeUnlessABackgroundIsGiven"},
+            {"--bench", "EsvrRender.MeasuresWithoutKeepingAPicture"},
+            {"--between", "EsvrRender.TheSumIsShownBetweenVoxelsWhereAskedFor"},
+            {"--bins", "EsvrRender.PartsOfTheDepthAndMemoryChangeNothingOnGpu"},
+            {"--bits", "EsvrRender.APngMayHave16BitsAChannel"},
+            {"--camera", "EsvrRender.ACameraFileIsReplacedByOptions"},
+            {"--center", "EsvrRender.AGivenCameraIsTaken"},
+            {"--clip", "EsvrRender.ModesAndBoxesChangeThePicture"},
+            {"--colors", "EsvrRender.AnExrHasTheSamePictureInLinearLight"},
+            {"--depth", "EsvrRender.DistancesAreWrittenWhereLightStops"},
+            {"--device", "EsvrRender.PartsOfTheDepthAndMemoryChangeNothingOnGpu"},
+            {"--eye", "EsvrRender.AGivenCameraIsTaken"},
+            {"--force", "EsvrRender.KeepsAPictureThatIsThere"},
+            {"--fov", "EsvrRender.ACameraFileIsReplacedByOptions"},
+            {"--frames", "EsvrRender.SomeFramesOfATurntableAreThoseOfTheWhole"},
+            {"--grid", "EsvrRender.TheGridThatIsNamedIsDrawn"},
+            {"--height", "EsvrRender.ACameraFileIsReplacedByOptions"},
+            {"--help", "EsvrRender.HelpNamesEveryBuiltInFunction"},
+            {"--max-memory", "EsvrRender.PicturesBeyondTheMemoryAllowedAreRefused"},
+            {"--max-vram", "EsvrRender.PartsOfTheDepthAndMemoryChangeNothingOnGpu"},
+            {"--method", "EsvrRender.BricksAreTheVoxelsOfTheSum"},
+            {"--min-transmittance", "EsvrRender.TheSamplingOfRaysChangesThePicture"},
+            {"--mode", "EsvrRender.ModesAndBoxesChangeThePicture"},
+            {"--opacity", "EsvrRender.ASavedTransferFunctionDrawsTheSame"},
+            {"--opacity-length", "EsvrRender.TheSamplingOfRaysChangesThePicture"},
+            {"--orthographic", "EsvrRender.TheMiddleOfTheVolumeIsInTheMiddleOfThePicture"},
+            {"--preset", "EsvrRender.APresetAndARangeChangeThePicture"},
+            {"--range", "EsvrRender.APresetAndARangeChangeThePicture"},
+            {"--ref", "EsvrRender.ComparesWithAReference"},
+            {"--report", "EsvrRender.ComparesWithAReference"},
+            {"--resolution", "EsvrRender.MeasuresWithoutKeepingAPicture"},
+            {"--sheet", "EsvrRender.ComparesWithAReference"},
+            {"--slice", "EsvrRender.ModesAndBoxesChangeThePicture"},
+            {"--step", "EsvrRender.TheSamplingOfRaysChangesThePicture"},
+            {"--tf", "EsvrRender.APresetAndARangeChangeThePicture"},
+            {"--tf-save", "EsvrRender.ASavedTransferFunctionDrawsTheSame"},
+            {"--threads", "EsvrRender.TheNumberOfThreadsChangesNothing"},
+            {"--turntable", "EsvrRender.ATurntableWritesAPictureForEveryAngle"},
+            {"--up", "EsvrRender.AGivenCameraIsTaken"},
+            {"--values", "EsvrRender.ValuesOfFewerBitsChangeThePictureALittle"}}},
+          {"check",
+           ESVR_COMPARE,
+           "check",
+           {{"--baseline", "CompareCheck.holdsARunAgainstItsBaseline"},
+            {"--box", "CompareOption.checkTakesTheGridTheBoxAndThePeak"},
+            {"--fail-on", "CompareCheck.tellsDifferencesBesidesTheVoxels"},
+            {"--force", "CompareOption.reportsAreReplacedWhereForced"},
+            {"--grid", "CompareOption.checkTakesTheGridTheBoxAndThePeak"},
+            {"--max-bytes", "CompareCheck.boundsTheFilesBytes"},
+            {"--max-error", "CompareLimit.passesOrFailsWithTheFigure"},
+            {"--max-mass-error", "CompareLimit.passesOrFailsWithTheFigure"},
+            {"--max-p999-error", "CompareLimit.passesOrFailsWithTheFigure"},
+            {"--min-iou", "CompareLimit.passesOrFailsWithTheFigure"},
+            {"--min-psnr", "CompareLimit.passesOrFailsWithTheFigure"},
+            {"--min-psnr-active", "CompareLimit.passesOrFailsWithTheFigure"},
+            {"--min-ssim", "CompareLimit.passesOrFailsWithTheFigure"},
+            {"--peak", "CompareOption.checkTakesTheGridTheBoxAndThePeak"},
+            {"--report", "CompareOption.reportsAreReplacedWhereForced"},
+            {"--ssim", "CompareCheck.findsNoErrorInTheFileItself"},
+            {"--update", "CompareCheck.holdsARunAgainstItsBaseline"}}},
+          {"table",
+           ESVR_COMPARE,
+           "table",
+           {{"--box", "CompareOption.tableTakesTheGridTheBoxAndThePeak"},
+            {"--colors", "CompareTable.SlowComparesPictures"},
+            {"--csv", "CompareTable.writesReportsInEachForm"},
+            {"--device", "CompareTable.fitsEllipsoidsWhereAsked"},
+            {"--external", "CompareTable.takesExternalResults"},
+            {"--fit", "CompareTable.fitsEllipsoidsWhereAsked"},
+            {"--force", "CompareOption.tablesAreReplacedWhereForced"},
+            {"--grid", "CompareOption.tableTakesTheGridTheBoxAndThePeak"},
+            {"--html", "CompareTable.writesReportsInEachForm"},
+            {"--image-size", "CompareTable.SlowComparesPictures"},
+            {"--image-step", "CompareOption.tablesPicturesTakeStepAndTransferFunctions"},
+            {"--images", "CompareTable.SlowComparesPictures"},
+            {"--lpips", "CompareTable.takesLpipsFromAProgramOfTheUsers"},
+            {"--markdown", "CompareTable.writesReportsInEachForm"},
+            {"--max-dense", "CompareTable.leavesRowsThatCannotBeWithTheirReason"},
+            {"--peak", "CompareOption.tableTakesTheGridTheBoxAndThePeak"},
+            {"--report", "CompareTable.writesReportsInEachForm"},
+            {"--row", "CompareTable.takesLpipsFromAProgramOfTheUsers"},
+            {"--rows", "CompareTable.hasLosslessRowsWithoutError"},
+            {"--runs", "CompareTable.SlowKeepsTheRowsThatAreMadeWhenInterrupted"},
+            {"--size", "CompareTable.matchesACandidatesSizeAndShowsTheSearch"},
+            {"--tf", "CompareOption.tablesPicturesTakeStepAndTransferFunctions"}}},
+          {"curves",
+           ESVR_COMPARE,
+           "curves",
+           {{"--box", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"},
+            {"--device", "CompareCurves.SlowHasBaselinesAtEachSizeAndFramesASecond"},
+            {"--fit", "CompareCurves.SlowHasBaselinesAtEachSizeAndFramesASecond"},
+            {"--force", "CompareOption.curvesAreReplacedWhereForced"},
+            {"--fps", "CompareCurves.SlowHasBaselinesAtEachSizeAndFramesASecond"},
+            {"--grid", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"},
+            {"--max-dense", "CompareOption.maxDenseSkipsZfpInCurves"},
+            {"--no-baselines", "CompareCurves.hasACandidatesOwnCurveAndItsFile"},
+            {"--output", "CompareCurves.hasACandidatesOwnCurveAndItsFile"},
+            {"--peak", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"}}}};
+}
+
+/// Long and short names: "-g" of "--grid", or nothing.
+std::map<std::string, std::string> optionsOf(const Program& program) {
+  std::vector<std::string> arguments{"--help"};
+  if (*program.job) arguments.insert(arguments.begin(), program.job);
+  const std::string help = test::runProgram(program.path, arguments).out;
+  static const std::regex kOption(R"(\n  (?:(-\w) \[ )?(--[\w-]+))");
+  std::map<std::string, std::string> options;
+  for (std::sregex_iterator it(help.begin(), help.end(), kOption), end; it != end; ++it)
+    options[(*it)[2]] = (*it)[1];
+  return options;
+}
+
+const std::vector<std::string>& testSources() {
+  static const std::vector<std::string> kSources = [] {
+    std::vector<std::string> sources;
+    for (const auto& file : std::filesystem::directory_iterator(ESVR_SOURCE_DIR "/tests/cli"))
+      if (file.path().string().ends_with("_test.cpp") &&
+          file.path().filename() != "option_table_test.cpp")
+        sources.push_back(test::readText(file.path()));
+    return sources;
+  }();
+  return kSources;
+}
+
+/// The text of a test up to the next one, and that of its fixture.
+std::string sourceOf(const std::string& test) {
+  const std::string suite = test.substr(0, test.find('.')), name = test.substr(suite.size() + 1);
+  for (const std::string& source : testSources())
+    for (const char* macro : {"TEST_F(", "TEST_P("}) {
+      const std::size_t begin = source.find(macro + suite + ", " + name + ")");
+      if (begin == std::string::npos) continue;
+      const std::size_t end = source.find("\nTEST", begin), fixture = source.find("class " + suite);
+      std::string text = source.substr(begin, end - begin);
+      if (fixture != std::string::npos)
+        text += source.substr(fixture, source.find("\n};", fixture) - fixture);
+      return text;
+    }
+  return {};
+}
+
+/// Whether a test's source has the option as an argument: quoted, as in a list of arguments or in a
+/// table of options without dashes, or in a command line.
+bool uses(const std::string& source, const std::string& option, const std::string& shortName) {
+  for (const std::string& form : {'"' + option + '"', option + ' ', '"' + option.substr(2) + '"',
+                                  '"' + (shortName.empty() ? option : shortName) + '"'})
+    if (source.find(form) != std::string::npos) return true;
+  return false;
+}
+
+class OptionTable : public testing::TestWithParam<Program> {};
+
+TEST_P(OptionTable, namesATestOfEachOption) {
+  const auto options = optionsOf(GetParam());
+  const Table tests = withCommon(GetParam().tests);
+  EXPECT_GT(options.size(), 10u);
+  for (const auto& [option, shortName] : options) {
+    const auto found = tests.find(option);
+    if (found == tests.end()) {
+      ADD_FAILURE() << option << " has no test that shows its effect; name it in this table";
+      continue;
+    }
+    EXPECT_TRUE(uses(sourceOf(found->second), option, shortName))
+        << found->second << " is not there or does not use " << option;
+  }
+  for (const auto& [option, test] : tests)
+    EXPECT_TRUE(options.contains(option)) << option << " is in this table and not in --help";
+}
+
+INSTANTIATE_TEST_SUITE_P(Programs, OptionTable, testing::ValuesIn(programs()),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace esvr

@@ -1,0 +1,171 @@
+// Plan: docs/report.md names exactly the keys that reports have. Reports of different runs are laid
+// over each other, so that every key that a run can write is there; the tables of the document are
+// read, and each key of either side must be on the other.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include "cli/converters.h"
+#include "cli/vdb_inputs.h"
+
+namespace esvr {
+namespace {
+
+using Json = nlohmann::json;
+using Keys = std::set<std::string>;
+using Table = std::map<std::string, std::string>;  // meanings by key
+
+/// Backticked words of the document that are values or keys of another object.
+const Keys kNoKeys{"default", "learned", "mask", "null", "paper", "voxels"};
+
+/// Words in backticks that may be keys: options have dashes, and values capitals or spaces.
+Keys namedIn(const std::string& text) {
+  static const std::regex kWord("`([a-z0-9_]+)`");
+  Keys words;
+  for (std::sregex_iterator it(text.begin(), text.end(), kWord), end; it != end; ++it)
+    words.insert((*it)[1]);
+  return words;
+}
+
+Keys keysOf(const Json& object) {
+  Keys keys;
+  for (const auto& item : object.items()) keys.insert(item.key());
+  return keys;
+}
+
+Keys without(Keys keys, const Keys& others) {
+  for (const auto& key : others) keys.erase(key);
+  return keys;
+}
+
+/// Lays `report` over `all`: objects get the keys of both, lists become one element.
+void merge(Json& all, const Json& report) {
+  if (report.is_object()) {
+    if (!all.is_object()) all = Json::object();
+    for (const auto& item : report.items()) merge(all[item.key()], item.value());
+  } else if (report.is_array() && !report.empty() && report[0].is_object()) {
+    for (const auto& element : report) merge(all, element);
+  } else if (all.is_null()) {
+    all = report;
+  }
+}
+
+std::string from(const std::string& text, const std::string& start) {
+  const std::size_t at = text.find(start);
+  EXPECT_NE(at, std::string::npos) << "docs/report.md has no '" << start << "'";
+  return at == std::string::npos ? "" : text.substr(at);
+}
+
+std::string paragraphFrom(const std::string& text, const std::string& start) {
+  const std::string rest = from(text, start);
+  return rest.substr(0, rest.find("\n\n"));
+}
+
+/// The first table after `start`: the keys of its first column and the text of its last.
+Table tableAfter(const std::string& text, const std::string& start) {
+  Table table;
+  const std::string rest = from(from(text, start), "\n|");
+  std::istringstream lines(rest.substr(1));
+  for (std::string line; std::getline(lines, line) && line.starts_with("|");) {
+    const std::size_t first = line.find(" |"), last = line.rfind(" | ", line.size() - 3);
+    for (const auto& key : namedIn(line.substr(0, first))) table[key] = line.substr(last);
+  }
+  return table;
+}
+
+Keys keysOf(const Table& table) {
+  Keys keys;
+  for (const auto& [key, meaning] : table) keys.insert(key);
+  return keys;
+}
+
+/// An object whose keys a text names; where it names none, they are explained in words.
+void expectNamed(const Json& object, const std::string& text, const std::string& where) {
+  const Keys named = namedIn(text);
+  if (!object.is_object() || without(named, kNoKeys).empty()) return;
+  EXPECT_EQ(without(keysOf(object), named), Keys{}) << where << ": not documented";
+  EXPECT_EQ(without(without(named, kNoKeys), keysOf(object)), Keys{}) << where << ": not written";
+}
+
+/// An object that has a table, and the objects in it that have a row.
+/// \param others  those in it that have a table of their own
+void expectTable(const Json& object, const Table& table, const Keys& others,
+                 const std::string& where) {
+  EXPECT_EQ(keysOf(object), keysOf(table)) << where;
+  for (const auto& [key, meaning] : table)
+    if (!others.contains(key) && object.contains(key))
+      expectNamed(object[key], meaning, where + "." + key);
+}
+
+class ReportDoc : public testing::Test {
+ protected:
+  [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
+  /// Runs a program and lays its report over those before.
+  void add(const char* program, std::vector<std::string> arguments, int exitCode = 0) {
+    arguments.insert(arguments.end(), {"--report", at("r.json"), "--force"});
+    const auto run = test::runProgram(program, arguments);
+    ASSERT_EQ(run.exitCode, exitCode) << run.err;
+    merge(all_, Json::parse(test::readText(at("r.json"))));
+  }
+
+  test::TemporaryFolder folder_;
+  std::string document_ = test::readText(ESVR_SOURCE_DIR "/docs/report.md");
+  Json all_;
+};
+
+TEST_F(ReportDoc, namesTheKeysOfAConversion) {
+  test::writeMixedInput(at("in.vdb"), {{.voxels = test::softBall({})}});
+  test::writeInput(at("cloud.vdb"), {{.voxels = test::cloud(12)}});
+  const std::vector<std::string> quick{"--device", "cpu", "--hits", "--iterations", "60"};
+  const auto convert = [&](const char* input, std::vector<std::string> more) {
+    more.insert(more.begin(), {at(input), at("out.esvr")});
+    more.insert(more.end(), quick.begin(), quick.end());
+    add(VDB2ESVR, more);
+  };
+  convert("in.vdb", {"--count", "30"});
+  convert("cloud.vdb", {"--max-error", "5%"});
+  add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--paper", "epochs=28,points=60", "--count", "40",
+                 "--device", "cpu", "--hits"});
+
+  expectTable(all_, tableAfter(document_, "## The report of a conversion"),
+              {"error", "grids", "seconds"}, "report");
+  const Table grid = tableAfter(document_, "### Each grid");
+  expectTable(all_["grids"], grid, {"curve", "fit", "paper"}, "grid");
+  expectTable(all_["grids"]["fit"], tableAfter(document_, "The object `fit`:"), {}, "fit");
+  expectTable(all_["grids"]["paper"], tableAfter(document_, "The object `paper`:"), {}, "paper");
+  const std::string curve = from(paragraphFrom(document_, "The list `curve`"), "point: ");
+  expectNamed(all_["grids"]["curve"], curve.substr(0, curve.find(". ")), "curve");
+  const std::string seconds = tableAfter(document_, "## The report of a conversion")["seconds"];
+  expectNamed(all_["seconds"], grid.at("seconds") + seconds, "seconds");
+}
+
+TEST_F(ReportDoc, namesTheKeysOfAFailure) {
+  test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
+  add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--size", "99"}, 2);
+  const std::string text = paragraphFrom(document_, "A run that writes no file");
+  Keys keys = keysOf(all_);
+  for (const char* object : {"error", "input"})
+    for (const auto& key : keysOf(all_[object])) keys.insert(key);
+  EXPECT_EQ(keys, without(namedIn(text), {"usage", "device", "failure"}));
+}
+
+TEST_F(ReportDoc, namesTheKeysOfAPicture) {
+  test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
+  ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
+  add(ESVR_RENDER, {at("in.esvr"), at("p.png"), "--ref", at("in.vdb"), "--resolution", "16x16"});
+  add(ESVR_RENDER, {at("in.esvr"), "--bench", "--turntable", "2", "--ref", at("in.vdb"),
+                    "--resolution", "16x16", "--device", "cpu"});
+  const Keys timed{"drawn", "reference"};
+  expectTable(all_, tableAfter(document_, "## The report of a picture"), timed, "report");
+  const Table figures = tableAfter(document_, "The objects `drawn` and `reference`:");
+  for (const auto& object : timed) expectTable(all_[object], figures, {}, object);
+}
+
+}  // namespace
+}  // namespace esvr

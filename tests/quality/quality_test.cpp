@@ -1,0 +1,123 @@
+// Plan: a floor under the quality of conversions of real files. Short fits of seven of them are
+// checked by `esvr-compare check` against baselines in this folder: fog, clouds, a CT scan, a level
+// set, and a simulation's three grids. The tolerances are below a loss of 0.5 dB and 3 % more bytes,
+// and above what rounding on another processor changes. Two tests make such losses and must be told.
+//
+// Where a change is meant to move the figures, ESVR_UPDATE_QUALITY=1 stores those of this machine:
+//   ESVR_UPDATE_QUALITY=1 ctest --preset release -R RealFileQuality
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "cli/run_program.h"
+
+namespace esvr {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+constexpr double kPsnrTolerance = 0.35;    // dB
+constexpr double kBytesTolerance = 0.025;  // of the bytes
+
+struct RealFile {
+  const char* name;
+  const char* path;  ///< in ESVR_DATA_DIR
+  int count;         ///< of ellipsoids in each grid
+};
+std::ostream& operator<<(std::ostream& out, const RealFile& file) { return out << file.path; }
+
+bool isUpdating() { return std::getenv("ESVR_UPDATE_QUALITY") != nullptr; }
+
+std::string baselineOf(const RealFile& file) {
+  return std::string(ESVR_SOURCE_DIR "/tests/quality/") + file.name + ".json";
+}
+
+/// A baseline keeps the tolerances that it has; a new one gets those of this test.
+void setTolerances(const std::string& path) {
+  json baseline = json::parse(test::readText(path));
+  baseline["bytes"]["tolerance"] =
+      std::round(baseline["bytes"]["value"].get<double>() * kBytesTolerance);
+  for (auto& grid : baseline["grids"])
+    for (const char* figure : {"psnr_box", "psnr_active"})
+      grid[figure]["tolerance"] = kPsnrTolerance;
+  test::writeText(path, baseline.dump(2) + "\n");
+}
+
+class RealFileQuality : public testing::TestWithParam<RealFile> {
+ protected:
+  void SetUp() override {
+    if (std::string(ESVR_DATA_DIR).empty()) GTEST_SKIP() << "ESVR_DATA_DIR is not set";
+    if (!std::filesystem::exists(source())) GTEST_SKIP() << "no file " << source();
+  }
+  [[nodiscard]] std::string source() const {
+    return std::string(ESVR_DATA_DIR "/") + GetParam().path;
+  }
+  [[nodiscard]] std::string output() const { return folder_ / "fit.esvr"; }
+  void convert(double share) const {
+    const int count = int(GetParam().count * share);
+    const auto run = test::runProgram(
+        VDB2ESVR, {source(), output(), "--preset", "draft", "--count", std::to_string(count),
+                   "--iterations", "100", "--device", "cpu", "--quiet"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+  }
+  [[nodiscard]] test::ProgramRun check(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments{"check", source(), output(), "--baseline",
+                                       baselineOf(GetParam())};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return test::runProgram(ESVR_COMPARE, arguments);
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_P(RealFileQuality, HasNotFallen) {
+  convert(1.0);
+  if (isUpdating()) {
+    ASSERT_EQ(check({"--update"}).exitCode, 0);
+    setTolerances(baselineOf(GetParam()));
+  }
+  const auto run = check();
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Files, RealFileQuality,
+    testing::Values(RealFile{"smoke1", "smoke1.vdb", 1000},
+                    RealFile{"hydrogen_atom", "hydrogen_atom.vdb", 1000},
+                    RealFile{"wdas_cloud_sixteenth", "wdas_cloud_sixteenth.vdb", 1000},
+                    RealFile{"aneurism", "aneurism.vdb", 1000},
+                    RealFile{"dragon_with_xform", "dragon_with_xform.vdb", 1000},
+                    RealFile{"cube_levelset", "cube_levelset.vdb", 300},
+                    RealFile{"fluid_data_0041", "fire/fluid_data_0041.vdb", 400}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+using RealFileQualityFloor = RealFileQuality;
+
+// 7 % fewer ellipsoids cost 0.3 dB here, 12 % fewer half a decibel.
+TEST_P(RealFileQualityFloor, NoticesALossOfHalfADecibel) {
+  convert(0.88);
+  const auto run = check();
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("PSNR"));
+}
+
+// 4 % more ellipsoids take 2.4 % more bytes here, 6 % more some 4 %.
+TEST_P(RealFileQualityFloor, NoticesMoreBytes) {
+  convert(1.06);
+  const auto run = check();
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("bytes"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Dragon, RealFileQualityFloor,
+                         testing::Values(RealFile{"dragon_with_xform", "dragon_with_xform.vdb",
+                                                  1000}));
+
+}  // namespace
+}  // namespace esvr
