@@ -10,7 +10,7 @@
 namespace esvr::vdb2esvr {
 
 /// On a terminal, one line on stderr that is redrawn, and erased when the bar goes out of scope.
-/// Where stderr is no terminal: a line every few seconds with --verbose, nothing otherwise.
+/// If stderr is not a terminal, a line is written every few seconds with --verbose, else nothing.
 class ProgressBar {
  public:
   /// \param grid       begins the line

@@ -22,7 +22,7 @@ struct RunRecord {
   double secondsWrite = 0.0, secondsTotal = 0.0;
 };
 
-/// What went in and came out: bytes of the converted grids in the input, and of the output.
+/// The bytes of the converted grids in the input, and the bytes of the output.
 struct Ratio {
   std::uint64_t bytesIn = 0, bytesOut = 0;
   std::size_t grids = 0, gridsOfInput = 0;
