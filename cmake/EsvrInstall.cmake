@@ -26,6 +26,7 @@ if(ESVR_WITH_CUDA)
   set(ESVR_CUDART libesvr_cudart_static.a) # of its own name: there may be another beside it
   if(ESVR_STATIC)
     get_target_property(cudart CUDA::cudart_static IMPORTED_LOCATION)
+    file(REAL_PATH ${cudart} cudart) # a link would be installed as a link
     install(FILES ${cudart} DESTINATION ${CMAKE_INSTALL_LIBDIR} RENAME ${ESVR_CUDART}
             COMPONENT library)
   endif()

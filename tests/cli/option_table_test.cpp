@@ -255,7 +255,7 @@ TEST_P(OptionTable, namesATestOfEachOption) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Programs, OptionTable, testing::ValuesIn(programs()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace
 }  // namespace esvr

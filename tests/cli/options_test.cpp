@@ -89,7 +89,7 @@ TEST_F(Vdb2EsvrOption, psnrIsReached) {
 
 TEST_F(Vdb2EsvrOption, secondsEndTheFit) {
   const Json grid =
-      convert({"--count", "20", "--iterations", "100000000", "--seconds", "0.2"})["grids"][0];
+      convert({"--count", "20", "--iterations", "10000000", "--seconds", "0.2"})["grids"][0];
   EXPECT_EQ(grid["fit"]["end"], "time up");
 }
 
@@ -391,7 +391,7 @@ INSTANTIATE_TEST_SUITE_P(
             "curves",
             ESVR_COMPARE,
             {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o", "DIR/c", "--force"}}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace
 }  // namespace esvr

@@ -360,10 +360,11 @@ TEST_F(Vdb2Esvr, reportsWhatThePapersMethodUsed) {
 /// Converts `voxels` within 5 % of their range and checks the bound and what the report says of it.
 /// \return whether ellipsoids and a residual were stored
 bool storesEllipsoidsWithinABound(const std::string& in, const std::string& out,
-                                  const std::vector<test::InputVoxel>& voxels) {
+                                  const std::vector<test::InputVoxel>& voxels,
+                                  const std::string& iterations) {
   test::writeInput(in, {{.voxels = voxels}});
   const auto run = vdb2esvr(
-      {in, out, "--max-error", "5%", "--kappa", "0", "--iterations", "200", "--report", "-"});
+      {in, out, "--max-error", "5%", "--kappa", "-6", "--iterations", iterations, "--report", "-"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
   const Json bound = Json::parse(run.out)["grids"][0]["bound"];
   const StoredGrid grid = readEsvr(out).grids[0];
@@ -379,8 +380,9 @@ bool storesEllipsoidsWithinABound(const std::string& in, const std::string& out,
   return grid.residual.has_value();
 }
 
-TEST_F(Vdb2Esvr, takesEllipsoidsForABoundWhereTheyAreSmaller) {
-  EXPECT_TRUE(storesEllipsoidsWithinABound(in(), out(), test::cloud(20)));
+/// Voxels of the cloud take some 2200 bytes and ellipsoids 650, after a whole fit.
+TEST_F(Vdb2Esvr, SlowTakesEllipsoidsForABoundWhereTheyAreSmaller) {
+  EXPECT_TRUE(storesEllipsoidsWithinABound(in(), out(), test::cloud(40), "1000"));
 }
 
 /// Every voxel of the noise needs a correction, whatever ellipsoids there are.
@@ -388,7 +390,7 @@ TEST_F(Vdb2Esvr, takesVoxelsForABoundWhereTheyAreSmaller) {
   test::Random random(17);
   std::vector<test::InputVoxel> noise = softBall({});
   for (auto& voxel : noise) voxel.value = float(random(0.1, 1.0));
-  EXPECT_FALSE(storesEllipsoidsWithinABound(in(), out(), noise));
+  EXPECT_FALSE(storesEllipsoidsWithinABound(in(), out(), noise, "100"));
 }
 
 TEST_F(Vdb2Esvr, triesNoEllipsoidsForABoundWhereTold) {

@@ -95,7 +95,7 @@ INSTANTIATE_TEST_SUITE_P(
                     RealFile{"dragon_with_xform", "dragon_with_xform.vdb", 1000},
                     RealFile{"cube_levelset", "cube_levelset.vdb", 300},
                     RealFile{"fluid_data_0041", "fire/fluid_data_0041.vdb", 400}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& tested) { return std::string(tested.param.name); });
 
 using RealFileQualityFloor = RealFileQuality;
 
