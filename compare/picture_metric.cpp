@@ -45,7 +45,7 @@ double lastNumber(const std::string& command, const std::string& text) {
   while (words >> word) last = word;
   const auto value = cli::parseNumber(last);
   if (!value)
-    throw RuntimeFailure("--lpips: " + command + " printed '" + last + "', which is no number");
+    throw RuntimeFailure("--lpips: " + command + " printed '" + last + "', which is not a number");
   return *value;
 }
 

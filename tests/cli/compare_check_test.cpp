@@ -63,6 +63,10 @@ class CompareCheck : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
+TEST_F(CompareCheck, refusesWhatTakesMoreMemoryThanAllowed) {
+  EXPECT_EQ(check("ref.vdb", {"--max-memory", "1KB"}).exitCode, 5);
+}
+
 TEST_F(CompareCheck, findsNoErrorInTheFileItself) {
   const auto report = reportOf("ref.vdb", {"--ssim"});
   ASSERT_EQ(report["grids"].size(), 2u);

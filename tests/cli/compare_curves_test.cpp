@@ -65,6 +65,12 @@ TEST_F(CompareCurves, hasTheCurveOfAFitAndTheFilesOfBoth) {
               testing::AllOf(HasSubstr("Error over run time"), HasSubstr("image/svg+xml")));
 }
 
+TEST_F(CompareCurves, refusesWhatTakesMoreMemoryThanAllowed) {
+  const auto run = curves(
+      {at("ref.vdb"), at("fit.esvr"), "--no-baselines", "--max-memory", "1KB", "-o", at("c")});
+  EXPECT_EQ(run.exitCode, 5) << run.err;
+}
+
 TEST_F(CompareCurves, SlowHasBaselinesAtEachSizeAndFramesASecond) {
   const auto run = curves({at("ref.vdb"), "--fit", "3KB", "--fit", "5KB", "--device", "cpu",
                            "--fps", "24", "-o", at("c")});

@@ -74,6 +74,11 @@ int rowsWithin(const json& report, const std::string& group, std::uint64_t bytes
   return rows;
 }
 
+TEST_F(CompareTable, refusesWhatTakesMoreMemoryThanAllowed) {
+  const auto run = table({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--max-memory", "1KB"});
+  EXPECT_EQ(run.exitCode, 5) << run.err;
+}
+
 TEST_F(CompareTable, hasLosslessRowsWithoutError) {
   const auto report = reportOf({"--rows", "lossless"});
   for (const char* name : {"OpenVDB float Blosc", "OpenVDB float Zip", "NanoVDB float raw",

@@ -138,6 +138,7 @@ std::vector<Program> programs() {
             {"--max-error", "CompareLimit.passesOrFailsWithTheFigure"},
             {"--max-mass-error", "CompareLimit.passesOrFailsWithTheFigure"},
             {"--max-p999-error", "CompareLimit.passesOrFailsWithTheFigure"},
+            {"--max-memory", "CompareCheck.refusesWhatTakesMoreMemoryThanAllowed"},
             {"--min-iou", "CompareLimit.passesOrFailsWithTheFigure"},
             {"--min-psnr", "CompareLimit.passesOrFailsWithTheFigure"},
             {"--min-psnr-active", "CompareLimit.passesOrFailsWithTheFigure"},
@@ -164,6 +165,7 @@ std::vector<Program> programs() {
             {"--lpips", "CompareTable.takesLpipsFromAProgramOfTheUsers"},
             {"--markdown", "CompareTable.writesReportsInEachForm"},
             {"--max-dense", "CompareTable.leavesRowsThatCannotBeWithTheirReason"},
+            {"--max-memory", "CompareTable.refusesWhatTakesMoreMemoryThanAllowed"},
             {"--peak", "CompareOption.tableTakesTheGridTheBoxAndThePeak"},
             {"--report", "CompareTable.writesReportsInEachForm"},
             {"--row", "CompareTable.takesLpipsFromAProgramOfTheUsers"},
@@ -181,8 +183,9 @@ std::vector<Program> programs() {
             {"--fps", "CompareCurves.SlowHasBaselinesAtEachSizeAndFramesASecond"},
             {"--grid", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"},
             {"--max-dense", "CompareOption.maxDenseSkipsZfpInCurves"},
-            {"--no-baselines", "CompareCurves.hasACandidatesOwnCurveAndItsFile"},
-            {"--output", "CompareCurves.hasACandidatesOwnCurveAndItsFile"},
+            {"--max-memory", "CompareCurves.refusesWhatTakesMoreMemoryThanAllowed"},
+            {"--no-baselines", "CompareCurves.hasTheCurveOfAFitAndTheFilesOfBoth"},
+            {"--output", "CompareCurves.hasTheCurveOfAFitAndTheFilesOfBoth"},
             {"--peak", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"}}}};
 }
 
