@@ -89,6 +89,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   result.end = end.end;
   result.curve = recorder.curve();
   result.deviceBytes = optimiser->deviceBytes();
+  result.deviceFull = optimiser->deviceFull();
   result.pairs = optimiser->pairCount();
   result.signedIntensities = anyNegative(result.field);
   result.secondsSeed = optimiser->secondsSeeding();

@@ -78,6 +78,8 @@ class Optimiser {
   [[nodiscard]] virtual std::uint64_t pairCount() const = 0;
   /// Largest GPU memory held so far; 0 on the CPU.
   [[nodiscard]] virtual std::size_t deviceBytes() const = 0;
+  /// \return true if GPU memory ran out, so that there are fewer ellipsoids than were asked for
+  [[nodiscard]] virtual bool deviceFull() const { return false; }
   /// Seconds spent so far on making seeds.
   [[nodiscard]] virtual double secondsSeeding() const = 0;
 };

@@ -3,6 +3,7 @@
 /// of docs/lab-notes.md.
 
 #include "fit/adam.h"
+#include "fit/listed_support.h"
 
 namespace esvr {
 
@@ -25,8 +26,7 @@ struct Tuning {
   double seedIntensity = 1.0;   ///< intensity of a seed, relative to the residual
   double seedWindow = 0.35;     ///< half width of a seed's window, relative to the seeds' spacing
   double intensityHeadroom = 1.5;  ///< limit of intensities, relative to the target's range
-  double listSlack = 0.5;          ///< voxels by which supports are widened in the pair lists
-  int rebuildEvery = 10;           ///< iterations between rebuilds of the pair lists
+  SlackRule slack;                 ///< decides when pair lists are rebuilt
   int warmUp = 20;                 ///< iterations in which step sizes rise to their full size
 };
 

@@ -59,6 +59,20 @@ TEST_P(OptimiserOn, ManyIterationsInACallAreThoseOfManyCalls) {
   EXPECT_EQ(inOne->measure().squaredSum, inMany->measure().squaredSum);
 }
 
+// Lists of pairs that serve for too long would leave out what supports have grown by: the loss that
+// a step sees must be that of lists just built, but for the share that may be missed.
+TEST_P(OptimiserOn, LargeStepsSeeTheWholeOfEveryEllipsoid) {
+  const auto going = make();
+  going->growTo(50);
+  for (int done = 0; done < 12; ++done) {
+    const auto stopped = make();
+    stopped->growTo(50);
+    stopped->iterate(std::vector<double>(std::size_t(done), 2.0));
+    const double exact = stopped->measure().squaredSum;
+    EXPECT_NEAR(going->iterate(std::array{2.0}), exact, 2e-3 * exact) << "after " << done;
+  }
+}
+
 TEST_P(OptimiserOn, RelocatesTheLeastUsefulAndKeepsTheCount) {
   const auto optimiser = make();
   optimiser->growTo(50);

@@ -2,13 +2,12 @@
 /// Ownership of device memory.
 
 #include <cstddef>
-#include <limits>
 #include <span>
 #include <stdexcept>
-#include <string>
 #include <type_traits>
 #include <utility>
 
+#include "core/cuda/allocate.h"
 #include "core/cuda/check.h"
 
 namespace esvr::cuda {
@@ -21,16 +20,9 @@ class DeviceBuffer {
 
  public:
   DeviceBuffer() = default;
-  /// Uninitialised. \throws DeviceError  out of memory (says how much was asked for)
+  /// Uninitialised. \throws DeviceMemoryError  out of memory (says how much was asked for)
   DeviceBuffer(std::size_t size, cudaStream_t stream) : size_(size), stream_(stream) {
-    if (size == 0) return;
-    const std::string doing = "allocating " + std::to_string(size) + " times " +
-                              std::to_string(sizeof(T)) + " bytes on the device";
-    if (size > std::numeric_limits<std::size_t>::max() / sizeof(T))
-      check(cudaErrorMemoryAllocation, doing);
-    void* memory = nullptr;
-    check(cudaMallocAsync(&memory, bytes(), stream), doing);
-    data_ = static_cast<T*>(memory);
+    if (size > 0) data_ = static_cast<T*>(allocate(size, sizeof(T), stream));
   }
   DeviceBuffer(std::span<const T> from, cudaStream_t stream) : DeviceBuffer(from.size(), stream) {
     upload(from);
@@ -41,7 +33,9 @@ class DeviceBuffer {
     return *this;
   }
   ~DeviceBuffer() {
-    if (data_ != nullptr) cudaFreeAsync(data_, stream_);
+    if (data_ == nullptr) return;
+    cudaFreeAsync(data_, stream_);
+    memoryAccount().give(bytes());
   }
 
   [[nodiscard]] T* data() noexcept { return data_; }

@@ -32,6 +32,8 @@ class GrowingBuffer {
     }
     return buffer_.data();
   }
+  /// Frees the memory. What was there is lost.
+  void release() { buffer_ = {}; }
   [[nodiscard]] T* data() { return buffer_.data(); }
   [[nodiscard]] const T* data() const { return buffer_.data(); }
   [[nodiscard]] std::size_t bytes() const { return buffer_.bytes(); }

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numeric>
 
@@ -11,15 +12,11 @@
 #include "field/gather.h"
 #include "fit/cpu/fit_errors.h"
 #include "fit/ellipsoid_math.h"
+#include "fit/motion_bound.h"
 #include "fit/parameter_gradient.h"
 #include "fit/scene.h"
 
 namespace esvr {
-namespace {
-
-constexpr int kListsStale = -1;
-
-}  // namespace
 
 CpuOptimiser::CpuOptimiser(const FitTarget& target, const OptimiserOptions& options,
                            const Tuning& tuning)
@@ -31,14 +28,29 @@ CpuOptimiser::CpuOptimiser(const FitTarget& target, const OptimiserOptions& opti
       limits_(limitsOf(target, tuning)) {}
 
 void CpuOptimiser::rebuildLists() {
-  pass_.rebuild(ellipsoids_, tuning_.listSlack);
-  iterationsSinceRebuild_ = 0;
+  const double radius = supportRadius(pass_.kernel());
+  listed_.resize(ellipsoids_.size());
+  tbb::parallel_for(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
+    listed_[i] = listedSupport(ellipsoids_[i], states_[i].steps, listed_[i], radius, tuning_.slack);
+  });
+  pass_.rebuild(listed_);
+  stale_ = false;
+}
+
+/// Whether a step has led an ellipsoid beyond what the lists hold.
+bool CpuOptimiser::anyOutgrown() const {
+  const double core = coreRadius(pass_.kernel(), tuning_.slack.missedShare);
+  std::atomic<bool> any = false;
+  tbb::parallel_for(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
+    if (!isHeld(listed_[i], ellipsoids_[i], core)) any = true;
+  });
+  return any;
 }
 
 void CpuOptimiser::refreshResiduals() {
   pass_.rebuild(ellipsoids_, kRoundingSlack);
   pass_.residuals(ellipsoids_, residuals_);
-  iterationsSinceRebuild_ = kListsStale;
+  stale_ = true;
 }
 
 std::vector<Ellipsoid> CpuOptimiser::newSeeds(std::size_t count) {
@@ -87,12 +99,11 @@ void CpuOptimiser::relocate(std::size_t count) {
 }
 
 double CpuOptimiser::iterateOnce(double factor) {
-  if (iterationsSinceRebuild_ < 0 || iterationsSinceRebuild_ >= tuning_.rebuildEvery)
-    rebuildLists();
-  ++iterationsSinceRebuild_;
+  if (stale_) rebuildLists();
   const double loss = pass_.gradients(ellipsoids_, gradients_);
   if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
   adamStep(ellipsoids_, states_, gradients_, tuning_.steps.scaled(factor), tuning_.adam, limits_);
+  stale_ = anyOutgrown();
   return loss;
 }
 
@@ -121,7 +132,7 @@ void CpuOptimiser::setKappa(float kappa) {
   unitVariance_ = kernelVariance(pass_.kernel());
   const double factor = std::sqrt(kernelWidth(pass_.kernel()).m / before);
   for (Ellipsoid& p : ellipsoids_) shrinkBy(p, factor);
-  iterationsSinceRebuild_ = kListsStale;
+  stale_ = true;
 }
 
 void CpuOptimiser::dropUnseen() {
@@ -135,7 +146,7 @@ void CpuOptimiser::dropUnseen() {
   ellipsoids_.resize(kept);
   states_.resize(kept);
   gradients_.resize(kept);
-  iterationsSinceRebuild_ = kListsStale;
+  stale_ = true;
 }
 
 }  // namespace esvr

@@ -38,6 +38,7 @@ class CpuOptimiser final : public Optimiser {
   [[nodiscard]] std::vector<Ellipsoid> newSeeds(std::size_t count);
   [[nodiscard]] std::vector<std::size_t> leastUseful(std::size_t count) const;
   void rebuildLists();
+  [[nodiscard]] bool anyOutgrown() const;
   void refreshResiduals();
   double iterateOnce(double factor);
 
@@ -52,8 +53,9 @@ class CpuOptimiser final : public Optimiser {
   std::vector<EllipsoidGradient> gradients_;
   std::vector<float> residuals_;
   double secondsSeeding_ = 0.0;
-  std::uint64_t samplings_ = 0;      ///< number of samplings, each with its own random numbers
-  int iterationsSinceRebuild_ = -1;  ///< -1: the lists are outdated
+  std::uint64_t samplings_ = 0;  ///< number of samplings, each with its own random numbers
+  std::vector<ListedSupport> listed_;  ///< the supports that the lists of the iterations hold
+  bool stale_ = true;  ///< true if those lists are outdated
 };
 
 }  // namespace esvr

@@ -13,10 +13,12 @@
 
 #include "field/brick_kernels.h"
 #include "field/brick_pairs.h"
+#include "field/gather.h"
 #include "fit/adam.h"
 #include "fit/cpu/pair_tapes.h"
 #include "fit/ellipsoid.h"
 #include "fit/frame.h"
+#include "fit/listed_support.h"
 #include "fit/parameter_gradient.h"
 #include "fit/target.h"
 
@@ -39,15 +41,19 @@ class PairPass {
 
   /// Rebuilds the lists with supports that are widened by `slack` voxels.
   void rebuild(std::span<const Ellipsoid> ellipsoids, double slack) {
-    std::vector<Support> reach(ellipsoids.size());
+    supports_.resize(ellipsoids.size());
     forEachEllipsoid(ellipsoids.size(), [&](std::size_t i) {
-      reach[i] = makeSupport(ellipsoids[i].center, ellipsoids[i].L, kernels_.radius(i), slack);
+      supports_[i] = makeSupport(ellipsoids[i].center, ellipsoids[i].L, kernels_.radius(i), slack);
     });
-    const auto supportOf = [&](std::size_t i) -> const Support& { return reach[i]; };
-    index_ = BrickIndex(target_.bricks);
-    if (!target_.narrowBand) appendReached(ellipsoids.size(), supportOf);
-    pairs_ = pairsWithin(index_, ellipsoids.size(), supportOf);
-    moments_.resize(pairs_.pairCount());
+    listSupports();
+  }
+  /// Builds the lists anew, of supports as they are to be listed.
+  void rebuild(std::span<const ListedSupport> listed) {
+    supports_.resize(listed.size());
+    forEachEllipsoid(listed.size(), [&](std::size_t i) {
+      supports_[i] = makeSupport(listed[i].center, listed[i].L, listed[i].reach, kRoundingSlack);
+    });
+    listSupports();
   }
 
   /// Writes r = V - target for every brick: the target's bricks first, then other bricks that
@@ -163,18 +169,25 @@ class PairPass {
   tbb::enumerable_thread_specific<PairTapes> tapes_;
 
  private:
+  void listSupports() {
+    const auto supportOf = [&](std::size_t i) -> const Support& { return supports_[i]; };
+    index_ = BrickIndex(target_.bricks);
+    if (!target_.narrowBand) appendReached(supports_.size(), supportOf);
+    pairs_ = pairsWithin(index_, supports_.size(), supportOf);
+    moments_.resize(pairs_.pairCount());
+  }
+
   template <class SupportOf>
   void appendReached(std::size_t ellipsoids, const SupportOf& supportOf) {
-    auto reached = missingBricks(index_, ellipsoids, supportOf);
-    if (target_.within)
-      std::erase_if(reached, [&](Coord brick) { return !target_.within->contains(brick); });
-    index_.append(reached);
+    const Box within = target_.within.value_or(bricksOf(Box::whole()));
+    index_.append(missingBricks(index_, ellipsoids, supportOf, within));
   }
 
   const FitTarget& target_;
   Kernels kernels_;
   BrickIndex index_;
   BrickPairs pairs_;
+  std::vector<Support> supports_;  ///< as last listed
   std::vector<LineForm> forms_;
   std::vector<Coord> frames_;  ///< origin of each form's center, near it for float32 precision
   std::vector<PairMoments> moments_;

@@ -1,5 +1,6 @@
 #include "core/cuda/check.h"
 #include "fit/cuda/brick_pass.cuh"
+#include "fit/cuda/halt.h"
 #include "fit/cuda/threads_per_brick.h"
 
 namespace esvr::cuda {
@@ -12,7 +13,7 @@ template <Pass kPass, class Sum, int kThreads>
 __global__ void __launch_bounds__(kThreads) brickPass(const BrickPassArguments a) {
   __shared__ Sum sums[kPaddedVoxels];
   const BlockBrick brick = blockBrick(a.scene);
-  if (!isFor<Sum>(brick.entries)) return;
+  if (isHalted(a.halted) || !isFor<Sum>(brick.entries)) return;
   const SharedKernel kernels{a.kernel};
   sumBrick<Sum, kThreads>(a.scene, kernels, a.target, {a.brickLoss, a.residual}, brick, sums);
   if constexpr (kPass == Pass::kResiduals) return;

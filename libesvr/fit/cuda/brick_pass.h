@@ -22,6 +22,7 @@ struct BrickPassArguments {
   double* brickLoss;  ///< out: a brick's sum of r^2
   float* moments;     ///< out: kMoments for each pair; not written for residuals alone
   float* residual;    ///< out: kBrickVoxels for each brick; null where they are not wanted
+  const int* halted;  ///< isHalted()
 };
 
 /// Values of a pair in `moments`: PairMoments, in its order.

@@ -77,7 +77,7 @@ __device__ void insertReached(const ReachedInsertion& into, Coord brick) {
 __global__ void collectReached(SupportSource source, ReachedInsertion into) {
   const std::size_t i = warpNumber();
   if (i >= source.count) return;
-  visitReachedBricks(supportOf(source, i), into.within, [&](Coord brick, bool reached) {
+  visitReachedBricks(source.supportOf(i), into.within, [&](Coord brick, bool reached) {
     if (reached) insertReached(into, brick);
   });
 }

@@ -8,7 +8,6 @@
 #include "esvr/error.h"
 #include "field/gather.h"
 #include "fit/cuda/make_cuda_intensity_passes.h"
-#include "fit/cuda/memory_pool.h"
 #include "fit/cuda/step.h"
 #include "fit/import_field.h"
 
@@ -153,7 +152,6 @@ void CudaIntensityPasses::applyNormal(std::span<const double> direction, std::ve
 std::unique_ptr<IntensityPasses> makeCudaIntensityPasses(const IntensityTarget& target,
                                                          const Device& device) {
   cuda::useDevice(device);
-  cuda::keepFreedMemory();
   return std::make_unique<cuda::CudaIntensityPasses>(target);
 }
 

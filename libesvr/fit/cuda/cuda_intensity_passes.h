@@ -2,6 +2,7 @@
 /// IntensityPasses on a GPU. Phi is worked out in each pass: that takes less time there than to
 /// read it.
 
+#include "core/cuda/memory_pool.h"
 #include "core/cuda/stream.h"
 #include "fit/cuda/brick_table.h"
 #include "fit/cuda/intensity_pass.h"
@@ -31,6 +32,7 @@ class CudaIntensityPasses final : public IntensityPasses {
   bool restricted_;
   KernelConstants<float> kernel_{};
   std::size_t count_ = 0;  ///< of ellipsoids
+  KeepFreedMemory keep_;
   Stream stream_;
   BrickTable bricks_;
   PairLists lists_;

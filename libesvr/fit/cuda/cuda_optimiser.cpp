@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/add_seconds.h"
 #include "core/cuda/copy.h"
@@ -10,20 +11,30 @@
 #include "esvr/error.h"
 #include "field/gather.h"
 #include "fit/cpu/seed.h"
+#include "fit/cuda/least_useful.h"
 #include "fit/cuda/make_cuda_optimiser.h"
 #include "fit/cuda/memory_plan.h"
-#include "fit/cuda/memory_pool.h"
 #include "fit/cuda/place_seeds.h"
+#include "fit/motion_bound.h"
 #include "fit/scene.h"
 
 namespace esvr {
 namespace cuda {
+namespace {
+
+std::optional<LimitMemory> limitOf(const OptimiserOptions& options) {
+  if (!options.maxDeviceBytes) return std::nullopt;
+  return std::optional<LimitMemory>(std::in_place, *options.maxDeviceBytes);
+}
+
+}  // namespace
 
 CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& options,
                              const Tuning& tuning)
     : target_(target),
       options_(options),
       tuning_(tuning),
+      limit_(limitOf(options)),
       bricks_(target.bricks, stream_.get()),
       lists_(stream_.get()),
       targetValues_(target.values, stream_.get()),
@@ -32,20 +43,19 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       adam_(stream_.get()),
       forms_(stream_.get()),
       usefulness_(stream_.get()),
+      listed_(stream_.get()),
       moments_(stream_.get()),
       residual_(stream_.get()),
       brickLoss_(stream_.get()),
       chunkSums_(stream_.get()),
-      loss_(stream_.get()),
       slope_(stream_.get()),
-      diverged_(1, stream_.get()),
+      status_(1, stream_.get()),
       sampling_(stream_.get()),
       ranking_(stream_.get()),
       errorSums_(stream_.get()) {
   setKernel();
-  loss_.reserve(1);
   slope_.reserve(1);
-  diverged_.setZero();
+  status_.setZero();
 }
 
 void CudaOptimiser::setKernel() {
@@ -68,45 +78,81 @@ BrickPassArguments CudaOptimiser::passArguments() {
                      .highest = float(target_.highest)},
           .brickLoss = brickLoss_.data(),
           .moments = moments_.data(),
-          .residual = nullptr};
+          .residual = nullptr,
+          .halted = nullptr};
 }
 
-StepArguments CudaOptimiser::stepArguments(double factor) {
+MomentSums CudaOptimiser::momentSums() {
+  return {.lists = lists_.view(),
+          .chunkCount = std::uint32_t(lists_.chunkCount()),
+          .moments = moments_.data(),
+          .chunkSums = chunkSums_.data(),
+          .halted = nullptr};
+}
+
+/// \param n  steps that were started since the status was looked at
+StepArguments CudaOptimiser::stepArguments(double factor, std::size_t n) {
+  StepStatus* const status = status_.data();
   return {.ellipsoidCount = std::uint32_t(count_),
-          .sums = {.lists = lists_.view(),
-                   .chunkCount = std::uint32_t(lists_.chunkCount()),
-                   .moments = moments_.data(),
-                   .chunkSums = chunkSums_.data()},
+          .sums = momentSums(),
           .ellipsoids = ellipsoids_.data(),
           .states = adam_.data(),
           .forms = forms_.data(),
           .usefulness = usefulness_.data(),
-          .diverged = diverged_.data(),
+          .diverged = &status->diverged,
           .radius = radius_,
           .edge = {kernel_.slope, kernelWidth(kernel_).logMByKappa},
           .factor = factor,
           .sizes = tuning_.steps,
           .adam = tuning_.adam,
-          .limits = limitsOf(target_, tuning_)};
+          .limits = limitsOf(target_, tuning_),
+          .listed = listed_.data(),
+          .core = coreRadius(kernel_, tuning_.slack.missedShare),
+          .halted = &status->halted[n],
+          .halts = &status->halted[n + 1]};
 }
 
-void CudaOptimiser::rebuildLists(double slack) {
-  const SupportSource supports{ellipsoids_.data(), count_, radius_, slack};
+void CudaOptimiser::writeForms() {
+  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+}
+
+void CudaOptimiser::buildLists(const SupportSource& supports) {
   if (!target_.narrowBand) bricks_.findReached(supports);
   lists_.rebuild(supports, bricks_);
-  threads_.listsChanged();
   moments_.reserve(lists_.pairCount() * kMoments);
   chunkSums_.reserve(lists_.chunkCount() * kMoments);
   brickLoss_.reserve(bricks_.size());
-  iterationsSinceRebuild_ = 0;
+}
+
+/// Lists for the steps that follow. None of them is halted yet.
+void CudaOptimiser::rebuildLists() {
+  launchListing({.count = std::uint32_t(count_),
+                 .ellipsoids = ellipsoids_.data(),
+                 .states = adam_.data(),
+                 .listed = listed_.data(),
+                 .radius = radius_,
+                 .rule = tuning_.slack},
+                stream_.get());
+  buildLists({.ellipsoids = nullptr,
+              .count = count_,
+              .radius = radius_,
+              .slack = kRoundingSlack,
+              .listed = listed_.data()});
+  status_.setZero();
+  threads_.listsChanged(served_);
+  served_ = 0;
+  stale_ = false;
 }
 
 void CudaOptimiser::refreshResiduals() {
-  rebuildLists(kRoundingSlack);
+  stale_ = true;
+  buildLists({.ellipsoids = ellipsoids_.data(),
+              .count = count_,
+              .radius = radius_,
+              .slack = kRoundingSlack});
   BrickPassArguments pass = passArguments();
   pass.residual = residual_.reserve(bricks_.size() * kBrickVoxels);
   launchResiduals(pass, stream_.get());
-  iterationsSinceRebuild_ = kListsStale;
 }
 
 void CudaOptimiser::reserve(std::size_t ellipsoids) {
@@ -115,13 +161,86 @@ void CudaOptimiser::reserve(std::size_t ellipsoids) {
   adam_.extend(ellipsoids, count_);
   forms_.extend(ellipsoids, count_);
   usefulness_.extend(ellipsoids, count_);
+  listed_.extend(ellipsoids, count_);
+}
+
+/// Gives back all memory whose contents can be made anew.
+void CudaOptimiser::releaseScratch() {
+  full_ = stale_ = true;
+  lists_ = PairLists(stream_.get());
+  sampling_ = VoxelSampling(stream_.get());
+  ranking_ = EllipsoidRanking(stream_.get());
+  errorSums_ = ErrorSums(stream_.get());
+  for (auto* buffer : {&moments_, &residual_}) buffer->release();
+  for (auto* buffer : {&brickLoss_, &chunkSums_}) buffer->release();
+  trimMemoryPool();
+}
+
+/// Keeps the ellipsoids in these places, which increase, with what is known of them, in no more
+/// memory than they need.
+void CudaOptimiser::keep(std::span<const std::size_t> places) {
+  const auto gather = [&]<class T>(GrowingBuffer<T>& buffer) {
+    std::vector<T> all(count_), kept;
+    downloadTo(std::span<T>(all), buffer.data(), stream_.get());
+    for (const std::size_t i : places) kept.push_back(all[i]);
+    buffer.release();
+    uploadTo(buffer.reserve(kept.size()), std::span<const T>(kept), stream_.get());
+  };
+  gather(ellipsoids_);
+  gather(adam_);
+  gather(usefulness_);
+  gather(listed_);
+  forms_.release();
+  forms_.reserve(places.size());
+  stepped_ = std::size_t(std::lower_bound(places.begin(), places.end(), stepped_) - places.begin());
+  count_ = places.size();
+  writeForms();
+  stale_ = true;
+}
+
+/// Gives up a tenth of the ellipsoids, those that are worth least; new ones first.
+void CudaOptimiser::dropLeastUseful() {
+  constexpr std::size_t kShare = 10;
+  const auto all = ellipsoids();
+  std::vector<Usefulness> usefulness(stepped_);
+  downloadTo(std::span(usefulness), usefulness_.data(), stream_.get());
+  std::vector<double> worth(count_, 0.0);
+  for (std::size_t i = 0; i < stepped_; ++i)
+    worth[i] =
+        removalError(all[i].intensity, double(usefulness[i].phi2), double(usefulness[i].rPhi));
+  keep(allButLowest(worth, count_ / kShare + 1));
+}
+
+/// Does work that allocates. Where memory is out, it is done again in what scratch has left.
+template <class Work>
+auto CudaOptimiser::withRoom(const Work& work) {
+  try {
+    return work();
+  } catch (const DeviceMemoryError&) {
+    releaseScratch();
+  }
+  return work();
+}
+
+/// The same, with ever fewer ellipsoids until it can be done.
+/// \throws DeviceMemoryError  it cannot be done with one
+template <class Work>
+auto CudaOptimiser::withFewer(const Work& work) {
+  for (;;) {
+    try {
+      return withRoom(work);
+    } catch (const DeviceMemoryError&) {
+      if (count_ < 2) throw;
+      dropLeastUseful();
+    }
+  }
 }
 
 std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t ellipsoids,
                                       const std::uint32_t* into) {
   refreshResiduals();
-  sumLoss();
-  const double loss = downloadValue(loss_.data(), stream_.get());
+  sumLoss(nullptr);
+  const double loss = downloadValue(&status_.data()->loss, stream_.get());
   const DeviceSampling drawn = sampling_.draw(
       residual_.data(), loss, bricks_.view().bricks,
       {count, bricks_.targetCount(), signsOf(target_), options_.seed ^ (++samplings_ << 32)});
@@ -141,51 +260,81 @@ std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t ellipsoids,
   return drawn.count;
 }
 
-void CudaOptimiser::growTo(std::size_t count) {
-  if (count <= count_) return;
-  const AddSeconds timer(secondsSeeding_);
-  requireMemory(target_, count, options_.maxDeviceBytes);
+void CudaOptimiser::grow(std::size_t count) {
   reserve(count);
   count_ += placeSeeds(count - count_, std::max(count - count_, count_), nullptr);
-  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+  writeForms();
+}
+
+void CudaOptimiser::growTo(std::size_t count) {
+  if (count <= count_ || full_) return;
+  const AddSeconds timer(secondsSeeding_);
+  if (count_ == 0) requireMemory(target_, count, options_.maxDeviceBytes);
+  const std::size_t affordable = affordableEllipsoids(target_, count, options_.maxDeviceBytes);
+  full_ = affordable < count;
+  if (affordable <= count_) return;
+  try {
+    withRoom([&] { grow(affordable); });
+  } catch (const DeviceMemoryError&) {
+    if (count_ == 0) throw;
+    releaseScratch();
+    std::vector<std::size_t> all(count_);
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    keep(all);  // without the room that growth has made
+  }
 }
 
 void CudaOptimiser::relocate(std::size_t count) {
   const AddSeconds timer(secondsSeeding_);
-  const auto chosen = ranking_.leastUseful(stepArguments(0.0), count, tuning_.graceSteps);
-  if (chosen.count == 0) return;
-  placeSeeds(chosen.count, count_, chosen.places);
-  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+  withFewer([&] {
+    const auto chosen = ranking_.leastUseful(stepArguments(0.0, 0), count, tuning_.graceSteps);
+    if (chosen.count == 0) return;
+    placeSeeds(chosen.count, count_, chosen.places);
+    writeForms();
+  });
 }
 
-void CudaOptimiser::takeGradients(std::optional<int> threads) {
-  if (threads) return launchGradients(passArguments(), *threads, stream_.get());
-  threads_.run(stream_.get(),
-               [&](int best) { launchGradients(passArguments(), best, stream_.get()); });
+void CudaOptimiser::sumLoss(const int* halted) {
+  launchLossSum({.brickLoss = brickLoss_.data(),
+                 .bricks = std::uint32_t(bricks_.size()),
+                 .sum = &status_.data()->loss,
+                 .halted = halted},
+                stream_.get());
 }
 
-void CudaOptimiser::sumLoss() {
-  launchLossSum(brickLoss_.data(), std::uint32_t(bricks_.size()), loss_.data(), stream_.get());
-}
-
-void CudaOptimiser::step(double factor) {
-  if (iterationsSinceRebuild_ < 0 || iterationsSinceRebuild_ >= tuning_.rebuildEvery)
-    rebuildLists(tuning_.listSlack);
-  ++iterationsSinceRebuild_;
-  takeGradients();
-  const StepArguments arguments = stepArguments(factor);
-  sumLoss();
+/// Starts a step. \param n  steps that were started since the status was looked at
+void CudaOptimiser::step(double factor, std::size_t n) {
+  StepArguments arguments = stepArguments(factor, n);
+  BrickPassArguments pass = passArguments();
+  pass.halted = arguments.sums.halted = arguments.halted;
+  threads_.run(stream_.get(), [&](int best) { launchGradients(pass, best, stream_.get()); });
+  sumLoss(arguments.halted);
   launchMomentSums(arguments.sums, stream_.get());
   launchStep(arguments, stream_.get());
+}
+
+/// Waits for the steps that were started. \return how many of them were taken
+std::size_t CudaOptimiser::look(std::size_t started) {
+  const StepStatus status = downloadValue(status_.data(), stream_.get());
+  if (!std::isfinite(status.loss) || status.diverged != 0)
+    throw RuntimeFailure("the fit diverged: an ellipsoid is not finite");
+  const std::size_t taken = status.taken(started);
+  loss_ = status.loss;
   stepped_ = count_;
+  served_ += taken;
+  stale_ = !status.canGoOn(started);
+  ahead_ = std::min(stale_ ? served_ : 2 * ahead_, StepStatus::kMaxAhead);
+  return taken;
 }
 
 double CudaOptimiser::iterate(std::span<const double> factors) {
-  for (const double factor : factors) step(factor);
-  const double loss = downloadValue(loss_.data(), stream_.get());
-  if (!std::isfinite(loss) || downloadValue(diverged_.data(), stream_.get()) != 0)
-    throw RuntimeFailure("the fit diverged: an ellipsoid is not finite");
-  return loss;
+  while (!factors.empty()) {
+    if (stale_) withFewer([&] { rebuildLists(); });
+    const std::size_t started = std::min(factors.size(), ahead_);
+    for (std::size_t n = 0; n < started; ++n) step(factors[n], n);
+    factors = factors.subspan(look(started));
+  }
+  return loss_;
 }
 
 double CudaOptimiser::kappaSlope() {
@@ -199,18 +348,20 @@ void CudaOptimiser::setKappa(float kappa) {
   setKernel();
   launchShrink(ellipsoids_.data(), std::uint32_t(count_),
                std::sqrt(kernelWidth(kernel_).m / before), stream_.get());
-  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
-  iterationsSinceRebuild_ = kListsStale;
+  writeForms();
+  stale_ = true;
 }
 
 FitErrors CudaOptimiser::measure() {
-  refreshResiduals();
-  return errorSums_.sum({.residual = residual_.data(),
-                         .bricks = bricks_.view().bricks,
-                         .active = active_.data(),
-                         .brickCount = std::uint32_t(bricks_.size()),
-                         .targetCount = std::uint32_t(bricks_.targetCount()),
-                         .box = target_.box});
+  return withFewer([&] {
+    refreshResiduals();
+    return errorSums_.sum({.residual = residual_.data(),
+                           .bricks = bricks_.view().bricks,
+                           .active = active_.data(),
+                           .brickCount = std::uint32_t(bricks_.size()),
+                           .targetCount = std::uint32_t(bricks_.targetCount()),
+                           .box = target_.box});
+  });
 }
 
 std::size_t CudaOptimiser::deviceBytes() const { return peakMemory(); }
@@ -222,35 +373,38 @@ std::vector<Ellipsoid> CudaOptimiser::ellipsoids() const {
 }
 
 void CudaOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
-  count_ = 0;
+  count_ = stepped_ = 0;
   reserve(ellipsoids.size());
   count_ = ellipsoids.size();
   uploadTo(ellipsoids_.data(), ellipsoids, stream_.get());
   const std::vector<AdamState> fresh(count_);
   uploadTo(adam_.data(), std::span<const AdamState>(fresh), stream_.get());
-  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
-  iterationsSinceRebuild_ = kListsStale;
+  writeForms();
+  stale_ = true;
 }
 
 std::vector<EllipsoidGradient> CudaOptimiser::gradients(int threads) {
-  rebuildLists(tuning_.listSlack);
-  takeGradients(threads);
-  launchMomentSums(stepArguments(0.0).sums, stream_.get());
+  rebuildLists();
+  launchGradients(passArguments(), threads, stream_.get());
+  launchMomentSums(momentSums(), stream_.get());
   DeviceBuffer<EllipsoidGradient> out(count_, stream_.get());
-  launchReadGradients(stepArguments(0.0), out.data(), stream_.get());
+  launchReadGradients(stepArguments(0.0, 0), out.data(), stream_.get());
   std::vector<EllipsoidGradient> host(count_);
   out.download(host);
   return host;
 }
 
-void CudaOptimiser::dropUnseen() {
-  if (count_ == 0) return;
+std::vector<Ellipsoid> CudaOptimiser::seenEllipsoids() {
   const auto all = ellipsoids();
-  const auto seen = gradients();
-  std::vector<Ellipsoid> kept;
+  const auto gradient = gradients();
+  std::vector<Ellipsoid> seen;
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (seen[i].phi2 > 0.0 && all[i].intensity != 0.0) kept.push_back(all[i]);
-  setEllipsoids(kept);
+    if (gradient[i].phi2 > 0.0 && all[i].intensity != 0.0) seen.push_back(all[i]);
+  return seen;
+}
+
+void CudaOptimiser::dropUnseen() {
+  if (count_ > 0) setEllipsoids(withFewer([&] { return seenEllipsoids(); }));
 }
 
 }  // namespace cuda
@@ -259,7 +413,6 @@ std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget& target,
                                              const OptimiserOptions& options,
                                              const Tuning& tuning) {
   cuda::useDevice(options.device);
-  cuda::keepFreedMemory();
   cuda::forgetPeakMemory();
   cuda::requireMemory(target, 1, options.maxDeviceBytes);
   return std::make_unique<cuda::CudaOptimiser>(target, options, tuning);

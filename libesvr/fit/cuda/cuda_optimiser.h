@@ -2,6 +2,11 @@
 /// A fit on a GPU. What runs over bricks, pairs and ellipsoids is in the kernels beside this file;
 /// here is their order.
 
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/cuda/memory_pool.h"
 #include "core/cuda/stream.h"
 #include "fit/cuda/brick_pass.h"
 #include "fit/cuda/brick_table.h"
@@ -10,6 +15,7 @@
 #include "fit/cuda/rank_ellipsoids.h"
 #include "fit/cuda/sample_voxels.h"
 #include "fit/cuda/step.h"
+#include "fit/cuda/step_status.h"
 #include "fit/cuda/threads_per_brick.h"
 #include "fit/optimiser.h"
 
@@ -23,7 +29,7 @@ class CudaOptimiser final : public Optimiser {
   void growTo(std::size_t count) override;
   void relocate(std::size_t count) override;
   double iterate(std::span<const double> factors) override;
-  [[nodiscard]] std::uint32_t batchSize() const override { return kBatch; }
+  [[nodiscard]] std::uint32_t batchSize() const override { return StepStatus::kMaxAhead; }
   [[nodiscard]] FitErrors measure() override;
   void dropUnseen() override;
   [[nodiscard]] const Kernel& kernel() const override { return options_.kernel; }
@@ -34,6 +40,7 @@ class CudaOptimiser final : public Optimiser {
   [[nodiscard]] std::vector<Ellipsoid> ellipsoids() const override;
   [[nodiscard]] std::uint64_t pairCount() const override { return lists_.pairCount(); }
   [[nodiscard]] std::size_t deviceBytes() const override;
+  [[nodiscard]] bool deviceFull() const override { return full_; }
   [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
 
   /// Gradients of 1/2 sum r^2 where the ellipsoids are.
@@ -43,22 +50,30 @@ class CudaOptimiser final : public Optimiser {
   void setEllipsoids(std::span<const Ellipsoid> ellipsoids);
 
  private:
-  /// Iterations without hearing from the device; events come more often in all but long runs.
-  static constexpr std::uint32_t kBatch = 64;
-  static constexpr int kListsStale = -1;
-
   void setKernel();
-  void rebuildLists(double slack);
+  void writeForms();
+  void buildLists(const SupportSource& supports);
+  void rebuildLists();
   void refreshResiduals();
-  void step(double factor);
-  /// \param threads  of a brick; default: the best measured
-  void takeGradients(std::optional<int> threads = std::nullopt);
-  void sumLoss();
+  void step(double factor, std::size_t n);
+  [[nodiscard]] std::size_t look(std::size_t started);
+  void sumLoss(const int* halted);
   void reserve(std::size_t ellipsoids);
+  void grow(std::size_t count);
+  [[nodiscard]] std::vector<Ellipsoid> seenEllipsoids();
+
+  void releaseScratch();
+  void keep(std::span<const std::size_t> places);
+  void dropLeastUseful();
+  template <class Work>
+  auto withRoom(const Work& work);
+  template <class Work>
+  auto withFewer(const Work& work);
   /// \return how many seeds there are: `count`, fewer where errors are few
   std::size_t placeSeeds(std::size_t count, std::size_t ellipsoids, const std::uint32_t* into);
   [[nodiscard]] BrickPassArguments passArguments();
-  [[nodiscard]] StepArguments stepArguments(double factor);
+  [[nodiscard]] MomentSums momentSums();
+  [[nodiscard]] StepArguments stepArguments(double factor, std::size_t n);
 
   const FitTarget& target_;
   OptimiserOptions options_;
@@ -66,6 +81,8 @@ class CudaOptimiser final : public Optimiser {
   KernelConstants<double> kernel_;
   double radius_;
   double unitVariance_;
+  std::optional<LimitMemory> limit_;
+  KeepFreedMemory keepFreed_;
   Stream stream_;
   BrickTable bricks_;
   PairLists lists_;
@@ -76,17 +93,22 @@ class CudaOptimiser final : public Optimiser {
   GrowingBuffer<AdamState> adam_;
   GrowingBuffer<PairForm> forms_;
   GrowingBuffer<Usefulness> usefulness_;
+  GrowingBuffer<ListedSupport> listed_;
   GrowingBuffer<float> moments_, residual_;
-  GrowingBuffer<double> brickLoss_, chunkSums_, loss_, slope_;
+  GrowingBuffer<double> brickLoss_, chunkSums_, slope_;
   std::size_t stepped_ = 0;  ///< ellipsoids that took part in the last step
-  DeviceBuffer<int> diverged_;
+  DeviceBuffer<StepStatus> status_;
   VoxelSampling sampling_;
   EllipsoidRanking ranking_;
   ErrorSums errorSums_;
   std::size_t count_ = 0;
   double secondsSeeding_ = 0.0;
   std::uint64_t samplings_ = 0;  ///< events so far: each draws from its own random stream
-  int iterationsSinceRebuild_ = kListsStale;
+  double loss_ = 0.0;            ///< before the last step
+  bool stale_ = true;            ///< the lists
+  std::size_t served_ = 0;       ///< steps that the lists have served
+  std::size_t ahead_ = 8;        ///< steps to start before the next look
+  bool full_ = false;            ///< memory was out: there will be no more ellipsoids
 };
 
 }  // namespace esvr::cuda

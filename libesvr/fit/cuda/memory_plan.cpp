@@ -1,10 +1,11 @@
 #include "fit/cuda/memory_plan.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
 
-#include "core/cuda/check.h"
+#include "core/cuda/memory_pool.h"
 #include "esvr/error.h"
 #include "fit/cuda/brick_pass.h"
 #include "fit/cuda/brick_table_view.h"
@@ -13,7 +14,7 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr double kSpare = 1.25;         // GrowingBuffer's
+constexpr double kSpare = 1.25;         // of a GrowingBuffer
 constexpr double kReachedShare = 1.0;   // bricks beyond the target's, to those of the target
 constexpr double kReach = 3.2;          // width of a support over the distance of neighbours
 constexpr double kSlotsPerEntry = 4.0;  // of hash tables, at most
@@ -26,7 +27,8 @@ constexpr double kBytesPerReached = kSlotsPerEntry * sizeof(ReachedSlot);
 constexpr double kBytesPerPair =
     double(kMoments * sizeof(float)) + 8.0 * sizeof(std::uint32_t);  // lists, sorted and not
 constexpr double kBytesPerEllipsoid =
-    double(sizeof(Ellipsoid) + sizeof(AdamState) + sizeof(PairForm) + sizeof(Usefulness)) +
+    double(sizeof(Ellipsoid) + sizeof(AdamState) + sizeof(PairForm) + sizeof(Usefulness) +
+           sizeof(ListedSupport)) +
     double(kMoments * sizeof(double)) + 9.0 * sizeof(std::uint32_t) + sizeof(Coord) * 2;
 
 double pairsOf(const FitTarget& target, double ellipsoids) {
@@ -54,24 +56,6 @@ std::size_t maxEllipsoidsIn(const FitTarget& target, double bound) {
 
 std::string megabytes(double bytes) { return std::to_string(std::llround(bytes / 1e6)) + " MB"; }
 
-cudaMemPool_t currentPool() {
-  int device = 0;
-  check(cudaGetDevice(&device), "asking for the current device");
-  cudaMemPool_t pool{};
-  check(cudaDeviceGetDefaultMemPool(&pool, device), "asking for the memory pool");
-  return pool;
-}
-
-/// What the device has left and what its pool keeps for us.
-std::size_t freeBytes() {
-  std::size_t free = 0, total = 0;
-  check(cudaMemGetInfo(&free, &total), "asking for the free memory");
-  std::uint64_t kept = 0;
-  check(cudaMemPoolGetAttribute(currentPool(), cudaMemPoolAttrReservedMemCurrent, &kept),
-        "asking for the pool's memory");
-  return free + kept;
-}
-
 }  // namespace
 
 std::size_t predictedBytes(const FitTarget& target, std::size_t ellipsoids) {
@@ -81,7 +65,7 @@ std::size_t predictedBytes(const FitTarget& target, std::size_t ellipsoids) {
 void requireMemory(const FitTarget& target, std::size_t ellipsoids,
                    std::optional<std::size_t> maxBytes, double extra) {
   const double need = double(predictedBytes(target, ellipsoids)) + extra;
-  const auto have = double(maxBytes ? *maxBytes : freeBytes());
+  const auto have = double(maxBytes ? *maxBytes : availableMemory());
   if (need <= have) return;
   const std::size_t would = maxEllipsoidsIn(target, have - extra);
   throw DeviceError("fitting " + std::to_string(ellipsoids) + " ellipsoids to " +
@@ -92,21 +76,16 @@ void requireMemory(const FitTarget& target, std::size_t ellipsoids,
                                : "; the bricks alone do not fit: use --device cpu"));
 }
 
+std::size_t affordableEllipsoids(const FitTarget& target, std::size_t wanted,
+                                 std::optional<std::size_t> maxBytes) {
+  const auto have = double(maxBytes ? *maxBytes : availableMemory());
+  if (bytesOf(target, std::max(double(wanted), 1.0)) <= have) return wanted;
+  return std::min(wanted, maxEllipsoidsIn(target, have));
+}
+
 bool fitsInMemory(const FitTarget& target, std::optional<std::size_t> maxBytes) {
-  return 2.0 * double(predictedBytes(target, 1)) <= double(maxBytes ? *maxBytes : freeBytes());
-}
-
-std::size_t peakMemory() {
-  std::uint64_t peak = 0;
-  check(cudaMemPoolGetAttribute(currentPool(), cudaMemPoolAttrUsedMemHigh, &peak),
-        "asking for the peak memory");
-  return peak;
-}
-
-void forgetPeakMemory() {
-  std::uint64_t zero = 0;
-  check(cudaMemPoolSetAttribute(currentPool(), cudaMemPoolAttrUsedMemHigh, &zero),
-        "resetting the peak memory");
+  return 2.0 * double(predictedBytes(target, 1)) <=
+         double(maxBytes ? *maxBytes : availableMemory());
 }
 
 }  // namespace esvr::cuda

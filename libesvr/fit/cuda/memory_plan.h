@@ -18,12 +18,12 @@ namespace esvr::cuda {
 void requireMemory(const FitTarget& target, std::size_t ellipsoids,
                    std::optional<std::size_t> maxBytes, double extra = 0.0);
 
+/// \return the most ellipsoids, `wanted` at most, whose fit stays within the memory; 0 where the
+///         bricks alone do not
+[[nodiscard]] std::size_t affordableEllipsoids(const FitTarget& target, std::size_t wanted,
+                                               std::optional<std::size_t> maxBytes);
+
 /// Whether a fit of the target with few ellipsoids leaves half of the memory free.
 [[nodiscard]] bool fitsInMemory(const FitTarget& target, std::optional<std::size_t> maxBytes);
-
-/// The most bytes that the current device's pool has handed out since the last call of
-/// forgetPeakMemory().
-[[nodiscard]] std::size_t peakMemory();
-void forgetPeakMemory();
 
 }  // namespace esvr::cuda

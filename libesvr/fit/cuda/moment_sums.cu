@@ -2,6 +2,7 @@
 
 #include "core/cuda/launch.h"
 #include "core/cuda/thread_number.cuh"
+#include "fit/cuda/halt.h"
 
 namespace esvr::cuda {
 namespace {
@@ -13,7 +14,7 @@ static_assert(kLanes >= kMoments);
 __global__ void sumChunks(const MomentSums a) {
   const std::size_t thread = threadNumber();
   const std::size_t chunk = thread / kLanes, lane = thread % kLanes;
-  if (chunk >= a.chunkCount || lane >= kMoments) return;
+  if (chunk >= a.chunkCount || lane >= kMoments || isHalted(a.halted)) return;
   const std::uint32_t i = a.lists.chunkOwner[chunk];
   const std::uint32_t begin = a.lists.ellipsoidBegin[i] +
                               std::uint32_t(chunk - a.lists.chunkBegin[i]) * PairListsView::kChunk;

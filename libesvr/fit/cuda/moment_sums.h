@@ -11,8 +11,9 @@ namespace esvr::cuda {
 struct MomentSums {
   PairListsView lists;
   std::uint32_t chunkCount;
-  const float* moments;  ///< kMoments for each pair
-  double* chunkSums;     ///< out: kMoments for each chunk
+  const float* moments;         ///< kMoments for each pair
+  double* chunkSums;            ///< out: kMoments for each chunk
+  const int* halted = nullptr;  ///< isHalted()
 };
 
 /// moment_sums.cuh adds up an ellipsoid's chunks afterwards.

@@ -35,7 +35,7 @@ __global__ void countPairsKernel(SupportSource source, BrickTableView bricks, st
   const std::size_t i = warpNumber();
   if (i >= source.count) return;
   const std::uint32_t n =
-      visitPairs(supportOf(source, i), bricks, [](std::uint32_t, Coord, std::uint32_t) {});
+      visitPairs(source.supportOf(i), bricks, [](std::uint32_t, Coord, std::uint32_t) {});
   if (threadIdx.x % kWarp != 0) return;
   counts[i] = n;
   // Every ellipsoid has a chunk: one that reaches nothing still takes a step, of zero.
@@ -64,7 +64,7 @@ __global__ void listPairsKernel(SupportSource source, BrickTableView bricks,
                                 std::uint32_t* owner) {
   const std::size_t i = warpNumber();
   if (i >= source.count) return;
-  const Support support = supportOf(source, i);
+  const Support support = source.supportOf(i);
   visitPairs(support, bricks, [&](std::uint32_t number, Coord brick, std::uint32_t n) {
     const std::uint32_t at = begin[i] + n;
     key[at] = number << kLinesBits | linesRank(support, brick);

@@ -8,12 +8,6 @@
 
 namespace esvr::cuda {
 
-/// Ellipsoid i's.
-__device__ inline Support supportOf(const SupportSource& source, std::size_t i) {
-  const Ellipsoid& p = source.ellipsoids[i];
-  return makeSupport(p.center, p.L, source.radiusOf(i), source.slack);
-}
-
 /// Calls visit(brick, reached) on all lanes together until every brick of `within` that is near a
 /// support has been visited by one lane, lanes and rounds in increasing order of the bricks.
 template <class Visit>

@@ -3,7 +3,9 @@
 #include "core/cuda/check.h"
 #include "core/cuda/reduce.cuh"
 #include "fit/adam_math.h"
+#include "fit/cuda/halt.h"
 #include "fit/cuda/moment_sums.cuh"
+#include "fit/motion_bound.h"
 #include "fit/parameter_gradient.h"
 
 namespace esvr::cuda {
@@ -21,10 +23,10 @@ __device__ void sumByOneBlock(std::uint32_t count, const Value& value, double* o
   if (threadIdx.x == 0) *out = sum;
 }
 
-__global__ void __launch_bounds__(kSumBlock)
-    sumLoss(const double* brickLoss, std::uint32_t count, double* out) {
+__global__ void __launch_bounds__(kSumBlock) sumLoss(const LossSum a) {
+  if (isHalted(a.halted)) return;
   sumByOneBlock(
-      count, [&](std::uint32_t b) { return brickLoss[b]; }, out);
+      a.bricks, [&](std::uint32_t b) { return a.brickLoss[b]; }, a.sum);
 }
 
 __global__ void __launch_bounds__(kSumBlock)
@@ -37,6 +39,10 @@ __device__ std::uint32_t ownEllipsoid() { return blockIdx.x * kStepBlock + threa
 
 __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   const std::uint32_t i = ownEllipsoid();
+  if (isHalted(a.halted)) {
+    if (i == 0) *a.halts = 1;
+    return;
+  }
   if (i >= a.ellipsoidCount) return;
 
   const PairSums sums = sumsOf(a.sums, i);
@@ -51,6 +57,13 @@ __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   a.usefulness[i] = {float(sums.phi2), float(sums.rPhi),
                      float(edgeGradient(gradient, a.edge.logMByKappa))};
   if (!finite(p)) *a.diverged = 1;  // integer sums would hide it
+  if (!isHeld(a.listed[i], p, a.core)) *a.halts = 1;
+}
+
+__global__ void __launch_bounds__(kStepBlock) list(const ListingArguments a) {
+  const std::uint32_t i = ownEllipsoid();
+  if (i < a.count)
+    a.listed[i] = listedSupport(a.ellipsoids[i], a.states[i].steps, a.listed[i], a.radius, a.rule);
 }
 
 __global__ void __launch_bounds__(kStepBlock)
@@ -86,10 +99,15 @@ void launchReadGradients(const StepArguments& a, EllipsoidGradient* out, cudaStr
   check(cudaGetLastError(), "starting to read gradients");
 }
 
-void launchLossSum(const double* brickLoss, std::uint32_t bricks, double* sum,
-                   cudaStream_t stream) {
-  sumLoss<<<1, kSumBlock, 0, stream>>>(brickLoss, bricks, sum);
+void launchLossSum(const LossSum& sum, cudaStream_t stream) {
+  sumLoss<<<1, kSumBlock, 0, stream>>>(sum);
   check(cudaGetLastError(), "starting the sum of the loss");
+}
+
+void launchListing(const ListingArguments& a, cudaStream_t stream) {
+  if (a.count == 0) return;
+  list<<<blocksFor(a.count, kStepBlock), kStepBlock, 0, stream>>>(a);
+  check(cudaGetLastError(), "starting to list supports");
 }
 
 void launchEdgeSum(const Usefulness* usefulness, std::uint32_t count, double* sum,

@@ -5,6 +5,7 @@
 
 #include "fit/adam.h"
 #include "fit/cuda/moment_sums.h"
+#include "fit/listed_support.h"
 #include "fit/parameter_gradient.h"
 
 namespace esvr::cuda {
@@ -37,6 +38,28 @@ struct StepArguments {
   StepSizes sizes;
   AdamOptions adam;
   EllipsoidLimits limits;
+  const ListedSupport* listed;  ///< an ellipsoid's, in the lists
+  double core;                  ///< radius within which no list may miss anything
+  const int* halted;            ///< isHalted()
+  int* halts;                   ///< set to 1 where the lists do not serve the next step
+};
+
+/// The loss of all bricks, in one order. Pointers are to device memory, borrowed.
+struct LossSum {
+  const double* brickLoss;
+  std::uint32_t bricks;
+  double* sum;        ///< out
+  const int* halted;  ///< isHalted()
+};
+
+/// The supports that lists are to hold. Pointers are to device memory, borrowed.
+struct ListingArguments {
+  std::uint32_t count;
+  const Ellipsoid* ellipsoids;
+  const AdamState* states;
+  ListedSupport* listed;  ///< as they were listed before, and out
+  double radius;          ///< of the support in the unit frame
+  SlackRule rule;
 };
 
 /// Takes the step; wants launchMomentSums before.
@@ -45,8 +68,10 @@ void launchStep(const StepArguments& arguments, cudaStream_t stream);
 void launchReadGradients(const StepArguments& arguments, EllipsoidGradient* out,
                          cudaStream_t stream);
 
-/// Sums a value of each brick, in one order.
-void launchLossSum(const double* brickLoss, std::uint32_t bricks, double* sum, cudaStream_t stream);
+void launchLossSum(const LossSum& sum, cudaStream_t stream);
+
+/// Writes listedSupport() of all ellipsoids.
+void launchListing(const ListingArguments& arguments, cudaStream_t stream);
 /// Sums byKappa of `count` ellipsoids, in one order.
 void launchEdgeSum(const Usefulness* usefulness, std::uint32_t count, double* sum,
                    cudaStream_t stream);

@@ -5,18 +5,27 @@
 
 #include "field/support.h"
 #include "fit/ellipsoid.h"
+#include "fit/listed_support.h"
 
 namespace esvr::cuda {
 
+/// Pointers are to device memory, borrowed.
 struct SupportSource {
   const Ellipsoid* ellipsoids;
   std::size_t count;
   double radius;                  ///< of the support in the unit frame
   double slack;                   ///< voxels by which supports are widened
   const double* radii = nullptr;  ///< an ellipsoid's; null: all have `radius`
+  const ListedSupport* listed =
+      nullptr;  ///< where it is not null, ellipsoids and radii are not read
 
   [[nodiscard]] ESVR_HD double radiusOf(std::size_t i) const {
     return radii != nullptr ? radii[i] : radius;
+  }
+  [[nodiscard]] ESVR_HD Support supportOf(std::size_t i) const {
+    if (listed != nullptr)
+      return makeSupport(listed[i].center, listed[i].L, listed[i].reach, slack);
+    return makeSupport(ellipsoids[i].center, ellipsoids[i].L, radiusOf(i), slack);
   }
 };
 

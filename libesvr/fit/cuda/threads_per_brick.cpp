@@ -9,8 +9,10 @@ constexpr int kListsServed = 8;  // a measurement costs two slower passes of som
 
 }  // namespace
 
-void ThreadsPerBrick::listsChanged() {
-  if (tried_ != kChoices) return;  // not all have been tried on the lists before
+void ThreadsPerBrick::listsChanged(std::size_t passes) {
+  tried_ = int(std::min(std::size_t(tried_), std::size_t(triedBefore_) + passes));
+  triedBefore_ = tried_;
+  if (tried_ != kChoices) return;
   if (served_ == 0) {
     std::array<double, kChoices> times{};
     for (int k = 0; k < kChoices; ++k)
@@ -18,7 +20,7 @@ void ThreadsPerBrick::listsChanged() {
           trials_[std::size_t(k)].end.millisecondsSince(trials_[std::size_t(k)].begin);
     best_ = int(std::min_element(times.begin(), times.end()) - times.begin());
   }
-  if (++served_ == kListsServed) served_ = tried_ = 0;
+  if (++served_ == kListsServed) served_ = tried_ = triedBefore_ = 0;
 }
 
 }  // namespace esvr::cuda

@@ -27,14 +27,17 @@ class ThreadsPerBrick {
 
   /// To be called where the host waits for the stream anyway, once new lists have been built: takes
   /// the best of what was measured, and begins anew when it has served for long enough.
-  void listsChanged();
+  /// \param passes  calls of run() since the call before that did work; those after them were halted
+  ///                (halt.h) and took no time
+  void listsChanged(std::size_t passes);
 
  private:
   struct Trial {
     Event begin, end;
   };
   std::array<Trial, kChoices> trials_;
-  int tried_ = 0;  ///< choices of the measurement that is going on
+  int tried_ = 0;        ///< choices of the measurement that is going on
+  int triedBefore_ = 0;  ///< those on the lists before
   int best_ = 1;
   int served_ = 0;  ///< lists since the last measurement
 };

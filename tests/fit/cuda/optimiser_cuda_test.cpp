@@ -39,7 +39,7 @@ TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
   onGpu.iterate(std::array{0.5});
 
   CpuPass engine(target, kernelConstants<double>(Kernel{}));
-  engine.rebuild(start, tuning.listSlack);
+  engine.rebuild(start, 0.5);
   std::vector<EllipsoidGradient> gradients(start.size());
   engine.gradients(start, gradients);
   auto expected = start;
@@ -55,6 +55,25 @@ TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
     for (int a = 0; a < 3; ++a)
       differing += std::abs(found[i].center[a] - expected[i].center[a]) > 1e-6;
   EXPECT_LE(differing, 2);
+}
+
+// The rule of motion_bound.h, and not how many steps were started at once, says when lists are built
+// anew: the same bits whatever the batches. Large steps outgrow lists within a batch.
+TEST_F(OptimiserOnGpu, StepsAheadOfOutgrownListsAreTakenAgain) {
+  const SparseVolume volume = test::tubeVolume();
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  CudaOptimiser inOne(target, {}, {}), inMany(target, {}, {});
+  inOne.growTo(200);
+  inMany.growTo(200);
+  inOne.iterate(std::vector<double>(60, 1.0));
+  for (int n = 0; n < 60; ++n) inMany.iterate(std::array{1.0});
+  const auto a = inOne.ellipsoids(), b = inMany.ellipsoids();
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].center, b[i].center) << i;
+    EXPECT_EQ(a[i].L, b[i].L) << i;
+    EXPECT_EQ(a[i].intensity, b[i].intensity) << i;
+  }
 }
 
 TEST_F(OptimiserOnGpu, TheThreadsOfABrickChangeNoBit) {

@@ -9,7 +9,6 @@
 #include "esvr/error.h"
 #include "field/gather.h"
 #include "fit/cuda/memory_plan.h"
-#include "fit/cuda/memory_pool.h"
 #include "fit/paper/cuda/make_cuda_paper_optimiser.h"
 #include "fit/scene.h"
 
@@ -222,7 +221,6 @@ paper::LossGradients CudaPaperOptimiser::gradients(std::size_t subvolume) {
 std::unique_ptr<paper::PaperOptimiser> paper::makeCudaPaperOptimiser(const FitTarget& target,
                                                                      const PaperOptions& options) {
   cuda::useDevice(options.device);
-  cuda::keepFreedMemory();
   cuda::forgetPeakMemory();
   PaperOptions chosen = options;
   chosen.visitOnly = chosen.visitOnly || !cuda::fitsInMemory(target, options.maxDeviceBytes);

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/cuda/memory_pool.h"
 #include "core/cuda/stream.h"
 #include "fit/cuda/brick_table.h"
 #include "fit/cuda/error_sums.h"
@@ -55,6 +56,7 @@ class CudaPaperOptimiser final : public paper::PaperOptimiser {
   paper::PaperOptions options_;
   Kernel kernel_;
   KernelConstants<double> constants_;
+  KeepFreedMemory keep_;
   Stream stream_;
   std::vector<std::unique_ptr<Part>> parts_;
   GrowingBuffer<paper::PaperEllipsoid> ellipsoids_;

@@ -144,16 +144,19 @@ paper::Population somePopulation(std::size_t count) {
 class PaperMethodOnGpu : public test::OnGpu {
  protected:
   void start(const paper::KernelKind& kind) {
+    startWith(somePopulation(200), kind, test::kSide / 2);
+  }
+  void startWith(const paper::Population& population, const paper::KernelKind& kind,
+                 int subvolumeSide) {
     paper::PaperOptions options{.kind = kind,
                                 .beta = 0.2,
-                                .subvolumeSide = test::kSide / 2,
+                                .subvolumeSide = subvolumeSide,
                                 .device = {},
                                 .maxDeviceBytes = {},
                                 .visitOnly = false};
     cpu_ = paper::makePaperOptimiser(target_, options);
     options.device = device_;
     gpu_ = paper::makePaperOptimiser(target_, options);
-    const auto population = somePopulation(200);
     cpu_->put(population);
     gpu_->put(population);
   }
@@ -194,6 +197,33 @@ TEST_F(PaperMethodOnGpu, ARunFollowsTheCpus) {
   // Signs of L1 part the two after a while: they agree in what they reach.
   const double expected = cpu_->measure().squaredSum;
   EXPECT_NEAR(gpu_->measure().squaredSum, expected, 0.01 * expected);
+}
+
+// Two bricks 20 bricks apart, and ellipsoids with the largest scale that the method allows, half the
+// longest axis: each reaches nearly all of every subvolume, and a hundred thousand bricks beyond.
+TEST_F(PaperMethodOnGpu, ItsLargestEllipsoidsReachAllOfAWideSparseTree) {
+  constexpr int kApart = 20;  // bricks
+  std::vector<BrickInput> bricks(2);
+  bricks[1].corner = Coord{kApart, kApart, kApart} * kBrickSide;
+  for (BrickInput& brick : bricks) {
+    brick.values.fill(0.5f);
+    brick.active.setAll();
+  }
+  volume_ = makeVolume(std::move(bricks), 0.0f);
+  target_ = makeTarget(volume_, std::nullopt);
+  const double half = 0.5 * (kApart + 1) * kBrickSide, logScale = std::log(half);
+  paper::Population population;
+  for (const double at : {0.1, 0.5, 0.9})
+    population.ellipsoids.push_back({{2 * half * at, half, 2 * half * (1 - at)},
+                                     {logScale, logScale, logScale},
+                                     {1, 0, 0, 0},
+                                     0.2,
+                                     5.0});
+  population.states.resize(population.size());
+  startWith(population, {}, (kApart + 1) / 2 * kBrickSide);
+  const double expected = cpu_->measure().squaredSum;
+  EXPECT_NEAR(gpu_->measure().squaredSum, expected, 1e-4 * expected);
+  EXPECT_EQ(gpu_->pairCount(), cpu_->pairCount());
 }
 
 }  // namespace

@@ -1,0 +1,97 @@
+#pragma once
+/// How far ellipsoids may move before the lists of pairs must be built anew, for host and device.
+///
+/// A list holds every brick that an ellipsoid's support reaches, and some more: the support is
+/// widened by a slack, which is a share of its radius, since steps too are shares of an ellipsoid's
+/// size. After every step the support is compared with what was listed. One ellipsoid that has
+/// outgrown its slack ends the lists, so that a rebuild comes as early as steps are large, and as
+/// late as they are small. What lies beyond the core of a support, where phi is small, may be missed
+/// until then.
+
+#include <cmath>
+
+#include "fit/ellipsoid_math.h"
+#include "fit/listed_support.h"
+
+namespace esvr {
+
+/// \return the radius in the unit frame beyond which phi is less than `share`
+[[nodiscard]] ESVR_HD inline double coreRadius(const KernelConstants<double>& k, double share) {
+  return std::sqrt(k.shift + std::log(k.numerator / (k.base + share) - k.plateau));
+}
+
+namespace motion_bound {
+
+using Eigen::Matrix3d;
+using ellipsoid_math::asEigen;
+
+/// How far the center has moved, in the unit frame of the listed support.
+ESVR_HD inline double offsetFrom(const ListedSupport& listed, const Ellipsoid& p) {
+  const Eigen::Vector3d d(p.center[0] - listed.center[0], p.center[1] - listed.center[1],
+                          p.center[2] - listed.center[2]);
+  return (asEigen(listed.L) * d).norm();
+}
+
+/// M^T M of M = L_listed F, which maps the unit ball of now into the unit frame of then.
+ESVR_HD inline Matrix3d squaredStretch(const ListedSupport& listed, const Ellipsoid& p) {
+  const Matrix3 F = inverse(p.L);
+  const Matrix3d M = asEigen(listed.L) * asEigen(F);
+  return M.transpose() * M;
+}
+
+/// Sylvester's criterion.
+ESVR_HD inline bool positiveDefinite(const Matrix3d& S) {
+  const double minor = S(0, 0) * S(1, 1) - S(0, 1) * S(0, 1);
+  return S(0, 0) > 0.0 && minor > 0.0 && S.determinant() > 0.0;
+}
+
+/// A bound of the largest eigenvalue from trace and norm (Wolkowicz and Styan 1980): exact where the
+/// others are equal.
+ESVR_HD inline double largestEigenvalueBound(const Matrix3d& S) {
+  const double mean = S.trace() / 3.0;
+  const double variance = S.squaredNorm() / 3.0 - mean * mean;
+  return mean + std::sqrt(2.0 * (variance > 0.0 ? variance : 0.0));
+}
+
+}  // namespace motion_bound
+
+/// \return whether a list still holds all bricks that the support of `radius` reaches. False where
+///         the ellipsoid is not finite.
+[[nodiscard]] ESVR_HD inline bool isHeld(const ListedSupport& listed, const Ellipsoid& p,
+                                         double radius) {
+  using namespace motion_bound;
+  const double left = (listed.reach - offsetFrom(listed, p)) / radius;
+  if (!(left > 0.0)) return false;
+  return positiveDefinite(left * left * Matrix3d::Identity() - squaredStretch(listed, p));
+}
+
+/// \return the slack that would have held an ellipsoid, at most: a share of its radius
+[[nodiscard]] ESVR_HD inline double motionSince(const ListedSupport& listed, const Ellipsoid& p,
+                                                double radius) {
+  using namespace motion_bound;
+  const double stretch = std::sqrt(largestEigenvalueBound(squaredStretch(listed, p)));
+  return offsetFrom(listed, p) / radius + stretch - 1.0;
+}
+
+/// \param steps   of the ellipsoid so far
+/// \param before  its support as it was last listed; not looked at where it has not settled
+[[nodiscard]] ESVR_HD inline double slackOf(const Ellipsoid& p, std::uint32_t steps,
+                                            const ListedSupport& before, double radius,
+                                            const SlackRule& rule) {
+  const Matrix3 F = inverse(p.L);
+  const double meanHalf = radius * std::sqrt(ellipsoid_math::norm2(F) / 3.0);  // voxels
+  const double low = rule.minSlack / meanHalf;
+  const double high = low > rule.maxSlack ? low : rule.maxSlack;
+  if (steps < rule.settledSteps) return high;
+  const double wanted = rule.slackOverMotion * motionSince(before, p, radius);
+  return wanted > low ? (wanted < high ? wanted : high) : low;
+}
+
+/// \return the support that a list is to hold
+[[nodiscard]] ESVR_HD inline ListedSupport listedSupport(const Ellipsoid& p, std::uint32_t steps,
+                                                         const ListedSupport& before, double radius,
+                                                         const SlackRule& rule) {
+  return {p.center, p.L, radius * (1.0 + slackOf(p, steps, before, radius, rule))};
+}
+
+}  // namespace esvr

@@ -1,0 +1,125 @@
+// Plan: an ellipsoid that isHeld() has its whole support inside what was listed, over random steps
+// of many sizes; growth by the slack is the most that is held, and a move by the slack is too;
+// motionSince() bounds the slack that holds; young ellipsoids get the largest slack. What a fit's
+// steps see of ellipsoids that move fast is in optimiser_test.cpp.
+
+#include "fit/motion_bound.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "../field/random_field.h"
+#include "random_ellipsoids.h"
+
+namespace esvr {
+namespace {
+
+using test::Random;
+
+constexpr double kRadius = 2.5;
+
+Ellipsoid sphere(double scale) {
+  return {{1, 2, 3}, {1 / scale, 0, 0, 0, 1 / scale, 0, 0, 0, 1 / scale}, 1.0};
+}
+
+ListedSupport listedAs(const Ellipsoid& p, double slack) {
+  return {p.center, p.L, kRadius * (1.0 + slack)};
+}
+
+/// The largest distance, in the listed unit frame, of points on the surface of p's support.
+double farthest(const ListedSupport& listed, const Ellipsoid& p, Random& random) {
+  const Matrix3 F = inverse(p.L);
+  double largest = 0.0;
+  for (int n = 0; n < 200; ++n) {
+    std::array<double, 3> q{random(-1, 1), random(-1, 1), random(-1, 1)}, x{};
+    const double length = std::hypot(q[0], q[1], q[2]);
+    for (int r = 0; r < 3; ++r)
+      x[r] = p.center[r] - listed.center[r] +
+             kRadius / length * (F[3 * r] * q[0] + F[3 * r + 1] * q[1] + F[3 * r + 2] * q[2]);
+    double square = 0.0;
+    for (int r = 0; r < 3; ++r)
+      square += std::pow(
+          listed.L[3 * r] * x[0] + listed.L[3 * r + 1] * x[1] + listed.L[3 * r + 2] * x[2], 2);
+    largest = std::max(largest, std::sqrt(square));
+  }
+  return largest;
+}
+
+TEST(MotionBound, WhatIsHeldLiesInsideWhatWasListed) {
+  Random random(5);
+  int held = 0, outgrown = 0;
+  for (const Ellipsoid& start : test::randomEllipsoids(300, 0.3, 20.0)) {
+    const ListedSupport listed = listedAs(start, 0.2);
+    Ellipsoid p = start;
+    for (int step = 0; step < 8; ++step) {
+      ParameterVector s;
+      for (double& value : s) value = 0.06 * random(-1, 1);
+      applyStep(p, s);
+      const double far = farthest(listed, p, random);
+      if (isHeld(listed, p, kRadius)) {
+        EXPECT_LE(far, listed.reach * (1 + 1e-12));
+        ++held;
+      } else {
+        ++outgrown;
+      }
+      EXPECT_LE(far, kRadius * (1.0 + motionSince(listed, p, kRadius)) * (1 + 1e-12));
+    }
+  }
+  EXPECT_GT(held, 200);
+  EXPECT_GT(outgrown, 200);
+}
+
+TEST(MotionBound, GrowthAndMovesEndWithTheSlack) {
+  for (const double scale : {0.2, 3.0, 16.0}) {
+    const Ellipsoid start = sphere(scale);
+    const ListedSupport listed = listedAs(start, 0.2);
+    EXPECT_TRUE(isHeld(listed, sphere(1.199 * scale), kRadius));
+    EXPECT_FALSE(isHeld(listed, sphere(1.201 * scale), kRadius));
+    Ellipsoid moved = start;
+    moved.center[1] += 0.199 * kRadius * scale;
+    EXPECT_TRUE(isHeld(listed, moved, kRadius));
+    moved.center[1] += 0.002 * kRadius * scale;
+    EXPECT_FALSE(isHeld(listed, moved, kRadius));
+    EXPECT_NEAR(motionSince(listed, moved, kRadius), 0.201, 1e-9);
+    EXPECT_NEAR(motionSince(listed, sphere(1.5 * scale), kRadius), 0.5, 1e-9);
+  }
+}
+
+TEST(MotionBound, WhatIsNotFiniteIsNotHeld) {
+  Ellipsoid p = sphere(1.0);
+  const ListedSupport listed = listedAs(p, 0.2);
+  p.center[0] = std::nan("");
+  EXPECT_FALSE(isHeld(listed, p, kRadius));
+  p = sphere(1.0);
+  p.L[4] = std::nan("");
+  EXPECT_FALSE(isHeld(listed, p, kRadius));
+}
+
+TEST(MotionBound, TheCoreEndsWherePhiIsTheShare) {
+  for (const float kappa : {-30.0f, 0.5f, 5.0f, 60.0f}) {
+    const auto k = kernelConstants<double>({.kappa = kappa});
+    for (const double share : {0.001, 0.05, 0.5})
+      EXPECT_NEAR(kernelPhi(k, std::pow(coreRadius(k, share), 2)), share, 1e-9);
+    EXPECT_NEAR(coreRadius(k, 0.0), supportRadius(k), 1e-9);
+  }
+}
+
+TEST(MotionBound, SlackFollowsTheMotionBefore) {
+  const SlackRule rule{.missedShare = 0.05,
+                       .minSlack = 0.2,
+                       .maxSlack = 0.3,
+                       .slackOverMotion = 1.0,
+                       .settledSteps = 4};
+  const Ellipsoid p = sphere(2.0);
+  const double least = 0.2 / (2.0 * kRadius);
+  EXPECT_EQ(slackOf(p, 3, {}, kRadius, rule), rule.maxSlack);
+  EXPECT_NEAR(slackOf(p, 4, listedAs(p, 0.1), kRadius, rule), least, 1e-12);
+  EXPECT_NEAR(slackOf(sphere(2.4), 4, listedAs(p, 0.1), kRadius, rule), 0.2, 1e-9);
+  EXPECT_EQ(slackOf(sphere(4.0), 4, listedAs(p, 0.1), kRadius, rule), rule.maxSlack);
+  // so small that minSlack is more
+  EXPECT_NEAR(slackOf(sphere(0.2), 3, {}, kRadius, rule), 0.4, 1e-12);
+}
+
+}  // namespace
+}  // namespace esvr
