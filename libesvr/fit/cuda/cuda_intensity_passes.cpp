@@ -86,6 +86,7 @@ IntensityPassArguments CudaIntensityPasses::arguments(std::span<const float> hei
   return {.scene = {.bricks = bricks_.view().bricks,
                     .brickCount = std::uint32_t(bricks_.size()),
                     .targetCount = std::uint32_t(bricks_.targetCount()),
+                    .ellipsoidCount = std::uint32_t(count_),
                     .pairCount = std::uint32_t(lists_.pairCount()),
                     .lists = lists_.view(),
                     .forms = forms_.data()},

@@ -12,7 +12,7 @@ namespace esvr::cuda {
 struct PassScene {
   const Coord* bricks;  ///< the target's first
   std::uint32_t brickCount, targetCount;
-  std::uint32_t pairCount;
+  std::uint32_t ellipsoidCount, pairCount;
   PairListsView lists;
   const PairForm* forms;  ///< one for each ellipsoid
 };
@@ -25,6 +25,7 @@ inline constexpr std::uint32_t kMaxNarrowEntries = 4096;
 /// \return an upper bound for the number of bricks with longer lists, which come first in
 ///         PairListsView::brickOrder
 [[nodiscard]] inline std::uint32_t maxWideBricks(const PassScene& scene) {
+  if (scene.ellipsoidCount <= kMaxNarrowEntries) return 0;
   return std::min(scene.brickCount, scene.pairCount / (kMaxNarrowEntries + 1));
 }
 

@@ -49,12 +49,15 @@ TEST(IntegerSum, OfNothingOrExtremesHasUnitsThatFloatsHave) {
 TEST(WideBricks, AreAtMostAsManyAsThePairsAllow) {
   cuda::PassScene scene{};
   scene.brickCount = 100;
+  scene.ellipsoidCount = 1'000'000;
   scene.pairCount = cuda::kMaxNarrowEntries;
   EXPECT_EQ(cuda::maxWideBricks(scene), 0u);
   scene.pairCount = 3 * (cuda::kMaxNarrowEntries + 1) + 5;
   EXPECT_EQ(cuda::maxWideBricks(scene), 3u);
   scene.pairCount = 4'000'000'000u;
   EXPECT_EQ(cuda::maxWideBricks(scene), 100u);
+  scene.ellipsoidCount = cuda::kMaxNarrowEntries;  // no list is longer
+  EXPECT_EQ(cuda::maxWideBricks(scene), 0u);
 }
 
 /// Pairs of ellipsoids in one place whose intensities differ by 2^-18, all about one brick.
