@@ -1,0 +1,41 @@
+// Lists and reads whatever comes as a VDB, in either format, within a bound on memory. A grid that
+// is read is a valid volume.
+
+#include <cstdint>
+
+#include "esvr/error.h"
+#include "esvr/sparse_volume.h"
+#include "esvr/vdb_io.h"
+#include "fuzz/input_file.h"
+
+namespace {
+
+using namespace esvr;
+
+constexpr std::uint64_t kMaxBytes = std::uint64_t{16} << 20;
+
+void readAll(const std::filesystem::path& path) {
+  for (const GridSummary& grid : inspectVdb(path).grids) {
+    if (!grid.isScalar) continue;
+    try {
+      const auto read =
+          readGrid(path, grid.uniqueName,
+                   {.nonFinite = NonFinite::kZero, .allowEmpty = true, .maxBytes = kMaxBytes});
+      checkInvariants(read.volume);
+    } catch (const BadInput&) {
+    } catch (const MemoryExceeded&) {
+    }
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static fuzz::InputFile file(".vdb");
+  try {
+    readAll(file.write(data, size));
+  } catch (const BadInput&) {
+  } catch (const MemoryExceeded&) {
+  }
+  return 0;
+}
