@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "cli/run_program.h"
@@ -416,6 +417,64 @@ TEST_F(EsvrRender, PicturesBeyondTheMemoryAllowedAreRefused) {
   EXPECT_THAT(large.err, AllOf(HasSubstr("30000 x 30000"), HasSubstr("43.2 GB")));
   EXPECT_EQ(draw("in.esvr", "large.png", {"--resolution", "100000x100000"}).exitCode, 2);
 }
+
+// ---- golden pictures
+
+/// A file of tests/format/golden and how it is drawn.
+struct Golden {
+  const char *name, *file;
+  std::vector<std::string> options;
+};
+std::ostream& operator<<(std::ostream& out, const Golden& golden) { return out << golden.name; }
+
+class GoldenPicture : public testing::TestWithParam<Golden> {
+ protected:
+  [[nodiscard]] static std::string golden() {
+    return std::string(ESVR_SOURCE_DIR "/tests/cli/golden/") + GetParam().name + ".png";
+  }
+  /// ESVR_UPDATE_GOLDEN=1 draws the picture anew, where a change is meant to change it.
+  [[nodiscard]] std::string draw() const {
+    const std::string out = std::getenv("ESVR_UPDATE_GOLDEN") ? golden() : folder_ / "out.png";
+    std::vector<std::string> arguments{
+        std::string(ESVR_SOURCE_DIR "/tests/format/golden/") + GetParam().file,
+        out,
+        "--force",
+        "--device",
+        "cpu",
+        "--resolution",
+        "48x48"};
+    arguments.insert(arguments.end(), GetParam().options.begin(), GetParam().options.end());
+    const auto run = runProgram(ESVR_RENDER, arguments);
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    return out;
+  }
+  TemporaryFolder folder_;
+};
+
+// Instruction sets differ by some 1e-6 of a value, which moves a channel by one step of 8 bits; a
+// ray may end one sample later, which is worth 1/4096.
+TEST_P(GoldenPicture, isDrawnAgain) {
+  const Pixels found = readPng(draw()), expected = readPng(golden());
+  ASSERT_EQ(found.rgba.size(), expected.rgba.size());
+  int largest = 0, visible = 0;
+  for (std::size_t i = 0; i < expected.rgba.size(); ++i) {
+    largest = std::max(largest, std::abs(int(found.rgba[i]) - int(expected.rgba[i])));
+    visible += expected.rgba[i] > 0;
+  }
+  EXPECT_LE(largest, 2);
+  EXPECT_GT(visible, 100) << "an empty picture proves nothing";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Files, GoldenPicture,
+    testing::Values(Golden{"layered", "layered.esvr", {}},
+                    Golden{"layered_sum", "layered.esvr", {"--between", "sum"}},
+                    Golden{"layered_bricks", "layered.esvr", {"--method", "bricks"}},
+                    Golden{"kappas", "kappas_and_chunks.esvr", {"--colors", "inferno"}},
+                    Golden{"level_set", "level_set.esvr", {"--opacity", "inverse"}},
+                    Golden{"maximum", "quantised.esvr", {"--mode", "maximum"}},
+                    Golden{"voxels", "voxels.esvr", {"--opacity-length", "4"}}),
+    [](const auto& tested) { return std::string(tested.param.name); });
 
 TEST_F(EsvrRender, HelpNamesEveryBuiltInFunction) {
   const auto help = runProgram(ESVR_RENDER, {"--help"});
