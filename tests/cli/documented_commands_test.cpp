@@ -73,6 +73,7 @@ void set(Words& words, const std::string& option, const std::string& value) {
 Words quickened(Words words) {
   if (words[0] == "esvr-sample") set(words, "--resolution", "40");
   if (words[0] == "vdb2esvr" && !has(words, "--lossless")) set(words, "--iterations", "60");
+  if (has(words, "--ratio")) set(words, "--ratio", "500");
   if (words[0] == "esvr-render" && !has(words, "--orthographic"))
     set(words, "--resolution", "48x48");
   if (words[0] == "esvr-compare" && words[1] == "table") {
