@@ -125,7 +125,8 @@ void judgeBaseline(const std::filesystem::path& path, CheckRecord& record) {
       record.notes.push_back("grid \"" + grid.name +
                              "\" is not in the baseline (--update adds it)");
   }
-  for (const auto& [name, figures] : stored.items()) {
+  for (const auto& item : stored.items()) {
+    const std::string& name = item.key();
     const auto same = [&](const CheckedGrid& grid) { return grid.name == name; };
     if (std::none_of(record.grids.begin(), record.grids.end(), same))
       record.failures.push_back("grid \"" + name + "\" of the baseline was not compared");

@@ -63,6 +63,7 @@ class RawImage : public ImageSource {
  public:
   RawImage(const fs::path& path, const RawLayout& layout)
       : path_(path), layout_(layout), type_(findType(layout.type)), file_(path, std::ios::binary) {
+    checkSize();
     checkLength();
     if (!file_) throw BadInput("cannot read " + path_.string());
   }
@@ -89,6 +90,11 @@ class RawImage : public ImageSource {
     return std::uint64_t(layout_.size.x) * std::uint64_t(layout_.size.y) * type_.bytes;
   }
 
+  void checkSize() const {
+    if (std::min({layout_.size.x, layout_.size.y, layout_.size.z}) < 1)
+      throw UsageError("an image of " + toString(layout_.size) + " voxels has none");
+  }
+
   void checkLength() const {
     std::error_code error;
     const std::uint64_t length = fs::file_size(path_, error);
@@ -96,10 +102,11 @@ class RawImage : public ImageSource {
     const double expected =
         double(layout_.size.z) * double(sliceBytes()) + double(layout_.headerBytes);
     if (double(length) == expected) return;
-    throw BadInput(path_.string() + " has " + std::to_string(length) + " bytes; " +
-                   toString(layout_.size) + " voxels of " + type_.name + " after " +
-                   std::to_string(layout_.headerBytes) + " bytes of header need " +
-                   std::to_string(std::uint64_t(expected)));
+    throw BadInput(
+        path_.string() + " has " + std::to_string(length) + " bytes; " + toString(layout_.size) +
+        " voxels of " + type_.name + " after " + std::to_string(layout_.headerBytes) +
+        " bytes of header need " +
+        (expected < 0x1p63 ? std::to_string(std::uint64_t(expected)) : "more than 2^63"));
   }
 
   fs::path path_;

@@ -182,6 +182,13 @@ TEST(OpenRaw, refusesAFileOfAnotherLength) {
   EXPECT_THROW(open({2147483647, 2147483647, 2147483647})(), BadInput);
 }
 
+TEST(OpenRaw, refusesASizeOfNoVoxels) {
+  const TemporaryFolder folder;
+  test::writeText(folder / "a.raw", "12345");
+  for (const Coord size : {Coord{0, 5, 1}, Coord{-1, -5, 1}, Coord{5, 1, -1}})
+    EXPECT_THROW((void)openRaw(folder / "a.raw", {.size = size, .type = "uint8"}), UsageError);
+}
+
 TEST(OpenRaw, listsTheTypesThereAre) {
   EXPECT_THAT(
       [] {
