@@ -301,21 +301,6 @@ TEST_F(CompareOption, curvesAreReplacedWhereForced) {
   EXPECT_EQ(test::runProgram(ESVR_COMPARE, arguments).exitCode, 1);
 }
 
-TEST_F(CompareOption, maxMemoryRefusesWhatNeedsMore) {
-  const std::vector<std::vector<std::string>> jobs{
-      {"check", at("ref.vdb"), at("off.vdb")},
-      {"table", at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--runs", "1"},
-      {"curves", at("ref.vdb"), at("fit.esvr"), "--no-baselines", "-o", at("m")}};
-  for (const auto& arguments : jobs)
-    for (const auto& [bound, exitCode] : {std::pair{"1KB", 5}, std::pair{"1GB", 0}}) {
-      auto bounded = arguments;
-      bounded.insert(bounded.end(), {"--max-memory", bound});
-      const auto ran = test::runProgram(ESVR_COMPARE, bounded);
-      EXPECT_EQ(ran.exitCode, exitCode) << arguments[0] << ' ' << bound << ": " << ran.err;
-      if (exitCode != 0) EXPECT_THAT(ran.err, HasSubstr("--max-memory"));
-    }
-}
-
 TEST_F(CompareOption, maxDenseSkipsZfpInCurves) {
   test::writeInput(at("cloud.vdb"), {{.voxels = test::cloud(8)}});
   const auto zfpPoints = [&](const char* bound) {
