@@ -20,16 +20,16 @@ using Range = tbb::blocked_range<std::size_t>;
 /// fewer.
 template <class Visit>
 void forEachPair(const BrickIndex& index, const Support& support, Visit&& visit) {
-  constexpr double kLookUps = 16.0;  // find() takes a fraction of what mayTouch() and sorting take
+  constexpr double kLookUps = 16.0;  // find() takes a fraction of what SlabTest and sorting take
   const Box around = common(brickRange(support), index.bounds());
   if (around.volume() <= kLookUps * double(index.size()))
     return forEachReachedBrick(support, index.bounds(), [&](Coord brick) {
       if (const auto b = index.find(brick); b != BrickIndex::kNone) visit(b);
     });
+  const SlabTest mayTouch(support);
   std::vector<std::uint32_t> touched;
   for (std::uint32_t b = 0; b < index.size(); ++b)
-    if (around.contains(index.bricks()[b]) && mayTouch(support, index.bricks()[b]))
-      touched.push_back(b);
+    if (around.contains(index.bricks()[b]) && mayTouch(index.bricks()[b])) touched.push_back(b);
   std::sort(touched.begin(), touched.end(), [&](std::uint32_t a, std::uint32_t b) {
     return index.bricks()[a] < index.bricks()[b];
   });

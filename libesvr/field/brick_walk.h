@@ -29,7 +29,7 @@ struct Run {
   return run;
 }
 
-/// The slabs that mayTouch() tests the middles of bricks against: |row . d| <= bound.
+/// The slabs that SlabTest tests the middles of bricks against: |row . d| <= bound.
 class Slabs {
  public:
   explicit Slabs(const Support& s) : support_(s) {
@@ -77,21 +77,22 @@ class Slabs {
 };
 
 template <class Visit>
-void visitBox(const Support& s, const Box& range, Visit&& visit) {
+void visitBox(const SlabTest& mayTouch, const Box& range, Visit&& visit) {
   for (std::int32_t x = range.min.x; x <= range.max.x; ++x)
     for (std::int32_t y = range.min.y; y <= range.max.y; ++y)
       for (std::int32_t z = range.min.z; z <= range.max.z; ++z)
-        if (const Coord brick{x, y, z}; mayTouch(s, brick)) visit(brick);
+        if (const Coord brick{x, y, z}; mayTouch(brick)) visit(brick);
 }
 
 template <class Visit>
 void visitLines(const Support& s, const Box& range, Visit&& visit) {
   const Slabs slabs(s);
+  const SlabTest mayTouch(s);
   for (std::int32_t x = range.min.x; x <= range.max.x; ++x) {
     const Run rows = slabs.rows(middleOf(x), {range.min.y, range.max.y});
     for (std::int32_t y = rows.first; y <= rows.last; ++y) {
       const Run line = slabs.line(middleOf(x), middleOf(y), {range.min.z, range.max.z});
-      visitBox(s, {{x, y, line.first}, {x, y, line.last}}, visit);
+      visitBox(mayTouch, {{x, y, line.first}, {x, y, line.last}}, visit);
     }
   }
 }
@@ -105,7 +106,7 @@ void forEachReachedBrick(const Support& s, const Box& within, Visit&& visit) {
   const Box range = common(brickRange(s), within);
   if (range.empty()) return;
   if (range.volume() <= kFewBricks)
-    brick_walk::visitBox(s, range, visit);
+    brick_walk::visitBox(SlabTest(s), range, visit);
   else
     brick_walk::visitLines(s, range, visit);
 }

@@ -35,7 +35,7 @@ double determinant(const Matrix3& m) {
          m[2] * (m[3] * m[7] - m[4] * m[6]);
 }
 
-/// The bricks' middles lie between three pairs of planes (mayTouch). Around each middle lies a cube
+/// The bricks' middles lie between three pairs of planes (SlabTest). Around each middle lies a cube
 /// as large as a brick, and the cubes do not overlap: their number is bounded by the volume between
 /// planes that are moved outwards by half a brick.
 double bricksBetweenSlabs(const Support& s) {

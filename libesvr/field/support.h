@@ -42,18 +42,31 @@ struct Support {
   return s.radius + kHalf * reach + s.slack * std::sqrt(length2);
 }
 
-/// False only where the brick's voxels certainly lie outside: tests the planes that bound the
-/// support perpendicular to the rows of L, which are its principal axes when L = S^-1 R^T.
-[[nodiscard]] ESVR_HD inline bool mayTouch(const Support& s, Coord brick) {
-  const double d[3] = {middleOf(brick.x) - s.center[0], middleOf(brick.y) - s.center[1],
-                       middleOf(brick.z) - s.center[2]};
-  for (int j = 0; j < 3; ++j) {
-    const double* row = &s.L[3 * j];
-    const double u = row[0] * d[0] + row[1] * d[1] + row[2] * d[2];
-    if (std::abs(u) > slabBound(s, j)) return false;
+/// Tests bricks against the planes that bound a support perpendicular to the rows of L, which are
+/// its principal axes when L = S^-1 R^T. The support must outlive the test.
+class SlabTest {
+ public:
+  ESVR_HD explicit SlabTest(const Support& support)
+      : support_(support),
+        bounds_{slabBound(support, 0), slabBound(support, 1), slabBound(support, 2)} {}
+
+  /// \return false only where the brick's voxels certainly lie outside
+  [[nodiscard]] ESVR_HD bool operator()(Coord brick) const {
+    const double d[3] = {middleOf(brick.x) - support_.center[0],
+                         middleOf(brick.y) - support_.center[1],
+                         middleOf(brick.z) - support_.center[2]};
+    for (int j = 0; j < 3; ++j) {
+      const double* row = &support_.L[3 * j];
+      const double u = row[0] * d[0] + row[1] * d[1] + row[2] * d[2];
+      if (std::abs(u) > bounds_[j]) return false;
+    }
+    return true;
   }
-  return true;
-}
+
+ private:
+  const Support& support_;
+  double bounds_[3];
+};
 
 /// The bricks that hold a voxel of a box, as a box of brick coordinates.
 [[nodiscard]] constexpr Box bricksOf(const Box& voxels) {

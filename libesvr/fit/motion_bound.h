@@ -3,10 +3,9 @@
 ///
 /// A list holds every brick that an ellipsoid's support reaches, and some more: the support is
 /// widened by a slack, which is a share of its radius, since steps too are shares of an ellipsoid's
-/// size. After every step the support is compared with what was listed. One ellipsoid that has
-/// outgrown its slack ends the lists, so that a rebuild comes as early as steps are large, and as
-/// late as they are small. What lies beyond the core of a support, where phi is small, may be missed
-/// until then.
+/// size. A step that would lead the ellipsoid's core out of its listed support is refused. The core
+/// leaves out the rim of a support, where phi is small. Once a small share of all steps was refused
+/// the lists end, so that a rebuild comes as early as steps are large and as late as they are small.
 
 #include <cmath>
 
@@ -63,6 +62,16 @@ ESVR_HD inline double largestEigenvalueBound(const Matrix3d& S) {
   const double left = (listed.reach - offsetFrom(listed, p)) / radius;
   if (!(left > 0.0)) return false;
   return positiveDefinite(left * left * Matrix3d::Identity() - squaredStretch(listed, p));
+}
+
+/// Refuses a step that leads an ellipsoid out of its listed support: moves it back, and leaves its
+/// intensity changed. \return whether the step was refused
+[[nodiscard]] ESVR_HD inline bool refuseStep(const ListedSupport& listed, double radius,
+                                             const Ellipsoid& before, Ellipsoid& p) {
+  if (isHeld(listed, p, radius)) return false;
+  p.center = before.center;
+  p.L = before.L;
+  return true;
 }
 
 /// \return the slack that would have held an ellipsoid, at most: a share of its radius

@@ -87,7 +87,7 @@ TEST(CompactGrid, ComesAsNearAsItCanToAPsnrOutOfReach) {
 }
 
 TEST(CompactGrid, FillsTheBytesThatItMayHave) {
-  for (const std::uint64_t bytes : {400u, 600u, 900u}) {
+  for (const std::uint64_t bytes : {500u, 600u, 900u}) {
     const auto compact = compactGrid(tube().grid, tube().source, {.bytes = bytes});
     EXPECT_LE(compact.bytes, bytes);
     // 60 ellipsoids: a step that is a bit too fine for one more bit of all costs 75 bytes, and

@@ -39,7 +39,7 @@ void expectAllPairs(const std::vector<Coord>& bricks, const std::vector<Support>
     std::vector<Coord> expected, found;
     const Box range = brickRange(reach[i]);
     for (const Coord brick : bricks)
-      if (range.contains(brick) && mayTouch(reach[i], brick)) expected.push_back(brick);
+      if (range.contains(brick) && SlabTest(reach[i])(brick)) expected.push_back(brick);
     std::sort(expected.begin(), expected.end());
     for (auto k = pairs.ellipsoidBegin[i]; k != pairs.ellipsoidBegin[i + 1]; ++k) {
       const auto brick =

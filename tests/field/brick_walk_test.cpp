@@ -27,7 +27,7 @@ std::vector<Coord> walked(const Support& support, const Box& within = kAll) {
 
 std::vector<Coord> lookedUp(const Support& support, const Box& within = kAll) {
   std::vector<Coord> bricks;
-  brick_walk::visitBox(support, common(brickRange(support), within),
+  brick_walk::visitBox(SlabTest(support), common(brickRange(support), within),
                        [&](Coord brick) { bricks.push_back(brick); });
   return bricks;
 }

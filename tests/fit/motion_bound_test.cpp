@@ -1,6 +1,6 @@
 // Plan: an ellipsoid that isHeld() has its whole support inside what was listed, over random steps
 // of many sizes; growth by the slack is the most that is held, and a move by the slack is too;
-// motionSince() bounds the slack that holds; young ellipsoids get the largest slack. What a fit's
+// motionSince() bounds the slack that holds; a step beyond it is refused; young ellipsoids get the largest slack. What a fit's
 // steps see of ellipsoids that move fast is in optimiser_test.cpp.
 
 #include "fit/motion_bound.h"
@@ -84,6 +84,25 @@ TEST(MotionBound, GrowthAndMovesEndWithTheSlack) {
     EXPECT_NEAR(motionSince(listed, moved, kRadius), 0.201, 1e-9);
     EXPECT_NEAR(motionSince(listed, sphere(1.5 * scale), kRadius), 0.5, 1e-9);
   }
+}
+
+TEST(MotionBound, AStepOutOfTheListsLeavesThePlaceAndTakesTheIntensity) {
+  const Ellipsoid before = sphere(2.0);
+  const ListedSupport listed = listedAs(before, 0.2);
+  Ellipsoid inside = sphere(2.1), outside = sphere(3.0);
+  outside.intensity = 0.5;
+  EXPECT_FALSE(refuseStep(listed, kRadius, before, inside));
+  EXPECT_EQ(inside.L, sphere(2.1).L);
+  EXPECT_TRUE(refuseStep(listed, kRadius, before, outside));
+  EXPECT_EQ(outside.center, before.center);
+  EXPECT_EQ(outside.L, before.L);
+  EXPECT_EQ(outside.intensity, 0.5);
+}
+
+TEST(MotionBound, ListsEndWithAShareOfRefusedSteps) {
+  const SlackRule rule{.refusedShare = 0.03};
+  EXPECT_EQ(rule.refusedSteps(20), 1u);  // few ellipsoids: the first one
+  EXPECT_EQ(rule.refusedSteps(1000), 31u);
 }
 
 TEST(MotionBound, WhatIsNotFiniteIsNotHeld) {

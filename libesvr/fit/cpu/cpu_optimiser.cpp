@@ -34,10 +34,11 @@ void CpuOptimiser::rebuildLists() {
     listed_[i] = listedSupport(ellipsoids_[i], states_[i].steps, listed_[i], radius, tuning_.slack);
   });
   pass_.rebuild(listed_);
+  refused_ = 0;
   stale_ = false;
 }
 
-/// Whether a step has led an ellipsoid beyond what the lists hold.
+/// Whether an ellipsoid is beyond what the lists hold.
 bool CpuOptimiser::anyOutgrown() const {
   const double core = coreRadius(pass_.kernel(), tuning_.slack.missedShare);
   std::atomic<bool> any = false;
@@ -47,15 +48,30 @@ bool CpuOptimiser::anyOutgrown() const {
   return any;
 }
 
-void CpuOptimiser::refreshResiduals() {
+/// Takes a step, within what the lists hold.
+void CpuOptimiser::step(double factor) {
+  const double core = coreRadius(pass_.kernel(), tuning_.slack.missedShare);
+  const std::vector<Ellipsoid> before = ellipsoids_;
+  adamStep(ellipsoids_, states_, gradients_, tuning_.steps.scaled(factor), tuning_.adam, limits_);
+  std::atomic<std::uint32_t> refused = 0;
+  tbb::parallel_for(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
+    if (refuseStep(listed_[i], core, before[i], ellipsoids_[i])) ++refused;
+  });
+  refused_ += refused;
+  stale_ = refused_ >= tuning_.slack.refusedSteps(ellipsoids_.size());
+}
+
+/// Lists that miss nothing, for residuals.
+void CpuOptimiser::buildTightLists() {
   pass_.rebuild(ellipsoids_, kRoundingSlack);
-  pass_.residuals(ellipsoids_, residuals_);
   stale_ = true;
 }
 
 std::vector<Ellipsoid> CpuOptimiser::newSeeds(std::size_t count) {
   const AddSeconds timer(secondsSeeding_);
-  refreshResiduals();
+  if (stale_) buildTightLists();
+  pass_.residuals(ellipsoids_, residuals_);
+  stale_ = true;  // the caller adds or moves ellipsoids
   SeedOptions options;
   options.draw = {count, target_.bricks.size(), signsOf(target_),
                   options_.seed ^ (++samplings_ << 32)};
@@ -102,8 +118,7 @@ double CpuOptimiser::iterateOnce(double factor) {
   if (stale_) rebuildLists();
   const double loss = pass_.gradients(ellipsoids_, gradients_);
   if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
-  adamStep(ellipsoids_, states_, gradients_, tuning_.steps.scaled(factor), tuning_.adam, limits_);
-  stale_ = anyOutgrown();
+  step(factor);
   return loss;
 }
 
@@ -114,7 +129,8 @@ double CpuOptimiser::iterate(std::span<const double> factors) {
 }
 
 FitErrors CpuOptimiser::measure() {
-  refreshResiduals();
+  buildTightLists();
+  pass_.residuals(ellipsoids_, residuals_);
   return errorsOf(target_, {pass_.index(), residuals_});
 }
 
@@ -132,7 +148,7 @@ void CpuOptimiser::setKappa(float kappa) {
   unitVariance_ = kernelVariance(pass_.kernel());
   const double factor = std::sqrt(kernelWidth(pass_.kernel()).m / before);
   for (Ellipsoid& p : ellipsoids_) shrinkBy(p, factor);
-  stale_ = true;
+  stale_ = stale_ || anyOutgrown();
 }
 
 void CpuOptimiser::dropUnseen() {

@@ -39,7 +39,8 @@ class CpuOptimiser final : public Optimiser {
   [[nodiscard]] std::vector<std::size_t> leastUseful(std::size_t count) const;
   void rebuildLists();
   [[nodiscard]] bool anyOutgrown() const;
-  void refreshResiduals();
+  void step(double factor);
+  void buildTightLists();
   double iterateOnce(double factor);
 
   const FitTarget& target_;
@@ -53,9 +54,10 @@ class CpuOptimiser final : public Optimiser {
   std::vector<EllipsoidGradient> gradients_;
   std::vector<float> residuals_;
   double secondsSeeding_ = 0.0;
-  std::uint64_t samplings_ = 0;  ///< number of samplings, each with its own random numbers
+  std::uint64_t samplings_ = 0;        ///< number of samplings, each with its own random numbers
   std::vector<ListedSupport> listed_;  ///< the supports that the lists of the iterations hold
-  bool stale_ = true;  ///< true if those lists are outdated
+  std::uint32_t refused_ = 0;          ///< steps that were refused since those lists were built
+  bool stale_ = true;                  ///< true if those lists are outdated
 };
 
 }  // namespace esvr

@@ -75,10 +75,10 @@ __device__ void insertReached(const ReachedInsertion& into, Coord brick) {
 }
 
 __global__ void collectReached(SupportSource source, ReachedInsertion into) {
-  const std::size_t i = warpNumber();
-  if (i >= source.count) return;
-  visitReachedBricks(source.supportOf(i), into.within, [&](Coord brick, bool reached) {
-    if (reached) insertReached(into, brick);
+  walkReachedBricks(source, into.within, [&](const auto& bricks) {
+    bricks.visit([&](Coord brick, bool reached) {
+      if (reached) insertReached(into, brick);
+    });
   });
 }
 

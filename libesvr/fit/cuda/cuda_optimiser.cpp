@@ -109,6 +109,8 @@ StepArguments CudaOptimiser::stepArguments(double factor, std::size_t n) {
           .limits = limitsOf(target_, tuning_),
           .listed = listed_.data(),
           .core = coreRadius(kernel_, tuning_.slack.missedShare),
+          .refused = &status->refused,
+          .maxRefused = tuning_.slack.refusedSteps(count_),
           .halted = &status->halted[n],
           .halts = &status->halted[n + 1]};
 }
@@ -145,12 +147,16 @@ void CudaOptimiser::rebuildLists() {
   stale_ = false;
 }
 
-void CudaOptimiser::refreshResiduals() {
+/// Lists that miss nothing, for residuals.
+void CudaOptimiser::buildTightLists() {
   stale_ = true;
   buildLists({.ellipsoids = ellipsoids_.data(),
               .count = count_,
               .radius = radius_,
               .slack = kRoundingSlack});
+}
+
+void CudaOptimiser::writeResiduals() {
   BrickPassArguments pass = passArguments();
   pass.residual = residual_.reserve(bricks_.size() * kBrickVoxels);
   launchResiduals(pass, stream_.get());
@@ -239,8 +245,10 @@ auto CudaOptimiser::withFewer(const Work& work) {
 
 std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t ellipsoids,
                                       const std::uint32_t* into) {
-  refreshResiduals();
-  sumLoss(nullptr);
+  if (stale_) buildTightLists();
+  stale_ = true;  // the caller adds or moves ellipsoids
+  writeResiduals();
+  sumLoss();
   const double loss = downloadValue(&status_.data()->loss, stream_.get());
   const DeviceSampling drawn = sampling_.draw(
       residual_.data(), loss, bricks_.view().bricks,
@@ -295,11 +303,8 @@ void CudaOptimiser::relocate(std::size_t count) {
   });
 }
 
-void CudaOptimiser::sumLoss(const int* halted) {
-  launchLossSum({.brickLoss = brickLoss_.data(),
-                 .bricks = std::uint32_t(bricks_.size()),
-                 .sum = &status_.data()->loss,
-                 .halted = halted},
+void CudaOptimiser::sumLoss() {
+  launchLossSum(brickLoss_.data(), std::uint32_t(bricks_.size()), &status_.data()->loss,
                 stream_.get());
 }
 
@@ -309,13 +314,13 @@ void CudaOptimiser::step(double factor, std::size_t n) {
   BrickPassArguments pass = passArguments();
   pass.halted = arguments.sums.halted = arguments.halted;
   threads_.run(stream_.get(), [&](int best) { launchGradients(pass, best, stream_.get()); });
-  sumLoss(arguments.halted);
   launchMomentSums(arguments.sums, stream_.get());
   launchStep(arguments, stream_.get());
 }
 
 /// Waits for the steps that were started. \return how many of them were taken
 std::size_t CudaOptimiser::look(std::size_t started) {
+  sumLoss();
   const StepStatus status = downloadValue(status_.data(), stream_.get());
   if (!std::isfinite(status.loss) || status.diverged != 0)
     throw RuntimeFailure("the fit diverged: an ellipsoid is not finite");
@@ -347,15 +352,21 @@ void CudaOptimiser::setKappa(float kappa) {
   const double before = kernelWidth(kernel_).m;
   options_.kernel.kappa = kappa;
   setKernel();
-  launchShrink(ellipsoids_.data(), std::uint32_t(count_),
-               std::sqrt(kernelWidth(kernel_).m / before), stream_.get());
+  launchShrink({.count = std::uint32_t(count_),
+                .ellipsoids = ellipsoids_.data(),
+                .factor = std::sqrt(kernelWidth(kernel_).m / before),
+                .listed = stale_ ? nullptr : listed_.data(),
+                .core = coreRadius(kernel_, tuning_.slack.missedShare),
+                .halts = status_.data()->halted},
+               stream_.get());
   writeForms();
-  stale_ = true;
+  stale_ = stale_ || downloadValue(status_.data()->halted, stream_.get()) != 0;
 }
 
 FitErrors CudaOptimiser::measure() {
   return withFewer([&] {
-    refreshResiduals();
+    buildTightLists();
+    writeResiduals();
     return errorSums_.sum({.residual = residual_.data(),
                            .bricks = bricks_.view().bricks,
                            .active = active_.data(),

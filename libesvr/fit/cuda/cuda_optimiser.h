@@ -54,10 +54,11 @@ class CudaOptimiser final : public Optimiser {
   void writeForms();
   void buildLists(const SupportSource& supports);
   void rebuildLists();
-  void refreshResiduals();
+  void buildTightLists();
+  void writeResiduals();
   void step(double factor, std::size_t n);
   [[nodiscard]] std::size_t look(std::size_t started);
-  void sumLoss(const int* halted);
+  void sumLoss();
   void reserve(std::size_t ellipsoids);
   void grow(std::size_t count);
   [[nodiscard]] std::vector<Ellipsoid> seenEllipsoids();

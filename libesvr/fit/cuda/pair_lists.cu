@@ -16,30 +16,28 @@ namespace {
 
 /// Calls visit(brick's number, brick, position among the ellipsoid's pairs) for each pair.
 /// \return how many there are, on all lanes
-template <class Visit>
-__device__ std::uint32_t visitPairs(const Support& support, const BrickTableView& bricks,
-                                    Visit&& visit) {
+template <class Team, class Visit>
+__device__ std::uint32_t visitPairs(const ReachedBricks<Team>& reachedBricks,
+                                    const BrickTableView& bricks, Visit&& visit) {
   std::uint32_t before = 0;
-  visitReachedBricks(support, bricks.bounds, [&](Coord brick, bool reached) {
+  reachedBricks.visit([&](Coord brick, bool reached) {
     const std::uint32_t number = reached ? bricks.find(brick) : kNoBrick;
-    const unsigned present = __ballot_sync(kAllLanes, number != kNoBrick);
-    const unsigned below = present & ((1u << threadIdx.x % kWarp) - 1u);
-    if (number != kNoBrick) visit(number, brick, before + std::uint32_t(__popc(below)));
-    before += std::uint32_t(__popc(present));
+    const TeamRank rank = reachedBricks.team.rank(number != kNoBrick);
+    if (number != kNoBrick) visit(number, brick, before + rank.before);
+    before += rank.all;
   });
   return before;
 }
 
 __global__ void countPairsKernel(SupportSource source, BrickTableView bricks, std::uint32_t* counts,
                                  std::uint32_t* chunks) {
-  const std::size_t i = warpNumber();
-  if (i >= source.count) return;
-  const std::uint32_t n =
-      visitPairs(source.supportOf(i), bricks, [](std::uint32_t, Coord, std::uint32_t) {});
-  if (threadIdx.x % kWarp != 0) return;
-  counts[i] = n;
-  // Every ellipsoid has a chunk: one that reaches nothing still takes a step, of zero.
-  chunks[i] = n == 0 ? 1 : (n - 1) / PairListsView::kChunk + 1;
+  walkReachedBricks(source, bricks.bounds, [&](const auto& reached) {
+    const std::uint32_t n = visitPairs(reached, bricks, [](std::uint32_t, Coord, std::uint32_t) {});
+    if (reached.team.lane() != 0) return;
+    counts[reached.ellipsoid] = n;
+    // Every ellipsoid has a chunk: one that reaches nothing still takes a step, of zero.
+    chunks[reached.ellipsoid] = n == 0 ? 1 : (n - 1) / PairListsView::kChunk + 1;
+  });
 }
 
 /// Entries of a brick stand in the order of their lines, the longest work first and neighbours
@@ -62,14 +60,13 @@ __device__ std::uint32_t linesRank(const Support& s, Coord brick) {
 __global__ void listPairsKernel(SupportSource source, BrickTableView bricks,
                                 const std::uint32_t* begin, std::uint32_t* key, std::uint32_t* pair,
                                 std::uint32_t* owner) {
-  const std::size_t i = warpNumber();
-  if (i >= source.count) return;
-  const Support support = source.supportOf(i);
-  visitPairs(support, bricks, [&](std::uint32_t number, Coord brick, std::uint32_t n) {
-    const std::uint32_t at = begin[i] + n;
-    key[at] = number << kLinesBits | linesRank(support, brick);
-    pair[at] = at;
-    owner[at] = std::uint32_t(i);
+  walkReachedBricks(source, bricks.bounds, [&](const auto& reached) {
+    visitPairs(reached, bricks, [&](std::uint32_t number, Coord brick, std::uint32_t n) {
+      const std::uint32_t at = begin[reached.ellipsoid] + n;
+      key[at] = number << kLinesBits | linesRank(reached.support, brick);
+      pair[at] = at;
+      owner[at] = std::uint32_t(reached.ellipsoid);
+    });
   });
 }
 

@@ -23,10 +23,10 @@ __device__ void sumByOneBlock(std::uint32_t count, const Value& value, double* o
   if (threadIdx.x == 0) *out = sum;
 }
 
-__global__ void __launch_bounds__(kSumBlock) sumLoss(const LossSum a) {
-  if (isHalted(a.halted)) return;
+__global__ void __launch_bounds__(kSumBlock)
+    sumLoss(const double* brickLoss, std::uint32_t count, double* out) {
   sumByOneBlock(
-      a.bricks, [&](std::uint32_t b) { return a.brickLoss[b]; }, a.sum);
+      count, [&](std::uint32_t b) { return brickLoss[b]; }, out);
 }
 
 __global__ void __launch_bounds__(kSumBlock)
@@ -46,18 +46,20 @@ __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   if (i >= a.ellipsoidCount) return;
 
   const PairSums sums = sumsOf(a.sums, i);
-  Ellipsoid p = a.ellipsoids[i];
+  const Ellipsoid before = a.ellipsoids[i];
+  Ellipsoid p = before;
   AdamState adam = a.states[i];
   const EllipsoidGradient gradient = ellipsoidGradient(a.forms[i].form, sums, a.edge.slope);
   const ParameterVector largest = largestStep(p, a.sizes.scaled(a.factor));
   moveWithin(p, adamDirection(adam, gradient.byParameter, a.adam, largest), a.limits);
+  if (!finite(p)) *a.diverged = 1;  // integer sums would hide it
+  if (refuseStep(a.listed[i], a.core, before, p) && atomicAdd(a.refused, 1u) + 1 == a.maxRefused)
+    *a.halts = 1;
   a.ellipsoids[i] = p;
   a.states[i] = adam;
   a.forms[i] = pairForm(p, a.radius);
   a.usefulness[i] = {float(sums.phi2), float(sums.rPhi),
                      float(edgeGradient(gradient, a.edge.logMByKappa))};
-  if (!finite(p)) *a.diverged = 1;  // integer sums would hide it
-  if (!isHeld(a.listed[i], p, a.core)) *a.halts = 1;
 }
 
 __global__ void __launch_bounds__(kStepBlock) list(const ListingArguments a) {
@@ -79,10 +81,11 @@ __global__ void __launch_bounds__(kStepBlock)
   if (i < count) forms[i] = pairForm(ellipsoids[i], radius);
 }
 
-__global__ void __launch_bounds__(kStepBlock)
-    shrink(Ellipsoid* ellipsoids, std::uint32_t count, double factor) {
+__global__ void __launch_bounds__(kStepBlock) shrink(const ShrinkArguments a) {
   const std::uint32_t i = ownEllipsoid();
-  if (i < count) shrinkBy(ellipsoids[i], factor);
+  if (i >= a.count) return;
+  shrinkBy(a.ellipsoids[i], a.factor);
+  if (a.listed != nullptr && !isHeld(a.listed[i], a.ellipsoids[i], a.core)) *a.halts = 1;
 }
 
 }  // namespace
@@ -99,8 +102,9 @@ void launchReadGradients(const StepArguments& a, EllipsoidGradient* out, cudaStr
   check(cudaGetLastError(), "starting to read gradients");
 }
 
-void launchLossSum(const LossSum& sum, cudaStream_t stream) {
-  sumLoss<<<1, kSumBlock, 0, stream>>>(sum);
+void launchLossSum(const double* brickLoss, std::uint32_t bricks, double* sum,
+                   cudaStream_t stream) {
+  sumLoss<<<1, kSumBlock, 0, stream>>>(brickLoss, bricks, sum);
   check(cudaGetLastError(), "starting the sum of the loss");
 }
 
@@ -116,9 +120,9 @@ void launchEdgeSum(const Usefulness* usefulness, std::uint32_t count, double* su
   check(cudaGetLastError(), "starting the sum of slopes by kappa");
 }
 
-void launchShrink(Ellipsoid* ellipsoids, std::uint32_t count, double factor, cudaStream_t stream) {
-  if (count == 0) return;
-  shrink<<<blocksFor(count, kStepBlock), kStepBlock, 0, stream>>>(ellipsoids, count, factor);
+void launchShrink(const ShrinkArguments& a, cudaStream_t stream) {
+  if (a.count == 0) return;
+  shrink<<<blocksFor(a.count, kStepBlock), kStepBlock, 0, stream>>>(a);
   check(cudaGetLastError(), "starting to shrink ellipsoids");
 }
 

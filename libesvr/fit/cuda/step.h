@@ -40,16 +40,10 @@ struct StepArguments {
   EllipsoidLimits limits;
   const ListedSupport* listed;  ///< an ellipsoid's, in the lists
   double core;                  ///< radius within which no list may miss anything
+  std::uint32_t* refused;       ///< steps that were refused since the lists were built
+  std::uint32_t maxRefused;     ///< so many end the lists
   const int* halted;            ///< isHalted()
   int* halts;                   ///< set to 1 where the lists do not serve the next step
-};
-
-/// The loss of all bricks, in one order. Pointers are to device memory, borrowed.
-struct LossSum {
-  const double* brickLoss;
-  std::uint32_t bricks;
-  double* sum;        ///< out
-  const int* halted;  ///< isHalted()
 };
 
 /// The supports that lists are to hold. Pointers are to device memory, borrowed.
@@ -68,7 +62,8 @@ void launchStep(const StepArguments& arguments, cudaStream_t stream);
 void launchReadGradients(const StepArguments& arguments, EllipsoidGradient* out,
                          cudaStream_t stream);
 
-void launchLossSum(const LossSum& sum, cudaStream_t stream);
+/// Sums the loss of all bricks, in one order.
+void launchLossSum(const double* brickLoss, std::uint32_t bricks, double* sum, cudaStream_t stream);
 
 /// Writes listedSupport() of all ellipsoids.
 void launchListing(const ListingArguments& arguments, cudaStream_t stream);
@@ -76,8 +71,16 @@ void launchListing(const ListingArguments& arguments, cudaStream_t stream);
 void launchEdgeSum(const Usefulness* usefulness, std::uint32_t count, double* sum,
                    cudaStream_t stream);
 
-/// Divides the scales of `count` ellipsoids by a factor.
-void launchShrink(Ellipsoid* ellipsoids, std::uint32_t count, double factor, cudaStream_t stream);
+/// Pointers are to device memory, borrowed.
+struct ShrinkArguments {
+  std::uint32_t count;
+  Ellipsoid* ellipsoids;
+  double factor;                ///< scales are divided by it
+  const ListedSupport* listed;  ///< an ellipsoid's, in the lists; null: there are no lists
+  double core;                  ///< as in StepArguments
+  int* halts;                   ///< set to 1 where the lists do not serve the next step
+};
+void launchShrink(const ShrinkArguments& arguments, cudaStream_t stream);
 
 /// Writes the forms of `count` ellipsoids.
 void launchForms(const Ellipsoid* ellipsoids, std::uint32_t count, double radius, PairForm* forms,

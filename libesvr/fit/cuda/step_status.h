@@ -2,6 +2,7 @@
 /// What the host hears of the steps that it has started.
 
 #include <cstddef>
+#include <cstdint>
 
 #include "fit/cuda/halt.h"
 
@@ -12,6 +13,7 @@ struct StepStatus {
 
   double loss;                ///< sum of r^2 before the last step that was taken
   int diverged;               ///< not 0: an ellipsoid is not finite
+  std::uint32_t refused;      ///< steps of ellipsoids that were refused since the lists were built
   int halted[kMaxAhead + 1];  ///< not 0 in place n: step n was not taken, nor were those after it
 
   /// \return how many of the steps were taken

@@ -5,7 +5,7 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kListsServed = 8;  // a measurement costs two slower passes of some eighty
+constexpr std::size_t kPassesServed = 160;  // a measurement costs two slower passes
 
 }  // namespace
 
@@ -13,14 +13,16 @@ void ThreadsPerBrick::listsChanged(std::size_t passes) {
   tried_ = int(std::min(std::size_t(tried_), std::size_t(triedBefore_) + passes));
   triedBefore_ = tried_;
   if (tried_ != kChoices) return;
-  if (served_ == 0) {
+  if (measuring_) {
     std::array<double, kChoices> times{};
     for (int k = 0; k < kChoices; ++k)
       times[std::size_t(k)] =
           trials_[std::size_t(k)].end.millisecondsSince(trials_[std::size_t(k)].begin);
     best_ = int(std::min_element(times.begin(), times.end()) - times.begin());
   }
-  if (++served_ == kListsServed) served_ = tried_ = triedBefore_ = 0;
+  served_ = measuring_ ? 0 : served_ + passes;
+  measuring_ = served_ >= kPassesServed;
+  if (measuring_) tried_ = triedBefore_ = 0;
 }
 
 }  // namespace esvr::cuda

@@ -39,7 +39,8 @@ class ThreadsPerBrick {
   int tried_ = 0;        ///< choices of the measurement that is going on
   int triedBefore_ = 0;  ///< those on the lists before
   int best_ = 1;
-  int served_ = 0;  ///< lists since the last measurement
+  bool measuring_ = true;
+  std::size_t served_ = 0;  ///< passes since the last measurement
 };
 
 }  // namespace esvr::cuda
