@@ -44,7 +44,8 @@ TEST(DeviceBuffer, OfNoElementsNeedsNoDevice) {
 class DeviceBufferOnGpu : public testing::Test {
  protected:
   void SetUp() override {
-    if (cudaDevices().empty()) GTEST_SKIP() << "no CUDA device: " << cudaVersions();
+    if (selectDevice("auto").kind != DeviceKind::kCuda)
+      GTEST_SKIP() << "no CUDA device: " << cudaVersions();
     stream.emplace();
   }
   std::optional<Stream> stream;
