@@ -2,6 +2,7 @@
 
 #include "cli/byte_size.h"
 #include "cli/command_line.h"
+#include "cli/number.h"
 #include "compare/program.h"
 #include "compare/report_options.h"
 #include "compare/scene_options.h"
@@ -91,7 +92,7 @@ cli::CommandLine makeCommandLine() {
 
 void readRows(const Arguments& a, TableOptions& options) {
   options.lossless = options.quantised = options.matched = options.zfp = false;
-  for (const auto& word : splitAtCommas(a.get<std::string>("rows"))) {
+  for (const auto& word : cli::splitText(a.get<std::string>("rows"), ',')) {
     if (word == "lossless")
       options.lossless = true;
     else if (word == "quantised")
