@@ -10,11 +10,11 @@
 #include "core/cuda/use_device.h"
 #include "esvr/error.h"
 #include "field/gather.h"
-#include "fit/cpu/seed.h"
 #include "fit/cuda/least_useful.h"
 #include "fit/cuda/make_cuda_optimiser.h"
 #include "fit/cuda/memory_plan.h"
 #include "fit/cuda/place_seeds.h"
+#include "fit/kernel_moments.h"
 #include "fit/motion_bound.h"
 #include "fit/scene.h"
 
@@ -61,7 +61,7 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
 void CudaOptimiser::setKernel() {
   kernel_ = kernelConstants<double>(options_.kernel);
   radius_ = supportRadius(kernel_);
-  unitVariance_ = kernelVariance(kernel_);
+  unitVariance_ = kernelMoments(kernel_).variance;
 }
 
 BrickPassArguments CudaOptimiser::passArguments() {
