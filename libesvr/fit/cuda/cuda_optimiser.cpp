@@ -65,13 +65,7 @@ void CudaOptimiser::setKernel() {
 }
 
 BrickPassArguments CudaOptimiser::passArguments() {
-  return {.scene = {.bricks = bricks_.view().bricks,
-                    .brickCount = std::uint32_t(bricks_.size()),
-                    .targetCount = std::uint32_t(bricks_.targetCount()),
-                    .ellipsoidCount = std::uint32_t(count_),
-                    .pairCount = std::uint32_t(lists_.pairCount()),
-                    .lists = lists_.view(),
-                    .forms = forms_.data()},
+  return {.scene = passScene(bricks_, lists_, count_, forms_.data()),
           .kernel = narrowed(kernel_),
           .target = {.values = targetValues_.data(),
                      .narrowBand = target_.narrowBand,
