@@ -18,7 +18,7 @@ constexpr double kNegligiblePsnr = 110.0;
 
 /// Iterations of the solver: for the float32 shapes, and for rounded shapes, which start from the
 /// intensities of the float32 ones. Further iterations would change the error of a trial by a
-/// thousandth (measured on the volumes of docs/lab-notes.md).
+/// thousandth (docs/lab-notes.md, "Number of trials").
 constexpr int kFirstIterations = 8, kIterations = 3;
 
 /// A sample takes one of kCubesPerSample cubes of 4^3 bricks. Smaller volumes are not sampled.

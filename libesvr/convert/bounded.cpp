@@ -13,7 +13,7 @@
 namespace esvr::convert {
 namespace {
 
-// Measured on the volumes of docs/benchmarks.md.
+// docs/benchmarks.md, "Voxels or a residual within an error bound", has the sizes that follow.
 /// The ellipsoids of a grid with a residual get this fraction (1/4) of the voxels' bytes.
 constexpr std::uint64_t kEllipsoidBytesDivisor = 4;
 /// Largest size of a short fit's grid, relative to the voxels', at which a full fit is tried.

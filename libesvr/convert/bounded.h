@@ -11,7 +11,7 @@ namespace esvr::convert {
 /// The smaller of two grids: voxels, or ellipsoids with a residual. The ellipsoids get a quarter of
 /// the bytes of the voxels. A short fit is tried first, and a full one if the short fit promises to
 /// be smaller than the voxels. Ellipsoids are smaller for smooth values and larger for noisy ones
-/// (docs/benchmarks.md).
+/// (docs/benchmarks.md, "Voxels or a residual within an error bound").
 [[nodiscard]] Conversion convertWithin(const Job& job, const BoundGoal& goal);
 
 /// A grid that holds the exact voxels and the exact active mask.

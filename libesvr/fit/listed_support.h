@@ -15,10 +15,8 @@ struct ListedSupport {
   double reach;  ///< its radius in the unit frame, slack included
 };
 
-/// How slack is chosen. Measured on aneurism and smoke1 with 2000 ellipsoids, 300 iterations and
-/// three seeds: lists are as long as with half a voxel for all ellipsoids (39,900 pairs for 39,700,
-/// and 16,800 for 17,900), and are built anew 83 times, where every tenth iteration and every event
-/// had made it 41.
+/// How slack is chosen. docs/lab-notes.md, "When lists of pairs are built anew", compares this rule
+/// with others.
 struct SlackRule {
   double missedShare = 0.05;       ///< share of its intensity that a list may miss of an ellipsoid
   double minSlack = 0.15;          ///< voxels
