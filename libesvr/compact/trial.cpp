@@ -101,7 +101,8 @@ std::vector<float> intensitiesOfFirstLayers(const Trial& trial, std::size_t laye
 }  // namespace
 
 TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
-    : target_{target.source, format::ruleOf(grid), target.box, grid.leaves,
+    : bricks_(grid.leaves),
+      target_{target.source, format::ruleOf(grid), target.box, bricks_,
               grid.topology != TopologyKind::kThreshold},
       sampleBricks_(sampleOf(knownCorners(target_))),
       sampleTarget_{target.source, target_.rule, target.box, sampleBricks_, true},
