@@ -37,7 +37,7 @@ cli::ProgramText programText() {
           "run and keeps the tolerances of the file.\n"
           "\n"
           "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 unusable input,\n"
-          "4 a limit was missed, 5 memory.",
+          "4 a limit was missed, 5 not enough memory (--max-memory).",
       .examples =
           "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45 --min-iou 0.98\n"
           "  esvr-compare check smoke.vdb back.vdb --max-error 1% --fail-on transform,metadata\n"

@@ -44,7 +44,7 @@ cli::ProgramText programText() {
           "what encoding and decoding allocate.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted (finished rows are printed), 2 wrong\n"
-          "options, 3 unusable input, 5 memory.",
+          "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
       .examples =
           "  esvr-compare table smoke.vdb smoke.esvr\n"
           "  esvr-compare table smoke.vdb smoke.esvr --html page.html --markdown table.md\n"
