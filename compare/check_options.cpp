@@ -1,13 +1,11 @@
 #include "compare/check_options.h"
 
-#include <limits>
-
-#include "cli/box_option.h"
 #include "cli/byte_size.h"
 #include "cli/choice.h"
 #include "cli/command_line.h"
 #include "cli/memory_limit.h"
 #include "cli/number.h"
+#include "compare/measure_options.h"
 #include "compare/program.h"
 #include "compare/report_options.h"
 #include "esvr/error.h"
@@ -39,7 +37,7 @@ cli::ProgramText programText() {
           "run and keeps the tolerances of the file.\n"
           "\n"
           "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 unusable input,\n"
-          "4 a limit was missed, 5 memory.",
+          "4 a limit was missed, 5 not enough memory (--max-memory).",
       .examples =
           "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45 --min-iou 0.98\n"
           "  esvr-compare check smoke.vdb back.vdb --max-error 1% --fail-on transform,metadata\n"
@@ -66,16 +64,11 @@ cli::CommandLine makeCommandLine() {
     ("ssim", bool_switch(), "measure and print the SSIM even without a limit on it")
     ("baseline", value<std::string>()->value_name("FILE.json"),
      "compare with the figures of this file")
-    ("update", bool_switch(), "write this run's figures to --baseline instead")
-    ("box", value<std::string>()->value_name("BOX"),
-     "box x0,y0,z0,x1,y1,z1 over which figures are measured (default: the reference's active "
-     "bounding box)")
-    ("peak", value<double>()->value_name("P"),
-     "peak of the PSNR (default: the reference's largest value)")
-    ("report", value<std::string>()->value_name("FILE.json"),
-     "write all results as JSON; '-' is stdout")
-    ("force,f", bool_switch(), "replace the report if it exists");
+    ("update", bool_switch(), "write this run's figures to --baseline instead");
   // clang-format on
+  addMeasureOptions(options);
+  addJsonReport(options);
+  options.add_options()("force,f", bool_switch(), "replace the report if it exists");
   cli::addMaxMemory(line);
   return line;
 }
@@ -132,11 +125,8 @@ std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv)
   options.baseline = a.find<std::string>("baseline");
   options.update = a.get<bool>("update");
   if (options.update && !options.baseline) throw UsageError("--update needs --baseline FILE.json");
-  if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
-  options.peak = a.find<double>("peak");
-  if (options.peak)
-    cli::requireRange("peak", *options.peak, std::numeric_limits<double>::min(),
-                      std::numeric_limits<double>::max());
+  options.box = boxOption(a);
+  options.peak = peakOption(a);
   options.ssim = a.get<bool>("ssim");
   options.report = a.find<std::string>("report").value_or("");
   options.overwrite = a.get<bool>("force");

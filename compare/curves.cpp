@@ -87,9 +87,7 @@ void curves(const CurvesOptions& options) {
   writeCurves(options.prefix, {record, options.table.commandLine}, options.overwrite);
   for (const auto& file : curveFiles(options.prefix, options.table.images.views > 0))
     log.info("wrote " + file.string());
-  if (record.interrupted)
-    throw RuntimeFailure("interrupted; " + std::to_string(record.rows.size()) +
-                         " rows were made, the others are missing");
+  requireAllRows(record);
 }
 
 }  // namespace esvr::compare

@@ -33,7 +33,7 @@ cli::ProgramText programText() {
           "fits that this run makes: the optimisation, and the whole time from voxels to file.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted (finished points are written), 2 wrong\n"
-          "options, 3 unusable input, 5 memory.",
+          "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
       .examples =
           "  esvr-compare curves smoke.vdb --output smoke\n"
           "  esvr-compare curves smoke.vdb 20k.esvr 40k.esvr 80k.esvr --output smoke --fps 400"};

@@ -108,12 +108,6 @@ std::uint64_t bytesOf(const GridFile& file, const std::filesystem::path& path, s
 
 }  // namespace
 
-Timing timingOf(std::vector<double> seconds) {
-  std::sort(seconds.begin(), seconds.end());
-  const std::size_t n = seconds.size();
-  return {(seconds[(n - 1) / 2] + seconds[n / 2]) / 2, seconds.front(), seconds.back(), int(n)};
-}
-
 std::string displayName(const BaselineSetting& setting) {
   if (const auto* packing = std::get_if<VoxelPacking>(&setting.how))
     return std::string(nameOf(packing->form)) + nameOf(packing->codec);

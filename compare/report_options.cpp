@@ -8,11 +8,15 @@ namespace esvr::compare {
 using cli::po::bool_switch;
 using cli::po::value;
 
+void addJsonReport(cli::po::options_description& options) {
+  options.add_options()("report", value<std::string>()->value_name("FILE.json"),
+                        "write all results as JSON; '-' is stdout");
+}
+
 void addReportOptions(cli::po::options_description& options) {
+  addJsonReport(options);
   // clang-format off
   options.add_options()
-    ("report", value<std::string>()->value_name("FILE.json"),
-     "write all results as JSON; '-' is stdout")
     ("markdown", value<std::string>()->value_name("FILE.md"), "write the tables as Markdown")
     ("csv", value<std::string>()->value_name("FILE.csv"),
      "write the figures with all digits as CSV")
@@ -39,16 +43,6 @@ void checkReportFiles(const ReportFiles& files, const std::vector<std::filesyste
   check(files.csv, ".csv");
   check(files.html, ".html");
   cli::requireDistinct(outputs);
-}
-
-std::vector<std::string> splitAtCommas(const std::string& text) {
-  std::vector<std::string> parts;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(',', begin), text.size());
-    parts.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return parts;
 }
 
 }  // namespace esvr::compare

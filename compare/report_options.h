@@ -15,13 +15,14 @@ struct ReportFiles {
   bool overwrite = false;
 };
 
+/// Adds --report.
+void addJsonReport(cli::po::options_description& options);
+/// Adds --report and the other forms of a report.
 void addReportOptions(cli::po::options_description& options);
 [[nodiscard]] ReportFiles reportFiles(const cli::Arguments& arguments);
 
 /// Checks before the work that the files can be written.
 /// \throws UsageError, RuntimeFailure  a file cannot be written
 void checkReportFiles(const ReportFiles& files, const std::vector<std::filesystem::path>& inputs);
-
-[[nodiscard]] std::vector<std::string> splitAtCommas(const std::string& text);
 
 }  // namespace esvr::compare

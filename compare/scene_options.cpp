@@ -1,10 +1,8 @@
 #include "compare/scene_options.h"
 
-#include <limits>
-
-#include "cli/box_option.h"
 #include "cli/byte_size.h"
 #include "cli/memory_limit.h"
+#include "compare/measure_options.h"
 
 namespace esvr::compare {
 
@@ -13,15 +11,12 @@ using cli::po::value;
 void addSceneOptions(cli::CommandLine& line) {
   line.argument("reference", "REF.vdb");
   line.repeatedArgument("candidates");
+  line.options().add_options()(
+      "grid,g", value<std::string>()->value_name("NAME"),
+      "the grid to compare, in every file (default: the first with voxels)");
+  addMeasureOptions(line.options());
   // clang-format off
   line.options().add_options()
-    ("grid,g", value<std::string>()->value_name("NAME"),
-     "the grid to compare, in every file (default: the first with voxels)")
-    ("box", value<std::string>()->value_name("BOX"),
-     "box x0,y0,z0,x1,y1,z1 over which figures are measured (default: the reference's active "
-     "bounding box)")
-    ("peak", value<double>()->value_name("P"),
-     "peak of the PSNR (default: the reference's largest value)")
     ("max-dense", value<std::string>()->value_name("BYTES")->default_value("1GB"),
      "skip ZFP if the box as an array of floats takes more than this")
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
@@ -36,11 +31,8 @@ void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
        a.find<std::vector<std::string>>("candidates").value_or(std::vector<std::string>{}))
     options.candidates.emplace_back(candidate);
   options.grid = a.find<std::string>("grid");
-  if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
-  options.peak = a.find<double>("peak");
-  if (options.peak)
-    cli::requireRange("peak", *options.peak, std::numeric_limits<double>::min(),
-                      std::numeric_limits<double>::max());
+  options.box = boxOption(a);
+  options.peak = peakOption(a);
   options.maxDense = cli::parseByteSize("max-dense", a.get<std::string>("max-dense"));
   options.device = a.get<std::string>("device");
   options.maxMemory = cli::maxMemoryOf(a);

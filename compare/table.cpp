@@ -107,9 +107,7 @@ void table(const TableOptions& options) {
   const TableScene scene = files.scene();
   TableRun(scene, record, log).run();
   tell(options, record);
-  if (record.interrupted)
-    throw RuntimeFailure("interrupted; " + std::to_string(record.rows.size()) +
-                         " rows were made, the others are missing");
+  requireAllRows(record);
 }
 
 }  // namespace esvr::compare

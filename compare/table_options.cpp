@@ -2,6 +2,7 @@
 
 #include "cli/byte_size.h"
 #include "cli/command_line.h"
+#include "cli/number.h"
 #include "compare/program.h"
 #include "compare/report_options.h"
 #include "compare/scene_options.h"
@@ -43,7 +44,7 @@ cli::ProgramText programText() {
           "what encoding and decoding allocate.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted (finished rows are printed), 2 wrong\n"
-          "options, 3 unusable input, 5 memory.",
+          "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
       .examples =
           "  esvr-compare table smoke.vdb smoke.esvr\n"
           "  esvr-compare table smoke.vdb smoke.esvr --html page.html --markdown table.md\n"
@@ -91,7 +92,7 @@ cli::CommandLine makeCommandLine() {
 
 void readRows(const Arguments& a, TableOptions& options) {
   options.lossless = options.quantised = options.matched = options.zfp = false;
-  for (const auto& word : splitAtCommas(a.get<std::string>("rows"))) {
+  for (const auto& word : cli::splitText(a.get<std::string>("rows"), ',')) {
     if (word == "lossless")
       options.lossless = true;
     else if (word == "quantised")

@@ -60,4 +60,7 @@ struct TableRecord {
   bool interrupted = false;
 };
 
+/// \throws RuntimeFailure  the run was interrupted; the text has the number of rows
+void requireAllRows(const TableRecord& record);
+
 }  // namespace esvr::compare

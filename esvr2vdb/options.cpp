@@ -33,7 +33,7 @@ cli::ProgramText programText() {
               "band are active. A file made with --topology exact stores which voxels are active.\n"
               "\n"
               "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
-              "be used, 5 not enough memory.",
+              "be used, 5 not enough memory (--max-memory).",
           .examples =
               "  esvr2vdb smoke.esvr smoke.vdb\n"
               "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   also print the errors\n"

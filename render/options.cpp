@@ -56,7 +56,7 @@ std::string notes() {
          "light, premultiplied. Both hold this command line in their metadata.\n"
          "\n"
          "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot be\n"
-         "used, 5 no such device or not enough memory.";
+         "used, 5 no such device or not enough memory (--max-memory, --max-vram).";
 }
 
 cli::ProgramText programText() {

@@ -15,7 +15,7 @@ GridChoice allThatCanBeFitted(const std::filesystem::path& file, const VdbSummar
   if (!choice.fitted.empty()) return choice;
   std::string text = file.string() + ": the file has no grid that can be fitted";
   for (const auto& grid : choice.skipped)
-    text += "\n  grid \"" + grid.uniqueName + "\" " + grid.skipReason;
+    text += "\n  grid \"" + grid.uniqueName + "\": " + grid.skipReason;
   throw BadInput(text);
 }
 
@@ -29,7 +29,7 @@ GridChoice named(const std::filesystem::path& file, const VdbSummary& summary,
   for (const std::size_t i : places) {
     const GridSummary& grid = summary.grids[i];
     if (!grid.skipReason.empty())
-      throw BadInput(file.string() + ": grid \"" + grid.uniqueName + "\" " + grid.skipReason);
+      throw BadInput(file.string() + ": grid \"" + grid.uniqueName + "\": " + grid.skipReason);
     choice.fitted.push_back(grid);
   }
   return choice;

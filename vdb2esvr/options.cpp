@@ -51,7 +51,8 @@ cli::ProgramText programText() {
           "incomplete.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted, 2 wrong options, 3 unusable input,\n"
-          "4 --psnr not reached (the file is written), 5 device or memory.",
+          "4 --psnr not reached (the file is written), 5 no such device or not enough memory\n"
+          "(--max-memory, --max-vram).",
       .examples =
           "  vdb2esvr smoke.vdb smoke.esvr                       choose everything from the data\n"
           "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          the best file of 100 KB\n"

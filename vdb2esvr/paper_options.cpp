@@ -4,7 +4,7 @@
 #include <limits>
 #include <map>
 #include <sstream>
-#include <string_view>
+#include <vector>
 
 #include "cli/choice.h"
 #include "cli/number.h"
@@ -43,17 +43,15 @@ struct Setting {
 
 /// Reads four rates that are separated by colons: position, scale, rotation, intensity.
 void readRates(const Setting& setting, PaperMethod& method) {
-  PaperRates& rates = method.rates;
-  std::string_view left = setting.value;
-  for (double* rate : {&rates.position, &rates.scale, &rates.rotation, &rates.intensity}) {
-    const std::size_t colon = left.find(':');
-    const auto number = cli::parseNumber(left.substr(0, colon));
-    const bool last = rate == &rates.intensity;
-    if (!number || *number < 0.0 || (colon == std::string_view::npos) != last)
-      setting.refuse("four rates of 0 or above, for example 2e-4:5e-3:1e-3:1e-2");
-    *rate = *number;
-    left.remove_prefix(last ? left.size() : colon + 1);
-  }
+  constexpr std::size_t kRates = 4;
+  std::vector<double> rates;
+  const auto parts = cli::splitText(setting.value, ':');
+  for (const auto& part : parts)
+    if (const auto rate = cli::parseNumber(part); rate && *rate >= 0.0) rates.push_back(*rate);
+  if (parts.size() != kRates || rates.size() != kRates)
+    setting.refuse("four rates of 0 or above, for example 2e-4:5e-3:1e-3:1e-2");
+  method.rates.position = rates[0], method.rates.scale = rates[1];
+  method.rates.rotation = rates[2], method.rates.intensity = rates[3];
 }
 
 void readK(const Setting& setting, PaperMethod& method) {
@@ -156,28 +154,24 @@ std::vector<Key> keys() {
   };
 }
 
-/// Takes the next KEY=VALUE from a list.
-Setting takeSetting(std::string_view& list) {
-  const std::size_t comma = list.find(',');
-  const std::string_view item = list.substr(0, comma);
-  list.remove_prefix(comma == std::string_view::npos ? list.size() : comma + 1);
+/// Reads KEY=VALUE.
+Setting settingOf(const std::string& item) {
   const std::size_t sign = item.find('=');
-  if (sign == std::string_view::npos)
-    throw UsageError("--paper takes KEY=VALUE[,KEY=VALUE...] or default, not '" +
-                     std::string(item) + "'; see --help paper");
-  return {std::string(item.substr(0, sign)), std::string(item.substr(sign + 1))};
+  if (sign == std::string::npos)
+    throw UsageError("--paper takes KEY=VALUE[,KEY=VALUE...] or default, not '" + item +
+                     "'; see --help paper");
+  return {item.substr(0, sign), item.substr(sign + 1)};
 }
 
 std::map<std::string, Setting> settingsIn(const std::vector<std::string>& given) {
   std::map<std::string, Setting> settings;
   for (const std::string& text : given) {
     if (text == kDefault) continue;
-    std::string_view left = text;
-    do {
-      const Setting setting = takeSetting(left);
+    for (const std::string& item : cli::splitText(text, ',')) {
+      const Setting setting = settingOf(item);
       if (!settings.emplace(setting.key, setting).second)
         throw UsageError("--paper: " + setting.key + " is given twice");
-    } while (!left.empty());
+    }
   }
   return settings;
 }

@@ -62,11 +62,13 @@ struct BaselineEncoder::State {
     double seconds = 0.0;
     {
       const AddSeconds clock(seconds);
-      writeBytes(file(), baselines::compressZfp(*dense, setting));
+      writeBytes(file(), baselines::compressZfp(*dense, setting, source.grid.descriptor.name));
     }
     return seconds;
   }
-  void decodeZfp(DenseBox& into) const { baselines::decompressZfp(readBytes(file()), into); }
+  void decodeZfp(DenseBox& into) const {
+    baselines::decompressZfp(readBytes(file()), file(), into);
+  }
 };
 
 BaselineEncoder::BaselineEncoder(const BaselineSource& source)

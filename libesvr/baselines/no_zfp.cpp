@@ -12,8 +12,12 @@ std::string zfpVersion() { return {}; }
 
 namespace baselines {
 
-std::vector<std::byte> compressZfp(const DenseBox&, const ZfpSetting&) { refuse(); }
-void decompressZfp(std::span<const std::byte>, DenseBox&) { refuse(); }
+std::vector<std::byte> compressZfp(const DenseBox&, const ZfpSetting&, const std::string&) {
+  refuse();
+}
+void decompressZfp(std::span<const std::byte>, const std::filesystem::path&, DenseBox&) {
+  refuse();
+}
 
 }  // namespace baselines
 }  // namespace esvr

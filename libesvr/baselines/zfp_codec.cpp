@@ -51,7 +51,8 @@ std::string zfpVersion() {
 
 namespace baselines {
 
-std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& setting) {
+std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& setting,
+                                   const std::string& grid) {
   DenseBox& source = const_cast<DenseBox&>(dense);  // ZFP takes no const pointer, but only reads
   const Field field = fieldOf(source);
   const Stream stream(zfp_stream_open(nullptr));
@@ -61,14 +62,15 @@ std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& sett
   zfp_stream_set_bit_stream(stream.get(), bits.get());
   zfp_stream_rewind(stream.get());
   if (zfp_write_header(stream.get(), field.get(), ZFP_HEADER_FULL) == 0)
-    throw RuntimeFailure("ZFP cannot describe this array");
+    throw RuntimeFailure("grid '" + grid + "': ZFP cannot describe its array of voxels");
   const std::size_t size = zfp_compress(stream.get(), field.get());
-  if (size == 0) throw RuntimeFailure("ZFP failed to compress");
+  if (size == 0) throw RuntimeFailure("grid '" + grid + "': ZFP failed to compress its voxels");
   bytes.resize(size);
   return bytes;
 }
 
-void decompressZfp(std::span<const std::byte> bytes, DenseBox& dense) {
+void decompressZfp(std::span<const std::byte> bytes, const std::filesystem::path& file,
+                   DenseBox& dense) {
   const Field field = fieldOf(dense);
   const Stream stream(zfp_stream_open(nullptr));
   const Bits bits(stream_open(const_cast<std::byte*>(bytes.data()), bytes.size()));
@@ -77,7 +79,7 @@ void decompressZfp(std::span<const std::byte> bytes, DenseBox& dense) {
   const bool read = zfp_read_header(stream.get(), field.get(), ZFP_HEADER_FULL) != 0 &&
                     zfp_field_size(field.get(), nullptr) == dense.values.size() &&
                     zfp_decompress(stream.get(), field.get()) != 0;
-  if (!read) throw BadInput("the ZFP stream does not belong to this box");
+  if (!read) throw BadInput(file.string() + ": the ZFP stream does not belong to this box");
 }
 
 }  // namespace baselines

@@ -1,8 +1,9 @@
 #include "cli/box_option.h"
 
 #include <array>
-#include <charconv>
+#include <cstdint>
 
+#include "cli/number.h"
 #include "esvr/error.h"
 
 namespace esvr::cli {
@@ -16,17 +17,15 @@ namespace {
 }  // namespace
 
 Box parseBox(const std::string& text, const std::string& option) {
-  std::array<std::int32_t, 6> numbers{};
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (i > 0 && (at == end || *at++ != ',')) refuse(option, text, "has fewer");
-    const auto [next, error] = std::from_chars(at, end, numbers[i]);
-    if (error != std::errc{}) refuse(option, text, "has something else");
-    at = next;
+  const auto parts = splitText(text, ',');
+  std::array<std::int32_t, 6> n{};
+  if (parts.size() < n.size()) refuse(option, text, "has fewer");
+  if (parts.size() > n.size()) refuse(option, text, "has more");
+  for (std::size_t i = 0; i < n.size(); ++i) {
+    const auto number = parseWhole(parts[i]);
+    if (!number || *number != std::int32_t(*number)) refuse(option, text, "has something else");
+    n[i] = std::int32_t(*number);
   }
-  if (at != end) refuse(option, text, "has more");
-  const auto& n = numbers;
   const Box box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
   if (box.empty()) refuse(option, text, "has no voxel in it");
   return box;

@@ -13,9 +13,9 @@ constexpr double kShare = 0.75;  // the rest is for what other programs need mea
 
 void addMaxMemory(CommandLine& line) {
   line.options().add_options()(kOption, po::value<std::string>()->value_name("SIZE"),
-                               "refuse input that needs more memory than this, for example 8GB; "
-                               "the need is estimated before "
-                               "any work begins (default: 3/4 of the memory that is available)");
+                               "refuse input that needs more memory than this, for example 8GB, "
+                               "with exit code 5; the need is estimated before any work begins "
+                               "(default: 3/4 of the memory that is available)");
 }
 
 std::uint64_t maxMemoryOf(const Arguments& arguments) {

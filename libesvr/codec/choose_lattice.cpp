@@ -9,7 +9,7 @@
 namespace esvr {
 namespace {
 
-// How the squared error grows, for a Gaussian of weight w (sums over its voxels, math.md):
+// How the squared error grows, for a Gaussian of weight w (sums over its voxels):
 // intensity w^2 (dI / I)^2, scale 3/4 w^2 (d log s)^2, position w^2 (d / s)^2,
 // quaternion w^2 (s1 / s3 - s3 / s1)^2 dq^2.
 constexpr double kScaleCurvature = 0.75;

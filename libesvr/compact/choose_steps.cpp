@@ -10,8 +10,9 @@ namespace {
 
 constexpr double kParametersPerEllipsoid = 10.0;
 
-// The numbers below were measured on the volumes of docs/lab-notes.md. The budget is the error that
-// rounding may add: the allowed error less the error without rounding.
+// The numbers below decide how many trials a choice takes (docs/lab-notes.md, "Number of trials")
+// and how much of a limit may stay unused. The budget is the error that rounding may add: the
+// allowed error less the error without rounding.
 
 /// Trials of approach() and of scaleTo().
 constexpr int kFirstTrials = 3, kMaxTrials = 10;
@@ -50,9 +51,9 @@ QuantiserSteps scaled(QuantiserSteps steps, double factor) {
 }
 
 /// The goal of a search.
-class Goal {
+class TrialGoal {
  public:
-  virtual ~Goal() = default;
+  virtual ~TrialGoal() = default;
   [[nodiscard]] virtual bool met(const Trial& trial) const = 0;
   [[nodiscard]] virtual bool metByFinerSteps() const = 0;
   /// True if a trial that meets the goal uses enough of the limit.
@@ -68,7 +69,7 @@ class Goal {
 };
 
 /// A limit on the error. The error that rounding adds grows with the square of the steps.
-class ErrorGoal : public Goal {
+class ErrorGoal : public TrialGoal {
  public:
   /// \param base  error without rounding
   ErrorGoal(double allowed, double base) : allowed_(allowed), base_(base) {}
@@ -94,9 +95,9 @@ class ErrorGoal : public Goal {
 };
 
 /// A limit on the bytes. Doubling the steps saves one bit of every parameter.
-class SizeGoal : public Goal {
+class BytesGoal : public TrialGoal {
  public:
-  SizeGoal(std::uint64_t bytes, std::size_t ellipsoids)
+  BytesGoal(std::uint64_t bytes, std::size_t ellipsoids)
       : bytes_(bytes), bytesPerOctave_(kParametersPerEllipsoid / 8.0 * double(ellipsoids)) {}
 
   [[nodiscard]] bool met(const Trial& trial) const override { return trial.bytes <= bytes_; }
@@ -142,7 +143,7 @@ QuantiserSteps stepsThatAdd(double error, std::size_t ellipsoids) {
 }
 
 /// Scales all steps together until they are within kBalanceRange of the goal's.
-Trial approach(TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps) {
+Trial approach(TrialMaker& maker, const TrialGoal& goal, const QuantiserSteps& steps) {
   Trial trial = maker.make(steps);
   for (int n = 1; n < kFirstTrials; ++n) {
     const double factor = goal.correction(trial, trial);
@@ -153,7 +154,7 @@ Trial approach(TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps)
 }
 
 /// Scales all steps together until the limit is used well.
-Trial scaleTo(TrialMaker& maker, const Goal& goal, const QuantiserSteps& steps) {
+Trial scaleTo(TrialMaker& maker, const TrialGoal& goal, const QuantiserSteps& steps) {
   Trial best = maker.make(steps);
   Trial last = best, before = best;
   double high = HUGE_VAL, low = 0.0, factor = 1.0;  // the bracket of the wanted factor
@@ -231,7 +232,7 @@ Trial balanced(TrialMaker& maker, const Trial& here) {
           std::uint64_t(std::max(double(here.bytes) - saved, 0.0))};
 }
 
-Trial search(TrialMaker& maker, const Goal& goal, const QuantiserSteps& guess) {
+Trial search(TrialMaker& maker, const TrialGoal& goal, const QuantiserSteps& guess) {
   const Trial expected = balanced(maker, approach(maker, goal, guess));
   return scaleTo(maker, goal, scaled(expected.steps, goal.correction(expected, expected)));
 }
@@ -247,7 +248,7 @@ Trial chooseStepsWithin(TrialMaker& maker, double allowed) {
 
 Trial chooseStepsFor(TrialMaker& maker, std::uint64_t bytes) {
   const double added = kUsualAddedShareOfError * std::max(maker.error(), maker.negligibleError());
-  return search(maker, SizeGoal(bytes, maker.count()), stepsThatAdd(added, maker.count()));
+  return search(maker, BytesGoal(bytes, maker.count()), stepsThatAdd(added, maker.count()));
 }
 
 }  // namespace esvr

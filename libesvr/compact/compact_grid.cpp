@@ -13,7 +13,7 @@ namespace esvr {
 namespace {
 
 /// Margin on a wanted PSNR, dB: a reader's sums have another order than the trials' and must still
-/// reach it. Measured on the volumes of docs/lab-notes.md.
+/// reach it.
 constexpr double kPsnrMargin = 5e-4;
 /// Up to this PSNR, dB, a reader's PSNR differs from a GPU trial's by less than kPsnrMargin.
 constexpr double kMaxPsnrOfMargin = 80.0;

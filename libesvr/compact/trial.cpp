@@ -18,7 +18,7 @@ constexpr double kNegligiblePsnr = 110.0;
 
 /// Iterations of the solver: for the float32 shapes, and for rounded shapes, which start from the
 /// intensities of the float32 ones. Further iterations would change the error of a trial by a
-/// thousandth (measured on the volumes of docs/lab-notes.md).
+/// thousandth (docs/lab-notes.md, "Number of trials").
 constexpr int kFirstIterations = 8, kIterations = 3;
 
 /// A sample takes one of kCubesPerSample cubes of 4^3 bricks. Smaller volumes are not sampled.
@@ -101,7 +101,8 @@ std::vector<float> intensitiesOfFirstLayers(const Trial& trial, std::size_t laye
 }  // namespace
 
 TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
-    : target_{target.source, format::ruleOf(grid), target.box, grid.leaves,
+    : bricks_(grid.leaves),
+      target_{target.source, format::ruleOf(grid), target.box, bricks_,
               grid.topology != TopologyKind::kThreshold},
       sampleBricks_(sampleOf(knownCorners(target_))),
       sampleTarget_{target.source, target_.rule, target.box, sampleBricks_, true},

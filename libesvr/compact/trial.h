@@ -31,8 +31,10 @@ struct TrialTarget {
 
 class TrialMaker {
  public:
-  /// Grid and source must outlive the maker. \throws DeviceError  the GPU cannot be used
+  /// The source must outlive the maker. \throws DeviceError  the GPU cannot be used
   TrialMaker(const StoredGrid& grid, const TrialTarget& target);
+  TrialMaker(const TrialMaker&) = delete;
+  TrialMaker& operator=(const TrialMaker&) = delete;
 
   /// The sum of squares over the box that corresponds to a PSNR in dB.
   [[nodiscard]] double squaresOf(double psnr) const;
@@ -64,6 +66,8 @@ class TrialMaker {
   [[nodiscard]] std::vector<Trial> make(std::span<const QuantiserSteps> steps,
                                         IntensityProblem& problem) const;
 
+  // Targets refer to the bricks before them, and problems to their targets.
+  std::vector<Coord> bricks_;
   IntensityTarget target_;
   std::vector<Coord> sampleBricks_;
   IntensityTarget sampleTarget_;

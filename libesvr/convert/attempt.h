@@ -35,7 +35,7 @@ struct Attempt {
 [[nodiscard]] Attempt attempt(const Job& job, double count, FitLength length);
 
 /// Loss of PSNR by quantising, dB, at which further bytes gain as much in more ellipsoids as in
-/// more bits. Measured on six volumes of docs/benchmarks.md.
+/// more bits (docs/lab-notes.md, "More ellipsoids or more bits").
 inline constexpr double kUsualLoss = 0.9;
 
 /// The goal of storing an attempt: `loss`, unless a PSNR or a number of bytes is given.

@@ -13,11 +13,17 @@
 namespace esvr::convert {
 namespace {
 
-// Measured on the volumes of docs/benchmarks.md.
+// docs/benchmarks.md, "Voxels or a residual within an error bound", has the sizes that follow.
 /// The ellipsoids of a grid with a residual get this fraction (1/4) of the voxels' bytes.
 constexpr std::uint64_t kEllipsoidBytesDivisor = 4;
 /// Largest size of a short fit's grid, relative to the voxels', at which a full fit is tried.
 constexpr double kMaxPromisingRatio = 1.15;
+
+double absoluteBound(const BoundGoal& goal, const SparseVolume& source) {
+  if (!goal.relative) return goal.bound;
+  const ValueRange range = activeRange(source);
+  return goal.bound * (double(range.max) - double(range.min));
+}
 
 Conversion asVoxels(const Job& job, VoxelLayer layer) {
   Conversion conversion;
@@ -68,10 +74,10 @@ void tryEllipsoids(const Job& job, double bound, Smallest& best) {
 
 }  // namespace
 
-double boundOf(const BoundGoal& goal, const SparseVolume& source) {
-  if (!goal.relative) return goal.bound;
-  const ValueRange range = activeRange(source);
-  return goal.bound * (double(range.max) - double(range.min));
+std::optional<double> boundOf(const Goal& goal, const SparseVolume& source) {
+  if (std::holds_alternative<LosslessGoal>(goal)) return 0.0;
+  if (const auto* within = std::get_if<BoundGoal>(&goal)) return absoluteBound(*within, source);
+  return std::nullopt;
 }
 
 Conversion convertLossless(const Job& job) {
@@ -84,7 +90,7 @@ Conversion convertLossless(const Job& job) {
 
 Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   const SparseVolume& source = job.input.source;
-  const double bound = boundOf(goal, source);
+  const double bound = absoluteBound(goal, source);
   if (bound == 0.0) return asVoxels(job, exactLayer(source));
   Conversion voxels = asVoxels(job, boundedLayer(source, bound, job.options.storage.activity));
   if (isNarrowBand(job.input.descriptor, source)) return voxels;

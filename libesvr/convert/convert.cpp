@@ -69,12 +69,6 @@ StoredGrid throughTheFormat(StoredGrid grid) {
   return std::move(decodeEsvr(bytes, "the stored grid").grids.front());
 }
 
-std::optional<double> boundOf(const Goal& goal, const SparseVolume& source) {
-  if (std::holds_alternative<LosslessGoal>(goal)) return 0.0;
-  if (const auto* within = std::get_if<BoundGoal>(&goal)) return convert::boundOf(*within, source);
-  return std::nullopt;
-}
-
 /// Checks the decoded grid against the bound.
 void requireBound(const ConvertInput& input, const StoredGrid& grid, double bound) {
   const double error = largestDifference(input.source, decodeGrid(grid));
@@ -90,7 +84,7 @@ Conversion convertVolume(const ConvertInput& input, const ConvertOptions& option
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
   Conversion conversion = std::visit(Converter({input, own}), options.goal);
   conversion.grid = throughTheFormat(std::move(conversion.grid));
-  if (const auto bound = boundOf(options.goal, input.source))
+  if (const auto bound = convert::boundOf(options.goal, input.source))
     requireBound(input, conversion.grid, *bound);
   return conversion;
 }

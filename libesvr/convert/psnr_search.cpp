@@ -9,7 +9,7 @@
 namespace esvr::convert {
 namespace {
 
-// Measured on the volumes of docs/benchmarks.md.
+// Usual values. They decide how many fits a search takes; the PSNR of every fit is measured.
 constexpr double kDbPerDoubling = 4.5;        // gain of PSNR by twice the ellipsoids
 constexpr double kShortFitBehind = 2.5;       // PSNR of a full fit less that of a short one, dB
 constexpr double kVoxelsPerEllipsoid = 35.0;  // active voxels per ellipsoid of the first guess

@@ -8,7 +8,7 @@
 namespace esvr::convert {
 namespace {
 
-// Measured on the volumes of docs/benchmarks.md.
+// Usual values. They decide how many fits a search takes; the bytes of every grid are counted.
 constexpr double kBytesPerEllipsoid = 8.0;  // first guess
 constexpr double kShortFitPrice = 0.94;     // bytes per ellipsoid of a short fit / of a full fit
 constexpr double kMaxUsefulLoss = 2.5;      // loss, dB, above which fewer ellipsoids are better

@@ -65,13 +65,6 @@ Device selectDevice(const std::string& text) {
   return chooseDevice(text, text == "cpu" ? CudaProbe{} : probeCuda());
 }
 
-std::vector<std::string> cudaDevices() {
-  std::vector<std::string> names;
-  for (const auto& device : probeCuda().devices)
-    if (device.whyNotUsable.empty()) names.push_back(device.name);
-  return names;
-}
-
 std::string deviceName(const Device& device) {
   if (device.kind == DeviceKind::kCpu) return "CPU";
   const std::string place = std::string(kCudaPrefix) + std::to_string(device.index);

@@ -11,8 +11,8 @@ namespace esvr {
 namespace {
 
 // Bytes that are held at once, at most. Lists that grow hold twice their content while they are
-// copied, and a tree that is written holds a brick again. esvr2vdb held 22 MB for smoke1 with 8,000
-// ellipsoids, of which the estimate is 24 MB.
+// copied, and a tree that is written holds a brick again. docs/lab-notes.md, "Memory estimates",
+// compares an estimate with what a program held.
 constexpr double kBytesPerEllipsoid = 512.0;  // parameters, support, prepared form
 constexpr double kBytesPerPair = 16.0;        // lists both ways, and what they are made from
 constexpr double kBytesOfValues = kBrickVoxels * sizeof(float);

@@ -13,8 +13,8 @@ namespace esvr {
 
 /// The kernel's constants in float32, for inner loops.
 [[nodiscard]] ESVR_HD inline KernelConstants<float> narrowed(const KernelConstants<double>& k) {
-  return {float(k.shift), float(k.numerator), float(k.plateau), float(k.base),
-          float(k.slope), float(k.cutoff),    float(k.expNegS)};
+  return {float(k.shift), float(k.numerator), float(k.plateau),
+          float(k.base),  float(k.slope),     float(k.cutoff)};
 }
 
 [[nodiscard]] inline SignsAllowed signsOf(const FitTarget& target) {

@@ -1,6 +1,6 @@
 #pragma once
-/// The tuned constants of a fit, which are the same for all data. They were measured on the volumes
-/// of docs/lab-notes.md.
+/// The tuned constants of a fit, which are the same for all data. docs/lab-notes.md, "The fit", has
+/// what was tried instead.
 
 #include "fit/adam.h"
 #include "fit/listed_support.h"

@@ -15,7 +15,8 @@
 namespace esvr::format {
 
 /// Blocks are decoded one without the other. Those of layers are smaller, so that a box needs fewer
-/// ellipsoids; each block has to learn its models anew, which is what that costs.
+/// ellipsoids; each block has to learn its models anew, which costs bytes (docs/lab-notes.md,
+/// "Importance layers").
 inline constexpr std::size_t kBlockEllipsoids = 4096, kLayerBlockEllipsoids = 2048;
 
 inline constexpr std::size_t kStreams = 4;  ///< positions, scales, rotations, intensities

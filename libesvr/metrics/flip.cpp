@@ -8,14 +8,14 @@
 #include "esvr/error.h"
 #include "metrics/flip_color.h"
 #include "metrics/flip_filters.h"
+#include "metrics/shown_pictures.h"
 
 namespace esvr {
 namespace {
 
 using metrics::Color;
+using metrics::kChannels, metrics::kColors;
 using metrics::Plane;
-
-constexpr int kChannels = 4, kColors = 3;
 
 // Exponents and knee of the paper's equations 4 to 7.
 constexpr double kColorExponent = 0.7, kFeatureExponent = 0.5;
@@ -24,10 +24,7 @@ constexpr double kKneeAt = 0.4, kKneeValue = 0.95;
 using Planes = std::array<Plane, kColors>;
 
 void checkPictures(const Image& reference, const Image& candidate, double pixelsPerDegree) {
-  if (reference.width < 1 || reference.height < 1)
-    throw UsageError("a picture without a pixel cannot be compared");
-  if (reference.width != candidate.width || reference.height != candidate.height)
-    throw UsageError("pictures of different sizes cannot be compared");
+  metrics::requireEqualSizes(reference, candidate);
   if (!(pixelsPerDegree > 0.0) || !std::isfinite(pixelsPerDegree))
     throw UsageError("FLIP needs pixels per degree above 0, not " +
                      std::to_string(pixelsPerDegree));
@@ -35,10 +32,7 @@ void checkPictures(const Image& reference, const Image& candidate, double pixels
 
 Color shownColor(const float* rgba) {
   Color color;
-  for (int c = 0; c < kColors; ++c) {
-    if (std::isnan(rgba[c])) throw BadInput("a picture has a color that is not a number");
-    color[c] = std::clamp(double(rgba[c]), 0.0, 1.0);
-  }
+  for (int c = 0; c < kColors; ++c) color[c] = metrics::shownValue(rgba[c]);
   return color;
 }
 

@@ -8,43 +8,29 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <string>
 
 #include "esvr/error.h"
 #include "esvr/metrics.h"
 #include "field/ssim_window.h"
+#include "metrics/shown_pictures.h"
 
 namespace esvr {
 namespace {
 
-constexpr int kChannels = 4, kColors = 3;
+using metrics::kChannels, metrics::kColors;
+
 constexpr double kPeak = 1.0;
 constexpr int kRowsPerTask = 16;
 
 using Rows = tbb::blocked_range<int>;
-
-std::string sizeOf(const Image& image) {
-  return std::to_string(image.width) + " x " + std::to_string(image.height);
-}
-
-void checkSizes(const Image& reference, const Image& candidate) {
-  if (reference.width < 1 || reference.height < 1)
-    throw UsageError("a picture of " + sizeOf(reference) + " pixels cannot be compared");
-  if (reference.width != candidate.width || reference.height != candidate.height)
-    throw UsageError("pictures of " + sizeOf(reference) + " and " + sizeOf(candidate) +
-                     " pixels cannot be compared");
-}
 
 /// One color channel, clamped to 0 to 1.
 class Plane {
  public:
   Plane(const Image& image, int channel)
       : width(image.width), height(image.height), values_(std::size_t(width) * height) {
-    for (std::size_t i = 0; i < values_.size(); ++i) {
-      const double v = image.rgba[i * kChannels + channel];
-      if (std::isnan(v)) throw BadInput("a picture has a color that is not a number");
-      values_[i] = std::clamp(v, 0.0, kPeak);
-    }
+    for (std::size_t i = 0; i < values_.size(); ++i)
+      values_[i] = metrics::shownValue(image.rgba[i * kChannels + channel]);
   }
   const int width, height;
   [[nodiscard]] const double* row(int y) const { return &values_[std::size_t(y) * width]; }
@@ -150,7 +136,7 @@ double largestDifference(const Plane& a, const Plane& b) {
 }  // namespace
 
 ImageMetrics compareImages(const Image& reference, const Image& candidate) {
-  checkSizes(reference, candidate);
+  metrics::requireEqualSizes(reference, candidate);
   const Window window;
   const double samples = double(reference.width) * reference.height * kColors;
   double squares = 0.0, ssim = 0.0;
@@ -167,7 +153,7 @@ ImageMetrics compareImages(const Image& reference, const Image& candidate) {
 }
 
 Image errorMap(const Image& reference, const Image& candidate, double gain) {
-  checkSizes(reference, candidate);
+  metrics::requireEqualSizes(reference, candidate);
   Image map{reference.width, reference.height, std::vector<float>(reference.rgba.size(), 1.0f)};
   for (std::size_t i = 0; i < map.rgba.size(); i += kChannels) {
     double largest = 0.0;
@@ -180,7 +166,7 @@ Image errorMap(const Image& reference, const Image& candidate, double gain) {
 
 Image sideBySide(std::span<const Image> images) {
   if (images.empty()) throw UsageError("there are no pictures to place side by side");
-  for (const Image& image : images) checkSizes(images.front(), image);
+  for (const Image& image : images) metrics::requireEqualSizes(images.front(), image);
   const std::size_t ofRow = std::size_t(kChannels) * std::size_t(images.front().width);
   Image all{int(images.size()) * images.front().width, images.front().height, {}};
   all.rgba.reserve(images.size() * images.front().rgba.size());

@@ -2,29 +2,16 @@
 
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
 #include <array>
 
 #include "core/brick_index.h"
 #include "esvr/error.h"
+#include "render/cell_bricks.h"
 
 namespace esvr {
 namespace {
 
 constexpr double kMaxBlocks = double(1 << 28);  // 1 GB
-
-Coord above(int corner) { return {corner >> 2, (corner >> 1) & 1, corner & 1}; }
-
-/// Bricks some cell of which has a voxel in a brick of the volume.
-std::vector<Coord> candidates(const SparseVolume& volume) {
-  std::vector<Coord> bricks;
-  bricks.reserve(8 * volume.bricks.size());
-  for (const Coord brick : volume.bricks)
-    for (int corner = 0; corner < 8; ++corner) bricks.push_back(brick - above(corner));
-  std::sort(bricks.begin(), bricks.end());
-  bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
-  return bricks;
-}
 
 class CellReader {
  public:
@@ -33,7 +20,7 @@ class CellReader {
   /// The voxels at the corners of a brick's cells. \return false where all are the background
   bool read(Coord brick, float* values) const {
     std::array<const float*, 8> from{};
-    for (int c = 0; c < 8; ++c) from[c] = find(brick + above(c));
+    for (int c = 0; c < 8; ++c) from[c] = find(brick + stepToCorner(c));
     bool any = false;
     for (int x = 0; x < kCellBrickSide; ++x)
       for (int y = 0; y < kCellBrickSide; ++y)
@@ -51,8 +38,7 @@ class CellReader {
     return at == BrickIndex::kNone ? nullptr : volume_.brickValues(at).data();
   }
   [[nodiscard]] float value(const std::array<const float*, 8>& from, Coord at) const {
-    const Coord step = brickOf(at);
-    const float* values = from[std::size_t(step.x << 2 | step.y << 1 | step.z)];
+    const float* values = from[cornerAt(brickOf(at))];
     return values == nullptr ? volume_.background : values[voxelOffset(localOf(at))];
   }
 
@@ -107,7 +93,7 @@ void index(BrickAtlas& atlas) {
 BrickAtlas makeBrickAtlas(const SparseVolume& volume) {
   const CellReader reader(volume);
   BrickAtlas atlas;
-  atlas.bricks = occupied(reader, candidates(volume));
+  atlas.bricks = occupied(reader, bricksWithCells(volume));
   Box blocks;
   for (const Coord brick : atlas.bricks) blocks.expand(blockOf(brick));
   if (atlas.bricks.empty()) return atlas;

@@ -23,7 +23,8 @@ std::size_t findGrid(const std::vector<GridSummary>& grids, const std::string& w
 }
 
 std::string notAFloatType(const std::string& valueType) {
-  return "its values are of type " + valueType + "; only float and double grids can be fitted";
+  return "its values are of type " + valueType +
+         ", which is not supported; float, half and double are";
 }
 
 }  // namespace esvr::vdb

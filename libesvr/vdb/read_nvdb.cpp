@@ -25,7 +25,8 @@ GridSummary summarise(const NanoEntry& entry) {
   grid.storedBytes = entry.storedBytes;
   grid.isScalar = isScalarFloatNano(entry.gridType);
   grid.skipReason = grid.isScalar ? "" : notAFloatType(grid.valueType);
-  if (grid.skipReason.empty() && entry.activeVoxels == 0) grid.skipReason = "has no active voxel";
+  if (grid.skipReason.empty() && entry.activeVoxels == 0)
+    grid.skipReason = "it has no active voxel";
   return grid;
 }
 

@@ -39,9 +39,9 @@ std::string reasonToSkip(const ArchiveEntry& entry) {
   if (isScalarFloatTree(entry)) return {};
   const std::string type = entry.valueType();
   if (type.starts_with("ptdataidx") || type.starts_with("ptidx"))
-    return "holds points (" + type + "), not a float volume";
+    return "it holds points (" + type + "), which are not supported";
   if (type == "float" || type == "double")
-    return "its tree (" + entry.treeType + ") is not OpenVDB's standard one";
+    return "its tree (" + entry.treeType + ") is not supported; OpenVDB's standard tree is";
   return notAFloatType(type);
 }
 
@@ -75,7 +75,7 @@ GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHea
   if (!countFromStatistics(head.metadata, grid)) countFromTree(archive, entry, grid);
   grid.isScalar = isScalarFloatTree(entry);
   grid.skipReason = reasonToSkip(entry);
-  if (grid.skipReason.empty() && grid.activeVoxels == 0) grid.skipReason = "has no active voxel";
+  if (grid.skipReason.empty() && grid.activeVoxels == 0) grid.skipReason = "it has no active voxel";
   return grid;
 }
 

@@ -23,7 +23,7 @@ std::ostream& operator<<(std::ostream& out, const Form& form) { return out << fo
 class BaselineForm : public testing::TestWithParam<Form> {
  protected:
   VolumeGrid grid_ = test::ballGrid();
-  test::TemporaryDirectory folder_;
+  test::TemporaryFolder folder_;
   BaselineEncoder encoder_{
       {.grid = grid_, .box = activeBox(grid_.volume), .folder = folder_.path()}};
 };
@@ -56,7 +56,7 @@ TEST_P(BaselineForm, leavesNoFileBehind) {
         {.grid = grid_, .box = activeBox(grid_.volume), .folder = folder_.path()});
     encoder.encode(parseBaseline(GetParam().setting));
   }
-  EXPECT_EQ(folder_.fileCount(), 0u);
+  EXPECT_EQ(folder_.names().size(), 0u);
 }
 
 class Encoder : public BaselineForm {};

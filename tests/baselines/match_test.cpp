@@ -17,7 +17,7 @@ namespace {
 class Matching : public testing::Test {
  protected:
   VolumeGrid grid_ = test::ballGrid();
-  test::TemporaryDirectory folder_;
+  test::TemporaryFolder folder_;
   BaselineEncoder encoder_{
       {.grid = grid_, .box = activeBox(grid_.volume), .folder = folder_.path()}};
 };

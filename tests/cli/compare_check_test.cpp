@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/converters.h"
+#include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/vdb_io.h"
 
@@ -17,6 +18,7 @@ namespace {
 
 using nlohmann::json;
 using test::InputGrid;
+using test::Refusal;
 using test::softBall;
 using testing::AllOf;
 using testing::ElementsAre;
@@ -266,14 +268,6 @@ TEST_F(CompareCheck, reportsFailuresInJson) {
   EXPECT_NEAR(report["grids"][0]["max_error"].get<double>(), 0.01, 1e-7);  // float32 near 1
 }
 
-struct Refusal {
-  std::vector<std::string> arguments;  ///< "DIR/x" stands for a file of the fixture's folder
-  int code;
-  const char* words;
-};
-std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
-  return out << testing::PrintToString(refusal.arguments);
-}
 class RefusedCheck : public CompareCheck, public testing::WithParamInterface<Refusal> {};
 
 TEST_P(RefusedCheck, isExplainedAndLeavesNoFile) {
@@ -282,12 +276,7 @@ TEST_P(RefusedCheck, isExplainedAndLeavesNoFile) {
   write("else.vdb", {{.name = "fuel", .voxels = softBall({})}});
   test::writeText(at("broken.vdb"), "no such thing");
   test::writeText(at("notes.json"), "[1, 2]");
-  std::vector<std::string> arguments = GetParam().arguments;
-  for (std::string& argument : arguments)
-    if (argument.starts_with("DIR/")) argument = at(argument.substr(4));
-  const auto run = compare(arguments);
-  EXPECT_EQ(run.exitCode, GetParam().code);
-  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  GetParam().expectOf(compare(GetParam().argumentsIn(folder_)));
   EXPECT_THAT(folder_.names(), ElementsAre("broken.vdb", "else.vdb", "none.vdb", "notes.json",
                                            "ref.vdb", "zero.vdb"));
 }

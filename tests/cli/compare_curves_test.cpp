@@ -9,12 +9,14 @@
 #include <set>
 
 #include "cli/converters.h"
+#include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
 
 namespace esvr {
 namespace {
 
 using nlohmann::json;
+using test::Refusal;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -98,24 +100,11 @@ TEST_F(CompareCurves, SlowChoosesSixSizesAndTellsThoseThatAreTooSmall) {
   EXPECT_EQ(files + refused, 6u);
 }
 
-struct Refusal {
-  std::vector<std::string> arguments;  ///< "DIR/x" stands for a file of the fixture's folder
-  int code;
-  const char* words;
-};
-std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
-  return out << testing::PrintToString(refusal.arguments);
-}
 class RefusedCurves : public CompareCurves, public testing::WithParamInterface<Refusal> {};
 
 TEST_P(RefusedCurves, isExplainedAndLeavesNoFile) {
   test::writeText(at("there.csv"), "precious");
-  std::vector<std::string> arguments = GetParam().arguments;
-  for (std::string& argument : arguments)
-    if (argument.starts_with("DIR/")) argument = at(argument.substr(4));
-  const auto run = curves(arguments);
-  EXPECT_EQ(run.exitCode, GetParam().code);
-  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  GetParam().expectOf(curves(GetParam().argumentsIn(folder_)));
   EXPECT_THAT(folder_.names(), testing::ElementsAre("fit.esvr", "ref.vdb", "there.csv"));
 }
 

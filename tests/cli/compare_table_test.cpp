@@ -11,12 +11,14 @@
 #include <sstream>
 
 #include "cli/converters.h"
+#include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
 
 namespace esvr {
 namespace {
 
 using nlohmann::json;
+using test::Refusal;
 using test::softBall;
 using testing::AllOf;
 using testing::ElementsAre;
@@ -253,14 +255,6 @@ TEST_F(CompareTable, SlowKeepsTheRowsThatAreMadeWhenInterrupted) {
   EXPECT_THAT(test::readText(at("t.csv")), HasSubstr("\nfit.esvr,ESVR,"));
 }
 
-struct Refusal {
-  std::vector<std::string> arguments;  ///< "DIR/x" stands for a file of the fixture's folder
-  int code;
-  const char* words;
-};
-std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
-  return out << testing::PrintToString(refusal.arguments);
-}
 class RefusedTable : public CompareTable, public testing::WithParamInterface<Refusal> {};
 
 TEST_P(RefusedTable, isExplainedAndLeavesNoFile) {
@@ -270,13 +264,7 @@ TEST_P(RefusedTable, isExplainedAndLeavesNoFile) {
   test::writeInput(at("far.vdb"), {{.voxels = softBall({100, 0, 0})}});
   ASSERT_EQ(test::quickFit(at("far.vdb"), at("far.esvr")).exitCode, 0);
   const auto before = folder_.names();
-  std::vector<std::string> arguments = GetParam().arguments;
-  for (std::string& argument : arguments)
-    for (std::size_t i; (i = argument.find("DIR/")) != std::string::npos;)
-      argument.replace(i, 4, at(""));
-  const auto run = table(arguments);
-  EXPECT_EQ(run.exitCode, GetParam().code);
-  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  GetParam().expectOf(table(GetParam().argumentsIn(folder_)));
   EXPECT_EQ(folder_.names(), before);
 }
 

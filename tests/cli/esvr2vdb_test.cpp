@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "cli/converters.h"
+#include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
 #include "esvr/vdb_io.h"
@@ -16,6 +17,7 @@ namespace esvr {
 namespace {
 
 using test::esvr2vdb;
+using test::Refusal;
 using test::softBall;
 using testing::AllOf;
 using testing::ElementsAre;
@@ -220,48 +222,32 @@ TEST_F(Esvr2Vdb, checksAFile) {
   EXPECT_THAT(damaged.err, HasSubstr("in.esvr"));
 }
 
-struct Refusal {
-  std::vector<std::string> arguments;  ///< IN and OUT stand for the fixture's files
-  int code;
-  const char* words;
-};
-std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
-  return out << testing::PrintToString(refusal.arguments);
-}
-
 class RefusedRun : public Esvr2Vdb, public testing::WithParamInterface<Refusal> {};
 
 TEST_P(RefusedRun, isExplainedAndLeavesNoFile) {
-  std::vector<std::string> arguments = GetParam().arguments;
-  for (std::string& argument : arguments) {
-    if (argument == "IN") argument = in();
-    if (argument == "OUT") argument = out();
-    if (argument.starts_with("DIR/")) argument = folder_ / argument.substr(4);
-  }
-  const auto run = esvr2vdb(arguments);
-  EXPECT_EQ(run.exitCode, GetParam().code);
-  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  GetParam().expectOf(esvr2vdb(GetParam().argumentsIn(folder_)));
   EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "source.vdb"));
 }
 
 INSTANTIATE_TEST_SUITE_P(
     All, RefusedRun,
-    testing::Values(Refusal{{}, 2, "IN.esvr"}, Refusal{{"IN"}, 2, "OUT.vdb"},
-                    Refusal{{"IN", "DIR/out.txt"}, 2, ".vdb or .nvdb"},
-                    Refusal{{"IN", "OUT", "--threshold", "-1"}, 2, "--threshold"},
-                    Refusal{{"IN", "OUT", "--half", "maybe"}, 2, "maybe"},
-                    Refusal{{"IN", "OUT", "--box", "0,0,0,1,1,1"}, 2, "--reference"},
-                    Refusal{{"IN", "OUT", "--list"}, 2, "--list"},
-                    Refusal{{"IN", "OUT", "--lod", "0"}, 2, "--lod"},
-                    Refusal{{"IN", "OUT", "--max-ellipsoids", "-1"}, 2, "--max-ellipsoids"},
-                    Refusal{{"IN", "OUT", "--bbox", "1,2,3"}, 2, "bbox"},
-                    Refusal{{"--check", "IN", "--lod", "1"}, 2, "--check"},
-                    Refusal{{"--list", "--check", "IN"}, 2, "two jobs"},
-                    Refusal{{"DIR/none.esvr", "OUT"}, 3, "none.esvr"},
-                    Refusal{{"DIR/source.vdb", "OUT"}, 3, "source.vdb"},
-                    Refusal{{"IN", "OUT", "-g", "smoke"}, 3, "\"density\""},
-                    Refusal{{"IN", "OUT", "--reference", "DIR/none.vdb"}, 3, "none.vdb"},
-                    Refusal{{"IN", "DIR/none/out.vdb"}, 1, "none/out.vdb"}));
+    testing::Values(
+        Refusal{{}, 2, "IN.esvr"}, Refusal{{"DIR/in.esvr"}, 2, "OUT.vdb"},
+        Refusal{{"DIR/in.esvr", "DIR/out.txt"}, 2, ".vdb or .nvdb"},
+        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--threshold", "-1"}, 2, "--threshold"},
+        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--half", "maybe"}, 2, "maybe"},
+        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--box", "0,0,0,1,1,1"}, 2, "--reference"},
+        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--list"}, 2, "--list"},
+        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--lod", "0"}, 2, "--lod"},
+        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--max-ellipsoids", "-1"}, 2, "--max-ellipsoids"},
+        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--bbox", "1,2,3"}, 2, "bbox"},
+        Refusal{{"--check", "DIR/in.esvr", "--lod", "1"}, 2, "--check"},
+        Refusal{{"--list", "--check", "DIR/in.esvr"}, 2, "two jobs"},
+        Refusal{{"DIR/none.esvr", "DIR/out.vdb"}, 3, "none.esvr"},
+        Refusal{{"DIR/source.vdb", "DIR/out.vdb"}, 3, "source.vdb"},
+        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "-g", "smoke"}, 3, "\"density\""},
+        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--reference", "DIR/none.vdb"}, 3, "none.vdb"},
+        Refusal{{"DIR/in.esvr", "DIR/none/out.vdb"}, 1, "none/out.vdb"}));
 
 TEST_F(Esvr2Vdb, keepsAnExistingFileUnlessForced) {
   test::writeText(out(), "precious");

@@ -15,14 +15,13 @@
 
 #include "cli/run_program.h"
 #include "esvr/container.h"
-#include "esvr/device.h"
-#include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "esvr/transfer_function.h"
 #include "esvr/vdb_io.h"
 #include "esvr/voxel_layer.h"
 #include "field/random_field.h"
+#include "support/on_device.h"
 
 namespace esvr::test {
 namespace {
@@ -284,11 +283,9 @@ TEST_F(EsvrRender, ValuesOfFewerBitsChangeThePictureALittle) {
 }
 
 TEST_F(EsvrRender, PartsOfTheDepthAndMemoryChangeNothingOnGpu) {
-  try {
-    (void)selectDevice("cuda");
-  } catch (const DeviceError& error) {
-    GTEST_SKIP() << error.what();
-  }
+  Device gpu;
+  selectOrSkip("cuda", gpu);
+  if (IsSkipped()) return;
   const auto usual = picture("in.esvr", {"--device", "cuda"});
   EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--bins", "3"}), usual), 48.0);
   EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--max-vram", "1"}), usual), 48.0);

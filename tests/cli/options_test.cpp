@@ -11,9 +11,8 @@
 #include "cli/converters.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/baseline.h"
-#include "esvr/device.h"
-#include "esvr/error.h"
 #include "esvr/vdb_io.h"
+#include "support/on_device.h"
 
 namespace esvr {
 namespace {
@@ -23,15 +22,6 @@ using test::softBall;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-bool hasGpu() {
-  try {
-    (void)selectDevice("cuda");
-    return true;
-  } catch (const DeviceError&) {
-    return false;
-  }
-}
 
 class Options : public testing::Test {
  protected:
@@ -148,7 +138,9 @@ TEST_F(Vdb2EsvrOption, devicesAreTakenAsNamed) {
 }
 
 TEST_F(Vdb2EsvrOption, maxVramBoundsTheDevicesMemoryOnGpu) {
-  if (!hasGpu()) GTEST_SKIP() << "there is no GPU";
+  Device gpu;
+  test::selectOrSkip("cuda", gpu);
+  if (IsSkipped()) return;
   const auto run =
       test::vdb2esvr({at("in.vdb"), at("none.esvr"), "--device", "cuda", "--max-vram", "0.00001"});
   EXPECT_EQ(run.exitCode, 5);

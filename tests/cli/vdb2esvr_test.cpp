@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/converters.h"
+#include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
 #include "esvr/grid_coding.h"
@@ -23,6 +24,7 @@ namespace {
 using test::InputGrid;
 using test::InputVoxel;
 using test::quickFit;
+using test::Refusal;
 using test::softBall;
 using test::vdb2esvr;
 using testing::AllOf;
@@ -154,23 +156,12 @@ TEST_F(Vdb2Esvr, fitsTheGridsThatAreNamedOnly) {
 
 // ---- options
 
-struct Refusal {
-  std::vector<std::string> options;
-  int code;
-  const char* words;
-};
-std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
-  return out << testing::PrintToString(refusal.options);
-}
-
 class RefusedOptions : public Vdb2Esvr, public testing::WithParamInterface<Refusal> {};
 
 TEST_P(RefusedOptions, areNamedAndLeaveNoFile) {
   std::vector<std::string> arguments{in(), out()};
-  arguments.insert(arguments.end(), GetParam().options.begin(), GetParam().options.end());
-  const auto run = vdb2esvr(arguments);
-  EXPECT_EQ(run.exitCode, GetParam().code);
-  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  arguments.insert(arguments.end(), GetParam().arguments.begin(), GetParam().arguments.end());
+  GetParam().expectOf(vdb2esvr(arguments));
   EXPECT_FALSE(outIsThere());
 }
 

@@ -7,22 +7,19 @@
 
 #include "../fit/volumes.h"
 #include "esvr/compact.h"
-#include "esvr/error.h"
 #include "esvr/fit.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "support/on_device.h"
 
 namespace esvr {
 namespace {
 
-class CompactGridOnGpu : public testing::TestWithParam<bool> {
+class CompactGridOnGpu : public test::OnGpu, public testing::WithParamInterface<bool> {
  protected:
   void SetUp() override {
-    try {
-      device_ = selectDevice("cuda");
-    } catch (const DeviceError& error) {
-      GTEST_SKIP() << error.what();
-    }
+    OnGpu::SetUp();
+    if (IsSkipped()) return;
     const bool band = GetParam();
     source_ = band ? test::levelSetVolume() : test::tubeVolume();
     FitOptions options;
@@ -37,7 +34,6 @@ class CompactGridOnGpu : public testing::TestWithParam<bool> {
   [[nodiscard]] double psnrOf(const StoredGrid& grid) const {
     return compareVolumes(source_, decodeGrid(grid)).psnrBox;
   }
-  Device device_;
   SparseVolume source_;
   StoredGrid grid_;
 };

@@ -14,6 +14,7 @@
 
 #include "esvr/error.h"
 #include "support/file_size_limit.h"
+#include "support/temporary_folder.h"
 
 namespace esvr {
 namespace {
@@ -24,18 +25,9 @@ using testing::ThrowsMessage;
 
 class AtomicFileTest : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "esvr-test-XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    directory_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(directory_); }
-
-  [[nodiscard]] fs::path target() const { return directory_ / "out.esvr"; }
-  [[nodiscard]] std::size_t entries() const {
-    return std::size_t(std::distance(fs::directory_iterator(directory_), fs::directory_iterator()));
-  }
-  fs::path directory_;
+  [[nodiscard]] fs::path target() const { return folder_ / "out.esvr"; }
+  [[nodiscard]] std::size_t entries() const { return folder_.names().size(); }
+  test::TemporaryFolder folder_;
 };
 
 std::span<const std::byte> bytesOf(std::string_view text) {
@@ -107,24 +99,24 @@ TEST_F(AtomicFileTest, ReplacingDoesNotWidenPermissions) {
 }
 
 TEST_F(AtomicFileTest, FollowsASymbolicLink) {
-  put(directory_ / "real", "old");
+  put(folder_ / "real", "old");
   fs::create_symlink("real", target());
   AtomicFile file(target(), true);
   file.write(bytesOf("new"));
   file.commit();
   EXPECT_TRUE(fs::is_symlink(target()));
-  EXPECT_EQ(contentOf(directory_ / "real"), "new");
+  EXPECT_EQ(contentOf(folder_ / "real"), "new");
 }
 
 TEST_F(AtomicFileTest, RefusesDevicesAndDirectoriesEvenWhenAskedToReplace) {
   EXPECT_THAT([&] { AtomicFile("/dev/full", true); },
               ThrowsMessage<RuntimeFailure>(HasSubstr("/dev/full")));
-  EXPECT_THAT([&] { AtomicFile(directory_, true); },
+  EXPECT_THAT([&] { AtomicFile(folder_.path(), true); },
               ThrowsMessage<RuntimeFailure>(HasSubstr("not a regular file")));
 }
 
 TEST_F(AtomicFileTest, NamesAMissingDirectory) {
-  EXPECT_THAT([&] { AtomicFile(directory_ / "no" / "out.esvr", false); },
+  EXPECT_THAT([&] { AtomicFile(folder_ / "no" / "out.esvr", false); },
               ThrowsMessage<RuntimeFailure>(HasSubstr("no/out.esvr: No such file")));
 }
 
@@ -181,12 +173,12 @@ TEST_F(AtomicFileTest, SurvivesBeingKilled) {
 
 TEST_F(AtomicFileTest, LeavesTheTemporaryFilesOfOthersAlone) {
   AtomicFile alive(target(), false);
-  put(directory_ / ".esvr-12345678.tmp.keep", "not ours");
-  put(directory_ / ".esvr-0badcafe.tmp", "left over");
-  AtomicFile other(directory_ / "other.esvr", false);
+  put(folder_ / ".esvr-12345678.tmp.keep", "not ours");
+  put(folder_ / ".esvr-0badcafe.tmp", "left over");
+  AtomicFile other(folder_ / "other.esvr", false);
   EXPECT_TRUE(fs::exists(alive.path()));
-  EXPECT_TRUE(fs::exists(directory_ / ".esvr-12345678.tmp.keep"));
-  EXPECT_FALSE(fs::exists(directory_ / ".esvr-0badcafe.tmp"));
+  EXPECT_TRUE(fs::exists(folder_ / ".esvr-12345678.tmp.keep"));
+  EXPECT_FALSE(fs::exists(folder_ / ".esvr-0badcafe.tmp"));
   alive.commit();
   EXPECT_TRUE(fs::exists(target()));
 }

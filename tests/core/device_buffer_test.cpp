@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/cuda/stream.h"
-#include "esvr/device.h"
+#include "support/on_device.h"
 
 namespace esvr::cuda {
 namespace {
@@ -41,11 +41,11 @@ TEST(DeviceBuffer, OfNoElementsNeedsNoDevice) {
   EXPECT_EQ(buffer.size(), 0u);
 }
 
-class DeviceBufferOnGpu : public testing::Test {
+class DeviceBufferOnGpu : public test::OnGpu {
  protected:
   void SetUp() override {
-    if (cudaDevices().empty()) GTEST_SKIP() << "no CUDA device: " << cudaVersions();
-    stream.emplace();
+    OnGpu::SetUp();
+    if (!IsSkipped()) stream.emplace();
   }
   std::optional<Stream> stream;
 };

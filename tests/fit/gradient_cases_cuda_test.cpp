@@ -8,7 +8,7 @@
 namespace esvr {
 namespace {
 
-class GradientCasesOnGpu : public test::OnGpu,
+class GradientCasesOnGpu : public test::CudaTest,
                            public testing::WithParamInterface<test::GradientCase> {
  protected:
   [[nodiscard]] std::vector<EllipsoidGradient> gradients() const {

@@ -10,7 +10,7 @@
 #include "esvr/field.h"
 #include "esvr/metrics.h"
 #include "fit/intensity_problem.h"
-#include "paper/on_device.h"
+#include "support/on_device.h"
 #include "volumes.h"
 
 namespace esvr::test {

@@ -10,20 +10,17 @@
 #include <array>
 #include <cmath>
 
-#include "esvr/error.h"
+#include "support/on_device.h"
 #include "volumes.h"
 
 namespace esvr {
 namespace {
 
-class OptimiserOn : public testing::TestWithParam<const char*> {
+class OptimiserOn : public test::OnDevice {
  protected:
   void SetUp() override {
-    try {
-      options_.device = selectDevice(GetParam());
-    } catch (const DeviceError& error) {
-      GTEST_SKIP() << error.what();
-    }
+    OnDevice::SetUp();
+    options_.device = device_;
   }
   [[nodiscard]] std::unique_ptr<Optimiser> make(const Tuning& tuning = {}) const {
     return makeOptimiser(target_, options_, tuning);
@@ -148,8 +145,7 @@ TEST_P(OptimiserOn, AFarPlaceChangesNoBit) {
   EXPECT_TRUE(test::sameBits(fitAt({}), fitAt({1 << 20, -(1 << 20), 1 << 20})));
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, OptimiserOn, testing::Values("cpu", "cuda"),
-                         [](const auto& device) { return std::string(device.param); });
+ESVR_ON_DEVICES(OptimiserOn);
 
 }  // namespace
 }  // namespace esvr

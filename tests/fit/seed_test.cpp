@@ -1,6 +1,5 @@
 // Plan: draws follow the squared residual of the signs allowed and nothing else; a seed takes
-// place, spread and height from the residual around it; the kernel's variance has its closed form
-// in the Gaussian limit.
+// place, spread and height from the residual around it.
 
 #include "fit/cpu/seed.h"
 
@@ -71,13 +70,6 @@ TEST(Seed, TakesPlaceAndHeightFromTheResidual) {
   EXPECT_NEAR(seeds[0].intensity + seeds[1].intensity + seeds[2].intensity, 0.5, 1e-7);
   const PrincipalAxes axes = principalAxes(seeds[1].L);
   EXPECT_GT(axes.scale[0], 1.4 * axes.scale[1]);  // longer along the bar
-}
-
-TEST(KernelVariance, IsOneHalfForTheGaussian) {
-  // e^-m has variance 1/2 along each axis; what eps cuts off goes to zero with it.
-  EXPECT_NEAR(kernelVariance(kernelConstants<double>({.kappa = -30.0f, .epsilon = 1e-9f})), 0.5,
-              1e-4);
-  EXPECT_GT(kernelVariance(kernelConstants<double>({.kappa = 5.0f})), 0.8);
 }
 
 }  // namespace

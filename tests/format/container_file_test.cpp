@@ -12,6 +12,7 @@
 #include "format/crafted_file.h"
 #include "format/sample_files.h"
 #include "support/file_size_limit.h"
+#include "support/temporary_folder.h"
 
 namespace esvr {
 namespace {
@@ -26,21 +27,14 @@ using testing::ThrowsMessage;
 
 class ContainerFile : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "esvr-test-XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    directory_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(directory_); }
-
-  [[nodiscard]] fs::path path() const { return directory_ / "f.esvr"; }
+  [[nodiscard]] fs::path path() const { return folder_ / "f.esvr"; }
   void put(const std::vector<std::byte>& bytes) const {
     std::ofstream out(path(), std::ios::binary);
     out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
   }
   void put(const std::string& text) const { put(test::bytesOf(text)); }
 
-  fs::path directory_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(ContainerFile, ComesBackAndHasTheSizeThatWasSaid) {
@@ -66,7 +60,7 @@ TEST_F(ContainerFile, AFullDiskLeavesNothing) {
     EXPECT_THAT([&] { writeEsvr(path(), test::everything(100)); },
                 ThrowsMessage<RuntimeFailure>(HasSubstr("f.esvr")));
   }
-  EXPECT_TRUE(fs::is_empty(directory_));
+  EXPECT_THAT(folder_.names(), IsEmpty());
 }
 
 TEST_F(ContainerFile, WhatCannotBeStoredIsNamedAndLeavesNothing) {
@@ -75,13 +69,13 @@ TEST_F(ContainerFile, WhatCannotBeStoredIsNamedAndLeavesNothing) {
   EXPECT_THAT([&] { writeEsvr(path(), test::fileOf(grid)); },
               ThrowsMessage<RuntimeFailure>(
                   AllOf(HasSubstr("'density'"), HasSubstr("intensity of ellipsoid 2"))));
-  EXPECT_TRUE(fs::is_empty(directory_));
+  EXPECT_THAT(folder_.names(), IsEmpty());
 }
 
 TEST_F(ContainerFile, OtherThingsAreRefusedByName) {
   EXPECT_THAT([&] { (void)readEsvr(path()); },
               ThrowsMessage<BadInput>(HasSubstr("f.esvr: No such file")));
-  EXPECT_THAT([&] { (void)readEsvr(directory_); },
+  EXPECT_THAT([&] { (void)readEsvr(folder_.path()); },
               ThrowsMessage<BadInput>(HasSubstr("not a regular file")));
   EXPECT_THAT([&] { (void)readEsvr("/dev/zero"); },
               ThrowsMessage<BadInput>(HasSubstr("not a regular file")));

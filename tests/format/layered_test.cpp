@@ -2,8 +2,6 @@
 // whole holds of it, and takes fewer bytes to read; lies in the directory are found out, whole or
 // in part, before memory is spent on them.
 
-#include <unistd.h>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,6 +19,7 @@
 #include "format/checksum.h"
 #include "format/crafted_file.h"
 #include "format/sample_files.h"
+#include "support/temporary_folder.h"
 
 namespace esvr {
 namespace {
@@ -91,21 +90,16 @@ TEST(LayeredFile, IsRefusedWhereItsLayersDoNotDivideIt) {
   EXPECT_THROW((void)encodeEsvr(file), RuntimeFailure);
 }
 
-/// A file on disk, removed in the end.
+/// A file on disk.
 class PartOfAFile : public testing::Test {
  protected:
-  void SetUp() override {
-    path_ = std::filesystem::temp_directory_path() /
-            ("esvr_part_" + std::to_string(::getpid()) + "_" +
-             testing::UnitTest::GetInstance()->current_test_info()->name());
-    writeEsvr(path_, {{}, {grid_}});
-  }
-  void TearDown() override { std::filesystem::remove(path_); }
+  void SetUp() override { writeEsvr(path_, {{}, {grid_}}); }
 
   [[nodiscard]] std::uint64_t size() const { return std::filesystem::file_size(path_); }
 
   StoredGrid grid_ = test::layeredGrid(9000);
-  std::filesystem::path path_;
+  test::TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "part.esvr";
 };
 
 TEST_F(PartOfAFile, OfAllLayersIsAllOfIt) {

@@ -9,7 +9,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <cmath>
 #include <limits>
@@ -18,6 +17,7 @@
 #include "esvr/metrics.h"
 #include "metrics/dense_reference.h"
 #include "metrics/volumes.h"
+#include "support/on_threads.h"
 
 namespace esvr {
 namespace {
@@ -150,13 +150,10 @@ TEST(CompareVolumes, aBoxAwayFromAllVoxelsHoldsBackgroundOnly) {
 TEST(CompareVolumes, sumsAreTheSameBitsForAnyNumberOfThreads) {
   const auto a = randomVolume({.seed = 11, .brickRange = 5, .brickShare = 0.6});
   const auto b = randomVolume({.seed = 12, .brickRange = 5, .brickShare = 0.6});
-  const auto with = [&](std::size_t threads) {
-    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return compareVolumes(a, b, {.ssim = true});
-  };
-  const auto one = with(1);
+  const auto compare = [&] { return compareVolumes(a, b, {.ssim = true}); };
+  const auto one = test::onThreads(1, compare);
   for (std::size_t threads : {2u, 3u, 7u}) {
-    const auto many = with(threads);
+    const auto many = test::onThreads(threads, compare);
     EXPECT_EQ(one.mseBox, many.mseBox);
     EXPECT_EQ(one.mseActive, many.mseActive);
     EXPECT_EQ(one.massCandidate, many.massCandidate);

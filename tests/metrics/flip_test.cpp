@@ -4,13 +4,13 @@
 // largest difference is that of green and blue; and what must not count.
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <cmath>
 #include <cstdint>
 
 #include "esvr/error.h"
 #include "esvr/flip.h"
+#include "support/on_threads.h"
 
 namespace esvr::test {
 namespace {
@@ -94,11 +94,8 @@ TEST(Flip, doesNotSeeAlphaNorWhatNoScreenShows) {
 }
 
 TEST(Flip, isTheSameForAnyNumberOfThreads) {
-  const auto withThreads = [&](std::size_t n) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, n);
-    return flip(blocks(), noisyBlocks());
-  };
-  EXPECT_EQ(withThreads(1).map, withThreads(3).map);
+  const auto map = [] { return flip(blocks(), noisyBlocks()).map; };
+  EXPECT_EQ(onThreads(1, map), onThreads(3, map));
 }
 
 TEST(Flip, refusesWhatCannotBeCompared) {

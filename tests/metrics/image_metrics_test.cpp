@@ -2,7 +2,6 @@
 // (means of products cancel to 1e-16 of squares below 1, over C2 = 9e-4: 1e-12), closed forms for
 // constant pictures, and what must not count: alpha, colors that no screen shows.
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include "esvr/error.h"
 #include "esvr/image_metrics.h"
 #include "field/random_field.h"
+#include "support/on_threads.h"
 
 namespace esvr::test {
 namespace {
@@ -91,12 +91,10 @@ TEST(ImageMetrics, AlphaAndWhatNoScreenShowsDoNotCount) {
 
 TEST(ImageMetrics, IsTheSameForAnyNumberOfThreads) {
   const Image a = noise(90, 130, 4), b = noise(90, 130, 5);
-  const auto withThreads = [&](std::size_t n) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, n);
-    return compareImages(a, b);
-  };
-  EXPECT_EQ(withThreads(1).ssim, withThreads(3).ssim);
-  EXPECT_EQ(withThreads(1).psnr, withThreads(3).psnr);
+  const auto compare = [&] { return compareImages(a, b); };
+  const ImageMetrics one = onThreads(1, compare), three = onThreads(3, compare);
+  EXPECT_EQ(one.ssim, three.ssim);
+  EXPECT_EQ(one.psnr, three.psnr);
 }
 
 TEST(ImageMetrics, WhatCannotBeComparedIsRefused) {

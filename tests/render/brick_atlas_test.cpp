@@ -8,7 +8,7 @@
 
 #include "esvr/error.h"
 #include "esvr/field.h"
-#include "field/random_field.h"
+#include "render/brick_scene.h"
 #include "render/picture.h"
 #include "render/reference_picture.h"
 
@@ -16,24 +16,7 @@ namespace esvr::test {
 namespace {
 
 SparseVolume volumeAt(const std::vector<Coord>& corners, float background = 0.0f) {
-  Random random(5);
-  std::vector<BrickInput> bricks;
-  for (const Coord corner : corners) {
-    BrickInput brick{corner, {}, {}};
-    for (float& v : brick.values) v = float(random(0.0, 1.0));
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), background);
-}
-
-RenderOptions optionsFor(const SparseVolume& volume, const CameraWish& wish = {}) {
-  RenderOptions o;
-  o.resolution = {45, 38};
-  o.camera = fitCamera(activeBox(volume), wish, o.resolution);
-  o.transfer = {builtInColorMap("turbo"), builtInOpacity("linear")};
-  o.opacityLength = 10.0;
-  return o;
+  return randomBricks(corners, 5, background);
 }
 
 Image marched(const SparseVolume& volume, const RenderOptions& o) {

@@ -6,7 +6,6 @@
 // channel: 72 dB where every pixel loses that. 70 dB is asked for; a sample missed or taken twice
 // costs more.
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <cmath>
 #include <limits>
@@ -16,6 +15,7 @@
 #include "field/random_field.h"
 #include "render/reference_picture.h"
 #include "render/vector.h"
+#include "support/on_threads.h"
 
 namespace esvr::test {
 namespace {
@@ -133,13 +133,10 @@ TEST(RenderField, FarCamerasLoseNothing) {
 TEST(RenderField, IsTheSameForAnyNumberOfThreads) {
   const Field field = randomField({.count = 300});
   const RenderOptions o = optionsFor({}, {130, 70});
-  const auto withThreads = [&](std::size_t n) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, n);
-    return renderField(field, o).rgba;
-  };
-  const auto one = withThreads(1);
-  EXPECT_EQ(one, withThreads(2));
-  EXPECT_EQ(one, withThreads(5));
+  const auto draw = [&] { return renderField(field, o).rgba; };
+  const auto one = onThreads(1, draw);
+  EXPECT_EQ(one, onThreads(2, draw));
+  EXPECT_EQ(one, onThreads(5, draw));
 }
 
 TEST(RenderField, TheEndOfARayCostsLittle) {

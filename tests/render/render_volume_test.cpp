@@ -3,15 +3,15 @@
 // render_field_test.cpp; the interpolation itself is float32, 1e-7 of the values. Then the two
 // renderers against each other.
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <cmath>
 
 #include "esvr/field.h"
 #include "esvr/render.h"
-#include "field/random_field.h"
+#include "render/brick_scene.h"
 #include "render/reference_picture.h"
 #include "render/vector.h"
+#include "support/on_threads.h"
 
 namespace esvr::test {
 namespace {
@@ -32,25 +32,10 @@ double trilinear(const SparseVolume& volume, const Vec3& place) {
 
 /// A few bricks far apart, some with neighbours, full of random values.
 SparseVolume scattered(Coord shift = {}) {
-  Random random(3);
-  std::vector<BrickInput> bricks;
-  for (const Coord corner : {Coord{0, 0, 0}, Coord{0, 0, 8}, Coord{8, 8, 8}, Coord{40, 0, 16},
-                             Coord{16, 40, 32}, Coord{0, 32, 0}}) {
-    BrickInput brick{corner + shift, {}, {}};
-    for (float& v : brick.values) v = float(random(0.0, 1.0));
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), 0.0f);
-}
-
-RenderOptions optionsFor(const SparseVolume& volume, const CameraWish& wish = {}) {
-  RenderOptions o;
-  o.resolution = {45, 38};
-  o.camera = fitCamera(activeBox(volume), wish, o.resolution);
-  o.transfer = {builtInColorMap("turbo"), builtInOpacity("linear")};
-  o.opacityLength = 10.0;
-  return o;
+  std::vector<Coord> corners{{0, 0, 0},   {0, 0, 8},    {8, 8, 8},
+                             {40, 0, 16}, {16, 40, 32}, {0, 32, 0}};
+  for (Coord& corner : corners) corner = corner + shift;
+  return randomBricks(corners, 3);
 }
 
 double agreement(const SparseVolume& volume, const RenderOptions& o) {
@@ -98,11 +83,8 @@ TEST(RenderVolume, EmptySpaceIsTransparentWhateverItsOpacity) {
 
 TEST(RenderVolume, IsTheSameForAnyNumberOfThreads) {
   const auto volume = scattered();
-  const auto withThreads = [&](std::size_t n) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, n);
-    return renderVolume(volume, optionsFor(volume)).rgba;
-  };
-  EXPECT_EQ(withThreads(1), withThreads(3));
+  const auto draw = [&] { return renderVolume(volume, optionsFor(volume)).rgba; };
+  EXPECT_EQ(onThreads(1, draw), onThreads(3, draw));
 }
 
 TEST(RenderVolume, NoVoxelsGiveAnEmptyPicture) {

@@ -6,7 +6,6 @@
 // of another cell costs more. Where a rule has a threshold, a voxel on it may come out either way
 // and is off by the threshold: 70 dB.
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <cmath>
 #include <string>
@@ -16,6 +15,7 @@
 #include "esvr/vdb_io.h"
 #include "field/random_field.h"
 #include "render/reference_picture.h"
+#include "support/on_threads.h"
 
 namespace esvr::test {
 namespace {
@@ -129,13 +129,10 @@ TEST(WindowTile, DrawsByTheRuleOfTheVoxels) {
 TEST(WindowTile, IsTheSameForAnyNumberOfThreads) {
   const Field field = randomField({.count = 300});
   const RenderOptions o = optionsFor({}, {130, 70});
-  const auto withThreads = [&](std::size_t n) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, n);
-    return renderField(field, o).rgba;
-  };
-  const auto one = withThreads(1);
-  EXPECT_EQ(one, withThreads(2));
-  EXPECT_EQ(one, withThreads(5));
+  const auto draw = [&] { return renderField(field, o).rgba; };
+  const auto one = onThreads(1, draw);
+  EXPECT_EQ(one, onThreads(2, draw));
+  EXPECT_EQ(one, onThreads(5, draw));
 }
 
 TEST(WindowTile, NothingToSeeIsTransparent) {

@@ -4,12 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/run_program.h"
+#include "cli/refusal.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr {
 namespace {
 
+using test::Refusal;
 using test::runProgram;
 using test::TemporaryFolder;
 using testing::ElementsAre;
@@ -72,22 +73,12 @@ TEST(EsvrSample, keepsAnExistingFileUnlessForced) {
   EXPECT_NO_THROW((void)readGrid(path, "density"));
 }
 
-struct Refusal {
-  std::vector<std::string> arguments;
-  int code;
-  const char* text;
-};
-
 class RefusedSample : public testing::TestWithParam<Refusal> {};
 
 TEST_P(RefusedSample, leavesNoFile) {
   const TemporaryFolder folder;
-  std::vector<std::string> arguments = GetParam().arguments;
-  for (std::string& argument : arguments)
-    if (argument.starts_with("DIR/")) argument = folder / argument.substr(4);
-  const auto run = sample(arguments);
-  EXPECT_EQ(run.exitCode, GetParam().code);
-  EXPECT_THAT(run.err, HasSubstr(GetParam().text));
+  const auto run = sample(GetParam().argumentsIn(folder));
+  GetParam().expectOf(run);
   EXPECT_THAT(run.out, IsEmpty());
   EXPECT_THAT(folder.names(), IsEmpty());
 }

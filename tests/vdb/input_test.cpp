@@ -28,7 +28,7 @@ class Input : public testing::Test {
     std::ofstream(directory_ / "text.vdb") << text;
     return directory_ / "text.vdb";
   }
-  test::TemporaryDirectory directory_;
+  test::TemporaryFolder directory_;
 };
 
 TEST_F(Input, ThatIsMissing) { expectRefused(directory_ / "missing.vdb", "no such file"); }

@@ -13,7 +13,7 @@
 namespace esvr {
 namespace {
 
-using test::TemporaryDirectory;
+using test::TemporaryFolder;
 using testing::Contains;
 using testing::Field;
 using testing::Not;
@@ -48,7 +48,7 @@ void insertEveryType(openvdb::MetaMap& map) {
 std::string described(const openvdb::MetaMap& map) { return map.str(); }
 
 TEST(Metadata, EveryTypeComesBackVerbatim) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   openvdb::MetaMap fileMetadata;
   insertEveryType(fileMetadata);
   auto source = test::smallGrid();
@@ -78,7 +78,7 @@ TEST(Metadata, EveryTypeComesBackVerbatim) {
 }
 
 TEST(Metadata, BytesAreThoseOfTheValueWithoutItsSize) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   auto source = test::smallGrid();
   source->insertMeta("answer", openvdb::Int32Metadata(0x01020304));
   test::save(directory / "in.vdb", {source});
@@ -88,7 +88,7 @@ TEST(Metadata, BytesAreThoseOfTheValueWithoutItsSize) {
 }
 
 TEST(Metadata, StatisticsOfTheOldFileAreReplacedByThoseOfTheNew) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   test::save(directory / "in.vdb", {test::smallGrid()});
   auto grid = readGrid(directory / "in.vdb", "density");
   for (const char* name : {"file_bbox_min", "file_bbox_max", "file_compression", "file_mem_bytes",
@@ -103,7 +103,7 @@ TEST(Metadata, StatisticsOfTheOldFileAreReplacedByThoseOfTheNew) {
 }
 
 TEST(Metadata, AnItemUnderOurOwnKeyIsNotOverwritten) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
   const std::vector<MetaItem> items{stringItem("creator", "Houdini 20.5"),
                                     stringItem("esvr_writer", "someone else")};
@@ -112,7 +112,7 @@ TEST(Metadata, AnItemUnderOurOwnKeyIsNotOverwritten) {
 }
 
 TEST(Metadata, VectorTypeAndLocalSpaceReachTheHost) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   auto source = test::smallGrid();
   source->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
   source->setIsInWorldSpace(false);
@@ -127,7 +127,7 @@ TEST(Metadata, VectorTypeAndLocalSpaceReachTheHost) {
 }
 
 TEST(Metadata, ADescriptorFromScratchNeedsNone) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   auto grid = test::gridOf("temperature", {{{0, 0, 0}, 1.0f}});
   grid.descriptor.gridClass = GridClass::kStaggered;
   writeGrids(directory / "out.vdb", {}, {&grid, 1});
@@ -137,7 +137,7 @@ TEST(Metadata, ADescriptorFromScratchNeedsNone) {
 }
 
 TEST(Metadata, AnItemWhoseBytesDoNotFitItsTypeIsCarriedAsTheyAre) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
   const MetaItem odd{"odd", "vec3s", {std::byte{1}, std::byte{2}}};
   grid.descriptor.metadata.push_back(odd);

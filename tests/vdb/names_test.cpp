@@ -43,7 +43,7 @@ class Names : public testing::Test {
   [[nodiscard]] float mark(const std::string& name) const {
     return valueAt(readGrid(path(), name).volume, {0, 0, 0});
   }
-  test::TemporaryDirectory directory_;
+  test::TemporaryFolder directory_;
 };
 
 TEST_F(Names, StandInFileOrder) {

@@ -61,7 +61,7 @@ TEST_P(RealFiles, ComeBackAsTheyWere) {
   const auto path = dataDir() / GetParam().path;
   const auto summary = inspectVdb(path);
   const auto grid = readGrid(path, summary.grids.front().uniqueName);
-  const test::TemporaryDirectory directory;
+  const test::TemporaryFolder directory;
   writeGrids(directory / "back.vdb", summary.metadata, {&grid, 1});
 
   test::expectSame(readGrid(directory / "back.vdb", grid.descriptor.name), grid);

@@ -1,46 +1,17 @@
 #pragma once
-/// Files for the tests of this folder: the real volumes and a directory of one's own.
+/// Files for the tests of this folder: the real volumes and a folder of one's own.
 
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-#include <atomic>
 #include <filesystem>
 #include <string>
+
+#include "support/temporary_folder.h"
 
 namespace esvr::test {
 
 /// The real volumes' folder, or an empty path where none is configured.
 inline std::filesystem::path dataDir() { return ESVR_DATA_DIR; }
-
-/// A directory that goes away with the test.
-class TemporaryDirectory {
- public:
-  TemporaryDirectory() {
-    static std::atomic<int> counter{0};
-    path_ = std::filesystem::temp_directory_path() /
-            ("esvr-test-" + std::to_string(::getpid()) + "-" + std::to_string(counter++));
-    std::filesystem::create_directories(path_);
-  }
-  ~TemporaryDirectory() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-
-  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const {
-    return path_ / name;
-  }
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  [[nodiscard]] std::size_t fileCount() const {
-    const std::filesystem::directory_iterator files(path_);
-    return std::size_t(std::distance(begin(files), end(files)));
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 }  // namespace esvr::test
 

@@ -67,7 +67,7 @@ openvdb::FloatGrid::Ptr gridUnder(const math::MapBase& map) {
 
 class EveryMap : public testing::TestWithParam<NamedMap> {
  protected:
-  test::TemporaryDirectory directory_;
+  test::TemporaryFolder directory_;
 };
 
 TEST_P(EveryMap, ComesBackFromVdbVerbatim) {
@@ -123,7 +123,7 @@ TEST(UniformTransform, IsWhatOpenVdbMakes) {
   EXPECT_EQ(transform.mapType, "UniformScaleMap");
   auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
   grid.descriptor.transform = transform;
-  const test::TemporaryDirectory directory;
+  const test::TemporaryFolder directory;
   writeGrids(directory / "out.vdb", {}, {&grid, 1});
   EXPECT_TRUE(test::load(directory / "out.vdb", "density")->transform() ==
               *math::Transform::createLinearTransform(0.1));

@@ -32,7 +32,7 @@ class Voxels : public testing::Test {
     test::save(path(), {grid});
     return readGrid(path(), grid->getName(), options);
   }
-  test::TemporaryDirectory directory_;
+  test::TemporaryFolder directory_;
 };
 
 /// How one file packs its values, and what its inactive voxels hold.
@@ -68,7 +68,7 @@ class EveryPacking : public testing::TestWithParam<Packing> {
   template <class Grid>
   void expectReadExactly() {
     const auto source = patterned<Grid>();
-    const test::TemporaryDirectory directory;
+    const test::TemporaryFolder directory;
     test::saveCompressed(directory / "in.vdb", {source}, GetParam().compression);
     const auto grid = readGrid(directory / "in.vdb", "density");
     EXPECT_EQ(activeVoxelCount(grid.volume), source->activeVoxelCount());

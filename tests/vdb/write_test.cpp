@@ -33,7 +33,7 @@ class Write : public testing::Test {
     writeGrids(path(), {}, {&grid, 1}, options);
     return openvdb::gridPtrCast<FloatGrid>(test::load(path(), grid.descriptor.name));
   }
-  test::TemporaryDirectory directory_;
+  test::TemporaryFolder directory_;
 };
 
 TEST_F(Write, InactiveVoxelsHoldTheBackground) {
@@ -136,7 +136,7 @@ TEST_F(Write, ValuesBeyondHalfAreRefusedNotMadeInfinite) {
       },
       ThrowsMessage<UsageError>(AllOf(HasSubstr("heat"), HasSubstr("65504"))));
   EXPECT_EQ(inspectVdb(path()).grids.front().name, "density");  // the old file stands
-  EXPECT_EQ(directory_.fileCount(), 1u);
+  EXPECT_EQ(directory_.names().size(), 1u);
 }
 
 TEST_F(Write, SeveralGridsOfOneNameKeepTheirOrder) {
@@ -168,14 +168,14 @@ TEST_F(Write, AnExistingFileStaysUnlessOverwriteIsGiven) {
   EXPECT_EQ(inspectVdb(path()).grids.front().name, "old");
   writeGrids(path(), {}, {&fresh, 1}, {.overwrite = true});
   EXPECT_EQ(inspectVdb(path()).grids.front().name, "new");
-  EXPECT_EQ(directory_.fileCount(), 1u);
+  EXPECT_EQ(directory_.names().size(), 1u);
 }
 
 TEST_F(Write, OtherExtensionsAreRefused) {
   const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
   for (const char* name : {"out.esvr", "out", "out.VDB.gz"})
     EXPECT_THROW(writeGrids(directory_ / name, {}, {&grid, 1}), UsageError) << name;
-  EXPECT_EQ(directory_.fileCount(), 0u);
+  EXPECT_EQ(directory_.names().size(), 0u);
 }
 
 TEST_F(Write, ADirectoryThatIsNotThereIsNamed) {
@@ -208,7 +208,7 @@ TEST_F(Write, AFullDiskIsNoticedAndLeavesNothing) {
           ThrowsMessage<RuntimeFailure>(AllOf(HasSubstr(name), HasSubstr("disk is full"))))
           << limit;
     }
-    EXPECT_EQ(directory_.fileCount(), 0u);
+    EXPECT_EQ(directory_.names().size(), 0u);
   }
 }
 

@@ -5,6 +5,15 @@
 
 namespace esvr::cuda {
 
+/// Makes room for at least n elements, without any to spare. What was there is lost when it has to
+/// grow.
+template <class T>
+void makeRoom(DeviceBuffer<T>& buffer, std::size_t n, cudaStream_t stream) {
+  if (buffer.size() >= n) return;
+  buffer = {};  // first freed, so that both are never held at once
+  buffer = DeviceBuffer<T>(n, stream);
+}
+
 /// Room for n elements. Growing leaves some to spare, so that sizes which creep up from call to
 /// call do not allocate each time.
 template <class T>
@@ -14,10 +23,7 @@ class GrowingBuffer {
 
   /// Room for at least n; what was there is lost when it has to grow.
   T* reserve(std::size_t n) {
-    if (n > buffer_.size()) {
-      buffer_ = {};  // first freed, so that both are never held at once
-      buffer_ = DeviceBuffer<T>(withSpare(n), stream_);
-    }
+    if (n > buffer_.size()) makeRoom(buffer_, withSpare(n), stream_);
     return buffer_.data();
   }
   /// Room for at least n; the first `kept` elements stay.

@@ -1,8 +1,10 @@
 #pragma once
-/// Reductions over the lanes of a warp and over the threads of a block. Each has one order, so that
-/// sums of floating-point numbers are the same bits in every run.
+/// Reductions and running sums over the lanes of a warp, and reductions over the threads of a block.
+/// Each has one order, so that sums of floating-point numbers are the same bits in every run.
 
 #include <cub/block/block_reduce.cuh>
+
+#include <cstdint>
 
 #include "core/cuda/launch.h"
 
@@ -43,6 +45,22 @@ __device__ inline float warpMax(float value) {
 }
 __device__ inline double warpMax(double value) {
   return reduceLanes<kWarp>(value, [](double a, double b) { return fmax(a, b); });
+}
+
+/// Without __reduce_or_sync, which devices before sm_80 lack.
+__device__ inline std::uint32_t warpOr(std::uint32_t bits) {
+  return reduceLanes<kWarp>(bits, [](std::uint32_t a, std::uint32_t b) { return a | b; });
+}
+
+/// The sum over the lanes below this one. To be called by all lanes of a warp.
+template <class T>
+__device__ inline T warpSumBelow(T value) {
+  T sum = value;
+  for (unsigned d = 1; d < kWarp; d *= 2) {
+    const T below = __shfl_up_sync(kAllLanes, sum, d);
+    if (threadIdx.x % kWarp >= d) sum += below;
+  }
+  return sum - value;
 }
 
 /// The largest value of a block; every thread gets it. The block can call it again at once.

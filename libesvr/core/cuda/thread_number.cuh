@@ -1,5 +1,5 @@
 #pragma once
-/// Which of all threads or warps of a launch this is, in 64 bits.
+/// Which of all threads or warps of a launch this is, and how many warps there are, in 64 bits.
 
 #include <cstddef>
 
@@ -11,5 +11,6 @@ __device__ inline std::size_t threadNumber() {
   return std::size_t(blockIdx.x) * blockDim.x + threadIdx.x;
 }
 __device__ inline std::size_t warpNumber() { return threadNumber() / kWarp; }
+__device__ inline std::size_t warpCount() { return std::size_t(gridDim.x) * blockDim.x / kWarp; }
 
 }  // namespace esvr::cuda

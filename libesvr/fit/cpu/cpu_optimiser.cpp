@@ -12,6 +12,7 @@
 #include "field/gather.h"
 #include "fit/cpu/fit_errors.h"
 #include "fit/ellipsoid_math.h"
+#include "fit/kernel_moments.h"
 #include "fit/motion_bound.h"
 #include "fit/parameter_gradient.h"
 #include "fit/scene.h"
@@ -24,7 +25,7 @@ CpuOptimiser::CpuOptimiser(const FitTarget& target, const OptimiserOptions& opti
       options_(options),
       tuning_(tuning),
       pass_(target, kernelConstants<double>(options.kernel)),
-      unitVariance_(kernelVariance(pass_.kernel())),
+      unitVariance_(kernelMoments(pass_.kernel()).variance),
       limits_(limitsOf(target, tuning)) {}
 
 void CpuOptimiser::rebuildLists() {
@@ -145,7 +146,7 @@ void CpuOptimiser::setKappa(float kappa) {
   const double before = kernelWidth(pass_.kernel()).m;
   options_.kernel.kappa = kappa;
   pass_.setKernel(kernelConstants<double>(options_.kernel));
-  unitVariance_ = kernelVariance(pass_.kernel());
+  unitVariance_ = kernelMoments(pass_.kernel()).variance;
   const double factor = std::sqrt(kernelWidth(pass_.kernel()).m / before);
   for (Ellipsoid& p : ellipsoids_) shrinkBy(p, factor);
   stale_ = stale_ || anyOutgrown();

@@ -2,8 +2,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <cmath>
-
 #include "fit/seed_math.h"
 
 namespace esvr {
@@ -38,19 +36,6 @@ std::vector<Ellipsoid> seedsFromResidual(const ResidualField& residual,
     seeds[i] = seedAt(residual, at[i], options, each);
   });
   return seeds;
-}
-
-double kernelVariance(const KernelConstants<double>& kernel) {
-  constexpr int kSteps = 400;
-  const double radius = supportRadius(kernel);
-  double mass = 0.0, second = 0.0;
-  for (int i = 0; i < kSteps; ++i) {
-    const double q = radius * (i + 0.5) / kSteps;
-    const double weight = kernelPhi(kernel, q * q) * q * q;
-    mass += weight;
-    second += weight * q * q / 3.0;
-  }
-  return second / mass;
 }
 
 }  // namespace esvr

@@ -11,7 +11,7 @@ namespace esvr {
 struct SeedOptions {
   SamplingOptions draw;
   int window = 2;             ///< half width of the window that shapes a seed, voxels
-  double unitVariance = 0.5;  ///< variance of the kernel (kernelVariance)
+  double unitVariance = 0.5;  ///< KernelMoments::variance
   double intensity = 1.0;     ///< intensity of a seed, relative to the residual
 };
 
@@ -19,8 +19,5 @@ struct SeedOptions {
 /// from the residual of one sign around the voxel.
 [[nodiscard]] std::vector<Ellipsoid> seedsFromResidual(const ResidualField& residual,
                                                        const SeedOptions& options);
-
-/// Variance along an axis of the density that is proportional to phi in the unit frame.
-[[nodiscard]] double kernelVariance(const KernelConstants<double>& kernel);
 
 }  // namespace esvr

@@ -83,13 +83,7 @@ void CudaIntensityPasses::setShapes(const Field& field) {
 
 IntensityPassArguments CudaIntensityPasses::arguments(std::span<const float> heights) {
   uploadTo(heights_.reserve(count_), heights, stream_.get());
-  return {.scene = {.bricks = bricks_.view().bricks,
-                    .brickCount = std::uint32_t(bricks_.size()),
-                    .targetCount = std::uint32_t(bricks_.targetCount()),
-                    .ellipsoidCount = std::uint32_t(count_),
-                    .pairCount = std::uint32_t(lists_.pairCount()),
-                    .lists = lists_.view(),
-                    .forms = forms_.data()},
+  return {.scene = passScene(bricks_, lists_, count_, forms_.data()),
           .heights = heights_.data(),
           .kernel = kernel_,
           .source = source_.data(),

@@ -10,11 +10,11 @@
 #include "core/cuda/use_device.h"
 #include "esvr/error.h"
 #include "field/gather.h"
-#include "fit/cpu/seed.h"
 #include "fit/cuda/least_useful.h"
 #include "fit/cuda/make_cuda_optimiser.h"
 #include "fit/cuda/memory_plan.h"
 #include "fit/cuda/place_seeds.h"
+#include "fit/kernel_moments.h"
 #include "fit/motion_bound.h"
 #include "fit/scene.h"
 
@@ -61,17 +61,11 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
 void CudaOptimiser::setKernel() {
   kernel_ = kernelConstants<double>(options_.kernel);
   radius_ = supportRadius(kernel_);
-  unitVariance_ = kernelVariance(kernel_);
+  unitVariance_ = kernelMoments(kernel_).variance;
 }
 
 BrickPassArguments CudaOptimiser::passArguments() {
-  return {.scene = {.bricks = bricks_.view().bricks,
-                    .brickCount = std::uint32_t(bricks_.size()),
-                    .targetCount = std::uint32_t(bricks_.targetCount()),
-                    .ellipsoidCount = std::uint32_t(count_),
-                    .pairCount = std::uint32_t(lists_.pairCount()),
-                    .lists = lists_.view(),
-                    .forms = forms_.data()},
+  return {.scene = passScene(bricks_, lists_, count_, forms_.data()),
           .kernel = narrowed(kernel_),
           .target = {.values = targetValues_.data(),
                      .narrowBand = target_.narrowBand,

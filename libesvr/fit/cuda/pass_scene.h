@@ -17,6 +17,17 @@ struct PassScene {
   const PairForm* forms;  ///< one for each ellipsoid
 };
 
+[[nodiscard]] inline PassScene passScene(const BrickTable& bricks, const PairLists& lists,
+                                         std::size_t ellipsoidCount, const PairForm* forms) {
+  return {bricks.view().bricks,
+          std::uint32_t(bricks.size()),
+          std::uint32_t(bricks.targetCount()),
+          std::uint32_t(ellipsoidCount),
+          std::uint32_t(lists.pairCount()),
+          lists.view(),
+          forms};
+}
+
 /// A brick whose list is longer than this is summed in 64-bit integers. In 32 bits a list of this
 /// length has units of 2^-17 of its largest intensity, and ordinary lists, of some 200 entries,
 /// units of 2^-22.

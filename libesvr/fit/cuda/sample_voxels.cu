@@ -71,12 +71,7 @@ __device__ int voxelAt(const SamplingArguments& a, std::uint32_t brick, std::uin
       a.residual + std::size_t(brick) * kBrickVoxels + std::size_t(lane) * kVoxelsPerLane;
   std::uint64_t own = 0;
   for (int v = 0; v < kVoxelsPerLane; ++v) own += a.units(r[v], a.signs);
-  std::uint64_t before = own;
-  for (int d = 1; d < kWarp; d *= 2) {
-    const std::uint64_t below = __shfl_up_sync(kAllLanes, before, d);
-    if (lane >= d) before += below;
-  }
-  before -= own;
+  std::uint64_t before = warpSumBelow(own);
   int found = kBrickVoxels;
   if (before <= at && at < before + own)
     for (int v = 0; v < kVoxelsPerLane && found == kBrickVoxels; ++v) {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "fit/kernel_moments.h"
 #include "fit/sampling_options.h"
 
 namespace esvr::paper {
@@ -14,18 +14,6 @@ std::uint64_t voxelsToDrawFrom(const FitTarget& target) {
          std::uint64_t(std::count(target.values.begin(), target.values.end(), 0.0f));
 }
 
-/// Integral of phi over the unit frame.
-double massOf(const KernelConstants<double>& kernel) {
-  constexpr int kSteps = 400;
-  const double step = supportRadius(kernel) / kSteps;
-  double mass = 0.0;
-  for (int i = 0; i < kSteps; ++i) {
-    const double u = (i + 0.5) * step;
-    mass += 4.0 * std::numbers::pi * u * u * kernelPhi(kernel, u * u) * step;
-  }
-  return mass;
-}
-
 }  // namespace
 
 std::vector<PaperEllipsoid> initialPoints(const FitTarget& target, std::size_t points,
@@ -34,7 +22,8 @@ std::vector<PaperEllipsoid> initialPoints(const FitTarget& target, std::size_t p
   const std::uint64_t count = std::min<std::uint64_t>(points, voxels);
   const double each = double(voxels) / double(std::max<std::uint64_t>(count, 1));
   const double scale = std::cbrt(each), units = kind.unitsPerScale(kind.k);
-  const double mass = massOf(kernelConstants<double>(kernelOf(kind))) / std::pow(units, 3.0);
+  const double mass =
+      kernelMoments(kernelConstants<double>(kernelOf(kind))).mass / std::pow(units, 3.0);
 
   std::vector<PaperEllipsoid> drawn;
   const auto nextAt = [&] {

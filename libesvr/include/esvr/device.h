@@ -2,7 +2,6 @@
 /// Selection of the device that computes.
 
 #include <string>
-#include <vector>
 
 namespace esvr {
 
@@ -15,9 +14,6 @@ struct Device {
 
 /// True if the library was built with CUDA, whether or not the machine has a GPU.
 [[nodiscard]] bool builtWithCuda() noexcept;
-
-/// Names of the usable CUDA devices; empty without CUDA, a driver or a GPU.
-[[nodiscard]] std::vector<std::string> cudaDevices();
 
 /// Selects a device by name: "auto", "cpu", "cuda" or "cuda:N". "auto" selects a CUDA device if one
 /// is usable, otherwise the CPU.

@@ -1,5 +1,5 @@
 #pragma once
-/// The kernel family phi of an ellipsoid with its derivatives, in one source for host and device.
+/// The kernel family phi of an ellipsoid, in one source for host and device.
 ///
 ///     phi(m) = ((1 + E) / (E + e^m) - eps) / (1 - eps)   for m < cutoff = ln((1 + E) / eps - E)
 ///     phi(m) = 0                                         otherwise
@@ -53,9 +53,10 @@ struct KernelConstants {
   Real numerator;  ///< A / (1 - eps)
   Real plateau;    ///< B
   Real base;       ///< eps / (1 - eps), which is subtracted from the quotient
-  Real slope;      ///< (1 - eps) B / A; times the quotient it is B / (B + y)
-  Real cutoff;     ///< m at the end of the support
-  Real expNegS;    ///< e^-s
+  /// (1 - eps) B / A, which times the quotient Q = phi + base is B / (B + y). Hence
+  /// phi' = Q (Q slope - 1), and the derivative by kappa is slope Q (1 - phi) (docs/math.md).
+  Real slope;
+  Real cutoff;  ///< m at the end of the support
 };
 
 /// The value of the paper's kernel at the end of its support.
@@ -68,44 +69,23 @@ template <class Real>
 ESVR_HD KernelConstants<Real> kernelConstants(const Kernel& kernel, double kappa) {
   const bool paper = kernel.form == KernelForm::kPaper;
   const double s = kappa > 0.0 ? kappa : 0.0;
-  const double expNegS = std::exp(-s);
   const double b = std::exp(kappa - s);
-  const double a = expNegS + b;
+  const double a = std::exp(-s) + b;
   const double eps = paper ? 0.0 : double(kernel.epsilon);
   const double norm = 1.0 / (1.0 - eps);
   const double cutoff = s + std::log(a / (paper ? paperEnd() : eps) - b);
-  return {Real(s),      Real(a * norm), Real(b), Real(eps * norm), Real(b / (a * norm)),
-          Real(cutoff), Real(expNegS)};
+  return {Real(s), Real(a * norm), Real(b), Real(eps * norm), Real(b / (a * norm)), Real(cutoff)};
 }
 template <class Real>
 ESVR_HD KernelConstants<Real> kernelConstants(const Kernel& kernel) {
   return kernelConstants<Real>(kernel, double(kernel.kappa));
 }
 
-/// phi and its derivatives at one m.
-template <class Real>
-struct KernelValue {
-  Real phi;
-  Real dPhiDm;      ///< derivative by m
-  Real dPhiDkappa;  ///< derivative by kappa, with the end of the support held fixed
-};
-
 /// The value of phi, which is 0 for m >= c.cutoff. \param m  not negative
 template <class Real>
 ESVR_HD inline Real kernelPhi(const KernelConstants<Real>& c, Real m) {
   if (!(m < c.cutoff)) return Real(0);
   return c.numerator / (c.plateau + std::exp(m - c.shift)) - c.base;
-}
-
-template <class Real>
-ESVR_HD inline KernelValue<Real> kernelValue(const KernelConstants<Real>& c, Real m) {
-  if (!(m < c.cutoff)) return {Real(0), Real(0), Real(0)};
-  const Real y = std::exp(m - c.shift);
-  const Real inv = Real(1) / (c.plateau + y);
-  const Real quotient = c.numerator * inv;
-  // d phi / d kappa = B (y - e^-s) / (B + y)^2 / (1 - eps), and 1 / (1 - eps) = 1 + base
-  const Real norm = c.base + Real(1);
-  return {quotient - c.base, -quotient * y * inv, norm * c.plateau * (y - c.expNegS) * inv * inv};
 }
 
 /// The half width of an ellipsoid: the radius at which phi is 1/2, in units of the scales.

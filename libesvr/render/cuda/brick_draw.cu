@@ -2,12 +2,11 @@
 
 #include <climits>
 
-#include "core/cuda/check.h"
+#include "core/cuda/thread_number.cuh"
 
 namespace esvr::cuda {
 namespace {
 
-constexpr int kWarp = 32;
 constexpr int kSide = kMarchTileSide, kTilePixels = kSide * kSide;
 constexpr int kThreads = 128, kBlocksPerMultiprocessor = 8;
 
@@ -69,9 +68,8 @@ __device__ int tileAt(double pixel, int count) {
 
 /// A warp a brick.
 __global__ void __launch_bounds__(kThreads) findRanges(const BrickDrawArguments a) {
-  const std::uint32_t warps = gridDim.x * blockDim.x / kWarp;
   const int lane = int(threadIdx.x) % kWarp, tileColumns = tilesAlong(a.resolution.width);
-  for (std::uint32_t i = (blockIdx.x * blockDim.x + threadIdx.x) / kWarp; i < a.count; i += warps) {
+  for (std::size_t i = warpNumber(); i < a.count; i += warpCount()) {
     const Cover c = coverOf(a.scene.view, a.bricks[i]);
     const bool seen = c.farthest >= 0.0 && c.lastColumn >= -0.5 && c.lastRow >= -0.5 &&
                       c.firstColumn <= a.resolution.width && c.firstRow <= a.resolution.height;
@@ -113,8 +111,7 @@ __global__ void __launch_bounds__(kTilePixels) marchKernel(const BrickDrawArgume
 
 void launchBricks(const BrickDrawArguments& a, int multiprocessors, cudaStream_t stream) {
   const int tiles = tilesAlong(a.resolution.width) * a.tileRows;
-  clearRanges<<<unsigned((tiles + kThreads - 1) / kThreads), kThreads, 0, stream>>>(a.ranges,
-                                                                                    tiles);
+  clearRanges<<<blocksFor(std::size_t(tiles), kThreads), kThreads, 0, stream>>>(a.ranges, tiles);
   check(cudaGetLastError(), "clearing tiles");
   findRanges<<<unsigned(multiprocessors * kBlocksPerMultiprocessor), kThreads, 0, stream>>>(a);
   check(cudaGetLastError(), "looking at bricks");

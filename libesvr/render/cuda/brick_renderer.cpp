@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/cuda/use_device.h"
 #include "render/brick_atlas.h"
 #include "render/cuda/brick_draw.h"
 #include "render/cuda/make_cuda_renderer.h"
@@ -15,13 +16,6 @@ namespace {
 constexpr int kSide = kMarchTileSide;
 
 std::size_t tilesAlong(int pixels) { return std::size_t((pixels + kSide - 1) / kSide); }
-
-int multiprocessorsOf(const Device& device) {
-  int count = 0;
-  check(cudaDeviceGetAttribute(&count, cudaDevAttrMultiProcessorCount, device.index),
-        "asking for the number of multiprocessors");
-  return count;
-}
 
 class BrickRenderer final : public MarchRenderer {
  public:
@@ -48,7 +42,7 @@ class BrickRenderer final : public MarchRenderer {
     ClipBox clip = clipOf(o);
     clip.box = {difference(clip.box.low, origin_), difference(clip.box.high, origin_)};
     const std::size_t tileRows = tilesAlong(band.rows);
-    atLeast(ranges_, tileRows * tilesAlong(o.resolution.width), stream());
+    makeRoom(ranges_, tileRows * tilesAlong(o.resolution.width), stream());
     launchBricks({.atlas = {{0, 0, 0}, blocks_, blockOf_.data(), brickOf_.data(), values_.data()},
                   .bricks = bricks_.data(),
                   .count = std::uint32_t(bricks_.size()),

@@ -1,20 +1,12 @@
 #pragma once
-/// Renderers on a CUDA device share this: memory that grows, and a transfer function's table.
+/// A transfer function's table on a CUDA device.
 
 #include <optional>
 
-#include "core/cuda/device_buffer.h"
+#include "core/cuda/growing_buffer.h"
 #include "render/sample_rule.h"
 
 namespace esvr::cuda {
-
-/// The content is lost where the memory has to grow.
-template <class T>
-void atLeast(DeviceBuffer<T>& buffer, std::size_t n, cudaStream_t stream) {
-  if (buffer.size() >= n) return;
-  buffer = {};  // first freed, so that both are never held at once
-  buffer = DeviceBuffer<T>(n, stream);
-}
 
 class DeviceTable {
  public:
@@ -24,7 +16,7 @@ class DeviceTable {
     if (known_ && known_->length == length && known_->transfer == options.transfer) return;
     known_ = {options.transfer, length, TransferTable(options.transfer, length)};
     const auto& entries = known_->table.entries();
-    atLeast(entries_, entries.size(), stream);
+    makeRoom(entries_, entries.size(), stream);
     entries_.upload(entries);
   }
   /// After an update.

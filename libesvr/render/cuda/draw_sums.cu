@@ -167,12 +167,6 @@ __device__ std::uint32_t addSorted(const SumArguments& a, Shared& s, const Place
   return touched;
 }
 
-/// Without __reduce_or_sync, which devices before sm_80 lack.
-__device__ std::uint32_t orOfWarp(std::uint32_t bits) {
-  for (int d = kWarp / 2; d > 0; d /= 2) bits |= __shfl_xor_sync(kAllLanes, bits, d);
-  return bits;
-}
-
 /// All of a bin's list. Leaves the samples touched by any ray in s.touched.
 __device__ void addBin(const SumArguments& a, Shared& s, const Place& place, const SumWork& work,
                        std::size_t list, int bin) {
@@ -190,7 +184,7 @@ __device__ void addBin(const SumArguments& a, Shared& s, const Place& place, con
     sortInMemory(a.draw.lists.entries + begin, n, sorted, s);
     touched = addSorted(a, s, place, work, open, sorted, int(n), firstSample);
   }
-  touched = orOfWarp(touched);
+  touched = warpOr(touched);
   if (place.lane == 0 && touched != 0) atomicOr(&s.touched, touched);
   __syncthreads();
 }

@@ -1,3 +1,4 @@
+#include "core/cuda/integer_sum.cuh"
 #include "render/cuda/draw_work.cuh"
 #include "render/voxel_window.h"
 
@@ -140,16 +141,14 @@ __device__ void layOut(Shared& s) {
   if (threadIdx.x == 0) s.filled = 0;
 }
 
-/// Units of a voxel's sum, a power of two of them for 1: a value within the bound is less than
-/// 2^22, which is as fine as float32 is, and the sum of n of them less than 2^30.
+/// Units of a voxel's sum, a power of two of them for 1.
 struct Units {
   float ofOne, one;
 };
 __device__ Units unitsFor(float bound, std::uint32_t n) {
-  constexpr int kBits = 21, kBitsOfSum = 29, kMaxExponent = 126;
-  const int e = min(kBits - ilogbf(bound), kBitsOfSum - ilogbf(bound * float(n)));
-  const int within = max(-kMaxExponent, min(kMaxExponent, e));
-  return {ldexpf(1.0f, within), ldexpf(1.0f, -within)};
+  // A value of less than 2^22 units is as fine as float32 is, and all that wholeNearest takes.
+  const int e = unitExponent(bound, n, {.valueBits = 21, .sumBits = kLimits32.sumBits});
+  return {ldexpf(1.0f, e), ldexpf(1.0f, -e)};
 }
 
 /// An ellipsoid in the window, its values in units, for the threads of a team.

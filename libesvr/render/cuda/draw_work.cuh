@@ -3,13 +3,11 @@
 /// bins are drawn from front to back, and whoever finishes a tile's last part puts its parts over
 /// each other. What a bin's samples are is the caller's.
 
-#include "core/cuda/check.h"
+#include "core/cuda/reduce.cuh"
 #include "render/cuda/tile_frame.h"
 
 namespace esvr::cuda {
 
-inline constexpr int kWarp = 32;
-inline constexpr unsigned kAllLanes = 0xffffffffu;
 inline constexpr int kSide = DrawTuning::kTileSide, kRays = DrawTuning::kTilePixels;
 inline constexpr int kGroups = DrawTuning::kGroups, kThreads = DrawTuning::kDrawThreads;
 inline constexpr int kWarps = kThreads / kWarp, kHalves = kRays / kWarp;

@@ -22,14 +22,6 @@ constexpr std::int64_t kMaxLists = std::int64_t{1} << 30;
 /// Some to spare, so that lists which grow from view to view do not allocate each time.
 std::size_t withSpare(std::size_t n) { return n + n / 4 + 1024; }
 
-int multiprocessorsOf(const Device& device) {
-  useDevice(device);
-  int count = 0;
-  check(cudaDeviceGetAttribute(&count, cudaDevAttrMultiProcessorCount, device.index),
-        "asking for the number of multiprocessors");
-  return count;
-}
-
 template <class... Buffers>
 std::size_t bytesOf(const Buffers&... buffers) {
   return (buffers.bytes() + ...);
@@ -64,7 +56,7 @@ SceneMemory::SceneMemory(const Field& field, cudaStream_t stream)
 
 void SceneMemory::prepare(const Field& field, Between between, cudaStream_t stream) {
   if (between == Between::kSum)
-    atLeast(views, ellipsoids.size(), stream);
+    makeRoom(views, ellipsoids.size(), stream);
   else if (forms.size() < ellipsoids.size())
     forms = DeviceBuffer<WindowForm>(windowForms(field), stream);
 }
@@ -119,6 +111,7 @@ FieldRenderer::FieldRenderer(const Field& field, const Device& device, const Ren
       voxelRule_(makeVoxelRule(field.background, voxels)),
       bound_(largestIntensity(field)),
       box_(supportBox(field)),
+      stream_(streamOn(device)),
       multiprocessors_(multiprocessorsOf(device)),
       scene_(field, stream_.get()),
       parts_(limits.depthParts) {}
@@ -186,14 +179,14 @@ void FieldRenderer::reserve(const TileFrame& f) {
   const std::size_t tiles = std::size_t(f.tiles()), lists = tiles * std::size_t(f.bins);
   const std::size_t parts = tiles * std::size_t(f.parts);
   const int rows = std::min(f.tileRows * kSide, f.resolution.height - f.firstTileRow * kSide);
-  atLeast(band_.counters, 1, stream);
-  atLeast(band_.counts, lists, stream);
-  atLeast(band_.ends, lists, stream);
-  atLeast(band_.items, parts * DrawTuning::kLengthClasses, stream);
+  makeRoom(band_.counters, 1, stream);
+  makeRoom(band_.counts, lists, stream);
+  makeRoom(band_.ends, lists, stream);
+  makeRoom(band_.items, parts * DrawTuning::kLengthClasses, stream);
   for (auto* ofTile : {&band_.partsOfTile, &band_.partsDone, &band_.closedAt})
-    atLeast(*ofTile, tiles, stream);
-  atLeast(band_.resultOf, parts, stream);
-  atLeast(band_.pixels, std::size_t(rows) * std::size_t(f.resolution.width), stream);
+    makeRoom(*ofTile, tiles, stream);
+  makeRoom(band_.resultOf, parts, stream);
+  makeRoom(band_.pixels, std::size_t(rows) * std::size_t(f.resolution.width), stream);
 }
 
 /// Clears what counts, looks at the ellipsoids, counts and plans.
@@ -260,11 +253,11 @@ void FieldRenderer::grow(const FrameCounters& c, Between between) {
     throw DeviceError("drawing on the GPU: " + std::to_string(c.pairs) +
                       " pairs of ellipsoids and tiles are more than the lists can hold");
   const cudaStream_t stream = stream_.get();
-  if (c.pairs > band_.entries.size()) atLeast(band_.entries, withSpare(c.pairs), stream);
-  if (needSorting(c, between)) atLeast(band_.sorted, band_.entries.size(), stream);
+  if (c.pairs > band_.entries.size()) makeRoom(band_.entries, withSpare(c.pairs), stream);
+  if (needSorting(c, between)) makeRoom(band_.sorted, band_.entries.size(), stream);
   if (std::uint64_t(c.results) * DrawTuning::kTilePixels > band_.results.size())
-    atLeast(band_.results, std::size_t(c.results + c.results / 4) * DrawTuning::kTilePixels,
-            stream);
+    makeRoom(band_.results, std::size_t(c.results + c.results / 4) * DrawTuning::kTilePixels,
+             stream);
 }
 
 void FieldRenderer::drawBand(const Scene& scene, Band band, Image* image) {

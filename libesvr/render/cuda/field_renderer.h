@@ -83,8 +83,8 @@ class FieldRenderer final : public Renderer {
   VoxelRule voxelRule_;
   float bound_;
   std::optional<PlaceBox> box_;
-  int multiprocessors_ = 0;
   Stream stream_;
+  int multiprocessors_;
   SceneMemory scene_;
   BandMemory band_;
   Event begin_, listed_, drawn_;

@@ -8,14 +8,6 @@
 #include "render/picture.h"
 
 namespace esvr::cuda {
-namespace {
-
-Stream streamOn(const Device& device) {
-  useDevice(device);
-  return Stream();
-}
-
-}  // namespace
 
 MarchRenderer::MarchRenderer(const Device& device, const RendererLimits& limits)
     : limits_(limits), stream_(streamOn(device)) {}
@@ -53,7 +45,7 @@ void MarchRenderer::drawBand(const RenderOptions& o, Band band, Image* image) {
   checkCancelled(o);
   const std::size_t width = std::size_t(o.resolution.width);
   const std::size_t count = std::size_t(band.rows) * width;
-  atLeast(pixels_, count, stream());
+  makeRoom(pixels_, count, stream());
   begin_.record(stream());
   pixels_.setZero();
   launch(o, band, pixels_.data());

@@ -1,19 +1,16 @@
-#include "core/cuda/check.h"
+#include "core/cuda/reduce.cuh"
+#include "core/cuda/thread_number.cuh"
 #include "render/cuda/tile_frame.h"
 
 namespace esvr::cuda {
 namespace {
 
-constexpr int kWarp = 32;
-constexpr unsigned kAllLanes = 0xffffffffu;
 constexpr int kSide = DrawTuning::kTileSide;
 
 /// Widened so that rounding to float32 leaves nothing out.
 constexpr double kWider = 1.0 + 1e-6, kNarrower = 1.0 - 1e-6;
 
-unsigned blocksOf(std::size_t items) {
-  return unsigned((items + DrawTuning::kListThreads - 1) / DrawTuning::kListThreads);
-}
+unsigned blocksOf(std::size_t items) { return blocksFor(items, DrawTuning::kListThreads); }
 
 unsigned largeBlocks(int multiprocessors) {
   return unsigned(multiprocessors * DrawTuning::kListBlocksPerMultiprocessor);
@@ -117,9 +114,7 @@ __device__ bool inManyLists(const TileFrame& frame, const Footprint& p) {
 template <class Visit>
 __device__ void visitLarge(const FrameCounters& counters, const std::uint32_t* large,
                            Visit&& visit) {
-  const std::uint32_t warps = gridDim.x * blockDim.x / kWarp;
-  std::uint32_t i = (blockIdx.x * blockDim.x + threadIdx.x) / kWarp;
-  for (; i < counters.large; i += warps) visit(large[i]);
+  for (std::size_t i = warpNumber(); i < counters.large; i += warpCount()) visit(large[i]);
 }
 
 __device__ bool look(const TileFrame& frame, const DeviceEllipsoids& all, const SeenEllipsoids& out,
@@ -187,18 +182,6 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
 /// A number of entries of many lists, of which each has less than 2^32.
 using Entries = unsigned long long;
 
-/// The sum over the lanes below; `total` gets that over all.
-__device__ Entries sumBelow(Entries value, Entries& total) {
-  const int lane = int(threadIdx.x) % kWarp;
-  Entries sum = value;
-  for (int d = 1; d < kWarp; d *= 2) {
-    const Entries below = __shfl_up_sync(kAllLanes, sum, d);
-    if (lane >= d) sum += below;
-  }
-  total = __shfl_sync(kAllLanes, sum, kWarp - 1);
-  return sum - value;
-}
-
 struct TileTotals {
   Entries entries = 0;
   std::uint32_t longestBin = 0, parts = 0;
@@ -256,8 +239,7 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
   TileTotals totals;
   if (any) totals = totalsOf(frame, &lists.counts[std::size_t(tile) * frame.bins]);
 
-  Entries ofWarp = 0;
-  const Entries below = sumBelow(totals.entries, ofWarp);
+  const Entries ofWarp = warpSum(totals.entries), below = warpSumBelow(totals.entries);
   Entries begin = 0;
   if (threadIdx.x % kWarp == 0 && ofWarp > 0) begin = atomicAdd(&lists.counters->pairs, ofWarp);
   begin = __shfl_sync(kAllLanes, begin, 0) + below;

@@ -42,7 +42,7 @@ TEST(ClippedRange, OfAHugeSupportIsTheBoxOfBricks) {
   EXPECT_TRUE(clippedRange(makeSupport(far.center, far.L, 2.0, 0.0), within).empty());
 }
 
-class BrickTableOnGpu : public test::OnGpu {
+class BrickTableOnGpu : public test::CudaTest {
  protected:
   void find(BrickTable& table, const std::vector<Ellipsoid>& ellipsoids, const Box& within) {
     const DeviceBuffer<Ellipsoid> device(std::span<const Ellipsoid>(ellipsoids), stream_->get());
@@ -59,7 +59,7 @@ class BrickTableOnGpu : public test::OnGpu {
     return bricks;
   }
   void SetUp() override {
-    OnGpu::SetUp();
+    CudaTest::SetUp();
     if (!IsSkipped()) stream_.emplace();
   }
   std::optional<Stream> stream_;

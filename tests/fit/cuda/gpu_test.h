@@ -1,24 +1,17 @@
 #pragma once
-/// Tests that need a GPU: where there is none they skip and say why.
-
-#include <gtest/gtest.h>
+/// Tests that call functions of CUDA themselves.
 
 #include "core/cuda/use_device.h"
-#include "esvr/error.h"
+#include "support/on_device.h"
 
 namespace esvr::test {
 
-class OnGpu : public testing::Test {
+class CudaTest : public OnGpu {
  protected:
   void SetUp() override {
-    try {
-      device_ = selectDevice("cuda");
-      cuda::useDevice(device_);
-    } catch (const DeviceError& error) {
-      GTEST_SKIP() << error.what();
-    }
+    OnGpu::SetUp();
+    if (!IsSkipped()) cuda::useDevice(device_);
   }
-  Device device_;
 };
 
 }  // namespace esvr::test

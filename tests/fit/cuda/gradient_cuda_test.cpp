@@ -56,7 +56,7 @@ void expectAgreement(const FitTarget& target, const Kernel& kernel,
   EXPECT_NEAR(onGpu.measure().squaredSum, loss, 1e-5 * loss);
 }
 
-class GradientOnGpu : public test::OnGpu, public testing::WithParamInterface<Case> {};
+class GradientOnGpu : public test::CudaTest, public testing::WithParamInterface<Case> {};
 
 // Float32 sums over some thousand voxels on both sides, and an exponential within 1e-6.
 TEST_P(GradientOnGpu, AgreesWithTheCpu) {
@@ -74,7 +74,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"subvoxel", 2.0f, 200, 0.1, 2.0}, Case{"huge", 2.0f, 5, 20.0, 2.0},
                     Case{"crowd", 2.0f, 5000, 0.5, 4.0}));
 
-class NarrowBandOnGpu : public test::OnGpu {};
+class NarrowBandOnGpu : public test::CudaTest {};
 
 TEST_F(NarrowBandOnGpu, SaturatesAsTheCpuDoes) {
   const SparseVolume volume = test::levelSetVolume();

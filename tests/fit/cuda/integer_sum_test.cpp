@@ -94,7 +94,7 @@ double squaredSum(const std::vector<Ellipsoid>& ellipsoids, const Kernel& kernel
   return sum;
 }
 
-class LongListsOnGpu : public test::OnGpu, public testing::WithParamInterface<std::size_t> {};
+class LongListsOnGpu : public test::CudaTest, public testing::WithParamInterface<std::size_t> {};
 
 // In 32 bits, 60,000 entries have units of 2^-13, and the rounding of so many adds 3 % and more to
 // the squares here. Short lists have finer units, whose rounding adds 0.4 % at most.

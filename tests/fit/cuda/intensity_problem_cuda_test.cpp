@@ -10,7 +10,7 @@ namespace {
 using test::Intensities;
 INSTANTIATE_TEST_SUITE_P(Cuda, Intensities, testing::Values("cuda"));
 
-class IntensitiesOnGpu : public test::OnGpu {};
+class IntensitiesOnGpu : public test::CudaTest {};
 
 struct Crowd {
   SparseVolume volume = test::tubeVolume();

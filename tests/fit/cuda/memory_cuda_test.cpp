@@ -41,7 +41,7 @@ class HoldAtMost {
   std::size_t before_;
 };
 
-class MemoryOnGpu : public test::OnGpu {
+class MemoryOnGpu : public test::CudaTest {
  protected:
   SparseVolume volume_ = test::tubeVolume();
   FitTarget target_ = makeTarget(volume_, std::nullopt);

@@ -19,7 +19,7 @@ namespace esvr {
 namespace {
 
 using cuda::CudaOptimiser;
-using OptimiserOnGpu = test::OnGpu;
+using OptimiserOnGpu = test::CudaTest;
 
 FitResult fitOn(const Device& device, const SparseVolume& volume) {
   FitOptions options;

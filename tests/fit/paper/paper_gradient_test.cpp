@@ -11,7 +11,7 @@
 #include "../random_ellipsoids.h"
 #include "dense_paper_loss.h"
 #include "fit/paper/paper_optimiser.h"
-#include "on_device.h"
+#include "support/on_device.h"
 
 namespace esvr::paper {
 namespace {

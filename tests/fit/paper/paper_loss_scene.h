@@ -58,6 +58,20 @@ inline Scene randomScene(std::uint64_t seed, const std::vector<Coord>& bricks = 
   return makeScene(bricks, (bricks.size() + 1) / 2, value, value);
 }
 
+/// The scene with bricks of zeros around its own and between them. The zeros are of both signs, as a
+/// residual 0 - t has the sign of -0.
+inline Scene withBricksOfZeros(const Scene& scene) {
+  Scene padded = scene;
+  for (int i = 0; i < 125; ++i) {
+    const Coord brick{i / 25 - 3, i / 5 % 5 - 2, i % 5 - 2};
+    if (std::find(scene.bricks.begin(), scene.bricks.end(), brick) == scene.bricks.end())
+      padded.bricks.push_back(brick);
+  }
+  padded.target.resize(padded.bricks.size() * kBrickVoxels);
+  padded.prediction.resize(padded.target.size(), -0.0f);
+  return padded;
+}
+
 /// Prediction less target. Exact for values of one exponent or multiples of one step, which these
 /// tests use where they compare bits.
 inline std::vector<float> residualOf(const Scene& scene) {

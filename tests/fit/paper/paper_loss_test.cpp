@@ -9,7 +9,6 @@
 // differ from voxel to voxel, 1e-7 of the norm.
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -21,6 +20,7 @@
 #include "field/random_field.h"
 #include "fit/paper/paper_loss.h"
 #include "fit/paper/paper_loss_scene.h"
+#include "support/on_threads.h"
 
 namespace esvr {
 namespace {
@@ -165,16 +165,7 @@ TEST(PaperLoss, OfIdenticalVolumesIsZeroAndSoIsItsGradient) {
 
 TEST(PaperLoss, BricksOfZerosChangeNoBit) {
   const Scene scene = randomScene(41);
-  Scene padded = scene;
-  for (int i = 0; i < 125; ++i) {
-    const Coord brick{i / 25 - 3, i / 5 % 5 - 2, i % 5 - 2};
-    if (std::find(scene.bricks.begin(), scene.bricks.end(), brick) == scene.bricks.end())
-      padded.bricks.push_back(brick);
-  }
-  padded.target.resize(padded.bricks.size() * kBrickVoxels);
-  // Of both signs: a residual 0 - t has the sign of -0.
-  padded.prediction.resize(padded.target.size(), -0.0f);
-
+  const Scene padded = test::withBricksOfZeros(scene);
   const auto [loss, gradient] = evaluate(scene);
   auto [paddedLoss, paddedGradient] = evaluate(padded);
   EXPECT_EQ(paddedLoss, loss);
@@ -184,11 +175,8 @@ TEST(PaperLoss, BricksOfZerosChangeNoBit) {
 
 TEST(PaperLoss, IsTheSameForAnyNumberOfThreads) {
   const Scene scene = randomScene(51);
-  const auto with = [&](std::size_t threads) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return evaluate(scene);
-  };
-  const auto one = with(1), four = with(4);
+  const auto loss = [&] { return evaluate(scene); };
+  const auto one = test::onThreads(1, loss), four = test::onThreads(4, loss);
   EXPECT_EQ(one.loss, four.loss);
   EXPECT_EQ(one.gradient, four.gradient);
 }

@@ -14,7 +14,7 @@
 #include "esvr/paper_method.h"
 #include "fit/paper/initial_points.h"
 #include "fit/paper/subvolumes.h"
-#include "on_device.h"
+#include "support/on_device.h"
 
 namespace esvr::paper {
 namespace {

@@ -8,6 +8,7 @@
 #include "esvr/field.h"
 #include "esvr/renderer.h"
 #include "field/random_field.h"
+#include "support/on_device.h"
 
 namespace esvr::test {
 namespace {
@@ -26,15 +27,8 @@ RenderOptions options(const CameraWish& wish = {}) {
   return o;
 }
 
-class BricksOnGpu : public testing::Test {
+class BricksOnGpu : public OnGpu {
  protected:
-  void SetUp() override {
-    try {
-      device_ = selectDevice("cuda");
-    } catch (const DeviceError& error) {
-      GTEST_SKIP() << error.what();
-    }
-  }
   void expectTheCpusPicture(const RenderOptions& o, const RendererLimits& limits = {}) const {
     const SparseVolume volume = blobs();
     const Image expected = renderVolume(volume, o);
@@ -43,7 +37,6 @@ class BricksOnGpu : public testing::Test {
     for (std::size_t i = 0; i < image.rgba.size(); ++i)
       ASSERT_NEAR(image.rgba[i], expected.rgba[i], 1.0 / 255.0);
   }
-  Device device_;
 };
 
 TEST_F(BricksOnGpu, AgreeFromEveryKindOfCamera) {

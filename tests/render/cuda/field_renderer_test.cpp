@@ -13,6 +13,7 @@
 #include "esvr/error.h"
 #include "esvr/renderer.h"
 #include "field/random_field.h"
+#include "support/on_device.h"
 
 namespace esvr::test {
 namespace {
@@ -51,15 +52,8 @@ TEST(FieldRenderer, SaysWhichDeviceIsNotThere) {
   EXPECT_THROW((void)makeFieldRenderer(field, {DeviceKind::kCuda, 12345}), DeviceError);
 }
 
-class FieldOnGpu : public testing::TestWithParam<Between> {
+class FieldOnGpu : public OnGpu, public testing::WithParamInterface<Between> {
  protected:
-  void SetUp() override {
-    try {
-      device_ = selectDevice("cuda");
-    } catch (const DeviceError& error) {
-      GTEST_SKIP() << error.what();
-    }
-  }
   [[nodiscard]] RenderOptions optionsFor(const CameraWish& wish = {},
                                          Resolution resolution = {130, 77}) const {
     RenderOptions o;
@@ -87,8 +81,6 @@ class FieldOnGpu : public testing::TestWithParam<Between> {
     EXPECT_GT(light, 0.0) << "an empty picture proves nothing";
     EXPECT_LE(largestDifference(drawn(field, o, limits, voxels), expected), kAsked);
   }
-
-  Device device_;
 };
 
 TEST_P(FieldOnGpu, AgreesFromEveryKindOfCamera) {

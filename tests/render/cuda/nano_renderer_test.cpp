@@ -8,6 +8,7 @@
 #include "esvr/field.h"
 #include "esvr/renderer.h"
 #include "field/random_field.h"
+#include "support/on_device.h"
 
 namespace esvr::test {
 namespace {
@@ -37,17 +38,7 @@ void expectClose(const Image& a, const Image& b) {
   for (std::size_t i = 0; i < a.rgba.size(); ++i) ASSERT_NEAR(a.rgba[i], b.rgba[i], 1.0 / 255.0);
 }
 
-class NanoOnGpu : public testing::TestWithParam<NanoValues> {
- protected:
-  void SetUp() override {
-    try {
-      device_ = selectDevice("cuda");
-    } catch (const DeviceError& error) {
-      GTEST_SKIP() << error.what();
-    }
-  }
-  Device device_;
-};
+class NanoOnGpu : public OnGpu, public testing::WithParamInterface<NanoValues> {};
 
 TEST_P(NanoOnGpu, DrawsTheCpusPicture) {
   const NanoVolume nano = makeNanoVolume(blobs(), GetParam());

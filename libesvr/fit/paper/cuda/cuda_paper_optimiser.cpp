@@ -73,13 +73,7 @@ PaperEllipsoids CudaPaperOptimiser::ellipsoids() {
 }
 
 PaperPassArguments CudaPaperOptimiser::passArguments(const Part& part) {
-  return {.scene = {.bricks = part.bricks.view().bricks,
-                    .brickCount = std::uint32_t(part.bricks.size()),
-                    .targetCount = std::uint32_t(part.bricks.targetCount()),
-                    .ellipsoidCount = std::uint32_t(count_),
-                    .pairCount = std::uint32_t(part.lists.pairCount()),
-                    .lists = part.lists.view(),
-                    .forms = forms_.data()},
+  return {.scene = passScene(part.bricks, part.lists, count_, forms_.data()),
           .kernel = narrowed(constants_),
           .kernels = ellipsoids().kernels,
           .target = {.values = values_,

@@ -46,7 +46,7 @@ LossAndGradient evaluate(const Scene& scene) {
   return result;
 }
 
-class PaperLossOnGpu : public test::OnGpu {
+class PaperLossOnGpu : public test::CudaTest {
  protected:
   static void expectDenseResult(const Scene& scene) {
     const auto [loss, gradient] = evaluate(scene);
@@ -94,14 +94,7 @@ TEST_F(PaperLossOnGpu, NoiseOnAnOffsetLosesNoDigits) {
 
 TEST_F(PaperLossOnGpu, BricksOfZerosChangeNoDerivative) {
   const Scene scene = test::randomScene(41);
-  Scene padded = scene;
-  for (int i = 0; i < 125; ++i) {
-    const Coord brick{i / 25 - 3, i / 5 % 5 - 2, i % 5 - 2};
-    if (std::find(scene.bricks.begin(), scene.bricks.end(), brick) == scene.bricks.end())
-      padded.bricks.push_back(brick);
-  }
-  padded.target.resize(padded.bricks.size() * kBrickVoxels);
-  padded.prediction.resize(padded.target.size(), -0.0f);
+  const Scene padded = test::withBricksOfZeros(scene);
   auto gradient = evaluate(padded).gradient;
   gradient.resize(scene.target.size());
   EXPECT_EQ(gradient, evaluate(scene).gradient);
@@ -141,7 +134,7 @@ paper::Population somePopulation(std::size_t count) {
 }
 
 /// Both devices with the same population and options.
-class PaperMethodOnGpu : public test::OnGpu {
+class PaperMethodOnGpu : public test::CudaTest {
  protected:
   void start(const paper::KernelKind& kind) {
     startWith(somePopulation(200), kind, test::kSide / 2);

@@ -1,0 +1,35 @@
+#include "compare/measure_options.h"
+
+#include <limits>
+
+#include "cli/box_option.h"
+
+namespace esvr::compare {
+
+using cli::po::value;
+
+void addMeasureOptions(cli::po::options_description& options) {
+  // clang-format off
+  options.add_options()
+    ("box", value<std::string>()->value_name("BOX"),
+     "box x0,y0,z0,x1,y1,z1 over which figures are measured (default: the reference's active "
+     "bounding box)")
+    ("peak", value<double>()->value_name("P"),
+     "peak of the PSNR (default: the reference's largest value)");
+  // clang-format on
+}
+
+std::optional<Box> boxOption(const cli::Arguments& a) {
+  const auto box = a.find<std::string>("box");
+  return box ? std::optional(cli::parseBox(*box)) : std::nullopt;
+}
+
+std::optional<double> peakOption(const cli::Arguments& a) {
+  const auto peak = a.find<double>("peak");
+  if (peak)
+    cli::requireRange("peak", *peak, std::numeric_limits<double>::min(),
+                      std::numeric_limits<double>::max());
+  return peak;
+}
+
+}  // namespace esvr::compare
