@@ -16,12 +16,12 @@ using cli::po::bool_switch;
 using cli::po::value;
 
 constexpr int kMaxSide = Resolution::kMaxSide;
-constexpr int kMaxFrames = 9999;   // four digits in a frame's name
+constexpr int kMaxFrames = 9999;   // the number in a frame's file name has four digits
 constexpr double kMinStep = 1e-3;  // voxels
 constexpr int kMaxBins = 16;
 constexpr double kMinVram = 0.001, kMaxVram = 1e4;  // GB
 
-/// "title: one, two, three." in lines of a help text.
+/// Formats "title: one, two, three." for a help text, with line breaks.
 std::string listOf(const std::string& title, const std::vector<std::string>& names) {
   constexpr std::size_t kLine = 80;
   std::string text, line = title + ":";
@@ -250,7 +250,7 @@ std::optional<Rgb> backgroundOf(const Arguments& a) {
   return Rgb{(*color)[0], (*color)[1], (*color)[2]};
 }
 
-constexpr double kEverywhere = 1e9;  // voxels; beyond any grid
+constexpr double kEverywhere = 1e9;  // voxels; larger than any coordinate in a grid
 
 PlaceBox sliceOf(const std::string& text) {
   const std::string axes = "xyz";

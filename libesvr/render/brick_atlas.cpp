@@ -15,7 +15,8 @@ constexpr double kMaxBlocks = double(1 << 28);  // 1 GB
 
 Coord above(int corner) { return {corner >> 2, (corner >> 1) & 1, corner & 1}; }
 
-/// Bricks some cell of which has a voxel in a brick of the volume.
+/// The bricks of cells that touch a brick of the volume. The cell of a voxel reaches up to the next
+/// voxel along each axis, so a brick of voxels is also read by the bricks of cells below it.
 std::vector<Coord> candidates(const SparseVolume& volume) {
   std::vector<Coord> bricks;
   bricks.reserve(8 * volume.bricks.size());
@@ -30,7 +31,7 @@ class CellReader {
  public:
   explicit CellReader(const SparseVolume& volume) : volume_(volume), index_(volume.bricks) {}
 
-  /// The voxels at the corners of a brick's cells. \return false where all are the background
+  /// Reads the voxels at the corners of a brick's cells. \return false if all are the background
   bool read(Coord brick, float* values) const {
     std::array<const float*, 8> from{};
     for (int c = 0; c < 8; ++c) from[c] = find(brick + above(c));
@@ -60,7 +61,7 @@ class CellReader {
   const BrickIndex index_;
 };
 
-/// Those of the candidates that show anything.
+/// The candidates that have a voxel other than the background.
 std::vector<Coord> occupied(const CellReader& reader, const std::vector<Coord>& all) {
   std::vector<char> any(all.size());
   tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
@@ -73,7 +74,7 @@ std::vector<Coord> occupied(const CellReader& reader, const std::vector<Coord>& 
   return bricks;
 }
 
-/// Floor division.
+/// The block of a brick. The shift rounds down, also below zero.
 Coord blockOf(Coord brick) {
   static_assert(kBlockBricks == 8);
   return {brick.x >> 3, brick.y >> 3, brick.z >> 3};

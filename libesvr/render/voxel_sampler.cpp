@@ -9,7 +9,8 @@ namespace {
 
 Coord above(int corner) { return {corner >> 2, (corner >> 1) & 1, corner & 1}; }
 
-/// Bricks some cell of which has a voxel in a brick of the volume.
+/// The bricks whose cells read a voxel of the volume's bricks. A cell reaches up to the next voxel
+/// along each axis, so these are the volume's bricks and their neighbours below.
 std::vector<Coord> bricksWithCells(const SparseVolume& volume) {
   std::vector<Coord> bricks;
   bricks.reserve(8 * volume.bricks.size());

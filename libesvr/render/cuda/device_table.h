@@ -1,5 +1,5 @@
 #pragma once
-/// Renderers on a CUDA device share this: memory that grows, and a transfer function's table.
+/// Parts that all CUDA renderers use: buffers that grow, and a transfer function's table.
 
 #include <optional>
 
@@ -8,17 +8,18 @@
 
 namespace esvr::cuda {
 
-/// The content is lost where the memory has to grow.
+/// Makes a buffer hold at least n elements. The content is lost if it has to grow.
 template <class T>
 void atLeast(DeviceBuffer<T>& buffer, std::size_t n, cudaStream_t stream) {
   if (buffer.size() >= n) return;
-  buffer = {};  // first freed, so that both are never held at once
+  buffer = {};  // frees the old memory first, so that both are never held at once
   buffer = DeviceBuffer<T>(n, stream);
 }
 
 class DeviceTable {
  public:
-  /// A table takes longer to make than a picture: views of one transfer function share it.
+  /// Makes the table anew only if the transfer function or its step changed, because making it can
+  /// take longer than drawing a picture.
   void update(const RenderOptions& options, cudaStream_t stream) {
     const double length = opacitySteps(options);
     if (known_ && known_->length == length && known_->transfer == options.transfer) return;
@@ -27,7 +28,7 @@ class DeviceTable {
     atLeast(entries_, entries.size(), stream);
     entries_.upload(entries);
   }
-  /// After an update.
+  /// Must be called after update().
   [[nodiscard]] TransferTableView view() const { return known_->table.on(entries_.data()); }
   [[nodiscard]] std::size_t bytes() const { return entries_.bytes(); }
 
