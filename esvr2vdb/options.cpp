@@ -19,15 +19,14 @@ cli::ProgramText programText() {
           .purpose =
               "Turns an .esvr file back into the VDB that it was made from. Names, transforms,\n"
               "metadata and background are exactly those of the source; voxels are as close to\n"
-              "it as was asked for when the file was made. --list and --check print what a file\n"
-              "holds.",
+              "it as was asked for. --list prints what a file holds, --check verifies a file.",
           .usage =
               "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
               "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
               "  esvr2vdb --check IN.esvr",
           .notes =
-              "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of the\n"
-              "file and of its grids.\n"
+              "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of\n"
+              "the file and of its grids.\n"
               "\n"
               "A voxel is active where it differs from the background by more than a threshold,\n"
               "which was chosen when the file was made. In a level set, the voxels of the narrow\n"

@@ -1,5 +1,5 @@
 #pragma once
-/// What lists of pairs hold of an ellipsoid, and by how much more than its support.
+/// The support of an ellipsoid as it is entered into the pair lists, and the rule for its slack.
 
 #include <array>
 #include <cstdint>
@@ -8,23 +8,23 @@
 
 namespace esvr {
 
-/// A support as it was listed.
+/// A support at the time when the lists were built. It is wider than the ellipsoid's support by a
+/// slack, so that the ellipsoid can move before the lists must be built again (motion_bound.h).
 struct ListedSupport {
   std::array<double, 3> center;
   Matrix3 L;
-  double reach;  ///< its radius in the unit frame, slack included
+  double reach;  ///< radius in the unit frame, including the slack
 };
 
-/// How slack is chosen. Measured on aneurism and smoke1 with 2000 ellipsoids, 300 iterations and
-/// three seeds: lists are as long as with half a voxel for all ellipsoids (39,900 pairs for 39,700,
-/// and 16,800 for 17,900), and are built anew 83 times, where every tenth iteration and every event
-/// had made it 41.
+/// The rule for the slack. It was compared with other rules (docs/lab-notes.md, "When lists of
+/// pairs are built anew").
 struct SlackRule {
-  double missedShare = 0.05;       ///< share of its intensity that a list may miss of an ellipsoid
-  double minSlack = 0.15;          ///< voxels
-  double maxSlack = 0.25;          ///< share of the radius, where minSlack is less
-  double slackOverMotion = 0.9;    ///< slack over the motion since the lists before
-  std::uint32_t settledSteps = 4;  ///< an ellipsoid that is younger gets maxSlack
+  /// Lists may miss the part of a support in which |value| is below this share of the intensity.
+  double missedShare = 0.05;
+  double minSlack = 0.15;          ///< smallest slack, voxels
+  double maxSlack = 0.25;          ///< largest slack as a share of the radius, if above minSlack
+  double slackOverMotion = 0.9;    ///< slack relative to the motion since the last lists
+  std::uint32_t settledSteps = 4;  ///< ellipsoids with fewer steps get the largest slack
 };
 
 }  // namespace esvr

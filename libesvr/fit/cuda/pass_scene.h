@@ -1,5 +1,5 @@
 #pragma once
-/// What every pass over the bricks reads: bricks, ellipsoids, and which of them meet.
+/// The data that every pass over the bricks reads: bricks, ellipsoids and pair lists.
 
 #include <algorithm>
 
@@ -8,18 +8,18 @@
 
 namespace esvr::cuda {
 
-/// Pointers are to device memory, borrowed.
+/// All pointers are to device memory that the caller owns.
 struct PassScene {
-  const Coord* bricks;  ///< the target's first
+  const Coord* bricks;  ///< the target's bricks first
   std::uint32_t brickCount, targetCount;
   std::uint32_t ellipsoidCount, pairCount;
   PairListsView lists;
   const PairForm* forms;  ///< one for each ellipsoid
 };
 
-/// A brick whose list is longer than this is summed in 64-bit integers. In 32 bits a list of this
-/// length has units of 2^-17 of its largest intensity, and ordinary lists, of some 200 entries,
-/// units of 2^-22.
+/// A brick whose list is longer than this is summed in 64-bit integers. With 32 bits, the unit of a
+/// list of this length is 2^-17 of its largest intensity. That of usual lists, which have about 200
+/// entries, is 2^-22.
 inline constexpr std::uint32_t kMaxNarrowEntries = 4096;
 
 /// \return an upper bound for the number of bricks with longer lists, which come first in

@@ -1,5 +1,5 @@
 #pragma once
-/// The bricks that an ellipsoid reaches, a warp for each ellipsoid.
+/// Finds the bricks that an ellipsoid reaches, with one warp for each ellipsoid.
 
 #include <cstdint>
 
@@ -8,8 +8,9 @@
 
 namespace esvr::cuda {
 
-/// Calls visit(brick, reached) on all lanes together until every brick of `within` that is near a
-/// support has been visited by one lane, lanes and rounds in increasing order of the bricks.
+/// Visits the bricks of `within` that overlap the bounding box of a support. In each round all
+/// lanes call visit(brick, reached) together, each with its own brick. Bricks increase from lane to
+/// lane and from round to round. `reached` is false for bricks that the support does not touch.
 template <class Visit>
 __device__ void visitReachedBricks(const Support& support, const Box& within, Visit&& visit) {
   const Box range = clippedRange(support, within);

@@ -11,10 +11,10 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kStepBlock = 64;  // small: few ellipsoids are to use many processors
+constexpr int kStepBlock = 64;  // small blocks spread few ellipsoids over many multiprocessors
 constexpr int kSumBlock = 1024;
 
-/// Sum of value(0 .. count - 1) by one block.
+/// Sums value(0) to value(count - 1) with one block.
 template <class Value>
 __device__ void sumByOneBlock(std::uint32_t count, const Value& value, double* out) {
   double sum = 0.0;
@@ -56,7 +56,7 @@ __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   a.forms[i] = pairForm(p, a.radius);
   a.usefulness[i] = {float(sums.phi2), float(sums.rPhi),
                      float(edgeGradient(gradient, a.edge.logMByKappa))};
-  if (!finite(p)) *a.diverged = 1;  // integer sums would hide it
+  if (!finite(p)) *a.diverged = 1;  // the integer sums of the next pass would hide it
   if (!isHeld(a.listed[i], p, a.core)) *a.halts = 1;
 }
 

@@ -5,7 +5,8 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kListsServed = 8;  // a measurement costs two slower passes of some eighty
+// Lists between two measurements. A measurement costs about two slower passes out of eighty.
+constexpr int kListsServed = 8;
 
 }  // namespace
 
