@@ -13,7 +13,7 @@ struct HashOfBrick {
   std::size_t operator()(Coord brick) const { return std::size_t(hashOf(brick)); }
 };
 
-/// A set of bricks, one bit each in blocks of 8^3.
+/// A set of bricks, which are stored as bits in blocks of 8^3 bricks.
 class BrickSet {
  public:
   void insert(Coord brick) {
@@ -35,9 +35,10 @@ double determinant(const Matrix3& m) {
          m[2] * (m[3] * m[7] - m[4] * m[6]);
 }
 
-/// The bricks' middles lie between three pairs of planes (mayTouch). Around each middle lies a cube
-/// as large as a brick, and the cubes do not overlap: their number is bounded by the volume between
-/// planes that are moved outwards by half a brick.
+/// An upper bound of the number of bricks that a support may touch. Their middles lie between three
+/// pairs of planes (mayTouch). The cubes of one brick around the middles do not overlap and lie
+/// between planes that are moved outwards by half a brick; the volume between these bounds their
+/// number.
 double bricksBetweenSlabs(const Support& s) {
   constexpr double kHalf = kBrickSide / 2.0, kBrickVolume = kBrickVoxels;
   double volume = 8.0 / std::abs(determinant(s.L));
@@ -58,7 +59,7 @@ double maxBricks(const Support& support, const Box& within) {
 }
 
 double countBricks(std::span<const Support> supports, const Box& within, double enough) {
-  constexpr std::int32_t kSlice = 64;  // bricks along x between two looks at the count
+  constexpr std::int32_t kSlice = 64;  // bricks along x between two checks of the count
   BrickSet set;
   for (const Support& support : supports) {
     Box left = common(brickRange(support), within);

@@ -10,15 +10,14 @@
 namespace esvr {
 namespace {
 
-// Bytes that are held at once, at most. Lists that grow hold twice their content while they are
-// copied, and a tree that is written holds a brick again. esvr2vdb held 22 MB for smoke1 with 8,000
-// ellipsoids, of which the estimate is 24 MB.
+// The largest number of bytes that are held at the same time. Lists take twice their size while
+// they grow, and a tree that is written holds each brick a second time.
 constexpr double kBytesPerEllipsoid = 512.0;  // parameters, support, prepared form
-constexpr double kBytesPerPair = 16.0;        // lists both ways, and what they are made from
+constexpr double kBytesPerPair = 16.0;        // both lists of pairs, and intermediate lists
 constexpr double kBytesOfValues = kBrickVoxels * sizeof(float);
 constexpr double kBytesPerBrick = 2.0 * (kBytesOfValues + sizeof(BrickMask)) + 96.0;
 
-/// Each brick is counted for each ellipsoid that reaches it.
+/// An upper bound that counts a brick once for each ellipsoid that reaches it.
 WorkEstimate boundOf(std::span<const Support> supports, const Box& within, double maxOfAll) {
   WorkEstimate bound{.ellipsoids = double(supports.size())};
   Box all;
