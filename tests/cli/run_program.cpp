@@ -74,7 +74,7 @@ TemporaryFolder::TemporaryFolder() {
 }
 
 TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;  // what cannot be removed is the system's to clean
+  std::error_code ignored;  // the system cleans up what cannot be removed
   fs::remove_all(path_, ignored);
 }
 

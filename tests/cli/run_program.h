@@ -1,5 +1,5 @@
 #pragma once
-/// Runs a program as a user would, for tests of the programs.
+/// Runs a program for the tests as a user does.
 
 #include <filesystem>
 #include <string>
@@ -8,15 +8,15 @@
 namespace esvr::test {
 
 struct ProgramRun {
-  int exitCode = -1;  ///< 128 + the signal's number where a signal ended it
+  int exitCode = -1;  ///< 128 + the number of the signal if a signal ended the program
   std::string out, err;
 };
 
-/// Without a shell: the arguments arrive as they are; standard input is empty.
+/// Runs without a shell, so that the arguments arrive unchanged. The standard input is empty.
 ProgramRun runProgram(const std::filesystem::path& program,
                       const std::vector<std::string>& arguments);
 
-/// A folder that is gone when the test is over.
+/// A folder that is removed at the end of the test.
 class TemporaryFolder {
  public:
   TemporaryFolder();
@@ -27,7 +27,7 @@ class TemporaryFolder {
   [[nodiscard]] std::filesystem::path operator/(const std::string& name) const {
     return path_ / name;
   }
-  /// Names of all that is in it, sorted: what a run left behind.
+  /// The sorted names of all files in the folder.
   [[nodiscard]] std::vector<std::string> names() const;
 
  private:

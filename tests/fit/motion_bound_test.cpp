@@ -1,7 +1,7 @@
-// Plan: an ellipsoid that isHeld() has its whole support inside what was listed, over random steps
-// of many sizes; growth by the slack is the most that is held, and a move by the slack is too;
-// motionSince() bounds the slack that holds; young ellipsoids get the largest slack. What a fit's
-// steps see of ellipsoids that move fast is in optimiser_test.cpp.
+// Plan: if isHeld() is true, the whole support lies inside the listed one, for random steps of many
+// sizes. Growth or a move by exactly the slack is the largest that is held. motionSince() is an
+// upper bound of the slack that would have sufficed. Young ellipsoids get the largest slack. Fits
+// with fast ellipsoids are tested in optimiser_test.cpp.
 
 #include "fit/motion_bound.h"
 
@@ -117,7 +117,7 @@ TEST(MotionBound, SlackFollowsTheMotionBefore) {
   EXPECT_NEAR(slackOf(p, 4, listedAs(p, 0.1), kRadius, rule), least, 1e-12);
   EXPECT_NEAR(slackOf(sphere(2.4), 4, listedAs(p, 0.1), kRadius, rule), 0.2, 1e-9);
   EXPECT_EQ(slackOf(sphere(4.0), 4, listedAs(p, 0.1), kRadius, rule), rule.maxSlack);
-  // so small that minSlack is more
+  // The ellipsoid is so small that minSlack is the larger of the two.
   EXPECT_NEAR(slackOf(sphere(0.2), 3, {}, kRadius, rule), 0.4, 1e-12);
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Files for the tests of this folder: the real volumes and a directory of one's own.
+/// Files for the tests of this folder: the real volumes, and a temporary directory.
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 
 namespace esvr::test {
 
-/// The real volumes' folder, or an empty path where none is configured.
+/// The folder of the real volumes; empty if none is configured.
 inline std::filesystem::path dataDir() { return ESVR_DATA_DIR; }
 
-/// A directory that goes away with the test.
+/// A directory that is removed at the end of the test.
 class TemporaryDirectory {
  public:
   TemporaryDirectory() {

@@ -1,5 +1,5 @@
 #pragma once
-/// Tests that need a GPU: where there is none they skip and say why.
+/// The base class of tests that need a GPU. Without one they skip and say why.
 
 #include <gtest/gtest.h>
 

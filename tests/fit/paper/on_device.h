@@ -1,5 +1,5 @@
 #pragma once
-/// Tests that run on every device; without a GPU those on it skip and say why.
+/// The base class of tests that run on every device. Without a GPU, its tests skip and say why.
 
 #include <gtest/gtest.h>
 
