@@ -1,14 +1,15 @@
-# Warnings and sanitizers for every target of the project, and of no project that contains it.
+# Sets warnings and sanitizers for every target of the project, but not if another project contains
+# it.
 if(NOT PROJECT_IS_TOP_LEVEL)
   return()
 endif()
 
 set(warnings -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  list(APPEND warnings -Wno-restrict) # false alarms on std::string's operator+, GCC bug 105651
+  list(APPEND warnings -Wno-restrict) # GCC bug 105651: false warnings about std::string's operator+
 endif()
 add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:${warnings}>")
-# No -Wpedantic for CUDA: nvcc's generated host code is full of line directives in gcc's style.
+# CUDA code is compiled without -Wpedantic, which warns about line directives that nvcc generates.
 list(REMOVE_ITEM warnings -Wpedantic)
 list(JOIN warnings "," forHostCompiler)
 add_compile_options("$<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=${forHostCompiler}>")

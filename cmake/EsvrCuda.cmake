@@ -1,10 +1,10 @@
-# Enables the language CUDA as ESVR_CUDA asks and sets ESVR_WITH_CUDA.
+# Enables the language CUDA according to ESVR_CUDA, and sets ESVR_WITH_CUDA.
 set(ESVR_WITH_CUDA OFF)
 if(NOT ESVR_CUDA)
   return()
 endif()
 
-set(ESVR_CUDA_MINIMUM 12.0) # the first nvcc that knows C++20
+set(ESVR_CUDA_MINIMUM 12.0) # the first nvcc that supports C++20
 
 # nvcc is often installed without being on PATH.
 if(NOT CMAKE_CUDA_COMPILER AND NOT DEFINED ENV{CUDACXX})
@@ -15,7 +15,7 @@ if(NOT CMAKE_CUDA_COMPILER AND NOT DEFINED ENV{CUDACXX})
   endif()
 endif()
 
-# The architecture that the project is measured on; `native` and lists are the user's to give.
+# The default is the architecture that the project is measured on. The user may set another one.
 if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
   set(CMAKE_CUDA_ARCHITECTURES 90 CACHE STRING "CUDA architectures")
 endif()
@@ -26,8 +26,8 @@ if(CMAKE_CUDA_COMPILER)
   enable_language(CUDA)
   if(CMAKE_CUDA_COMPILER_VERSION VERSION_GREATER_EQUAL ESVR_CUDA_MINIMUM)
     find_package(CUDAToolkit REQUIRED)
-    # Not CMAKE_CUDA_STANDARD: before 3.26 CMake does not know nvcc's C++20.
-    # Constexpr functions run on the device too: those of std::array, Coord and voxel offsets.
+    # CMAKE_CUDA_STANDARD is not used, because CMake before 3.26 does not know nvcc's C++20.
+    # Device code calls constexpr functions: those of std::array, Coord and voxel offsets.
     add_compile_options("$<$<COMPILE_LANGUAGE:CUDA>:-std=c++20;--expt-relaxed-constexpr>")
     set(ESVR_WITH_CUDA ON)
   endif()

@@ -1,6 +1,6 @@
-# What libesvr needs, in one place for the build and for those who link a static libesvr:
-# esvr_find_dependencies(find_package) here, esvr_find_dependencies(find_dependency) in
-# esvrConfig.cmake. A macro, since imported targets belong to the folder that finds them.
+# Finds the packages that libesvr needs. The build calls esvr_find_dependencies(find_package), and
+# esvrConfig.cmake calls esvr_find_dependencies(find_dependency) for users of a static libesvr. It
+# is a macro, because imported targets belong to the folder that finds them.
 macro(esvr_find_dependencies find)
   cmake_language(CALL ${find} Threads REQUIRED)
   cmake_language(CALL ${find} TBB REQUIRED)

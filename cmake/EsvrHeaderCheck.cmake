@@ -1,5 +1,5 @@
-# Target check_headers: every public header compiles alone, twice in one file; those with code for
-# the device (ESVR_HD) under nvcc too.
+# The target check_headers compiles every public header on its own, included twice in one file.
+# Headers with device code (ESVR_HD) are compiled by nvcc too.
 file(GLOB_RECURSE publicHeaders CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/libesvr/include
      libesvr/include/esvr/*.h)
 

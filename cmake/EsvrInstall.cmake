@@ -1,5 +1,5 @@
-# Installs the library, its headers and the package that find_package(esvr) reads. The component
-# `library` is all that another project needs; programs are in the component `programs`.
+# Installs the library, its headers and the package for find_package(esvr). The component `library`
+# has everything that another project needs; the component `programs` has the programs.
 include(CMakePackageConfigHelpers)
 
 set(packageDir ${CMAKE_INSTALL_LIBDIR}/cmake/esvr)
@@ -23,10 +23,10 @@ get_target_property(libraryType esvr TYPE)
 string(COMPARE EQUAL ${libraryType} STATIC_LIBRARY ESVR_STATIC)
 if(ESVR_WITH_CUDA)
   set(ESVR_CUDA_IN TRUE)
-  set(ESVR_CUDART libesvr_cudart_static.a) # of its own name: there may be another beside it
+  set(ESVR_CUDART libesvr_cudart_static.a) # CUDA's own may be in the same folder
   if(ESVR_STATIC)
     get_target_property(cudart CUDA::cudart_static IMPORTED_LOCATION)
-    file(REAL_PATH ${cudart} cudart) # a link would be installed as a link
+    file(REAL_PATH ${cudart} cudart) # because a link would be installed as a link
     install(FILES ${cudart} DESTINATION ${CMAKE_INSTALL_LIBDIR} RENAME ${ESVR_CUDART}
             COMPONENT library)
   endif()

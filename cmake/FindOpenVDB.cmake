@@ -1,4 +1,4 @@
-# Finds OpenVDB, which installs no package config: target OpenVDB::openvdb.
+# Finds OpenVDB, which installs no package file of its own: target OpenVDB::openvdb.
 find_path(OpenVDB_INCLUDE_DIR openvdb/openvdb.h)
 find_library(OpenVDB_LIBRARY openvdb)
 mark_as_advanced(OpenVDB_INCLUDE_DIR OpenVDB_LIBRARY)
@@ -12,8 +12,8 @@ if(OpenVDB_INCLUDE_DIR)
 endif()
 set(required OpenVDB_LIBRARY OpenVDB_INCLUDE_DIR)
 if(usesImath)
-  # Its headers inline conversions that need Imath's table. Imath's own package config names a
-  # library that Debian does not install with it, so the library is looked for here.
+  # OpenVDB's headers have inline conversions that need a table of Imath. Imath's own package file
+  # names a library that Debian does not install with it, so the library is searched here.
   find_library(OpenVDB_Imath_LIBRARY Imath)
   mark_as_advanced(OpenVDB_Imath_LIBRARY)
   list(APPEND required OpenVDB_Imath_LIBRARY)

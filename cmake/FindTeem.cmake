@@ -1,4 +1,4 @@
-# Finds teem, which reads NRRD images: target Teem::teem. Its own package file names no target.
+# Finds teem, which reads NRRD images: target Teem::teem. Teem's own package file defines no target.
 find_path(Teem_INCLUDE_DIR teem/nrrd.h)
 find_library(Teem_LIBRARY teem)
 mark_as_advanced(Teem_INCLUDE_DIR Teem_LIBRARY)

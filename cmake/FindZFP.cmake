@@ -1,4 +1,4 @@
-# Finds ZFP: target ZFP::zfp. Debian's package has no package file of its own.
+# Finds ZFP: target ZFP::zfp. Debian installs no package file for it.
 find_path(ZFP_INCLUDE_DIR zfp.h)
 find_library(ZFP_LIBRARY zfp)
 mark_as_advanced(ZFP_INCLUDE_DIR ZFP_LIBRARY)

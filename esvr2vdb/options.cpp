@@ -19,14 +19,14 @@ cli::ProgramText programText() {
           .purpose =
               "Turns an .esvr file back into the VDB that it was made from. Names, transforms,\n"
               "metadata and background are exactly those of the source; voxels are as close to\n"
-              "it as the file was asked to be. --list and --check tell what a file holds.",
+              "it as was asked for. --list prints what a file holds, --check verifies a file.",
           .usage =
               "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
               "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
               "  esvr2vdb --check IN.esvr",
           .notes =
-              "OUT may end in .nvdb: then a NanoVDB file is written. It has no place for the\n"
-              "metadata of the file and of its grids.\n"
+              "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of\n"
+              "the file and of its grids.\n"
               "\n"
               "A voxel is active where it differs from the background by more than a threshold,\n"
               "which was chosen when the file was made. In a level set, the voxels of the narrow\n"
@@ -56,9 +56,9 @@ cli::CommandLine commandLine() {
     ("threshold", value<float>()->value_name("T"),
      "make those voxels active that differ from the background by more (default: as stored)")
     ("lod", value<std::int64_t>()->value_name("N"),
-     "use the N heaviest layers of ellipsoids only; --list -v prints the error of each layer")
+     "use the first N importance layers only; --list -v prints the error of each layer")
     ("max-ellipsoids", value<std::int64_t>()->value_name("N"),
-     "use the N heaviest ellipsoids of each grid only")
+     "use the N ellipsoids of each grid that contribute most to its values only")
     ("bbox", value<std::string>()->value_name("BOX"),
      "write the voxels of the box x0,y0,z0,x1,y1,z1 only; parts of IN that cannot reach them are "
      "not read")

@@ -24,7 +24,7 @@ struct Options {
   std::vector<std::string> grids;  ///< empty: all
   DecodeOptions decode;
   ReadPart part;                             ///< the part of the file that is read
-  std::optional<std::size_t> maxEllipsoids;  ///< the heaviest of each grid
+  std::optional<std::size_t> maxEllipsoids;  ///< keep those of each grid with the largest weight
   WriteOptions write;
   std::optional<std::filesystem::path> reference;
   std::optional<Box> box;       ///< PSNR against the reference is taken over it

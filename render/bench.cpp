@@ -16,15 +16,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kDefaultViews = 720;  // the paper's, of 0.5 degrees each
+constexpr int kDefaultViews = 720;  // as in the paper: steps of 0.5 degrees
 constexpr int kWarmUp = 5;
 constexpr int kCompared = 36;
-constexpr double kSlowest = 0.01;  // share of frames that "1 % low" is of
+constexpr double kSlowest = 0.01;  // share of the frames that "1 % low" averages
 
-/// The times of all counted frames.
+/// The times of all frames after the warm-up.
 struct Times {
   std::vector<double> frameMs, listMs, drawMs;
-  double pairs = 0.0, occupancy = 0.0;  ///< means
+  double pairs = 0.0, occupancy = 0.0;  ///< means over the frames
   FrameStats last;
 };
 
@@ -34,7 +34,7 @@ double median(std::vector<double> v) {
   return *middle;
 }
 
-/// Mean of the slowest.
+/// Mean of the slowest hundredth of the frames, at least of one.
 double slowest(std::vector<double> v) {
   std::sort(v.begin(), v.end(), std::greater<>());
   const auto n = std::max<std::size_t>(1, std::size_t(std::ceil(double(v.size()) * kSlowest)));

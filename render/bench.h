@@ -1,5 +1,5 @@
 #pragma once
-/// --bench: how fast a scene is drawn, and how well.
+/// The option --bench: measures the speed, memory and quality of drawing.
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -10,16 +10,17 @@ namespace esvr::render {
 
 struct Benched {
   Renderer& renderer;
-  Renderer* reference;  ///< null: none
+  Renderer* reference;  ///< null if there is no --ref
 };
 
-/// Draws `views` pictures of a full turn, 720 for 0, some beforehand that do not count; then, where
-/// there is a reference, the same of it, and compares some of the pictures.
-/// \throws  as Renderer::draw
+/// Draws the pictures of a full turn, after a few that warm up and do not count. If there is a
+/// reference, it is measured in the same way, and up to 36 pictures are compared with it.
+/// \param views  number of pictures; 0 stands for 720
+/// \throws       as for Renderer::draw
 [[nodiscard]] nlohmann::ordered_json bench(const Benched& benched, const RenderOptions& options,
                                            int views, const cli::Log& log);
 
-/// JSON has no infinity: null.
+/// A number for a JSON file. Infinity becomes null, because JSON cannot express it.
 [[nodiscard]] nlohmann::ordered_json jsonNumber(double value);
 
 }  // namespace esvr::render

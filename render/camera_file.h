@@ -1,5 +1,5 @@
 #pragma once
-/// --camera.
+/// The option --camera: reads a camera file.
 
 #include <filesystem>
 
@@ -7,9 +7,10 @@
 
 namespace esvr::render {
 
-/// A JSON object with any of "eye", "center", "up" (three numbers each), "fov" or "height", and
-/// "orthographic" (true or false; true where there is a height).
-/// \throws BadInput  missing, not JSON, another key (lists those there are), not so many numbers
+/// Reads a JSON object. Its optional keys are "eye", "center" and "up" (three numbers each), "fov",
+/// "height", and "orthographic" (true or false; the default is true if "height" is given).
+/// \throws BadInput  the file is missing or not JSON, a key is unknown, or a value has the wrong
+///                   form
 [[nodiscard]] CameraWish readCamera(const std::filesystem::path& path);
 
 }  // namespace esvr::render

@@ -22,7 +22,7 @@ namespace {
 using Bytes = std::vector<std::byte>;
 constexpr std::size_t kChannels = 4;
 
-/// A file in memory; OpenEXR goes back to fill in its table of lines.
+/// An output file in memory. It can seek, because OpenEXR goes back to fill in its line table.
 class ByteStream final : public Imf::OStream {
  public:
   ByteStream() : Imf::OStream("a picture") {}
@@ -41,7 +41,7 @@ class ByteStream final : public Imf::OStream {
   std::size_t at_ = 0;
 };
 
-/// IEC 61966-2-1.
+/// Converts an sRGB channel to linear light (IEC 61966-2-1).
 float linearLight(float color) {
   return color <= 0.04045f ? color / 12.92f : std::pow((color + 0.055f) / 1.055f, 2.4f);
 }
@@ -56,7 +56,7 @@ std::vector<float> linearPixels(const Image& image) {
   return pixels;
 }
 
-/// In the layout of a picture, the first of four.
+/// The distances of a depth picture, stored in the first of every four floats as in its pixels.
 std::vector<float> depths(const Image& image) {
   std::vector<float> pixels = image.rgba;
   for (std::size_t i = 0; i < pixels.size(); i += kChannels)
@@ -81,7 +81,7 @@ Bytes written(const Image& image, std::vector<float> pixels,
     Imf::OutputFile file(stream, header);
     file.setFrameBuffer(buffer);
     file.writePixels(image.height);
-  }  // writes the table of lines
+  }  // the destructor writes the line table
   return stream.take();
 }
 

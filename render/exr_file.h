@@ -1,5 +1,5 @@
 #pragma once
-/// Pictures as OpenEXR: 32-bit floats.
+/// Encodes pictures as OpenEXR files with 32-bit floats.
 
 #include <cstddef>
 #include <string>
@@ -10,17 +10,18 @@
 namespace esvr::render {
 
 struct ExrText {
-  std::string software;  ///< who wrote it
-  std::string comment;   ///< how
+  std::string software;  ///< program that wrote the file
+  std::string comment;   ///< its command line
 };
 
-/// Channels R, G, B, A: premultiplied, in linear light, as the format wants them. Colors, which are
-/// a screen's here, are converted before they are premultiplied.
-/// \throws RuntimeFailure  OpenEXR's own words
+/// Encodes the channels R, G, B and A, premultiplied and in linear light, as the format requires.
+/// The colors of pictures are sRGB and are converted before they are premultiplied.
+/// \throws RuntimeFailure  with OpenEXR's message
 [[nodiscard]] std::vector<std::byte> encodeExr(const Image& image, const ExrText& text);
 
-/// Channel Z: the red of a picture drawn with RenderMode::kDepth; infinite where its alpha is 0.
-/// \throws RuntimeFailure  as encodeExr
+/// Encodes the distances of a picture that was drawn with RenderMode::kDepth as the channel Z.
+/// Pixels without a distance, which have an alpha of 0, are infinite.
+/// \throws RuntimeFailure  as for encodeExr
 [[nodiscard]] std::vector<std::byte> encodeDepthExr(const Image& image, const ExrText& text);
 
 }  // namespace esvr::render

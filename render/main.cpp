@@ -1,4 +1,4 @@
-// esvr-render: draws the ellipsoids of an .esvr file, or the voxels of a VDB.
+// esvr-render draws the ellipsoids of an .esvr file or the voxels of a VDB file.
 
 #include "cli/run_main.h"
 #include "cli/thread_limit.h"

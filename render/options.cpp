@@ -16,12 +16,12 @@ using cli::po::bool_switch;
 using cli::po::value;
 
 constexpr int kMaxSide = Resolution::kMaxSide;
-constexpr int kMaxFrames = 9999;   // four digits in a frame's name
+constexpr int kMaxFrames = 9999;   // the number in a frame's file name has four digits
 constexpr double kMinStep = 1e-3;  // voxels
 constexpr int kMaxBins = 16;
 constexpr double kMinVram = 0.001, kMaxVram = 1e4;  // GB
 
-/// "title: one, two, three." in lines of a help text.
+/// Formats "title: one, two, three." for a help text, with line breaks.
 std::string listOf(const std::string& title, const std::vector<std::string>& names) {
   constexpr std::size_t kLine = 80;
   std::string text, line = title + ":";
@@ -36,7 +36,8 @@ std::string listOf(const std::string& title, const std::vector<std::string>& nam
 std::string notes() {
   return "IN may be an .esvr, a .vdb or an .nvdb. All are drawn with the same camera, samples,\n"
          "transfer function and compositing. Voxels are interpolated trilinearly.\n"
-         "An .esvr that stores voxels, or ellipsoids with a residual, is drawn from voxels.\n"
+         "An .esvr that stores voxels is drawn from them. A residual and a stored active mask are\n"
+         "drawn with --method bricks only.\n"
          "\n"
          "Places and lengths are in voxels of the grid's index space; its transform is not\n"
          "applied. By default the camera sees all active voxels. Places where the value is\n"
@@ -44,13 +45,13 @@ std::string notes() {
          "\n" +
          listOf("Color maps", builtInColorMaps()) + listOf("Opacity curves", builtInOpacities()) +
          "\n"
-         "CAM.json holds what the camera options say: {\"eye\": [1, 2, 3], \"center\": [...],\n"
+         "CAM.json has the values of the camera options: {\"eye\": [1, 2, 3], \"center\": [...],\n"
          "\"up\": [...], \"fov\": 30}, or \"height\" for an orthographic camera.\n"
          "\n"
-         "--ref draws the voxels of a VDB beside every picture, on the same device, and prints\n"
-         "how far apart the two pictures are. OUT.error.png shows the error ten times as\n"
-         "bright. --bench draws a full turn, keeps no picture, and reports the frames a second\n"
-         "and the time of each step, with --ref for both files.\n"
+         "--ref also draws the voxels of a VDB with the same camera, on the same device, and\n"
+         "prints the error of each picture. OUT.error.png shows the error ten times as bright.\n"
+         "--bench draws a full turn, writes no picture, and reports the frames per second and the\n"
+         "time of each step; with --ref it does so for both files.\n"
          "\n"
          "A PNG holds the colors of a screen, not premultiplied. An EXR holds floats in linear\n"
          "light, premultiplied. Both hold this command line in their metadata.\n"
@@ -115,8 +116,8 @@ cli::CommandLine commandLine() {
      "color behind the volume, each channel from 0 to 1 (default: transparent)")
     ("bits", value<int>()->value_name("B")->default_value(8), "bits of a PNG's channel, 8 or 16")
     ("mode", value<std::string>()->value_name("M")->default_value("composite"),
-     "composite: put the samples of a ray over each other; maximum or average: show this value of "
-     "the samples")
+     "composite: composite the samples of a ray from front to back; maximum or average: show this "
+     "value of the samples")
     ("clip", value<std::string>()->value_name("BOX"),
      "draw only what lies in the box x0,y0,z0,x1,y1,z1")
     ("slice", value<std::string>()->value_name("A=P"),
@@ -237,7 +238,7 @@ void readRange(const Arguments& a, Options& options) {
     options.rangeKind = RangeKind::kOwn;
   else {
     const auto v = cli::parseNumbers("range", text, 2);
-    if (v[0] > v[1]) throw UsageError("--range must rise: '" + text + "'");
+    if (v[0] > v[1]) throw UsageError("--range must have LO <= HI, not '" + text + "'");
     options.rangeKind = RangeKind::kGiven;
     options.range = {float(v[0]), float(v[1])};
   }
@@ -250,7 +251,7 @@ std::optional<Rgb> backgroundOf(const Arguments& a) {
   return Rgb{(*color)[0], (*color)[1], (*color)[2]};
 }
 
-constexpr double kEverywhere = 1e9;  // voxels; beyond any grid
+constexpr double kEverywhere = 1e9;  // voxels; larger than any coordinate in a grid
 
 PlaceBox sliceOf(const std::string& text) {
   const std::string axes = "xyz";
@@ -265,7 +266,7 @@ PlaceBox sliceOf(const std::string& text) {
 
 std::optional<PlaceBox> clipOf(const Arguments& a) {
   const auto clip = a.find<std::string>("clip"), slice = a.find<std::string>("slice");
-  if (clip && slice) throw UsageError("--clip and --slice are two boxes; give one");
+  if (clip && slice) throw UsageError("--clip and --slice cannot be given together");
   if (slice) return sliceOf(*slice);
   if (!clip) return std::nullopt;
   const auto v = cli::parseNumbers("clip", *clip, 6);
@@ -275,7 +276,7 @@ std::optional<PlaceBox> clipOf(const Arguments& a) {
 void readFrames(const Arguments& a, Options& options) {
   const auto text = a.find<std::string>("frames");
   if (!text) return;
-  if (options.turntable == 0) throw UsageError("--frames says nothing without --turntable");
+  if (options.turntable == 0) throw UsageError("--frames needs --turntable");
   const auto dash = text->find('-');
   if (dash == std::string::npos || dash == 0)
     throw UsageError("--frames must be like 0-35, not '" + *text + "'");
@@ -337,15 +338,15 @@ void readMeasuring(const Arguments& a, Options& options) {
   options.sheet = a.find<std::string>("sheet").value_or("");
   options.bench = a.get<bool>("bench");
   if (!options.sheet.empty() && (options.reference.empty() || options.bench))
-    throw UsageError("--sheet shows a picture beside that of --ref; give both");
+    throw UsageError("--sheet needs --ref, and cannot be given with --bench");
   options.report = a.find<std::string>("report").value_or("");
   if (options.bench && !options.depth.empty())
-    throw UsageError("--bench keeps no picture; leave --depth out");
+    throw UsageError("--bench writes no picture; leave --depth out");
   if (options.bench != options.output.empty())
-    throw UsageError(options.bench ? "--bench keeps no picture; leave OUT.png out"
+    throw UsageError(options.bench ? "--bench writes no picture; leave OUT.png out"
                                    : "OUT.png is missing");
   if (!options.report.empty() && !options.bench && options.reference.empty())
-    throw UsageError("--report says what --bench or --ref found; give one of them");
+    throw UsageError("--report writes the results of --bench or --ref; give one of them");
 }
 
 std::string joined(int argc, const char* const* argv) {

@@ -15,31 +15,31 @@ inline constexpr const char* kProgram = "esvr-render";
 
 /// The range of values that the transfer function covers.
 enum class RangeKind {
-  kAuto,  ///< those of the active voxels and the background
-  kData,  ///< those of the active voxels
-  kOwn,   ///< as its points have them
+  kAuto,  ///< range of the active voxels and the background
+  kData,  ///< range of the active voxels
+  kOwn,   ///< range of the transfer function's own points
   kGiven
 };
 
 struct Options {
   std::filesystem::path input;
-  std::filesystem::path output;     ///< empty: no picture is kept
+  std::filesystem::path output;     ///< empty: no picture is written
   std::optional<std::string> grid;  ///< default: the first that can be drawn
-  TransferFunction transfer;        ///< not yet over its range
+  TransferFunction transfer;        ///< before it is rescaled to its range
   RangeKind rangeKind = RangeKind::kAuto;
-  ValueRange range;  ///< kGiven
+  ValueRange range;  ///< the range of RangeKind::kGiven
   CameraWish camera;
   Resolution resolution;
   double step = 1.0, opacityLength = 1.0;
-  std::optional<double> minTransmittance;  ///< none: as RenderOptions has it
-  std::optional<Rgb> background;           ///< none: the picture is transparent
+  std::optional<double> minTransmittance;  ///< default: that of RenderOptions
+  std::optional<Rgb> background;           ///< default: the picture is transparent
   int bits = 8;                            ///< bits of a PNG's channel
   Between between = Between::kVoxels;
   RenderMode mode = RenderMode::kComposite;
   std::optional<PlaceBox> clip;
-  int turntable = 0;             ///< pictures of a full turn; 0: one picture
-  int firstFrame = 0;            ///< the first of those to draw
-  std::optional<int> lastFrame;  ///< the last of those to draw; none: all
+  int turntable = 0;             ///< number of pictures of a full turn; 0: one picture
+  int firstFrame = 0;            ///< first picture of the turn to draw
+  std::optional<int> lastFrame;  ///< last picture of the turn to draw; default: the turn's last
   std::filesystem::path depth;   ///< file of distances; empty: none
   std::filesystem::path saveTransfer;
   std::string device = "auto";
@@ -57,8 +57,9 @@ struct Options {
   std::string commandLine;  ///< for the picture's metadata
 };
 
-/// \return nothing where --help or --version was printed
-/// \throws UsageError; BadInput: a transfer function's file
+/// Parses the command line. \return nothing if --help or --version was printed
+/// \throws UsageError  the options are wrong
+/// \throws BadInput    the file of a transfer function or camera is wrong
 [[nodiscard]] std::optional<Options> parseOptions(int argc, const char* const* argv);
 
 }  // namespace esvr::render

@@ -14,7 +14,7 @@ namespace {
 constexpr int kChannels = 4;
 using Bytes = std::vector<std::byte>;
 
-/// Most significant byte first, as PNG has it.
+/// Appends a channel with the most significant byte first, as PNG requires.
 void append(double v, int bits, std::vector<png_byte>& to) {
   const double maxLevel = double((1 << bits) - 1);
   const auto level = unsigned(std::lround(std::clamp(v, 0.0, 1.0) * maxLevel));
@@ -42,8 +42,8 @@ std::vector<png_byte> pixelsOf(const Image& image, const PngForm& form) {
   return pixels;
 }
 
-/// The data that libpng is given and gives back. It is C and leaves by longjmp: nothing on its way
-/// may need a destructor, so everything that does lives here.
+/// The data that libpng reads and writes. libpng leaves by longjmp on errors, which skips
+/// destructors; all objects that need one therefore live here, outside the jump.
 struct Writing {
   std::vector<png_byte> pixels;
   std::vector<png_bytep> rows;
@@ -86,7 +86,7 @@ png_text textChunk(const char* key, const std::string& text) {
   return chunk;
 }
 
-/// Writes the file's header.
+/// The header of a PNG file.
 struct PngHeader {
   int width, height, bits;
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// Pictures as PNG.
+/// Encodes pictures as PNG files.
 
 #include <cstddef>
 #include <optional>
@@ -11,16 +11,17 @@
 namespace esvr::render {
 
 struct PngText {
-  std::string software;  ///< who wrote it
-  std::string comment;   ///< how; UTF-8
+  std::string software;  ///< program that wrote the file
+  std::string comment;   ///< its command line; UTF-8
 };
 
 struct PngForm {
-  std::optional<Rgb> background;  ///< the picture before it, else RGBA
-  int bits = 8;                   ///< a channel: 8 or 16
+  std::optional<Rgb> background;  ///< color behind the picture; default: an RGBA file
+  int bits = 8;                   ///< bits of a channel, 8 or 16
 };
 
-/// sRGB; colors that are not premultiplied. \throws RuntimeFailure  libpng's own words
+/// Encodes a picture in sRGB, with colors that are not premultiplied.
+/// \throws RuntimeFailure  with libpng's message
 [[nodiscard]] std::vector<std::byte> encodePng(const Image& image, const PngForm& form,
                                                const PngText& text);
 

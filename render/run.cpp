@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// "turn.png" and 7: "turn.0007.png".
+/// The file name of a frame: "turn.0007.png" for "turn.png" and 7.
 fs::path frameName(const fs::path& output, int frame) {
   constexpr std::size_t kDigits = 4;
   std::string number = std::to_string(frame);
@@ -59,13 +59,13 @@ std::vector<fs::path> depthOutputs(const Options& options) {
   return frameNames(options, options.depth);
 }
 
-/// "turn.0007.png": "turn.0007.error.png".
+/// The file name of a picture's error map: "turn.0007.error.png" for "turn.0007.png".
 fs::path errorName(const fs::path& picture) {
   fs::path name = picture;
   return name.replace_extension("error" + picture.extension().string());
 }
 
-/// All that can go wrong without work goes wrong before it.
+/// Checks all output files before anything is drawn, so that a mistake costs no time.
 void checkFiles(const Options& options, const std::vector<fs::path>& files) {
   for (const auto& file : files) {
     cli::requireDistinct({options.input, file});
@@ -88,8 +88,8 @@ void checkFiles(const Options& options, const std::vector<fs::path>& files) {
   if (toFile) cli::checkOutput(options.report, {".json"}, options.overwrite);
 }
 
-/// A picture is held as four floats a pixel and encoded in memory, and so are, with --ref, that of
-/// the reference, their difference and a sheet of all three.
+/// Checks the memory for pictures. Each is held as four floats a pixel and is encoded in memory.
+/// With --ref there are also the reference's picture, the difference and, with --sheet, the sheet.
 void checkPictureSize(const Options& options) {
   constexpr double kBytesPerPixel = 48.0;
   const double pictures = options.reference.empty() ? 1.0 : (options.sheet.empty() ? 3.0 : 6.0);
@@ -121,7 +121,7 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
   return r;
 }
 
-/// A file's scene, prepared for drawing.
+/// The scene of a file together with its renderer.
 struct Drawing {
   Drawing(Scene from, const DrawSettings& settings, const RenderOptions& sample)
       : scene(std::move(from)), renderer(scene, settings, sample) {}
@@ -130,7 +130,7 @@ struct Drawing {
   SceneRenderer renderer;
 };
 
-/// The reference is drawn as it is, whatever the values of the other.
+/// The drawing of --ref. If the input is a VDB file, --values applies to the input alone.
 std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings& settings,
                                      const RenderOptions& sample) {
   if (options.reference.empty()) return nullptr;
@@ -153,7 +153,7 @@ class Frames {
         drawing_(drawing),
         reference_(reference) {}
 
-  /// \param sheet  empty: none
+  /// Draws one frame. \param sheet  file of the sheet; empty: none
   void draw(const RenderOptions& r, const fs::path& file, const fs::path& sheet) {
     cli::Stopwatch watch;
     const Image image = drawing_.renderer->draw(r);
@@ -184,7 +184,7 @@ class Frames {
 
   void compare(const RenderOptions& r, const Image& image, const fs::path& file,
                const fs::path& sheet) {
-    constexpr double kGain = 10.0;  // as --help has it
+    constexpr double kGain = 10.0;  // gain of the difference; --help states it
     const Image expected = reference_->renderer->draw(r);
     const ImageMetrics m = compareImages(expected, image);
     const Image error = errorMap(expected, image, kGain);

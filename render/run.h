@@ -1,5 +1,5 @@
 #pragma once
-/// Draws what was asked for.
+/// Carries out the options of esvr-render.
 
 #include "render/options.h"
 

@@ -19,7 +19,8 @@ std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
   return findGrid(names, *grid, path);
 }
 
-/// A grid that holds its voxels is drawn from them: they are what it stands for.
+/// Reads a grid of an .esvr file. If the grid stores its voxels, they are drawn instead of the
+/// ellipsoids, because they are exact.
 Scene encoded(const SceneFile& from) {
   EsvrFile file = readEsvr(from.path, {from.maxMemory});
   StoredGrid& grid = file.grids[placeOf(file, from.path, from.grid)];
@@ -63,7 +64,7 @@ Scene readScene(const SceneFile& file) {
 
 namespace {
 
-/// Milliseconds of a picture, once what it needs is there.
+/// Seconds for a picture, measured on the second one because the first also prepares data.
 double timeOf(Renderer& renderer, const RenderOptions& options) {
   renderer.drawOnDevice(options);
   cli::Stopwatch watch;
@@ -71,7 +72,7 @@ double timeOf(Renderer& renderer, const RenderOptions& options) {
   return watch.lap();
 }
 
-/// Nothing where it does not fit.
+/// A renderer of decoded voxels, or null if they do not fit into the device memory.
 std::unique_ptr<Renderer> bricksThatFit(const SparseVolume& volume, const DrawSettings& s,
                                         const RenderOptions& sample) {
   try {

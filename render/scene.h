@@ -1,5 +1,5 @@
 #pragma once
-/// The content of a file, to be drawn.
+/// Reads the content of a file and draws it.
 
 #include <filesystem>
 #include <optional>
@@ -14,40 +14,41 @@ namespace esvr::render {
 
 struct Scene {
   std::variant<Field, VolumeGrid> content;
-  std::string grid;  ///< its name
-  Box box;           ///< around the active voxels
-  ValueRange data;   ///< over the active voxels
+  std::string grid;  ///< name of the grid
+  Box box;           ///< bounding box of the active voxels
+  ValueRange data;   ///< range of the active voxels
   float background = 0.0f;
-  std::optional<StoredGrid> encoded{};  ///< the grid that a field was read from
+  std::optional<StoredGrid> encoded{};  ///< stored grid of the field; none for voxels
 };
 
 struct SceneFile {
   std::filesystem::path path;
-  std::optional<std::string> grid;           ///< nothing: the first that can be drawn
+  std::optional<std::string> grid;           ///< default: the first grid that can be drawn
   std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes
 };
 
-/// \throws BadInput  the file cannot be read, has no such grid or none that can be drawn;
-///                   MemoryExceeded
+/// \throws BadInput        the file cannot be read, or has no such grid or none that can be drawn
+/// \throws MemoryExceeded  the grid needs more than SceneFile::maxMemory
 [[nodiscard]] Scene readScene(const SceneFile& file);
 
-/// The device and the way of drawing.
+/// The way to draw a field, with the names of --method.
 enum class Method { kEllipsoids, kBricks, kAuto };
 
 struct DrawSettings {
   Device device;
-  Method method = Method::kEllipsoids;  ///< the way to draw a field
+  Method method = Method::kEllipsoids;
   RendererLimits limits;
-  std::optional<NanoValues> values;          ///< march voxels as a NanoVDB grid of these
+  std::optional<NanoValues> values;          ///< draw voxels as a NanoVDB grid of this value type
   std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes that decoding may take
 };
 
 /// Draws a scene, which must outlive it.
 class SceneRenderer {
  public:
-  /// Voxels are marched as a NanoVDB grid on a CUDA device, or where `values` asks for one. A field
-  /// is drawn by Method: its ellipsoids; its voxels, decoded once; or, by trying both with `sample`
-  /// once each, what is faster and fits. \throws DeviceError
+  /// Voxels are drawn as a NanoVDB grid on a CUDA device, or if `values` asks for one. A field is
+  /// drawn as `method` says: from its ellipsoids, or from voxels that are decoded once. kAuto draws
+  /// the options `sample` in both ways and takes the faster one that fits into memory.
+  /// \throws DeviceError  the device fails, or its memory is exhausted
   SceneRenderer(const Scene& scene, const DrawSettings& settings, const RenderOptions& sample);
 
   Renderer* operator->() { return renderer_.get(); }

@@ -1,1 +1,1 @@
-// Nothing: its target is there for the headers that it precompiles.
+// This file is empty. Its target exists for the headers that it precompiles.

@@ -1,6 +1,7 @@
 #pragma once
-/// Sorted Morton keys as the numbers of keys on either side of every split: the order of the
-/// ellipsoids within a cell, which means nothing, costs nothing.
+/// Codes a set of sorted Morton keys as a tree: for every split it stores how many keys have a 0 in
+/// the next bit. The order of ellipsoids in a cell has no meaning, and in this form it costs no
+/// bits.
 
 #include <algorithm>
 #include <array>
@@ -13,13 +14,14 @@
 
 namespace esvr::codec {
 
-/// \tparam Side  Writer: `keys` are sorted; Reader: `keys` are zeros and become the keys
+/// \tparam Side  with a Writer, code() takes sorted keys; with a Reader it takes zeros and sets the
+///               keys
 template <class Side>
 class CellTree {
  public:
   explicit CellTree(Side& side) : side_(side) {}
 
-  /// \param bits  of a key
+  /// \param bits  number of bits of a key
   void code(std::span<std::uint64_t> keys, int bits) {
     if (keys.empty() || bits == 0) return;
     const std::uint64_t bit = std::uint64_t{1} << (bits - 1);
@@ -42,7 +44,7 @@ class CellTree {
     return codeLarge(n, zeros);
   }
 
-  /// How far from half and half.
+  /// Codes the number of zeros as its distance from half of the keys.
   std::uint32_t codeLarge(std::uint32_t n, std::uint32_t zeros) {
     const auto width = std::size_t(std::bit_width(n));
     const std::uint32_t half = n / 2;

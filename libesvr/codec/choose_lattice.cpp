@@ -14,17 +14,17 @@ namespace {
 // quaternion w^2 (s1 / s3 - s3 / s1)^2 dq^2.
 constexpr double kScaleCurvature = 0.75;
 
-constexpr double kCoarsestScale = 0.5;  // a coarser step is no small change any more
+constexpr double kCoarsestScale = 0.5;  // the estimates above hold for small changes only
 constexpr double kLog2e = std::numbers::log2e;
-constexpr double kFixed = 256.0;  // Lattice counts bits in 1/256
+constexpr double kFixed = 256.0;  // Lattice stores numbers of bits in units of 1/256
 constexpr std::size_t kMaxThresholds = 16;
 constexpr int kLastRatio = 255;
 
-constexpr std::size_t kMinLayered = 2048;  // ellipsoids: layers of fewer cost more than they bring
-constexpr std::size_t kFirstLayers = 8;    // the first has an eighth at least, then a quarter, half
+constexpr std::size_t kMinLayered = 2048;  // ellipsoids; layers of fewer cost too many bytes
+constexpr std::size_t kFirstLayers = 8;    // the first layer has at least an eighth of all
 
-/// Bounds for the largest weight: float32 does not show finer steps, and coarser ones leave
-/// nothing.
+/// Limits of the steps relative to the largest weight. Finer steps are below the precision of
+/// float32, and coarser steps round everything away.
 constexpr double kFinestStep = 0x1p-20, kCoarsestStep = 1.0;
 
 QuantiserSteps within(const QuantiserSteps& steps, double low, double high) {
@@ -36,7 +36,7 @@ double volumeLog(const Ellipsoids& e, std::size_t i) {
   return double(e.logScale[0][i]) + e.logScale[1][i] + e.logScale[2][i];
 }
 
-/// The middle one of sum phi^2 over the volume: what the kernel makes of a unit of it.
+/// The median over the ellipsoids of sum phi^2 divided by the product of the scales.
 double curvatureOfVolume(const Ellipsoids& e, std::span<const double> phi2) {
   std::vector<double> ratio(e.size());
   for (std::size_t i = 0; i < e.size(); ++i) ratio[i] = phi2[i] / std::exp(volumeLog(e, i));
@@ -52,7 +52,8 @@ std::vector<double> weightsOf(const Ellipsoids& e, std::span<const double> phi2)
   return w;
 }
 
-/// An octave of the weight for each precision, the largest weight in the highest.
+/// The precision of each ellipsoid. Each precision stands for an octave of the weight, and the
+/// highest one has the largest weight.
 std::vector<std::uint8_t> precisionsOf(const std::vector<double>& weights, double largest) {
   std::vector<std::uint8_t> e(weights.size());
   for (std::size_t i = 0; i < e.size(); ++i) {
@@ -121,8 +122,9 @@ class Chooser {
     lattice_.positionSlope = int(std::lround(kFixed * lattice_.scaleStep * kLog2e));
   }
 
-  /// Bits of a rotation at precision 0, where the largest scale is `ratio` coarse steps above the
-  /// smallest: somewhere in [ratio, ratio + 2), as two of them were cut off.
+  /// Number of bits of a rotation component at precision 0, if the coarse steps of the largest and
+  /// the smallest scale differ by `ratio`. The scales themselves differ by a number of steps in
+  /// [ratio, ratio + 2), because two differences were rounded down.
   [[nodiscard]] int rotationBitsAt(int ratio) const {
     const double log = (ratio + 0.75) * lattice_.scaleStep;
     const double step = steps_.rotation / (lightest_ * 2.0 * std::sinh(log));
@@ -138,7 +140,8 @@ class Chooser {
   }
 
   void chooseIntensities(double curvatureOfVolume) {
-    // the volume's logarithm at code 0: three lowest scales, and half a step for each difference
+    // Logarithm of the product of the scales at code 0: three times the lowest scale, and half a
+    // step for each difference.
     const double log = 3.0 * lowestLog_ + 1.5 * lattice_.scaleStep;
     lattice_.intensityStep = steps_.intensity / std::sqrt(curvatureOfVolume * std::exp(log));
     lattice_.intensitySlope = int(std::lround(kFixed * 0.5 * lattice_.scaleStep * kLog2e));
@@ -149,7 +152,7 @@ class Chooser {
 
   const Ellipsoids& e_;
   QuantiserSteps steps_;
-  double lightest_;  ///< the weight, amid its octave, that precision 0 stands for
+  double lightest_;  ///< the weight in the middle of the octave of precision 0
   double lowestLog_ = 0.0;
   Lattice lattice_;
 };

@@ -12,12 +12,13 @@ namespace esvr {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
-constexpr std::size_t kGrain = 256;  // ellipsoids
+constexpr std::size_t kGrain = 256;  // ellipsoids of a TBB task
 
-/// A quaternion's components but the largest lie within +-sqrt(1/2).
+/// The three smaller components of a unit quaternion lie within +-sqrt(1/2), an interval of this
+/// length.
 constexpr double kRotationSide = std::numbers::sqrt2;
 
-/// The middle of a cell.
+/// The middle of the interval that a code stands for, with 2^bits intervals in a unit.
 double middle(double code, int bits) { return std::ldexp(code + 0.5, -bits); }
 
 void putScales(const QuantisedEllipsoids& q, std::size_t i, Ellipsoids& e) {

@@ -1,6 +1,6 @@
 #pragma once
-/// How many bits each parameter of an ellipsoid has: integers alone, the same for who writes and
-/// who reads (docs/format.md, "The lattice").
+/// Computes the number of bits of each parameter of an ellipsoid. Only integers are used, so that
+/// writer and reader get the same numbers (docs/format.md, "The quantisation lattice").
 
 #include <algorithm>
 #include <cstdint>
@@ -9,7 +9,8 @@
 
 namespace esvr {
 
-/// Scales of an ellipsoid in coarse steps: smallest, middle above it, largest above that.
+/// The scales of an ellipsoid in coarse steps: the low one, the middle one above the low one, and
+/// the high one above the middle one.
 struct CoarseScales {
   std::uint32_t low, middle, high;
 };
@@ -31,7 +32,7 @@ inline int rotationBits(const Lattice& lattice, int precision, const CoarseScale
   return std::clamp(bits, 0, Lattice::kMaxRotationBits);
 }
 
-/// The step of an intensity is the lattice's, halved so many times.
+/// The number of times that the lattice's intensity step is halved for an ellipsoid.
 inline int intensityShift(const Lattice& lattice, const CoarseScales& s) {
   const int volume = int(3 * s.low + 2 * s.middle + s.high);
   const int shift = (lattice.intensityBase + lattice.intensitySlope * volume) >> 8;

@@ -1,11 +1,11 @@
 #pragma once
-/// Morton order: bits of three coordinates in turn.
+/// Morton keys, in which the bits of three coordinates alternate.
 
 #include <cstdint>
 
 namespace esvr {
 
-/// Spreads 21 bits so that two zero bits follow each.
+/// Spreads the lowest 21 bits, so that two zero bits lie between neighbours.
 constexpr std::uint64_t spreadBits(std::uint64_t v) {
   v = (v | v << 32) & 0x1f00000000ffff;
   v = (v | v << 16) & 0x1f0000ff0000ff;
@@ -15,7 +15,7 @@ constexpr std::uint64_t spreadBits(std::uint64_t v) {
   return v;
 }
 
-/// The inverse: every third bit, from the lowest.
+/// The inverse of spreadBits: takes every third bit, from the lowest.
 constexpr std::uint32_t gatherBits(std::uint64_t v) {
   v &= 0x1249249249249249;
   v = (v | v >> 2) & 0x10c30c30c30c30c3;

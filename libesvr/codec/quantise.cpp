@@ -19,10 +19,11 @@ namespace esvr {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
-constexpr std::size_t kGrain = 256;  // ellipsoids
+constexpr std::size_t kGrain = 256;  // ellipsoids of a TBB task
 constexpr double kRotationSide = std::numbers::sqrt2;
 
-/// The cell of a value counted in coarse steps, cut into 2^bits. \throws RuntimeFailure
+/// The code of a value in coarse steps, each of which is divided into 2^bits codes.
+/// \throws RuntimeFailure  the value has no code
 std::uint32_t codeOf(double steps, int bits, std::uint32_t lastCoarse, const char* what) {
   const double code = std::floor(std::ldexp(std::max(steps, 0.0), bits));
   if (!(code < std::ldexp(double(lastCoarse) + 1.0, bits)))
@@ -30,7 +31,8 @@ std::uint32_t codeOf(double steps, int bits, std::uint32_t lastCoarse, const cha
   return std::uint32_t(code);
 }
 
-/// Each logarithm is counted from the one below it as a reader will have it: errors do not add up.
+/// Codes the scales. Each logarithm is coded as the difference from the decoded value of the next
+/// smaller scale, so that rounding errors do not add up.
 void putScales(const std::array<double, 3>& logScale, std::size_t i, QuantisedEllipsoids& q) {
   const int bits = scaleBits(q.lattice, q.precision[i]);
   double below = double(q.lattice.lowestScale);
@@ -79,7 +81,7 @@ std::uint64_t keyOf(const Ellipsoids& e, std::size_t i, const Lattice& lattice) 
   return key;
 }
 
-/// Layers are counted from the heaviest.
+/// The number of an ellipsoid's layer, counted from the layer of the largest weights.
 std::size_t layerOf(const LatticeChoice& choice, std::size_t i) {
   return std::size_t(std::count_if(choice.layerFrom.begin(), choice.layerFrom.end(),
                                    [&](auto from) { return choice.precision[i] < from; }));
@@ -89,7 +91,7 @@ std::vector<std::size_t> fileOrder(const Ellipsoids& e, const LatticeChoice& cho
   struct Place {
     std::size_t layer;
     std::uint64_t key;
-    std::size_t ellipsoid;  // of equals those that come first
+    std::size_t ellipsoid;  // decides between equal keys
     auto operator<=>(const Place&) const = default;
   };
   std::vector<Place> places(e.size());
@@ -103,7 +105,7 @@ std::vector<std::size_t> fileOrder(const Ellipsoids& e, const LatticeChoice& cho
   return order;
 }
 
-/// \param order  the ellipsoids', layer by layer
+/// \param order  the ellipsoids in their new order, layer by layer
 std::vector<std::size_t> layerEnds(const LatticeChoice& choice,
                                    const std::vector<std::size_t>& order) {
   std::vector<std::size_t> ends;
@@ -113,7 +115,7 @@ std::vector<std::size_t> layerEnds(const LatticeChoice& choice,
   return ends;
 }
 
-/// All of ellipsoid `from` but its precision, which is there already, in place i.
+/// Quantises ellipsoid `from` to place i, where its precision is already set.
 void put(const Ellipsoids& e, std::size_t from, std::size_t i, QuantisedEllipsoids& q) {
   const SortedAxes axes = sortedAxes(e, from);
   putScales(axes.logScale, i, q);

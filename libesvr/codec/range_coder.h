@@ -1,6 +1,6 @@
 #pragma once
-/// An adaptive binary range coder: every decision has a model that learns how likely it is.
-/// Integers alone, so that what one machine wrote any other reads (docs/format.md, "Range coder").
+/// An adaptive binary range coder. Each decision has a model that learns its probability. Only
+/// integers are used, so that every machine reads the same (docs/format.md, "The range coder").
 
 #include <array>
 #include <cstddef>
@@ -10,8 +10,8 @@
 
 namespace esvr::codec {
 
-/// The probability of a zero, learnt: the n-th decision moves it by 1/(n + 1.5) of the way, and
-/// later ones by as much as the last.
+/// Learns the probability of a zero. Decision number n, counted from 0, moves it towards 0 or 1 by
+/// 1/(n + 1.5) of the distance. From n = kMemory - 1 on, that share stays the same.
 class BitModel {
  public:
   static constexpr int kBits = 16;
@@ -31,7 +31,7 @@ class BitModel {
 
  private:
   static constexpr std::uint32_t kMinZero = 32;
-  static constexpr std::size_t kMemory = 160;  ///< decisions that count
+  static constexpr std::size_t kMemory = 160;  ///< decisions until the share stays the same
   static constexpr std::array<std::uint16_t, kMemory> kShares = [] {
     std::array<std::uint16_t, kMemory> shares{};
     for (std::uint32_t n = 0; n < kMemory; ++n) shares[n] = std::uint16_t(2 * kOne / (2 * n + 3));
@@ -56,7 +56,7 @@ class RangeEncoder {
     normalise();
   }
 
-  /// The lowest `bits` bits of a value, the highest of them first, each as likely 0 as 1.
+  /// Codes the lowest `bits` bits of a value, the highest first, without models.
   void raw(std::uint32_t value, int bits) {
     while (bits-- > 0) {
       range_ >>= 1;
@@ -65,10 +65,10 @@ class RangeEncoder {
     }
   }
 
-  /// The encoded bytes. Zeros at the end are left out; a decoder finds them there anyway.
+  /// Returns the encoded bytes. Zeros at the end are left out, since a decoder reads zeros there.
   [[nodiscard]] std::vector<std::byte> finish() {
     for (int i = 0; i < 5; ++i) shiftLow();
-    bytes_.erase(bytes_.begin());  // the first is always 0
+    bytes_.erase(bytes_.begin());  // the first byte is always 0
     while (!bytes_.empty() && bytes_.back() == std::byte{}) bytes_.pop_back();
     return std::move(bytes_);
   }
@@ -81,7 +81,7 @@ class RangeEncoder {
     }
   }
 
-  /// Sends the top byte of `low_` on its way: it waits behind bytes that a carry could still reach.
+  /// Outputs the top byte of `low_`. Bytes that a later carry could still change are held back.
   void shiftLow() {
     if (low_ < 0xff000000u || low_ > 0xffffffffu) {
       const auto carry = std::uint32_t(low_ >> 32);

@@ -15,7 +15,7 @@ Quaternion product(const Quaternion& a, const Quaternion& b) {
           a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
 }
 
-/// Exchanges two neighbouring axes: a quarter turn about the third puts one in the other's place.
+/// Exchanges two neighbouring axes by a quarter turn about the third.
 void exchange(SortedAxes& axes, std::size_t first) {
   const double h = std::sqrt(0.5);
   const Quaternion quarter = first == 0 ? Quaternion{h, 0, 0, h} : Quaternion{h, h, 0, 0};

@@ -1,5 +1,5 @@
 #pragma once
-/// One of the 24 ways in which a scale triple and a quaternion name the same ellipsoid.
+/// Chooses one of the 24 combinations of scales and rotation that describe the same ellipsoid.
 
 #include <array>
 #include <cstddef>
@@ -10,11 +10,12 @@ namespace esvr {
 
 struct SortedAxes {
   std::array<double, 3> logScale;  ///< decreasing
-  std::array<double, 4> rotation;  ///< unit, w >= |x|, |y|, |z|
+  std::array<double, 4> rotation;  ///< unit quaternion w, x, y, z with w >= |x|, |y|, |z|
 };
 
-/// Axes by decreasing scale; of the quaternions that differ by half turns about the axes, which do
-/// not change an ellipsoid, the one with the largest w: none of the others exceeds sqrt(1/2).
+/// Sorts the axes by decreasing scale. Half turns about the axes do not change an ellipsoid; of the
+/// quaternions that they lead to, the one whose w is the largest component is taken. Its other
+/// components are at most sqrt(1/2) in magnitude.
 [[nodiscard]] SortedAxes sortedAxes(const Ellipsoids& e, std::size_t i);
 
 }  // namespace esvr

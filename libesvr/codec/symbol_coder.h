@@ -1,6 +1,7 @@
 #pragma once
-/// Numbers as decisions of a range coder. Written once for both directions: a `Writer` takes the
-/// number and gives it back, a `Reader` ignores what it is given and gives what was written.
+/// Codes numbers as decisions of a range coder. The code is the same for both directions: a
+/// `Writer` writes a number and returns it, and a `Reader` ignores its argument and returns what
+/// was written.
 
 #include <algorithm>
 #include <array>
@@ -30,7 +31,8 @@ struct Reader {
   std::uint32_t raw(std::uint32_t, int bits) { return coder.raw(bits); }
 };
 
-/// A number of kBits bits, each decision with a model for the bits above it.
+/// Codes a number of kBits bits from the highest to the lowest. Each bit has a model for every
+/// combination of the bits above it.
 template <int kBits>
 class TreeModel {
  public:
@@ -46,8 +48,8 @@ class TreeModel {
   std::array<BitModel, std::size_t{1} << kBits> models_;
 };
 
-/// Any number of fewer than 2^kWidthBits bits: how many it has, then those below the leading one,
-/// of which the first kModelled have models.
+/// Codes a number of less than 2^kWidthBits bits: first the number of its bits, then the bits below
+/// the leading one. The first kModelled of these have models.
 template <int kWidthBits>
 class NumberModelOf {
  public:
@@ -73,6 +75,6 @@ class NumberModelOf {
   std::array<std::array<BitModel, std::size_t{1} << kModelled>, std::size_t{1} << kWidthBits> bits_;
 };
 
-using NumberModel = NumberModelOf<5>;  ///< below 2^31
+using NumberModel = NumberModelOf<5>;  ///< numbers below 2^31
 
 }  // namespace esvr::codec

@@ -11,13 +11,13 @@
 namespace esvr::codec {
 namespace {
 
-/// A voxel's mirror image that has been coded before it.
+/// The mirror image of a voxel, if it was coded before the voxel.
 struct Image {
   std::int32_t code = 0;
   bool active = false;
 };
 
-/// Finds images: the first axis along which one lies before the voxel.
+/// Finds the image of a voxel, along the first axis on which an image lies before it.
 class Mirrors {
  public:
   Mirrors(const VoxelModel& model, const VoxelLayer& layer, const BrickIndex& index)
@@ -54,8 +54,10 @@ class Mirrors {
   std::uint32_t last_ = BrickIndex::kNone;
 };
 
-constexpr std::size_t kActivities = 128, kImages = 3;  // no image, not active, active
-constexpr std::size_t kVacancies = 5;                  // no image, and four of activity and code
+// Numbers of contexts. The image of a voxel is missing, inactive or active. For vacancy it is
+// missing, or has one of four combinations of activity and code.
+constexpr std::size_t kActivities = 128, kImages = 3;
+constexpr std::size_t kVacancies = 5;
 constexpr int kClassBits = 4;
 constexpr std::size_t kClasses = std::size_t{1} << kClassBits;
 
@@ -107,7 +109,7 @@ class VoxelCoder {
     return codeDistance(cell, image, written);
   }
 
-  /// 1 for the first of the common codes, 0 for any that is not common.
+  /// The number of a common code, counted from 1; 0 for all other codes.
   [[nodiscard]] std::uint32_t classOf(std::int32_t code) const {
     const auto it = std::find(model_.common.begin(), model_.common.end(), code);
     return it == model_.common.end() ? 0u : std::uint32_t(it - model_.common.begin()) + 1u;
@@ -145,7 +147,7 @@ class VoxelCoder {
     return std::int32_t(result);
   }
 
-  /// A guess is a sum of seven codes at most.
+  /// Largest distance of a code from its prediction, which is a sum of at most seven codes.
   static constexpr std::uint64_t kMaxDifference = std::uint64_t{1} << 35;
 
   Side& side_;

@@ -1,6 +1,6 @@
 #pragma once
-/// The voxels of a layer's bricks as decisions of a range coder: each is foretold from the voxels
-/// before it and from its mirror images, in contexts of how well that went so far.
+/// Codes the voxels of a layer's bricks with a range coder. Each voxel is predicted from the voxels
+/// before it and from its mirror image; the contexts depend on the errors of recent predictions.
 
 #include <array>
 #include <cstdint>
@@ -12,22 +12,23 @@
 
 namespace esvr::codec {
 
-/// Both sides must know this before the first voxel.
+/// The parameters of the coder, which a reader must know before the first voxel.
 struct VoxelModel {
   static constexpr std::int32_t kNoMirror = -1;
   static constexpr std::size_t kMaxCommon = 15;
 
-  std::int32_t vacantCode = 0;  ///< the code that a missing voxel counts as
-  /// Along each axis a voxel at p has its image at mirror - p, in voxels from the layer's origin.
+  std::int32_t vacantCode = 0;  ///< code of vacant voxels and of voxels without a brick
+  /// The image of a voxel at p along an axis is at mirror - p, in voxels from the layer's origin.
   std::array<std::int32_t, 3> mirror{kNoMirror, kNoMirror, kNoMirror};
-  std::vector<std::int32_t> common;  ///< codes that many voxels have, the most frequent first
+  std::vector<std::int32_t> common;  ///< frequent codes in decreasing order of frequency
 };
 
-/// Codes bricks in the order given, which must have every brick after those whose coordinates are
-/// nowhere above its own. Voxels in the order of their offsets.
+/// Writes the bricks in the given order, and the voxels of a brick in the order of their offsets.
+/// A brick must come after all bricks none of whose coordinates is larger than its own.
 void codeVoxels(Writer& side, std::span<const std::size_t> order, const VoxelModel& model,
                 VoxelLayer& layer);
-/// Fills the codes and masks of a layer whose bricks are set. \throws BadInput
+/// Reads the codes and masks of a layer whose bricks are set.
+/// \throws BadInput  a code is out of range
 void codeVoxels(Reader& side, std::span<const std::size_t> order, const VoxelModel& model,
                 VoxelLayer& layer);
 

@@ -1,5 +1,6 @@
 #pragma once
-/// A brick with the voxels before it, one deep along every axis: what the coders of voxels look at.
+/// A brick together with one layer of the voxels before it along every axis, which the voxel coder
+/// reads.
 
 #include <array>
 #include <cstdint>
@@ -21,19 +22,19 @@ struct Halo {
     return (local.x + 1) * kStepX + (local.y + 1) * kStepY + local.z + 1;
   }
 
-  /// Copies the voxels that lie before brick b. Nothing within it is changed: each voxel is set
-  /// before it is read.
-  /// \param vacantCode  of voxels where no brick is
+  /// Copies the voxels that lie before brick b. The voxels of the brick itself are not set here,
+  /// because the coder sets each of them before it is read.
+  /// \param vacantCode  code for voxels that no brick has
   void fill(const VoxelLayer& layer, const BrickIndex& index, std::size_t b,
             std::int32_t vacantCode) {
-    for (int corner = 0; corner < 7; ++corner) {  // of 8, the last being the brick itself
+    for (int corner = 0; corner < 7; ++corner) {  // corner 7 is the brick itself
       const Coord step{(corner >> 2 & 1) - 1, (corner >> 1 & 1) - 1, (corner & 1) - 1};
       copyFrom(layer, index.find(layer.bricks[b] + step), step, vacantCode);
     }
   }
 
-  /// The activity of the seven voxels before one, as bits from the highest: A, B, C, AB, AC,
-  /// BC, ABC, those before it along x, y, z, x and y, ...
+  /// The activities of the seven voxels before a voxel, as bits from the highest to the lowest: A,
+  /// B, C (before it along x, y, z), AB, AC, BC, ABC (along two or three axes).
   [[nodiscard]] std::size_t activityAround(int cell) const {
     std::size_t bits = 0;
     for (const int back : {kStepX, kStepY, kStepZ, kStepX + kStepY, kStepX + kStepZ,
@@ -43,7 +44,7 @@ struct Halo {
   }
 
  private:
-  /// The last slice along every axis on which the step is -1.
+  /// Copies the last slice of a neighbour along every axis on which the step is -1.
   void copyFrom(const VoxelLayer& layer, std::uint32_t neighbour, Coord step,
                 std::int32_t vacantCode) {
     const auto first = [](int s) { return s < 0 ? -1 : 0; };

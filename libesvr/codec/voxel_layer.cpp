@@ -13,7 +13,7 @@ namespace {
 using Limits = std::numeric_limits<std::int32_t>;
 
 constexpr std::size_t kLargestPalette = 4096;
-constexpr double kMargin = 1.0 - 1e-6;  // of a bound: for what rounding to float32 adds
+constexpr double kMargin = 1.0 - 1e-6;  // factor of a bound, which leaves room for rounding
 constexpr double kLargestCode = 0x1p30;
 constexpr int kHalfMantissa = 10, kHalfLowest = -14, kHalfHighest = 15;
 constexpr std::int32_t kHalfOne = 1 << kHalfMantissa, kHalfSign = 0x8000, kHalfBits = 0x7fff;
@@ -22,7 +22,7 @@ bool sameBits(float a, float b) {
   return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
 }
 
-/// -0 comes before 0: every bit pattern has a number of its own.
+/// The number of a float in increasing order. -0 comes before 0, so every bit pattern has its own.
 std::int32_t orderOf(std::int32_t magnitude, bool negative) {
   return negative ? -1 - magnitude : magnitude;
 }
@@ -46,7 +46,8 @@ float halfAt(std::int32_t n) {
                     : std::ldexp(mantissa + kHalfOne, exponent - kHalfHighest - kHalfMantissa);
   return std::copysign(float(magnitude), n < 0 ? -1.0f : 1.0f);
 }
-/// The code of the nearest half below in magnitude; halfAt() tells whether it is the value.
+/// The number of the half that is nearest to v among those of no larger magnitude. v is a half if
+/// halfAt() of the result equals v.
 std::int32_t orderOfHalf(float v) {
   const double magnitude = std::abs(double(v));
   int exponent = magnitude > 0.0 ? std::ilogb(magnitude) : kHalfLowest;
@@ -89,7 +90,7 @@ std::int32_t codeOf(const VoxelLayer& layer, float v) {
   return orderOfFloat(v);
 }
 
-/// The values that there are, in order; nothing where they are too many.
+/// The distinct values of a volume in increasing order; empty if there are too many for a palette.
 std::vector<float> paletteOf(const SparseVolume& volume) {
   std::vector<float> values = volume.values;
   std::sort(values.begin(), values.end(), inOrder);
@@ -119,7 +120,7 @@ void fill(const SparseVolume& volume, VoxelLayer& layer) {
   }
 }
 
-/// Bricks without an active voxel go.
+/// Removes the bricks without an active voxel.
 void dropInactive(VoxelLayer& layer) {
   std::size_t kept = 0;
   for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
@@ -190,7 +191,7 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
 
 namespace {
 
-/// Over the bricks of the first.
+/// The largest difference over the bricks of `a`.
 double largestOver(const SparseVolume& a, const SparseVolume& b) {
   double largest = 0.0;
   for (std::size_t i = 0; i < a.brickCount(); ++i) {

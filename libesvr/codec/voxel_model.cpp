@@ -11,10 +11,10 @@
 namespace esvr::codec {
 namespace {
 
-constexpr std::size_t kCommonShare = 512;     // one of so many voxels makes a code common
-constexpr std::size_t kSamples = 2048;        // of voxels, to find a mirror by
-constexpr double kAlike = 0.9;                // of the samples, for a mirror to be tried
-constexpr std::int32_t kMaxExtent = 1 << 14;  // voxels: further apart no mirror is looked for
+constexpr std::size_t kCommonShare = 512;     // a code is common if 1 of 512 voxels has it
+constexpr std::size_t kSamples = 2048;        // voxels that are compared with their images
+constexpr double kAlike = 0.9;                // share of equal samples above which a mirror is used
+constexpr std::int32_t kMaxExtent = 1 << 14;  // voxels; the search is skipped for larger grids
 
 constexpr std::int32_t Coord::*kAxes[] = {&Coord::x, &Coord::y, &Coord::z};
 
@@ -22,8 +22,8 @@ bool vacantAt(const VoxelLayer& layer, std::size_t i) {
   return layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels));
 }
 
-/// The coder takes vacant voxels for this code. Any would do: a code near the background serves
-/// best.
+/// The code that vacant voxels count as in predictions. Any code is correct; the code that they
+/// have in the layer, which is near the background, gives the best predictions.
 std::int32_t vacantCodeOf(const VoxelLayer& layer) {
   for (std::size_t i = 0; i < layer.codes.size(); ++i)
     if (vacantAt(layer, i)) return layer.codes[i];
@@ -63,7 +63,7 @@ class MirrorSearch {
       last_ = maxCoord(last_, brick * kBrickSide + Coord{7, 7, 7});
   }
 
-  /// The best of the mirrors about the middle half of the grid.
+  /// The best mirror along an axis, if it lies in the middle half of the grid.
   [[nodiscard]] std::int32_t along(std::int32_t Coord::*axis) const {
     const std::int32_t extent = last_.*axis + 1;
     if (samples_.empty() || extent > kMaxExtent) return VoxelModel::kNoMirror;
@@ -79,7 +79,7 @@ class MirrorSearch {
   }
 
  private:
-  /// Evenly among the voxels that are not vacant.
+  /// Takes samples evenly among the voxels that are not vacant.
   void takeSamples() {
     std::size_t voxels = 0, seen = 0;
     for (std::size_t i = 0; i < layer_.codes.size(); ++i) voxels += vacantAt(layer_, i) ? 0 : 1;

@@ -1,13 +1,13 @@
 #pragma once
-/// Finds the properties that a layer's voxels share, before they are coded.
+/// Chooses the parameters of the voxel coder for a layer.
 
 #include "codec/voxel_coder.h"
 #include "esvr/voxel_layer.h"
 
 namespace esvr::codec {
 
-/// Codes that many voxels have, where voxels are floats or halves; along each axis the mirror that
-/// most of a sample of voxels is alike under, where there is one.
+/// Finds frequent codes (for floats and halves only) and, along each axis, the mirror under which
+/// the most voxels of a sample are equal, if there is a good one.
 [[nodiscard]] VoxelModel chooseModel(const VoxelLayer& layer);
 
 [[nodiscard]] bool hasMirror(const VoxelModel& model);

@@ -1,6 +1,7 @@
 #pragma once
-/// Foretells a voxel's code from those before it and from its mirror image, by whichever rule has
-/// done best lately. Integers alone (docs/format.md, "Voxels").
+/// Predicts the code of a voxel from the voxels before it and from its mirror image. Of several
+/// predictions it takes the one with the smallest recent error. Only integers are used
+/// (docs/format.md, "Voxels").
 
 #include <algorithm>
 #include <array>
@@ -18,7 +19,9 @@ class VoxelPredictor {
   static constexpr std::size_t kAroundContexts = 80, kImageContexts = 31;
   static constexpr std::size_t kContexts = kAroundContexts + kImageContexts;
 
-  /// \param at  the voxel in a halo's codes \param image  its mirror image's code, where it has one
+  /// Computes the predictions for a voxel.
+  /// \param at     the voxel in the codes of a halo
+  /// \param image  code of the voxel's mirror image, if it has one
   void look(const std::int32_t* at, std::optional<std::int32_t> image) {
     constexpr int kX = Halo::kStepX, kY = Halo::kStepY, kZ = Halo::kStepZ;
     const std::int64_t a = at[-kX], b = at[-kY], c = at[-kZ], ab = at[-kX - kY], ac = at[-kX - kZ],
@@ -41,8 +44,9 @@ class VoxelPredictor {
 
   [[nodiscard]] std::int64_t guess() const { return guesses_[best_]; }
 
-  /// How far off the guess is likely to be: of an image, the width of its late errors; else that of
-  /// the spread around the voxel and of late errors, in half octaves.
+  /// The context of the prediction's error. For the mirror image it is the number of bits of its
+  /// recent errors; otherwise it is the magnitude, in half octaves, of the differences between the
+  /// surrounding voxels plus recent errors.
   [[nodiscard]] std::size_t context() const {
     const auto late = std::uint64_t(errors_[best_]);
     if (best_ == kImage)
@@ -62,13 +66,13 @@ class VoxelPredictor {
 
  private:
   static constexpr std::size_t kGuesses = 7, kImage = 0;
-  static constexpr std::int64_t kUnit = 16;    // errors are counted in sixteenths
-  static constexpr std::int64_t kMemory = 16;  // and fade by a sixteenth
+  static constexpr std::int64_t kUnit = 16;    // errors are counted in units of 1/16
+  static constexpr std::int64_t kMemory = 16;  // recent errors decay by 1/16 for each voxel
   static constexpr std::int64_t kMaxError = std::int64_t{1} << 34;
 
   std::array<std::int64_t, kGuesses> guesses_{}, errors_{};
   std::int64_t spread_ = 0;
-  std::ptrdiff_t first_ = 0;  ///< offset of the first guess that exists
+  std::ptrdiff_t first_ = 0;  ///< index of the first prediction that exists
   std::size_t best_ = 0;
 };
 

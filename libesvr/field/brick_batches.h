@@ -1,5 +1,5 @@
 #pragma once
-/// Evaluates a field over any number of bricks with a bounded buffer.
+/// Evaluates a field over any number of bricks with a buffer of bounded size.
 
 #include <cstddef>
 #include <functional>
@@ -10,10 +10,10 @@
 
 namespace esvr {
 
-/// Bricks that are evaluated at once: 32 MB.
+/// Number of bricks that are evaluated at once. Their values take 32 MB.
 inline constexpr std::size_t kBatchBricks = 16384;
 
-/// Takes a brick's index corner and its kBrickVoxels values, which it may change.
+/// A function of a brick's index corner and its kBrickVoxels values, which it may change.
 using BrickVisitor = std::function<void(Coord, std::span<float>)>;
 
 /// Calls `visit` for every brick, in order, from the calling thread.

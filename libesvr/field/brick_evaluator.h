@@ -1,6 +1,5 @@
 #pragma once
-/// A field made ready for the bricks it is wanted on: the lists are built once, however the bricks
-/// are then divided.
+/// Evaluates a field on bricks in several calls. The pair lists are built once for all of them.
 
 #include <span>
 #include <vector>
@@ -15,7 +14,8 @@ class BrickEvaluator {
   /// \param corners  index corners of the bricks; must outlive the evaluator
   BrickEvaluator(const Field& field, std::span<const Coord> corners);
 
-  /// V on bricks first, first + 1, ... as many as `out` holds, kBrickVoxels each. TBB over bricks.
+  /// Evaluates V on the bricks first, first + 1, ..., in parallel.
+  /// \param out  kBrickVoxels values for each brick; its size decides how many bricks are evaluated
   void evaluate(std::size_t first, std::span<float> out) const;
 
  private:

@@ -5,7 +5,8 @@
 namespace esvr {
 namespace {
 
-/// Halo coordinates along one axis that a brick covers, and its own coordinate at the first.
+/// The halo coordinates along one axis that a brick covers, and the brick's own coordinate at the
+/// first of them.
 struct Segment {
   int first, last, local;
 };
@@ -18,7 +19,8 @@ Segment clipped(const Segment& s, int low, int high) {
   return {std::max(s.first, low), std::min(s.last, high), s.local + std::max(low - s.first, 0)};
 }
 
-/// Copies one of 27 bricks. Its place along z is known to the compiler, so that rows are unrolled.
+/// Copies one of the 27 bricks. Its position along z is a template parameter, so that the compiler
+/// unrolls the rows.
 template <int kZ, class Value>
 void copyBrick(const Value* brick, const Segment& xs, const Segment& ys, HaloValues& out) {
   constexpr Segment kZs = kSegments[kZ];

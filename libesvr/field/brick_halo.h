@@ -1,5 +1,5 @@
 #pragma once
-/// A brick's values with those of its neighbours, as far as windows reach.
+/// The halo of a brick: its values and those of its neighbours, as far as SSIM windows reach.
 
 #include <array>
 #include <cstdint>
@@ -10,21 +10,21 @@
 
 namespace esvr {
 
-/// Positions in an index of the 27 bricks around a place, itself in the middle, z fastest;
-/// BrickIndex::kNone where there is none.
+/// The numbers in an index of a brick and its 26 neighbours, z fastest, with the brick itself in
+/// the middle; BrickIndex::kNone for missing bricks.
 using BricksAround = std::array<std::uint32_t, 27>;
 [[nodiscard]] BricksAround bricksAround(const BrickIndex& index, Coord brick);
 
-/// The smallest box of halo coordinates outside which all is zero.
-/// \param boxes  of each brick of the index, in its local coordinates: zero outside
+/// The smallest box of halo coordinates outside which all values are zero.
+/// \param boxes  for each brick of the index, a box of local coordinates outside which it is zero
 [[nodiscard]] Box haloSupport(const BricksAround& around, std::span<const Box> boxes);
 
-/// Arrays of kBrickVoxels, null for bricks that are zero.
+/// The values of the 27 bricks, kBrickVoxels each; null for bricks that are zero.
 template <class Value>
 using ValuesAround = std::array<const Value*, 27>;
 
-/// Makes float64 of them, so that products and sums of windows lose nothing.
-/// \param seen  halo coordinates to fill; rows along z are filled whole
+/// Fills a halo with the values as float64, so that window sums of their products are precise.
+/// \param seen  halo coordinates to fill, which is extended to whole rows along z
 void fillHalo(const ValuesAround<float>& bricks, const Box& seen, HaloValues& out);
 void fillHalo(const ValuesAround<double>& bricks, const Box& seen, HaloValues& out);
 

@@ -1,9 +1,9 @@
-// Body of brick_kernels_*.cpp: the same source under other instruction sets. No inline library
-// function may be called here: a copy compiled for AVX-512 could be the one the linker keeps for
-// all.
+// The body of brick_kernels_*.cpp, which compile it for different instruction sets. No inline
+// function of a library may be called here: the linker keeps one copy of such a function for the
+// whole program, and that could be the one compiled for AVX-512.
 //
-// Wants ESVR_KERNEL_NAMESPACE, ESVR_KERNEL_LANES = 8 (a row) or 16 (two rows), and
-// ESVR_KERNEL_NATIVE, the floats in a register: as many, or half of them.
+// The including file defines ESVR_KERNEL_NAMESPACE, ESVR_KERNEL_LANES (8 for one row of a brick, 16
+// for two rows) and ESVR_KERNEL_NATIVE (floats in a register: ESVR_KERNEL_LANES or half of it).
 
 #include "field/brick_kernels.h"
 #include "field/line_math.h"
@@ -11,7 +11,7 @@
 namespace esvr::ESVR_KERNEL_NAMESPACE {
 namespace {
 
-constexpr int kLanes = ESVR_KERNEL_LANES;    // a row of the brick, or two
+constexpr int kLanes = ESVR_KERNEL_LANES;    // floats in one row of a brick, or in two rows
 constexpr int kNative = ESVR_KERNEL_NATIVE;  // floats in a register
 constexpr int kRows = kLanes / 8;
 
@@ -21,7 +21,8 @@ typedef int NativeInt __attribute__((vector_size(4 * kNative)));
 #if ESVR_KERNEL_NATIVE == ESVR_KERNEL_LANES
 using Vec = Native;
 #else
-/// Two registers that act as one: left to the compiler, wide vectors become scalars.
+/// A vector of kLanes floats in one or two registers. Compilers turn vectors that are wider than a
+/// register into scalar code, so they are divided here.
 struct Vec {
   Native low, high;
 };
@@ -36,7 +37,7 @@ inline Vec& operator+=(Vec& a, Vec b) { return a = a + b; }
 inline Vec& operator+=(Vec& a, float b) { return a = a + b; }
 #endif
 
-/// Applies an operation on registers to one that may be two.
+/// Applies an operation on registers to a vector.
 template <class Operation>
 inline Native each(Operation operation, Native a) {
   return operation(a);
@@ -68,7 +69,7 @@ inline void store(float* p, Vec v) {
 alignas(64) constexpr float kLaneZ[16] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
 alignas(64) constexpr float kLaneY[16] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
 
-/// In an order of its own for each instruction set, and the same one always.
+/// Sums the lanes. The order of the additions is fixed for each instruction set.
 inline float sumLanes(Vec v) {
   float s[kLanes];
   __builtin_memcpy(s, &v, sizeof s);
@@ -81,8 +82,9 @@ inline float sumLanes(Vec v) {
   return total;
 }
 
-/// e^x for x in [-87, 88]; below, e^-87. Within 1.5 ulp: x = n ln 2 + r, |r| <= ln 2 / 2, and a
-/// polynomial of degree 6 whose coefficients were fitted at Chebyshev nodes.
+/// e^x for x in [-87, 88], and e^-87 for smaller x. It is computed as 2^n e^r with x = n ln 2 + r
+/// and |r| <= ln 2 / 2. For e^r it uses a polynomial of degree 6, whose coefficients were fitted at
+/// Chebyshev nodes. The error is at most 1.5 units in the last place.
 inline Native expApprox(Native x) {
   constexpr float kLog2e = 1.44269504f, kLn2High = 0.693359375f, kLn2Low = -2.12194440e-4f;
   constexpr float kRound =
@@ -107,8 +109,8 @@ struct Rows {
 
 inline int clampRow(float y) { return y < 0.0f ? 0 : (y > 8.0f ? 8 : int(y)); }
 
-/// Rows of slice dx that the support can touch. The half width is padded by a voxel's hundredth
-/// against rounding; rows beyond the support contribute exactly zero.
+/// The rows of slice dx that the support can touch. The half width is widened by a hundredth of a
+/// voxel because of rounding. Rows outside the support contribute exactly 0.
 inline Rows rowsOfSlice(const LineForm& f, float dx, float cy) {
   const float q = dx / f.halfX;
   const float left = 1.0f - q * q;
@@ -123,7 +125,7 @@ inline Rows slices(const LineForm& f, float cx) {
   return {clampRow(cx - f.halfX - 0.01f + 1.0f), clampRow(cx + f.halfX + 0.01f + 1.0f)};
 }
 
-/// One ellipsoid in the frame of a brick.
+/// An ellipsoid in the frame of a brick.
 struct Local {
   float cx, cy;
   Vec dz;
@@ -139,7 +141,7 @@ inline Local localise(const LineForm& f, const float corner[3]) {
   return l;
 }
 
-/// t of row y = 0.
+/// The value of t in row y = 0.
 inline Vec firstDistance(const LineForm& f, const Local& l, float dx) {
   return distanceAlong(f, load(kLaneY), l.cy, dx, l.dz);
 }
@@ -155,7 +157,7 @@ inline Vec phiOf(const KernelConstants<float>& k, Vec m) {
       m);
 }
 
-/// The residual times phi + base: zero where phi is, which is outside the support.
+/// residual * (phi + base) inside the support, and 0 outside, where phi is 0.
 inline Vec weightedQuotient(const KernelConstants<float>& k, Vec phi, Vec residual) {
   return each([&k](Native p, Native r) { return p > 0.0f ? r * (p + k.base) : Native{}; }, phi,
               residual);
@@ -246,7 +248,8 @@ void backward(const LineForm& f, const float corner[3], const KernelConstants<fl
              sumLanes(rEdge)};
 }
 
-/// Calls visit(phi, row of 512 values) for every row of a tape, in its order.
+/// Calls visit(phi, row) for every row of a tape in its order; `row` points to the row's values in
+/// `values`.
 template <class Value, class Visit>
 inline void visitTape(const PairTape& tape, Value* values, Visit&& visit) {
   const float* phi = tape.phi;

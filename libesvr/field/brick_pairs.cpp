@@ -15,8 +15,8 @@ namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
 
-/// Calls visit(brick position) for the bricks of an index that a support may touch, in the order of
-/// their coordinates: looks at the bricks around the support or at those of the index, whichever are
+/// Calls visit(number) for the bricks of an index that a support may touch, in the order of their
+/// coordinates. It searches the bricks around the support or those of the index, whichever is
 /// fewer.
 template <class Visit>
 void forEachPair(const BrickIndex& index, const Support& support, Visit&& visit) {
@@ -36,7 +36,8 @@ void forEachPair(const BrickIndex& index, const Support& support, Visit&& visit)
   for (const std::uint32_t b : touched) visit(b);
 }
 
-/// Calls visit(ellipsoid, its n-th pair, brick position) for every pair, ellipsoids in parallel.
+/// Calls visit(ellipsoid, n, brick) for every pair; n counts the pairs of the ellipsoid. Ellipsoids
+/// are visited in parallel.
 template <class Visit>
 void visitPairs(const BrickIndex& index, std::size_t ellipsoids, const SupportOf& supportOf,
                 Visit&& visit) {
@@ -48,7 +49,7 @@ void visitPairs(const BrickIndex& index, std::size_t ellipsoids, const SupportOf
   });
 }
 
-/// Bricks of each ellipsoid, one list after the other.
+/// Lists the bricks of all ellipsoids, one list behind the other.
 std::vector<std::uint32_t> bricksByEllipsoid(const BrickIndex& index, std::size_t ellipsoids,
                                              const SupportOf& supportOf,
                                              std::vector<std::uint32_t>& begin) {

@@ -11,26 +11,26 @@
 
 namespace esvr {
 
-/// Pairs in brick order; within a brick in the ellipsoids' order, so that sums have one order.
+/// The pairs, sorted by brick and, within a brick, by ellipsoid, so that sums have a fixed order.
 struct BrickPairs {
-  std::vector<std::uint32_t> brickBegin;      ///< bricks + 1: range of a brick's pairs
-  std::vector<std::uint32_t> ellipsoid;       ///< a pair's ellipsoid
-  std::vector<std::uint32_t> ellipsoidBegin;  ///< ellipsoids + 1: range in pairOf
-  std::vector<std::uint32_t> pairOf;          ///< an ellipsoid's pairs, in brick order
+  std::vector<std::uint32_t> brickBegin;      ///< by brick: its pairs are [b] to [b + 1] - 1
+  std::vector<std::uint32_t> ellipsoid;       ///< by pair: its ellipsoid
+  std::vector<std::uint32_t> ellipsoidBegin;  ///< by ellipsoid: its range in pairOf, as above
+  std::vector<std::uint32_t> pairOf;          ///< numbers of an ellipsoid's pairs, by brick
 
   [[nodiscard]] std::size_t pairCount() const { return ellipsoid.size(); }
 };
 
-/// Support of ellipsoid i; called from several threads.
+/// Returns the support of ellipsoid i. It is called from several threads.
 using SupportOf = std::function<Support(std::size_t)>;
 
-/// Pairs over the bricks of an index. Bricks not in the index are left out.
-/// \throws RuntimeFailure  2^32 pairs or more
+/// The pairs of ellipsoids and the bricks of an index. Other bricks are ignored.
+/// \throws RuntimeFailure  there are 2^32 pairs or more
 [[nodiscard]] BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
                                      const SupportOf& supportOf);
 
-/// Bricks that some support reaches and the index lacks, in increasing order.
-/// \param within  a box of brick coordinates; bricks elsewhere are left out
+/// The bricks that a support reaches and that are not in the index, in increasing order.
+/// \param within  box of brick coordinates; bricks outside are ignored
 [[nodiscard]] std::vector<Coord> missingBricks(const BrickIndex& index, std::size_t ellipsoids,
                                                const SupportOf& supportOf,
                                                const Box& within = bricksOf(Box::whole()));

@@ -1,6 +1,7 @@
 #pragma once
-/// Visits the bricks that a support may touch, in increasing order. What it costs follows their
-/// number and not the volume of the bounding box, which is a million times larger for a needle.
+/// Visits the bricks that a support may touch, in increasing order. The time is proportional to
+/// their number and not to the volume of the bounding box, which can be a million times larger for
+/// a thin ellipsoid.
 
 #include <algorithm>
 #include <array>
@@ -12,13 +13,13 @@ namespace esvr {
 
 namespace brick_walk {
 
-/// Bricks along an axis; none where last is before first.
+/// A range of bricks along an axis; empty if last < first.
 struct Run {
   std::int32_t first, last;
 };
 
-/// The bricks of `run` whose middles lie between two places, and one more at either end, since
-/// places are rounded. A place that is not a number bounds nothing.
+/// The bricks of `run` whose middles lie between two positions, and one more at each end because of
+/// rounding. A position that is NaN does not limit the range.
 [[nodiscard]] inline Run between(double low, double high, Run run) {
   constexpr double kMiddle = (kBrickSide - 1) / 2.0;
   const double first = std::floor((low - kMiddle) / kBrickSide) - 1.0;
@@ -33,7 +34,7 @@ struct Run {
 class Slabs {
  public:
   explicit Slabs(const Support& s) : support_(s) {
-    Matrix3 unit;  // maps the slabs to |u| <= 1
+    Matrix3 unit;  // maps the intersection of the slabs to the cube |u_j| <= 1
     for (int j = 0; j < 3; ++j) {
       bounds_[j] = slabBound(s, j);
       for (int c = 0; c < 3; ++c) unit[3 * j + c] = s.L[3 * j + c] / bounds_[j];
@@ -45,8 +46,8 @@ class Slabs {
     halfY_ = kAround * line_form::conditionalSigmaY(columnOf(unit, 1), columnOf(unit, 2));
   }
 
-  /// Bricks along y that the slabs may hold where the bricks' middles lie at x: those of the
-  /// ellipsoid around the slabs' common part.
+  /// The range of bricks along y that may lie in the slabs, for bricks whose middles are at x. It
+  /// is that of an ellipsoid around the intersection of the slabs.
   [[nodiscard]] Run rows(double x, Run all) const {
     const double dx = x - support_.center[0], t = dx / halfX_, left = 1.0 - t * t;
     const double half = halfY_ * std::sqrt(left < 0.0 ? 0.0 : left);
@@ -54,7 +55,7 @@ class Slabs {
     return between(middle - half, middle + half, all);
   }
 
-  /// Bricks along z that the slabs hold where the bricks' middles lie at x and y.
+  /// The range of bricks along z that lie in the slabs, for bricks whose middles are at x and y.
   [[nodiscard]] Run line(double x, double y, Run run) const {
     for (int j = 0; j < 3; ++j) {
       const double* row = &support_.L[3 * j];
@@ -68,8 +69,7 @@ class Slabs {
   }
 
  private:
-  static constexpr double kAround =
-      1.7320508075688774;  // of a cube, the sphere through its corners
+  static constexpr double kAround = 1.7320508075688774;  // half diagonal of the cube |u_j| <= 1
 
   const Support& support_;
   std::array<double, 3> bounds_;
@@ -99,10 +99,11 @@ void visitLines(const Support& s, const Box& range, Visit&& visit) {
 
 }  // namespace brick_walk
 
-/// \param within  a box of brick coordinates; bricks elsewhere are left out
+/// Calls visit(brick) for every brick that a support may touch.
+/// \param within  box of brick coordinates; bricks outside are ignored
 template <class Visit>
 void forEachReachedBrick(const Support& s, const Box& within, Visit&& visit) {
-  constexpr double kFewBricks = 512.0;  // below that many in the box, finding lines does not pay
+  constexpr double kFewBricks = 512.0;  // a smaller box is searched faster without lines
   const Box range = common(brickRange(s), within);
   if (range.empty()) return;
   if (range.volume() <= kFewBricks)

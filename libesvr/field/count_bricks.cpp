@@ -13,7 +13,7 @@ struct HashOfBrick {
   std::size_t operator()(Coord brick) const { return std::size_t(hashOf(brick)); }
 };
 
-/// A set of bricks, one bit each in blocks of 8^3.
+/// A set of bricks, which are stored as bits in blocks of 8^3 bricks.
 class BrickSet {
  public:
   void insert(Coord brick) {
@@ -58,7 +58,7 @@ double maxBricks(const Support& support, const Box& within) {
 }
 
 double countBricks(std::span<const Support> supports, const Box& within, double enough) {
-  constexpr std::int32_t kSlice = 64;  // bricks along x between two looks at the count
+  constexpr std::int32_t kSlice = 64;  // bricks along x between two checks of the count
   BrickSet set;
   for (const Support& support : supports) {
     Box left = common(brickRange(support), within);

@@ -7,11 +7,11 @@
 
 namespace esvr {
 
-/// A bound on the number of bricks within a box that a support may touch.
+/// An upper bound of the number of bricks in a box that a support may touch.
 [[nodiscard]] double maxBricks(const Support& support, const Box& within);
 
-/// The number of bricks within a box that one support or more may touch. Stops, and returns what it
-/// has, once there are more than `enough`.
+/// The number of bricks in a box that at least one support may touch. The count stops once it is
+/// above `enough`.
 [[nodiscard]] double countBricks(std::span<const Support> supports, const Box& within,
                                  double enough);
 

@@ -21,7 +21,8 @@ Coords merged(const Coords& a, const Coords& b) {
   return result;
 }
 
-/// A shift keeps the order of Coord, so that growing along an axis is a merge of three lists.
+/// Grows the set along one axis. Shifted bricks keep their order, so this is a merge of three
+/// lists.
 Coords grownAlong(const Coords& bricks, Coord axis) {
   return merged(merged(shifted(bricks, axis * -1), bricks), shifted(bricks, axis));
 }

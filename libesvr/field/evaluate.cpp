@@ -8,7 +8,7 @@
 namespace esvr {
 namespace {
 
-/// Lists of more bricks are not begun: these alone take 48 GiB.
+/// Largest number of bricks that are listed, which takes 48 GiB.
 constexpr double kMaxListed = 0x1p32;
 
 void requireListable(const std::vector<Support>& reach, const Box& within) {

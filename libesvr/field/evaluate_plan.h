@@ -1,5 +1,5 @@
 #pragma once
-/// Everything that the evaluation of a field on bricks needs, whatever device does it.
+/// The data that the evaluation of a field on bricks needs on any device.
 
 #include <span>
 
@@ -11,10 +11,10 @@ namespace esvr {
 
 struct EvaluatePlan {
   GatheredField field;
-  BrickPairs pairs;  ///< bricks in the order of the corners
+  BrickPairs pairs;  ///< pairs with the bricks, which are in the order of the corners
 };
 
-/// \param corners  index corners, multiples of 8
+/// \param corners  index corners of the bricks, multiples of 8
 [[nodiscard]] EvaluatePlan planEvaluation(const Field& field, std::span<const Coord> corners);
 
 }  // namespace esvr

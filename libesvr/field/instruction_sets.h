@@ -1,10 +1,10 @@
 #pragma once
-/// The instruction sets of this processor beyond the baseline that everything is compiled for.
+/// Queries the instruction sets of this processor beyond those that all code is compiled for.
 
 namespace esvr {
 
 #if defined(ESVR_X86_64)
-/// x86-64-v3 and x86-64-v4 as far as kernels need them.
+/// The parts of x86-64-v3 and x86-64-v4 that the kernels need.
 inline bool runsAvx2() {
   __builtin_cpu_init();
   return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&

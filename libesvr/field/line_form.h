@@ -1,13 +1,15 @@
 #pragma once
 /// An ellipsoid prepared for evaluation along lines parallel to y.
 ///
-/// With L = S^-1 R^T (or any Q L, Q a rotation) and d = x - mu, m = |L d|^2. Along the line
-/// d = (dx, t + y*, dz) with y* = sx dx + sz dz the place of closest approach,
+/// Let L = S^-1 R^T (or Q L with any rotation Q), with the columns Lx, Ly, Lz, and d = x - mu, so
+/// that m = |L d|^2. On a line with given dx and dz, the point closest to the center is at
+/// dy = y* = sx dx + sz dz. With t = dy - y*,
 ///
-///     m = |px dx + pz dz|^2 + a t^2,   a = |Ly|^2,  px = Lx - Ly (Lx.Ly) / a,  pz likewise,
+///     m = |px dx + pz dz|^2 + a t^2
+///     a = |Ly|^2,  px = Lx - Ly (Lx.Ly) / a,  pz = Lz - Ly (Lz.Ly) / a
 ///
-/// a sum of two non-negative terms: nothing cancels, so float32 holds for needles and pancakes too,
-/// and a row of eight voxels costs one multiply-add each. The coefficients are computed in float64.
+/// Both terms are non-negative, so there is no cancellation, and float32 is precise enough for very
+/// thin ellipsoids too. A voxel takes one multiply-add. The coefficients are computed in float64.
 
 #include <array>
 #include <cmath>
@@ -20,29 +22,30 @@
 namespace esvr {
 
 struct LineForm {
-  std::array<float, 3> center;  ///< voxels, relative to whatever frame the caller works in
-  std::array<float, 3> px, pz;  ///< columns of L along x and z, projected off Ly
+  std::array<float, 3> center;  ///< voxels in the frame of the caller
+  std::array<float, 3> px, pz;  ///< parts of Lx and Lz that are perpendicular to Ly
   std::array<float, 3> ly;      ///< column of L along y
-  float sx, sz;                 ///< shift of the closest approach
+  float sx, sz;                 ///< slopes of y*
   float a;                      ///< |Ly|^2
   float halfX;                  ///< half width of the support's bounding box along x
-  float slopeYx, halfYx;  ///< in the plane dx: y-extent slopeYx dx +- halfYx sqrt(1 - (dx/halfX)^2)
+  /// The support's extent along y in the plane dx is slopeYx dx +- halfYx sqrt(1 - (dx / halfX)^2).
+  float slopeYx, halfYx;
   float intensity;
 };
 
 /// \param L       maps displacements to the unit frame
-/// \param radius  of the support in the unit frame (supportRadius)
+/// \param radius  radius of the support in the unit frame (supportRadius)
 [[nodiscard]] ESVR_HD inline LineForm makeLineForm(const std::array<double, 3>& center,
                                                    const Matrix3& L, double radius,
                                                    double intensity);
 
-/// L = S^-1 R^T of ellipsoid i: u = L d.
+/// The matrix L = S^-1 R^T of ellipsoid i, which maps a displacement d to u = L d.
 [[nodiscard]] Matrix3 unitFrame(const Ellipsoids& e, std::size_t i);
 
-/// F = L^-1: its columns are the semi-axes' directions times their scales, up to a rotation.
+/// The inverse F = L^-1. Its columns are the axes times their scales, up to a rotation.
 [[nodiscard]] ESVR_HD inline Matrix3 inverse(const Matrix3& L);
 
-/// (row i of F) . (row j of F) = Sigma_ij.
+/// Sigma_ij, which is the product of the rows i and j of F.
 [[nodiscard]] ESVR_HD inline double sigma(const Matrix3& F, int i, int j) {
   return F[3 * i] * F[3 * j] + F[3 * i + 1] * F[3 * j + 1] + F[3 * i + 2] * F[3 * j + 2];
 }
@@ -60,11 +63,10 @@ ESVR_HD inline std::array<float, 3> projectedOff(const Vec3& v, const Vec3& axis
           float(v[2] - axis[2] * coefficient)};
 }
 
-/// Half width in y of the unit ellipsoid's section through its center by the plane x = const.
+/// Half width along y of the section of the ellipsoid |L d| = 1 by the plane dx = 0.
 ESVR_HD inline double conditionalSigmaY(const Vec3& ly, const Vec3& lz) {
-  // Variance of y given x in the unit frame: Sigma_yy - Sigma_xy^2 / Sigma_xx without cancellation
-  // is 1 / (Ly.Ly - (Ly.Lz)^2 / Lz.Lz), the y-y entry of the inverse of the 2x2 block of the
-  // precision.
+  // Its square is Sigma_yy - Sigma_xy^2 / Sigma_xx, the variance of y for a given x. It equals
+  // 1 / (Ly.Ly - (Ly.Lz)^2 / Lz.Lz), which has less cancellation.
   const double c = dot(ly, lz) / dot(lz, lz);
   const Vec3 off{ly[0] - lz[0] * c, ly[1] - lz[1] * c, ly[2] - lz[2] * c};
   return 1.0 / std::sqrt(dot(off, off));

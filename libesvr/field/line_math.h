@@ -1,31 +1,32 @@
 #pragma once
-/// The per-voxel math of a LineForm, written once for the CPU's vectors and for CUDA: T is float or
-/// a vector of floats. phi of what comes out is in esvr/kernel.h.
+/// The math of a LineForm for each voxel, which gives m. The code serves SIMD vectors and CUDA: T
+/// is float or a vector of floats.
 ///
-/// Functions are static: every instruction set's translation unit must keep its own copy, since the
-/// linker would be free to keep one of them for all.
+/// The functions are static, so that each translation unit keeps its own copy for its instruction
+/// set. Otherwise the linker could keep one copy for all of them.
 
 #include "esvr/kernel.h"
 #include "field/line_form.h"
 
 namespace esvr {
 
-/// m at the closest approach of the line at (dx, dz); no voxel of the line has a smaller m.
-/// \param pzDz  pz times dz
+/// m at the point of the line (dx, dz) that is closest to the center. No voxel of the line has a
+/// smaller m.
+/// \param pzDz  pz * dz
 template <class T>
 ESVR_HD static inline T closestSquared(const LineForm& f, float dx, const T (&pzDz)[3]) {
   const T u0 = pzDz[0] + f.px[0] * dx, u1 = pzDz[1] + f.px[1] * dx, u2 = pzDz[2] + f.px[2] * dx;
   return u0 * u0 + u1 * u1 + u2 * u2;
 }
 
-/// t: how far y lies beyond the closest approach.
-/// \param centerY  the center's y in the frame of y
+/// The distance t from the closest point to y.
+/// \param centerY  y of the center, in the frame of y
 template <class T>
 ESVR_HD static inline T distanceAlong(const LineForm& f, T y, float centerY, float dx, T dz) {
   return y - (centerY + f.sx * dx) - dz * f.sz;
 }
 
-/// m at t, from m at the closest approach.
+/// m at t. \param closest  m at the closest point
 template <class T>
 ESVR_HD static inline T squaredAt(const LineForm& f, T closest, T t) {
   return closest + f.a * t * t;

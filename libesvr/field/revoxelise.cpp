@@ -9,7 +9,7 @@
 namespace esvr {
 namespace {
 
-/// Turns the sums of one brick into voxels. \return its active voxels
+/// Turns the sums of one brick into voxels. \return the mask of its active voxels
 BrickMask settle(const VoxelRule& rule, std::span<float> values) {
   BrickMask mask;
   for (int v = 0; v < kBrickVoxels; ++v) {
@@ -39,7 +39,7 @@ void refuseTooFarApart(Coord low, std::span<const Coord> corners) {
   }
 }
 
-/// Moves the origin to the smallest corner that is left, as makeVolume would have it.
+/// Moves the origin to the smallest corner of the remaining bricks, as in makeVolume.
 void tightenOrigin(SparseVolume& volume) {
   if (volume.bricks.empty()) {
     volume.origin = {};

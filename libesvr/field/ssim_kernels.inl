@@ -1,6 +1,6 @@
-// Body of ssim_kernels_*.cpp: the same source under other instruction sets; the loops over i are
-// for the compiler to vectorise. No inline library function may be called here, as in
-// brick_kernels.inl.
+// The body of ssim_kernels_*.cpp, which compile it for different instruction sets. The compiler
+// vectorises the loops over i. No inline function of a library may be called here, for the reason
+// in brick_kernels.inl.
 
 #include "field/ssim_kernels.h"
 #include "field/ssim_window.h"
@@ -8,7 +8,7 @@
 namespace esvr::ESVR_KERNEL_NAMESPACE {
 namespace {
 
-/// The window is symmetric: two voxels share a multiplication.
+/// One window sum. The window is symmetric, so two voxels share a multiplication.
 inline double sumAt(const double* weights, const double* in, int stride) {
   double sum = weights[kSsimRadius] * in[kSsimRadius * stride];
   for (int tap = 0; tap < kSsimRadius; ++tap)

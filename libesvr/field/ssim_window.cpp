@@ -7,7 +7,7 @@
 namespace esvr {
 namespace {
 
-constexpr double kLuminance = 0.01, kContrast = 0.03;  // K1 and K2
+constexpr double kLuminance = 0.01, kContrast = 0.03;  // K1 and K2 of Wang et al. 2004
 
 constexpr int kSlice = kHaloSide * kHaloSide;
 

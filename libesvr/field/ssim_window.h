@@ -14,14 +14,13 @@ inline constexpr int kSsimRadius = 5;
 inline constexpr int kSsimTaps = 2 * kSsimRadius + 1;
 inline constexpr double kSsimSigma = 1.5;
 
-/// SSIM adds these constants to its quotients' terms: (K1 L)^2 and (K2 L)^2 for values of the range
-/// L.
+/// The constants (K1 L)^2 and (K2 L)^2 of SSIM, for values with the range L.
 struct SsimConstants {
   double c1, c2;
 };
 [[nodiscard]] SsimConstants ssimConstants(double peak);
 
-/// A brick with the voxels that its windows reach, z fastest.
+/// Side of the halo, which is a brick with the voxels around it that its windows reach, z fastest.
 inline constexpr int kHaloSide = kBrickSide + 2 * kSsimRadius;
 inline constexpr int kHaloVoxels = kHaloSide * kHaloSide * kHaloSide;
 inline constexpr Box kWholeHalo{{0, 0, 0}, {kHaloSide - 1, kHaloSide - 1, kHaloSide - 1}};
@@ -31,35 +30,35 @@ using BrickSums = std::array<double, kBrickVoxels>;
 
 constexpr int haloOffset(int x, int y, int z) { return (x * kHaloSide + y) * kHaloSide + z; }
 
-/// Weights along one axis; they sum to 1.
+/// The weights along one axis, whose sum is 1.
 [[nodiscard]] std::array<double, kSsimTaps> ssimWeights();
 
-/// The brick's voxels whose windows meet a box of halo coordinates; empty where the box is.
+/// The voxels of the brick whose windows overlap a box of halo coordinates; empty if the box is.
 [[nodiscard]] Box windowsThatSee(const Box& halo);
-/// The halo coordinates that the windows around a box of the brick's voxels meet.
+/// The halo coordinates that the windows around a box of the brick's voxels overlap.
 [[nodiscard]] Box seenByWindows(const Box& voxels);
 
-/// Weighted sums of the windows around a brick's voxels, axis by axis.
+/// Computes the weighted sums of the windows around a brick's voxels, axis by axis.
 class SsimWindow {
  public:
   SsimWindow() : weights_(ssimWeights()) {}
 
-  /// Bounds what is summed, so that the rest costs nothing.
+  /// Limits of a computation; the time depends on them.
   struct Extent {
     Box support;  ///< halo coordinates outside which every value is zero
     Box voxels;   ///< the brick's voxels whose sums are wanted; rows along z are summed whole
 
-    /// The values that are read, in whole rows along z: all of them must be given.
+    /// The halo coordinates that are read, in whole rows along z. All their values must be given.
     [[nodiscard]] Box read() const;
   };
-  /// The same bits for every support that holds the values.
-  /// \param out  in voxelOffset order; meaningless outside extent.voxels
+  /// Sums the values. The result has the same bits for every support that contains the values.
+  /// \param out  sums in voxelOffset order; undefined outside extent.voxels
   void sum(const HaloValues& values, const Extent& extent, BrickSums& out);
-  /// Sums of the values' products.
+  /// Sums the products of two halos.
   void sumProducts(const HaloValues& a, const HaloValues& b, const Extent& extent, BrickSums& out);
 
-  /// Sum along one axis of the weights that lie in [low, high], for a window around `at`: what a
-  /// window clipped at a box's border is divided by.
+  /// Sum along one axis of the weights at positions in [low, high], for a window around `at`. A
+  /// window that is clipped at the border of a box is divided by it.
   [[nodiscard]] double weightWithin(std::int64_t at, std::int64_t low, std::int64_t high) const;
 
  private:

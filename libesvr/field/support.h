@@ -1,5 +1,6 @@
 #pragma once
-/// The region an ellipsoid reaches, and the bricks that it may touch.
+/// The support of an ellipsoid, which is the region where its kernel is not 0, and the bricks that
+/// it may touch.
 
 #include <array>
 #include <cmath>
@@ -12,11 +13,11 @@
 namespace esvr {
 
 struct Support {
-  std::array<double, 3> center;  ///< voxels, in the frame of the bricks
+  std::array<double, 3> center;  ///< voxels in the frame of the bricks
   Matrix3 L;
-  double radius;               ///< in the unit frame
-  double slack;                ///< voxels that every face is moved outwards
-  std::array<double, 3> half;  ///< half widths of the bounding box, slack included
+  double radius;               ///< radius in the unit frame
+  double slack;                ///< voxels by which every face is moved outwards
+  std::array<double, 3> half;  ///< half widths of the bounding box, including the slack
 };
 
 [[nodiscard]] ESVR_HD inline Support makeSupport(const std::array<double, 3>& center,
@@ -32,10 +33,10 @@ struct Support {
   return double(brick) * kBrickSide + (kBrickSide - 1) / 2.0;
 }
 
-/// How far a brick's middle may lie from the support's center, measured along row j of L, while the
-/// brick may touch the support.
+/// Largest distance, along row j of L, between the support's center and the middle of a brick that
+/// may touch it.
 [[nodiscard]] ESVR_HD inline double slabBound(const Support& s, int j) {
-  constexpr double kHalf = (kBrickSide - 1) / 2.0;  // voxels are points: a brick spans 7, not 8
+  constexpr double kHalf = (kBrickSide - 1) / 2.0;  // voxels are points, so a brick spans 7 voxels
   const double* row = &s.L[3 * j];
   const double reach = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
   const double length2 = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
@@ -68,20 +69,20 @@ class SlabTest {
   double bounds_[3];
 };
 
-/// The bricks that hold a voxel of a box, as a box of brick coordinates.
+/// The bricks that contain a voxel of a box, as a box of brick coordinates.
 [[nodiscard]] constexpr Box bricksOf(const Box& voxels) {
   return {brickOf(voxels.min), brickOf(voxels.max)};
 }
 
-/// The brick along an axis that holds a place, which may lie beyond all voxels that there can be.
+/// The brick that contains a position along an axis. Positions beyond the index space are clamped.
 [[nodiscard]] ESVR_HD inline std::int32_t brickAlong(double place) {
   constexpr double kFirst = Box::kMin, kLast = Box::kMax;
   const double inside = place < kFirst ? kFirst : (place < kLast ? place : kLast);
   return std::int32_t(inside) >> kBrickLog2;
 }
 
-/// Bricks that overlap the bounding box, as a box of brick coordinates. It is cut off at the ends of
-/// the index space, and has no brick where the support has no extent that is a number.
+/// The bricks that overlap the bounding box, as a box of brick coordinates. It is cut off at the
+/// ends of the index space, and is empty if the extent of the support is NaN.
 [[nodiscard]] ESVR_HD inline Box brickRange(const Support& s) {
   std::int32_t low[3], high[3];
   for (int a = 0; a < 3; ++a) {

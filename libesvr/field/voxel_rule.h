@@ -1,6 +1,6 @@
 #pragma once
-/// The rule that turns a sum of ellipsoids into a voxel, for host and device. revoxelise() applies
-/// it; RevoxeliseOptions (field.h) says what its parts mean.
+/// The rule that turns a sum of ellipsoids into a voxel, which revoxelise() applies. Its parameters
+/// are explained in RevoxeliseOptions (field.h). The code is compiled for host and device.
 
 #include <cmath>
 #include <limits>
@@ -12,32 +12,32 @@ namespace esvr {
 
 struct VoxelRule {
   float background = 0.0f;
-  float low = -std::numeric_limits<float>::infinity();  ///< smaller sums become this
-  float high = std::numeric_limits<float>::infinity();  ///< larger sums become this
+  float low = -std::numeric_limits<float>::infinity();  ///< smaller sums are clamped to this
+  float high = std::numeric_limits<float>::infinity();  ///< larger sums are clamped to this
   float threshold = 0.0f;
   bool narrowBand = false;
 
-  /// The value that a voxel takes where it is active.
+  /// The clamped sum, which is the value of an active voxel.
   [[nodiscard]] ESVR_HD float settled(float sum) const {
     return sum < low ? low : (high < sum ? high : sum);
   }
-  /// How far a settled value is from being inactive.
+  /// The activity of a settled value. A voxel is active if it is above the threshold.
   [[nodiscard]] ESVR_HD float activity(float settled) const {
     return narrowBand ? background - std::fabs(settled) : std::fabs(settled - background);
   }
   [[nodiscard]] ESVR_HD bool isActive(float settled) const { return activity(settled) > threshold; }
-  /// The value that a voxel takes where it is not active.
+  /// The value of an inactive voxel.
   [[nodiscard]] ESVR_HD float inactiveValue(float settled) const {
     return narrowBand ? std::copysign(background, settled) : background;
   }
-  /// The voxel of a sum.
+  /// The value of the voxel that a sum becomes.
   [[nodiscard]] ESVR_HD float operator()(float sum) const {
     const float value = settled(sum);
     return isActive(value) ? value : inactiveValue(value);
   }
 };
 
-/// \param options  its bricks take no part
+/// \param options  its bricks are not used
 [[nodiscard]] inline VoxelRule makeVoxelRule(float background, const RevoxeliseOptions& options) {
   VoxelRule rule{.background = background};
   if (options.range) rule.low = options.range->min, rule.high = options.range->max;

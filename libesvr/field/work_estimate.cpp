@@ -14,11 +14,11 @@ namespace {
 // copied, and a tree that is written holds a brick again. docs/lab-notes.md, "Memory estimates",
 // compares an estimate with what a program held.
 constexpr double kBytesPerEllipsoid = 512.0;  // parameters, support, prepared form
-constexpr double kBytesPerPair = 16.0;        // lists both ways, and what they are made from
+constexpr double kBytesPerPair = 16.0;        // both lists of pairs, and intermediate lists
 constexpr double kBytesOfValues = kBrickVoxels * sizeof(float);
 constexpr double kBytesPerBrick = 2.0 * (kBytesOfValues + sizeof(BrickMask)) + 96.0;
 
-/// Each brick is counted for each ellipsoid that reaches it.
+/// An upper bound that counts a brick once for each ellipsoid that reaches it.
 WorkEstimate boundOf(std::span<const Support> supports, const Box& within, double maxOfAll) {
   WorkEstimate bound{.ellipsoids = double(supports.size())};
   Box all;

@@ -2,7 +2,7 @@
 /// Eigen's fixed-size matrices, for host and device.
 
 #if defined(__CUDACC__)
-// Eigen annotates defaulted members, which nvcc remarks on.
+// Eigen annotates defaulted members, which nvcc warns about.
 #pragma nv_diagnostic push
 #pragma nv_diag_suppress 20012
 #endif

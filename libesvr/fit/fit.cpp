@@ -27,7 +27,7 @@ PresetValues valuesOf(Preset preset) {
   return {35.0, 1500};
 }
 
-/// A GPU makes a third more iterations, since they take little time.
+/// The number of iterations. A GPU makes a third more, because they take little time there.
 std::uint32_t iterationsOf(const PresetValues& preset, DeviceKind device) {
   return device == DeviceKind::kCuda ? preset.iterations * 4 / 3 : preset.iterations;
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// What lists of pairs hold of an ellipsoid, and by how much more than its support.
+/// The support of an ellipsoid as it is entered into the pair lists, and the rule for its slack.
 
 #include <array>
 #include <cstddef>
@@ -9,11 +9,12 @@
 
 namespace esvr {
 
-/// A support as it was listed.
+/// A support at the time when the lists were built. It is wider than the ellipsoid's support by a
+/// slack, so that the ellipsoid can move before the lists must be built again (motion_bound.h).
 struct ListedSupport {
   std::array<double, 3> center;
   Matrix3 L;
-  double reach;  ///< its radius in the unit frame, slack included
+  double reach;  ///< radius in the unit frame, including the slack
 };
 
 /// How slack is chosen, and when lists end. docs/lab-notes.md has the measurements

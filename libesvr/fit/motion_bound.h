@@ -1,5 +1,6 @@
 #pragma once
-/// How far ellipsoids may move before the lists of pairs must be built anew, for host and device.
+/// Decides when ellipsoids have moved so far that the pair lists must be built again. The code is
+/// compiled for host and device.
 ///
 /// A list holds every brick that an ellipsoid's support reaches, and some more: the support is
 /// widened by a slack, which is a share of its radius, since steps too are shares of an ellipsoid's
@@ -14,7 +15,7 @@
 
 namespace esvr {
 
-/// \return the radius in the unit frame beyond which phi is less than `share`
+/// \return the radius in the unit frame beyond which phi is below `share`
 [[nodiscard]] ESVR_HD inline double coreRadius(const KernelConstants<double>& k, double share) {
   return std::sqrt(k.shift + std::log(k.numerator / (k.base + share) - k.plateau));
 }
@@ -24,28 +25,29 @@ namespace motion_bound {
 using Eigen::Matrix3d;
 using ellipsoid_math::asEigen;
 
-/// How far the center has moved, in the unit frame of the listed support.
+/// Distance that the center has moved, in the unit frame of the listed support.
 ESVR_HD inline double offsetFrom(const ListedSupport& listed, const Ellipsoid& p) {
   const Eigen::Vector3d d(p.center[0] - listed.center[0], p.center[1] - listed.center[1],
                           p.center[2] - listed.center[2]);
   return (asEigen(listed.L) * d).norm();
 }
 
-/// M^T M of M = L_listed F, which maps the unit ball of now into the unit frame of then.
+/// M^T M for M = L_listed F, which maps the unit frame of the ellipsoid to that of its listed
+/// support.
 ESVR_HD inline Matrix3d squaredStretch(const ListedSupport& listed, const Ellipsoid& p) {
   const Matrix3 F = inverse(p.L);
   const Matrix3d M = asEigen(listed.L) * asEigen(F);
   return M.transpose() * M;
 }
 
-/// Sylvester's criterion.
+/// Tests a symmetric matrix by Sylvester's criterion.
 ESVR_HD inline bool positiveDefinite(const Matrix3d& S) {
   const double minor = S(0, 0) * S(1, 1) - S(0, 1) * S(0, 1);
   return S(0, 0) > 0.0 && minor > 0.0 && S.determinant() > 0.0;
 }
 
-/// A bound of the largest eigenvalue from trace and norm (Wolkowicz and Styan 1980): exact where the
-/// others are equal.
+/// An upper bound of the largest eigenvalue, computed from trace and norm (Wolkowicz and Styan
+/// 1980). It is exact if the other two eigenvalues are equal.
 ESVR_HD inline double largestEigenvalueBound(const Matrix3d& S) {
   const double mean = S.trace() / 3.0;
   const double variance = S.squaredNorm() / 3.0 - mean * mean;
@@ -54,7 +56,7 @@ ESVR_HD inline double largestEigenvalueBound(const Matrix3d& S) {
 
 }  // namespace motion_bound
 
-/// \return whether a list still holds all bricks that the support of `radius` reaches. False where
+/// \return true if the listed support contains the ellipsoid's support of radius `radius`. False if
 ///         the ellipsoid is not finite.
 [[nodiscard]] ESVR_HD inline bool isHeld(const ListedSupport& listed, const Ellipsoid& p,
                                          double radius) {
@@ -82,8 +84,9 @@ ESVR_HD inline double largestEigenvalueBound(const Matrix3d& S) {
   return offsetFrom(listed, p) / radius + stretch - 1.0;
 }
 
-/// \param steps   of the ellipsoid so far
-/// \param before  its support as it was last listed; not looked at where it has not settled
+/// The slack for the next lists, as a share of the radius.
+/// \param steps   number of steps that the ellipsoid has taken
+/// \param before  its support in the last lists; not used for fewer than settledSteps steps
 [[nodiscard]] ESVR_HD inline double slackOf(const Ellipsoid& p, std::uint32_t steps,
                                             const ListedSupport& before, double radius,
                                             const SlackRule& rule) {
@@ -96,7 +99,7 @@ ESVR_HD inline double largestEigenvalueBound(const Matrix3d& S) {
   return wanted > low ? (wanted < high ? wanted : high) : low;
 }
 
-/// \return the support that a list is to hold
+/// \return the support for the next lists
 [[nodiscard]] ESVR_HD inline ListedSupport listedSupport(const Ellipsoid& p, std::uint32_t steps,
                                                          const ListedSupport& before, double radius,
                                                          const SlackRule& rule) {

@@ -17,7 +17,7 @@ class CellReader {
  public:
   explicit CellReader(const SparseVolume& volume) : volume_(volume), index_(volume.bricks) {}
 
-  /// The voxels at the corners of a brick's cells. \return false where all are the background
+  /// Reads the voxels at the corners of a brick's cells. \return false if all are the background
   bool read(Coord brick, float* values) const {
     std::array<const float*, 8> from{};
     for (int c = 0; c < 8; ++c) from[c] = find(brick + stepToCorner(c));
@@ -46,7 +46,7 @@ class CellReader {
   const BrickIndex index_;
 };
 
-/// Those of the candidates that show anything.
+/// The candidates that have a voxel other than the background.
 std::vector<Coord> occupied(const CellReader& reader, const std::vector<Coord>& all) {
   std::vector<char> any(all.size());
   tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
@@ -59,7 +59,7 @@ std::vector<Coord> occupied(const CellReader& reader, const std::vector<Coord>& 
   return bricks;
 }
 
-/// Floor division.
+/// The block of a brick. The shift rounds down, also below zero.
 Coord blockOf(Coord brick) {
   static_assert(kBlockBricks == 8);
   return {brick.x >> 3, brick.y >> 3, brick.z >> 3};

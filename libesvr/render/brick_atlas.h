@@ -1,5 +1,6 @@
 #pragma once
-/// Voxels as bricks of cells, ready to be marched (brick_march.h).
+/// A volume as bricks of cells, the form in which rays march through it (brick_march.h). A cell is
+/// the cube between eight neighbouring voxels.
 
 #include <vector>
 
@@ -8,7 +9,7 @@
 
 namespace esvr {
 
-/// A brick of cells is there where any of its cells has a corner that is not the background.
+/// Holds every brick of cells that has a voxel other than the background.
 struct BrickAtlas {
   Coord origin, blocks;
   std::vector<std::uint32_t> blockOf, brickOf;

@@ -1,6 +1,7 @@
 #pragma once
-/// Marches a ray through bricks that hold all corners of their cells, so that a sample needs one
-/// brick only; over blocks and bricks that are not there in one step. For host and device.
+/// Marches a ray through bricks of cells. A brick holds all voxels at the corners of its cells, so
+/// that the interpolation of a sample reads one brick only. A ray crosses an empty brick, or an
+/// empty block of bricks, in one step. The code is compiled for host and device.
 
 #include <cstdint>
 
@@ -8,34 +9,34 @@
 
 namespace esvr {
 
-/// A brick of cells, 8 along a side, with the 9 x 9 x 9 voxels at their corners, z fastest.
+/// A brick has 8 x 8 x 8 cells and stores the 9 x 9 x 9 voxels at their corners, z fastest.
 inline constexpr int kCellBrickSide = kBrickSide + 1;
 inline constexpr int kCellBrickVoxels = kCellBrickSide * kCellBrickSide * kCellBrickSide;
-/// Bricks are found through blocks of 8 x 8 x 8 of them.
+/// A brick is found through its block, which has 8 x 8 x 8 bricks.
 inline constexpr int kBlockBricks = 8;
 inline constexpr int kBlockSide = kBlockBricks * kBrickSide;  ///< voxels
 inline constexpr int kBricksOfBlock = kBlockBricks * kBlockBricks * kBlockBricks;
 inline constexpr std::uint32_t kNoCells = 0xffffffffu;
 
-/// A brick atlas wherever it lies.
+/// Pointers to a brick atlas in host or device memory.
 struct BrickAtlasView {
   Coord origin;                  ///< first voxel of the first block
-  Coord blocks;                  ///< number along each axis
-  const std::uint32_t* blockOf;  ///< z fastest; a block's number, or kNoCells
-  const std::uint32_t* brickOf;  ///< kBricksOfBlock a block, z fastest; a brick's, or kNoCells
-  const float* values;           ///< kCellBrickVoxels a brick
+  Coord blocks;                  ///< number of blocks along each axis
+  const std::uint32_t* blockOf;  ///< number of each block, or kNoCells; z fastest
+  const std::uint32_t* brickOf;  ///< by block: number of each brick, or kNoCells; z fastest
+  const float* values;           ///< kCellBrickVoxels for each brick
 };
 
 namespace brick_march {
 
-/// The content at a cell: a brick, or a cube without any.
+/// The brick that has a cell, or the empty cube around the cell: a brick or a whole block.
 struct Found {
-  std::uint32_t brick;
-  Coord low;  ///< the cube's
+  std::uint32_t brick;  ///< kNoCells: empty
+  Coord low;            ///< lowest corner of the brick or cube
   int side;
 };
 
-/// \param v  relative to the atlas, within its blocks
+/// \param v  cell relative to the atlas; it must lie within the blocks
 ESVR_HD inline Found find(const BrickAtlasView& a, const Coord& v) {
   const Coord block{v.x / kBlockSide, v.y / kBlockSide, v.z / kBlockSide};
   const std::uint32_t number =
@@ -54,7 +55,7 @@ ESVR_HD inline Found find(const BrickAtlasView& a, const Coord& v) {
 
 ESVR_HD inline float between(float a, float b, float s) { return a + s * (b - a); }
 
-/// \param values  of the brick
+/// \param values  voxels of the brick
 ESVR_HD inline float interpolate(const float* values, const FloatPlace& p, const Coord& cell) {
   constexpr int kMask = kBrickSide - 1, kX = kCellBrickSide * kCellBrickSide, kY = kCellBrickSide;
   const float* v = values + (cell.x & kMask) * kX + (cell.y & kMask) * kY + (cell.z & kMask);
@@ -76,7 +77,7 @@ ESVR_HD inline bool inside(const BrickAtlasView& a, const Coord& v) {
 
 }  // namespace brick_march
 
-/// \param scene  its box and view relative to the atlas' origin
+/// \param scene  its box and view are relative to the atlas' origin
 ESVR_HD inline PixelColor marchBricks(const BrickAtlasView& atlas, const MarchScene& scene,
                                       int column, int row, const SampleRange& wanted) {
   using namespace brick_march;
@@ -86,7 +87,7 @@ ESVR_HD inline PixelColor marchBricks(const BrickAtlasView& atlas, const MarchSc
   for (int i = 0; i < samples.count && scene.rule.open(ray);) {
     const FloatPlace place = samples.at(i);
     const Coord cell = cellOf(place);
-    if (!inside(atlas, cell)) {  // by rounding, at the box's faces
+    if (!inside(atlas, cell)) {  // rounding can move a place beyond the box
       ++i;
       continue;
     }

@@ -9,11 +9,12 @@
 namespace esvr {
 namespace {
 
-// Every fifth of 256 entries, 0xRRGGBB; straight lines between them are within 2/255 of the others.
-// viridis, magma, inferno, plasma: S. van der Walt, N. Smith and E. Firing, bids.github.io/colormap
-// (CC0). cividis: J. Nunez, C. Anderton and R. Renslow, PLOS ONE 13(7), 2018, by the polynomial,
-// and turbo: A. Mikhailov, "Turbo, an improved rainbow colormap", 2019, by the polynomial that
-// d3-scale-chromatic 3 publishes.
+// The tables hold every fifth of a map's 256 colors as 0xRRGGBB. Linear interpolation gives the
+// other colors to within 2.5/255 (tests/render/transfer_function_test.cpp checks some of them).
+// Sources: viridis, magma, inferno and plasma are by S. van der Walt, N. Smith and E. Firing,
+// bids.github.io/colormap (CC0). cividis (J. Nunez, C. Anderton and R. Renslow, PLOS ONE 13(7),
+// 2018) and turbo (A. Mikhailov, "Turbo, an improved rainbow colormap", 2019) are computed by the
+// polynomials that d3-scale-chromatic 3 publishes.
 constexpr std::uint32_t kViridis[] = {
     0x440154, 0x46085c, 0x471063, 0x481769, 0x481d6f, 0x482475, 0x472a7a, 0x46307e, 0x453781,
     0x433d84, 0x414287, 0x3f4889, 0x3d4e8a, 0x3a538b, 0x38598c, 0x355e8d, 0x33638d, 0x31688e,
@@ -81,8 +82,8 @@ ColorMap fromPoints(ColorSpace space, std::initializer_list<ColorPoint> points) 
   return map;
 }
 
-// The ends are those of K. Moreland, "Diverging color maps for scientific visualization", ISVC
-// 2009.
+// The two end colors are from K. Moreland, "Diverging color maps for scientific visualization",
+// ISVC 2009.
 ColorMap coolToWarm() {
   return fromPoints(ColorSpace::kDiverging,
                     {{0.0, {0.230, 0.299, 0.754}}, {1.0, {0.706, 0.016, 0.150}}});
@@ -93,7 +94,7 @@ ColorMap grayscale() {
 ColorMap xRay() {
   return fromPoints(ColorSpace::kRgb, {{0.0, {1.0, 1.0, 1.0}}, {1.0, {0.0, 0.0, 0.0}}});
 }
-// As ParaView's "Black-Body Radiation": black, red, yellow, white.
+// The colors of ParaView's preset "Black-Body Radiation": black, red, yellow, white.
 ColorMap blackBody() {
   return fromPoints(ColorSpace::kRgb, {{0.0, {0.0, 0.0, 0.0}},
                                        {0.4, {0.901961, 0.0, 0.0}},
@@ -101,15 +102,14 @@ ColorMap blackBody() {
                                        {1.0, {1.0, 1.0, 1.0}}});
 }
 
-// Gray that brightens where smoke is thin and lit through.
+// Thin smoke is bright because light passes through it; dense smoke is dark gray.
 ColorMap smoke() {
   return fromPoints(
       ColorSpace::kLab,
       {{0.0, {0.90, 0.90, 0.92}}, {0.3, {0.70, 0.70, 0.73}}, {1.0, {0.22, 0.22, 0.24}}});
 }
-// For values from air (0) over soft tissue (about a third) to dense bone (1), as a linear CT window
-// of -1000 to 2000 HU has them: fat at 0.30, muscle at 0.35, spongy bone from 0.43, compact bone
-// from 0.6.
+// The map is for CT values that were scaled linearly from -1000 HU (0) to 2000 HU (1). Air is then
+// at 0, fat at 0.30, muscle at 0.35, spongy bone from 0.43 and compact bone from 0.6.
 ColorMap ctBone() {
   return fromPoints(ColorSpace::kRgb, {{0.0, {0.0, 0.0, 0.0}},
                                        {0.38, {0.55, 0.25, 0.15}},

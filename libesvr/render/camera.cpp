@@ -10,8 +10,8 @@
 namespace esvr {
 namespace {
 
-constexpr Vec3 kFromCenter{0.5, 0.35, 1.0};  // towards the eye
-constexpr double kParallel = 1e-6;           // sine of an angle that is taken for none
+constexpr Vec3 kFromCenter{0.5, 0.35, 1.0};  // default direction from the center to the eye
+constexpr double kParallel = 1e-6;           // sine of the angle below which vectors are parallel
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
@@ -20,7 +20,7 @@ Vec3 middle(const Box& box) {
           (double(box.min.z) + box.max.z) / 2};
 }
 
-/// Voxels have an extent of half a voxel around their place.
+/// Radius of the sphere around a box. A voxel extends half a voxel to each side of its index.
 double boundingRadius(const Box& box) {
   return length({double(box.max.x) - box.min.x + 1, double(box.max.y) - box.min.y + 1,
                  double(box.max.z) - box.min.z + 1}) /
@@ -31,13 +31,13 @@ bool parallel(const Vec3& a, const Vec3& b) {
   return length(cross(a, b)) <= kParallel * length(a) * length(b);
 }
 
-/// Distance at which a sphere touches the nearer pair of the picture's edges.
+/// Distance from the eye at which a sphere just fits into the shorter side of the picture.
 double fittingDistance(double radius, double fov, double aspect) {
   const double half = std::tan(radians(fov) / 2);
   return radius / std::sin(std::atan(half * std::min(1.0, aspect)));
 }
 
-/// y, or z where the view runs along y.
+/// The y axis, or the z axis if the camera looks along y.
 Vec3 defaultUp(const Camera& camera) {
   const Vec3 y{0.0, 1.0, 0.0}, z{0.0, 0.0, 1.0};
   return parallel(difference(camera.center, camera.eye), y) ? z : y;

@@ -50,7 +50,8 @@ Rgb mixedHsv(const Rgb& from, const Rgb& to, double s, bool wrap) {
   return fromHsv(hsv);
 }
 
-// CIE L*a*b* (CIE 15:2004) by way of XYZ, with sRGB's primaries (IEC 61966-2-1), white D65.
+// CIE L*a*b* (CIE 15:2004), computed through XYZ with the primaries of sRGB (IEC 61966-2-1) and
+// the white point D65.
 
 constexpr Triple kWhite{0.9505, 1.0, 1.089};
 
@@ -86,10 +87,11 @@ Rgb fromLab(const Triple& lab) {
                 gammaCoded(0.0557 * x - 0.2040 * y + 1.0570 * z)});
 }
 
-// Moreland's Msh: the polar form of L*a*b*. Magnitude, saturation (an angle), hue (an angle).
+// Moreland's color space Msh is the polar form of L*a*b*: a magnitude M, and two angles for the
+// saturation s and the hue h.
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kUnsaturated = 0.05;  ///< radians: a grey below
+constexpr double kUnsaturated = 0.05;  ///< radians; a color with a smaller s counts as grey
 constexpr double kWhiteMagnitude = 88.0;
 
 Triple toMsh(const Rgb& c) {
@@ -108,8 +110,8 @@ double angleBetween(double a, double b) {
   return std::min(d, 2 * kPi - d);
 }
 
-/// The hue for an unsaturated color of magnitude m that a saturated one fades to: turned so that
-/// the way between is straight in L*a*b*, and away from purple.
+/// The hue for a grey of magnitude m at the end of an interpolation from a saturated color. Its
+/// choice makes the path straight in L*a*b*, and turns it away from purple (Moreland 2009).
 double fadedHue(const Triple& saturated, double m) {
   if (saturated[0] >= m - 0.1) return saturated[2];
   const double turn = saturated[1] * std::sqrt(m * m - saturated[0] * saturated[0]) /

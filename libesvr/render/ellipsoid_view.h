@@ -1,5 +1,5 @@
 #pragma once
-/// Ellipsoids as a camera sees them.
+/// Projects the ellipsoids of a field into a picture.
 
 #include <cstdint>
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace esvr {
 
-/// The ellipsoids that some ray of the picture may meet, in their order in the field.
+/// The ellipsoids that at least one ray of the picture may meet, in the order of the field.
 struct VisibleEllipsoids {
   std::vector<ScreenBounds> bounds;
   std::vector<EllipsoidView> views;  ///< for Between::kSum
@@ -20,11 +20,11 @@ struct VisibleEllipsoids {
 [[nodiscard]] VisibleEllipsoids visibleEllipsoids(const Field& field, const View& view,
                                                   Resolution resolution, Between between);
 
-/// A field's ellipsoids as they are handed to a camera; `chunk` counts the field's chunks.
+/// The ellipsoids of all chunks of a field in one array.
 [[nodiscard]] std::vector<PackedEllipsoid> packed(const Field& field);
-/// The origins that the chunks' centers are relative to.
+/// The origins of the chunks. Centers of ellipsoids are relative to them.
 [[nodiscard]] std::vector<Vec3> chunkOrigins(const Field& field);
-/// One kernel for all ellipsoids, or one for each, in the order of `packed`.
+/// One kernel if all ellipsoids share it, otherwise one for each in the order of packed().
 [[nodiscard]] std::vector<RayKernel> rayKernels(const Field& field);
 
 }  // namespace esvr

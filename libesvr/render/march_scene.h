@@ -1,5 +1,6 @@
 #pragma once
-/// Everything that marching through voxels needs, whatever holds them; for host and device.
+/// The parts of ray marching that do not depend on how voxels are stored. The code is compiled for
+/// host and device.
 
 #include "render/ray_box.h"
 #include "render/sample_rule.h"
@@ -9,7 +10,7 @@ namespace esvr {
 /// The parameters that all rays of a picture share.
 struct MarchScene {
   View view;
-  PlaceBox box;  ///< outside of it every sample is the background
+  PlaceBox box;  ///< every sample outside this box is the background
   double step;
   ClipBox clip;
   SampleRule rule;
@@ -19,10 +20,11 @@ struct FloatPlace {
   float x, y, z;
 };
 
-/// A ray's samples in the box: `first` is where the first one lies, so that float32 will do.
+/// The samples of a ray inside the box. Sample i lies at first + i apart. It is computed from the
+/// first sample in the box and not from the eye, so that float32 is precise enough.
 struct MarchSamples {
   FloatPlace first, apart;
-  float number;  ///< the first sample's number, from the eye
+  float number;  ///< number of the first sample, counted from the eye
   int count;
 
   [[nodiscard]] ESVR_HD FloatPlace at(int i) const {
@@ -35,7 +37,7 @@ ESVR_HD inline FloatPlace floatPlace(const Vec3& v) {
   return {float(v[0]), float(v[1]), float(v[2])};
 }
 
-/// \param wanted  samples to look at, at most
+/// \param wanted  further limit on the range of samples
 ESVR_HD inline MarchSamples samplesOf(const MarchScene& s, int column, int row,
                                       const SampleRange& wanted) {
   const Ray ray = s.view.ray(column, row);
@@ -54,8 +56,8 @@ ESVR_HD inline float samplesToFace(float place, float apart, int low, int high) 
   return ((apart > 0.0f ? float(high) : float(low)) - place) / apart;
 }
 
-/// How many samples on, one at least, the first lies that is not in an empty cube.
-/// \param low, side  of the cube
+/// Number of samples from a place to the first one outside an empty cube, at least 1.
+/// \param low, side  lowest corner and side of the cube
 ESVR_HD inline int samplesToLeave(const FloatPlace& p, const FloatPlace& apart, const Coord& low,
                                   int side) {
   constexpr float kRounding = 1e-3f;

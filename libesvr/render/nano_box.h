@@ -6,7 +6,8 @@
 
 namespace esvr {
 
-/// Places whose cell has a corner in a leaf; for a grid without leaves, none.
+/// The box of all places whose interpolation reads a voxel of a leaf; empty for a grid without
+/// leaves.
 [[nodiscard]] inline PlaceBox sampledBox(const NanoVolume& volume) {
   const Coord low = volume.voxels.min, high = volume.voxels.max;
   if (volume.voxels.empty()) return {{1.0, 1.0, 1.0}, {0.0, 0.0, 0.0}};

@@ -1,6 +1,7 @@
 #pragma once
-/// Marches a ray through a NanoVDB grid: trilinear samples where leaves are, and hierarchical steps
-/// over nodes that are not there, as large as the tree says. Written once for host and device.
+/// Marches a ray through a NanoVDB grid. Samples near leaf nodes are interpolated trilinearly; a
+/// region without leaves is crossed in one step, whose size is that of the tree's empty node. The
+/// code is compiled for host and device.
 
 #include <nanovdb/NanoVDB.h>
 #if __has_include(<nanovdb/math/SampleFromVoxels.h>)  // OpenVDB 12 and up
@@ -17,8 +18,9 @@ namespace esvr {
 
 namespace nano_march {
 
-/// How many samples on the first one lies that may see a voxel outside of an empty node; 0 where
-/// this one may. A node's cells but those on its upper faces have all corners within it.
+/// Number of samples from a place to the first one that may read a voxel outside an empty node; 0
+/// if the sample at the place already may. A cell reaches to the next voxel along each axis, so
+/// only the cells at the upper faces of a node read voxels outside it.
 ESVR_HD inline int samplesToLeave(const FloatPlace& place, const FloatPlace& apart,
                                   const nanovdb::Coord& at, std::uint32_t dim) {
   const int mask = ~(int(dim) - 1), side = int(dim) - 1;

@@ -48,7 +48,7 @@ const json& chosen(const json& presets, const std::string& name, const std::stri
                  " with RGBPoints; there are " + listed(presets));
 }
 
-/// The numbers of an array, in rows of so many.
+/// The numbers of an array whose length must be a multiple of `row`.
 std::vector<double> numbers(const json& preset, const char* key, std::size_t row) {
   const json& array = preset.at(key);
   const bool fits =

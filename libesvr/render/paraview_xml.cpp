@@ -29,7 +29,7 @@ void appendColor(const ptree& node, json& to) {
   for (const char* channel : {"r", "g", "b"}) to.push_back(attribute(node, channel));
 }
 
-/// A map of colors only has an opacity of 1 everywhere, or none.
+/// False for a map of colors only: its points have no opacity, or all have an opacity of 1.
 bool hasOpacities(const ptree& map) {
   for (const auto& [tag, node] : map)
     if (tag == "Point" && node.get<double>("<xmlattr>.o", 1.0) != 1.0) return true;
@@ -58,7 +58,7 @@ json presetOf(const ptree& map) {
   return preset;
 }
 
-/// Maps lie at the top or in <ColorMaps>.
+/// Appends the color maps of a file, which may lie at the top level or inside <ColorMaps>.
 void appendMaps(const ptree& tree, json& presets) {
   for (const auto& [tag, node] : tree) {
     if (tag == "ColorMap") presets.push_back(presetOf(node));

@@ -1,12 +1,13 @@
 #pragma once
-/// ParaView's color maps of before 2014.
+/// Reads the XML color maps that ParaView wrote before 2014.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 namespace esvr {
 
-/// The maps of a file as presets of the JSON form. \throws BadInput  not XML, not numbers
+/// Converts the color maps of a file to presets in ParaView's JSON format.
+/// \throws BadInput  the file is not XML, or an attribute is not a number
 [[nodiscard]] nlohmann::json presetsOfXml(const std::filesystem::path& path);
 
 }  // namespace esvr

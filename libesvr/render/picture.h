@@ -1,5 +1,5 @@
 #pragma once
-/// Both renderers share this: checked options and the picture in the making.
+/// The checked options of a picture, and its pixels while it is drawn. All CPU renderers use it.
 
 #include "esvr/render.h"
 #include "render/sample_rule.h"
@@ -7,12 +7,12 @@
 
 namespace esvr {
 
-/// \throws UsageError  as renderField
+/// \throws UsageError  as for renderField
 void checkRenderOptions(const RenderOptions& options);
 
 class Picture {
  public:
-  /// \throws UsageError  as renderField
+  /// \throws UsageError  as for renderField
   explicit Picture(const RenderOptions& options);
 
   const View view;
@@ -25,7 +25,7 @@ class Picture {
   Image image_;
 };
 
-/// \throws Cancelled  where that was asked for
+/// \throws Cancelled  RenderOptions::cancel was set
 void checkCancelled(const RenderOptions& options);
 
 }  // namespace esvr

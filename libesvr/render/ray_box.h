@@ -1,5 +1,5 @@
 #pragma once
-/// The part of a ray that lies in a box, for host and device.
+/// The part of a ray that lies in a box. The code is compiled for host and device.
 
 #include <cmath>
 #include <limits>
@@ -9,7 +9,7 @@
 
 namespace esvr {
 
-/// Distances along a ray; begin > end where there are none.
+/// An interval of distances along a ray; empty if begin > end.
 struct RayInterval {
   double begin, end;
 };
@@ -23,7 +23,7 @@ ESVR_HD inline RayInterval slab(double origin, double direction, double low, dou
   return a < b ? RayInterval{a, b} : RayInterval{b, a};
 }
 
-/// Not before the ray's origin.
+/// The part of a ray that lies in a box and not behind the ray's origin.
 ESVR_HD inline RayInterval within(const Ray& ray, const PlaceBox& box) {
   RayInterval t{0.0, std::numeric_limits<double>::infinity()};
   for (int a = 0; a < 3; ++a) {
@@ -34,7 +34,7 @@ ESVR_HD inline RayInterval within(const Ray& ray, const PlaceBox& box) {
   return t;
 }
 
-/// A ray's samples from first to last, counted from the eye.
+/// A range of a ray's samples. Sample n lies n steps from the eye.
 struct SampleRange {
   double first, last;
 
@@ -50,7 +50,7 @@ ESVR_HD inline SampleRange samplesIn(const RayInterval& t, double step) {
   return {std::ceil(t.begin / step), std::floor(t.end / step)};
 }
 
-/// A box that may be none: then all places are in it.
+/// An optional clip box. If it is not given, all places are inside.
 struct ClipBox {
   PlaceBox box;
   bool given;

@@ -1,46 +1,50 @@
 #pragma once
-/// Adds an ellipsoid to the samples of a ray: the math of the innermost loop, written once for
+/// Adds an ellipsoid to the samples of a ray. This is the math of the innermost loop, compiled for
 /// host and device.
 ///
-/// In the unit frame of an ellipsoid, u = S^-1 R^T (p - center), a ray runs as o + tau v, tau
-/// counted along the camera's forward. Along it
+/// In the frame u = S^-1 R^T (p - center) of an ellipsoid (docs/math.md), a ray is a line
+/// u = o + tau v. Its parameter tau is the depth along the camera's forward direction. The
+/// argument m = |u|^2 of the kernel is, along the ray,
 ///
-///     m(tau) = |o x v|^2 / |v|^2 + |v|^2 (tau - closest)^2 :
+///     m(tau) = |o x v|^2 / |v|^2 + |v|^2 (tau - closest)^2
 ///
-/// both terms are positive, so nothing cancels. v and o x v ("beside") are linear in the place of
-/// the pixel; they are kept relative to the ray through the ellipsoid's center, where beside is
-/// zero, so that float32 is enough for a camera at any distance.
+/// with the parameter `closest` of the point nearest to the center. Both terms are positive, so
+/// there is no cancellation. The vectors v ("along") and o x v ("beside") are linear functions of
+/// the pixel's position. They are stored relative to the pixel whose ray goes through the
+/// ellipsoid's center, where o x v is zero. Float32 is then precise enough for a camera at any
+/// distance.
 
 #include "esvr/kernel.h"
 
 namespace esvr {
 
-inline constexpr int kBinSamples = 32;  ///< samples of a ray that are summed at once
+inline constexpr int kBinSamples = 32;  ///< consecutive samples of a ray that make a bin
 
-/// KernelConstants for base 2: phi = numerator / (plateau + 2^(m log2(e) - shift)) - base.
+/// The constants of a kernel in base 2: phi(m) = numerator / (plateau + 2^(m log2(e) - shift)) -
+/// base for m < cutoff. KernelConstants (kernel.h) has them in base e.
 struct RayKernel {
   float numerator, plateau, shift, base, cutoff;
 };
 
-/// An ellipsoid for the rays of any pixel. `dx` and `dy` are the pixel's place relative to
-/// EllipsoidView's, in pixels.
+/// An ellipsoid in the form that all rays of a picture use. dx and dy are the distance in pixels
+/// from the reference pixel of its EllipsoidView.
 struct RayForm {
   float along[3], alongX[3], alongY[3];     ///< v = along + dx alongX + dy alongY
-  float beside[3], besideX[3], besideY[3];  ///< o x v likewise
-  float offX, offY;      ///< closest approach to the center, along v, as far as v does not turn
+  float beside[3], besideX[3], besideY[3];  ///< o x v = beside + dx besideX + dy besideY
+  float offX, offY;      ///< change of u . v at `depth` for dx and dy, without the turn of the ray
   float gain, base;      ///< numerator and base of the kernel, times the intensity
-  float plateau, shift;  ///< the kernel's
-  float cutoff;
+  float plateau, shift;  ///< as in RayKernel
+  float cutoff;          ///< as in RayKernel
 };
 
-/// A pixel's ray, as samples count: `unit` samples for each unit of tau.
+/// The number of samples per unit of tau on a pixel's ray.
 struct RayScale {
   float unit;
-  float pastTile;  ///< unit less that of the middle of the tile
+  float pastTile;  ///< `unit` minus the value on the ray through the middle of the tile
 };
 
-/// The samples of a bin at which the support meets a ray: from `first` to `last`, none where last
-/// is less. In base 2 the exponent at sample i is `nearest` + `speed` (i - `middle`)^2.
+/// The samples of a bin that lie in an ellipsoid's support: `first` to `last`, none if last <
+/// first. At sample i the exponent in the kernel is, in base 2, nearest + speed (i - middle)^2.
 struct RaySpan {
   int first, last;
   float middle, nearest, speed;
@@ -59,8 +63,9 @@ ESVR_HD inline float clamped(float v, float low, float high) {
 
 }  // namespace ray_math
 
-/// \param depth        tau of the closest approach of the ray through the center
-/// \param middleAhead  samples from the bin's first one to there, on the tile's middle ray
+/// \param depth        tau of the point nearest to the center, on the reference pixel's ray
+/// \param middleAhead  number of samples from the bin's first one to the depth `depth`, on the ray
+///                     through the middle of the tile
 ESVR_HD inline RaySpan spanOn(const RayForm& f, float dx, float dy, const RayScale& ray,
                               float depth, float middleAhead) {
   using namespace ray_math;
@@ -71,12 +76,12 @@ ESVR_HD inline RaySpan spanOn(const RayForm& f, float dx, float dy, const RaySca
     beside[i] = f.beside[i] + dx * f.besideX[i] + dy * f.besideY[i];
   }
   const float along2 = squared(along), beside2 = squared(beside);
-  if (!(beside2 < f.cutoff * along2)) return {0, -1, 0.0f, 0.0f, 0.0f};  // passes by
+  if (!(beside2 < f.cutoff * along2)) return {0, -1, 0.0f, 0.0f, 0.0f};  // misses the support
   const float inverse = 1.0f / along2, nearest = beside2 * inverse;
   const float turned = turn[0] * along[0] + turn[1] * along[1] + turn[2] * along[2];
   const float later = -(f.offX * dx + f.offY * dy + depth * turned) * inverse;
   const float middle = middleAhead + depth * ray.pastTile + later * ray.unit;
-  // Rounding may have nearest just beyond the cutoff.
+  // Rounding may put `nearest` just beyond the cutoff.
   const float left = f.cutoff > nearest ? f.cutoff - nearest : 0.0f;
   const float half = std::sqrt(left * inverse) * ray.unit;
   const float first = std::ceil(clamped(middle - half, 0.0f, float(kBinSamples)));
@@ -85,7 +90,7 @@ ESVR_HD inline RaySpan spanOn(const RayForm& f, float dx, float dy, const RaySca
           along2 / (ray.unit * ray.unit) * kLog2e};
 }
 
-/// intensity * phi at a sample of the span.
+/// The value intensity * phi at a sample of the span.
 ESVR_HD inline float valueAt(const RayForm& f, const RaySpan& span, int sample) {
   const float t = float(sample) - span.middle;
   return f.gain / (f.plateau + std::exp2(span.nearest + span.speed * t * t)) - f.base;

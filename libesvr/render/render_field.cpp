@@ -12,8 +12,8 @@ using Lists = std::vector<std::vector<std::uint32_t>>;
 
 int tilesAlong(int pixels) { return (pixels + kTileSide - 1) / kTileSide; }
 
-/// For each tile of a row of tiles, the ellipsoids whose bounds overlap it, in their order. A row
-/// at a time, so that lists never hold more than a row's.
+/// For each tile of one row of tiles, lists the ellipsoids whose bounds overlap it, in the order of
+/// the field. Only one row is listed at a time, which limits the memory of the lists.
 Lists ellipsoidsOfTiles(const VisibleEllipsoids& ellipsoids, int firstRow, int tiles) {
   Lists lists(static_cast<std::size_t>(tiles));
   for (std::uint32_t p = 0; p < ellipsoids.bounds.size(); ++p) {

@@ -12,8 +12,8 @@
 namespace esvr {
 namespace {
 
-/// The first sample behind a brick that has nothing. Rounding must not lose a sample that lies on
-/// the brick's far side: it may be looked at twice instead.
+/// The first sample behind an empty brick. Because of rounding, a sample on the far face of the
+/// brick may be visited twice, but it is never skipped.
 double behindBrick(const Ray& ray, Coord brick, double sample, double step) {
   constexpr double kRounding = 1e-6;
   const Vec3 low{double(brick.x) * kBrickSide, double(brick.y) * kBrickSide,
@@ -44,7 +44,7 @@ class RayMarch {
   }
 
  private:
-  /// Takes a sample and \return the next one to take.
+  /// Adds a sample to the ray. \return the number of the next sample to visit
   double advance(const Ray& ray, double sample, RayState& state) const {
     const Vec3 place = sum(ray.origin, scaled(ray.direction, sample * options_.step));
     const Cell cell = cellOf(place);

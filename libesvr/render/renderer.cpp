@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kMaxDepthParts = 16;
 
-/// Draws with a function of render.h.
+/// A renderer on the CPU, which calls a function of render.h for each picture.
 template <class Draw>
 class CpuRenderer final : public Renderer {
  public:

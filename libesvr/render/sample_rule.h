@@ -1,21 +1,24 @@
 #pragma once
-/// The rule that combines a ray's samples, for host and device.
+/// The rule that combines the samples of a ray into a pixel. The code is compiled for host and
+/// device.
 
 #include "esvr/render.h"
 #include "render/transfer_table.h"
 
 namespace esvr {
 
-/// The state of a ray on its way. The first three depend on the mode: a color; the
-/// largest value and how many there were; their sum and number; a distance and whether there is
-/// one.
+/// The state of a ray while its samples are added. The meaning of r, g and b depends on the mode:
+///  - kComposite: the color so far, premultiplied by opacity;
+///  - kMaximum: r is the largest value, g the number of values;
+///  - kAverage: r is the sum of the values, g their number;
+///  - kDepth: r is the distance, g is 1 once the distance is known.
 struct alignas(16) RayState {
   float r = 0.0f, g = 0.0f, b = 0.0f;
   float transmittance = 1.0f;
 };
 
-/// A color. A pixel's is premultiplied, but for RenderMode::kDepth; a sample's is as
-/// SampleRule::prepared says.
+/// The color of a pixel, which is premultiplied except in RenderMode::kDepth, or of a sample, whose
+/// meaning SampleRule::prepared() defines.
 struct alignas(16) PixelColor {
   float r, g, b, alpha;
 };
@@ -26,17 +29,18 @@ struct SampleRule {
 
   TransferTableView table;
   RenderMode mode;
-  float background;  ///< the field's
+  float background;  ///< background value of the field or volume
   float minTransmittance;
   float step;
 
-  /// False where nothing behind would show.
+  /// False if no further sample can change the pixel (early ray termination).
   [[nodiscard]] ESVR_HD bool open(const RayState& ray) const {
     return !(ray.transmittance < minTransmittance) && !(mode == RenderMode::kDepth && ray.g > 0.0f);
   }
 
-  /// Prepares a value for a ray: its color, not premultiplied, or where modes keep values, the
-  /// value and an alpha of 1. Where alpha is 0 there is nothing to add.
+  /// Turns a value into what add() takes. In kComposite and kDepth it is the value's color, not
+  /// premultiplied. In kMaximum and kAverage, r is the value itself and alpha is 1. A sample with
+  /// an alpha of 0 does not change the ray.
   [[nodiscard]] ESVR_HD PixelColor prepared(float value) const {
     if (mode == RenderMode::kMaximum || mode == RenderMode::kAverage)
       return {value, 0.0f, 0.0f, 1.0f};
@@ -44,7 +48,7 @@ struct SampleRule {
     return {c.r, c.g, c.b, c.alpha};
   }
 
-  /// \param number  of the sample, from the eye
+  /// \param number  number of the sample, counted from the eye
   ESVR_HD void add(RayState& ray, const PixelColor& sample, float number) const {
     if (sample.alpha == 0.0f) return;
     switch (mode) {
@@ -67,7 +71,8 @@ struct SampleRule {
     add(ray, prepared(value), number);
   }
 
-  /// Joins what a ray gathered behind. Not for RenderMode::kDepth, which has no parts.
+  /// Adds the samples that lie behind those of `ray` and were gathered in `behind`. It is not used
+  /// in RenderMode::kDepth, where a ray cannot be divided into parts.
   ESVR_HD void join(RayState& ray, const RayState& behind) const {
     if (mode == RenderMode::kComposite) {
       ray.r += ray.transmittance * behind.r;
@@ -110,8 +115,8 @@ struct SampleRule {
   }
 };
 
-/// Voxels that an opacity is taken for. One number for a whole ray is no step along it: its opacity
-/// is the transfer function's own.
+/// The length that the opacity of a sample stands for, in units of opacityLength. In kMaximum and
+/// kAverage one value stands for the whole ray, and has the opacity of the transfer function.
 [[nodiscard]] inline double opacitySteps(const RenderOptions& options) {
   const bool alongRay =
       options.mode == RenderMode::kComposite || options.mode == RenderMode::kDepth;

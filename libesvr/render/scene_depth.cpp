@@ -15,7 +15,8 @@ struct Distances {
   double nearest, farthest;
 };
 
-/// A sphere about the support will do: the box only says where to begin and to stop.
+/// Expands the box by the sphere around a support. That is exact enough, because the box only
+/// decides where rays begin and end.
 void expand(PlaceBox& box, const PackedEllipsoid& e, const Vec3& origin, double radius) {
   const double reach = radius * std::max({e.scale[0], e.scale[1], e.scale[2]});
   for (int a = 0; a < 3; ++a) {

@@ -1,5 +1,5 @@
 #pragma once
-/// How far away a scene begins and ends.
+/// The range of depths in which a scene lies.
 
 #include <optional>
 
@@ -9,17 +9,17 @@
 
 namespace esvr {
 
-/// Around the supports of all ellipsoids; nothing where there are none.
+/// A box around the supports of all ellipsoids; nothing if there are no ellipsoids.
 [[nodiscard]] std::optional<PlaceBox> supportBox(const Field& field);
 
-/// The part of a support's box that shows: with the cells around its voxels, where these are
-/// interpolated.
+/// The box in which samples can differ from the background. If samples are interpolated between
+/// voxels, it is larger than the box of the supports by the cells around their voxels.
 [[nodiscard]] PlaceBox shownBox(const PlaceBox& support, Between between);
 
-/// The bins of the rays' samples that may lie in a box; last < first where none does.
+/// The bins whose samples may lie in a box; empty if last < first.
 [[nodiscard]] BinRange binsWithin(const PlaceBox& box, const View& view, double step);
 
-/// \throws UsageError  rays that pass all these bins have more than 2^24 samples
+/// \throws UsageError  a ray has more than 2^24 samples in these bins
 void checkRayLength(const BinRange& bins);
 
 }  // namespace esvr

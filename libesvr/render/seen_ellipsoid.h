@@ -1,7 +1,7 @@
 #pragma once
-/// How a camera sees an ellipsoid: its outline in the picture, how deep it lies and what a ray
-/// needs of it. Written once for host and device, in float64: a camera may be a million voxels
-/// away.
+/// Projects an ellipsoid into a picture: its outline, its range of depths, and its form for rays.
+/// The code is compiled for host and device. It computes in float64, because a camera may be a
+/// million voxels away.
 
 #include <cstdint>
 
@@ -11,9 +11,9 @@
 
 namespace esvr {
 
-/// Parameters as they are kept for drawing.
+/// The parameters of an ellipsoid in one record.
 struct alignas(16) PackedEllipsoid {
-  float center[3];  ///< relative to its chunk's origin
+  float center[3];  ///< relative to the origin of its chunk
   float intensity;
   float scale[3];
   std::uint32_t chunk;
@@ -26,42 +26,42 @@ ESVR_HD inline Matrix3 unitRotation(const PackedEllipsoid& e) {
                                 double(e.rotation[3])}));
 }
 
-/// In the view's coordinates: right, up, forward.
+/// An ellipsoid in the coordinates of the view: right, up, forward.
 struct SeenEllipsoid {
   Vec3 center;
-  std::array<Vec3, 3> axes;  ///< have unit length
+  std::array<Vec3, 3> axes;  ///< unit vectors
   Vec3 scale;                ///< the scales along the axes
 };
 
-/// An ellipsoid in the form that rays need.
+/// An ellipsoid in the form that rays use (ray_math.h).
 struct alignas(16) EllipsoidView {
-  double column, row;  ///< the pixel that dx and dy of `form` are counted from
-  double depth;        ///< tau of the closest approach there
+  double column, row;  ///< reference pixel, from which the dx and dy of `form` count
+  double depth;        ///< tau of the point nearest to the center, on the ray of that pixel
   RayForm form;
 };
 
-/// A support's outline, an ellipse about (column, row): all (c, r) with
-/// (c - column, r - row) [xx xy; xy yy]^-1 (c - column, r - row) < 1. In pixels.
+/// The outline of a support in the picture, in pixels. It is an ellipse around (column, row): with
+/// d = (c - column, r - row), a point (c, r) is inside if d^T [xx xy; xy yy]^-1 d < 1.
 struct ScreenEllipse {
   double column, row;
   double xx, xy, yy;
-  bool everywhere;  ///< the support reaches the plane of the eye: no bounds are known
+  bool everywhere;  ///< the support reaches the plane of the eye, so it may cover every pixel
 };
 
-/// A support's bounds, errs on the side of inclusion.
+/// Bounds of a support in the picture. They may be slightly too large, but never too small.
 struct ScreenBounds {
   std::int32_t firstColumn, lastColumn, firstRow, lastRow;  ///< pixels whose rays may meet it
-  double nearest, farthest;                                 ///< along forward, not below 0
+  double nearest, farthest;                                 ///< depths along forward, at least 0
 };
 
-/// A range of columns, counted by the middles of pixels.
+/// A range of columns. Whole numbers are the middles of pixels.
 struct PixelSpan {
   double low, high;
 };
 
 namespace ellipsoid_math {
 
-inline constexpr double kSlack = 1e-3;  ///< pixels, for rounding
+inline constexpr double kSlack = 1e-3;  ///< pixels that are added to bounds because of rounding
 
 ESVR_HD inline Vec3 row(const std::array<Vec3, 3>& axes, const Vec3& lengths, int coordinate) {
   return {axes[0][coordinate] * lengths[0], axes[1][coordinate] * lengths[1],
@@ -77,7 +77,8 @@ ESVR_HD inline void store(const Vec3& from, double factor, float (&to)[3]) {
   for (int i = 0; i < 3; ++i) to[i] = float(from[i] * factor);
 }
 
-/// Rows of the support's half axes: |row| is its half extent along a coordinate of the view.
+/// The rows of the matrix whose columns are the support's half axes. The length of a row is the
+/// half extent of the support along that coordinate of the view.
 struct HalfAxes {
   Vec3 x, y, z;
 };
@@ -86,8 +87,8 @@ ESVR_HD inline HalfAxes halfAxes(const SeenEllipsoid& e, double radius) {
   return {row(e.axes, lengths, 0), row(e.axes, lengths, 1), row(e.axes, lengths, 2)};
 }
 
-/// The planes through the eye that touch the support are a conic, whose dual is the outline. The
-/// terms are written so that nothing cancels for a support that is small and far away.
+/// The planes through the eye that touch the support form a conic; its dual conic is the outline.
+/// The terms are arranged so that they do not cancel for a small support far away.
 ESVR_HD inline ScreenEllipse perspectiveOutline(const View& view, const Vec3& c,
                                                 const HalfAxes& f) {
   const double a = c[2] * c[2] - inner(f.z, f.z), s = 1.0 / (a * view.pixel);
@@ -118,7 +119,7 @@ ESVR_HD inline std::int32_t lastPixel(double high, int count) {
 
 }  // namespace ellipsoid_math
 
-/// \param fromEye  of the origin of its chunk
+/// \param fromEye  displacement from the eye to the origin of the ellipsoid's chunk
 ESVR_HD inline SeenEllipsoid seenBy(const View& view, const PackedEllipsoid& e,
                                     const Vec3& fromEye) {
   const Matrix3 R = unitRotation(e);
@@ -129,11 +130,12 @@ ESVR_HD inline SeenEllipsoid seenBy(const View& view, const PackedEllipsoid& e,
           {double(e.scale[0]), double(e.scale[1]), double(e.scale[2])}};
 }
 
-/// An ellipsoid whose support, of radius 1 in its unit frame, holds all places that are
-/// interpolated from a voxel in the support of `e`: a ball around a cell, added to it. Of the
-/// ellipsoids that hold both, the one whose squared axes have the least sum.
+/// An ellipsoid that contains all places whose interpolation reads a voxel in the support of `e`.
+/// These lie in the sum (Minkowski) of the support and a ball whose radius is the diagonal of a
+/// cell. Of the ellipsoids with the axes of `e` that contain this sum, the result is the one whose
+/// squared half axes have the minimum sum. Its scales are its half axes.
 ESVR_HD inline SeenEllipsoid widenedByCells(const SeenEllipsoid& e, double radius) {
-  constexpr double kCell2 = 3.0;  // squared, from a voxel to the end of the cells around it
+  constexpr double kCell2 = 3.0;  // squared diagonal of a cell
   const Vec3 half = scaled(e.scale, radius);
   const double p = std::sqrt(inner(half, half) / (3.0 * kCell2));
   SeenEllipsoid wide = e;
@@ -142,7 +144,7 @@ ESVR_HD inline SeenEllipsoid widenedByCells(const SeenEllipsoid& e, double radiu
   return wide;
 }
 
-/// \param radius  of the support in the unit frame
+/// \param radius  radius of the support in units of the scales
 ESVR_HD inline ScreenEllipse outlineOf(const View& view, const SeenEllipsoid& e, double radius) {
   using namespace ellipsoid_math;
   const HalfAxes f = halfAxes(e, radius);
@@ -176,14 +178,14 @@ ESVR_HD inline bool visible(const ScreenBounds& b) {
   return b.farthest >= 0.0 && b.firstColumn <= b.lastColumn && b.firstRow <= b.lastRow;
 }
 
-/// The part of the picture in which an ellipsoid shows.
+/// The part of the picture in which an ellipsoid is visible.
 struct ScreenExtent {
   ScreenEllipse outline;
   ScreenBounds bounds;
 };
 
-/// \param radius    of the support in the unit frame
-/// \param ofVoxels  true: where anything shows that is interpolated from voxels in the support
+/// \param radius    radius of the support in units of the scales
+/// \param ofVoxels  whether samples are interpolated from voxels, which widens the extent by a cell
 ESVR_HD inline ScreenExtent screenExtentOf(const View& view, const SeenEllipsoid& e, double radius,
                                            bool ofVoxels, Resolution resolution) {
   const SeenEllipsoid shown = ofVoxels ? widenedByCells(e, radius) : e;
@@ -192,9 +194,9 @@ ESVR_HD inline ScreenExtent screenExtentOf(const View& view, const SeenEllipsoid
   return {outline, boundsOf(outline, shown, reach, resolution)};
 }
 
-/// The columns that an outline covers between two rows; low > high where it does not come there.
-/// Exact but for kSlack: its left and right end are where its outline is vertical, or else at the
-/// row nearest to that.
+/// The columns that an outline covers between two rows; low > high if it covers none. The result is
+/// exact up to kSlack: the leftmost point is where the outline is vertical, or, if that is outside
+/// the rows, on the row nearest to it. The same holds for the rightmost point.
 ESVR_HD inline PixelSpan columnsBetween(const ScreenEllipse& o, double firstRow, double lastRow) {
   using namespace ellipsoid_math;
   const double halfHeight = std::sqrt(o.yy);
@@ -209,10 +211,11 @@ ESVR_HD inline PixelSpan columnsBetween(const ScreenEllipse& o, double firstRow,
   return {o.column + slope * left - half(left), o.column + slope * right + half(right)};
 }
 
-/// Perspective rays share their origin, eye, and run along forward + x right + y up; orthographic
-/// ones run along forward from eye + x right + y up. Where the support reaches the plane of the
-/// eye, the ray through the center may point backwards, and the middle of the picture is taken
-/// instead.
+/// The form of an ellipsoid for rays. Perspective rays begin at the eye and run along
+/// forward + x right + y up; orthographic rays begin at eye + x right + y up and run along forward.
+/// The reference pixel is where the ray through the ellipsoid's center meets the picture. If the
+/// support reaches the plane of the eye, that ray may point backwards, and the reference pixel is
+/// the middle of the picture.
 ESVR_HD inline EllipsoidView viewOf(const View& view, const SeenEllipsoid& e, bool reachesEye,
                                     float intensity, const RayKernel& kernel) {
   using namespace ellipsoid_math;
@@ -232,7 +235,7 @@ ESVR_HD inline EllipsoidView viewOf(const View& view, const SeenEllipsoid& e, bo
   const Vec3 besideY = view.perspective ? cross(eye, up) : cross(up, forward);
   const double depth = centered ? z : -inner(eye, forward) / inner(forward, forward);
   const Vec3 closest = centered ? none : sum(eye, scaled(forward, depth));
-  const double dx = view.pixel, dy = -view.pixel;  // a step to the next column, to the next row
+  const double dx = view.pixel, dy = -view.pixel;  // steps to the next column and the next row
 
   EllipsoidView p;
   p.column = view.columnAt(x0), p.row = view.rowAt(y0), p.depth = depth;
@@ -249,7 +252,8 @@ ESVR_HD inline EllipsoidView viewOf(const View& view, const SeenEllipsoid& e, bo
   return p;
 }
 
-/// How long one unit along forward is on the rays of a rectangle of pixels.
+/// The range, over the rays of a rectangle of pixels, of the length of ray for one unit of depth
+/// along forward.
 struct UnitRange {
   double min, max;
 };
@@ -263,14 +267,14 @@ ESVR_HD inline UnitRange unitRange(const View& view, int firstColumn, int lastCo
           view.unitAlong(greater(-x0, x1), greater(-y0, y1))};
 }
 
-/// The bins, counted from the eye, that a support's samples lie in.
+/// The bins that samples in a support may lie in, counted from the eye.
 struct BinRange {
   std::int64_t first, last;
 };
 ESVR_HD inline BinRange binsOf(const ScreenBounds& b, const UnitRange& unit, double step) {
   using ellipsoid_math::clampedTo;
-  constexpr double kRounding = 1e-6;   // a bound may lie on a sample
-  constexpr double kLastBin = 0x1p52;  // a support may reach beyond all places that there are
+  constexpr double kRounding = 1e-6;   // bins; a bound may lie exactly on a sample
+  constexpr double kLastBin = 0x1p52;  // keeps the conversion to integers within their range
   const double binLength = step * kBinSamples;
   const double first = std::floor(b.nearest * unit.min / binLength - kRounding);
   const double last = std::floor(b.farthest * unit.max / binLength + kRounding);

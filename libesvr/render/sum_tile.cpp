@@ -7,13 +7,13 @@
 namespace esvr {
 namespace {
 
-/// The bits of samples first to last; none where last is before first.
+/// Sets the bits of the samples first to last; no bit if last < first.
 std::uint32_t samplesFrom(int first, int last) {
   constexpr std::uint64_t kOne = 1;
   return last < first ? 0u : std::uint32_t((kOne << (last + 1)) - (kOne << first));
 }
 
-/// Samples for each unit along forward, on the ray through the middle of a whole tile.
+/// Number of samples per unit of depth along forward, on the ray through the middle of the tile.
 double middleUnit(const TileScene& scene, TilePlace place) {
   constexpr double kMiddle = (kTileSide - 1) / 2.0;
   const View& view = scene.view;

@@ -38,8 +38,7 @@ void Tile::draw(std::span<const std::uint32_t> ellipsoids) {
   std::vector<Entry> active;
   auto next = all.begin();
   for (std::int64_t bin = 0; next != all.end() || !active.empty(); ++bin) {
-    if (active.empty())
-      bin = std::max(bin, next->bins.first);  // bins without ellipsoids cost nothing
+    if (active.empty()) bin = std::max(bin, next->bins.first);  // skips bins without ellipsoids
     for (; next != all.end() && next->bins.first <= bin; ++next) active.push_back(*next);
     drawBin(bin, active);
     if (!anyAlive()) return;

@@ -1,5 +1,6 @@
 #pragma once
-/// A square of pixels, drawn by bins of depth from front to back.
+/// A tile is a square of pixels that is drawn together. Its samples are divided by depth into bins,
+/// which are drawn from front to back.
 
 #include <memory>
 #include <span>
@@ -15,15 +16,15 @@ namespace esvr {
 inline constexpr int kTileSide = 16;  ///< pixels
 
 struct TilePlace {
-  int column, row;  ///< its first pixel's
+  int column, row;  ///< first pixel of the tile
 };
 
-/// Everything that tiles need to know about the picture.
+/// The parameters that all tiles of a picture share.
 struct TileScene {
   const RenderOptions& options;
   const View& view;
   const VisibleEllipsoids& ellipsoids;
-  const std::vector<Vec3>& origins;  ///< the chunks' origins
+  const std::vector<Vec3>& origins;  ///< origins of the chunks
   SampleRule rule;
   VoxelRule voxelRule;
 };
@@ -35,7 +36,7 @@ class Tile {
   Tile& operator=(const Tile&) = delete;
   virtual ~Tile() = default;
 
-  /// \param ellipsoids  whose bounds overlap the tile, in increasing order
+  /// \param ellipsoids  numbers of the ellipsoids whose bounds overlap the tile, increasing
   void draw(std::span<const std::uint32_t> ellipsoids);
   void copyTo(Picture& picture) const;
 
@@ -64,7 +65,7 @@ class Tile {
   std::vector<RayState> rays_;
 };
 
-/// As the options have it between voxels.
+/// Makes a tile of the kind that RenderOptions::between asks for.
 [[nodiscard]] std::unique_ptr<Tile> makeTile(const TileScene& scene, TilePlace place);
 
 }  // namespace esvr

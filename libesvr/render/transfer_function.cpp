@@ -9,7 +9,7 @@
 namespace esvr {
 namespace {
 
-/// The first point behind x; its place is 0 before all points and the end behind them.
+/// The first point whose x is larger; the end if there is none.
 template <class Point>
 auto nextPoint(const std::vector<Point>& points, double x) {
   return std::upper_bound(points.begin(), points.end(), x,
@@ -21,13 +21,15 @@ double fraction(const Point& a, const Point& b, double x) {
   return (x - a.x) / (b.x - a.x);
 }
 
-/// Bends the way between two points so that the midpoint has half of it.
+/// Maps the position s between two points, from 0 to 1, so that `midpoint` is mapped to 1/2 (VTK's
+/// midpoint of a node).
 double bentAtMidpoint(double s, double midpoint) {
   if (s < midpoint) return 0.5 * s / midpoint;
   return midpoint < 1.0 ? 0.5 + 0.5 * (s - midpoint) / (1.0 - midpoint) : 1.0;
 }
 
-/// A Hermite curve whose tangents flatten as it gets sharper; s is first drawn to the ends.
+/// VTK's interpolation for a sharpness between 0 and 1: s is moved towards 0 or 1, and a Hermite
+/// curve, whose tangents become flatter as the sharpness grows, gives the opacity.
 double sharpened(double s, double sharpness, double y1, double y2) {
   const double power = 1.0 + 10.0 * sharpness;
   s = s < 0.5 ? 0.5 * std::pow(2.0 * s, power) : 1.0 - 0.5 * std::pow(2.0 * (1.0 - s), power);
@@ -37,7 +39,8 @@ double sharpened(double s, double sharpness, double y1, double y2) {
   return std::clamp(y, std::min(y1, y2), std::max(y1, y2));
 }
 
-constexpr double kStraight = 0.01, kStepped = 0.99;  // sharpnesses, as VTK has them
+// VTK interpolates linearly below the first sharpness and makes a step above the second one.
+constexpr double kStraight = 0.01, kStepped = 0.99;
 
 double opacityBetween(const OpacityPoint& a, const OpacityPoint& b, double x) {
   const double s = bentAtMidpoint(fraction(a, b, x), a.midpoint);
@@ -92,7 +95,7 @@ Rgb colorAt(const ColorMap& map, double x) {
   const auto next = nextPoint(map.points, x);
   if (next == map.points.begin()) return next->color;
   const auto last = std::prev(next);
-  // On a point that color is meant, in ColorSpace::kStep too.
+  // At a point the result is the color of the point, also in ColorSpace::kStep.
   if (next == map.points.end() || x == last->x) return last->color;
   return mixed(map.space, last->color, next->color, fraction(*last, *next, x));
 }

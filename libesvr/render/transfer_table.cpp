@@ -15,7 +15,8 @@ Classified classified(const TransferFunction& f, double value, double length) {
   return {float(color.r), float(color.g), float(color.b), float(alpha)};
 }
 
-/// None, too, where float32 cannot hold it.
+/// Intervals per unit of value; kNoExtent if the extent is 0, or so small that float32 cannot hold
+/// the result.
 float scaleOf(double extent) {
   const double scale = extent > 0.0 ? kIntervals / extent : 0.0;
   return scale < std::numeric_limits<float>::max() ? float(scale) : TransferTableView::kNoExtent;
@@ -31,7 +32,7 @@ TransferTable::TransferTable(const TransferFunction& f, double length)
   entries_.reserve(kIntervals + 1);
   for (int i = 0; i <= kIntervals; ++i)
     entries_.push_back(classified(f, low + (high - low) * i / kIntervals, length));
-  // Below all points are the first of those at one place, above them the last.
+  // Several points may have the same x. Below it, the first of them counts, and above it the last.
   entries_.front() =
       classified(f, std::nextafter(low, -std::numeric_limits<double>::max()), length);
 }

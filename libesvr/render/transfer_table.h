@@ -1,6 +1,6 @@
 #pragma once
-/// A transfer function sampled, with opacities for the step: what a renderer asks for every sample.
-/// The looking up is written once for host and device.
+/// A table of a transfer function, with opacities that are corrected for the distance between
+/// samples. A renderer looks up every sample in it. The look-up is compiled for host and device.
 
 #include <vector>
 
@@ -9,18 +9,18 @@
 
 namespace esvr {
 
-/// Not premultiplied.
+/// A color and opacity, not premultiplied.
 struct alignas(16) Classified {
   float r, g, b, alpha;
 };
 
-/// A table wherever it lies.
+/// Pointers to a table in host or device memory.
 struct TransferTableView {
   static constexpr int kIntervals = 4096;
   static constexpr float kNoExtent = 0.0f;
 
-  const Classified* entries;  ///< kIntervals + 1
-  float low, scale;           ///< scale: intervals for one unit of value
+  const Classified* entries;  ///< kIntervals + 1 entries
+  float low, scale;           ///< lowest value, and intervals per unit of value
   Classified nan;
 
   [[nodiscard]] ESVR_HD Classified operator()(float value) const {
@@ -42,13 +42,13 @@ struct TransferTableView {
 
 class TransferTable {
  public:
-  /// \param length  of a step, in units of the length that opacities are given for
+  /// \param length  length of a step, in units of the length that opacities are given for
   TransferTable(const TransferFunction& function, double length);
 
   [[nodiscard]] Classified operator()(float value) const { return view()(value); }
   [[nodiscard]] TransferTableView view() const { return on(entries_.data()); }
   [[nodiscard]] const std::vector<Classified>& entries() const { return entries_; }
-  /// With the entries copied elsewhere.
+  /// A view of a copy of the entries, for example on a device.
   [[nodiscard]] TransferTableView on(const Classified* entries) const {
     return {entries, low_, scale_, nan_};
   }

@@ -15,14 +15,14 @@ ESVR_HD inline Vec3 difference(const Vec3& a, const Vec3& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 ESVR_HD inline Vec3 scaled(const Vec3& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-/// Not `dot`, which field/line_form.h has for itself.
+/// The dot product. field/line_form.h already has a function `dot`.
 ESVR_HD inline double inner(const Vec3& a, const Vec3& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 ESVR_HD inline Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-/// Holds for lengths whose square overflows, too.
+/// The length, also if its square overflows.
 inline double length(const Vec3& a) { return std::hypot(a[0], a[1], a[2]); }
 inline Vec3 unit(const Vec3& a) { return scaled(a, 1.0 / length(a)); }
 

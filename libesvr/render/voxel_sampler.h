@@ -11,7 +11,8 @@
 
 namespace esvr {
 
-/// The eight voxels around a place: the one at or below it, and the way to the next one.
+/// The eight voxels around a place, given by the lowest of them and the position of the place
+/// between it and the next voxels, from 0 to 1 along each axis.
 struct Cell {
   Coord voxel;
   std::array<float, 3> fraction;
@@ -23,24 +24,25 @@ struct Cell {
           {float(place[0] - x), float(place[1] - y), float(place[2] - z)}};
 }
 
-/// Coordinates are relative to the volume's origin. Keeps a reference to the volume.
+/// Interpolates in a volume, to which it keeps a reference. Coordinates are relative to the
+/// volume's origin.
 class VoxelSampler {
  public:
-  /// Positions of a brick and of its neighbours above along x (4), y (2) and z (1); kNone where
-  /// there is none.
+  /// The numbers of a brick and of its seven upper neighbours. The bits of the array index say
+  /// along which axes a neighbour lies above: 4 for x, 2 for y, 1 for z. kNone: no such brick.
   using Corners = std::array<std::uint32_t, 8>;
 
   explicit VoxelSampler(const SparseVolume& volume);
 
-  /// The bricks for the cells of a brick; null where all of those are background.
+  /// The bricks that the cells of a brick read; null if all these voxels are the background.
   [[nodiscard]] const Corners* find(Coord brick) const {
     const std::uint32_t at = index_.find(brick);
     return at == BrickIndex::kNone ? nullptr : &corners_[at];
   }
-  /// Exactly the background where all eight voxels are.
+  /// The result is exactly the background if all eight voxels are.
   [[nodiscard]] float interpolate(const Corners& corners, const Cell& cell) const;
 
-  /// Outside of this box are no cells but those of the background.
+  /// All cells outside this box have the background at their corners.
   [[nodiscard]] const Vec3& low() const { return low_; }
   [[nodiscard]] const Vec3& high() const { return high_; }
 

@@ -1,8 +1,9 @@
 #pragma once
-/// The voxels that the samples of neighbouring rays are interpolated from: slabs across the axis
-/// that the rays run along most, and in each slab a rectangle of rows and columns that goes with
-/// the rays. So there are about as many as the rays have room for between them, whatever their
-/// direction. For host and device.
+/// A voxel window holds the voxels that the samples of a bundle of neighbouring rays are
+/// interpolated from. It consists of slabs, which are planes of voxels perpendicular to the axis
+/// that is closest to the rays' direction. In each slab it has a rectangle of rows and columns; its
+/// place follows the rays from slab to slab. A window is therefore hardly larger than the space
+/// between the rays, whatever their direction. The code is compiled for host and device.
 
 #include <cmath>
 #include <cstdint>
@@ -12,8 +13,8 @@
 #include "render/whole.h"
 #include "render/window_form.h"
 
-/// Before loops over few corners. Windows are planned by one thread of a block: unrolled, they
-/// would take registers from all the others.
+/// Keeps nvcc from unrolling a loop. A window is planned by one thread of a block, but an unrolled
+/// loop would take registers from all threads.
 #if defined(__CUDA_ARCH__)
 #define ESVR_ROLLED _Pragma("unroll 1")
 #else
@@ -22,30 +23,31 @@
 
 namespace esvr {
 
-/// Pixels of a picture, first and last.
+/// A rectangle of pixels; the last column and row belong to it.
 struct PixelRectangle {
   int firstColumn, lastColumn, firstRow, lastRow;
 };
 
-/// A ray at the corner of a rectangle of pixels: at which slab it is at a depth along forward; at
-/// which row and column at slab s.
+/// A ray at the corner of a rectangle of pixels, with its position in slabs, rows and columns. At a
+/// depth d along forward it is at slab coordinate slab + d slabOfDepth. At slab coordinate s it is
+/// at row coordinate row + s rowOfSlab and column coordinate column + s columnOfSlab.
 struct CornerRay {
   double slab, slabOfDepth;
   double row, rowOfSlab;
   double column, columnOfSlab;
 };
 
-/// The rays of a rectangle of pixels: those at its corners hold the others between them.
+/// The rays of a rectangle of pixels. All of them lie between the rays at its corners.
 struct RayBundle {
   static constexpr int kCorners = 4;
 
   WindowAxes axes;
   CornerRay corners[kCorners];
-  UnitRange unit;  ///< the rays' range
-  bool together;   ///< false: their directions are too different for one window
+  UnitRange unit;  ///< as unitRange() of the rectangle
+  bool together;   ///< false if the directions of the rays differ too much for one window
 };
 
-/// Depths along forward.
+/// A range of depths along forward.
 struct DepthRange {
   double near, far;
 };
@@ -60,10 +62,10 @@ struct VoxelWindow {
 
 namespace voxel_window {
 
-/// Voxels, for rounding: samples are found in float32, relative to the window.
+/// Voxels by which windows are widened, because positions of samples are rounded to float32.
 inline constexpr double kSlack = 1e-3;
-/// The share of a ray's length that it must go along the slabs' axis. A ray that is taken alone
-/// goes 0.57.
+/// Smallest |cosine| of the angle between a ray and the axis of the slabs. It is at least 0.57 for
+/// a bundle of one ray, whose slabs are perpendicular to the axis that is closest to the ray.
 inline constexpr double kMinAlong = 0.3;
 
 ESVR_HD inline int maxAlong(const Vec3& d) {
@@ -71,7 +73,8 @@ ESVR_HD inline int maxAlong(const Vec3& d) {
   return x >= y && x >= z ? 0 : (y >= z ? 1 : 2);
 }
 
-/// Rounds down, within the integers. No voxel lies at the ends, so any bound there will do.
+/// Rounds down, and clamps the result to 32-bit integers. There are no voxels near their ends, so a
+/// clamped result is harmless.
 ESVR_HD inline std::int32_t whole(double v) {
   constexpr double kFar = double(1 << 30);
   return std::int32_t(std::floor(ellipsoid_math::clampedTo(v, -2.0 * kFar, 1.99 * kFar)));
@@ -92,8 +95,8 @@ ESVR_HD inline CornerRay cornerRay(const WindowAxes& axes, const Vec3& origin, c
           column};
 }
 
-/// The extent of rays between the slabs before and behind: the planes of voxels at a slab serve
-/// both.
+/// An interval of coordinates. rowsAt() and columnsAt() return what the rays cover from one slab
+/// before to one slab behind, because the voxels of a slab serve the samples on both sides.
 struct Extent {
   double low, high;
 };
@@ -126,7 +129,8 @@ ESVR_HD inline Extent slabsOf(const RayBundle& b, const DepthRange& depth) {
   return e;
 }
 
-/// How many voxels hold all cells of an extent, wherever it begins.
+/// Number of voxels that suffices for the cells of both extents, wherever between two voxels they
+/// begin.
 ESVR_HD inline double voxelsAcross(const Extent& at, const Extent& orAt) {
   const double width = ellipsoid_math::greater(at.high - at.low, orAt.high - orAt.low);
   return std::floor(width + 2.0 * kSlack) + 3.0;
@@ -156,18 +160,20 @@ ESVR_HD inline RayBundle bundleOf(const View& view, const PixelRectangle& p) {
   return b;
 }
 
-/// The depths of some samples on any ray of a bundle. \param step  voxels
+/// A range that contains the depths of the samples on every ray of a bundle.
+/// \param step  distance between samples, voxels
 ESVR_HD inline DepthRange depthsOf(const RayBundle& b, double firstSample, double lastSample,
                                    double step) {
   return {firstSample * step / b.unit.max, lastSample * step / b.unit.min};
 }
 
-/// How large a window may be.
+/// The limits on the size of a window.
 struct WindowLimits {
   int slabs, voxels;
 };
 
-/// The window for the samples of a bundle within some depths. \return false where it is too large
+/// Finds the window for the samples of a bundle in a range of depths.
+/// \return false if the window is too large
 ESVR_HD inline bool windowFor(const RayBundle& b, const DepthRange& depth,
                               const WindowLimits& limits, VoxelWindow& w) {
   using namespace voxel_window;
@@ -190,12 +196,12 @@ ESVR_HD inline std::int32_t firstColumnAt(const RayBundle& b, double slab) {
   return voxel_window::whole(voxel_window::columnsAt(b, slab).low - voxel_window::kSlack);
 }
 
-/// The place of a slab of a window, in voxels from its first slab's first voxel, and where it is
-/// kept: voxel (row, column) of it at start + row * columns + column.
+/// The first row and column of a slab, relative to the window's origin, and its place in memory:
+/// the voxel at (row, column), relative to the origin too, is at start + row * columns + column.
 struct WindowSlab {
   std::int32_t row, column, start;
 };
-/// The window's first voxel, along slabs, rows and columns.
+/// The first voxel of the first slab of a window.
 struct WindowOrigin {
   std::int32_t slab, row, column;
 };
@@ -210,7 +216,7 @@ ESVR_HD inline WindowSlab slabOf(const RayBundle& b, const VoxelWindow& w,
   return {row, column, slab * w.rows * w.columns - row * w.columns - column};
 }
 
-/// A place in a window, in voxels from its first.
+/// A place relative to the window's origin, in voxels.
 struct WindowPlace {
   float slab, row, column;
 };
@@ -218,13 +224,15 @@ struct WindowPlace {
 namespace voxel_window {
 ESVR_HD inline float between(float a, float b, float s) { return a + s * (b - a); }
 
-/// In the plane of a slab. \param v  the voxel before the place
+/// Bilinear interpolation in the plane of a slab.
+/// \param v            the voxel at or below the place
+/// \param row, column  position of the place from that voxel, 0 to 1
 ESVR_HD inline float inPlane(const float* v, int columns, float row, float column) {
   return between(between(v[0], v[1], column), between(v[columns], v[columns + 1], column), row);
 }
 }  // namespace voxel_window
 
-/// \param values  of the window
+/// Trilinear interpolation in a window. \param values  voxels of the window
 ESVR_HD inline float interpolate(const float* values, const WindowSlab* slabs, int columns,
                                  const WindowPlace& p) {
   using namespace voxel_window;

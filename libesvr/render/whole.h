@@ -1,6 +1,7 @@
 #pragma once
-/// Whole numbers around a float, for host and device. Conversions are slow on a device: there, 1.5
-/// * 2^23 is added, which leaves whole numbers in the lowest bits. All floats less than 2^22.
+/// Rounds floats to integers, on host and device. Conversion instructions are slow on a device.
+/// There, 1.5 * 2^23 is added instead, which leaves the rounded number in the lowest bits of the
+/// float. The magnitude of the floats must be below 2^22.
 
 #include <cmath>
 
@@ -12,7 +13,7 @@ namespace whole_numbers {
 inline constexpr float kShift = 12582912.0f;  ///< 1.5 * 2^23
 }
 
-/// floor(v), and what is left.
+/// floor(v), and the fraction v - floor(v).
 struct WholePart {
   int whole;
   float left;
@@ -47,11 +48,11 @@ ESVR_HD inline int wholeNearest(float v) {
 #endif
 }
 
-/// From `first` to `last`; none where last is less.
+/// The integers from `first` to `last`; none if last < first.
 struct WholeRange {
   int first, last;
 };
-/// Those from low to high that are within others.
+/// The integers from low to high that also lie in `others`.
 ESVR_HD inline WholeRange wholeWithin(float low, float high, WholeRange others) {
   const float first = float(others.first), last = float(others.last);
   const float from = low < first ? first : (low > last ? last + 1.0f : low);

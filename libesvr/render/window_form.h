@@ -1,14 +1,17 @@
 #pragma once
-/// Adds an ellipsoid to voxels, line by line; written once for host and device.
+/// Adds an ellipsoid to the voxels of a window, row by row. The code is compiled for host and
+/// device.
 ///
-/// Voxels are counted in slabs across one axis, rows across a second, columns along the third. With
-/// d = x - center and L = S^-1 R^T = Q U, U upper triangular in the order column, row, slab,
+/// The slab, row and column of a voxel are its coordinates along the three axes, in an order that
+/// depends on the window. Let d = x - center, and let L = S^-1 R^T = Q U be a QR decomposition with
+/// an upper triangular U whose rows and columns are in the order column, row, slab. Then
 ///
-///     m = |L d|^2 = (cc dc + cr dr + cs ds)^2 + (rr dr + rs ds)^2 + (ss ds)^2 :
+///     m = |L d|^2 = (cc dc + cr dr + cs ds)^2 + (rr dr + rs ds)^2 + (ss ds)^2
 ///
-/// the last square alone says which slabs the support meets, the last two which rows of a slab, all
-/// three which voxels of a row. Nothing cancels, so float32 holds for needles and pancakes too. U
-/// is computed in float64.
+/// The last square alone decides which slabs the support (m < cutoff) meets, the last two decide
+/// which rows of a slab, and all three decide which voxels of a row. No term is negative, so there
+/// is no cancellation, and float32 is precise enough for very thin ellipsoids too. U is computed in
+/// float64.
 
 #include <array>
 #include <cstdint>
@@ -18,53 +21,55 @@
 
 namespace esvr {
 
-/// The axes of voxels' slabs, rows and columns; the slabs' comes first, the others in order.
+/// The axes (0, 1, 2 for x, y, z) that slab, row and column coordinates count along.
 struct WindowAxes {
   int slab, row, column;
 };
+/// The axes for a given slab axis. The other two keep their order.
 ESVR_HD inline WindowAxes axesOfSlabs(int slab) {
   return {slab, slab == 0 ? 1 : 0, slab == 2 ? 1 : 2};
 }
 
-/// U, and how far the support reaches from the center across slabs.
+/// The entries of U for one choice of the slab axis.
 struct alignas(16) WindowOrder {
   float cc, cr, cs, rr, rs, ss;
-  float slabs;
+  float slabs;  ///< half extent of the support along the slab axis
 };
 
-/// The kernel, as RayKernel has it, times the intensity.
+/// The constants of RayKernel; gain and base are numerator and base times the intensity.
 struct alignas(16) WindowKernel {
   float gain, base, plateau, shift, cutoff;
-  float bound;  ///< no value is further from 0
+  float bound;  ///< |intensity|, which no value exceeds
 };
 
+/// An ellipsoid in the form for windows.
 struct alignas(16) WindowForm {
-  float center[3];  ///< relative to its chunk's origin
+  float center[3];  ///< relative to the origin of its chunk
   std::uint32_t chunk;
-  WindowOrder order[3];  ///< by the axis of the slabs
+  WindowOrder order[3];  ///< indexed by the slab axis
   WindowKernel kernel;
 };
 static_assert(sizeof(WindowForm) == 144);
 
-/// The voxels of a row that a support holds: from `first` to `last`, none where last is less. In
-/// base 2 the exponent at column i is `nearest` + `speed` (i - `middle`)^2.
+/// The voxels of a row that lie in a support: columns `first` to `last`, none if last < first. At
+/// column i the exponent in the kernel is, in base 2, nearest + speed (i - middle)^2.
 struct WindowRun {
   int first, last;
   float middle, nearest, speed;
 };
 
-/// A row's place and the columns that are wanted. All count from one voxel, as `center` does.
+/// A row of voxels, and the range of columns to which the run is limited.
 struct WindowRow {
-  float slab, row;  ///< from the center
+  float slab, row;  ///< relative to the ellipsoid's center
   float centerColumn;
   int firstColumn, lastColumn;
 };
 
-/// Rows that the support meets in a slab, from the center; low > high where none.
+/// The rows that a support meets in a slab, relative to its center; none if low > high.
 struct WindowExtent {
   float low, high;
 };
-/// \param slab  from the center
+/// \param slab  relative to the ellipsoid's center
 ESVR_HD inline WindowExtent rowsOf(const WindowKernel& k, const WindowOrder& o, float slab) {
   const float ofSlab = o.ss * slab, left = k.cutoff - ofSlab * ofSlab;
   if (!(left > 0.0f)) return {1.0f, -1.0f};
@@ -86,7 +91,7 @@ ESVR_HD inline WindowRun runOn(const WindowKernel& k, const WindowOrder& o, cons
   return {columns.first, columns.last, middle, nearest * kLog2e - k.shift, o.cc * o.cc * kLog2e};
 }
 
-/// intensity * phi at a column of the run.
+/// The value intensity * phi at a column of the run.
 ESVR_HD inline float valueAt(const WindowKernel& k, const WindowRun& run, int column) {
   const float t = float(column) - run.middle;
   return k.gain / (k.plateau + std::exp2(run.nearest + run.speed * t * t)) - k.base;

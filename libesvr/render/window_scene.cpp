@@ -7,7 +7,7 @@
 namespace esvr {
 namespace {
 
-/// L = S^-1 R^T by its columns.
+/// The three columns of L = S^-1 R^T.
 using Columns = std::array<Vec3, 3>;
 
 Columns unitColumns(const PackedEllipsoid& e) {
@@ -22,7 +22,7 @@ Vec3 without(const Vec3& v, const Vec3& direction, double along) {
   return difference(v, scaled(direction, along));
 }
 
-/// By Gram and Schmidt, the columns' axis first.
+/// U by Gram-Schmidt orthogonalisation, in the order column, row, slab.
 WindowOrder orderOf(const Columns& l, int slabAxis, double radius) {
   const WindowAxes axes = axesOfSlabs(slabAxis);
   const Vec3 &column = l[axes.column], &row = l[axes.row], &slab = l[axes.slab];

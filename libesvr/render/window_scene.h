@@ -1,5 +1,5 @@
 #pragma once
-/// Ellipsoids for the voxels of windows.
+/// Brings the ellipsoids of a field into the form for voxel windows.
 
 #include <vector>
 
@@ -11,7 +11,7 @@ namespace esvr {
 
 [[nodiscard]] WindowForm windowForm(const PackedEllipsoid& e, const RayKernel& kernel);
 
-/// In the order of `packed`.
+/// The forms of all ellipsoids, in the order of packed().
 [[nodiscard]] std::vector<WindowForm> windowForms(const Field& field);
 
 }  // namespace esvr

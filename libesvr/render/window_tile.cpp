@@ -6,9 +6,9 @@
 namespace esvr {
 namespace {
 
-/// A window that stays in the cache; fewer samples at once than kFewSamples are taken only where a
-/// single ray's are too many.
+/// The limits keep a window in the processor's cache.
 constexpr WindowLimits kLimits{.slabs = 256, .voxels = 1 << 15};
+/// A block is not split below this number of samples unless it has a single ray.
 constexpr int kFewSamples = 8;
 
 int extent(int first, int last) { return last - first + 1; }
@@ -41,7 +41,8 @@ void WindowTile::drawBlock(const Block& block, std::span<const Entry> active) {
     for (int column = p.firstColumn; column <= p.lastColumn; ++column) drawRay(block, column, row);
 }
 
-/// From front to back for every ray. One sample of one ray always has a window.
+/// Draws the two halves of a block whose window is too large, from front to back. The window of a
+/// single sample always fits, so the recursion ends.
 void WindowTile::drawParts(const Block& block, std::span<const Entry> active) {
   const PixelRectangle& p = block.pixels;
   const int columns = extent(p.firstColumn, p.lastColumn), rows = extent(p.firstRow, p.lastRow);

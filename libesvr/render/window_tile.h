@@ -1,5 +1,5 @@
 #pragma once
-/// A tile whose samples are interpolated from the voxels that they lie between.
+/// A tile whose samples are interpolated between voxels (Between::kVoxels).
 
 #include "render/tile.h"
 #include "render/voxel_window.h"
@@ -11,17 +11,17 @@ class WindowTile final : public Tile {
   WindowTile(const TileScene& scene, TilePlace place);
 
  private:
-  /// Samples of a rectangle of the picture's pixels.
+  /// A range of samples on the rays of a rectangle of pixels.
   struct Block {
     PixelRectangle pixels;
     double firstSample;
     int samples;
   };
-  /// The voxels of a block, and what of the block finds them.
+  /// The voxel window of a block.
   struct Window {
     VoxelWindow shape;
     WindowOrigin origin;
-    Vec3 corner;  ///< the origin, along x, y, z
+    Vec3 corner;  ///< the origin in the order x, y, z
   };
   void drawBin(std::int64_t bin, std::span<const Entry> active) override;
   void drawBlock(const Block& block, std::span<const Entry> active);
@@ -34,8 +34,8 @@ class WindowTile final : public Tile {
 
   Window window_{};
   std::vector<WindowSlab> slabs_;
-  std::vector<float> values_;  ///< sums, then voxels
-  std::vector<char> filled_;   ///< slabs that something was added to
+  std::vector<float> values_;  ///< sums of ellipsoids; later the voxels that they become
+  std::vector<char> filled_;   ///< 1 for slabs that an ellipsoid was added to
 };
 
 }  // namespace esvr

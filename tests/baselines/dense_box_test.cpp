@@ -1,5 +1,6 @@
-// Plan: a volume's voxels in a box as an array and back, across bricks and where the box cuts them;
-// the order of the array; which voxels come back active; the bound on memory.
+// Plan: the voxels of a box become an array and a volume again, across bricks and where the box
+// cuts bricks. The tests check the order of the array, the active voxels that come back, and the
+// limit on memory.
 
 #include "baselines/dense_box.h"
 

@@ -1,5 +1,5 @@
-// Plan: which voxels go at a threshold, in a fog volume, about a background that is not 0, and in a
-// level set, whose band grows narrower from its edge.
+// Plan: the tests check which voxels are dropped at a threshold in a fog volume, with a background
+// other than 0, and in a level set, whose band becomes narrower from its edge.
 
 #include "baselines/drop_voxels.h"
 

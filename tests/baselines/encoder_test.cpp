@@ -1,6 +1,6 @@
-// Plan: what each form gives back of a soft ball: lossless ones every voxel, half within its half
-// ulp, quantised ones within a step of their leaf's range, FpN and ZFP within their bounds; and
-// what is refused.
+// Plan: each form stores a soft ball and gives back its voxels. Lossless forms give back every
+// voxel, half floats are within half a unit in the last place, quantised forms within a step of the
+// leaf's range, and FpN and ZFP within their bounds. Forms that do not fit the grid are refused.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 struct Form {
   const char* setting;
-  double maxError;  ///< derived: see the table
+  double maxError;  ///< see the derivation at the table
 };
 std::ostream& operator<<(std::ostream& out, const Form& form) { return out << form.setting; }
 
@@ -38,8 +38,9 @@ TEST_P(BaselineForm, givesBackTheVoxelsWithinItsBound) {
   EXPECT_EQ(metrics.iou, 1.0);
 }
 
-// Values lie in (0, 1]: half has 11 bits, so 2^-12 near 1. A leaf's range is at most 1, and FpB has
-// 2^B - 1 steps over it, of which half is lost (and a little float rounding).
+// Values lie in (0, 1]. A half has a mantissa of 11 bits, so its error is at most 2^-12 near 1. A
+// leaf's range is at most 1, and FpB divides it into 2^B - 1 steps; the error is half a step plus
+// float rounding.
 INSTANTIATE_TEST_SUITE_P(All, BaselineForm,
                          testing::Values(Form{"vdb-float-blosc", 0.0}, Form{"vdb-float-zip", 0.0},
                                          Form{"vdb-float", 0.0}, Form{"vdb-half-blosc", 1.0 / 4096},

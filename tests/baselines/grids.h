@@ -6,7 +6,7 @@
 
 namespace esvr::test {
 
-/// A soft ball of radius 12 about (20, 20, 20): values fall from 1 to nothing.
+/// A soft ball of radius 12 around (20, 20, 20), whose values fall from 1 to 0.
 inline VolumeGrid ballGrid() {
   VolumeGrid grid;
   grid.descriptor.name = "density";

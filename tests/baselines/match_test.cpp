@@ -1,5 +1,5 @@
-// Plan: a search ends within its budget and near it, its best is the best of what it tried, FpN and
-// ZFP reach a PSNR with no fewer bytes in what was tried, and what cannot be is said.
+// Plan: a search ends within its limit and near it, and its result is the best of its trials. FpN
+// and ZFP reach a PSNR, and no smaller trial reaches it. Goals that cannot be reached are reported.
 
 #include <gtest/gtest.h>
 
@@ -38,8 +38,8 @@ TEST_P(MatchingForms, fillsTheSizeAskedFor) {
   const Match match = matchSize(encoder_, like, bytes);
   ASSERT_TRUE(match.found);
   EXPECT_LE(match.best.bytes, bytes);
-  // The ball has some 400 distinct values, so that a step of the threshold is below 1 % of its
-  // bytes.
+  // The ball has about 400 distinct values, so a step of the threshold changes the bytes by less
+  // than 1 %.
   EXPECT_GE(double(match.best.bytes), 0.9 * double(bytes));
   EXPECT_GT(match.best.setting.threshold, 0.0);
   EXPECT_EQ(encoder_.encode(match.best.setting).bytes, match.best.bytes) << "the row's command";

@@ -1,5 +1,5 @@
-// Plan: every setting's text reads back as the same setting, and other texts are refused with what
-// there is.
+// Plan: the text of every setting is parsed to the same setting. Other texts are refused with a
+// list of the valid ones.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 #pragma once
-/// What the benchmarks of field measure on.
+/// The scene that the benchmarks of field/ measure.
 
 #include <benchmark/benchmark.h>
 
@@ -12,7 +12,7 @@
 
 namespace esvr::bench {
 
-/// A field as dense as fits of thin structures are, on all bricks that it reaches.
+/// A random field that is as dense as fits of thin structures, and all bricks that it reaches.
 struct Scene {
   explicit Scene(std::size_t ellipsoids)
       : field(test::randomField({.count = ellipsoids, .extent = 256, .smallest = 0.7})),
@@ -24,7 +24,7 @@ struct Scene {
   std::vector<float> values;
 };
 
-/// Pairs of an ellipsoid and a brick, a second.
+/// Reports the pairs of an ellipsoid and a brick per second.
 inline void countPairs(benchmark::State& state, const Scene& scene) {
   const auto pairs = planEvaluation(scene.field, scene.corners).pairs.pairCount();
   state.SetItemsProcessed(state.iterations() * std::int64_t(pairs));

@@ -1,4 +1,5 @@
-/// Evaluation of fields on the CPU. items_per_second: pairs of an ellipsoid and a brick.
+/// Benchmarks of the evaluation of fields on the CPU. items_per_second counts pairs of an ellipsoid
+/// and a brick.
 
 #include "bench/bench_scene.h"
 
@@ -7,7 +8,7 @@ namespace {
 
 using bench::Scene;
 
-/// The part that both devices share: gathering, and the lists of pairs.
+/// The part that both devices need: gathering the ellipsoids and listing the pairs.
 void planOfEvaluation(benchmark::State& state) {
   const Scene scene(std::size_t(state.range()));
   for (auto _ : state) benchmark::DoNotOptimize(planEvaluation(scene.field, scene.corners));

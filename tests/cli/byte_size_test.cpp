@@ -1,4 +1,4 @@
-// Plan: what people write for a size, and what is not one.
+// Plan: sizes as users write them are parsed, and other texts are refused.
 
 #include "cli/byte_size.h"
 

@@ -1,5 +1,5 @@
-// Plan: what a command line yields, what it refuses and with which words; exit codes of everything
-// that can be thrown; signals.
+// Plan: the tests check the results of command lines, the messages for wrong ones, the exit code of
+// every exception, and signals.
 
 #include "cli/command_line.h"
 

@@ -1,6 +1,6 @@
-// Plan: `esvr-compare check` as a script runs it: files of all three kinds against their source,
-// each limit met and missed, baselines, differences that fail on demand, and what it refuses, with
-// code and words.
+// Plan: `esvr-compare check` is run as in a script. Files of all three formats are compared with
+// their source. The tests check each limit, baselines, --fail-on, and the exit codes and messages
+// of refused input.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ test::ProgramRun compare(std::vector<std::string> arguments) {
   return test::runProgram(ESVR_COMPARE, arguments);
 }
 
-/// A folder with a source of two grids.
+/// A folder with a source file of two grids.
 class CompareCheck : public testing::Test {
  protected:
   void SetUp() override { write("ref.vdb", {ball(), heat()}); }
@@ -40,7 +40,7 @@ class CompareCheck : public testing::Test {
   static InputGrid heat() {
     return {.name = "heat", .voxels = softBall({40, 0, 0}, 2.0f, 1.0f), .background = 1.0f};
   }
-  /// The ball with every voxel a little too high: an error of 0.01 throughout.
+  /// The ball with every voxel 0.01 too high.
   static InputGrid drifted() {
     InputGrid grid = ball();
     for (auto& voxel : grid.voxels) voxel.value += 0.01f;
@@ -84,7 +84,7 @@ TEST_F(CompareCheck, findsNoErrorInTheFileItself) {
 }
 
 TEST_F(CompareCheck, seesNoDifferenceWhereOnlyTheHeadersDiffer) {
-  write("again.vdb", {ball(), heat()});  // another UUID
+  write("again.vdb", {ball(), heat()});  // has another UUID
   ASSERT_NE(test::readText(at("ref.vdb")), test::readText(at("again.vdb")));
   const auto run =
       check("again.vdb", {"--min-psnr", "200", "--max-error", "0", "--fail-on", "all"});
@@ -119,8 +119,9 @@ TEST_P(CompareLimit, passesOrFailsWithTheFigure) {
   EXPECT_THAT(run.out, IsEmpty());
 }
 
-// An error of 0.01 at every active voxel and a peak of 1 are 40 dB over them; the ball fills 485 of
-// the 729 voxels of its box, which adds 1.8 dB. Its values sum up to about 0.43 of its voxels.
+// An error of 0.01 at every active voxel and a peak of 1 give 40 dB over the active voxels. The
+// ball fills 485 of the 729 voxels of its box, which adds 1.8 dB. The sum of its values is about
+// 0.43 times its number of voxels.
 INSTANTIATE_TEST_SUITE_P(
     All, CompareLimit,
     testing::Values(Limit{"min-psnr", "41.7", "41.9"}, Limit{"min-psnr-active", "39.9", "40.1"},
@@ -134,7 +135,7 @@ INSTANTIATE_TEST_SUITE_P(
     });
 
 TEST_F(CompareCheck, takesErrorsAsAShareOfTheRange) {
-  write("off.vdb", {drifted(), heat()});  // the ball's values range over 0.96
+  write("off.vdb", {drifted(), heat()});  // the ball's values have a range of 0.96
   EXPECT_EQ(check("off.vdb", {"--max-error", "1.1%"}).exitCode, 0);
   EXPECT_EQ(check("off.vdb", {"--max-error", "0.9%"}).exitCode, 4);
 }

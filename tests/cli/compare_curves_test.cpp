@@ -1,5 +1,5 @@
-// Plan: `esvr-compare curves` as a user runs it: the points in either form of data, the pictures
-// that are there, sizes that it chooses itself, and what it refuses.
+// Plan: `esvr-compare curves` is run as by a user. The tests check the points in both data formats,
+// the pictures that are written, the sizes that the program chooses, and what it refuses.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -42,7 +42,7 @@ std::set<std::string> seriesOf(const json& points) {
   return names;
 }
 
-/// A file holds no times: only a fit that is made here has a curve over seconds.
+/// A file holds no times, so only a fit that the command makes has a curve over seconds.
 TEST_F(CompareCurves, hasTheCurveOfAFitAndTheFilesOfBoth) {
   const auto run = curves({at("ref.vdb"), at("fit.esvr"), "--fit", "3KB", "--device", "cpu",
                            "--no-baselines", "-o", at("c")});
@@ -90,7 +90,7 @@ TEST_F(CompareCurves, SlowHasBaselinesAtEachSizeAndFramesASecond) {
 TEST_F(CompareCurves, SlowChoosesSixSizesAndTellsThoseThatAreTooSmall) {
   const auto run = curves({at("ref.vdb"), "--no-baselines", "--device", "cpu", "-o", at("c")});
   ASSERT_EQ(run.exitCode, 0) << run.err;
-  // The ball's VDB takes so little that there is no room for a grid in a 100th of it and below.
+  // The ball's VDB is so small that a hundredth of its size has no room for a grid.
   std::size_t files = 0, refused = 0;
   for (const auto& point : points()) files += point["kind"] == "file";
   for (std::size_t at = 0; (at = run.err.find("no fit of", at)) != std::string::npos; ++at)

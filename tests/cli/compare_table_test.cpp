@@ -1,6 +1,6 @@
-// Plan: `esvr-compare table` as a user runs it, on a small grid: which rows there are, that figures
-// are what the files give, that a row's command makes the same row, sizes that match, external
-// results, reports in each form, and what it refuses.
+// Plan: `esvr-compare table` is run as by a user, on a small grid. The tests check which rows there
+// are, that figures agree with the files, that the command of a row makes the same row, matched
+// sizes, external results, all report formats, and what the program refuses.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ test::ProgramRun table(std::vector<std::string> arguments) {
   return test::runProgram(ESVR_COMPARE, arguments);
 }
 
-/// A folder with a grid and its fit. The ball spans (-4, -4, -4) to (4, 4, 4).
+/// A folder with a grid and a fit of it. The ball extends from (-4, -4, -4) to (4, 4, 4).
 class CompareTable : public testing::Test {
  protected:
   void SetUp() override {
@@ -45,7 +45,7 @@ class CompareTable : public testing::Test {
     EXPECT_EQ(run.exitCode, 0) << run.err;
     return json::parse(run.out, nullptr, false);
   }
-  /// Raw float32 of the ball's box, with `error` added to every voxel.
+  /// Writes the ball's box as raw float32, with `error` added to every voxel.
   void writeRaw(const std::string& name, float error) const {
     std::ofstream stream(at(name), std::ios::binary);
     for (int z = -4; z <= 4; ++z)
@@ -65,7 +65,7 @@ const json* rowOf(const json& report, const std::string& name, const std::string
   return nullptr;
 }
 
-/// How many rows of the group were made, none of which may have more than `bytes`.
+/// The number of rows of a group that were made. None of them may have more than `bytes`.
 int rowsWithin(const json& report, const std::string& group, std::uint64_t bytes) {
   int rows = 0;
   for (const auto& row : report["rows"])
@@ -106,7 +106,8 @@ TEST_F(CompareTable, hasQuantisedRowsWithinTheirBounds) {
 }
 
 TEST_F(CompareTable, matchesACandidatesSizeAndShowsTheSearch) {
-  // The smallest VDB has some 1500 bytes: a candidate must be larger for other rows to match it.
+  // The smallest VDB file has about 1500 bytes. A candidate must be larger, so that other rows can
+  // match its size.
   ASSERT_EQ(test::vdb2esvr({at("ref.vdb"), at("large.esvr"), "--count", "60", "--iterations", "60",
                             "--kappa", "0", "--storage", "float32"})
                 .exitCode,
@@ -211,8 +212,8 @@ TEST_F(CompareTable, SlowComparesPictures) {
 }
 
 TEST_F(CompareTable, takesLpipsFromAProgramOfTheUsers) {
-  // It stands for LPIPS: 0 for equal pictures and 0.25 for others, after a line that is no figure.
-  // It takes PNG files only, and the reference's first.
+  // This script takes the place of LPIPS. It prints a line that is no figure, and then 0 for equal
+  // pictures and 0.25 for others. It accepts PNG files only, and the reference must come first.
   test::writeText(at("metric.sh"),
                   "for f; do [ \"$(head -c 4 \"$f\" | tail -c 3)\" = PNG ] || exit 9; done\n"
                   "echo \"$# files\"; echo \"$1\" >> \"$0.references\"\n"
@@ -244,7 +245,7 @@ TEST_F(CompareTable, SlowPutsPicturesOnThePage) {
 }
 
 TEST_F(CompareTable, SlowKeepsTheRowsThatAreMadeWhenInterrupted) {
-  // So many runs that the table takes minutes, and its first row a fraction of a second.
+  // With this number of runs the table takes minutes, but its first row a fraction of a second.
   const auto run = test::runProgram(
       "/usr/bin/timeout", {"--preserve-status", "-s", "TERM", "6", ESVR_COMPARE, "table",
                            at("ref.vdb"), at("fit.esvr"), "--runs", "300", "--csv", at("t.csv")});

@@ -1,5 +1,5 @@
 #pragma once
-/// The two converters as a user runs them.
+/// Runs the two converters as a user does.
 
 #include <string>
 #include <vector>
@@ -15,15 +15,15 @@ inline ProgramRun esvr2vdb(const std::vector<std::string>& arguments) {
   return runProgram(ESVR2VDB, arguments);
 }
 
-/// A fit of milliseconds.
+/// A fit that takes milliseconds.
 inline ProgramRun quickFit(const std::string& input, const std::string& output,
                            std::vector<std::string> more = {}) {
   more.insert(more.begin(), {input, output, "--count", "30", "--iterations", "60", "--kappa", "0"});
   return vdb2esvr(more);
 }
 
-/// A shell's command line with a bound of 512 bytes on the size of files, which a full disk is
-/// like; a message on stderr finds room.
+/// Runs a command line in a shell that limits files to 512 bytes, which has the effect of a full
+/// disk. A message on stderr still fits.
 inline ProgramRun runOnFullDisk(const std::string& commandLine) {
   return runProgram("/bin/sh", {"-c", "ulimit -f 1; exec " + commandLine});
 }

@@ -1,7 +1,7 @@
-// Plan: the commands that README.md shows run, in the order in which they are
-// shown and in one folder, so that a later one finds the files of those before. They are made quick
-// first: small volumes and pictures, few iterations. Commands of other programs (./setup, cmake) are
-// not run, nor those on smoke1.vdb where ESVR_DATA_DIR does not have it.
+// Plan: the commands of README.md run in their order and in one folder, so that later ones find the
+// files of earlier ones. They are made quick first, by small volumes and pictures and few
+// iterations. Commands of other programs (./setup, cmake) are not run, nor commands on smoke1.vdb
+// if ESVR_DATA_DIR does not have it.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -37,8 +37,8 @@ Words wordsOf(const std::string& line) {
   return words;
 }
 
-/// The commands of a document's indented blocks that begin with a program of ours; "$ " before a
-/// command and a backslash at the end of its line are as in a shell.
+/// The commands in the indented blocks of a document that begin with one of the project's programs.
+/// As in a shell, "$ " may stand before a command, and a backslash continues a line.
 std::vector<Words> commandsOf(const std::string& document) {
   std::vector<Words> commands;
   std::istringstream lines(document);
@@ -60,7 +60,7 @@ bool has(const Words& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
-/// Gives an option a value, whether it is there or not.
+/// Sets the value of an option, which is added if it is missing.
 void set(Words& words, const std::string& option, const std::string& value) {
   const auto it = std::find(words.begin(), words.end(), option);
   if (it != words.end())
@@ -69,7 +69,7 @@ void set(Words& words, const std::string& option, const std::string& value) {
     words.insert(words.end(), {option, value});
 }
 
-/// The same command on less.
+/// Changes a command so that it takes little time.
 Words quickened(Words words) {
   if (words[0] == "esvr-sample") set(words, "--resolution", "40");
   if (words[0] == "vdb2esvr" && !has(words, "--lossless")) set(words, "--iterations", "60");
@@ -101,7 +101,7 @@ class DocumentedCommands : public testing::TestWithParam<const char*> {
   }
   void TearDown() override { fs::current_path(before_); }
 
-  /// The first file that a command takes is there, or it makes it.
+  /// True if the command makes its first file, or if that file exists.
   [[nodiscard]] static bool canRun(const Words& words) {
     if (words[0] == "esvr-sample") return true;
     const auto input = std::find_if(words.begin(), words.end(), isInput);

@@ -1,4 +1,5 @@
-// Plan: every file of the data folder's edge cases through both programs, as its row there says.
+// Plan: both programs process every file of the data folder's edge cases, with the results that
+// their rows in its README state.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,7 +17,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-/// A real file's fit and what comes back of it.
+/// Fits a real file and decodes it.
 class EdgeFile : public testing::Test {
  protected:
   void SetUp() override {

@@ -1,4 +1,4 @@
-// Plan: bounds in units and as a share of the range, and what is no bound.
+// Plan: bounds may be given in value units and as a share of the range; other texts are refused.
 
 #include "cli/error_bound.h"
 

@@ -1,5 +1,5 @@
-// Plan: esvr2vdb as a user runs it: its jobs, what it refuses, with which code and words, and that
-// nothing is left behind.
+// Plan: esvr2vdb is run as by a user. The tests check its jobs, and the exit codes and messages of
+// refused input; a failure leaves no file behind.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-/// A folder with a fit of two grids and its source.
+/// A folder with a source file of two grids and a fit of it.
 class Esvr2Vdb : public testing::Test {
  protected:
   void SetUp() override {
@@ -75,7 +75,7 @@ TEST_F(Esvr2Vdb, savesAsHalfWhereAsked) {
   EXPECT_FALSE(inspectVdb(out()).grids[0].savedAsHalf) << "the source was not";
 }
 
-/// As the report on stderr has it: "read N of M bytes".
+/// The numbers of the message "read N of M bytes" on stderr.
 struct BytesRead {
   unsigned long read = 0, whole = 0;
 };
@@ -88,7 +88,7 @@ BytesRead bytesRead(const std::string& err) {
 }
 
 TEST_F(Esvr2Vdb, writesAPartOfTheVoxelsWithoutReadingTheRest) {
-  // "heat" lies 40 voxels beside "density": its ellipsoids cannot reach the box
+  // "heat" lies 40 voxels away from "density", so its ellipsoids cannot reach the box.
   const auto run = esvr2vdb({in(), out(), "--bbox", "-4,-4,-4,3,7,7"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const Box box = inspectVdb(out()).grids[0].activeBox;
@@ -175,7 +175,7 @@ TEST_F(Esvr2Vdb, saysThatNanoVdbHoldsNoMetadata) {
   EXPECT_THAT(esvr2vdb({in(), out()}).err, Not(HasSubstr("metadata")));
 }
 
-/// An .esvr file whose one ellipsoid reaches thousands of voxels.
+/// Writes an .esvr file whose only ellipsoid reaches thousands of voxels.
 void writeHugeScale(const std::string& path) {
   StoredGrid grid;
   grid.descriptor.name = "smoke";

@@ -1,4 +1,5 @@
-// Plan: a blob as .esvr and as .vdb, drawn as a user would; pictures are read back with libpng.
+// Plan: a blob is drawn from an .esvr and from a .vdb file, as by a user, and the pictures are read
+// back with libpng.
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -135,14 +136,15 @@ TEST_F(EsvrRender, ThePictureHoldsItsCommandLine) {
 }
 
 TEST_F(EsvrRender, EllipsoidsLookLikeTheirVoxels) {
-  // A byte that is off by one here and there. Before a background, since colors of what is nearly
-  // transparent are nearly anything.
+  // Bytes may differ by one. The background is black, because the color of an almost transparent
+  // pixel is not well defined.
   const std::vector<std::string> black{"--background", "0,0,0"};
   EXPECT_GE(psnrOf(picture("in.esvr", black), picture("in.vdb", black)), 60.0);
 }
 
 TEST_F(EsvrRender, TheSumIsShownBetweenVoxelsWhereAskedFor) {
-  // Blobs of 4 voxels: trilinear interpolation is off by some percent of a value between voxels.
+  // Between the voxels of blobs with scales of 4 voxels, trilinear interpolation differs from the
+  // sum by a few percent.
   const std::vector<std::string> black{"--background", "0,0,0"};
   const Pixels sum = picture("in.esvr", {"--background", "0,0,0", "--between", "sum"});
   EXPECT_GE(psnrOf(sum, picture("in.vdb", black)), 35.0);
@@ -228,7 +230,7 @@ TEST_F(EsvrRender, AnExrHasTheSamePictureInLinearLight) {
   const std::size_t middle = 24 * 64 + 32;
   EXPECT_NEAR(alpha[middle], png.at(32, 24)[3] / 255.0, 0.5 / 255 + 1e-6);
   const double color = png.at(32, 24)[0] / 255.0;
-  // Half a level of 255 is at most 2.4 half levels of linear light.
+  // Half a level of 255 corresponds to at most 2.4 half levels in linear light.
   EXPECT_NEAR(red[middle], alpha[middle] * std::pow((color + 0.055) / 1.055, 2.4), 2.4 / 255);
   EXPECT_EQ(alpha[0], 0.0f);
   Imf::InputFile file((folder_ / "out.exr").c_str());
@@ -259,7 +261,7 @@ TEST_F(EsvrRender, TheSamplingOfRaysChangesThePicture) {
   EXPECT_NE(picture("in.esvr", {"--step", "4"}).rgba, usual.rgba);
   EXPECT_NE(picture("in.esvr", {"--opacity-length", "6"}).rgba, usual.rgba);
   EXPECT_NE(picture("in.esvr", {"--min-transmittance", "0.6"}).rgba, usual.rgba);
-  // A ray that ends at 1/4096 of the light lacks less than a step of 8 bits.
+  // The error of a ray that ends at 1/4096 of the light is below one level of 8 bits.
   EXPECT_GE(psnrOf(picture("in.esvr", {"--min-transmittance", "0"}), usual), 48.0);
 }
 
@@ -417,7 +419,7 @@ TEST_F(EsvrRender, PicturesBeyondTheMemoryAllowedAreRefused) {
 
 // ---- golden pictures
 
-/// How the blob is drawn.
+/// The options with which the blob is drawn.
 struct Golden {
   const char *name, *input;
   std::vector<std::string> options;
@@ -431,9 +433,9 @@ class GoldenPicture : public EsvrRender, public testing::WithParamInterface<Gold
   }
 };
 
-// Instruction sets differ by some 1e-6 of a value, which moves a channel by one step of 8 bits; a
-// ray may end one sample later, which is worth 1/4096. ESVR_UPDATE_GOLDEN=1 stores the pictures of
-// this machine, where a change is meant to change them.
+// Instruction sets differ by about 1e-6 of a value, which can change a channel by one level of 8
+// bits. A ray may also end one sample later, which changes a channel by at most 1/4096.
+// ESVR_UPDATE_GOLDEN=1 stores the pictures of this machine after an intended change.
 TEST_P(GoldenPicture, isDrawnAgain) {
   auto options = GetParam().options;
   options.insert(options.end(), {"--device", "cpu", "--resolution", "48x48"});

@@ -1,6 +1,6 @@
-// Plan: every option of every program has a test that shows its effect. The table names it; the
-// test reads --help and fails where an option is not in the table, or no longer in --help, and where
-// the test that the table names is not there or does not use the option.
+// Plan: every option of every program has a test that shows its effect. A table names that test.
+// The test here reads --help. It fails if an option is missing from the table or from --help, or if
+// the named test does not exist or does not use the option.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using Table = std::map<std::string, std::string>;  // "Suite.test" by option
 struct Program {
   const char* name;
   const char* path;
-  const char* job;  ///< of esvr-compare
+  const char* job;  ///< command of esvr-compare
   Table tests;
 };
 std::ostream& operator<<(std::ostream& out, const Program& program) { return out << program.name; }
@@ -189,7 +189,7 @@ std::vector<Program> programs() {
             {"--peak", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"}}}};
 }
 
-/// Long and short names: "-g" of "--grid", or nothing.
+/// The short name of each long name, such as "-g" for "--grid"; empty if there is none.
 std::map<std::string, std::string> optionsOf(const Program& program) {
   std::vector<std::string> arguments{"--help"};
   if (*program.job) arguments.insert(arguments.begin(), program.job);
@@ -213,7 +213,7 @@ const std::vector<std::string>& testSources() {
   return kSources;
 }
 
-/// The text of a test up to the next one, and that of its fixture.
+/// The source text of a test and of its fixture.
 std::string sourceOf(const std::string& test) {
   const std::string suite = test.substr(0, test.find('.')), name = test.substr(suite.size() + 1);
   for (const std::string& source : testSources())
@@ -229,8 +229,8 @@ std::string sourceOf(const std::string& test) {
   return {};
 }
 
-/// Whether a test's source has the option as an argument: quoted, as in a list of arguments or in a
-/// table of options without dashes, or in a command line.
+/// True if a test uses an option as an argument: in quotes, without dashes in a table of options,
+/// or in a command line.
 bool uses(const std::string& source, const std::string& option, const std::string& shortName) {
   for (const std::string& form : {'"' + option + '"', option + ' ', '"' + option.substr(2) + '"',
                                   '"' + (shortName.empty() ? option : shortName) + '"'})

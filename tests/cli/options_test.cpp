@@ -1,5 +1,5 @@
-// Plan: options of the converters and of the comparison whose effect no other test shows, each by
-// what it changes in the output; and those that all programs share.
+// Plan: the options of the converters and of esvr-compare whose effect no other test shows, each by
+// the change in the output, and the options that all programs share.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ class Options : public testing::Test {
 class Vdb2EsvrOption : public Options {
  protected:
   void SetUp() override { test::writeInput(at("in.vdb"), {{.voxels = test::cloud(8)}}); }
-  /// The report of a conversion to NAME.
+  /// Converts to NAME and returns the report.
   [[nodiscard]] Json convert(std::vector<std::string> options,
                              const std::string& name = "out.esvr") const {
     options.insert(options.begin(), {at("in.vdb"), at(name), "--force", "--report", "-"});
@@ -45,7 +45,7 @@ class Vdb2EsvrOption : public Options {
     EXPECT_EQ(run.exitCode, 0) << run.err;
     return Json::parse(run.out, nullptr, false);
   }
-  /// The report on the grid of a fit of milliseconds.
+  /// Makes a fit that takes milliseconds, and returns the report of its grid.
   [[nodiscard]] Json quick(std::vector<std::string> options,
                            const std::string& name = "out.esvr") const {
     options.insert(options.end(), {"--iterations", "60", "--device", "cpu"});
@@ -150,7 +150,7 @@ TEST_F(Vdb2EsvrOption, maxVramBoundsTheDevicesMemoryOnGpu) {
 
 class Esvr2VdbOption : public Options {
  protected:
-  /// A cube of 16^3 equal voxels, which a tree may hold as tiles, losslessly.
+  /// A cube of 16^3 equal voxels, stored losslessly, which a tree can hold as tiles.
   void SetUp() override {
     std::vector<test::InputVoxel> cube;
     for (int v = 0; v < 4096; ++v) cube.push_back({{v / 256, v / 16 % 16, v % 16}, 1.0f});
@@ -210,7 +210,7 @@ class CompareOption : public Options {
       more.insert(more.end(), {"--rows", "none"});
     return run("table", more)["rows"][0];
   }
-  /// The points of a curve.
+  /// Returns the points of a curve.
   [[nodiscard]] std::string curves(std::vector<std::string> more) const {
     more.insert(more.begin(), {"curves", at("ref.vdb"), at("fit.esvr"), "-o", at("c"),
                                "--no-baselines", "--force"});
@@ -316,7 +316,7 @@ struct Program {
   const char* name;
   const char* path;
   std::vector<std::string>
-      arguments;  ///< of a run of milliseconds; "DIR/x" is in the test's folder
+      arguments;  ///< arguments of a run of milliseconds; "DIR/x" is in the test's folder
 };
 std::ostream& operator<<(std::ostream& out, const Program& program) { return out << program.name; }
 

@@ -1,4 +1,4 @@
-// Plan: what an output path is refused for, before any work, and that the check leaves no trace.
+// Plan: an output path is refused before any work, for each reason, and the check leaves no file.
 
 #include "cli/output.h"
 

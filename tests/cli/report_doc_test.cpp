@@ -1,6 +1,6 @@
-// Plan: docs/report.md names exactly the keys that reports have. Reports of different runs are laid
-// over each other, so that every key that a run can write is there; the tables of the document are
-// read, and each key of either side must be on the other.
+// Plan: docs/report.md names exactly the keys that reports have. The reports of several runs are
+// merged, so that they have every key that a run can write. They are compared with the tables of
+// the document: each key must be in both.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,9 +19,9 @@ namespace {
 
 using Json = nlohmann::json;
 using Keys = std::set<std::string>;
-using Table = std::map<std::string, std::string>;  // meanings by key
+using Table = std::map<std::string, std::string>;  // meaning of each key
 
-/// Backticked words of the document that are values or keys of another object.
+/// Words in backticks in the document that are values, or keys of another object.
 const Keys kNoKeys{"default", "learned", "mask", "null", "paper", "voxels"};
 
 /// Words in backticks that may be keys: options have dashes, and values capitals or spaces.
@@ -44,7 +44,7 @@ Keys without(Keys keys, const Keys& others) {
   return keys;
 }
 
-/// Lays `report` over `all`: objects get the keys of both, lists become one element.
+/// Merges `report` into `all`: objects get the keys of both, and lists become one element.
 void merge(Json& all, const Json& report) {
   if (report.is_object()) {
     if (!all.is_object()) all = Json::object();
@@ -67,7 +67,7 @@ std::string paragraphFrom(const std::string& text, const std::string& start) {
   return rest.substr(0, rest.find("\n\n"));
 }
 
-/// The first table after `start`: the keys of its first column and the text of its last.
+/// The first table after `start`: the keys in its first column, with the text of its last column.
 Table tableAfter(const std::string& text, const std::string& start) {
   Table table;
   const std::string rest = from(from(text, start), "\n|");
@@ -93,8 +93,8 @@ Keys allKeysOf(const Json& object) {
   return keys;
 }
 
-/// An object whose keys a text names; where it names none, they are explained in words. It may name
-/// those of objects in it too.
+/// Checks that a text names the keys of an object. It may name keys of inner objects too. A text
+/// without keys explains the object in words, and is not checked.
 void expectNamed(const Json& object, const std::string& text, const std::string& where) {
   const Keys named = namedIn(text);
   if (!object.is_object() || without(named, kNoKeys).empty()) return;
@@ -103,8 +103,8 @@ void expectNamed(const Json& object, const std::string& text, const std::string&
       << where << ": not written";
 }
 
-/// An object that has a table, and the objects in it that have a row.
-/// \param others  those in it that have a table of their own
+/// Checks an object against a table, and its inner objects against the rows of the table.
+/// \param others  inner objects that have a table of their own
 void expectTable(const Json& object, const Table& table, const Keys& others,
                  const std::string& where) {
   EXPECT_EQ(keysOf(object), keysOf(table)) << where;
@@ -116,7 +116,7 @@ void expectTable(const Json& object, const Table& table, const Keys& others,
 class ReportDoc : public testing::Test {
  protected:
   [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
-  /// Runs a program and lays its report over those before.
+  /// Runs a program and merges its report into `all_`.
   void add(const char* program, std::vector<std::string> arguments, int exitCode = 0) {
     arguments.insert(arguments.end(), {"--report", at("r.json"), "--force"});
     const auto run = test::runProgram(program, arguments);

@@ -1,5 +1,5 @@
 #pragma once
-/// Runs a program as a user would, for tests of the programs.
+/// Runs a program for the tests as a user does.
 
 #include <filesystem>
 #include <string>
@@ -10,11 +10,11 @@
 namespace esvr::test {
 
 struct ProgramRun {
-  int exitCode = -1;  ///< 128 + the signal's number where a signal ended it
+  int exitCode = -1;  ///< 128 + the number of the signal if a signal ended the program
   std::string out, err;
 };
 
-/// Without a shell: the arguments arrive as they are; standard input is empty.
+/// Runs without a shell, so that the arguments arrive unchanged. The standard input is empty.
 ProgramRun runProgram(const std::filesystem::path& program,
                       const std::vector<std::string>& arguments);
 

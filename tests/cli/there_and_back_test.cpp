@@ -1,6 +1,6 @@
-// Plan: each kind of extreme grid is fitted, written and turned back by the programs. What is not
-// voxels comes back exactly: name, class, transform, metadata, background, `creator`; voxels come
-// back to a PSNR that says they are the same thing: the fits are short, and no bound on accuracy.
+// Plan: each kind of extreme grid is fitted, written and decoded by the programs. Name, class,
+// transform, metadata, background and `creator` come back exactly. The voxels come back with a PSNR
+// that shows that the values are in the right places; the fits are short, so the PSNR is low.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -80,7 +80,7 @@ InputGrid bothSigns() {
   return grid;
 }
 
-constexpr double kAlike = 25.0;  // dB: within a twentieth of the peak
+constexpr double kAlike = 25.0;  // dB; errors are about a twentieth of the peak
 constexpr double kExact = 100.0;
 constexpr int kFar = 10'000'000;
 

@@ -1,5 +1,6 @@
-// Plan: vdb2esvr as a user runs it: what it refuses, with which code and words, leaving nothing
-// behind; what it tells of what it did; what becomes of an interrupted run.
+// Plan: vdb2esvr is run as by a user. The tests check exit codes and messages of refused input,
+// which leaves no file behind, the output and report of a run, and the result of an interrupted
+// run.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -36,7 +37,7 @@ using testing::Not;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-/// A folder with one good input.
+/// A folder with one valid input file.
 class Vdb2Esvr : public testing::Test {
  protected:
   void SetUp() override { test::writeInput(in(), {{.voxels = softBall({})}}); }
@@ -78,7 +79,7 @@ TEST_P(BadInputFile, isRefusedByNameWithCodeThreeAndNothingIsWritten) {
   EXPECT_THAT(folder.names(), Not(testing::Contains(HasSubstr("esvr"))));
 }
 
-/// A grid whose first voxel in index order that is not finite is (1, 2, 3).
+/// A grid with voxels that are not finite. The first of them in index order is (1, 2, 3).
 InputGrid withNonFinite() {
   InputGrid grid{.voxels = softBall({})};
   grid.voxels.push_back({{9, 9, 9}, kInf});
@@ -341,15 +342,15 @@ TEST_F(Vdb2Esvr, reportsWhatThePapersMethodUsed) {
   EXPECT_EQ(paper["points"], 60);
   EXPECT_EQ(paper["rates"]["scale"], 2e-3);
   EXPECT_EQ(paper["prune_score"], "no-fa");
-  EXPECT_EQ(paper["densify"]["until"], 4);  // of 400 in 2800 epochs
+  EXPECT_EQ(paper["densify"]["until"], 4);  // 400 of 2800 epochs in the paper
   EXPECT_EQ(paper["prunes"][0]["epoch"], 12);
   EXPECT_EQ(paper["prunes"][0]["after"], 40);
   EXPECT_GT(report["grids"][0]["fit"]["hits"], 1.0);
   EXPECT_GT(report["grids"][0]["fit"]["voxel_pairs"], 1);
 }
 
-/// Converts `voxels` within 5 % of their range and checks the bound and what the report says of it.
-/// \return whether ellipsoids and a residual were stored
+/// Converts `voxels` with --max-error 5% and checks the bound and the report.
+/// \return true if ellipsoids and a residual were stored
 bool storesEllipsoidsWithinABound(const std::string& in, const std::string& out,
                                   const std::vector<test::InputVoxel>& voxels,
                                   const std::string& iterations) {
@@ -371,12 +372,12 @@ bool storesEllipsoidsWithinABound(const std::string& in, const std::string& out,
   return grid.residual.has_value();
 }
 
-/// Voxels of the cloud take some 2200 bytes and ellipsoids 650, after a whole fit.
+/// The voxels of the cloud take about 2200 bytes, and ellipsoids about 650 bytes after a full fit.
 TEST_F(Vdb2Esvr, SlowTakesEllipsoidsForABoundWhereTheyAreSmaller) {
   EXPECT_TRUE(storesEllipsoidsWithinABound(in(), out(), test::cloud(40), "1000"));
 }
 
-/// Every voxel of the noise needs a correction, whatever ellipsoids there are.
+/// Every voxel of noise needs a correction, whatever the ellipsoids are.
 TEST_F(Vdb2Esvr, takesVoxelsForABoundWhereTheyAreSmaller) {
   test::Random random(17);
   std::vector<test::InputVoxel> noise = softBall({});
@@ -404,7 +405,7 @@ TEST_F(Vdb2Esvr, dividesByTheGridsThatWereConverted) {
   EXPECT_THAT(run.out, HasSubstr("1 of 2 grids"));
   const Json report = Json::parse(test::readText(path));
   const double converted = report["input"]["bytes_converted"], all = report["input"]["bytes"];
-  EXPECT_LT(converted, 0.6 * all);  // two grids alike
+  EXPECT_LT(converted, 0.6 * all);  // two equal grids
   EXPECT_GT(converted, 0.2 * all);
   EXPECT_DOUBLE_EQ(report["ratio"], converted / double(report["output"]["bytes"]));
 }
@@ -456,7 +457,7 @@ TEST_F(Vdb2Esvr, reportsTheErrorOfTheVoxelsThatComeBack) {
 
 // ---- Ctrl-C
 
-/// A fit of a minute that is stopped after a second.
+/// A fit of a minute, which is stopped after a second.
 class Interrupted : public Vdb2Esvr {
  protected:
   [[nodiscard]] test::ProgramRun interrupted(const std::string& onCancel) const {

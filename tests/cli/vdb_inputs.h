@@ -1,5 +1,6 @@
 #pragma once
-/// VDB files as hosts write them, made with OpenVDB itself: inputs for the tests of the programs.
+/// Writes VDB files with OpenVDB itself, as other programs do: inputs for the tests of the
+/// programs.
 
 #include <filesystem>
 #include <string>
@@ -18,7 +19,7 @@ enum class InputMap { kUniform, kRotated, kSheared, kFrustum };
 
 struct InputGrid {
   std::string name = "density";
-  std::vector<InputVoxel> voxels{};  ///< the active ones
+  std::vector<InputVoxel> voxels{};  ///< active voxels
   float background = 0.0f;
   bool levelSet = false;
   InputMap map = InputMap::kUniform;
@@ -26,21 +27,22 @@ struct InputGrid {
 
 inline constexpr const char* kInputCreator = "Houdini/SOP_OpenVDB_Write";
 
-/// Float grids with a custom metadata item each, in a file whose `creator` is kInputCreator.
+/// Writes float grids with a custom metadata item each. The file's `creator` is kInputCreator.
 void writeInput(const std::filesystem::path& path, const std::vector<InputGrid>& grids);
 
-/// A bool, an int32, a vec3s and a points grid, named after their types, and the grids given.
+/// Writes a bool, an int32, a vec3s and a points grid, named after their types, and the given
+/// grids.
 void writeMixedInput(const std::filesystem::path& path, const std::vector<InputGrid>& grids);
 
-/// A round body of soft edge about `center`, its middle at `peak` above `background`.
+/// A soft ball around `center`, whose middle is at `peak` above `background`.
 [[nodiscard]] std::vector<InputVoxel> softBall(Coord center, float peak = 1.0f,
                                                float background = 0.0f);
 
-/// A Gaussian of standard deviation `reach` / 3 about the origin, cut off at the distance `reach`:
-/// smooth and large, so that ellipsoids are much smaller than voxels.
+/// A Gaussian around the origin with a standard deviation of `reach` / 3, cut off at the distance
+/// `reach`. It is smooth and large, so that ellipsoids are much smaller than voxels.
 [[nodiscard]] std::vector<InputVoxel> cloud(int reach);
 
-/// The distance from the surface of a sphere of radius 8 about the origin, in the cube of `reach`.
+/// The distance from a sphere of radius 8 around the origin, in the cube from -reach to reach.
 [[nodiscard]] std::vector<InputVoxel> distances(int reach);
 
 }  // namespace esvr::test

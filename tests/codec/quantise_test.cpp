@@ -1,5 +1,5 @@
-// Plan: what comes back is within half a step of what went in, the ellipsoid named by sorted axes
-// is the same one, and rounding what was rounded changes nothing.
+// Plan: dequantised parameters are within half a step of the originals, sorted axes describe the
+// same ellipsoid, and quantising dequantised values changes nothing.
 
 #include "esvr/quantised.h"
 
@@ -25,7 +25,7 @@ Ellipsoids sample(std::size_t n = 300, double aspect = 20.0) {
   return e;
 }
 
-/// sum phi^2 of a Gaussian: (pi / 2)^1.5 times the volume.
+/// The sum of phi^2 of a Gaussian is (pi / 2)^1.5 times its volume.
 std::vector<double> curvatureOf(const Ellipsoids& e) {
   std::vector<double> c(e.size());
   for (std::size_t i = 0; i < c.size(); ++i)
@@ -43,7 +43,7 @@ Rounded rounded(const Ellipsoids& e, double step) {
   return r;
 }
 
-/// Sigma^-1 = R S^-2 R^T, which all names of an ellipsoid share.
+/// Sigma^-1 = R S^-2 R^T, which does not depend on how an ellipsoid is described.
 std::array<double, 9> precisionMatrix(const std::array<double, 3>& logScale,
                                       const std::array<double, 4>& q) {
   const double w = q[0], x = q[1], y = q[2], z = q[3];
@@ -75,7 +75,7 @@ TEST(SortedAxes, NameTheSameEllipsoidInAnyOrder) {
         precisionMatrix({shuffled.logScale[0][i], shuffled.logScale[1][i], shuffled.logScale[2][i]},
                         {e.rotation[0][i], e.rotation[1][i], e.rotation[2][i], e.rotation[3][i]});
     const auto after = precisionMatrix(axes.logScale, axes.rotation);
-    // quaternions are of unit length to 2e-7, and entries reach e^(2 * 0.7) = 4
+    // The length of quaternions is 1 to within 2e-7, and entries reach e^(2 * 0.7) = 4.
     for (std::size_t k = 0; k < 9; ++k) EXPECT_NEAR(after[k], before[k], 1e-5) << i;
   }
 }
@@ -97,7 +97,8 @@ TEST(Quantise, KeepsEveryParameterWithinHalfItsStep) {
           std::ldexp(0.5 * q.lattice.intensityStep, -intensityShift(q.lattice, s));
       for (std::size_t a = 0; a < 3; ++a) {
         EXPECT_NEAR(back.center[a][i], e.center[a][order[i]], place + 1e-5);
-        // a scale that rounding put below the one before it is cut off there: one half step more
+        // A scale that rounding makes smaller than the one before it is cut off there, which adds
+        // half a step.
         EXPECT_NEAR(back.logScale[a][i], axes.logScale[a], 2.0 * scale + 1e-6);
       }
       EXPECT_NEAR(back.intensity[i], e.intensity[order[i]], intensity * (1.0 + 1e-5));
@@ -114,7 +115,8 @@ TEST(Quantise, TurnsAnAxisByNoMoreThanItsBitsAllow) {
     double dot = 0.0;
     for (std::size_t c = 0; c < 4; ++c) dot += axes.rotation[c] * back.rotation[c][i];
     const int bits = rotationBits(q.lattice, q.precision[i], coarseScales(q, i));
-    // three components each within half a step, the largest follows: at most twice their length
+    // Three components are within half a step each, and the largest one follows: the error is at
+    // most twice the length of the first three.
     const double angle = 2.0 * std::sqrt(3.0) * std::ldexp(std::sqrt(0.5), -bits);
     if (bits > 2) {
       EXPECT_GT(dot, std::cos(angle) - 1e-6) << i;

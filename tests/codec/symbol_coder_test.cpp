@@ -1,5 +1,5 @@
-// Plan: whatever is written is read, near-certain decisions cost next to nothing, and carries run
-// through any number of bytes.
+// Plan: the decoder returns what was encoded, nearly certain decisions take almost no bits, and
+// carries propagate through any number of bytes.
 
 #include "codec/symbol_coder.h"
 
@@ -25,7 +25,7 @@ TEST(RangeCoder, GivesBackDecisionsOfAnyProbability) {
     RangeDecoder decoder(bytes);
     BitModel learnt;
     for (std::size_t i = 0; i < bits.size(); ++i) ASSERT_EQ(decoder.bit(learnt), bits[i]) << i;
-    // entropy, and what learning and a least probability of 1/2048 cost
+    // The entropy, plus the cost of learning and of a smallest probability of 1/2048.
     const double p = double(ones) / 1000.0;
     const double entropy = p > 0.0 && p < 1.0 ? -p * std::log2(p) - (1 - p) * std::log2(1 - p) : 0;
     EXPECT_LT(double(bytes.size()) * 8.0, 20'000 * (entropy * 1.02 + 0.005) + 64);
@@ -33,7 +33,7 @@ TEST(RangeCoder, GivesBackDecisionsOfAnyProbability) {
 }
 
 TEST(RangeCoder, CarriesThroughRunsOfOnes) {
-  // Decisions that keep the interval's low end just below a power of two.
+  // Decisions that keep the lower end of the interval just below a power of two.
   RangeEncoder encoder;
   std::vector<std::uint32_t> values;
   for (std::uint32_t i = 0; i < 500; ++i) values.push_back(i % 50 == 49 ? 0u : 0xffffu);
@@ -90,12 +90,12 @@ TEST(CellTree, PaysNothingForTheOrder) {
   for (auto& key : keys) key = engine() >> 43;
   std::size_t size = 0;
   (void)throughTheTree(keys, 21, size);
-  // log2 of the number of multisets: n (21 - log2 n + log2 e) bits, 5.4 % more at most
+  // log2 of the number of multisets is n (21 - log2 n + log2 e) bits; 5.4 % more are allowed.
   EXPECT_LT(double(size) * 8.0, 4096 * (21 - 12 + 1.4427) * 1.054);
 }
 
 TEST(CellTree, RefusesASplitOfMoreThanThereAre) {
-  // 3 keys need numbers from 0 to 3, but are coded in 4 bits: ones are read as 15
+  // 3 keys need numbers from 0 to 3, but the number has 4 bits, so ones are read as 15.
   RangeEncoder encoder;
   for (int i = 0; i < 200; ++i) encoder.raw(1, 1);
   const auto bytes = encoder.finish();

@@ -1,5 +1,5 @@
-// Plan: exact layers give back every bit in the smallest form that can, bounded ones keep their
-// bound at any scale of values.
+// Plan: exact layers give back every bit in the smallest form that can hold it. Bounded layers keep
+// their bound for values of any scale.
 
 #include "esvr/voxel_layer.h"
 
@@ -32,7 +32,7 @@ void expectExact(const SparseVolume& volume, VoxelForm form) {
   EXPECT_EQ(largestError(volume, layer), 0.0);
 }
 
-/// Values made from a random number in [-1, 1].
+/// A volume whose values are made from random numbers in [-1, 1].
 SparseVolume made(const std::function<float(double)>& value) {
   test::Random random(11);
   return test::volumeOf({-8, 16, 800}, 3, 0.25f, [&](Coord) { return value(random(-1.0, 1.0)); });
@@ -44,7 +44,7 @@ TEST(ExactLayer, NoticesTheFewValuesOfEightBits) {
 }
 
 TEST(ExactLayer, HoldsHalvesAsHalves) {
-  // eleven bits of mantissa over thirty octaves, subnormal halves among them
+  // The values have mantissas of eleven bits over thirty octaves, including subnormal halves.
   expectExact(made([](double r) {
                 return float(std::ldexp(std::floor(r * 1024), int(std::lround(r * 1e6)) % 15 - 9));
               }),

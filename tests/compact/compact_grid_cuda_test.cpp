@@ -1,5 +1,5 @@
-// Plan: bits chosen on a GPU hold what the CPU's hold, measured by the CPU, and are the same in
-// every run.
+// Plan: results of a GPU meet the same goals as those of the CPU, measured by the CPU, and are the
+// same in every run.
 
 #include <gtest/gtest.h>
 
@@ -42,7 +42,7 @@ TEST_P(CompactGridOnGpu, CostsNoMoreThanWasAllowed) {
   const double before = psnrOf(grid_);
   for (const double loss : {0.05, 0.3, 2.0}) {
     const auto compact = compactGrid(grid_, source_, {.loss = loss, .device = device_});
-    // the CPU adds up the same field in another order
+    // The CPU sums the same field in another order.
     EXPECT_GE(psnrOf(compact.grid), before - loss - 1e-3) << loss;
   }
 }
@@ -57,7 +57,7 @@ TEST_P(CompactGridOnGpu, ReachesThePsnrAskedFor) {
 TEST_P(CompactGridOnGpu, TakesAboutTheBytesOfTheCpu) {
   const auto cpu = compactGrid(grid_, source_, {});
   const auto gpu = compactGrid(grid_, source_, {.device = device_});
-  // a trial more or less: 7 % of the error, a tenth of a bit of some 60
+  // The number of trials may differ by one, which is 7 % of the error or a tenth of about 60 bits.
   EXPECT_NEAR(double(gpu.bytes), double(cpu.bytes), 0.05 * double(cpu.bytes));
 }
 
@@ -72,7 +72,7 @@ TEST_P(CompactGridOnGpu, GivesTheSameBytesInEveryRun) {
 
 TEST_P(CompactGridOnGpu, HoldsNearFloat32sOwnPrecision) {
   const SparseVolume source = test::ellipsoidVolume(300, 0.2, 1.0);
-  // what that volume was made of: without rounding the error is zero
+  // The volume was made from this field, so the error without rounding is zero.
   Field field =
       test::randomField({.count = 300, .extent = 30.0, .smallest = 1.5, .aspect = 2.0, .seed = 9});
   test::Random random(17);

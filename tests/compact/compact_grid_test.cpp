@@ -1,5 +1,5 @@
-// Plan: on a small fit, what quantising costs stays within what was allowed, measured on the voxels
-// that come back through the file's bytes; more loss allowed means fewer bytes.
+// Plan: on a small fit, the loss by quantising is within the allowed loss, measured on the voxels
+// that are decoded from the file's bytes. A larger allowed loss gives fewer bytes.
 
 #include "esvr/compact.h"
 
@@ -55,7 +55,7 @@ TEST(CompactGrid, CostsNoMoreThanWasAllowed) {
   for (const double loss : {0.05, 0.3, 2.0}) {
     const auto compact = compactGrid(tube().grid, tube().source, {.loss = loss});
     const double after = psnrOf(tube(), compact.grid);
-    // the search sums in float64 what the metric sums in float64 too: voxels are float32
+    // The search and the metric both sum in float64; voxels are float32.
     EXPECT_GE(after, before - loss - 1e-4) << loss;
     EXPECT_NEAR(compact.loss, before - after, 1e-3);
   }
@@ -65,7 +65,7 @@ TEST(CompactGrid, SpendsFewerBytesWhereMoreLossIsAllowed) {
   const auto size = [](double loss) {
     return bytesOf(compactGrid(tube().grid, tube().source, {.loss = loss}).grid).size();
   };
-  // of 60 ellipsoids the bytes jump by a twentieth where the lattice does
+  // With 60 ellipsoids the bytes change in jumps of a twentieth.
   const std::size_t fine = size(0.05), usual = size(1.0), coarse = size(3.0);
   EXPECT_LT(usual, fine);
   EXPECT_LT(coarse, usual);
@@ -90,8 +90,8 @@ TEST(CompactGrid, FillsTheBytesThatItMayHave) {
   for (const std::uint64_t bytes : {500u, 600u, 900u}) {
     const auto compact = compactGrid(tube().grid, tube().source, {.bytes = bytes});
     EXPECT_LE(compact.bytes, bytes);
-    // 60 ellipsoids: a step that is a bit too fine for one more bit of all costs 75 bytes, and
-    // steps are tried to half a per cent
+    // With 60 ellipsoids, a step that is slightly too fine for one more bit of each costs 75 bytes.
+    // Steps are tried to within half a percent.
     EXPECT_GE(compact.bytes, bytes - 20);
   }
 }
@@ -109,10 +109,10 @@ TEST(CompactGrid, KeepsTheBandOfALevelSet) {
   const auto compact = compactGrid(ball.grid, ball.source);
   EXPECT_FALSE(compact.grid.quantised.empty());
   const double loss = psnrOf(ball, ball.grid) - psnrOf(ball, compact.grid);
-  // the search and the metric sum in float64 over voxels of float32, as above
+  // The search and the metric sum in float64 over voxels of float32, as above.
   EXPECT_LE(loss, CompactOptions{}.loss + 1e-4);
   EXPECT_NEAR(compact.loss, loss, 1e-3);
-  // Voxels at the ends of the band change sides: of the 0.1 dB, a hundredth of the band.
+  // A loss of 0.1 dB may move a hundredth of the band's voxels across its ends.
   EXPECT_GE(iouOf(ball, compact.grid), iouOf(ball, ball.grid) - 0.01);
 }
 

@@ -1,5 +1,5 @@
-// Plan: the first layers and the heaviest are the ellipsoids that they say, and come nearer the
-// whole the more there are.
+// Plan: firstLayers() and heaviest() return the right ellipsoids, and more ellipsoids come closer
+// to the whole grid.
 
 #include "esvr/level_of_detail.h"
 
@@ -14,7 +14,7 @@
 namespace esvr {
 namespace {
 
-/// n ellipsoids whose intensities span many octaves, quantised in layers.
+/// A grid of n ellipsoids whose intensities span many octaves, quantised in layers.
 StoredGrid layered(std::size_t n) {
   StoredGrid grid;
   grid.field = test::randomField({.count = n, .extent = 50.0, .smallest = 1.0, .seed = 4});
@@ -35,7 +35,7 @@ TEST(Layers, AreThereFromSomeEllipsoidsOn) {
   EXPECT_EQ(layerCount(layered(2000)), 1u);
   const StoredGrid grid = layered(4000);
   ASSERT_GE(layerCount(grid), 3u);
-  // an eighth at least in the first, and about a half in the last
+  // The first layer has at least an eighth of the ellipsoids, and the last one about a half.
   EXPECT_GE(layerSizes(grid).front().ellipsoids, 500u);
   EXPECT_LE(layerSizes(grid).back().ellipsoids, 2000u);
 }

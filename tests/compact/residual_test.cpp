@@ -1,5 +1,5 @@
-// Plan: a residual keeps every voxel within the bound, by value and with the mask, whatever the
-// sum is like and as far off as another machine's rounding may take it.
+// Plan: a residual keeps every voxel within the bound, by value and with a mask, for any sum and
+// for the rounding differences of another machine.
 
 #include "esvr/residual.h"
 
@@ -58,7 +58,7 @@ TEST(WithResidual, IsSmallerTheMoreErrorIsAllowed) {
   EXPECT_EQ(withResidual(grid, tube, 100.0)->residual->bricks.size(), 0u);
 }
 
-/// Intensities a few units in the last place off move the sum as another evaluation would.
+/// Changes of intensities in the last places move the sum as another machine's evaluation does.
 TEST(WithResidual, HoldsForASumThatRoundsDifferently) {
   const SparseVolume tube = test::tubeVolume();
   const double bound = 0.01;
@@ -91,6 +91,6 @@ TEST(WithResidual, BelongsToAllOfTheEllipsoids) {
   EXPECT_FALSE(heaviest(*grid, 3).residual);
 }
 
-/// What is smooth is worth its ellipsoids, noise is not.
+/// Ellipsoids with a residual are smaller than voxels for smooth data, but not for noise.
 }  // namespace
 }  // namespace esvr

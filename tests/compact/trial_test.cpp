@@ -1,5 +1,5 @@
-// Plan: errors of trials and of their layers against those of the voxels that a reader decodes;
-// several trials at once against each alone.
+// Plan: the errors of trials and of their layers agree with those of the decoded voxels, and
+// several trials at once give the same results as each alone.
 
 #include "compact/trial.h"
 
@@ -45,7 +45,7 @@ TEST(Trial, HasTheErrorOfItsVoxels) {
   const Trial trial = maker.make({0.1, 0.1, 0.1, 0.1});
   const auto metrics = metricsOf(fitted.source, storedOf(fitted.grid, trial));
   const double squares = metrics.mseBox * metrics.boxVoxels;
-  EXPECT_NEAR(trial.error, squares, 1e-6 * squares);  // float32 sums in one order or another
+  EXPECT_NEAR(trial.error, squares, 1e-6 * squares);  // float32 sums depend on the order
 }
 
 TEST(Trial, OfSeveralIsAsItIsAlone) {

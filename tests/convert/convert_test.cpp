@@ -1,8 +1,8 @@
-// Plan: what each goal promises. A size is met and never exceeded; a PSNR is reached and not
-// exceeded by far, with a bound on the number of ellipsoids and as float32 too; a bound on the error
-// holds on every voxel and takes the smaller of voxels and ellipsoids; lossless is exact. What is
-// out of reach is said so, what contradicts itself is refused, and the same input gives the same
-// bytes on any number of threads and at any time.
+// Plan: the tests check the promise of each goal. A size is met and never exceeded. A PSNR is
+// reached and not exceeded by much, also with a limit on the number of ellipsoids and as float32. A
+// bound on the error holds for every voxel, and the smaller of voxels and ellipsoids is stored.
+// Lossless conversion is exact. Goals out of reach are reported and contradictory options are
+// refused. The same input gives the same bytes on any number of threads and at any time.
 
 #include "esvr/convert.h"
 
@@ -38,16 +38,16 @@ double psnrOf(const SparseVolume& volume, const StoredGrid& grid) {
   return compareVolumes(volume, decodeGrid(grid)).psnrBox;
 }
 
-/// Noise: no sum of fewer ellipsoids than voxels comes near.
+/// Noise, which no sum of fewer ellipsoids than voxels approximates.
 SparseVolume noiseVolume(int bricks) {
   test::Random random(3);
   return test::volumeOf({}, bricks, 0.0f, [&](Coord) { return float(random(0.5, 1.0)); });
 }
 
-/// Sixteen blobs, each a few voxels wide.
+/// Sixteen blobs that are a few voxels wide.
 SparseVolume smoothVolume() {
   test::Random random(5);
-  std::array<std::array<double, 4>, 16> blobs;  // center, width
+  std::array<std::array<double, 4>, 16> blobs;  // center and width
   for (auto& [x, y, z, width] : blobs)
     x = random(5, 43), y = random(5, 43), z = random(5, 43), width = random(3, 6);
   return test::volumeOf({}, 6, 0.0f, [&](Coord v) {
@@ -188,7 +188,7 @@ TEST(ConvertVolume, KeepsTheCurveOfOneFitInTheFile) {
   EXPECT_GT(conversion.grid.curve.size(), 2u);
 }
 
-/// Wall-clock time must not reach the file, nor may the number of threads.
+/// Neither the wall-clock time nor the number of threads may change the file.
 TEST(ConvertVolume, GivesTheSameBytesAgainOnAnyNumberOfThreads) {
   const SparseVolume volume = test::tubeVolume();
   for (const Goal& goal : {Goal(FitGoal{}), Goal(SizeGoal{1000}), Goal(PsnrGoal{30.0})}) {
@@ -225,7 +225,7 @@ TEST(BytesAdded, IsWhatAGridMakesAFileLonger) {
   const SparseVolume volume = test::tubeVolume();
   const StoredGrid grid = converted(volume, LosslessGoal{}).grid;
   const auto sizeOf = [](const EsvrFile& file) { return encodeEsvr(file).size(); };
-  // sections begin at multiples of 8: padding counts, so that grids together take no more than that
+  // Sections begin at multiples of 8. The padding counts, so several grids take at most this much.
   EXPECT_LE(sizeOf({{}, {grid}}), sizeOf({}) + bytesAdded(grid));
   EXPECT_GT(sizeOf({{}, {grid}}) + 8, sizeOf({}) + bytesAdded(grid));
   EXPECT_LE(sizeOf({{}, {grid, grid}}), sizeOf({}) + 2 * bytesAdded(grid));

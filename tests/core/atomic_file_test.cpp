@@ -133,7 +133,7 @@ TEST_F(AtomicFileTest, AFullDiskIsAFailureAndLeavesTheOldFile) {
   EXPECT_EQ(entries(), 1u);
 }
 
-/// A process that writes a file of a megabyte over and over.
+/// A process that writes a file of one megabyte again and again.
 pid_t startWriter(const fs::path& target) {
   const pid_t child = ::fork();
   if (child != 0) return child;
@@ -146,8 +146,8 @@ pid_t startWriter(const fs::path& target) {
   }
 }
 
-// Killed at a hundred moments, a write leaves the old file or the whole new one, and the next write
-// removes what is left over.
+// If a write is killed at any of a hundred moments, the file is the old one or the complete new
+// one, and the next write removes temporary files.
 TEST_F(AtomicFileTest, SurvivesBeingKilled) {
   const std::string oldContent(1 << 20, 'o'), newContent(1 << 20, 'n');
   int leftOver = 0;

@@ -53,7 +53,7 @@ TEST(Box, ExpandingByAnEmptyBoxChangesNothing) {
 }
 
 TEST(Box, CountsTheVoxelsOfTheWholeLattice) {
-  // 2^32 cubed: the integers would have overflowed at the first side.
+  // The volume is 2^32 cubed. Integers would overflow with the first side.
   const Box box{kFarLow, kFarHigh};
   EXPECT_EQ(box.volume(), 0x1p96);
 }

@@ -83,11 +83,11 @@ TEST_F(DeviceBufferOnGpu, RefusesCopiesOfAnotherSize) {
 }
 
 TEST_F(DeviceBufferOnGpu, SaysHowMuchWasAskedForWhenMemoryIsOut) {
-  // 2^50 bytes are more than any device has; 2^63 elements of 8 bytes do not even fit a size_t.
+  // No device has 2^50 bytes, and 2^63 elements of 8 bytes exceed size_t.
   for (const std::size_t n : {std::size_t{1} << 47, std::size_t{1} << 63})
     EXPECT_THAT([&] { DeviceBuffer<double>(n, stream->get()); },
                 ThrowsMessage<DeviceError>(HasSubstr(std::to_string(n) + " times 8 bytes")));
-  // The failure is not reported again by what follows.
+  // Later calls must not report this failure again.
   EXPECT_NO_THROW(check(cudaGetLastError(), "nothing"));
 }
 

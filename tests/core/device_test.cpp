@@ -18,7 +18,7 @@ using testing::ThrowsMessage;
 
 CudaProbe noGpu() { return {.versions = {}, .devices = {}, .whyNoDevices = "no driver"}; }
 
-/// Device 0 is too old for the build, 1 and 2 are usable.
+/// Device 0 is too old for the build; devices 1 and 2 are usable.
 CudaProbe threeGpus() {
   return {.versions = {},
           .devices = {{0, "Old", "too old"}, {1, "New", ""}, {2, "Newer", ""}},
@@ -75,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(Texts, MeaninglessDevice,
                                          "cuda:1x", "cuda: 1", "cuda:+1",
                                          "cuda:99999999999999999999"));
 
-// The machine that runs the tests may have a GPU or not, and a driver or not.
+// The machine that runs the tests may or may not have a GPU and a driver.
 
 TEST(SelectDevice, WorksOnAnyMachine) {
   EXPECT_EQ(selectDevice("cpu").kind, DeviceKind::kCpu);

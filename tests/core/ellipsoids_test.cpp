@@ -19,7 +19,7 @@ Ellipsoids unitSpheres(std::size_t n, bool perEllipsoidKappa = false) {
   return e;
 }
 
-/// Every array of e, to be spoilt one at a time.
+/// Every array of e; the tests spoil one at a time.
 std::vector<std::vector<float>*> arraysOf(Ellipsoids& e) {
   std::vector<std::vector<float>*> arrays{&e.intensity};
   for (auto& v : e.center) arrays.push_back(&v);
@@ -71,12 +71,13 @@ INSTANTIATE_TEST_SUITE_P(Values, NonFiniteEllipsoid,
                                          -std::numeric_limits<float>::infinity()));
 
 TEST(WellFormed, ToleratesRoundingOfAQuaternionButNoMore) {
-  // Four components rounded to float32 move the length by at most 2 ulp of 1, 1.2e-7 each.
+  // The rounding of four components to float32 changes the length by at most 2 ulp of 1, which are
+  // 1.2e-7 each.
   auto e = unitSpheres(1);
   const float half = 0.5f * (1.0f + 4 * std::numeric_limits<float>::epsilon());
   for (auto& q : e.rotation) q[0] = half;
   EXPECT_TRUE(wellFormed(e));
-  e.rotation[1][0] = 0.5001f;  // moves the length by 5e-5, the stated bound is 1e-5
+  e.rotation[1][0] = 0.5001f;  // changes the length by 5e-5; the stated bound is 1e-5
   EXPECT_FALSE(wellFormed(e));
   for (auto& q : e.rotation) q[0] = 0.0f;
   EXPECT_FALSE(wellFormed(e));
@@ -90,7 +91,7 @@ TEST(Field, CountsTheEllipsoidsOfAllItsChunks) {
 }
 
 TEST(Chunk, CentersAreExactToTwoToTheMinusTwelfthOfAVoxel) {
-  // The header's promise: neighbours of float32 just below kChunkExtent are 2^-12 apart.
+  // The header states this: neighbouring float32 numbers just below kChunkExtent differ by 2^-12.
   const float extent = float(kChunkExtent);
   EXPECT_EQ(extent - std::nextafter(extent, 0.0f), 0x1p-12f);
 }

@@ -1,5 +1,5 @@
-/// Plan: unique names of lists with shared, empty and number-like names; each unique name finds its
-/// own grid; every other way to ask that the header promises.
+/// Plan: the tests check unique names in lists with shared, empty and number-like names. Each
+/// unique name finds its own grid, and so do the other forms that the header allows.
 
 #include "esvr/grid_names.h"
 

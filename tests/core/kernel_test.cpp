@@ -7,11 +7,11 @@
 //  - the paper's formula and the Gaussian, which are members of the family;
 // from kappa = -30, a Gaussian, to 5000, a step.
 //
-// Tolerances. With t = m - s, phi = A / (B + e^t) - base. Rounding t and e^t moves phi by at most
-// (|t| + 1) u e^t / (B + e^t) of a quotient that is at most 1 / (1 - eps); t < 5.2 wherever e^t /
-// (B
-// + e^t) is not tiny (the support ends there), which makes 6.2 u. The constants, the sum, the
-// quotient and the difference add 4 u and u = epsilon / 2: together 5.1 epsilon, rounded up to 8.
+// Tolerances. With t = m - s, phi = A / (B + e^t) - base. Rounding t and e^t changes phi by at most
+// (|t| + 1) u e^t / (B + e^t) times a quotient that is at most 1 / (1 - eps). Where e^t / (B + e^t)
+// is not tiny, t < 5.2, since the support ends there; this gives 6.2 u. The constants, the sum, the
+// quotient and the difference add 4 u. With u = epsilon / 2 the total is 5.1 epsilon, rounded up to
+// 8.
 
 #include "esvr/kernel.h"
 
@@ -48,7 +48,7 @@ long double definitionOfCutoff(long double kappa) {
 
 Kernel kernelOf(float kappa) { return {.kappa = kappa}; }
 
-/// Places inside the support, exact in float: even steps over it, and closer ones over the edge.
+/// Values of m inside the support that are exact in float: equal steps, and finer ones at the edge.
 std::vector<float> samples(float kappa) {
   const auto end = float(definitionOfCutoff(kappa));
   std::vector<float> ms{0.0f, 1e-30f, 1e-6f};
@@ -115,8 +115,8 @@ void KernelOfKappa::expectDerivativesOfTheDefinition() const {
     const auto found = derivatives(c, Real(m));
     const auto byM =
         double((definition(GetParam(), m + h) - definition(GetParam(), m - h)) / (2 * h));
-    // Differences: h^2 / 6 times the third derivative (below 1), and long double's rounding of phi
-    // and of m, 1e-19 (1 + m), over h.
+    // The differences err by h^2 / 6 times the third derivative, which is below 1, and by the
+    // rounding of phi and m in long double, 1e-19 (1 + m) / h.
     const double difference = 1e-12 + 1e-13 * (1.0 + double(m));
     EXPECT_NEAR(double(found.byM), byM, 2 * kRounding<Real> + difference) << "m = " << m;
     const auto byKappa = double(definitionByKappa(GetParam(), m));
@@ -134,10 +134,10 @@ TEST_P(KernelOfKappa, MovesByItsDerivativeWhenKappaMoves) {
   const float kappa = GetParam();
   const auto c = constants<double>();
   const double h = 1e-5;
-  // Both neighbours lose half a ulp of kappa, of m and of phi; h^2 / 6 is below that.
+  // Both neighbours round kappa, m and phi to half an ulp; h^2 / 6 is smaller.
   const double tolerance = 1e-10 + kRounding<double> * (1.0 + std::abs(double(kappa))) / h;
   for (const float m : samples(kappa)) {
-    if (double(m) >= double(c.cutoff) - 0.1) continue;  // inside both neighbours' supports
+    if (double(m) >= double(c.cutoff) - 0.1) continue;  // inside the supports of both neighbours
     const auto above = kernelConstants<double>(kernelOf(kappa), kappa + h);
     const auto below = kernelConstants<double>(kernelOf(kappa), kappa - h);
     const double difference = (kernelPhi(above, double(m)) - kernelPhi(below, double(m))) / (2 * h);
@@ -153,7 +153,7 @@ TEST_P(KernelOfKappa, IsHalfAtItsWidth) {
     return std::log(kernelWidth(kernelConstants<double>(kernelOf(GetParam()), kappa)).m);
   };
   const double difference = (logMAt(GetParam() + h) - logMAt(GetParam() - h)) / (2 * h);
-  // as in the test above
+  // The tolerance is that of the test above.
   EXPECT_NEAR(kernelWidth(c).logMByKappa, difference,
               1e-10 + kRounding<double> * (1.0 + std::abs(double(GetParam()))) / h);
 }
@@ -163,7 +163,7 @@ void KernelOfKappa::expectEndsWithoutAJump() const {
   const auto c = constants<Real>();
   const auto exact = double(definitionOfCutoff(GetParam()));
   EXPECT_NEAR(double(c.cutoff), exact, exact * kRounding<Real>);
-  // The slope at the end is below eps / (1 - eps), and the cutoff is off by its own rounding.
+  // The slope at the end is below eps / (1 - eps), and the cutoff has a rounding error of its own.
   const double jump = kRounding<Real> * (1.0 + 0.01 * exact);
   EXPECT_NEAR(double(kernelPhi(c, std::nextafter(c.cutoff, Real(0)))), 0.0, jump);
   EXPECT_EQ(kernelPhi(c, c.cutoff), Real(0));
@@ -191,7 +191,7 @@ void KernelOfKappa::expectFallsFromOne() const {
   Real previous = kernelPhi(c, Real(0));
   for (int i = 1; i <= kSteps; ++i) {
     const Real phi = kernelPhi(c, c.cutoff * Real(i) / Real(kSteps));
-    // exp may err by its last place, which moves the sum and the quotient by one each.
+    // exp may err in its last place, which changes the sum and the quotient by one ulp each.
     ASSERT_LE(phi, previous + 2 * std::numeric_limits<Real>::epsilon()) << "step " << i;
     ASSERT_GE(double(phi), -kRounding<Real>) << "step " << i;
     previous = phi;
@@ -213,7 +213,7 @@ TEST_P(KernelOfKappa, HasTheSlopeConstantThatTurnsItIntoALogistic) {
 }
 
 TEST(PaperKernel, IsThePapersFormulaInThePapersScales) {
-  // Paper, eq. 5: sigma(k (1 - q)) / sigma(k) for q < 1.42^2, k = 5; m = k q.
+  // Paper, eq. 5: sigma(k (1 - q)) / sigma(k) for q < 1.42^2, with k = 5 and m = k q.
   constexpr double k = 5.0;
   const Kernel kernel{.form = KernelForm::kPaper, .kappa = float(k)};
   const auto c = kernelConstants<double>(kernel);
@@ -240,7 +240,8 @@ TEST(PaperKernel, EndsAtTheSameValueForEveryK) {
 TEST(PaperKernel, JumpsWhereItsSupportEnds) {
   const Kernel kernel{.form = KernelForm::kPaper, .kappa = 5.0f};
   const auto c = kernelConstants<double>(kernel);
-  // 1 / ((1 + e^(k (1.42^2 - 1))) sigma(k)): the 0.6 % that the continuous form takes off.
+  // The value is 1 / ((1 + e^(k (1.42^2 - 1))) sigma(k)), the 0.6 % that the continuous form
+  // subtracts.
   EXPECT_NEAR(kernelPhi(c, std::nextafter(c.cutoff, 0.0)), 0.0062, 5e-5);
 }
 

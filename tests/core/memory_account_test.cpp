@@ -1,6 +1,6 @@
-// Plan: what buffers may hold is limited to the byte, also from many threads; a refusal takes
-// nothing and says what it refused; limits are restored; numbers of things beyond 32 bits are
-// refused by name.
+// Plan: the account limits the bytes of all buffers exactly, also from many threads. A refused
+// request changes nothing, and its message says what was refused. Limits are restored. Numbers of
+// objects beyond 32 bits are refused by name.
 
 #include "core/cuda/memory_account.h"
 

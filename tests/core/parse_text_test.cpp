@@ -1,4 +1,5 @@
-// Plan: whole texts as numbers, whole numbers, the number that begins a text, and lists.
+// Plan: the tests parse whole texts as numbers, integers, a number at the start of a text, and
+// lists.
 
 #include "core/parse_text.h"
 

@@ -14,8 +14,8 @@ namespace {
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// A brick at `corner` with one active voxel of value 1; the others hold 9, which no function that
-/// looks at active voxels may see.
+/// A brick at `corner` with one active voxel of value 1. The other voxels hold 9, which functions
+/// of active voxels must ignore.
 BrickInput brickWith(Coord corner, Coord activeLocal) {
   BrickInput brick{};
   brick.corner = corner;

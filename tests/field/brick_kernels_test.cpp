@@ -1,6 +1,6 @@
-// Plan: every instruction set that this processor runs gives what the baseline gives, forward and
-// backward, on ellipsoids inside, across and outside a brick; sums differ by rounding alone, so the
-// tolerance is a few hundred float32 ulp of the sum of magnitudes.
+// Plan: the kernels of every instruction set that this processor has agree with the baseline,
+// forward and backward, for ellipsoids inside, across and outside a brick. Sums differ by rounding
+// only, so the tolerance is a few hundred float32 ulp of the sum of magnitudes.
 
 #include "field/brick_kernels.h"
 

@@ -1,6 +1,6 @@
-// Plan: pairs over the bricks of an index are those of every brick with every support, in the order
-// of bricks' coordinates for each ellipsoid, for supports that are smaller and larger than the
-// index; more pairs than 32 bits count are refused by their number.
+// Plan: the pairs over the bricks of an index are those found by testing every brick against every
+// support, in the order of the bricks' coordinates, for supports that are smaller and larger than
+// the index. More pairs than 32 bits can number are refused.
 #include "field/brick_pairs.h"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ namespace {
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// Bricks far apart and in no order.
+/// Bricks far apart, in random order.
 std::vector<Coord> scatteredBricks(std::size_t count) {
   test::Random random(3);
   std::vector<Coord> bricks;

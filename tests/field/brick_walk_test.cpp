@@ -1,6 +1,6 @@
-// Plan: forEachReachedBrick visits the bricks that a look at every brick of the bounding box finds,
-// in the same order, over balls, needles and pancakes of every direction; supports without numbers
-// or beyond the index space have the bricks that there are; the bounds on counts are bounds.
+// Plan: forEachReachedBrick visits the bricks that a test of every brick of the bounding box finds,
+// in the same order, for balls, thin and flat ellipsoids of all directions. Supports with NaN have
+// no bricks, supports beyond the index space are cut off, and upper bounds of counts hold.
 #include "field/brick_walk.h"
 
 #include <gtest/gtest.h>
@@ -92,7 +92,7 @@ TEST(BrickWalk, ASupportWithoutNumbersHasNoBricks) {
     EXPECT_TRUE(brickRange(support).empty());
 }
 
-// A diagonal needle: its bounding box has 10^12 bricks, and it reaches about 10^5 of them.
+// The bounding box of a diagonal thin ellipsoid has 10^12 bricks, of which it reaches about 10^5.
 TEST(BrickWalk, ANeedleCostsWhatItReaches) {
   const double s = 1.0 / std::sqrt(3.0), t = 1.0 / std::sqrt(2.0), u = 1.0 / std::sqrt(6.0);
   const double across = 1.0, along = 1.0 / 35000.0;

@@ -1,5 +1,5 @@
 #pragma once
-/// Bricks to evaluate on.
+/// Makes cubes of bricks for tests.
 
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace esvr::test {
 
-/// Corners of bricks^3 bricks, from `corner` on.
+/// Corners of a cube of bricks^3 bricks, beginning at `corner`.
 inline std::vector<Coord> cube(Coord corner, int bricks) {
   std::vector<Coord> corners;
   for (int x = 0; x < bricks; ++x)

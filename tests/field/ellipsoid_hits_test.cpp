@@ -1,5 +1,6 @@
-// Plan: the average number of ellipsoids a voxel, over the voxels that any meets, against a count
-// by the definition in float64, for kernels with and without an edge of each ellipsoid's own.
+// Plan: the average number of ellipsoids that reach a voxel, over the voxels that any reaches,
+// agrees with a count by the definition in float64, for shared kernels and kernels of each
+// ellipsoid.
 
 #include <gtest/gtest.h>
 
@@ -41,7 +42,7 @@ bool holds(const Shape& s, Coord v) {
 }
 
 double countedOverAll(const Field& field) {
-  constexpr int kMargin = 14, kExtent = 20;  // beyond the longest support
+  constexpr int kMargin = 14, kExtent = 20;  // longer than the longest support
   const auto shapes = shapesOf(field);
   double hits = 0.0, voxels = 0.0;
   for (int x = -kMargin; x < kExtent + kMargin; ++x)
@@ -56,7 +57,7 @@ double countedOverAll(const Field& field) {
   return hits / voxels;
 }
 
-// Float32 may place a voxel on the other side of a support's border: one in ten thousand.
+// Float32 may put a voxel on the other side of a support's border: about one voxel in ten thousand.
 TEST(AverageHits, AreThoseOfACountOverEveryVoxel) {
   Field field = test::randomField({.count = 30, .extent = 20, .smallest = 0.7, .aspect = 4.0});
   EXPECT_NEAR(averageHits(field), countedOverAll(field), 1e-3);

@@ -1,8 +1,8 @@
-// Plan: evaluateBricks (float32, SIMD, lists) against evaluateReference (float64, every ellipsoid
-// at every voxel) over kernels from the Gaussian limit to a hard edge, over needles and pancakes,
-// far origins and supports that cross bricks; outside reachedBricks the reference must be zero; the
-// result must not depend on the number of threads, on where the field lies, nor on other bricks
-// asked for.
+// Plan: evaluateBricks (float32, SIMD, lists) agrees with evaluateReference (float64, every
+// ellipsoid at every voxel) for kernels from the Gaussian limit to a hard edge, for thin and flat
+// ellipsoids, far origins and supports that cross bricks. The reference is zero outside
+// reachedBricks. The result does not depend on the number of threads, on the field's position, or
+// on the other bricks.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -41,8 +41,8 @@ double largestError(const Field& field, const std::vector<Coord>& corners) {
 
 class EvaluateKappa : public testing::TestWithParam<float> {};
 
-// A float32 ulp of m is at most 2^-23 m; |phi'| m stays below kappa e^0.. so the error of one term
-// is a few ulp of its intensity times the edge's steepness.
+// A float32 ulp of m is at most 2^-23 m, and |phi'| m is limited, so the error of one term is a few
+// ulp of its intensity times the steepness of the edge.
 TEST_P(EvaluateKappa, AgreesWithTheFloat64Sum) {
   const Field field = test::randomField({.count = 30, .extent = 32, .kappa = GetParam()});
   const double steepness = std::max(1.0, double(GetParam()));
@@ -126,7 +126,7 @@ TEST(ReachedBricks, AreFewForAThinDiagonalNeedle) {
   auto& e = field.chunks[0].ellipsoids;
   e.logScale = {std::vector{std::log(40.0f)}, {std::log(0.4f)}, {std::log(0.4f)}};
   const float half = std::sqrt(0.5f);
-  e.rotation = {std::vector{half}, {0.0f}, {0.0f}, {half}};  // about z by 90 degrees: along y
+  e.rotation = {std::vector{half}, {0.0f}, {0.0f}, {half}};  // 90 degrees about z: along y
   const double length = 2 * 40.0 * 3.0;
   EXPECT_LT(reachedBricks(field).size(), 4 * (length / kBrickSide + 2));
 }
@@ -137,8 +137,8 @@ Field paperField(std::size_t count, double extent) {
   return field;
 }
 
-/// Whether rounding may decide on which side of a support's end a voxel lies: m is a float32 sum of
-/// six terms, some 1e-6 of the cutoff.
+/// True if rounding may decide on which side of a support's end a voxel lies. m is a float32 sum of
+/// six terms, with an error of about 1e-6 of the cutoff.
 bool liesOnAnEnd(const Field& field, Coord voxel) {
   const Ellipsoids& e = field.chunks[0].ellipsoids;
   const double cutoff = kernelConstants<double>(field.kernel).cutoff;
@@ -154,7 +154,8 @@ bool liesOnAnEnd(const Field& field, Coord voxel) {
   return false;
 }
 
-/// As for other kernels of this kappa; an error on the end itself may be the jump, 0.006.
+/// The tolerance is that of other kernels with this kappa. Exactly at the end of the support the
+/// error may be the jump, 0.006.
 TEST(PaperKernel, AgreesWithTheFloat64SumOnBothSidesOfItsJump) {
   const Field field = paperField(5, 16);
   const auto corners = cube({-8, -8, -8}, 4);
@@ -175,13 +176,13 @@ TEST(PaperKernel, AgreesWithTheFloat64SumOnBothSidesOfItsJump) {
 TEST(PaperKernel, EndsAtItsCutoffWithAJump) {
   Field field = paperField(1, 1);
   auto& e = field.chunks[0].ellipsoids;
-  // A sphere about the origin whose support ends between the voxels 4 and 5 away, near 4.
+  // A sphere around the origin whose support ends between the voxels at distances 4 and 5, near 4.
   const double radius = supportRadius(kernelConstants<double>(field.kernel));
   for (auto& c : e.center) c[0] = 0.0f;
   for (auto& s : e.logScale) s[0] = float(std::log(4.001 / radius));
   e.intensity[0] = 1.0f;
   const auto values = evaluate(field, {{0, 0, 0}});
-  // phi falls no faster than e^-m, and m grows by 0.005 over the last 0.001 of 4 voxels
+  // phi falls no faster than e^-m, and m grows by 0.005 over the last 0.001 of 4 voxels.
   EXPECT_NEAR(values[voxelOffset({4, 0, 0})], paperEnd(), 0.01 * paperEnd());
   EXPECT_EQ(values[voxelOffset({5, 0, 0})], 0.0f);
 }

@@ -1,6 +1,7 @@
-// Plan: m along a line, put together from a float32 line form, against |L d|^2 in float64 at the
-// voxels of bricks, over scales, needles, pancakes and far centers; the closest approach must bound
-// the line from below in float32 too, since the CUDA kernel skips lines by it.
+// Plan: m on a line, computed from a float32 line form, agrees with |L d|^2 in float64 at the
+// voxels of bricks, for many scales, thin and flat ellipsoids and far centers. The value at the
+// closest point must be a lower bound for the line in float32 too, because the CUDA kernel skips
+// lines by it.
 
 #include "field/line_math.h"
 
@@ -37,7 +38,7 @@ double squaredByDefinition(const Ellipsoids& e, std::size_t i, Coord voxel) {
 }
 
 LineForm lineForm(const Ellipsoids& e, std::size_t i) {
-  constexpr double kRadius = 3.0;  // only widths depend on it
+  constexpr double kRadius = 3.0;  // affects half widths only
   return makeLineForm({e.center[0][i], e.center[1][i], e.center[2][i]}, unitFrame(e, i), kRadius,
                       e.intensity[i]);
 }
@@ -63,9 +64,9 @@ class LineMath : public testing::TestWithParam<Shape> {
                                     .ellipsoids;
 };
 
-// u = px dx + pz dz and t have terms up to |d| / s, s the smallest scale, that may cancel down to
-// |u|: some five roundings of 2^-24 |d| / s each, so m = |u|^2 is off by 2 |u| times that and by
-// its square.
+// The terms of u = px dx + pz dz and of t are up to |d| / s, with the smallest scale s, and may
+// cancel down to |u|. Each has about five roundings of 2^-24 |d| / s. The error of m = |u|^2 is
+// therefore 2 |u| times that, plus its square.
 TEST_P(LineMath, IsTheSquaredDistanceUpToRounding) {
   const double perTerm = 5 * 0x1p-24 * std::sqrt(3.0) * kSide / GetParam().smallest;
   for (std::size_t i = 0; i < ellipsoids.size(); ++i) {

@@ -1,5 +1,5 @@
 #pragma once
-/// Random fields for the tests of evaluation and fit, the same on every machine.
+/// Makes random fields for tests, which are the same on every machine.
 
 #include <cmath>
 #include <cstdint>
@@ -8,11 +8,11 @@
 
 namespace esvr::test {
 
-/// SplitMix64: a well-mixed sequence without any library's distributions.
+/// SplitMix64, a generator of well-mixed numbers. No distribution of a library is used.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed) {}
-  /// Uniform in [low, high).
+  /// A uniform number in [low, high).
   double operator()(double low, double high) {
     state_ += 0x9e3779b97f4a7c15ull;
     std::uint64_t z = state_;
@@ -28,10 +28,10 @@ class Random {
 
 struct RandomFieldOptions {
   std::size_t count = 40;
-  double extent = 40.0;    ///< centers in [0, extent)^3
+  double extent = 40.0;    ///< centers lie in [0, extent)^3
   double smallest = 0.5;   ///< shortest scale, voxels
-  double aspect = 4.0;     ///< longest over shortest scale
-  double intensity = 1.0;  ///< in [-intensity, intensity)
+  double aspect = 4.0;     ///< longest scale / shortest scale
+  double intensity = 1.0;  ///< intensities lie in [-intensity, intensity)
   float kappa = 2.0f;
   Coord origin{};
   std::uint64_t seed = 7;

@@ -1,5 +1,6 @@
-// Plan: every instruction set that this processor runs gives what the baseline gives but for
-// rounding: 11 products of numbers below 1 by weights that sum to 1, 1e-15.
+// Plan: the kernels of every instruction set that this processor has agree with the baseline up to
+// rounding. A sum has 11 products of numbers below 1 with weights whose sum is 1, so the tolerance
+// is 1e-15.
 
 #include "field/ssim_kernels.h"
 
@@ -12,7 +13,7 @@ namespace esvr {
 namespace {
 
 constexpr double kTolerance = 1e-15;
-constexpr int kCount = 93, kStride = 19;  // no multiple of any vector
+constexpr int kCount = 93, kStride = 19;  // not multiples of any vector length
 
 std::vector<double> randomValues(std::size_t count, std::uint64_t seed) {
   test::Random random(seed);

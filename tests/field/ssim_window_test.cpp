@@ -1,8 +1,9 @@
-// Plan: the window's weights; its sums against three nested loops over each window, and the same
-// bits for every support that holds the values, whatever else there is; halos against single
-// look-ups; dilation.
+// Plan: the tests check the weights of the window, its sums against three nested loops over each
+// window, halos against single look-ups, and dilation. Sums have the same bits for every support
+// that contains the values.
 //
-// Tolerance of sums: values and weights' sum are at most 1, 33 additions of 1.1e-16 each: 1e-14.
+// Tolerance of sums: values and the sum of the weights are at most 1, and there are 33 additions
+// with an error of 1.1e-16 each, so 1e-14 suffices.
 
 #include "field/ssim_window.h"
 
@@ -71,7 +72,7 @@ TEST_P(SsimWindowSupport, ALargerSupportGivesTheSameBits) {
   const auto halo = randomHalo(GetParam());
   SsimWindow used, window;
   BrickSums sums, whole;
-  used.sum(*randomHalo(kWholeHalo), {kWholeHalo, kWholeBrick}, sums);  // leaves its sums behind
+  used.sum(*randomHalo(kWholeHalo), {kWholeHalo, kWholeBrick}, sums);  // leaves other sums behind
   used.sum(*halo, {GetParam(), kWholeBrick}, sums);
   window.sum(*halo, {kWholeHalo, kWholeBrick}, whole);
   EXPECT_EQ(sums, whole);
@@ -137,7 +138,7 @@ TEST(BrickHalo, SupportHoldsTheBoxesOfTheBricksAsFarAsWindowsReach) {
   const std::vector<Coord> bricks{{-1, 0, 0}, {0, 0, 1}, {0, 0, -1}, {0, -1, 0}};
   const BrickIndex index(bricks);
   const std::vector<Box> boxes{kWholeBrick, {{1, 2, 3}, {1, 2, 3}}, Box{}, {{0, 0, 0}, {7, 2, 7}}};
-  // Of the last brick nothing lies within reach of (0, 0, 0): it ends at y = -6.
+  // Nothing of the last brick lies within reach of (0, 0, 0), because it ends at y = -6.
   EXPECT_EQ(haloSupport(bricksAround(index, {0, 0, 0}), boxes), (Box{{0, 5, 5}, {6, 12, 16}}));
   EXPECT_EQ(haloSupport(bricksAround(index, {-2, 1, 0}), boxes), (Box{{13, 0, 5}, {17, 4, 12}}));
   EXPECT_TRUE(haloSupport(bricksAround(index, {0, 0, -2}), boxes).empty());

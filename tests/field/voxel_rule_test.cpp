@@ -1,5 +1,5 @@
-// Plan: the rule by its definition, in the words of RevoxeliseOptions, over backgrounds, ranges,
-// thresholds and bands; and what revoxelise() makes of a sum.
+// Plan: the rule follows its definition in RevoxeliseOptions for all backgrounds, ranges,
+// thresholds and bands, and revoxelise() applies it.
 #include "field/voxel_rule.h"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
-// Plan: estimates are upper bounds of what the lists of an evaluation hold, are made again with more
-// care where they seem too large, and take no time for supports of any size; what would take too
-// much is refused before it is begun.
+// Plan: estimates are upper bounds of what the lists of an evaluation hold. They are refined if
+// they seem too large, and take no time for supports of any size. Work that is too large is refused
+// before it begins.
 #include "esvr/work_estimate.h"
 
 #include <gmock/gmock.h>

@@ -1,6 +1,5 @@
-// Plan: an ellipsoid's own moves and forms: steps act on the semi-axes as stated, clamps hold,
-// principal axes give the shape back for needles and pancakes too, and export loses nothing but
-// float32.
+// Plan: steps move and scale the semi-axes as stated, limits hold, principal axes describe the same
+// shape for thin and flat ellipsoids too, and export loses only float32 precision.
 
 #include "fit/ellipsoid_math.h"
 
@@ -18,7 +17,7 @@ Ellipsoid sphere(double scale) {
   return {{1.0, 2.0, 3.0}, {1 / scale, 0, 0, 0, 1 / scale, 0, 0, 0, 1 / scale}, 0.5};
 }
 
-/// Sigma^-1 = L^T L: the shape, whatever rotation L carries on its left.
+/// Sigma^-1 = L^T L, which is the shape without the rotation on the left of L.
 Matrix3 precision(const Matrix3& L) {
   Matrix3 p{};
   for (int i = 0; i < 3; ++i)
@@ -37,7 +36,7 @@ TEST(ApplyStep, MovesTheCenterInUnitsOfTheScale) {
 TEST(ApplyStep, GrowsASemiAxisByTheRelativeStep) {
   Ellipsoid p = sphere(2.0);
   applyStep(p, {0, 0, 0, 0.01});
-  // exp(0.01) to second order: the third is 2e-7
+  // The step is exp(0.01) to second order; the third-order term is 2e-7.
   EXPECT_NEAR(principalAxes(p.L).scale[0], 2.0 * std::exp(0.01), 1e-6);
   EXPECT_NEAR(principalAxes(p.L).scale[2], 2.0, 1e-12);
 }
@@ -47,7 +46,7 @@ TEST(ClampScales, HoldsBothLimitsAndKeepsTheDirections) {
   p.L = {100.0, 0, 0, 0, 1.0, 0, 0, 0, 0.01};
   clampScales(p, 0.25, 64.0);
   const PrincipalAxes axes = principalAxes(p.L);
-  // Aspect 1e4, ten times what fits meet, where the closed-form solver keeps 1e-4.
+  // At an aspect ratio of 1e4, ten times what fits meet, the closed-form solver is precise to 1e-4.
   EXPECT_NEAR(axes.scale[0], 64.0, 64.0 * 1e-4);
   EXPECT_NEAR(axes.scale[1], 1.0, 1e-4);
   EXPECT_NEAR(axes.scale[2], 0.25, 1e-12);
@@ -62,8 +61,8 @@ TEST(ClampScales, LeavesWhatIsWithinUntouched) {
 
 class Aspect : public testing::TestWithParam<double> {};
 
-// The rotation's float32 quaternion turns the long axis by 1e-7 of its length, seen from the short
-// one aspect times larger, and squared in the precision.
+// The rounding of the quaternion to float32 turns the long axis by 1e-7. In units of the short axis
+// this is larger by the aspect ratio, and it is squared in Sigma^-1.
 TEST_P(Aspect, ExportKeepsTheShape) {
   const Field field =
       test::randomField({.count = 50, .smallest = 0.3, .aspect = GetParam(), .seed = 4});

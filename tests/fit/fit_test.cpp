@@ -1,6 +1,6 @@
-// Plan: what a user may rely on. Invariances that hold by construction are held to bits (place,
-// empty space, threads, repetition); targets are met and say so; degenerate and extreme input gives
-// the exact or a finite answer; what is asked for wrongly is refused.
+// Plan: the tests check what a user may rely on. Invariances by construction (position, empty
+// space, threads, repetition) hold bit by bit. Goals are met and reported. Degenerate and extreme
+// input gives the exact or a finite result, and wrong options are refused.
 
 #include "esvr/fit.h"
 
@@ -45,7 +45,8 @@ TEST(Fit, CurveAgreesWithTheMetricsOfItsField) {
   const FitResult result = fit(volume, quick());
   const CompareOptions compare;
   const VolumeMetrics m = compareVolumes(volume, revoxelise(result.field, {}), compare);
-  // The curve counts errors outside the box too, hence the side; float32 parameters move the rest.
+  // The curve also counts errors outside the box, and float32 parameters change the error, hence
+  // the tolerance.
   EXPECT_NEAR(result.curve.back().psnrBox, m.psnrBox, 0.05);
   EXPECT_LE(result.curve.back().psnrBox, m.psnrBox + 1e-3);
   EXPECT_NEAR(result.curve.back().psnrActive, m.psnrActive, 1e-2);
@@ -101,8 +102,8 @@ TEST_P(FitScale, ReachesTheSamePsnrAtAnyScaleOfValues) {
   const FitResult plain = fit(test::ellipsoidVolume(20, 0.2, 1.0), quick());
   const FitResult scaled = fit(test::ellipsoidVolume(20, 0.2, 1.0, {}, GetParam()), quick());
   const bool powerOfTwo = std::frexp(GetParam(), std::make_unique<int>().get()) == 0.5;
-  // Powers of two scale exactly; other factors round the input itself by 6e-8 and the fit diverges
-  // from there as any two runs with different input do.
+  // Powers of two scale exactly. Other factors round the input by 6e-8, and the fit then diverges
+  // as for any two different inputs.
   EXPECT_NEAR(scaled.curve.back().psnrBox, plain.curve.back().psnrBox, powerOfTwo ? 1e-9 : 1.0);
 }
 INSTANTIATE_TEST_SUITE_P(Scales, FitScale, testing::Values(0x1p-20, 0x1p40, 1e-30, 1e4, 1e30));
@@ -181,7 +182,7 @@ TEST(Fit, EndsInTime) {
   options.seconds = 0.3;
   const FitResult result = fit(test::tubeVolume(), options);
   EXPECT_EQ(result.end, FitEnd::kTimeUp);
-  EXPECT_LT(result.curve.back().seconds, 2.0);  // the clock is looked at once an iteration
+  EXPECT_LT(result.curve.back().seconds, 2.0);  // the time is checked once per iteration
   EXPECT_GT(result.curve.back().iteration, 10u);
 }
 
@@ -238,7 +239,7 @@ TEST(Fit, FollowsTheBandOfALevelSetAndNothingBeyond) {
   const auto banded = compareVolumes(volume, revoxelise(fit(volume, options).field, band));
   options.narrowBand = false;
   const auto plain = compareVolumes(volume, revoxelise(fit(volume, options).field, band));
-  EXPECT_GT(banded.psnrActive, 18.0);  // an error of an eighth of the band's half width
+  EXPECT_GT(banded.psnrActive, 18.0);  // the error is an eighth of the band's half width
   EXPECT_GT(banded.iou, 0.9);
   EXPECT_GT(banded.psnrActive, plain.psnrActive + 2.0);
 }

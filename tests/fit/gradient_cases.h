@@ -1,6 +1,6 @@
 #pragma once
-/// Ellipsoids of every shape at the edges of their kernels, the derivatives of their sum in float64,
-/// and what a device's gradients must agree with. For the tests of every pass of a fit.
+/// Ellipsoids of all shapes for tests of gradients, the derivatives of their sum in float64, and
+/// the comparisons that gradients of a device must pass.
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ inline std::ostream& operator<<(std::ostream& out, const GradientCase& c) {
   return out << c.name << ", kappa " << c.kappa;
 }
 
-/// From spheres of a tenth of a voxel to a hundred voxels, with aspects up to 1:1000.
+/// Cases from spheres of a tenth of a voxel to a hundred voxels, with aspect ratios up to 1000.
 inline std::vector<GradientCase> gradientCases() {
   std::vector<GradientCase> cases;
   for (const float kappa : {-30.0f, -3.0f, 2.0f, 5.0f, 30.0f})
@@ -44,17 +44,17 @@ inline std::vector<GradientCase> gradientCases() {
   return cases;
 }
 
-/// "needle_kappa_minus_30", a name of a test.
+/// The name of a case in a test, such as "needle_kappa_minus_30".
 inline std::string nameOf(const GradientCase& c) {
   return std::string(c.name) + "_kappa_" + (c.kappa < 0 ? "minus_" : "") +
          std::to_string(int(std::abs(c.kappa)));
 }
 
-/// Two bricks along each axis.
+/// A target with two bricks along each axis.
 class SmallTarget {
  public:
   SmallTarget() : volume_(randomVolume()), target_(makeTarget(volume_, std::nullopt)) {
-    // Other bricks count for nothing, as those beyond a narrow band, whose limits no residual meets.
+    // The narrow band makes other bricks count for nothing; its limits are never reached.
     target_.narrowBand = true;
     target_.lowest = -1e9, target_.highest = 1e9;
   }
@@ -79,7 +79,7 @@ class SmallTarget {
   FitTarget target_;
 };
 
-/// ((1 + E) / (E + e^m) - eps) / (1 - eps) with E = e^kappa, the definition of esvr/kernel.h.
+/// The definition of esvr/kernel.h: ((1 + E) / (E + e^m) - eps) / (1 - eps) with E = e^kappa.
 inline double phiByDefinition(double kappa, double m) {
   const double E = std::exp(kappa), eps = double(Kernel::kDefaultEpsilon);
   return std::max(0.0, ((1.0 + E) / (E + std::exp(m)) - eps) / (1.0 - eps));
@@ -99,7 +99,7 @@ inline double contribution(const Ellipsoid& p, double kappa, Coord v) {
   return p.intensity * phiByDefinition(kappa, squaredDistance(p, v));
 }
 
-/// L = S^-1 R^T with a random rotation.
+/// L = S^-1 R^T with a random rotation R.
 inline Matrix3 randomFrame(const double (&scales)[3], Random& random) {
   double q[4], norm = 0.0;
   for (double& v : q) v = random(-1.0, 1.0), norm += v * v;
@@ -111,11 +111,11 @@ inline Matrix3 randomFrame(const double (&scales)[3], Random& random) {
   return L;
 }
 
-/// By how much float32 may be off in m, as far as the support reaches. A displacement from the center
-/// is rounded to 2^-24 of the largest coordinate D that enters it, and so are its products with the
-/// rows of L, which moves a voxel by D 2^-24 / (shortest scale) in the unit frame and m by 2 sqrt(m)
-/// times that. Some 16 such roundings enter m: for each axis those of the center, the displacement,
-/// its two products and their sum.
+/// Largest error of m in float32 within the support. A displacement from the center is rounded to
+/// 2^-24 of the largest coordinate D that enters it, and so are its products with the rows of L.
+/// This moves a voxel by D 2^-24 / (shortest scale) in the unit frame, and changes m by 2 sqrt(m)
+/// times that. About 16 such roundings enter m: for each axis those of the center, the
+/// displacement, its two products and their sum.
 inline double errorOfM(const GradientCase& c, const Ellipsoid& p) {
   double largest = SmallTarget::kSide;
   for (const double x : p.center) largest = std::max(largest, x);
@@ -124,8 +124,8 @@ inline double errorOfM(const GradientCase& c, const Ellipsoid& p) {
   return 16.0 * 2.0 * radius * largest * 0x1p-24 / shortest;
 }
 
-/// A voxel of the target lies where the kernel is near 1/2, so that all derivatives are there to be
-/// found; the center may lie far outside.
+/// An ellipsoid for which the kernel is near 1/2 at a voxel of the target, so that no derivative is
+/// close to 0. Its center may lie far outside.
 inline Ellipsoid atAVoxel(const GradientCase& c, Random& random) {
   Ellipsoid p{{}, randomFrame(c.scales, random), random(0.1, 0.5) * (random(0, 1) < 0.3 ? -1 : 1)};
   const double half = kernelWidth(kernelConstants<double>({.kappa = c.kappa})).m;
@@ -140,9 +140,9 @@ inline Ellipsoid atAVoxel(const GradientCase& c, Random& random) {
   return p;
 }
 
-/// Whether a voxel is so near to the end of the support, where the derivatives jump, that rounding
-/// decides on which side of it, or whether the center lies below the frame that begins at 0: the
-/// next one begins 4096 voxels before, and so large coordinates leave few digits to test.
+/// True if a voxel is so close to the end of the support, where derivatives jump, that rounding
+/// decides on which side it lies. Also true if the center lies below 0: its frame then begins 4096
+/// voxels before, and large coordinates leave few digits to test.
 inline bool isUnfit(const GradientCase& c, const Ellipsoid& p, const SmallTarget& target) {
   if (*std::min_element(p.center.begin(), p.center.end()) < 0.0) return true;
   const double cutoff = kernelConstants<double>({.kappa = c.kappa}).cutoff;
@@ -162,14 +162,14 @@ inline std::vector<Ellipsoid> ellipsoidsOf(const GradientCase& c, const SmallTar
   return ellipsoids;
 }
 
-/// How far float32 gradients may be off, relative to the sum of the magnitudes of their terms: no
-/// kernel's derivatives change by more than themselves where m changes by 1, and sums of up to 4096
-/// terms in eight lanes, brick by brick, add some 2^-24 for each of 64 rows.
+/// Largest error of float32 gradients relative to the sum of the magnitudes of their terms. If m
+/// changes by 1, no derivative of the kernel changes by more than its own size. Sums of up to 4096
+/// terms in eight lanes, brick by brick, add about 2^-24 for each of 64 rows.
 inline double toleranceOf(const GradientCase& c, const Ellipsoid& p) {
   return 64 * 0x1p-24 + errorOfM(c, p);
 }
 
-/// Differences err by 2^-53 over the step and by the square of the step, and no voxel lies within a
+/// The error of differences is 2^-53 / step plus the square of the step. No voxel lies within a
 /// step of the end of a support.
 inline constexpr double kDifferenceStep = 1e-6;
 
@@ -180,7 +180,7 @@ inline Ellipsoid moved(Ellipsoid p, const ParameterVector& direction, double ste
   return p;
 }
 
-/// The loss's derivative by the sum at every voxel, V - target in float64.
+/// The derivative of the loss by the sum at every voxel, V - target, in float64.
 inline std::vector<double> residualsOf(const SmallTarget& target, const GradientCase& c,
                                        const std::vector<Ellipsoid>& ellipsoids) {
   std::vector<double> r(target.get().values.size());
@@ -191,7 +191,7 @@ inline std::vector<double> residualsOf(const SmallTarget& target, const Gradient
   return r;
 }
 
-/// <g, dV> and the sum of the magnitudes of its terms.
+/// The product <g, dV> and the sum of the magnitudes of its terms.
 struct Projection {
   double sum = 0.0, magnitude = 0.0;
 };
@@ -219,7 +219,7 @@ inline ParameterVector unit(int parameter) {
   return direction;
 }
 
-/// Every gradient against differences, each parameter by itself and kappa with the scales held.
+/// Compares every gradient with differences: each parameter alone, and kappa at fixed scales.
 inline void expectDifferences(const SmallTarget& target, const GradientCase& c,
                               const std::vector<Ellipsoid>& ellipsoids,
                               const std::vector<double>& g,
@@ -243,7 +243,7 @@ inline void expectDifferences(const SmallTarget& target, const GradientCase& c,
   }
 }
 
-/// <g, dV> = <dL, dtheta> for a random direction dtheta of all parameters and of kappa together.
+/// Checks <g, dV> = <dL, dtheta> for a random direction dtheta of all parameters and kappa.
 inline void expectAdjointIdentity(const SmallTarget& target, const GradientCase& c,
                                   const std::vector<Ellipsoid>& ellipsoids,
                                   const std::vector<double>& g,

@@ -1,5 +1,5 @@
-// Plan: the gradients of a GPU against float64 differences and the adjoint identity, over the same
-// shapes and kernels as the CPU's (gradient_test.cpp).
+// Plan: the gradients of a GPU are compared with float64 differences and the adjoint identity, for
+// the shapes and kernels of the CPU's tests (gradient_test.cpp).
 
 #include "cuda/gpu_test.h"
 #include "fit/cuda/cuda_optimiser.h"

@@ -1,9 +1,9 @@
-// Plan: the gradients of 1/2 sum r^2, by every parameter of every ellipsoid and by kappa, against
-// central differences of a float64 sum over all voxels of a dense box: over a whole random field
-// with its bricks that only supports reach, and over ellipsoids of every shape and kernel
-// (gradient_cases.h), which gradient_cases_cuda_test.cpp gives to a GPU. For the same shapes the
-// adjoint identity <g, dV> = <dL, dtheta> for a random g, in the pass of a fit, where g is what a
-// random target leaves, and in the pass of the paper's method, which is given g.
+// Plan: the gradients of 1/2 sum r^2 by every parameter of every ellipsoid and by kappa are
+// compared with central differences of a float64 sum over all voxels of a dense box. This is done
+// for a random field, including bricks that only supports reach, and for ellipsoids of every shape
+// and kernel (gradient_cases.h). For these shapes the adjoint identity <g, dV> = <dL, dtheta> is
+// checked for a random g, in the pass of the default fit, where g is the residual of a random
+// target, and in the pass of the paper's method, whose input is g.
 
 #include <gtest/gtest.h>
 
@@ -38,7 +38,7 @@ double valueAt(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<d
   return value;
 }
 
-/// 1/2 sum r^2 in float64 over a box that holds every support.
+/// 1/2 sum r^2 in float64 over a box that contains every support.
 double referenceLoss(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<double>& k,
                      const SparseVolume& volume, const FitTarget& target, int margin) {
   double loss = 0.0;
@@ -54,9 +54,9 @@ double referenceLoss(const std::vector<Ellipsoid>& ellipsoids, const KernelConst
 
 class GradientKappa : public testing::TestWithParam<float> {};
 
-// The loss is about 1e4 and float64, so differences of step 1e-6 carry errors near 1e-6; the step
-// is that small because phi has a kink at the end of its support, which few voxels then straddle.
-// The gradient itself is a float32 sum over some thousand voxels.
+// The loss is about 1e4 in float64, so differences with a step of 1e-6 have errors near 1e-6. The
+// step is so small because phi has a kink at the end of its support, and few voxels should lie
+// across it. The gradient itself is a float32 sum over a few thousand voxels.
 TEST_P(GradientKappa, SlowAgreesWithCentralDifferences) {
   const SparseVolume volume = denseVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
@@ -86,7 +86,7 @@ TEST_P(GradientKappa, SlowAgreesWithCentralDifferences) {
     EXPECT_LT(std::sqrt(error2), 3e-4 * std::sqrt(norm2)) << "ellipsoid " << i;
   }
 }
-// By kappa with half widths held: scales follow, as a run's steps of kappa have them.
+// The derivative by kappa is taken at fixed half widths: the scales change as in a run.
 TEST_P(GradientKappa, AgreesWithCentralDifferencesByKappa) {
   const SparseVolume volume = denseVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
@@ -111,7 +111,8 @@ TEST_P(GradientKappa, AgreesWithCentralDifferencesByKappa) {
     slope += edgeGradient(g, kernelWidth(k).logMByKappa);
     for (int j = 3; j < 6; ++j) terms += std::abs(g.byParameter[j]);
   }
-  // Sums as above; a Gaussian's slope is nothing, beside the loss's own rounding over the step.
+  // The precision of sums is as above. For a Gaussian the slope is nothing compared with the
+  // rounding of the loss.
   EXPECT_NEAR(slope, difference, 3e-4 * std::max(terms * kernelWidth(k).logMByKappa, 1.0));
 }
 

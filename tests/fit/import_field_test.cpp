@@ -1,4 +1,4 @@
-// Plan: the fit's form of a field becomes the file's form again.
+// Plan: a field that is imported and exported again is the same field.
 
 #include "fit/import_field.h"
 
@@ -21,7 +21,7 @@ TEST(ImportField, IsTheWayBack) {
   EXPECT_EQ(a.center, b.center);
   EXPECT_EQ(a.intensity, b.intensity);
   for (std::size_t i = 0; i < a.size(); ++i) {
-    // axes come back in another order: the same matrix, to float32
+    // The axes may come back in another order, but the matrix is the same to float32 precision.
     const Matrix3 A = inverse(unitFrame(a, i)), B = inverse(unitFrame(b, i));
     const double size = sigma(A, 0, 0) + sigma(A, 1, 1) + sigma(A, 2, 2);
     for (int r = 0; r < 3; ++r)

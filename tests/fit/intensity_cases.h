@@ -1,7 +1,7 @@
 #pragma once
-/// Plan, for each device: the solution against one of dense normal equations in float64, exact data
-/// recovered, errors as a reader has them, voxels that come back exactly left alone, and nothing
-/// left over from the field before.
+/// Plan for each device: the solution agrees with that of dense normal equations in float64, exact
+/// data is recovered, errors are those of a reader, voxels that a reader gets exactly are left out,
+/// and nothing depends on the field before.
 
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ inline Field someField() {
       {.count = 12, .extent = 14.0, .smallest = 1.5, .aspect = 2.0, .origin = {6, 16, 11}});
 }
 
-/// Every voxel active.
+/// A target in which every voxel is active.
 inline IntensityTarget targetOf(const SparseVolume& volume) {
   return {volume, {.threshold = -1.0f}, activeBox(volume)};
 }
@@ -39,9 +39,10 @@ TEST_P(Intensities, ThatMadeTheVolumeAreFound) {
   const SparseVolume volume = revoxelise(truth, {});
   auto problem = problemOf(truth, targetOf(volume));
   std::vector<float> guess(truth.ellipsoidCount(), 0.1f);
-  guess[3] = -0.1f;  // signs are allowed then
+  guess[3] = -0.1f;  // negative intensities are allowed then
   EXPECT_GT(problem.error(guess).squares, 1.0);
-  // 12 unknowns: exact after 12 steps but for rounding in float32 brick sums
+  // With 12 unknowns the result is exact after 12 steps, up to rounding in float32 sums over
+  // bricks.
   EXPECT_LT(problem.solve(guess, 30), 1e-7);
   const auto& wanted = truth.chunks[0].ellipsoids.intensity;
   for (std::size_t i = 0; i < guess.size(); ++i) EXPECT_NEAR(guess[i], wanted[i], 1e-3) << i;
@@ -49,7 +50,7 @@ TEST_P(Intensities, ThatMadeTheVolumeAreFound) {
 
 using Row = std::vector<double>;
 
-/// Gauss's way, in place. \return x of A x = b
+/// Gaussian elimination in place. \return x with A x = b
 inline Row solved(std::vector<Row> A, Row b) {
   const std::size_t n = b.size();
   for (std::size_t k = 0; k < n; ++k)
@@ -65,7 +66,7 @@ inline Row solved(std::vector<Row> A, Row b) {
   return b;
 }
 
-/// Every ellipsoid alone, with an intensity of 1.
+/// For each ellipsoid a field that has this ellipsoid alone, with an intensity of 1.
 inline std::vector<Field> kernelsOf(const Field& field) {
   std::vector<Field> kernels(field.ellipsoidCount(), field);
   for (std::size_t i = 0; i < kernels.size(); ++i) {
@@ -94,7 +95,7 @@ TEST_P(Intensities, AgreeWithDenseNormalEquations) {
       for (std::size_t c = 0; c < phi.size(); ++c) normal[r][c] += phi[r] * phi[c];
     }
   };
-  // all voxels that a support reaches, and all of the volume's
+  // The loop visits all voxels of the volume and all that a support reaches.
   for (std::int32_t x = 0; x < 40; ++x)
     for (std::int32_t y = 0; y < 40; ++y)
       for (std::int32_t z = 0; z < 40; ++z) {
@@ -103,14 +104,15 @@ TEST_P(Intensities, AgreeWithDenseNormalEquations) {
         add({x, y, z}, at ? double(volume.brickValues(*at)[std::size_t(offset)]) : 0.0);
       }
   const Row exact = solved(normal, right);
-  // sums over a brick are float32: 1e-6 of sums of about 100, over curvatures of about 10
+  // Sums over a brick are float32: an error of 1e-6 of sums of about 100, divided by curvatures of
+  // about 10.
   for (std::size_t i = 0; i < exact.size(); ++i) {
     EXPECT_NEAR(solution[i], exact[i], 1e-4) << i;
     EXPECT_NEAR(problem.curvature()[i], normal[i][i], 1e-4 * normal[i][i]);
   }
 }
 
-/// A reader's rule that leaves voxels inactive and clamps others.
+/// A rule by which a reader makes some voxels inactive and clamps others.
 struct ReaderRule {
   RevoxeliseOptions options{.threshold = 0.2f, .range = ValueRange{0.0f, 0.9f}};
   VoxelRule rule = makeVoxelRule(0.0f, options);
@@ -121,10 +123,10 @@ TEST_P(Intensities, HaveTheErrorThatAReaderGets) {
   const SparseVolume volume = tubeVolume();
   const ReaderRule rule;
   Box box = activeBox(volume);
-  box.min.x += 3, box.max.z -= 5;  // not along bricks
+  box.min.x += 3, box.max.z -= 5;  // the box cuts bricks
   const auto found = problemOf(field, {volume, rule.rule, box}).error(intensitiesOf(field));
   const auto metrics = compareVolumes(volume, revoxelise(field, rule.options), {.box = box});
-  // values within 1e-6, errors up to 1, some 20,000 voxels whose differences cancel
+  // Values are within 1e-6, errors up to 1, and the differences of about 20,000 voxels cancel.
   EXPECT_NEAR(found.squares, metrics.mseBox * metrics.boxVoxels, 1e-4);
   EXPECT_NEAR(found.largest, metrics.maxError, 1e-5);
 }
@@ -142,7 +144,7 @@ TEST_P(Intensities, KeepTheirSignWhereThereIsOne) {
 TEST_P(Intensities, LeaveExactVoxelsAlone) {
   const Field field = someField();
   const SparseVolume volume = tubeVolume();
-  // nothing is active: every voxel of the background is exact, and no other matters to the fit
+  // Nothing is active. Every voxel of the background is then exact, and others do not matter.
   IntensityTarget target = targetOf(volume);
   target.rule.threshold = 1e6f;
   auto passes = makeIntensityPasses(target, device_);
@@ -162,7 +164,7 @@ TEST_P(Intensities, LeaveExactVoxelsAlone) {
     EXPECT_LE(some[i], all[i] * (1.0 + 1e-5)) << i;
     sumSome += some[i], sumAll += all[i];
   }
-  EXPECT_LT(sumSome, 0.9 * sumAll);  // much of the field lies beside the tube
+  EXPECT_LT(sumSome, 0.9 * sumAll);  // a large part of the field lies beside the tube
 }
 
 TEST_P(Intensities, DoNotDependOnTheFieldBefore) {

@@ -1,5 +1,5 @@
-// Plan: steps go against the slope whatever its size, by no more than the largest step; they stay
-// in bounds; without a slope nothing moves; a valley's floor is found.
+// Plan: steps go against the slope, whatever its size, and are at most the largest step. Kappa
+// stays within its limits and does not move without a slope. The minimum of a valley is found.
 
 #include "fit/kappa_descent.h"
 

@@ -136,7 +136,7 @@ TEST(MotionBound, SlackFollowsTheMotionBefore) {
   EXPECT_NEAR(slackOf(p, 4, listedAs(p, 0.1), kRadius, rule), least, 1e-12);
   EXPECT_NEAR(slackOf(sphere(2.4), 4, listedAs(p, 0.1), kRadius, rule), 0.2, 1e-9);
   EXPECT_EQ(slackOf(sphere(4.0), 4, listedAs(p, 0.1), kRadius, rule), rule.maxSlack);
-  // so small that minSlack is more
+  // The ellipsoid is so small that minSlack is the larger of the two.
   EXPECT_NEAR(slackOf(sphere(0.2), 3, {}, kRadius, rule), 0.4, 1e-12);
 }
 

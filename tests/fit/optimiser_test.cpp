@@ -1,7 +1,7 @@
-// Plan: the moves of a run on every device: growth reaches its count and seeds where the error is;
-// relocation moves the least useful and no others; unseen ellipsoids go; without error nothing is
-// seeded; a whole fit is the same bits in three runs and in a far place. Without a GPU its tests
-// skip.
+// Plan: the operations of a run on every device. Growth reaches its count and places seeds where
+// the error is. Relocation moves the least useful ellipsoids only. Ellipsoids that reach no voxel
+// are dropped, and without an error there are no seeds. A whole fit has the same bits in three runs
+// and at a distant position. Without a GPU, its tests skip.
 
 #include "fit/optimiser.h"
 
@@ -56,8 +56,8 @@ TEST_P(OptimiserOn, ManyIterationsInACallAreThoseOfManyCalls) {
   EXPECT_EQ(inOne->measure().squaredSum, inMany->measure().squaredSum);
 }
 
-// Lists of pairs that serve for too long would leave out what supports have grown by: the loss that
-// a step sees must be that of lists just built, but for the share that may be missed.
+// If lists were used for too long, they would miss the parts by which supports have grown. The loss
+// of a step must agree with that of new lists, except for the share that lists may miss.
 TEST_P(OptimiserOn, LargeStepsSeeTheWholeOfEveryEllipsoid) {
   const auto going = make();
   going->growTo(50);
@@ -86,7 +86,7 @@ TEST_P(OptimiserOn, RelocatesTheLeastUsefulAndKeepsTheCount) {
 TEST_P(OptimiserOn, DropsWhatNoVoxelSees) {
   Tuning tiny;
   tiny.smallestScale = 0.01;
-  tiny.largestScale = 0.02;  // supports of a twentieth of a voxel: most see no voxel
+  tiny.largestScale = 0.02;  // supports of a twentieth of a voxel, most of which contain no voxel
   const auto optimiser = make(tiny);
   optimiser->growTo(50);
   for (int i = 0; i < 5; ++i) optimiser->iterate(std::array{1.0});
@@ -105,7 +105,7 @@ TEST_P(OptimiserOn, AnotherEdgeKeepsTheHalfWidths) {
   const double moved = kernelWidth(kernelConstants<double>(optimiser->kernel())).m;
   const auto after = optimiser->ellipsoids();
   for (std::size_t i = 0; i < before.size(); ++i)
-    for (int k = 0; k < 9; ++k)  // a product of two rounded numbers, a square root among them
+    for (int k = 0; k < 9; ++k)  // a product of two rounded numbers, one of them a square root
       EXPECT_NEAR(after[i].L[k] / std::sqrt(moved), before[i].L[k] / std::sqrt(m),
                   1e-14 * std::sqrt(before[i].L[0] * before[i].L[0] + 1.0));
 }
@@ -115,7 +115,7 @@ TEST_P(OptimiserOn, SlopeByKappaIsTheLosssDifference) {
   optimiser->growTo(50);
   for (int i = 0; i < 40; ++i) optimiser->iterate(std::array{0.5});
   EXPECT_NE(optimiser->kappaSlope(), 0.0);
-  optimiser->iterate(std::array{0.0});  // gradients where it stands
+  optimiser->iterate(std::array{0.0});  // computes gradients without a step
   const float kappa = optimiser->kernel().kappa;
   const double slope = optimiser->kappaSlope();
   const auto lossAt = [&](float k) {
@@ -124,7 +124,7 @@ TEST_P(OptimiserOn, SlopeByKappaIsTheLosssDifference) {
   };
   constexpr float kStep = 1.0f / 64;
   const double difference = (lossAt(kappa + kStep) - lossAt(kappa - kStep)) / (2 * kStep);
-  // the third derivative over a step of 1/64, and kinks at the ends of supports
+  // The error is the third derivative over a step of 1/64, and kinks at the ends of supports.
   EXPECT_NEAR(slope, difference, 0.02 * std::abs(difference));
 }
 

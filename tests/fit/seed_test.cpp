@@ -27,13 +27,13 @@ TEST(DrawVoxels, FollowsTheEnergyBrickByBrick) {
   ASSERT_EQ(voxels.size(), 100u);
   const auto inSecond =
       std::count_if(voxels.begin(), voxels.end(), [](Coord v) { return v.x >= 8; });
-  EXPECT_NEAR(double(inSecond), 80.0, 1.0);  // systematic: within one of 4 / (1 + 4)
+  EXPECT_NEAR(double(inSecond), 80.0, 1.0);  // systematic sampling errs by at most one
 }
 
 TEST(DrawVoxels, LeavesAloneWhatItsSignCannotMend) {
   Bricks b({{0, 0, 0}});
-  b.values[10] = 5.0f;   // V too high
-  b.values[20] = -1.0f;  // V too low
+  b.values[10] = 5.0f;   // V is too high
+  b.values[20] = -1.0f;  // V is too low
   for (const Coord v : sampleVoxels(b.field(), {.count = 50, .targetBricks = 1}).voxels)
     EXPECT_EQ(v, voxelLocal(20));
   SamplingOptions negative{
@@ -57,7 +57,7 @@ TEST(DrawVoxels, FindsNothingWhereThereIsNoError) {
 
 TEST(Seed, TakesPlaceAndHeightFromTheResidual) {
   Bricks b({{0, 0, 0}, {0, 0, 1}});
-  // A bar along z across two bricks: three voxels high, symmetric about (4, 4, 7).
+  // A bar along z across two bricks, three voxels long and symmetric about (4, 4, 7).
   for (int z = 6; z <= 8; ++z)
     b.values[std::size_t((z >> 3) * kBrickVoxels + voxelOffset({4, 4, z & 7}))] = -0.5f;
   SeedOptions options;
@@ -66,7 +66,7 @@ TEST(Seed, TakesPlaceAndHeightFromTheResidual) {
   ASSERT_EQ(seeds.size(), 3u);
   EXPECT_NEAR(seeds[1].center[0], 4.0, 1e-9);
   EXPECT_NEAR(seeds[1].center[2], 7.0, 1e-9);
-  // All three see the same residual and share it.
+  // All three seeds have the same residual and share it.
   EXPECT_NEAR(seeds[0].intensity + seeds[1].intensity + seeds[2].intensity, 0.5, 1e-7);
   const PrincipalAxes axes = principalAxes(seeds[1].L);
   EXPECT_GT(axes.scale[0], 1.4 * axes.scale[1]);  // longer along the bar

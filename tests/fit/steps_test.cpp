@@ -1,5 +1,5 @@
-// Plan: Adam's step under gradients of any size, under a scaled loss, at its limits, and over very
-// many steps; schedules that start and end where they say.
+// Plan: Adam's step is checked for gradients of any size, for a scaled loss, at its limits, and
+// over many steps. Schedules start and end at the given values.
 
 #include <gtest/gtest.h>
 
@@ -21,8 +21,8 @@ TEST(Adam, FirstStepHasTheTunedSizeWhateverTheGradient) {
     g[0].byParameter.fill(0.0);
     g[0].byParameter[0] = size;
     adamStep(p, state, g, {0.1, 0.1, 0.1}, {}, {0.25, 64.0, -2.0, 2.0});
-    // float32 moments round g^2; below 1e-19 they would underflow, which the target's scale
-    // excludes
+    // Float32 moments round g^2. Below 1e-19 they would underflow, which the target's scale
+    // excludes.
     if (size > 1e-19 && size < 1e19) {
       EXPECT_NEAR(p[0].center[0], -0.1, 1e-6);
     }
@@ -40,7 +40,7 @@ TEST(Adam, KeepsIntensitiesInRange) {
   EXPECT_EQ(p[0].intensity, 0.0);
 }
 
-/// A hundred steps down the bowl |center - (1, 2, 3)|^2 / 2, its gradient scaled.
+/// A hundred steps down the bowl |center - (1, 2, 3)|^2 / 2, with a scaled gradient.
 std::array<double, 3> descend(double scale) {
   std::vector<Ellipsoid> p{{{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 1.0}};
   std::vector<AdamState> state(1);
@@ -58,7 +58,7 @@ TEST(Adam, TakesTheSameWayHoweverTheLossIsScaled) {
   const auto expected = descend(1.0);
   for (const double scale : {1e-6, 1e6}) {
     const auto found = descend(scale);
-    // Float32 moments round the scaled gradients differently, by 1e-7 a step.
+    // Float32 moments round the scaled gradients differently, by 1e-7 for each step.
     for (std::size_t a = 0; a < 3; ++a) EXPECT_NEAR(found[a], expected[a], 1e-4);
   }
 }
@@ -74,7 +74,7 @@ TEST(Adam, LeavesALimitWhenTheGradientPointsBackInside) {
     for (int i = 0; i < steps; ++i) adamStep(p, state, g, {}, {}, {kSmallest, 64.0, 0.0, 1.5});
     return principalAxes(p[0].L).scale[2];
   };
-  EXPECT_NEAR(push(1.0, 30), kSmallest, 1e-9);  // growing smaller, held
+  EXPECT_NEAR(push(1.0, 30), kSmallest, 1e-9);  // shrinks until the limit holds it
   EXPECT_GT(push(-1.0, 60), 2 * kSmallest);
 }
 
@@ -91,7 +91,7 @@ TEST(Adam, SlowKeepsAShapeValidOverAHundredThousandSteps) {
   double norm2 = 0.0;
   for (const double q : axes.rotation) norm2 += q * q;
   EXPECT_NEAR(norm2, 1.0, 1e-12);
-  EXPECT_GE(axes.scale[2], 0.25 * (1 - 1e-6));  // what the closed-form eigensolver is exact to
+  EXPECT_GE(axes.scale[2], 0.25 * (1 - 1e-6));  // the precision of the closed-form eigensolver
   EXPECT_LE(axes.scale[0], 16.0 * (1 + 1e-6));
 }
 

@@ -11,8 +11,8 @@
 
 namespace esvr::test {
 
-/// Every voxel of a cube of bricks set from a function of its index coordinates; active where the
-/// value differs from the background.
+/// A cube of bricks whose voxels are a function of their index coordinates. Voxels that differ from
+/// the background are active.
 inline SparseVolume volumeOf(Coord corner, int bricks, float background,
                              const std::function<float(Coord)>& value) {
   std::vector<BrickInput> input;
@@ -30,7 +30,7 @@ inline SparseVolume volumeOf(Coord corner, int bricks, float background,
   return makeVolume(std::move(input), background);
 }
 
-/// A field that ellipsoids can represent exactly, as voxels.
+/// The voxels of a field that ellipsoids can represent exactly.
 inline SparseVolume ellipsoidVolume(std::size_t count, double lowest, double highest,
                                     Coord shift = {}, double scale = 1.0) {
   Field field =
@@ -41,7 +41,7 @@ inline SparseVolume ellipsoidVolume(std::size_t count, double lowest, double hig
   return revoxelise(field, {.threshold = 0.0f});
 }
 
-/// A bent tube with soft walls: thin, branching data in small.
+/// A bent tube with soft walls, as small example of thin structures.
 inline SparseVolume tubeVolume(Coord shift = {}) {
   return volumeOf(shift, 5, 0.0f, [&](Coord v) {
     const Coord c = v - shift;
@@ -51,8 +51,8 @@ inline SparseVolume tubeVolume(Coord shift = {}) {
   });
 }
 
-/// The narrow band of a ball as a level set: background 3, -3 inside, bricks without a voxel of the
-/// band left out.
+/// The narrow band of a ball as a level set. The background is 3, the inside -3, and bricks without
+/// a voxel of the band are left out.
 inline SparseVolume levelSetVolume() {
   SparseVolume volume = volumeOf({}, 6, 3.0f, [](Coord v) {
     const double distance = std::hypot(v.x - 23.5, v.y - 23.5, v.z - 23.5) - 19.0;

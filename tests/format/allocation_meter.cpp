@@ -9,7 +9,8 @@ thread_local std::size_t allocated = 0;
 
 }  // namespace
 
-// All forms but the aligned: a sanitizer's own would otherwise allocate what these free.
+// All forms of new and delete except the aligned ones are replaced. Otherwise a sanitizer's own
+// would allocate what these free.
 void* operator new(std::size_t n, const std::nothrow_t&) noexcept {
   allocated += n;
   return std::malloc(n == 0 ? 1 : n);

@@ -1,11 +1,12 @@
 #pragma once
-/// Counts what the program asks of operator new: how much a hostile file can make a reader take.
+/// Counts the bytes requested from operator new, which shows how much memory a hostile file makes a
+/// reader take.
 
 #include <cstddef>
 
 namespace esvr::test {
 
-/// Bytes asked for by this thread since the meter was made; nothing is taken off for what is freed.
+/// Bytes requested by this thread since the meter was made. Freed memory is not subtracted.
 class AllocationMeter {
  public:
   AllocationMeter();

@@ -1,4 +1,4 @@
-// Files on disk: written whole or not at all, refused for what they are.
+// Plan: files on disk are written completely or not at all, and other kinds of files are refused.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -99,7 +99,7 @@ TEST_F(ContainerFile, InspectionListsTheSections) {
   EXPECT_EQ(summary.fileBytes, fs::file_size(path()));
   std::vector<std::string> kinds;
   for (const auto& s : summary.sections) kinds.push_back(s.kind);
-  // No rotations in the first chunk, nothing at all in the second.
+  // The first chunk has no rotations, and the second one has no ellipsoids.
   EXPECT_THAT(kinds, ElementsAre("grid", "chunks", "centers", "scales", "intensities", "centers",
                                  "scales", "rotations", "intensities", "kappas"));
   EXPECT_EQ(summary.sections[2].rawBytes, 50u * 3 * sizeof(float));

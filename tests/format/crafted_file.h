@@ -1,6 +1,6 @@
 #pragma once
-/// An .esvr file taken apart, so that a test can change a part and put it together again with
-/// checksums that match: damage that only the reader's own checks can find.
+/// Takes an .esvr file apart, so that a test can change a part and assemble the file with correct
+/// checksums. Such damage is found by the reader's own checks only.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,15 +19,15 @@ class CraftedFile {
  public:
   explicit CraftedFile(const std::vector<std::byte>& bytes);
 
-  /// The section of a kind, of the first grid or chunk that has one.
+  /// The section of a kind, in the first grid or chunk that has one.
   [[nodiscard]] CraftedSection& section(format::SectionKind kind);
   void erase(format::SectionKind kind);
 
-  /// Adds a section of raw content.
+  /// Adds a section with raw content.
   CraftedSection& add(const format::SectionId& id, std::uint16_t flags,
                       std::vector<std::byte> stored);
 
-  /// The content of a section, uncompressed; and another in its place.
+  /// The uncompressed content of a section. The setter replaces it.
   [[nodiscard]] std::vector<std::byte> content(format::SectionKind kind);
   void setContent(format::SectionKind kind, std::vector<std::byte> raw);
 
@@ -40,13 +40,13 @@ class CraftedFile {
     setContent(kind, std::move(raw));
   }
 
-  /// Sections one behind the other, with fresh offsets and checksums.
+  /// Puts the sections behind each other, with new offsets and checksums.
   [[nodiscard]] std::vector<std::byte> assemble();
 
-  /// Header and table from `table` as it is, before the sections at their offsets.
+  /// Writes header and table from `table` unchanged, with the sections at their offsets.
   [[nodiscard]] std::vector<std::byte> assembleAs(const format::SectionTable& table) const;
 
-  /// What assemble() wrote last.
+  /// The table of the last call of assemble().
   [[nodiscard]] const format::SectionTable& table() const { return table_; }
 
   std::uint16_t versionMajor = format::kVersionMajor, versionMinor = format::kVersionMinor;

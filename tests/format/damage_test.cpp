@@ -1,6 +1,6 @@
-// Damage by accident: whatever happens to a file's bytes, it is refused or its content is the
-// original's. Checksums cover every byte that is not zero by rule, so no damage passes unseen but
-// by a collision of 64 bits.
+// Plan: whatever happens to the bytes of a file by accident, it is refused or its content is that
+// of the original. Checksums cover every byte that need not be zero, so damage is found unless
+// 64-bit hashes collide.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ bool refused(const Bytes& bytes) {
   }
 }
 
-/// A file of all kinds of sections whose padding is not empty, small enough to damage every byte.
+/// A file with all kinds of sections and padding between them, small enough to damage every byte.
 EsvrFile smallFile() { return test::everything(3); }
 
 TEST(Damage, TruncationAtEveryByteIsRefused) {
@@ -52,7 +52,8 @@ TEST(Damage, BytesAfterTheEndAreRefused) {
   EXPECT_TRUE(refused(bytes));
 }
 
-/// One to eight of: a byte changed, a run cut out, a run doubled elsewhere, a run reversed.
+/// Applies one to eight of these: changes a byte, cuts a run out, repeats a run elsewhere, reverses
+/// a run.
 class Mutator {
  public:
   explicit Mutator(std::uint32_t seed) : pass_(seed) {}
@@ -102,7 +103,7 @@ TEST(Damage, TenThousandMutationsAreRefusedOrChangeNothing) {
     } catch (const BadInput&) {
     }
   }
-  EXPECT_LT(accepted, 500);  // those that wrote what was there
+  EXPECT_LT(accepted, 500);  // mutations that changed nothing
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 
 constexpr auto kKindOfNoVersion = format::SectionKind(0x7e57);
 
-/// Every number typed here, none computed.
+/// Every number is written here, and none is computed.
 StoredGrid oneEllipsoid() {
   StoredGrid grid = emptyGrid();
   grid.descriptor.name = "density";
@@ -41,7 +41,7 @@ StoredGrid fewValues() {
   return makeStoredVoxels({}, volume, exactLayer(volume));
 }
 
-/// A palette of values above 0 as floats, whose order is that of their bits.
+/// A palette of positive values as floats, whose order is that of their bits.
 VoxelLayer asFloats(VoxelLayer layer) {
   layer.form = VoxelForm::kFloat;
   for (auto& code : layer.codes)
@@ -50,7 +50,7 @@ VoxelLayer asFloats(VoxelLayer layer) {
   return layer;
 }
 
-/// 16 x 8 x 8 floats that are alike under a mirror along x, many of them 0.5.
+/// 16 x 8 x 8 floats that are equal under a mirror along x, many of them 0.5.
 StoredGrid mirroredValues() {
   std::vector<BrickInput> bricks(2);
   for (std::size_t b = 0; b < bricks.size(); ++b) {
@@ -79,7 +79,7 @@ StoredGrid masked() {
   return grid;
 }
 
-/// An ellipsoid with three corrections in a brick.
+/// An ellipsoid with a residual that corrects three voxels of a brick.
 StoredGrid corrected() {
   StoredGrid grid = oneEllipsoid();
   VoxelLayer& residual = grid.residual.emplace();

@@ -1,5 +1,5 @@
 #pragma once
-/// The files in tests/format/golden: their content, and how this version of the format writes it.
+/// The content of the files in tests/format/golden, and how this version of the format writes them.
 
 #include <cstddef>
 #include <string>
@@ -12,7 +12,7 @@ namespace esvr::test {
 struct GoldenFile {
   std::string name;
   EsvrFile content;
-  bool unknownSection = false;  ///< followed by an optional section of a kind nobody knows
+  bool unknownSection = false;  ///< an optional section of an unknown kind follows
 };
 
 [[nodiscard]] std::vector<GoldenFile> goldenFiles();

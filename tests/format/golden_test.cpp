@@ -1,5 +1,5 @@
-// The files in golden/ are read, and this library still writes them. Another format is another
-// version.
+// Plan: the files in golden/ are read, and this library still writes them. A change of the format
+// needs a new version.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -71,8 +71,7 @@ TEST(GoldenFiles, OneEllipsoidDecodesToTheNumbersTyped) {
   EXPECT_EQ(chunk.ellipsoids.intensity[0], 0.75f);
 }
 
-// What compressed bytes look like is the compression library's affair and may change with it; all
-// else is ours.
+// The compressed bytes depend on the version of the compression library. All other bytes do not.
 TEST(GoldenFiles, AreWrittenByteForByteWhereNothingIsCompressed) {
   int compared = 0;
   for (const auto& golden : test::goldenFiles()) {

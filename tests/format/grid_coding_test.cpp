@@ -1,7 +1,7 @@
-// Plan. Sources are made from fields whose voxels are known, so that what must come back is known:
-// the same field with its own threshold gives the same voxels; a field that is off gives the best
-// overlap that an exhaustive search over all thresholds finds, and no threshold that costs squared
-// error; level sets give their band and their inside; grids without contrast give their bricks.
+// Plan: sources are made from fields whose voxels are known. The same field with its threshold
+// gives the same voxels. A different field gives the best overlap that an exhaustive search over
+// all thresholds finds, and no threshold that increases the squared error. Level sets give their
+// band and their inside, and grids without contrast give their bricks.
 
 #include "esvr/grid_coding.h"
 
@@ -37,14 +37,14 @@ Field positiveField(std::uint64_t seed, Coord origin = {}) {
   return field;
 }
 
-/// A field whose source was something like it, for an overlap below 1.
+/// A field that differs from the one of the source, for an overlap below 1.
 Field perturbed(Field field) {
   test::Random random(11);
   for (float& x : field.chunks[0].ellipsoids.center[0]) x += float(random(-1.0, 1.0));
   return field;
 }
 
-/// One round body, inside negative: V falls from 3 to -3 as a signed distance would.
+/// A round body with a negative inside: V falls from 3 to -3 as a signed distance would.
 Field ball(float background = 3.0f) {
   Field field;
   field.background = background;
@@ -100,7 +100,8 @@ TEST(GridCoding, FactsOfTheSourceAreStored) {
   EXPECT_TRUE(grid.leaves.empty());
 }
 
-// The thresholds are edges of bins: exactly representable, so that the source's cut can be met.
+// The thresholds are edges of bins, which floats represent exactly, so that the source's threshold
+// can be met.
 TEST(GridCoding, AFieldThatFitsGivesItsSourceBack) {
   for (const float threshold : {0.0f, 0.0625f, 0.5f}) {
     const Field field = positiveField(2);
@@ -122,7 +123,7 @@ TEST(GridCoding, TheThresholdOverlapsAsWellAsTheBestOfManyThatCostNoError) {
   }
   const VolumeMetrics chosen = compareVolumes(source, decodeGrid(grid));
   ASSERT_LT(bestIou, 0.99);
-  // A bin spans up to 1/128 of its threshold, which holds less than 0.01 of these voxels.
+  // A bin covers up to 1/128 of its threshold, which contains less than 0.01 of these voxels.
   EXPECT_GE(chosen.iou, bestIou - 0.01);
   EXPECT_GT(chosen.iou, decodedAt(grid, source, 0.0f).iou);
   EXPECT_LE(chosen.mseBox, 1.001 * mseOfAll);
@@ -142,7 +143,8 @@ TEST(GridCoding, TheThresholdIsTheSameElsewhereAndScalesWithTheValues) {
   const float threshold = thresholdOf(here, 0.1f);
   EXPECT_GT(threshold, 0.0f);
   EXPECT_EQ(thresholdOf(there, 0.1f), threshold);
-  // One more threshold than bins below each power of two: the edge itself is off by one ulp.
+  // There is one more threshold than bins below each power of two, so the edge itself differs by
+  // one ulp.
   EXPECT_FLOAT_EQ(thresholdOf(faint, 0.1f * scale), threshold * scale);
 }
 
@@ -227,7 +229,7 @@ TEST(GridCoding, ValuesThatEqualTheBackgroundKeepTheirBricks) {
 TEST(GridCoding, TheMaskComesBackBitForBitWhereItIsStored) {
   const Field field = positiveField(5);
   SparseVolume source = revoxelise(field, {.threshold = 0.01f});
-  // holes that no threshold finds, and a voxel that no ellipsoid reaches
+  // The mask has holes that no threshold finds, and a voxel that no ellipsoid reaches.
   for (auto& mask : source.active) mask.words[3] &= 0x5555555555555555;
   const StoredGrid grid = makeStoredGrid(kFog, source, field, Activity::kExact);
   EXPECT_EQ(grid.topology, TopologyKind::kMask);

@@ -1,5 +1,5 @@
-// Damage on purpose: files whose checksums match and whose content lies. Every case changes one
-// thing in a good file; the reader must name it.
+// Plan: files that were damaged on purpose have correct checksums but wrong content. Every case
+// changes one thing in a good file, and the reader must name it.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ constexpr float kInf = std::numeric_limits<float>::infinity();
 constexpr std::uint32_t kUnknownKind = 0x1234;
 constexpr std::size_t kMegabyte = 1 << 20;
 
-/// Offsets in the record of a grid without name, map and metadata (docs/format.md, "grid").
+/// Offsets in the record of a grid without name, map and metadata (docs/format.md, "Grid record").
 namespace at {
 constexpr std::size_t kNameLength = 0, kClass = 4, kValueType = 5, kBackground = 6, kAffine = 22,
                       kItems = 23, kTopology = 27, kWithinRange = 28, kThreshold = 29,
@@ -41,7 +41,7 @@ constexpr std::size_t kNameLength = 0, kClass = 4, kValueType = 5, kBackground =
                       kEpsilon = 82, kChunkCount = 86, kChunkBox = 102, kCount = 126;
 }  // namespace at
 
-/// One chunk of four ellipsoids with all attributes, leaves, a curve.
+/// A grid with one chunk of four ellipsoids with all attributes, leaves and a curve.
 StoredGrid plainGrid() {
   StoredGrid grid = test::emptyGrid();
   grid.topology = TopologyKind::kLeaves;
@@ -95,11 +95,11 @@ TEST(HostileFile, SectionsOfAnyOrderAreRead) {
 
 TEST(HostileFile, LineEndsChangedByATextTransferAreNamed) {
   auto bytes = plainFile();
-  bytes.erase(bytes.begin() + 5);  // CR LF -> LF
+  bytes.erase(bytes.begin() + 5);  // changes CR LF to LF
   EXPECT_THAT([&] { decode(bytes); }, ThrowsMessage<BadInput>(HasSubstr("as text")));
 }
 
-/// A change to the sections, and what the reader says of it.
+/// A change to the sections, and the reader's message.
 struct ContentLie {
   const char* name;
   std::function<void(CraftedFile&)> tell;
@@ -134,7 +134,7 @@ std::function<void(CraftedFile&)> resized(SectionKind kind, std::ptrdiff_t by) {
     file.setContent(kind, std::move(raw));
   };
 }
-/// Another section of the kind of one that is there, for another grid or chunk.
+/// Adds a section of an existing kind for another grid or chunk.
 std::function<void(CraftedFile&)> stray(SectionKind kind, std::uint32_t grid, std::uint32_t chunk) {
   return [=](CraftedFile& file) {
     file.add({kind, grid, chunk}, format::kRequired, file.content(kind));
@@ -216,7 +216,7 @@ const ContentLie kContentLies[] = {
 INSTANTIATE_TEST_SUITE_P(HostileFile, ContentLies, testing::ValuesIn(kContentLies),
                          [](const auto& lie) { return lie.param.name; });
 
-/// A change to the section table alone.
+/// A change to the section table only.
 struct TableLie {
   const char* name;
   std::function<void(SectionTable&)> tell;
@@ -269,7 +269,7 @@ TEST(HostileFile, BytesBetweenTheSectionsMustBeZero) {
               ThrowsMessage<BadInput>(HasSubstr("byte " + std::to_string(gap) + " belongs to no")));
 }
 
-/// A kilobyte of file that claims, section by section, as much content as the reader believes in.
+/// A file of a kilobyte whose sections claim as much content as the reader may believe.
 TEST(HostileFile, AKilobyteCannotAskForAGigabyte) {
   CraftedFile file(plainFile());
   for (const auto kind : {K::kCenters, K::kScales, K::kRotations, K::kIntensities, K::kKappas,
@@ -287,7 +287,7 @@ TEST(HostileFile, AKilobyteCannotAskForAGigabyte) {
   }
 }
 
-/// Zeros compress best of all: the most that a small file can hold in earnest.
+/// Zeros compress best, so this is the most that a small file can really hold.
 TEST(HostileFile, TheMostThatAKilobyteCanHoldIsBounded) {
   StoredGrid grid = test::emptyGrid();
   grid.descriptor.metadata = {{"zeros", "string", std::vector<std::byte>(4 * kMegabyte)}};

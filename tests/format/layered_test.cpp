@@ -1,6 +1,6 @@
-// Plan: chunks in importance layers come back integer by integer; a part of a file is what the
-// whole holds of it, and takes fewer bytes to read; lies in the directory are found out, whole or
-// in part, before memory is spent on them.
+// Plan: chunks in importance layers are decoded integer by integer. A part of a file has the same
+// ellipsoids as that part of the whole file, and takes fewer bytes to read. Wrong directories are
+// detected before memory is allocated for them, in a whole file and in a part.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -59,8 +59,8 @@ TEST(LayeredFile, HasTheHeavierEllipsoidsInTheFirstLayers) {
   EXPECT_EQ(first, q.size());
 }
 
-/// 20000 ellipsoids are the aim of layers; these are spread evenly and all alike, so that what
-/// layers cost is not hidden by what they save.
+/// Layers are meant for 20,000 ellipsoids. These are spread evenly and are all similar, so that the
+/// cost of layers is not hidden by what they save.
 TEST(LayeredFile, CostsLittleMoreThanOneWithoutLayers) {
   StoredGrid one = test::quantisedGrid(20000), layered = test::layeredGrid(20000);
   layered.layerErrors.clear();
@@ -133,7 +133,7 @@ TEST_F(PartOfAFile, OfSoManyEllipsoidsHasWholeLayersOfThem) {
 }
 
 TEST_F(PartOfAFile, OfABoxGivesTheSameValuesThere) {
-  // the second chunk lies far away, and is of no use here
+  // The second chunk lies far away, so it is not needed here.
   const Box box{{0, 0, 0}, {9, 9, 9}};
   const PartOfFile part = readEsvrPart(path_, {.box = box});
   EXPECT_EQ(part.file.grids[0].field.chunks[1].ellipsoids.size(), 0u);
@@ -159,13 +159,13 @@ TEST_F(PartOfAFile, DamagedInABlockIsRefusedWhereTheBlockIsRead) {
   EXPECT_THROW((void)decodeEsvr(bytes, "f"), BadInput);
 }
 
-/// Offsets in the section (docs/format.md, "Layered ellipsoids"), for no rotation thresholds.
+/// Offsets in the section (docs/format.md, "Layered ellipsoids"), without rotation thresholds.
 namespace at {
 constexpr std::size_t kSize = 0, kCount = 4, kCell = 12, kThresholds = 78, kLayers = 79;
-constexpr std::size_t kEntry = 30;  // bytes of a block's
+constexpr std::size_t kEntry = 30;  // bytes of a block's entry
 }  // namespace at
 
-/// The content with its directory's checksum made right.
+/// The content with a corrected checksum of its directory.
 std::vector<std::byte> repaired(std::vector<std::byte> content) {
   std::uint32_t size = 0;
   std::memcpy(&size, content.data(), sizeof size);
@@ -184,7 +184,7 @@ void expectLie(std::size_t offset, T value, const char* answer) {
               ThrowsMessage<BadInput>(HasSubstr(answer)));
 }
 
-/// Where the layers are counted: behind as many thresholds as there are.
+/// The offset of the number of layers, which follows the thresholds.
 std::size_t layersAt() {
   CraftedFile file(encodeEsvr(layeredFile(20)));
   return at::kLayers +

@@ -1,6 +1,6 @@
-// Plan: small files that ask for much: one huge scale, scales that no arithmetic holds, metadata,
-// voxels and ellipsoids that cost a file next to nothing. Each is refused before memory is
-// allocated, with the number that it asks for; within the limit the same content is read.
+// Plan: small files that ask for much: one huge scale, extreme scales, metadata, voxels and
+// ellipsoids that take almost no bytes. Each is refused before memory is allocated, with the number
+// of bytes in the message. Within the limit, the same content is read.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Writes the golden files: make_golden FOLDER. After a release only for new ones: those that are
-// there must not change within a version of the format.
+// Writes the golden files: make_golden FOLDER. After a release it is used for new files only,
+// because existing ones must not change within a version of the format.
 
 #include <filesystem>
 #include <fstream>

@@ -1,5 +1,5 @@
-// Plan: quantised chunks come back integer by integer; lies about them are found out before memory
-// is spent on them.
+// Plan: quantised chunks are decoded integer by integer. Wrong sections are detected before memory
+// is allocated for them.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -75,12 +75,12 @@ TEST(QuantisedFile, ManyAlikeArePaddedToWhatAReaderBelieves) {
   EXPECT_EQ(test::difference(decodeEsvr(encodeEsvr(file), "memory"), file), "");
 }
 
-/// Offsets in the section (docs/format.md, "Ellipsoids").
+/// Offsets in the section (docs/format.md, "Quantised ellipsoids").
 namespace at {
 constexpr std::size_t kCount = 0, kCell = 8, kScaleStep = 28, kIntensityStep = 40,
                       kPositionBase = 48, kCellBits = 72, kSigns = 73, kThresholds = 74;
 }  // namespace at
-/// Of the number of ellipsoids in a chunk record.
+/// Offset of the number of ellipsoids in a chunk record.
 constexpr std::size_t kCountInChunk = 36;
 
 template <class T>
@@ -128,7 +128,7 @@ TEST(QuantisedLies, AKilobyteCannotAskForAGigabyte) {
     const auto bytes = file.assemble();
     ASSERT_LT(bytes.size(), 2048u);
     const test::AllocationMeter meter;
-    try {  // a few more than there are may be read: from zeros behind the streams
+    try {  // a few more than there are may be read, from zeros behind the streams
       (void)decodeEsvr(bytes, "lie");
     } catch (const BadInput&) {
     }

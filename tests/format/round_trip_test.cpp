@@ -1,4 +1,4 @@
-// What is written comes back, bit by bit, in the file's order of ellipsoids.
+// Plan: everything that is written is read again bit by bit, in the file's order of ellipsoids.
 
 #include <gtest/gtest.h>
 

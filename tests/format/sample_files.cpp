@@ -11,11 +11,12 @@
 namespace esvr::test {
 namespace {
 
-/// The same numbers on every machine, which the standard's distributions do not promise.
+/// Random numbers that are the same on every machine, which the standard's distributions do not
+/// promise.
 class Numbers {
  public:
   explicit Numbers(std::uint32_t seed) : pass_(seed) {}
-  /// On a lattice of 2^-16 of the range, so that arithmetic is exact.
+  /// A number on a lattice of 2^-16 of the range, so that arithmetic with it is exact.
   float between(float low, float high) {
     return low + (high - low) * float(pass_() >> 16) / 65536.0f;
   }
@@ -24,7 +25,7 @@ class Numbers {
   std::mt19937 pass_;
 };
 
-/// Pythagorean quaternions: of unit length in any arithmetic.
+/// Pythagorean quaternions, whose length is exactly 1 in any arithmetic.
 constexpr float kUnitQuaternions[][4] = {
     {0.5f, 0.5f, 0.5f, 0.5f}, {0.5f, -0.5f, 0.5f, -0.5f}, {0.0f, 0.6f, 0.8f, 0.0f},
     {0.8f, 0.0f, 0.0f, 0.6f}, {0.1f, 0.5f, 0.7f, 0.5f},   {0.7f, -0.1f, 0.5f, 0.5f},
@@ -162,11 +163,11 @@ StoredGrid chunkedGrid(std::size_t ellipsoidsPerChunk) {
 
 namespace {
 
-/// The three highest of the precisions that there are, each a layer of its own.
+/// The three highest of the given precisions, each of which becomes a layer.
 std::vector<std::uint8_t> threeHighest(std::vector<std::uint8_t> precision) {
   std::sort(precision.begin(), precision.end(), std::greater<>());
   precision.erase(std::unique(precision.begin(), precision.end()), precision.end());
-  if (precision.size() > 1) precision.pop_back();  // the last layer needs no mark
+  if (precision.size() > 1) precision.pop_back();  // the last layer needs no precision of its own
   if (precision.size() > 3) precision.resize(3);
   return precision;
 }

@@ -1,5 +1,5 @@
-// Plan: layers of every form come back integer by integer; lies are found out before memory is
-// spent on them; what a smooth volume costs is a bound on the predictor.
+// Plan: layers of every form are decoded integer by integer. Wrong sections are detected before
+// memory is allocated for them. The bytes of a smooth volume limit the errors of the predictor.
 
 #include "format/voxel_section.h"
 
@@ -54,13 +54,13 @@ TEST(VoxelSection, PredictsWhatIsSmooth) {
     return float(std::sin(v.x * 0.05) + std::sin(v.y * 0.04) * std::cos(v.z * 0.03));
   });
   const VoxelLayer layer = boundedLayer(smooth, 0.01, Activity::kExact);
-  // neighbours differ by two steps at most, second differences by a tenth of one
+  // Neighbours differ by at most two steps, and second differences are a tenth of a step.
   EXPECT_LT(double(putVoxels(layer).size()) * 8.0, 1.6 * double(smooth.values.size()));
 }
 
 std::size_t bytesOf(const SparseVolume& volume) { return putVoxels(exactLayer(volume)).size(); }
 
-/// Noise is foretold by nothing but its image.
+/// Noise can be predicted from its mirror image only.
 TEST(VoxelSection, FindsMirrors) {
   test::Random random(9);
   std::map<std::array<int, 3>, float> noise;
@@ -74,19 +74,19 @@ TEST(VoxelSection, FindsMirrors) {
   const SparseVolume mirrored = test::volumeOf({}, 4, -1.0f, [&](Coord v) {
     return at(std::min(v.x, 29 - v.x), std::min(v.y, 31 - v.y), v.z);
   });
-  // a quarter of the voxels, two columns of them without an image; and what it takes to say so
+  // A quarter of the voxels, two columns of which have no image, plus the cost of the decisions.
   EXPECT_LT(double(bytesOf(mirrored)), 0.35 * double(bytesOf(plain)));
   EXPECT_EQ(voxelsOf(putVoxels(exactLayer(mirrored)), "v"), exactLayer(mirrored));
 }
 
-/// Floats that are one value for the most part: what stands between does not spoil the guesses.
+/// Most floats have one common value. The values between them must not spoil the predictions.
 TEST(VoxelSection, KnowsCommonValues) {
   test::Random random(10);
   const SparseVolume volume = test::volumeOf(
       {}, 4, 0.0f, [&](Coord v) { return v.x < 16 ? 0.5f : float(0.6 + 0.4 * random(0.0, 1.0)); });
   const VoxelLayer layer = exactLayer(volume);
   ASSERT_EQ(layer.form, VoxelForm::kFloat);
-  // 23 bits of noise for half of the voxels, next to nothing for the others
+  // Half of the voxels have 23 bits of noise; the others take almost no bits.
   EXPECT_LT(double(putVoxels(layer).size()) * 8.0, 0.5 * 25.0 * double(volume.values.size()));
   EXPECT_EQ(voxelsOf(putVoxels(layer), "v"), layer);
 }
@@ -115,9 +115,9 @@ TEST(VoxelFile, TakesNoThreshold) {
 TEST(Residual, IsRefusedWhereItIsNone) {
   const SparseVolume tube = test::tubeVolume();
   StoredGrid grid = test::emptyGrid();
-  grid.residual = exactLayer(tube);  // no lattice
+  grid.residual = exactLayer(tube);  // not of the lattice form
   EXPECT_THROW((void)encodeEsvr({{}, {grid}}), RuntimeFailure);
-  grid.residual = boundedLayer(tube, 0.1, Activity::kExact);  // not all of it active
+  grid.residual = boundedLayer(tube, 0.1, Activity::kExact);  // not all voxels active
   EXPECT_THROW((void)encodeEsvr({{}, {grid}}), RuntimeFailure);
   for (BrickMask& mask : grid.residual->active) mask.setAll();
   for (BrickMask& mask : grid.residual->vacant) mask = {};

@@ -1,4 +1,4 @@
-// Reads baselines of `esvr-compare check` and holds a record of one grid against them.
+// Reads baselines of `esvr-compare check` and compares the record of one grid with them.
 
 #include <cstdint>
 

@@ -1,4 +1,4 @@
-// Reads cameras of esvr-render. A camera that is accepted and checked gives finite places.
+// Reads cameras of esvr-render. A camera that is accepted and checked has finite positions.
 
 #include <cmath>
 #include <cstdint>

@@ -1,6 +1,6 @@
-// Decodes whatever comes, as it is and with its checksums made right, within a bound on memory. A
-// file that is accepted must be written again to bytes that decode to the same, and its grids become
-// voxels or are refused.
+// Decodes any bytes, unchanged and with corrected checksums, within a memory limit. A file that is
+// accepted must be encoded to bytes that decode to the same content, and its grids become voxels or
+// are refused.
 
 #include <cstdint>
 #include <cstdlib>
@@ -21,7 +21,7 @@ void decodeVoxels(const esvr::StoredGrid& grid) {
   try {
     esvr::checkInvariants(esvr::decodeGrid(grid, {.maxBytes = kMaxVoxels}));
   } catch (const esvr::MemoryExceeded&) {
-  } catch (const esvr::RuntimeFailure&) {  // supports that are 2^31 voxels apart
+  } catch (const esvr::RuntimeFailure&) {  // supports are 2^31 voxels apart
   }
 }
 

@@ -1,4 +1,4 @@
-// Reads dense images: as NRRD, and as RAW with a layout that the first bytes choose.
+// Reads dense images, as NRRD and as RAW with a layout that the first bytes choose.
 
 #include <array>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #pragma once
-/// What is fuzzed as a file, for readers that take a path.
+/// Fuzzer input as a file, for readers that take a path.
 
 #include <unistd.h>
 
@@ -10,10 +10,10 @@
 
 namespace esvr::fuzz {
 
-/// A file of one process, replaced by each input and removed at the end.
+/// A file of one process, which is replaced by each input and removed at the end.
 class InputFile {
  public:
-  /// \param extension  ".vdb"
+  /// \param extension  extension of the file, such as ".vdb"
   explicit InputFile(const std::string& extension)
       : path_(std::filesystem::temp_directory_path() /
               ("esvr-fuzz-" + std::to_string(::getpid()) + extension)) {}

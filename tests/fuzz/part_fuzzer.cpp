@@ -1,6 +1,6 @@
-// Reads parts of an .esvr file with its checksums made right: some layers, some ellipsoids, a box,
-// and coarser levels of detail of what was read. The first bytes choose the part. A part of a file
-// that is whole must be readable, and its voxels become a valid volume or are refused.
+// Reads parts of an .esvr file with corrected checksums: some layers, some ellipsoids, a box, and
+// coarser levels of detail of the result. The first bytes choose the part. If the whole file is
+// valid, a part of it must be readable, and its voxels become a valid volume or are refused.
 
 #include <cstdint>
 #include <span>
@@ -37,7 +37,7 @@ void decode(const StoredGrid& grid, const std::optional<Box>& box) {
   try {
     checkInvariants(decodeGrid(grid, {.box = box, .maxBytes = kMaxVoxels}));
   } catch (const MemoryExceeded&) {
-  } catch (const RuntimeFailure&) {  // supports that are 2^31 voxels apart
+  } catch (const RuntimeFailure&) {  // supports are 2^31 voxels apart
   }
 }
 

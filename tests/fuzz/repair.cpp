@@ -11,7 +11,7 @@ namespace {
 
 using namespace format;
 
-/// Offsets in the header and in an entry of the table (docs/format.md).
+/// Offsets in the header and in an entry of the section table (docs/format.md).
 constexpr std::size_t kVersionAt = 8, kSectionsAt = 12, kSizeAt = 16, kTableAt = 24,
                       kTableChecksumAt = 32;
 constexpr std::size_t kEntryOffsetAt = 24, kEntryStoredAt = 32, kEntryChecksumAt = 48;
@@ -27,13 +27,13 @@ void store(std::span<std::byte> bytes, std::size_t at, T value) {
   std::memcpy(bytes.data() + at, &value, sizeof value);
 }
 
-/// The part of the file that an offset and a size name; empty where it lies outside.
+/// The part of the file at an offset; empty if it does not lie in the file.
 std::span<std::byte> part(std::span<std::byte> file, std::uint64_t offset, std::uint64_t size) {
   const bool inside = offset <= file.size() && size <= file.size() - offset;
   return inside ? file.subspan(offset, size) : std::span<std::byte>{};
 }
 
-/// Offsets in layered ellipsoids, and sizes there.
+/// Offsets and sizes in the section of layered ellipsoids.
 constexpr std::size_t kThresholdsAt = 78, kLayersAt = 79, kBlockBytesAt = 6, kBlockSumAt = 22,
                       kBlockEntryBytes = 30, kSumBytes = 8;
 
@@ -44,7 +44,7 @@ void repairBlock(std::span<std::byte> section, std::span<std::byte> entry, std::
   at += size;
 }
 
-/// The directory has a checksum of its own, and every block.
+/// Corrects the checksums of the directory and of every block.
 void repairLayered(std::span<std::byte> section) {
   if (section.size() <= kLayersAt) return;
   const std::size_t size = load<std::uint32_t>(section, 0);

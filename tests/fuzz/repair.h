@@ -1,5 +1,5 @@
 #pragma once
-/// Makes the checksums of an .esvr file right, whatever is in it.
+/// Corrects the checksums of an .esvr file with any content.
 
 #include <cstddef>
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace esvr::fuzz {
 
-/// A copy whose size, version, magic and checksums match, as far as header and table lie in the
-/// file: without it a fuzzer would never get past the first checksum.
+/// A copy with the correct size, version, magic number and checksums, as far as header and table
+/// lie in the file. Without it a fuzzer would never get past the first checksum.
 [[nodiscard]] std::vector<std::byte> repaired(std::span<const std::byte> bytes);
 
 }  // namespace esvr::fuzz

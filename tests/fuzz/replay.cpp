@@ -1,4 +1,4 @@
-// Runs a fuzzer over the files of folders, without a fuzzing engine: replay FOLDER...
+// Runs a fuzzer on the files of folders without a fuzzing engine: replay FOLDER...
 
 #include <cstdint>
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace {
 int replay(const std::filesystem::path& folder) {
   int inputs = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    std::cout << entry.path().string() << std::endl;  // flushed: a crash comes after its name
+    std::cout << entry.path().string() << std::endl;  // flushed before a crash
     std::ifstream in(entry.path(), std::ios::binary);
     const std::string bytes(std::istreambuf_iterator<char>(in), {});
     LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());

@@ -1,4 +1,4 @@
-// Reads skeletons. The links of a skeleton that is accepted lead to nodes of it.
+// Reads skeletons. If a skeleton is accepted, its links lead to its nodes.
 
 #include <cstdint>
 #include <cstdlib>

@@ -1,4 +1,5 @@
-// Reads ParaView presets, in JSON and in XML. What is accepted is a valid transfer function.
+// Reads ParaView presets in JSON and in XML. A preset that is accepted is a valid transfer
+// function.
 
 #include <cstdint>
 

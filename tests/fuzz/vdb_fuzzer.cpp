@@ -1,4 +1,4 @@
-// Lists and reads whatever comes as a VDB, in either format, within a bound on memory. A grid that
+// Lists and reads any bytes as an OpenVDB and as a NanoVDB file, within a memory limit. A grid that
 // is read is a valid volume.
 
 #include <cstdint>

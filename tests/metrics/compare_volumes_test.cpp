@@ -1,11 +1,11 @@
-// Plan: (1) random sparse volumes against plain dense float64 loops: both sides' bricks differ, the
-// box cuts bricks, coordinates are negative, backgrounds are not zero; (2) answers known in closed
-// form; (3) the same bits for any number of threads; (4) cost that follows the bricks, not the box;
-// (5) scale, place and refusals.
+// Plan: (1) random sparse volumes are compared with plain dense float64 loops: the bricks of both
+// sides differ, the box cuts bricks, coordinates are negative, and backgrounds are not zero; (2)
+// results that are known in closed form; (3) the bits do not depend on the number of threads; (4)
+// the time depends on the bricks and not on the box; (5) scale, position, and refused input.
 //
 // Tolerance of (1): sums of n < 5e4 float64 terms in two orders differ by less than n eps = 1e-11
-// of the sum of the terms' sizes; squared errors are all positive, masses are compared with the sum
-// of sizes in mind (values are of order 1, so 1e-11 * n).
+// of the sum of the terms' magnitudes. Squared errors are positive. Values are of order 1, so
+// masses may differ by 1e-11 * n.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 
 constexpr double kSumTolerance = 1e-11;
-constexpr Box kBox{{-13, -16, -3}, {9, 5, 17}};  // cuts bricks and reaches beyond them
+constexpr Box kBox{{-13, -16, -3}, {9, 5, 17}};  // cuts bricks and extends beyond them
 constexpr Box kEverywhere{{-32, -32, -32}, {31, 31, 31}};
 
 struct RandomCase {
@@ -55,7 +55,7 @@ TEST_P(AgainstDense, everyMetricAgreesWithThePlainLoops) {
   EXPECT_EQ(got.iou, want.iou);
   EXPECT_NEAR(got.mseBox, want.mseBox, kSumTolerance * want.mseBox);
   EXPECT_NEAR(got.mseActive, want.mseActive, kSumTolerance * want.mseActive);
-  EXPECT_NEAR(got.psnrBox, want.psnrBox, 1e-9);  // 10 / ln 10 * kSumTolerance and rounding
+  EXPECT_NEAR(got.psnrBox, want.psnrBox, 1e-9);  // kSumTolerance * 10 / ln 10, and rounding
   EXPECT_NEAR(got.psnrActive, want.psnrActive, 1e-9);
   EXPECT_NEAR(got.massReference, want.massReference, kSumTolerance * want.boxVoxels);
   EXPECT_NEAR(got.massCandidate, want.massCandidate, kSumTolerance * want.boxVoxels);
@@ -82,7 +82,7 @@ TEST(CompareVolumes, identicalVolumesHaveNoError) {
   EXPECT_EQ(m.iou, 1.0);
   EXPECT_EQ(m.massReference, m.massCandidate);
   ASSERT_TRUE(m.ssim.has_value());
-  EXPECT_NEAR(*m.ssim, 1.0, 1e-15);  // quotients of equal numbers: only their sum rounds
+  EXPECT_NEAR(*m.ssim, 1.0, 1e-15);  // the quotients are exact; only their sum is rounded
 }
 
 TEST(CompareVolumes, oneVoxelHasTheAnswerOfTheFormula) {
@@ -128,7 +128,7 @@ TEST(CompareVolumes, differentBackgroundsCountInEmptySpace) {
 }
 
 TEST(CompareVolumes, theLargestErrorIsFoundInSpaceWithoutBricks) {
-  // bricks fill all of the box but its last brick; errors in them are smaller than outside
+  // The bricks fill all of the box but its last brick. Errors in them are smaller than outside.
   const auto value = [](Coord) { return 1.0f; };
   const auto a = volumeOf(Box{{8, 8, 8}, {23, 23, 15}}, value, 0.0f);
   const auto b = volumeOf(Box{{8, 8, 8}, {23, 23, 15}}, value, 2.0f);

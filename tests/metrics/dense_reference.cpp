@@ -60,7 +60,7 @@ void sumOverActive(VolumeMetrics& m, const SparseVolume& a, const SparseVolume& 
 
 double gaussian(int distance) { return std::exp(-distance * distance / (2.0 * 1.5 * 1.5)); }
 
-/// SSIM at one voxel, weights renormalised over the part of the 11^3 window inside the box.
+/// SSIM at one voxel. The weights are normalised over the part of the 11^3 window inside the box.
 double ssimAt(const SparseVolume& a, const SparseVolume& b, const Box& box, double peak, Coord at) {
   const Coord radius{5, 5, 5};
   const Box window{maxCoord(at - radius, box.min), minCoord(at + radius, box.max)};

@@ -1,12 +1,12 @@
 #pragma once
-/// The metrics by their definitions: plain loops over every voxel of a box, float64. Slow, and
-/// independent of the library's bricks, trees and shortcuts.
+/// The metrics by their definitions, as plain float64 loops over every voxel of a box. They share
+/// no code with the library's bricks.
 
 #include "esvr/metrics.h"
 
 namespace esvr::test {
 
-/// `everywhere` must hold all active voxels of both volumes.
+/// Computes all metrics. `everywhere` must contain all active voxels of both volumes.
 VolumeMetrics denseMetrics(const SparseVolume& reference, const SparseVolume& candidate,
                            const Box& box, const Box& everywhere, double peak);
 

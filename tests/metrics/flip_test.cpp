@@ -1,7 +1,7 @@
-// Plan: FLIP against values that make_flip_fixture.py computed from the paper's equations with
-// two-dimensional kernels. The published implementation, run on the same pictures in float64, gives
-// the same to 1e-8: it rounds the matrix from XYZ to nine digits. Then what the paper states: the
-// largest difference is that of green and blue; and what must not count.
+// Plan: FLIP agrees with values that make_flip_fixture.py computed from the paper's equations with
+// two-dimensional kernels. The published implementation gives the same to 1e-8 in float64; it
+// rounds the matrix from XYZ to nine digits. As the paper states, the largest difference is that of
+// green and blue. Alpha and colors outside the range of a screen do not count.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,8 @@ namespace {
 
 constexpr int kWidth = 40, kHeight = 28, kBlock = 4;
 
-/// As in make_flip_fixture.py: a multiple of 2^-24, exact in float32.
+/// The same function as in make_flip_fixture.py. Its values are multiples of 2^-24 and exact in
+/// float32.
 double hashed(std::uint64_t index) {
   return double((index * 2654435761u % (std::uint64_t{1} << 32)) >> 8) / (1 << 24);
 }
@@ -56,7 +57,7 @@ struct Known {
 
 class FlipFixture : public testing::TestWithParam<Known> {};
 
-// Float64 on both sides, sums of some hundred products: 1e-9 leaves room for the order of sums. The
+// Both sides sum some hundred products in float64, so 1e-9 leaves room for the order of sums. The
 // map is float32: 1e-7.
 TEST_P(FlipFixture, agreesWithThePapersEquations) {
   const Known& known = GetParam();

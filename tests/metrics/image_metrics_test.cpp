@@ -1,6 +1,7 @@
-// Plan: PSNR and the largest difference by hand; SSIM against windows summed directly in float64
-// (means of products cancel to 1e-16 of squares below 1, over C2 = 9e-4: 1e-12), closed forms for
-// constant pictures, and what must not count: alpha, colors that no screen shows.
+// Plan: PSNR and the largest difference are checked by hand. SSIM is compared with windows that are
+// summed directly in float64; means of products cancel to 1e-16 of squares below 1, divided by C2 =
+// 9e-4, which gives 1e-12. Constant pictures have closed forms. Alpha and colors outside the range
+// of a screen do not count.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +29,7 @@ Image noise(int width, int height, std::uint64_t seed) {
   return image;
 }
 
-/// SSIM of one window by the definition, the variances as sums of squared differences.
+/// SSIM of one window by the definition, with variances as sums of squared differences.
 double windowSsim(const Image& a, const Image& b, int cx, int cy, int channel) {
   double weights = 0.0, meanA = 0.0, meanB = 0.0;
   const auto overWindow = [&](auto&& visit) {
@@ -107,7 +108,7 @@ TEST(ImageMetrics, WhatCannotBeComparedIsRefused) {
 
 TEST(ErrorMap, ShowsTheLargestDifferenceOfAPixel) {
   Image a = constant(2, 1, 0.5f), b = a;
-  b.rgba[5] = 0.25f;  // green of the second pixel
+  b.rgba[5] = 0.25f;  // green channel of the second pixel
   const Image map = errorMap(a, b, 2.0);
   EXPECT_EQ(map.rgba, (std::vector<float>{0, 0, 0, 1, 0.5f, 0.5f, 0.5f, 1}));
   EXPECT_EQ(errorMap(a, b, 100.0).rgba[4], 1.0f);

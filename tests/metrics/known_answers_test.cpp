@@ -1,6 +1,6 @@
-// Plan: the metrics of two volumes against what scikit-image and numpy say of the same voxels as
-// arrays (make_metrics_fixture.py; SSIM and FLIP have tests of their own). 1e-6 is asked for; sums
-// in float64 of 32^3 values below 1 are good to 1e-10.
+// Plan: the metrics of two volumes agree with those that scikit-image and numpy compute for the
+// same voxels as arrays (make_metrics_fixture.py; SSIM and FLIP have tests of their own). The
+// tolerance is 1e-6; float64 sums of 32^3 values below 1 are precise to 1e-10.
 
 #include <gtest/gtest.h>
 
@@ -13,12 +13,12 @@ namespace {
 constexpr int kSide = 32, kFirst = 10, kLast = 21;
 constexpr double kTolerance = 1e-10;
 
-/// As make_ssim_fixture.py has it.
+/// The same function as in make_ssim_fixture.py.
 double hashed(std::uint64_t index) {
   return double((index * 2654435761u % (std::uint64_t{1} << 32)) >> 8) / (1 << 24);
 }
 
-/// A block of values of which those above `activeAbove` are active.
+/// A block of values. Those above `activeAbove` are active.
 template <class ValueAt>
 SparseVolume block(float background, double activeAbove, const ValueAt& valueAt) {
   const Box box{{kFirst, kFirst, kFirst}, {kLast, kLast, kLast}};

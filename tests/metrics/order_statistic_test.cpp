@@ -1,4 +1,5 @@
-// Plan: the selection by digits against sorting, on errors of all magnitudes; ranks by counting.
+// Plan: the selection by digits agrees with sorting for errors of all magnitudes, and ranks with
+// counting.
 
 #include "metrics/order_statistic.h"
 
@@ -14,7 +15,7 @@
 namespace esvr::metrics {
 namespace {
 
-/// A row of voxels with the given errors against an empty candidate.
+/// A row of voxels whose errors against an empty candidate are given.
 SparseVolume rowOf(const std::vector<float>& errors) {
   std::vector<test::Voxel> voxels;
   for (std::size_t i = 0; i < errors.size(); ++i)
@@ -48,7 +49,7 @@ TEST(ErrorOfRank, countsEachVoxelOfTheUnionOnce) {
 
 TEST(NearestRank, isTheCeilingOfTheShare) {
   EXPECT_EQ(nearestRank(1, 999), 1u);
-  EXPECT_EQ(nearestRank(999, 999), 999u);  // 998.001
+  EXPECT_EQ(nearestRank(999, 999), 999u);  // the ceiling of 998.001
   EXPECT_EQ(nearestRank(1000, 999), 999u);
   EXPECT_EQ(nearestRank(1001, 999), 1000u);
   EXPECT_EQ(nearestRank(2000, 999), 1998u);

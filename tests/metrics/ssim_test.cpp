@@ -1,9 +1,10 @@
-// Plan: (1) plain dense float64 windows, clipped at the box, on random sparse volumes; (2) values
-// that scikit-image computed (make_ssim_fixture.py); (3) closed forms where windows see background
-// only. The window itself: tests/field/ssim_window_test.cpp.
+// Plan: SSIM agrees with (1) plain dense float64 windows that are clipped at the box, on random
+// sparse volumes; (2) values of scikit-image (make_ssim_fixture.py); (3) closed forms for windows
+// that contain background only. The window itself is tested in tests/field/ssim_window_test.cpp.
 //
-// Tolerance of (1): a variance is off by a few eps of the squared values (order 1) and is divided
-// by C2 = 9e-4 peak^2, so each SSIM by about 10 * 2.2e-16 / 9e-4 = 2.5e-12.
+// Tolerance of (1): a variance has an error of a few eps of the squared values, which are of order
+// 1, and is divided by C2 = 9e-4 peak^2. Each SSIM has an error of about 10 * 2.2e-16 / 9e-4 =
+// 2.5e-12.
 
 #include <gtest/gtest.h>
 
@@ -45,7 +46,7 @@ INSTANTIATE_TEST_SUITE_P(Random, AgainstDenseWindows,
                                          DenseCase{4, 0.0f, 0.0f, {{-14, -3, 1}, {14, 0, 2}}},
                                          DenseCase{5, 0.0f, 0.0f, {{-4, -4, -4}, {-4, -4, -4}}}));
 
-/// The block of hashed values that make_ssim_fixture.py describes.
+/// The block of hashed values of make_ssim_fixture.py.
 float fixtureValue(Coord v, std::uint64_t shift) {
   const auto index = std::uint64_t((v.x * 32 + v.y) * 32 + v.z) + shift;
   return float(std::uint32_t(index * 2654435761u) >> 8) * 0x1p-24f;
@@ -68,7 +69,7 @@ TEST_P(AgainstScikitImage, boxMeanAgrees) {
   };
   const auto b = volumeOf(block, mixed, c.backgroundB);
   const double got = ssim3d(a, b, Box{{0, 0, 0}, {31, 31, 31}}, c.peak);
-  EXPECT_NEAR(got, c.ssim, 1e-10);  // scikit-image subtracts moments of order 1 as we do
+  EXPECT_NEAR(got, c.ssim, 1e-10);  // scikit-image subtracts moments of order 1 too
 }
 
 INSTANTIATE_TEST_SUITE_P(Fixture, AgainstScikitImage,

@@ -38,7 +38,7 @@ BrickInput randomBrick(Coord brick, std::uint64_t seed, const RandomVolumeOption
     const double fate = hashUnit(seed, std::uint64_t(3 * i));
     const auto value = float(2.0 * hashUnit(seed, std::uint64_t(3 * i + 1)) - 0.5);
     if (fate < options.activeShare) input.active.set(i);
-    // some inactive voxels hold a value of their own, as the inside of a level set does
+    // Some inactive voxels have their own values, as inside a level set.
     const bool keepsValue = fate < options.activeShare + 0.1;
     if (keepsValue) input.values[std::size_t(i)] = value;
   }

@@ -10,7 +10,7 @@
 
 namespace esvr::test {
 
-/// A uniform number of [0, 1) that depends on its arguments only.
+/// A uniform number in [0, 1) that depends on its arguments only.
 double hashUnit(std::uint64_t seed, std::uint64_t index);
 
 struct Voxel {
@@ -28,13 +28,13 @@ SparseVolume volumeOf(const Box& box, const std::function<float(Coord)>& value,
 struct RandomVolumeOptions {
   std::uint64_t seed = 0;
   int brickRange = 2;        ///< brick positions from -brickRange to brickRange - 1
-  double brickShare = 0.1;   ///< of the places that hold a brick
-  double activeShare = 0.5;  ///< of a brick's voxels; the others hold the background or a value
+  double brickShare = 0.1;   ///< share of the positions that have a brick
+  double activeShare = 0.5;  ///< share of active voxels; others hold the background or a value
   float background = 0.0f;
 };
 SparseVolume randomVolume(const RandomVolumeOptions& options);
 
-/// The same voxels elsewhere. \param by  multiples of 8
+/// The same voxels at another position. \param by  displacement, multiples of 8
 SparseVolume movedBy(SparseVolume volume, Coord by);
 
 }  // namespace esvr::test

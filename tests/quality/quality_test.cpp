@@ -1,9 +1,10 @@
-// Plan: a floor under the quality of conversions of real files. Short fits of seven of them are
-// checked by `esvr-compare check` against baselines in this folder: fog, clouds, a CT scan, a level
-// set, and a simulation's three grids. The tolerances are below a loss of 0.5 dB and 3 % more bytes,
-// and above what rounding on another processor changes. Two tests make such losses and must be told.
+// Plan: conversions of real files must not become worse. Short fits of seven files (fog, clouds, a
+// CT scan, a level set, and three grids of a simulation) are checked by `esvr-compare check`
+// against baselines in this folder. The tolerances are below a loss of 0.5 dB and 3 % more bytes,
+// and above the differences of rounding on another processor. Two tests make such losses and check
+// that they are reported.
 //
-// Where a change is meant to move the figures, ESVR_UPDATE_QUALITY=1 stores those of this machine:
+// ESVR_UPDATE_QUALITY=1 stores the figures of this machine after an intended change:
 //   ESVR_UPDATE_QUALITY=1 ctest --preset release -R RealFileQuality
 
 #include <gmock/gmock.h>
@@ -23,12 +24,12 @@ using nlohmann::json;
 using testing::HasSubstr;
 
 constexpr double kPsnrTolerance = 0.35;    // dB
-constexpr double kBytesTolerance = 0.025;  // of the bytes
+constexpr double kBytesTolerance = 0.025;  // share of the bytes
 
 struct RealFile {
   const char* name;
-  const char* path;  ///< in ESVR_DATA_DIR
-  int count;         ///< of ellipsoids in each grid
+  const char* path;  ///< path in ESVR_DATA_DIR
+  int count;         ///< number of ellipsoids in each grid
 };
 std::ostream& operator<<(std::ostream& out, const RealFile& file) { return out << file.path; }
 
@@ -38,7 +39,7 @@ std::string baselineOf(const RealFile& file) {
   return std::string(ESVR_SOURCE_DIR "/tests/quality/") + file.name + ".json";
 }
 
-/// A baseline keeps the tolerances that it has; a new one gets those of this test.
+/// A baseline keeps its tolerances. A new one gets those of this test.
 void setTolerances(const std::string& path) {
   json baseline = json::parse(test::readText(path));
   baseline["bytes"]["tolerance"] =
@@ -99,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 using RealFileQualityFloor = RealFileQuality;
 
-// 7 % fewer ellipsoids cost 0.3 dB here, 12 % fewer half a decibel.
+// Here, 7 % fewer ellipsoids cost 0.3 dB, and 12 % fewer cost half a decibel.
 TEST_P(RealFileQualityFloor, NoticesALossOfHalfADecibel) {
   convert(0.88);
   const auto run = check();
@@ -107,7 +108,7 @@ TEST_P(RealFileQualityFloor, NoticesALossOfHalfADecibel) {
   EXPECT_THAT(run.err, HasSubstr("PSNR"));
 }
 
-// 4 % more ellipsoids take 2.4 % more bytes here, 6 % more some 4 %.
+// Here, 4 % more ellipsoids take 2.4 % more bytes, and 6 % more take about 4 %.
 TEST_P(RealFileQualityFloor, NoticesMoreBytes) {
   convert(1.06);
   const auto run = check();

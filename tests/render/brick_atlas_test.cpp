@@ -1,7 +1,7 @@
-// Plan: marching through bricks of cells against renderVolume, which looks at the same voxels
-// through their neighbours. Places are float32 here: 1e-5 voxel off, so that a sample now and then
-// falls into the next cell, of nearly the same value. Bricks apart, touching, at negative places,
-// and blocks that are not there in between.
+// Plan: marching through bricks of cells agrees with renderVolume, which reads the same voxels
+// through neighbouring bricks. Positions are float32 here, with errors of 1e-5 voxel, so that a few
+// samples fall into the next cell, whose value is nearly the same. The cases are bricks that are
+// apart, touch or have negative positions, and empty blocks between them.
 #include "render/brick_atlas.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Plan: the fitted camera by what it must show, corner by corner; projections by hand.
+// Plan: a fitted camera shows every corner of the box; projections are checked by hand.
 #include "esvr/camera.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 constexpr Box kBox{{-10, 0, 5}, {30, 60, 25}};
 constexpr double kExact = 1e-9;
 
-/// Where a place is in the picture, -1 to 1 in each direction.
+/// The position of a point in the picture, from -1 to 1 in each direction.
 std::array<double, 2> placeInPicture(const View& view, Resolution resolution, const Vec3& place) {
   Vec3 c = view.coordinates(difference(place, view.eye));
   const double depth = view.perspective ? c[2] : 1.0;
@@ -105,7 +105,7 @@ TEST(Camera, WhatMakesNoSenseIsRefused) {
   refused([](Camera& c) { c.height = -1.0; });
   refused([](Camera& c) { c.eye[1] = std::numeric_limits<double>::infinity(); });
   refused([](Camera&) {}, {0, 10});
-  // The renderers keep the numbers of pixels in 16 bits.
+  // The renderers store the numbers of pixels in 16 bits.
   refused([](Camera&) {}, {32768, 10});
   refused([](Camera&) {}, {10, 100'000});
   EXPECT_NO_THROW(checkCamera(good, {Resolution::kMaxSide, 1}));

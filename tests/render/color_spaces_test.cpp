@@ -1,6 +1,6 @@
-// Plan: the ends of every space are the colors given; what lies between follows from the space's
-// definition where that can be said in a few numbers. Tolerances: conversions are float64; L*a*b*'s
-// matrices are published to four digits, so a color comes back to 1e-3.
+// Plan: the ends of every interpolation are the given colors, and colors between them follow from
+// the definition of the space. Tolerances: conversions are float64, but the matrices of L*a*b* are
+// published with four digits, so a color is precise to 1e-3.
 #include "render/color_spaces.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,8 @@ TEST(ColorSpaces, RgbMixesChannels) {
 }
 
 TEST(ColorSpaces, HsvPassesThroughTheHuesBetween) {
-  // Red has hue 0, green 1/3: half way lies yellow; red to blue (2/3) passes green.
+  // Red has hue 0 and green hue 1/3; yellow is half-way. From red to blue (2/3), the path passes
+  // green.
   expectColor(mixed(ColorSpace::kHsv, {1, 0, 0}, {0, 1, 0}, 0.5), {1, 1, 0}, kExact);
   expectColor(mixed(ColorSpace::kHsv, {1, 0, 0}, {0, 0, 1}, 0.5), {0, 1, 0}, kExact);
 }
@@ -37,19 +38,20 @@ TEST(ColorSpaces, WrappedHsvTakesTheShorterWay) {
 }
 
 TEST(ColorSpaces, LabMixesBlackAndWhiteToTheGreyOfHalfTheLightness) {
-  // L* = 50 has Y = ((50 + 16) / 116)^3 = 0.18419, which is 0.4663 under sRGB's curve.
+  // L* = 50 has Y = ((50 + 16) / 116)^3 = 0.18419, which is 0.4663 on sRGB's curve.
   expectColor(mixed(ColorSpace::kLab, {0, 0, 0}, {1, 1, 1}, 0.5), {0.4663, 0.4663, 0.4663},
               kFourDigits);
 }
 
 TEST(ColorSpaces, DivergingPassesThroughMorelandsWhite) {
-  // The middle of his table 2, (221, 221, 221), which is M = 88 without saturation.
+  // The middle of Moreland's table 2 is (221, 221, 221), which is M = 88 without saturation.
   expectColor(mixed(ColorSpace::kDiverging, kBlue, kRed, 0.5), bytes(221, 221, 221), 1 / 255.0);
 }
 
 TEST(ColorSpaces, DivergingFadesAsInMorelandsTable) {
-  // His 33 entries: number 8, counted from 0, and number 24. 1/255 for his rounding, as much again
-  // for the four digits of the conversion, which a hue near grey enlarges.
+  // Entries 8 and 24, counted from 0, of the 33 entries in Moreland's table. The tolerance is 1/255
+  // for his rounding, and as much for the four digits of the conversion, whose errors grow near
+  // grey.
   expectColor(mixed(ColorSpace::kDiverging, kBlue, kRed, 8 / 32.0), bytes(141, 176, 254),
               2 / 255.0);
   expectColor(mixed(ColorSpace::kDiverging, kBlue, kRed, 24 / 32.0), bytes(244, 154, 123),

@@ -1,7 +1,7 @@
-// Plan: bounds on the screen against the pixels whose rays meet the support, found one by one in
-// float64 from the ray itself. No such pixel may lie outside. For round ellipsoids of ten pixels
-// the bounds are exact to a pixel: between two rows the outline recedes by 0.5^2 / (2 * 10) pixels
-// only.
+// Plan: the bounds of an ellipsoid in the picture are compared with the pixels whose rays meet the
+// support, which are found in float64 from the rays. No such pixel may lie outside. For round
+// ellipsoids of ten pixels the bounds are exact to a pixel, because the outline recedes by only
+// 0.5^2 / (2 * 10) pixels between two rows.
 #include "render/ellipsoid_view.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ constexpr Resolution kPicture{70, 50};
 struct Meeting {
   bool any = false;
   int firstColumn = kPicture.width, lastColumn = -1, firstRow = kPicture.height, lastRow = -1;
-  double nearest = 1e30, farthest = -1e30;  // along forward, of the places of entry and exit
+  double nearest = 1e30, farthest = -1e30;  // depths along forward where rays enter and leave
 
   void add(int column, int row, double entry, double exit) {
     any = true;
@@ -32,7 +32,7 @@ Vec3 times(const Matrix3& m, const Vec3& v) {
           m[6] * v[0] + m[7] * v[1] + m[8] * v[2]};
 }
 
-/// Solves | o + t v |^2 = cutoff in the unit frame.
+/// Solves |o + t v|^2 = cutoff in the unit frame.
 void addRay(const Field& field, const View& view, int column, int row, Meeting& meeting) {
   const Ellipsoids& e = field.chunks[0].ellipsoids;
   const Ray ray = view.ray(column, row);

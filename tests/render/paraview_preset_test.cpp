@@ -1,5 +1,5 @@
-// Plan: a preset as ParaView writes it comes back point by point; what is no preset is refused with
-// its file and reason.
+// Plan: a preset as ParaView writes it is read point by point. Other files are refused with their
+// name and the reason.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -44,7 +44,7 @@ TEST_F(ParaViewPreset, ComesBackPointByPoint) {
   EXPECT_EQ(f.colors.points[0].color, (Rgb{0.25, 0.5, 0.75}));
   EXPECT_EQ(f.colors.points[1].x, 10.0);
   ASSERT_EQ(f.opacity.size(), 2u);
-  EXPECT_EQ(f.opacity[0].midpoint, 0.25);  // the file has them the other way round
+  EXPECT_EQ(f.opacity[0].midpoint, 0.25);  // the file has the opposite order
   EXPECT_EQ(f.opacity[0].sharpness, 0.75);
   EXPECT_EQ(f.opacity[1].opacity, 0.5);
 }

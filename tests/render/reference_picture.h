@@ -1,7 +1,6 @@
 #pragma once
-/// Pictures by the definition in render.h, in float64: every ellipsoid at every sample, the
-/// transfer function itself instead of a table of it, no bounds, no end of a ray before its last
-/// sample.
+/// Draws pictures in float64 by the definition in render.h: every ellipsoid at every sample, the
+/// transfer function itself instead of a table of it, no bounds, and no early end of a ray.
 
 #include <functional>
 
@@ -9,7 +8,7 @@
 
 namespace esvr::test {
 
-/// The value at a place; nothing counts as empty but exactly the background.
+/// The value at a position. Only values that are exactly the background count as empty.
 using ValueAtPlace = std::function<double(const Vec3&)>;
 
 struct SampledScene {
@@ -21,7 +20,7 @@ struct SampledScene {
 [[nodiscard]] ValueAtPlace sumOfEllipsoids(const Field& field);
 [[nodiscard]] Image referencePicture(const SampledScene& scene, const RenderOptions& options);
 
-/// Over all four channels, of a peak of 1.
+/// The PSNR over all four channels with a peak of 1.
 [[nodiscard]] double imagePsnr(const Image& a, const Image& b);
 [[nodiscard]] double largestDifference(const Image& a, const Image& b);
 

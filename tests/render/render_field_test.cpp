@@ -1,9 +1,9 @@
-// Plan: pictures of sums of random ellipsoids (Between::kSum; window_tile_test.cpp has the other)
-// against the float64 reference (reference_picture.h), from
-// every kind of camera. What may differ: sums in float32 (1e-6 of the intensities), the table of
-// the transfer function where the color map bends (1e-5 of a color), samples on the end of a
-// support, which are 0 to rounding, and the light behind minTransmittance, at most 1/4096 of a
-// channel: 72 dB where every pixel loses that. 70 dB is asked for; a sample missed or taken twice
+// Plan: pictures of random fields with Between::kSum (window_tile_test.cpp has the other case) are
+// compared with the float64 reference (reference_picture.h), for every kind of camera. These
+// differences are expected: float32 sums (1e-6 of the intensities), the table of the transfer
+// function where the color map bends (1e-5 of a color), samples at the end of a support, which are
+// 0 up to rounding, and the light behind minTransmittance, at most 1/4096 of a channel, which gives
+// 72 dB if every pixel loses it. The tests require 70 dB; a sample that is missed or taken twice
 // costs more.
 #include <gtest/gtest.h>
 
@@ -113,15 +113,15 @@ TEST(RenderField, AgreesWithABackgroundAndSeveralChunks) {
 }
 
 TEST(RenderField, FarCamerasLoseNothing) {
-  // From 1e5 times the volume's size, 4e6 voxels: the picture is the same ellipsoids', some 1e-9
-  // voxel of rounding in float64.
+  // From 1e5 times the volume's size, 4e6 voxels, the picture shows the same ellipsoids, with about
+  // 1e-9 voxel of rounding in float64.
   const Vec3 away{1e6, 2e6, 3.3e6};
   CameraWish wish{.eye = sum(away, {20, 20, 20}), .center = Vec3{20, 20, 20}};
   wish.fov = 2.0 * std::atan(30.0 / length(away)) * 180.0 / 3.14159265358979;
   RenderOptions o = optionsFor(wish, {20, 20});
   const Vec3 forward = unit(difference(o.camera.center, o.camera.eye));
-  // The reference samples from 0 on; a plane nearer by a whole number of steps has the same
-  // samples, if the rays hardly diverge: at most 70 / 4e6 over 100 voxels.
+  // The reference takes samples from 0 on. A plane that is nearer by a whole number of steps has
+  // the same samples, if the rays hardly diverge: here by at most 70 / 4e6 over 100 voxels.
   RenderOptions near = o;
   near.camera.projection = Projection::kOrthographic;
   near.camera.height = 2.0 * 30.0;
@@ -214,7 +214,7 @@ TEST(RenderField, StopsWhereAsked) {
   EXPECT_THROW((void)renderField(randomField({}), o), Cancelled);
 }
 
-// A file may say so; without a limit the rays would be followed for ever.
+// A file may contain such a support. Without the limit, the rays would have no end.
 TEST(RenderField, RaysThroughASupportOfAnySizeAreRefused) {
   for (const Between between : {Between::kSum, Between::kVoxels})
     for (const float logScale : {18.0f, 32.0f}) {

@@ -1,7 +1,7 @@
-// Plan: the largest value, the mean and the depth of half the light along each ray, and a clip box,
-// against the same taken in float64 from every sample of a dense walk. Both renderers; voxels by
-// their own interpolation. Differences as in render_field_test.cpp; a depth may be one sample off
-// where the light is just about half, so that few pixels may differ there.
+// Plan: the largest value, the mean, the depth of half the light along each ray, and a clip box
+// agree with the same quantities computed in float64 from every sample, for both renderers. The
+// differences are those of render_field_test.cpp. A depth may differ by one sample where the light
+// is almost half, so a few pixels may differ there.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ RenderOptions optionsFor(RenderMode mode, Projection projection = Projection::kP
   return o;
 }
 
-/// What a mode is by its definition.
+/// A mode by its definition.
 struct Gathered {
   double largest = -std::numeric_limits<double>::infinity(), sum = 0.0, light = 1.0, depth = 0.0;
   int count = 0;
@@ -65,7 +65,7 @@ std::array<double, 4> expected(const Gathered& all, const RenderOptions& o) {
   return colored(o.mode == RenderMode::kMaximum ? all.largest : all.sum / all.count, o.transfer);
 }
 
-/// Share of the pixels that are off by more than a tolerance.
+/// The share of the pixels that differ by more than a tolerance.
 double shareOff(const Field& field, const RenderOptions& o, double tolerance) {
   const ValueAtPlace value = sumOfEllipsoids(field);
   const View view(o.camera, o.resolution);
@@ -87,7 +87,7 @@ TEST(RenderModes, ShowTheLargestAndTheMeanValue) {
   const Field field = randomField({.count = 40});
   for (const auto projection : {Projection::kPerspective, Projection::kOrthographic})
     for (const auto mode : {RenderMode::kMaximum, RenderMode::kAverage})
-      // A sample on the end of a support counts for one and not for the other: its value is 0.
+      // A sample at the end of a support has the value 0, and may count in one picture only.
       EXPECT_LE(shareOff(field, optionsFor(mode, projection), 1e-3), 0.02);
 }
 

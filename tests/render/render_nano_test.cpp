@@ -1,8 +1,8 @@
-// Plan: the picture of a NanoVDB grid against that of the same voxels marched in float64
-// (renderVolume). Places in float32 are off by 1e-5 voxel, so that a sample now and then falls into
-// the next cell; values by 1e-5 of their range. Quantised values are off by half a step of 4, 8 or
-// 16 bits of a leaf's range, here up to 1. Negative coordinates, empty space, bricks that touch at
-// their corners only, a camera inside.
+// Plan: the picture of a NanoVDB grid agrees with that of the same voxels marched in float64
+// (renderVolume). Float32 positions have errors of 1e-5 voxel, so that a few samples fall into the
+// next cell, and values have errors of 1e-5 of their range. Quantised values differ by half a step
+// of 4, 8 or 16 bits of a leaf's range, which is up to 1 here. The cases have negative coordinates,
+// empty space, bricks that touch at corners only, and a camera inside.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -78,7 +78,7 @@ TEST(RenderNano, StepsOverAllOfAFarEmptySpace) {
   expectTheVolumesPicture(grid, NanoValues::kFloat, o, 1e-3);
 }
 
-/// Their background is a quantised value too, and no longer exactly empty: opacity begins at it.
+/// The background is a quantised value too, so it is not exactly empty; the opacity begins at it.
 TEST(RenderNano, QuantisedValuesAreCloseBy) {
   VolumeGrid grid = blobs();
   for (float& v : grid.volume.values) v = std::abs(v);

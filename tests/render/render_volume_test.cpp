@@ -1,7 +1,7 @@
-// Plan: marching over bricks, with its jumps, against float64 trilinear interpolation at every
-// sample of a dense walk (reference_picture.h). The same sources of difference as in
-// render_field_test.cpp; the interpolation itself is float32, 1e-7 of the values. Then the two
-// renderers against each other.
+// Plan: marching over bricks, which skips empty ones, agrees with float64 trilinear interpolation
+// at every sample (reference_picture.h). The differences are those of render_field_test.cpp; the
+// interpolation itself is float32, with errors of 1e-7 of the values. Then the two renderers are
+// compared with each other.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,7 +30,7 @@ double trilinear(const SparseVolume& volume, const Vec3& place) {
   return value;
 }
 
-/// A few bricks far apart, some with neighbours, full of random values.
+/// A few bricks far apart, some with neighbours, with random values.
 SparseVolume scattered(Coord shift = {}) {
   std::vector<Coord> corners{{0, 0, 0},   {0, 0, 8},    {8, 8, 8},
                              {40, 0, 16}, {16, 40, 32}, {0, 32, 0}};
@@ -57,7 +57,7 @@ TEST(RenderVolume, AgreesAlongAxesWhereSamplesLieOnTheFacesOfBricks) {
   for (const Vec3& from : {Vec3{100, 0, 0}, Vec3{0, 0, -100}, Vec3{0, 100, 0}}) {
     RenderOptions o = optionsFor(volume, {.projection = Projection::kOrthographic});
     o.resolution = {48, 48};
-    o.camera.height = 96.0;  // a pixel is two voxels: rays pass through voxels
+    o.camera.height = 96.0;  // a pixel is two voxels wide, so that rays pass through voxels
     o.camera.center = {8.0, 20.0, 0.0};
     o.camera.eye = sum(o.camera.center, from);
     o.camera.up = from[1] == 0.0 ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
@@ -76,7 +76,7 @@ TEST(RenderVolume, EmptySpaceIsTransparentWhateverItsOpacity) {
   volume.background = 0.0f;
   RenderOptions o = optionsFor(volume);
   o.transfer.opacity = builtInOpacity("inverse");
-  o.opacityLength = o.step;  // where 1 - (1 - opacity)^0.1 is steep at opacity 1, a table is coarse
+  o.opacityLength = o.step;  // 1 - (1 - opacity)^0.1 is too steep at opacity 1 for a table
   EXPECT_GE(agreement(volume, o), kAsked);
   EXPECT_EQ(renderVolume(volume, o).rgba[3], 0.0f) << "a corner that no ray to the volume meets";
 }
@@ -93,9 +93,9 @@ TEST(RenderVolume, NoVoxelsGiveAnEmptyPicture) {
 }
 
 TEST(Renderers, AgreeOnSmoothFields) {
-  // Trilinear interpolation of a blob with scale s errs by up to 3/8 of its second derivative, some
-  // 2 I / s^2: 0.7 % of the intensity for s = 10, the more the smaller. Bent down by an opacity of
-  // 1/20, and mostly in one direction: 45 dB.
+  // For a blob with scale s, trilinear interpolation errs by up to 3/8 of the second derivative,
+  // about 2 I / s^2. This is 0.7 % of the intensity for s = 10, and more for smaller scales. An
+  // opacity of 1/20 reduces it, and most errors have the same sign, which gives 45 dB.
   Field field = randomField({.count = 25, .smallest = 8.0, .aspect = 1.5, .kappa = 0.0f});
   for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
   const SparseVolume volume = revoxelise(field, {.threshold = -1.0f});

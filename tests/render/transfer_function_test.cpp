@@ -1,6 +1,7 @@
-// Plan: curves by their definition at ends, midpoints and beyond; built-in maps against entries of
-// the published 256 that are no points of ours. Tolerance there: 2/255, which straight lines
-// between every fifth entry keep to (measured over all 256), and half a level of rounding.
+// Plan: curves follow their definition at ends, midpoints and beyond. Built-in maps agree with
+// entries of the published tables of 256 colors that are not in the library's tables. Linear
+// interpolation between every fifth entry is within 2/255 of all 256 entries, and rounding adds
+// half a level.
 #include "esvr/transfer_function.h"
 
 #include <gtest/gtest.h>
@@ -44,7 +45,7 @@ TEST(ColorMap, TwoPointsAtOnePlaceAreAJump) {
 
 struct Entry {
   const char* map;
-  int place;  // of 0 to 255
+  int place;  // index, 0 to 255
   Rgb color;
 };
 
@@ -103,8 +104,8 @@ TEST(OpacityCurve, TheMidpointHasHalfOfTheChange) {
 }
 
 TEST(OpacityCurve, SharpnessDrawsTheCurveToItsEnds) {
-  // By the formula: s = 0.25 becomes 0.5 * 0.5^6 = 1/128 for sharpness 0.5; the Hermite curve with
-  // tangents 0.5 is there 3 s^2 - 2 s^3 + 0.5 (2 s^3 - 3 s^2 + s).
+  // By the formula, s = 0.25 becomes 0.5 * 0.5^6 = 1/128 for sharpness 0.5. The Hermite curve with
+  // tangents 0.5 is then 3 s^2 - 2 s^3 + 0.5 (2 s^3 - 3 s^2 + s).
   const OpacityCurve curve{{0.0, 0.0, 0.5, 0.5}, {1.0, 1.0}};
   const double s = 1.0 / 128, s2 = s * s, s3 = s2 * s;
   EXPECT_NEAR(opacityAt(curve, 0.25), 3 * s2 - 2 * s3 + 0.5 * (2 * s3 - 3 * s2 + s), kExact);

@@ -1,7 +1,7 @@
-// Plan: all voxels that samples of a rectangle's rays lie between are in the window, found sample
-// by sample in float64 from the ray itself; a window's values are interpolated as their places say,
-// which a linear function shows: trilinear interpolation gives it back, to float32. Windows for one
-// sample of one ray have a handful of voxels whatever the direction.
+// Plan: the window contains all voxels that the samples of a rectangle's rays lie between, which
+// are found for each sample in float64 from its ray. Interpolation in a window gives back a linear
+// function, to float32 precision. Windows for one sample of one ray have few voxels for every
+// direction.
 #include "render/voxel_window.h"
 
 #include <gtest/gtest.h>

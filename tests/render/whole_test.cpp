@@ -1,4 +1,5 @@
-// Plan: against floor and ceil, at whole numbers, halves and their neighbours of either sign.
+// Plan: the functions agree with floor and ceil at whole numbers, halves and their neighbours of
+// both signs.
 #include "render/whole.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,8 @@
-// Plan: what an ellipsoid adds to the voxels around it, row by row, against the definition in
-// float64, for every order of the axes. Tolerance 2e-5 of the intensity at aspect 10: float32 in
-// three products that sum to at most the cutoff, 8, whose square the exponent takes; 2e-4 at 200,
-// as evaluateBricks. No voxel of the support may be missed, and slabs and rows end where it does.
+// Plan: the values that an ellipsoid adds to the voxels around it, row by row, agree with the
+// definition in float64, for every order of the axes. At an aspect ratio of 10 the tolerance is
+// 2e-5 of the intensity, for float32 products whose sum is at most the cutoff, 8. At 200 it is
+// 2e-4, as for evaluateBricks. No voxel of the support may be missed, and slabs and rows end where
+// the support ends.
 #include "render/window_form.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +26,7 @@ Coord voxelAt(const WindowAxes& axes, int slab, int row, int column) {
   return {of(0), of(1), of(2)};
 }
 
-/// All of a row from 0 to kReach - 1, by the runs.
+/// The values of a row from 0 to kReach - 1, computed by the runs.
 std::vector<double> rowOf(const WindowForm& f, int axis, int slab, int row) {
   const WindowAxes axes = axesOfSlabs(axis);
   std::vector<double> values(kReach, 0.0);

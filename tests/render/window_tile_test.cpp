@@ -1,10 +1,9 @@
-// Plan: pictures whose samples are interpolated from voxels (Between::kVoxels) against those of the
-// voxels that revoxelise() makes, marched by renderVolume: over cameras, steps, zooms, shapes and
-// rules. Voxels differ by rounding, some 1e-6 of the sum of the intensities that reach them, and
-// samples by that of a place in float32, 1e-5 voxel; so do the places of a sharp edge, a kappa of
-// 12 and above, whose slope is a few times as steep. 80 dB is asked for; a voxel missed or a sample
-// of another cell costs more. Where a rule has a threshold, a voxel on it may come out either way
-// and is off by the threshold: 70 dB.
+// Plan: pictures with Between::kVoxels agree with those of the voxels that revoxelise() makes,
+// drawn by renderVolume, for cameras, steps, zooms, shapes and rules. Voxels differ by rounding,
+// about 1e-6 of the sum of the intensities that reach them. Samples differ by the rounding of
+// positions to float32, 1e-5 voxel, which counts a few times as much at the sharp edges of a kappa
+// of 12 and above. The tests require 80 dB; a missed voxel or a sample of another cell costs more.
+// If a rule has a threshold, a voxel at the threshold may be active in one picture only: 70 dB.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -103,7 +102,7 @@ TEST(WindowTile, DrawsTheVoxelsPictureOfSmallAndThinEllipsoids) {
 }
 
 TEST(WindowTile, DrawsOneEllipsoidThatCoversEverything) {
-  // Of float32 at a distance of hundreds of voxels and no more than its curvature: 1e-5.
+  // The error is that of float32 at distances of hundreds of voxels: 1e-5.
   Field field = randomField({.count = 1, .smallest = 60.0, .aspect = 1.5});
   field.chunks[0].ellipsoids.intensity[0] = 0.3f;
   EXPECT_GE(agreement(field, optionsFor()), kAsked);
@@ -141,7 +140,7 @@ TEST(WindowTile, NothingToSeeIsTransparent) {
   for (const float v : renderField(Field{}, optionsFor()).rgba) ASSERT_EQ(v, 0.0f);
 }
 
-/// A short fit: many of its ellipsoids are smaller than a voxel.
+/// A short fit, in which many ellipsoids are smaller than a voxel.
 TEST(WindowTile, RealFileAgreesWithItsVoxelsAtEveryStep) {
   if (std::string(ESVR_DATA_DIR).empty())
     GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>";

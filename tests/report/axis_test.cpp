@@ -1,5 +1,5 @@
-// Plan: ticks at round numbers within the axis, linear and logarithmic; values that cannot be
-// shown; axes of one value and of none.
+// Plan: the tests check ticks at round numbers on linear and logarithmic axes, values that cannot
+// be shown, and axes of one value and of none.
 
 #include "report/axis.h"
 

@@ -1,4 +1,4 @@
-// Plan: the test vectors of RFC 4648, and bytes above 127.
+// Plan: the encoder agrees with the test vectors of RFC 4648, and encodes bytes above 127.
 
 #include "report/base64.h"
 

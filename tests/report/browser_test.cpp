@@ -1,5 +1,5 @@
-// Plan: a page in a real browser without a window. Scripts added to the page click and drag as a
-// reader would and leave what they see in the page, which the browser prints.
+// Plan: a page is opened in a real browser without a window. Scripts in the page click and drag as
+// a reader does and write what they see into the page, which the browser prints.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// A picture of one color, as SVG.
+/// An SVG picture of one color.
 Picture square(const std::string& color) {
   return {color, "image/svg+xml",
           "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"64\" height=\"48\"><rect width=\"64\" "
@@ -36,8 +36,8 @@ HtmlPage page() {
           .commands = {"esvr-compare table a.vdb", "esvr 0.1.0"}};
 }
 
-/// The page after `script` has run in it, as the browser has it. The script's function see(text)
-/// keeps a text.
+/// Opens the page in the browser and runs `script` in it. The script's function see(text) records a
+/// text.
 class Browser : public testing::Test {
  protected:
   void SetUp() override {

@@ -1,4 +1,4 @@
-// Plan: cells as people and as programs read them, and tables in each form.
+// Plan: the tests check cells for people and for programs, and tables in each form.
 
 #include "report/data_table.h"
 

@@ -1,4 +1,4 @@
-// Plan: markup, control characters, UTF-8 that is right and UTF-8 that is not.
+// Plan: the tests check markup, control characters, and valid and invalid UTF-8.
 
 #include "report/escape.h"
 

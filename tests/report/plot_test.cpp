@@ -1,5 +1,6 @@
-// Plan: what a plot draws, as files of either kind and by its pixels: a line where it should be,
-// the same picture for the same plot, and texts and values that cannot be drawn.
+// Plan: plots are checked as files of both formats and by their pixels: lines are in the right
+// places, the same plot gives the same picture, and texts and values that cannot be drawn are left
+// out.
 
 #include "report/plot.h"
 
@@ -26,7 +27,7 @@ Plot plot() {
           .series = {{"ESVR", {{1e4, 35.0}, {1e5, 45.0}}}, {"ZFP", {{5e4, 30.0}, {2e5, 44.0}}}}};
 }
 
-/// Width and height from a PNG's header.
+/// Width and height from the header of a PNG file.
 std::pair<int, int> sizeOf(const std::string& png) {
   const auto number = [&](std::size_t at) {
     int value = 0;

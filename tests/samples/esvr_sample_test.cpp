@@ -1,5 +1,6 @@
-// Plan: esvr-sample as a user runs it: files that read back, refusals with code and words, nothing
-// half-written, the same voxels for any number of threads.
+// Plan: esvr-sample is run as by a user. Its files are read back, wrong options are refused with
+// exit code and message, no incomplete file is left, and the voxels do not depend on the number of
+// threads.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -105,7 +106,7 @@ TEST(EsvrSample, helpListsTheKindsAndVersionThePartsOnStdout) {
 
 TEST(EsvrSample, leavesNothingWhenInterrupted) {
   const TemporaryFolder folder;
-  // minutes of work, stopped after half a second
+  // Minutes of work, which are stopped after half a second.
   const auto run = runProgram(
       "/usr/bin/timeout", {"--foreground", "--preserve-status", "--signal=INT", "0.5", ESVR_SAMPLE,
                            "plume", folder / "a.vdb", "--resolution", "6000"});

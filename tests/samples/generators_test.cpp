@@ -1,6 +1,7 @@
-// Plan, for every generator: the same bits on every machine (a hash of the volume is a constant of
-// this file) and for any number of threads; another seed gives another volume; active voxels grow
-// with the resolution as the shape demands; the smallest resolutions; values in range.
+// Plan, for every generator: the bits are the same on every machine (this file has a hash of the
+// volume) and for any number of threads; another seed gives another volume; the number of active
+// voxels grows with the resolution as the shape requires; the smallest resolutions work; values are
+// in range.
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -21,7 +22,7 @@ namespace {
 struct Generator {
   const char* name;
   std::function<SparseVolume(const SampleOptions&)> make;
-  std::uint64_t hash;  ///< of resolution 48, seed 1
+  std::uint64_t hash;  ///< hash at resolution 48 with seed 1
   bool seeded;
   double dimension;  ///< voxels grow as resolution^dimension: 3 for solids, 2 for surfaces, less
                      ///< where thin parts are thickened to a voxel

@@ -1,4 +1,5 @@
-// Plan: constants that would show any change of the numbers; ranges; continuity and slope of noise.
+// Plan: stored constants show any change of the random numbers. The tests also check ranges, and
+// the continuity and slope of noise.
 
 #include "generators/hash_noise.h"
 
@@ -29,7 +30,8 @@ TEST(Random, uniformFillsItsRangeEvenly) {
   }
   EXPECT_GE(low, 0.0);
   EXPECT_LT(high, 1.0);
-  // the mean's standard deviation is sqrt(1 / 12 / draws) = 9e-4: five of them
+  // The standard deviation of the mean is sqrt(1 / 12 / draws) = 9e-4; the tolerance is five of
+  // them.
   EXPECT_NEAR(sum / kDraws, 0.5, 4.6e-3);
 }
 

@@ -1,5 +1,5 @@
-// Plan: a dense image in memory becomes the volume its rules say, voxel by voxel; every raw type
-// and byte order; NRRD headers and transforms; what is refused.
+// Plan: a dense image in memory becomes a volume by the stated rules, voxel by voxel. The tests
+// check every raw type and byte order, NRRD headers and transforms, and refused files.
 
 #include "images/image_volume.h"
 

@@ -1,5 +1,5 @@
-// Plan: raw2vdb as a user runs it: RAW and NRRD images, their options, refusals with code and
-// words.
+// Plan: raw2vdb is run as by a user. The tests check RAW and NRRD images, their options, and the
+// exit codes and messages of refused input.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ using test::runProgram;
 using test::TemporaryFolder;
 using testing::HasSubstr;
 
-/// 4 x 3 x 2 bytes: 0, 10, 20, ...
+/// 4 x 3 x 2 bytes with the values 0, 10, 20, ...
 std::string ramp() {
   std::string bytes;
   for (int i = 0; i < 24; ++i) bytes.push_back(char(i * 10));

@@ -1,4 +1,4 @@
-// Plan: every kind by name has grids that can be written; what the grids say of themselves.
+// Plan: every kind has grids that can be written, with the right names, classes and metadata.
 
 #include "kinds/sample_kinds.h"
 

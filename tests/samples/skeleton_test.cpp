@@ -1,4 +1,5 @@
-// Plan: what SWC text becomes; every bad line is refused by number; tubes and pieces of a skeleton.
+// Plan: SWC text becomes a skeleton, every wrong line is refused with its number, and the tubes and
+// pieces of a skeleton are right.
 
 #include "swc/skeleton.h"
 
@@ -91,7 +92,7 @@ TEST(TubesOf, linkEveryNodeToItsParentAndKeepLonelyNodesAsBalls) {
 }
 
 TEST(LongestPieces, keepsThePiecesOfMostCable) {
-  // pieces of length 1 (nodes 1, 2), 3 (10, 11, 12) and 0 (20), mixed
+  // The pieces have lengths of 1 (nodes 1, 2), 3 (10, 11, 12) and 0 (20), in mixed order.
   const auto s = parse(
       "1 0 0 0 0 1 -1\n11 0 2 0 0 1 10\n2 0 1 0 0 1 1\n10 0 0 0 0 1 -1\n12 0 2 1 0 1 11\n"
       "20 0 7 7 7 1 -1\n");

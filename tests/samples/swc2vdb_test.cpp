@@ -1,5 +1,5 @@
-// Plan: swc2vdb as a user runs it: a skeleton becomes tubes at its own place; refusals; real
-// skeletons where they are there.
+// Plan: swc2vdb is run as by a user. A skeleton becomes tubes at its own position, wrong input is
+// refused, and real skeletons are converted if they exist.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ TEST(Swc2Vdb, putsTubesWhereTheSkeletonLies) {
   const VolumeGrid grid = readGrid(out, "density");
   const auto& m = grid.descriptor.transform.affine.value();
   EXPECT_DOUBLE_EQ(m[0], 2.0) << "68 units on 34 voxels";
-  // the voxel at the bar's middle is inside
+  // The voxel in the middle of the bar is inside.
   const auto index = [&](double world, std::size_t axis) {
     return int((world - m[12 + axis]) / m[0] + 0.5);
   };

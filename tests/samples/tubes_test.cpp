@@ -1,5 +1,5 @@
-// Plan: the distance to a round cone against a search over its balls; soft edges; the scale of a
-// set of tubes.
+// Plan: the distance to a round cone agrees with a search over its balls. The tests also check soft
+// edges and the scale of a set of tubes.
 
 #include "generators/tubes.h"
 
@@ -16,7 +16,7 @@
 namespace esvr::samples {
 namespace {
 
-/// Minimum over the balls of a tube, on a fine grid along its axis.
+/// The minimum over the balls of a tube, on a fine grid along its axis.
 double searchedDistance(const Tube& tube, Vec3 p) {
   constexpr int kBalls = 20'000;
   double nearest = std::numeric_limits<double>::infinity();
@@ -34,7 +34,7 @@ TEST(SignedDistance, isTheMinimumOverTheBalls) {
     const Tube tube{random.inCube(-2.0, 2.0), random.inCube(-2.0, 2.0), random.uniform(0.0, 2.0),
                     random.uniform(0.0, 2.0)};
     const Vec3 p = random.inCube(-4.0, 4.0);
-    // the search is off by the second order of its step: 7 / 20000 squared over distances >= 1e-3
+    // The error of the search is of second order in its step: (7 / 20000)^2 over distances >= 1e-3.
     EXPECT_NEAR(signedDistance(tube, p), searchedDistance(tube, p), 2e-4) << "tube " << i;
   }
 }
@@ -49,7 +49,7 @@ TEST(VoxeliseTubes, fadesOverTheEdgeAcrossTheSurface) {
   const Tube tube{{20.0, 20.0, 0.0}, {20.0, 20.0, 40.0}, 5.0, 5.0};
   const SparseVolume volume = voxeliseTubes(std::vector{tube}, 2.0, {});
   EXPECT_EQ(valueAt(volume, {20, 20, 20}), 1.0f);
-  EXPECT_EQ(valueAt(volume, {24, 20, 20}), 1.0f);  // distance -1: half the edge
+  EXPECT_EQ(valueAt(volume, {24, 20, 20}), 1.0f);  // distance -1, which is half the edge
   EXPECT_EQ(valueAt(volume, {25, 20, 20}), 0.5f);
   EXPECT_EQ(valueAt(volume, {26, 20, 20}), 0.0f);
   EXPECT_EQ(activeBox(volume), (Box{{15, 15, -5}, {25, 25, 45}}));
@@ -61,7 +61,7 @@ TEST(FitTubes, givesTheLongestSideTheResolution) {
   EXPECT_DOUBLE_EQ(scaled.voxelSize, 0.5);
   const Tube& tube = scaled.tubes.front();
   EXPECT_DOUBLE_EQ(tube.radiusA, 10.0);
-  // the surface starts at the lower face of voxel 1: 0.5
+  // The surface begins at the lower face of voxel 1, which is at 0.5.
   EXPECT_DOUBLE_EQ(tube.a.x - tube.radiusA, 0.5);
   EXPECT_DOUBLE_EQ(scaled.origin.x + tube.a.x * scaled.voxelSize, 100.0);
 }

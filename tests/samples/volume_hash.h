@@ -6,7 +6,8 @@
 
 namespace esvr::test {
 
-/// A hash of all that a volume holds: bricks, values to the bit, activity, origin, background.
+/// A hash of everything in a volume: bricks, values bit by bit, active masks, origin and
+/// background.
 std::uint64_t hashOf(const SparseVolume& volume);
 
 }  // namespace esvr::test

@@ -1,4 +1,5 @@
-// Plan: the octree search against a plain visit of every voxel, for every kind of shape; limits.
+// Plan: the octree search agrees with a plain visit of every voxel, for every kind of shape, and
+// keeps its limits.
 
 #include "generators/voxelise.h"
 
@@ -35,7 +36,7 @@ void searchAndCompare(const S& shape, const Box& box, float background = 0.0f) {
 
 TEST(Voxelise, findsEveryVoxelOfTubes) {
   auto tubes = treeTubes({.resolution = 200, .seed = 2});
-  tubes.resize(40);  // the visit asks every tube at every voxel
+  tubes.resize(40);  // the plain visit tests every tube at every voxel
   searchAndCompare(TubeShape(tubes, 2.0), boundsOf(tubes, 2.0));
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What a full disk looks like to a writer.
+/// Simulates a full disk for a writer.
 
 #include <sys/resource.h>
 
@@ -7,7 +7,7 @@
 
 namespace esvr::test {
 
-/// While it lives, no file of this process grows beyond a size: writing fails.
+/// During its lifetime, no file of this process grows beyond a size, and writing fails.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {

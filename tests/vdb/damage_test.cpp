@@ -1,7 +1,7 @@
-/// Plan: files cut at every place and with every byte damaged, made ones of each packing and real
-/// ones at many places. Each is either read, to a volume that is sound and finite, or refused as
-/// BadInput; nothing else may happen. What OpenVDB would believe and come to grief over is damaged
-/// on purpose: chunk sizes, lengths of names, counts.
+/// Plan: files are cut at every position, and every byte is damaged; small files of each packing
+/// completely, and real ones at many positions. Each file is either read as a valid finite volume
+/// or refused with BadInput. Values that OpenVDB would believe (chunk sizes, lengths of names,
+/// counts) are damaged on purpose.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ using Bytes = std::vector<std::byte>;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// Damage may turn a bit into a large active tile; no need to build it.
+/// Damage may turn a bit into a large active tile, which is not worth building.
 constexpr ReadOptions kSmall{.maxBytes = std::uint64_t{8} << 20};
 
 class Damage : public testing::Test {
@@ -41,7 +41,7 @@ class Damage : public testing::Test {
     grid->tree().addTile(1, {64, 0, 0}, 0.5f, true);
     grid->insertMeta("note", openvdb::StringMetadata("about this grid"));
     grid->setSaveFloatAsHalf(half);
-    grid->setGridClass(openvdb::GRID_UNKNOWN);  // OpenVDB zips no other
+    grid->setGridClass(openvdb::GRID_UNKNOWN);  // OpenVDB zips grids of this class only
     grid->setTransform(openvdb::math::Transform::createFrustumTransform(
         {openvdb::Vec3d(0), openvdb::Vec3d(100)}, 0.5, 1.0, 0.1));
     test::saveCompressed(path(), {grid}, compression);
@@ -51,7 +51,7 @@ class Damage : public testing::Test {
   test::TemporaryFolder directory_;
 };
 
-/// Where the bytes of `text` begin.
+/// The offset at which the bytes of `text` begin.
 std::size_t find(const Bytes& bytes, const std::string& text) {
   const auto* needle = reinterpret_cast<const std::byte*>(text.data());
   const auto it = std::search(bytes.begin(), bytes.end(), needle, needle + text.size());
@@ -79,7 +79,7 @@ TEST_F(Damage, AFileCutAnywhereIsRefused) {
 }
 
 TEST_F(Damage, AnyByteMayBeWrong) {
-  constexpr std::size_t kHead = 1200;  // header, directory, metadata, map; then nodes, mostly empty
+  constexpr std::size_t kHead = 1200;  // header, directory, metadata and map; then nodes
   std::size_t refused = 0;
   std::mt19937 random(1);
   for (const auto compression : kEveryCodec)
@@ -98,7 +98,7 @@ TEST_F(Damage, EveryBitOfALeafMayBeWrong) {
   for (const auto compression : kEveryCodec) {
     test::saveCompressed(path(), {test::smallGrid()}, compression);
     const Bytes whole = test::bytesOf(path());
-    // The last leaf's mask, packing, chunk size, chunk header and the head of its values.
+    // The last leaf's mask, packing, chunk size, chunk header and the first of its values.
     const std::size_t leafBytes = std::min<std::size_t>(whole.size(), compression ? 110 : 2200);
     for (std::size_t i = whole.size() - leafBytes; i < whole.size() - leafBytes + 110; ++i)
       for (int bit = 0; bit < 8; ++bit) {
@@ -115,7 +115,7 @@ TEST_F(Damage, ANegativeChunkSizeDoesNotOverrunTheLeaf) {
   grid->setGridClass(openvdb::GRID_UNKNOWN);
   test::saveCompressed(path(), {grid}, COMPRESS_ZIP | COMPRESS_ACTIVE_MASK);
   const Bytes whole = test::bytesOf(path());
-  // Three floats do not shrink: the file ends in their negative size, -12, and the floats.
+  // Three floats do not shrink, so the file ends with their negative size, -12, and the floats.
   const std::size_t at = whole.size() - 12 - 8;
   std::int64_t size = 0;
   std::memcpy(&size, whole.data() + at, sizeof size);
@@ -144,7 +144,7 @@ TEST_F(Damage, ADirectoryThatRunsInCirclesEnds) {
   constexpr std::size_t kGridCount = 8 + 4 + 4 + 4 + 1 + 36 + 4;
   const std::size_t positions = find(whole, "Tree_float_5_4_3") + 16 + 4;
   auto circle = withValueAt(whole, kGridCount, std::int32_t{0x7fffffff});
-  circle = withValueAt(circle, positions + 16, std::int64_t{kGridCount + 4});  // next: itself
+  circle = withValueAt(circle, positions + 16, std::int64_t{kGridCount + 4});  // itself
   EXPECT_FALSE(readable(circle));
   EXPECT_FALSE(readable(withValueAt(whole, positions, std::int64_t{-1})));
   EXPECT_FALSE(readable(withValueAt(whole, positions + 16, std::int64_t{1} << 60)));
@@ -153,7 +153,7 @@ TEST_F(Damage, ADirectoryThatRunsInCirclesEnds) {
 TEST_F(Damage, AFrustumWithinAFrustumIsRefused) {
   const Bytes whole = madeFile(COMPRESS_NONE, false);
   const std::size_t outer = find(whole, "NonlinearFrustumMap");
-  const std::size_t inner = outer + 19 + 64;  // its own numbers, then its second map
+  const std::size_t inner = outer + 19 + 64;  // its own numbers precede its second map
   Bytes nested(whole.begin(), whole.begin() + std::ptrdiff_t(inner));
   nested.insert(nested.end(), whole.begin() + std::ptrdiff_t(outer) - 4, whole.end());
   test::writeBytes(path(), nested);

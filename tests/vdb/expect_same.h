@@ -1,5 +1,5 @@
 #pragma once
-/// Volumes and grids compared bit by bit.
+/// Compares volumes and grids bit by bit.
 
 #include <gtest/gtest.h>
 

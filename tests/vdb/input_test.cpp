@@ -1,4 +1,4 @@
-/// Plan: whatever is handed over as a file is answered with BadInput that names it.
+/// Plan: everything that is not a valid VDB file is refused with a BadInput that names it.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ TEST_F(Input, ThatIsOlderThanWhatIsRead) {
 }
 
 TEST_F(Input, OfANewerFormatVersionIsTried) {
-  // OpenVDB 13 stamps 225 on every file, and nothing else changed for float grids.
+  // OpenVDB 13 writes version 225 into every file, and nothing else changed for float grids.
   test::save(directory_ / "new.vdb", {test::smallGrid()});
   auto bytes = test::bytesOf(directory_ / "new.vdb");
   bytes[8] = std::byte{225};

@@ -44,7 +44,7 @@ std::vector<std::byte> bytesOf(const std::filesystem::path& path) {
 }
 
 void writeBytes(const std::filesystem::path& path, const std::vector<std::byte>& bytes) {
-  std::filesystem::remove(path);  // a file emptied and rewritten is flushed to the disk by ext4
+  std::filesystem::remove(path);  // ext4 flushes files that are emptied and rewritten
   std::ofstream(path, std::ios::binary)
       .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// Files made with OpenVDB itself, so that the reader is tested against what others write.
+/// Makes files with OpenVDB itself, so that the reader is tested with files of another writer.
 
 #include "vdb/scalar_trees.h"
 
@@ -14,7 +14,7 @@ namespace esvr::test {
 /// A float grid with one leaf of three active voxels, named "density".
 openvdb::FloatGrid::Ptr smallGrid(float background = 0.0f);
 
-/// Writes with OpenVDB's own writer, under its default compression unless told otherwise.
+/// Writes with OpenVDB's own writer, by default with its default compression.
 void save(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
           const openvdb::MetaMap& metadata = {});
 void saveCompressed(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
@@ -26,7 +26,7 @@ openvdb::GridBase::Ptr load(const std::filesystem::path& path, const std::string
 std::vector<std::byte> bytesOf(const std::filesystem::path& path);
 void writeBytes(const std::filesystem::path& path, const std::vector<std::byte>& bytes);
 
-/// A volume from scratch: these active voxels (any order), the rest background.
+/// A volume with these active voxels, in any order; the rest is background.
 struct VoxelValue {
   Coord voxel;
   float value;

@@ -1,6 +1,7 @@
-/// Plan: an item of every type OpenVDB registers, and one it does not know, on file and grid; bytes
-/// read equal the bytes OpenVDB wrote; written back, OpenVDB's reader finds equal items. Then what
-/// must not travel (statistics, temporaries) and what must not be overwritten.
+/// Plan: an item of every type that OpenVDB registers, and one of an unknown type, is stored in the
+/// file and in a grid. The bytes that are read equal those that OpenVDB wrote, and OpenVDB reads
+/// equal items from the written file. Statistics and temporary items are not copied, and some are
+/// not overwritten.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,7 +19,7 @@ using testing::Contains;
 using testing::Field;
 using testing::Not;
 
-/// One item of each kind, on any MetaMap.
+/// Inserts one item of each type.
 void insertEveryType(openvdb::MetaMap& map) {
   openvdb::initialize();
   map.insertMeta("a bool", openvdb::BoolMetadata(true));

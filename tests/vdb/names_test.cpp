@@ -1,5 +1,5 @@
-/// Plan: what a user types for a grid finds the right one: empty names, shared names, names that
-/// look like numbered ones; grids that cannot be fitted are listed by name and type.
+/// Plan: the name that a user gives finds the right grid, also for empty names, shared names and
+/// names that look like numbered ones. Grids that cannot be fitted are listed by name and type.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// Grids of these names, whose voxel (0, 0, 0) holds 1, 2, ... in turn.
+/// Grids with these names. The voxel (0, 0, 0) of the first one holds 1, of the second one 2, ...
 openvdb::GridPtrVec gridsNamed(const std::vector<std::string>& names) {
   openvdb::GridPtrVec grids;
   for (const auto& name : names) {
@@ -113,7 +113,8 @@ TEST_F(Names, OfGridsThatCannotBeFittedComeWithTheirType) {
 }
 
 TEST_F(Names, OfTypesThatOpenVdbDoesNotKnowAreListedToo) {
-  // A tree of another shape, as in a host's file: the first grid's type, rewritten.
+  // The tree has another shape, as in other programs' files: the type of the first grid is
+  // rewritten.
   const auto other = test::smallGrid();
   other->setName("other");
   test::save(path(), {other, test::smallGrid()});

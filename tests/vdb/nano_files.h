@@ -1,5 +1,5 @@
 #pragma once
-/// Files made with NanoVDB's own writer.
+/// Makes files with NanoVDB's own writer.
 
 #include <openvdb/Grid.h>
 
@@ -11,10 +11,10 @@ namespace esvr::test {
 
 enum class NanoCodec { kNone, kZip, kBlosc };
 
-/// Grids of floats, doubles or vectors of three floats.
+/// Writes grids of floats, doubles or vectors of three floats.
 void saveNano(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
               NanoCodec codec = NanoCodec::kNone);
-/// A grid of floats in one of NanoVDB's forms.
+/// Writes a grid of floats in one of NanoVDB's value types.
 void saveNanoAs(const std::filesystem::path& path, const openvdb::GridBase& grid,
                 NanoValues values);
 

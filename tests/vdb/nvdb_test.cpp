@@ -1,5 +1,6 @@
-/// Plan: files made with NanoVDB's own writer, in every codec and float type, read exactly; files
-/// written here are read by NanoVDB's own reader; then cut, bent and inconsistent ones.
+/// Plan: files of NanoVDB's own writer, with every codec and float type, are read exactly. Files
+/// written by the library are read by NanoVDB's own reader. Files that are cut, damaged or
+/// inconsistent are refused.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,7 +27,7 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 using Bytes = std::vector<std::byte>;
 
-/// Leaves, tiles of two levels, a background that is not zero.
+/// A grid with leaves, tiles of two levels, and a background that is not zero.
 openvdb::FloatGrid::Ptr sourceGrid() {
   auto grid = test::smallGrid(0.5f);
   for (int i = 0; i < 300; ++i)
@@ -83,7 +84,8 @@ TEST_F(Nvdb, OfDoublesReadsAsItsSource) {
   EXPECT_EQ(valueAt(grid.volume, {-1, 2, 3}), 0.3f);
 }
 
-/// Writes under a quantised type and expects each value within `tolerance` of its source.
+/// Writes a grid with a quantised type and checks that each value is within `tolerance` of its
+/// source.
 void expectQuantised(const std::filesystem::path& path, NanoValues values, const char* type,
                      float tolerance) {
   const auto source = sourceGrid();
@@ -98,11 +100,11 @@ void expectQuantised(const std::filesystem::path& path, NanoValues values, const
 }
 
 TEST_F(Nvdb, OfQuantisedFloatsReadsWithinTheirStep) {
-  // A leaf spans at most 3: half a step of 2^-n of that, and float's rounding.
+  // A leaf's range is at most 3. The error is half a step of 2^-n of that, and float rounding.
   expectQuantised(path(), NanoValues::kFp4, "fp4", 0.5f * 3 / 15 + 1e-6f);
   expectQuantised(path(), NanoValues::kFp8, "fp8", 0.5f * 3 / 255 + 1e-6f);
   expectQuantised(path(), NanoValues::kFp16, "fp16", 0.5f * 3 / 65535 + 1e-6f);
-  expectQuantised(path(), NanoValues::kFpN, "fpn", 0.01f + 1e-6f);  // its default for fog
+  expectQuantised(path(), NanoValues::kFpN, "fpn", 0.01f + 1e-6f);  // the default tolerance for fog
 }
 
 TEST_F(Nvdb, OfALevelSetKeepsInsideAndOutsideApart) {
@@ -185,7 +187,8 @@ TEST_F(Nvdb, AnyByteMayBeWrong) {
   for (const NanoCodec codec : {NanoCodec::kNone, NanoCodec::kZip, NanoCodec::kBlosc}) {
     save({test::smallGrid()}, codec);
     const Bytes whole = test::bytesOf(path());
-    // Every byte of the headers; of the nodes, which are large and mostly empty, some.
+    // Every byte of the headers is damaged, and some bytes of the nodes, which are large and mostly
+    // empty.
     for (std::size_t i = 0; i < whole.size(); i += i < 1200 ? 1 : 1 + whole.size() / 400) {
       Bytes damaged = whole;
       damaged[i] ^= i % 2 == 0 ? std::byte{0x80} : std::byte{0xff};
@@ -197,8 +200,8 @@ TEST_F(Nvdb, AnyByteMayBeWrong) {
 TEST_F(Nvdb, OffsetsThatLeadAstrayAreNotFollowed) {
   save({test::smallGrid()});
   const Bytes whole = test::bytesOf(path());
-  // The offsets of tree and nodes are the 64-bit words whose change makes a node lie elsewhere:
-  // whichever they are, no word of the file may lead outside of it.
+  // The offsets of tree and nodes are 64-bit words whose change moves a node. Whichever words they
+  // are, none may lead outside the file.
   const std::int64_t astray[] = {std::int64_t{1} << 40, -(std::int64_t{1} << 40),
                                  std::numeric_limits<std::int64_t>::max(),
                                  std::numeric_limits<std::int64_t>::min(), 32};

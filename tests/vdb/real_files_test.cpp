@@ -1,6 +1,6 @@
-/// Plan: every real file reads as its row in the data folder's README says; counts and boxes agree
-/// with the statistics that the files' own writers left in them; and written back, it is the same
-/// grid to the last bit, transform and metadata included.
+/// Plan: every real file is read as its row in the data folder's README states. Counts and boxes
+/// agree with the statistics that its writer stored. Written again, it is the same grid bit by bit,
+/// including transform and metadata.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

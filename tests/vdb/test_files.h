@@ -10,7 +10,7 @@
 
 namespace esvr::test {
 
-/// The real volumes' folder, or an empty path where none is configured.
+/// The folder of the real volumes; empty if none is configured.
 inline std::filesystem::path dataDir() { return ESVR_DATA_DIR; }
 
 }  // namespace esvr::test

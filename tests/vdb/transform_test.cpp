@@ -1,6 +1,6 @@
-/// Plan: one grid under every map that OpenVDB has; what is read is the map's own bytes; what is
-/// written back is, to OpenVDB's reader, the same map of the same type; the affine matrix agrees
-/// with OpenVDB's indexToWorld in float64, to rounding.
+/// Plan: a grid is stored with every map that OpenVDB has. The bytes of the map are read unchanged.
+/// OpenVDB reads the same map of the same type from the written file. The affine matrix agrees with
+/// OpenVDB's indexToWorld in float64, up to rounding.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -48,13 +48,13 @@ std::vector<NamedMap> everyMap() {
       make<math::ScaleTranslateMap>(Vec3d(0.1, 0.2, 0.3), Vec3d(4, 5, 6)),
       make<math::UniformScaleTranslateMap>(1.0 / 3.0, Vec3d(4, 5, 6)),
       make<math::UnitaryMap>(Vec3d(1, 1, 0).unit(), 0.3), make<math::AffineMap>(sheared()),
-      // A map that OpenVDB would simplify if asked: it must keep its type all the same.
+      // OpenVDB could simplify this map. It must keep its type.
       make<math::AffineMap>(math::Mat4d::identity()),
       make<math::NonlinearFrustumMap>(box, 0.4, 2.5),
       make<math::NonlinearFrustumMap>(box, 0.4, 2.5, std::make_shared<math::AffineMap>(sheared()))};
 }
 
-/// A grid whose map is exactly this one: Transform's constructor would simplify it.
+/// A grid with exactly this map, which the constructor of Transform would simplify.
 openvdb::FloatGrid::Ptr gridUnder(const math::MapBase& map) {
   std::stringstream stream(std::ios::in | std::ios::out | std::ios::binary);
   openvdb::io::setCurrentVersion(stream);
@@ -98,7 +98,7 @@ TEST_P(EveryMap, HasItsAffineMatrixWhereItIsLinear) {
       sum += term;
       size += std::abs(term);
     }
-    // Four terms, each rounded once and added once, on both sides.
+    // Both sides have four terms, each of which is rounded once and added once.
     EXPECT_NEAR(sum, world[c], 16 * std::numeric_limits<double>::epsilon() * size);
   }
 }

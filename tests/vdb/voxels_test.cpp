@@ -1,6 +1,6 @@
-/// Plan: trees made with OpenVDB, values compared exactly: leaves under every packing a file can
-/// have, tiles of every level, inactive voxels with anything in them, level sets, values float
-/// cannot hold, coordinates at both ends of the lattice.
+/// Plan: trees made with OpenVDB are read, and their values are compared exactly: leaves with every
+/// packing, tiles of every level, inactive voxels with any content, level sets, values that float
+/// cannot hold, and coordinates at both ends of the index space.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -35,10 +35,10 @@ class Voxels : public testing::Test {
   test::TemporaryFolder directory_;
 };
 
-/// How one file packs its values, and what its inactive voxels hold.
+/// How a file packs its values, and what its inactive voxels hold.
 struct Packing {
   std::uint32_t compression;
-  int inactiveValues;  ///< distinct ones beside the background
+  int inactiveValues;  ///< number of distinct values other than the background
   bool half;
 };
 std::ostream& operator<<(std::ostream& out, const Packing& p) {
@@ -48,11 +48,12 @@ std::ostream& operator<<(std::ostream& out, const Packing& p) {
 
 class EveryPacking : public testing::TestWithParam<Packing> {
  protected:
-  /// Every third voxel of 20^3 active, some inactive ones with other values. Half holds them all.
+  /// A grid of 20^3 voxels. Every third one is active, and some inactive ones hold other values.
+  /// All values are exact in half.
   template <class Grid>
   static typename Grid::Ptr patterned() {
     auto grid = Grid::create(2.0);
-    grid->setName("density");  // of class unknown: OpenVDB zips no other
+    grid->setName("density");  // of class unknown, since OpenVDB zips no other
     auto accessor = grid->getAccessor();
     for (int i = 0; i < 8000; ++i) {
       const openvdb::Coord at(i / 400 - 10, i / 20 % 20, i % 20);
@@ -101,7 +102,7 @@ TEST_F(Voxels, ActiveTilesBecomeBricks) {
   auto source = test::smallGrid();
   source->tree().addTile(1, {8, 0, 0}, 3.0f, true);      // 8^3
   source->tree().addTile(2, {128, 0, 0}, 4.0f, true);    // 128^3
-  source->tree().addTile(2, {-128, 0, 0}, 5.0f, false);  // inactive: background whatever it says
+  source->tree().addTile(2, {-128, 0, 0}, 5.0f, false);  // inactive tiles become background
   const auto grid = saveAndRead(source);
   EXPECT_EQ(grid.volume.brickCount(), 1u + 1u + 16u * 16u * 16u);
   EXPECT_EQ(activeVoxelCount(grid.volume), source->activeVoxelCount());
@@ -113,7 +114,7 @@ TEST_F(Voxels, ActiveTilesBecomeBricks) {
 
 TEST_F(Voxels, ATileTooLargeForTheLimitIsRefusedBeforeItIsExpanded) {
   auto source = test::smallGrid();
-  source->tree().addTile(3, {4096, 0, 0}, 1.0f, true);  // 4096^3 voxels: 288 GB of bricks
+  source->tree().addTile(3, {4096, 0, 0}, 1.0f, true);  // 4096^3 voxels take 288 GB of bricks
   test::save(path(), {source});
   EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
               ThrowsMessage<MemoryExceeded>(

@@ -1,5 +1,5 @@
-/// Plan: what is written is read with OpenVDB's own reader: values, states, tiles, types, half.
-/// Then the ways in which writing fails, each of which must leave nothing behind.
+/// Plan: OpenVDB's own reader reads the written files: values, states, tiles, types and half
+/// floats. Writing can fail in several ways, each of which leaves no file.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ class Write : public testing::Test {
 
 TEST_F(Write, InactiveVoxelsHoldTheBackground) {
   auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}, {{-3, 5, 100}, 2.0f}}, 0.5f);
-  grid.volume.values[1] = 99.0f;  // inactive: a fit leaves anything there
+  grid.volume.values[1] = 99.0f;  // an inactive voxel may hold any value
   const auto back = writeAndLoad(grid);
   ASSERT_TRUE(back);
   EXPECT_EQ(back->background(), 0.5f);
@@ -74,14 +74,14 @@ TEST_F(Write, ALevelSetComesBackWithSignsEverywhere) {
   ASSERT_TRUE(back);
   EXPECT_EQ(back->getGridClass(), openvdb::GRID_LEVEL_SET);
   EXPECT_TRUE(back->tree().hasSameTopology(sphere->tree()));
-  for (int x = -48; x < 48; x += 2)  // leaves, the space inside and outside, tiles included
+  for (int x = -48; x < 48; x += 2)  // leaves, the space inside and outside, and tiles
     for (int y = -48; y < 48; y += 2)
       for (int z = -48; z < 48; ++z)
         ASSERT_EQ(back->tree().getValue({x, y, z}), sphere->tree().getValue({x, y, z}));
 }
 
 TEST_F(Write, ActiveVoxelsOfALevelSetSurviveTheFloodFill) {
-  // As fluid solvers write them: active throughout, whole leaves of one value.
+  // Fluid solvers write such files: all voxels are active, and whole leaves have one value.
   auto voxels = fullBrick({0, 0, 0}, -1.25f);
   for (const auto& voxel : fullBrick({8, 0, 0}, 7.0f)) voxels.push_back(voxel);
   auto grid = test::gridOf("phi", voxels, 3.0f);
@@ -117,7 +117,7 @@ TEST_F(Write, HalfFollowsTheSourceUnlessToldOtherwise) {
     const auto back = writeAndLoad(grid, {.half = mode, .overwrite = true});
     const float expected = back->saveFloatAsHalf() ? float(openvdb::math::half(0.1f)) : 0.1f;
     EXPECT_EQ(back->tree().getValue({0, 0, 0}), expected);
-    EXPECT_EQ(back->type(), "Tree_float_5_4_3");  // never OpenVDB's native half grid
+    EXPECT_EQ(back->type(), "Tree_float_5_4_3");  // never the native half grid of OpenVDB
     return inspectVdb(path()).grids.front().savedAsHalf;
   };
   EXPECT_FALSE(savedAsHalf(ValueType::kFloat, HalfMode::kAuto));

@@ -8,7 +8,7 @@ namespace {
 
 enum class Pass { kGradients, kResiduals };
 
-/// One block a brick, one group of lanes a pair.
+/// Each block works on one brick, and each group of lanes on one pair at a time.
 template <Pass kPass, class Sum, int kThreads>
 __global__ void __launch_bounds__(kThreads) brickPass(const BrickPassArguments a) {
   __shared__ Sum sums[kPaddedVoxels];

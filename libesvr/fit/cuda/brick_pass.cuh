@@ -1,17 +1,18 @@
 #pragma once
-/// The parts of a pass over the bricks, for passes whose ellipsoids share a kernel and for passes
-/// whose ellipsoids have their own.
+/// Device functions of a pass over the bricks. They are templates, so that ellipsoids can share one
+/// kernel or have their own.
 
 #include "fit/cuda/brick_pass.h"
 #include "fit/cuda/brick_sums.cuh"
 
 namespace esvr::cuda {
 
-/// Which kernel an ellipsoid has.
+/// One kernel for all ellipsoids.
 struct SharedKernel {
   const KernelConstants<float>& kernel;
   __device__ const KernelConstants<float>& of(std::uint32_t) const { return kernel; }
 };
+/// A kernel for each ellipsoid.
 struct OwnKernels {
   const KernelConstants<float>* kernels;
   __device__ const KernelConstants<float>& of(std::uint32_t ellipsoid) const {
@@ -19,16 +20,16 @@ struct OwnKernels {
   }
 };
 
-/// Where a pass leaves residuals; null: it does not.
+/// The outputs of a pass; those that are not wanted are null.
 struct ResidualOutput {
-  double* brickLoss;  ///< a brick's sum of r^2
-  float* residual;    ///< kBrickVoxels for each brick
+  double* brickLoss;  ///< sum of r^2 of each brick
+  float* residual;    ///< kBrickVoxels values for each brick
 };
 
-constexpr int kMomentSlots = 16;  // kMoments, made a power of two
+constexpr int kMomentSlots = 16;  // kMoments, rounded up to a power of two
 static_assert(kMomentSlots % kGroup == 0, "each lane ends with some of the moments");
 
-/// Adds a lane's share of a pair to the sums.
+/// Adds the lane's share of a pair's voxels to the sums.
 template <class Sum>
 __device__ void addPair(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
                         float units, Sum* sums) {
@@ -51,7 +52,8 @@ __device__ inline float residualOf(const PassTarget& target, bool inTarget, std:
   return target.narrowBand ? fminf(fmaxf(r, target.lowest - t), target.highest - t) : r;
 }
 
-/// Replaces sums by residuals. Squares are summed in the same order whatever the number of threads.
+/// Replaces the sums by residuals. The order in which squares are added does not depend on the
+/// number of threads.
 template <class Sum, int kThreads>
 __device__ void toResiduals(const PassScene& scene, const PassTarget& target,
                             const ResidualOutput& out, std::uint32_t brick, float unit, Sum* sums) {
@@ -72,7 +74,8 @@ __device__ void toResiduals(const PassScene& scene, const PassTarget& target,
   out.brickLoss[brick] = loss;
 }
 
-/// Leaves the residuals of a brick in `sums`, for the thread that wrote them.
+/// Computes the residuals of a brick in `sums`. A barrier must follow before a thread reads
+/// residuals that another one wrote.
 template <class Sum, int kThreads, class Kernels>
 __device__ void sumBrick(const PassScene& scene, const Kernels& kernels, const PassTarget& target,
                          const ResidualOutput& out, const BlockBrick& brick, Sum* sums) {
@@ -88,8 +91,8 @@ __device__ void sumBrick(const PassScene& scene, const Kernels& kernels, const P
   toResiduals<Sum, kThreads>(scene, target, out, brick.number, unit, sums);
 }
 
-/// A lane's moments of a pair, in the order of PairMoments.
-/// \param byValue  the loss's derivative by each voxel
+/// Computes the moments over the lane's share of a pair's voxels, in the order of PairMoments.
+/// \param byValue  derivative of the loss by the value of each voxel
 template <class Sum>
 __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
                            const Sum* byValue, float (&s)[kMomentSlots]) {
@@ -121,8 +124,8 @@ __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kern
   });
 }
 
-/// Sums kGroup values over a group's lanes; lane n gets the sum of value n. Each exchange halves
-/// what a lane keeps.
+/// Sums kGroup values over the lanes of a group; lane n gets the sum of value n. Each exchange
+/// halves the number of values that a lane holds.
 __device__ inline float transposeSum(float* s) {
   const unsigned group = lanesOfGroup<kGroup>();
   const unsigned lane = threadIdx.x % kGroup;
@@ -139,7 +142,7 @@ __device__ inline float transposeSum(float* s) {
   return s[0];
 }
 
-/// Writes the moments of an entry, by a group of lanes.
+/// Writes the moments of one entry. All lanes of a group call it together.
 template <class Kernels, class Sum>
 __device__ void writeMoments(const PassScene& scene, const Kernels& kernels, std::uint32_t entry,
                              Coord corner, const Sum* byValue, float* moments) {

@@ -1,5 +1,5 @@
 #pragma once
-/// One pass over the bricks: residuals, their squares, and the moments of pairs.
+/// A pass over the bricks. It computes the residuals, their squares, and the moments of the pairs.
 
 #include <cuda_runtime_api.h>
 
@@ -7,31 +7,31 @@
 
 namespace esvr::cuda {
 
-/// The values that sums are compared with.
+/// The values that the sum is compared with.
 struct PassTarget {
-  const float* values;    ///< kBrickVoxels for each target brick, in device memory
-  bool narrowBand;        ///< residuals saturate at the target's range
-  float lowest, highest;  ///< that range
+  const float* values;    ///< kBrickVoxels values for each target brick, in device memory
+  bool narrowBand;        ///< the sum is clamped to [lowest, highest] before it is compared
+  float lowest, highest;  ///< range of the target
 };
 
-/// Pointers are to device memory, borrowed.
+/// All pointers are to device memory that the caller owns.
 struct BrickPassArguments {
   PassScene scene;
   KernelConstants<float> kernel;
   PassTarget target;
-  double* brickLoss;  ///< out: a brick's sum of r^2
-  float* moments;     ///< out: kMoments for each pair; not written for residuals alone
-  float* residual;    ///< out: kBrickVoxels for each brick; null where they are not wanted
-  const int* halted;  ///< isHalted()
+  double* brickLoss;  ///< output: sum of r^2 of each brick
+  float* moments;     ///< output of launchGradients: kMoments values for each pair
+  float* residual;    ///< output: kBrickVoxels values for each brick; null: not wanted
+  const int* halted;  ///< flag of isHalted()
 };
 
-/// Values of a pair in `moments`: PairMoments, in its order.
+/// Number of moments of a pair. They are stored in the order of PairMoments.
 inline constexpr int kMoments = 12;
 
-/// Loss and moments for gradients of 1/2 sum r^2. \param threads  ThreadsPerBrick::threads of a
-/// choice
+/// Writes the loss, and the moments for the gradients of 1/2 sum r^2.
+/// \param threads  threads for each brick, one of ThreadsPerBrick::threads()
 void launchGradients(const BrickPassArguments& arguments, int threads, cudaStream_t stream);
-/// Loss and residuals.
+/// Writes the loss and the residuals.
 void launchResiduals(const BrickPassArguments& arguments, cudaStream_t stream);
 
 }  // namespace esvr::cuda

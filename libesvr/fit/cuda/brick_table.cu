@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t kMinReachedSlots = std::size_t{1} << 12;
 
-/// A table that is at most half full has no probe of this length: of 2^24 slots the longest is
-/// about 90.
+/// Largest number of slots that are probed for a brick. A table that is at most half full never
+/// needs so many: in one with 2^24 slots the longest probe has a length of about 90.
 constexpr int kMaxProbes = 256;
 
 __global__ void insertTargets(const Coord* bricks, std::uint32_t count, std::uint32_t* slots,
@@ -25,17 +25,18 @@ __global__ void insertTargets(const Coord* bricks, std::uint32_t count, std::uin
   while (atomicCAS(&slots[s], kNoBrick, std::uint32_t(number)) != kNoBrick) s = (s + 1) & mask;
 }
 
-/// Where bricks go. The counter goes beyond maxCount when the table is too small.
+/// The table into which kernels insert bricks. If the table is too small, `count` ends above
+/// maxCount.
 struct ReachedInsertion {
   ReachedSlot* slots;
   std::uint32_t mask;
   std::uint32_t maxCount;
   std::uint32_t* count;
-  BrickTableView targets;  ///< these bricks are passed over,
-  Box within;              ///< and those beyond
+  BrickTableView targets;  ///< target bricks, which are not inserted
+  Box within;              ///< bricks outside are not inserted
 };
 
-/// Waits until a slot that another thread has claimed holds its brick.
+/// Waits until a claimed slot holds its brick. \return true if that is the given brick
 __device__ bool holds(ReachedSlot& slot, Coord brick) {
   volatile int* const state = &slot.state;
   while (*state != ReachedSlot::kReady) __nanosleep(20);
@@ -44,7 +45,7 @@ __device__ bool holds(ReachedSlot& slot, Coord brick) {
   return there.x == brick.x && there.y == brick.y && there.z == brick.z;
 }
 
-/// Claims an empty slot for a brick. \return whether no other thread was faster
+/// Claims an empty slot for a brick. \return false if another thread has claimed it before
 __device__ bool claim(ReachedSlot& slot, Coord brick, std::uint32_t* count) {
   if (atomicCAS(&slot.state, ReachedSlot::kEmpty, ReachedSlot::kBeingWritten) !=
       ReachedSlot::kEmpty)
@@ -60,8 +61,8 @@ __device__ bool tooSmall(const ReachedInsertion& into) {
   return *static_cast<volatile std::uint32_t*>(into.count) > into.maxCount;
 }
 
-/// Claims a slot for a brick, or finds the one it has. Threads that begin together can fill the
-/// table before any of them sees the count, so the length of a probe ends it too.
+/// Claims a slot for a brick, unless the brick has one. Threads that begin at the same time can
+/// fill the table before any of them sees the count, so the length of a probe is limited too.
 __device__ void insertReached(const ReachedInsertion& into, Coord brick) {
   const auto hash = std::uint32_t(hashOf(brick));
   if (!into.within.contains(brick) || into.targets.findTarget(brick, hash) != kNoBrick) return;
@@ -82,7 +83,7 @@ __global__ void collectReached(SupportSource source, ReachedInsertion into) {
   });
 }
 
-constexpr int kNeighbours = 27;  // a brick itself is one
+constexpr int kNeighbours = 27;  // including the brick itself
 
 __global__ void collectAround(const Coord* bricks, std::uint32_t count, ReachedInsertion into) {
   const std::size_t n = threadNumber();
@@ -92,7 +93,7 @@ __global__ void collectAround(const Coord* bricks, std::uint32_t count, ReachedI
                 bricks[n / kNeighbours] + Coord{side / 9 - 1, side / 3 % 3 - 1, side % 3 - 1});
 }
 
-/// In any order; they are sorted next.
+/// Lists the reached bricks in any order. They are sorted afterwards.
 __global__ void listReached(const ReachedSlot* slots, std::uint32_t slotCount, Coord* out,
                             std::uint32_t* count) {
   const std::size_t s = threadNumber();
@@ -143,8 +144,8 @@ void BrickTable::buildTargetTable() {
   check(cudaGetLastError(), "filling the table of bricks");
 }
 
-/// \param launch  launch(where to) starts the kernel that inserts
-/// \return whether the table was large enough
+/// \param launch  launch(insertion) starts the kernel that inserts the bricks
+/// \return false if the table was too small
 template <class Launch>
 bool BrickTable::collect(const Box& within, Launch&& launch) {
   ReachedSlot* const slots = reachedSlots_.reserve(reachedSlotCount_);
@@ -181,7 +182,7 @@ void BrickTable::forgetReached() {
   bounds_ = targetBounds_;
 }
 
-/// \param expected  reached bricks; a table that turns out too small grows
+/// \param expected  expected number of reached bricks; the table grows if there are more
 template <class Launch>
 void BrickTable::find(std::size_t expected, const Box& within, Launch&& launch) {
   reachedSlotCount_ = std::max({reachedSlotCount_, kMinReachedSlots, slotsFor(expected)});

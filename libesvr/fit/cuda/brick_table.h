@@ -1,9 +1,9 @@
 #pragma once
-/// The bricks of a fit on the device, found by their coordinates.
+/// A hash table of the bricks of a fit on the device.
 ///
-/// Target bricks are known from the start. Those that only supports reach come and go with the
-/// ellipsoids: each rebuild finds them anew, and numbers them in increasing order of their
-/// coordinates, so that numbers do not depend on the order in which threads found them.
+/// Target bricks are known from the start. Other bricks that supports reach change with the
+/// ellipsoids. Each rebuild finds them again and numbers them in increasing order of their
+/// coordinates, so that the numbers do not depend on the order in which threads found them.
 
 #include <bit>
 #include <cstdint>
@@ -15,12 +15,12 @@
 
 namespace esvr::cuda {
 
-/// Every brick that there can be.
+/// A box that contains every brick.
 inline constexpr Box kAllBricks{{Box::kMin, Box::kMin, Box::kMin},
                                 {Box::kMax, Box::kMax, Box::kMax}};
 
-/// Slots of a table that is to hold so many entries: it is at most half full, so that probes stay
-/// short.
+/// Number of slots for a table with this number of entries. The table is at most half full, which
+/// keeps probes short.
 [[nodiscard]] inline std::size_t slotsFor(std::size_t entries) {
   return std::bit_ceil(2 * entries + 2);
 }
@@ -30,10 +30,10 @@ class BrickTable {
   /// \throws DeviceError  there are more bricks than kernels can number
   BrickTable(std::span<const Coord> targetBricks, cudaStream_t stream);
 
-  /// Finds the bricks beyond the target's that supports reach.
-  /// \param within  bricks elsewhere are passed over
+  /// Finds the bricks that supports reach and that are not target bricks.
+  /// \param within  bricks outside this box are ignored
   void findReached(const SupportSource& supports, const Box& within = kAllBricks);
-  /// Finds another table's bricks and their neighbours, in the place of those that supports reach.
+  /// Takes the bricks of another table and their neighbours as the reached bricks.
   void findAround(const BrickTable& other, const Box& within = kAllBricks);
 
   [[nodiscard]] std::size_t targetCount() const { return targetCount_; }
@@ -51,8 +51,8 @@ class BrickTable {
 
   cudaStream_t stream_;
   std::size_t targetCount_, reachedCount_ = 0;
-  Box targetBounds_, bounds_;    ///< in bricks
-  GrowingBuffer<Coord> bricks_;  ///< target bricks, then those reached
+  Box targetBounds_, bounds_;    ///< in brick coordinates
+  GrowingBuffer<Coord> bricks_;  ///< target bricks, then reached bricks
   std::size_t slotCount_ = 0;
   GrowingBuffer<std::uint32_t> slots_;
   std::size_t reachedSlotCount_ = 0;

@@ -1,5 +1,5 @@
 #pragma once
-/// Look-ups in a BrickTable, as kernels see it.
+/// A BrickTable as kernels use it, and look-ups in it.
 
 #include <cstdint>
 
@@ -9,7 +9,7 @@ namespace esvr::cuda {
 
 inline constexpr std::uint32_t kNoBrick = 0xffffffffu;
 
-/// A slot of the table of reached bricks, which threads fill at the same time.
+/// A slot of the table of reached bricks. Many threads fill the table at the same time.
 struct ReachedSlot {
   enum State : int { kEmpty = 0, kBeingWritten = 1, kReady = 2 };
   int state;
@@ -17,7 +17,7 @@ struct ReachedSlot {
   std::uint32_t number;
 };
 
-/// Open addressing with linear probing; the numbers of slots are powers of two.
+/// The tables use open addressing with linear probing. Their numbers of slots are powers of two.
 struct BrickTableView {
   const Coord* bricks;
   const std::uint32_t* slots;  ///< numbers of target bricks
@@ -25,10 +25,10 @@ struct BrickTableView {
   const ReachedSlot* reachedSlots;
   std::uint32_t reachedMask;
   bool anyReached;
-  Box bounds;  ///< no brick lies beyond
+  Box bounds;  ///< contains all bricks
 
 #if defined(__CUDACC__)
-  /// Number of a brick, kNoBrick where there is none.
+  /// Number of a brick; kNoBrick if the table does not have it.
   __device__ std::uint32_t find(Coord brick) const {
     const auto hash = std::uint32_t(hashOf(brick));
     const std::uint32_t target = findTarget(brick, hash);

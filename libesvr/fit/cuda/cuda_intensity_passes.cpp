@@ -15,14 +15,14 @@ namespace esvr {
 namespace cuda {
 namespace {
 
-/// Relative to a frame, in bricks.
+/// The known bricks, in brick coordinates relative to their frame.
 std::vector<Coord> bricksOf(const IntensityTarget& target) {
   std::vector<Coord> bricks = knownCorners(target);
   for (Coord& b : bricks) b = brickOf(b - target.source.origin);
   return bricks;
 }
 
-/// Values of the known bricks, in their order.
+/// The source's values in the known bricks, in the order of the bricks.
 std::vector<float> valuesOf(const IntensityTarget& target) {
   const auto corners = knownCorners(target);
   std::vector<float> all;

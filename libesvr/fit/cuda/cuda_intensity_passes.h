@@ -1,6 +1,6 @@
 #pragma once
-/// IntensityPasses on a GPU. Phi is worked out in each pass: that takes less time there than to
-/// read it.
+/// IntensityPasses on a GPU. Every pass computes phi again, which is faster there than reading it
+/// from memory.
 
 #include "core/cuda/memory_pool.h"
 #include "core/cuda/stream.h"
@@ -12,7 +12,7 @@ namespace esvr::cuda {
 
 class CudaIntensityPasses final : public IntensityPasses {
  public:
-  /// The device that is to be used must be the current one.
+  /// The device must be the current one.
   explicit CudaIntensityPasses(const IntensityTarget& target);
 
   void setShapes(const Field& field) override;
@@ -25,13 +25,13 @@ class CudaIntensityPasses final : public IntensityPasses {
   [[nodiscard]] StoredError totalError();
   void sumPairs(std::vector<double>* rPhi, std::vector<double>* phi2);
 
-  Coord origin_;  ///< of the bricks' frame
+  Coord origin_;  ///< origin of the bricks' frame
   float sourceBackground_, fieldBackground_ = 0.0f;
   VoxelRule stored_;
   Box box_;
   bool restricted_;
   KernelConstants<float> kernel_{};
-  std::size_t count_ = 0;  ///< of ellipsoids
+  std::size_t count_ = 0;  ///< number of ellipsoids
   KeepFreedMemory keep_;
   Stream stream_;
   BrickTable bricks_;

@@ -85,7 +85,7 @@ MomentSums CudaOptimiser::momentSums() {
           .halted = nullptr};
 }
 
-/// \param n  steps that were started since the status was looked at
+/// \param n  number of steps that were started since the last call of look()
 StepArguments CudaOptimiser::stepArguments(double factor, std::size_t n) {
   StepStatus* const status = status_.data();
   return {.ellipsoidCount = std::uint32_t(count_),
@@ -121,7 +121,7 @@ void CudaOptimiser::buildLists(const SupportSource& supports) {
   brickLoss_.reserve(bricks_.size());
 }
 
-/// Lists for the steps that follow. None of them is halted yet.
+/// Builds the lists for the following steps, and clears their halt flags.
 void CudaOptimiser::rebuildLists() {
   launchListing({.count = std::uint32_t(count_),
                  .ellipsoids = ellipsoids_.data(),
@@ -165,7 +165,7 @@ void CudaOptimiser::reserve(std::size_t ellipsoids) {
   listed_.extend(ellipsoids, count_);
 }
 
-/// Gives back all memory whose contents can be made anew.
+/// Frees all memory whose contents can be computed again.
 void CudaOptimiser::releaseScratch() {
   full_ = stale_ = true;
   lists_ = PairLists(stream_.get());
@@ -177,8 +177,8 @@ void CudaOptimiser::releaseScratch() {
   trimMemoryPool();
 }
 
-/// Keeps the ellipsoids in these places, which increase, with what is known of them, in no more
-/// memory than they need.
+/// Keeps the ellipsoids at these places, which must increase, together with their states, and frees
+/// the memory of the others.
 void CudaOptimiser::keep(std::span<const std::size_t> places) {
   const auto gather = [&]<class T>(GrowingBuffer<T>& buffer) {
     std::vector<T> all(count_), kept;
@@ -199,7 +199,8 @@ void CudaOptimiser::keep(std::span<const std::size_t> places) {
   stale_ = true;
 }
 
-/// Gives up a tenth of the ellipsoids, those that are worth least; new ones first.
+/// Drops the tenth of the ellipsoids whose removal adds the least error. New ellipsoids, which have
+/// not taken a step yet, are dropped first.
 void CudaOptimiser::dropLeastUseful() {
   constexpr std::size_t kShare = 10;
   const auto all = ellipsoids();
@@ -212,7 +213,8 @@ void CudaOptimiser::dropLeastUseful() {
   keep(allButLowest(worth, count_ / kShare + 1));
 }
 
-/// Does work that allocates. Where memory is out, it is done again in what scratch has left.
+/// Does work that allocates memory. If memory runs out, the scratch memory is freed and the work is
+/// done again.
 template <class Work>
 auto CudaOptimiser::withRoom(const Work& work) {
   try {
@@ -223,8 +225,8 @@ auto CudaOptimiser::withRoom(const Work& work) {
   return work();
 }
 
-/// The same, with ever fewer ellipsoids until it can be done.
-/// \throws DeviceMemoryError  it cannot be done with one
+/// Does the same, and drops ellipsoids until the memory suffices.
+/// \throws DeviceMemoryError  the memory does not suffice for one ellipsoid
 template <class Work>
 auto CudaOptimiser::withFewer(const Work& work) {
   for (;;) {
@@ -283,7 +285,7 @@ void CudaOptimiser::growTo(std::size_t count) {
     releaseScratch();
     std::vector<std::size_t> all(count_);
     std::iota(all.begin(), all.end(), std::size_t{0});
-    keep(all);  // without the room that growth has made
+    keep(all);  // frees the memory that was reserved for the growth
   }
 }
 
@@ -302,7 +304,7 @@ void CudaOptimiser::sumLoss() {
                 stream_.get());
 }
 
-/// Starts a step. \param n  steps that were started since the status was looked at
+/// Starts a step. \param n  number of steps that were started since the last call of look()
 void CudaOptimiser::step(double factor, std::size_t n) {
   StepArguments arguments = stepArguments(factor, n);
   BrickPassArguments pass = passArguments();
@@ -312,7 +314,7 @@ void CudaOptimiser::step(double factor, std::size_t n) {
   launchStep(arguments, stream_.get());
 }
 
-/// Waits for the steps that were started. \return how many of them were taken
+/// Waits for the started steps and reads their status. \return how many of them were taken
 std::size_t CudaOptimiser::look(std::size_t started) {
   sumLoss();
   const StepStatus status = downloadValue(status_.data(), stream_.get());

@@ -1,6 +1,6 @@
 #pragma once
-/// A fit on a GPU. What runs over bricks, pairs and ellipsoids is in the kernels beside this file;
-/// here is their order.
+/// The optimiser on a GPU. It decides the order of the operations; their kernels are in the other
+/// files of this folder.
 
 #include <optional>
 #include <span>
@@ -43,10 +43,10 @@ class CudaOptimiser final : public Optimiser {
   [[nodiscard]] bool deviceFull() const override { return full_; }
   [[nodiscard]] double secondsSeeding() const override { return secondsSeeding_; }
 
-  /// Gradients of 1/2 sum r^2 where the ellipsoids are.
-  /// \param threads  ThreadsPerBrick::threads of a choice; changes no bit
+  /// The gradients of 1/2 sum r^2 for the current ellipsoids.
+  /// \param threads  threads for each brick, which do not change the result
   [[nodiscard]] std::vector<EllipsoidGradient> gradients(int threads = ThreadsPerBrick::threads(1));
-  /// Takes over ellipsoids as they are; they have taken no step yet.
+  /// Replaces the ellipsoids. The new ones have taken no step yet.
   void setEllipsoids(std::span<const Ellipsoid> ellipsoids);
 
  private:
@@ -70,7 +70,7 @@ class CudaOptimiser final : public Optimiser {
   auto withRoom(const Work& work);
   template <class Work>
   auto withFewer(const Work& work);
-  /// \return how many seeds there are: `count`, fewer where errors are few
+  /// Places seeds. \return their number, which is below `count` if few voxels have an error
   std::size_t placeSeeds(std::size_t count, std::size_t ellipsoids, const std::uint32_t* into);
   [[nodiscard]] BrickPassArguments passArguments();
   [[nodiscard]] MomentSums momentSums();
@@ -97,19 +97,19 @@ class CudaOptimiser final : public Optimiser {
   GrowingBuffer<ListedSupport> listed_;
   GrowingBuffer<float> moments_, residual_;
   GrowingBuffer<double> brickLoss_, chunkSums_, slope_;
-  std::size_t stepped_ = 0;  ///< ellipsoids that took part in the last step
+  std::size_t stepped_ = 0;  ///< number of ellipsoids that took part in the last step
   DeviceBuffer<StepStatus> status_;
   VoxelSampling sampling_;
   EllipsoidRanking ranking_;
   ErrorSums errorSums_;
   std::size_t count_ = 0;
   double secondsSeeding_ = 0.0;
-  std::uint64_t samplings_ = 0;  ///< events so far: each draws from its own random stream
-  double loss_ = 0.0;            ///< before the last step
-  bool stale_ = true;            ///< the lists
-  std::size_t served_ = 0;       ///< steps that the lists have served
-  std::size_t ahead_ = 8;        ///< steps to start before the next look
-  bool full_ = false;            ///< memory was out: there will be no more ellipsoids
+  std::uint64_t samplings_ = 0;  ///< number of samplings, each with its own random numbers
+  double loss_ = 0.0;            ///< sum of r^2 before the last step
+  bool stale_ = true;            ///< whether the lists are outdated
+  std::size_t served_ = 0;       ///< steps taken with the current lists
+  std::size_t ahead_ = 8;        ///< steps to start before the next look()
+  bool full_ = false;            ///< memory ran out, so no more ellipsoids are added
 };
 
 }  // namespace esvr::cuda

@@ -10,9 +10,9 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kColumns = 4;  // of FitErrors, in its order
+constexpr int kColumns = 4;  // members of FitErrors, in its order
 
-/// A warp a brick; column c of brick b goes to out[c brickCount + b].
+/// Each warp sums one brick. Column c of brick b is written to out[c * brickCount + b].
 __global__ void brickErrors(const ErrorArguments a, double* out) {
   const std::size_t b = warpNumber();
   if (b >= a.brickCount) return;
@@ -42,7 +42,7 @@ FitErrors ErrorSums::sum(const ErrorArguments& a) {
   double* const totals = totals_.reserve(kColumns);
   brickErrors<<<blocksFor(n * kWarp, kBlock), kBlock, 0, stream_>>>(a, columns);
   check(cudaGetLastError(), "summing errors");
-  // CUB reduces doubles in the same order in every run on one kind of device.
+  // On one kind of device, CUB reduces doubles in the same order in every run.
   for (int c = 0; c < kColumns; ++c)
     withTemporary(temporary_, "summing errors", [&](void* memory, std::size_t& bytes) {
       if (c == kColumns - 1)

@@ -1,5 +1,5 @@
 #pragma once
-/// Errors of a fit from its residuals.
+/// Computes the errors of a fit from its residuals.
 
 #include <cuda_runtime_api.h>
 
@@ -9,11 +9,11 @@
 
 namespace esvr::cuda {
 
-/// Pointers are to device memory, borrowed.
+/// All pointers are to device memory that the caller owns.
 struct ErrorArguments {
-  const float* residual;  ///< kBrickVoxels a brick
+  const float* residual;  ///< kBrickVoxels values for each brick
   const Coord* bricks;
-  const BrickMask* active;  ///< of the target bricks
+  const BrickMask* active;  ///< active masks of the target bricks
   std::uint32_t brickCount, targetCount;
   Box box;
 };

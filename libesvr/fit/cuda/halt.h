@@ -1,13 +1,13 @@
 #pragma once
-/// Kernels that do nothing once the lists of pairs are outgrown (fit/motion_bound.h). The host
-/// starts several steps ahead; the step that finds an ellipsoid outside its listed support halts
-/// those after it, which the host starts again when it has built new lists.
+/// A flag that makes kernels do nothing once the pair lists are outdated (fit/motion_bound.h). The
+/// host starts several steps ahead. A step that finds an ellipsoid outside its listed support sets
+/// the flag of the steps after it; the host starts these again after it has built new lists.
 
 #include "esvr/kernel.h"
 
 namespace esvr::cuda {
 
-/// \param flag  in device memory; null: never halted
+/// \param flag  flag in device memory; null: never halted
 ESVR_HD inline bool isHalted(const int* flag) { return flag != nullptr && *flag != 0; }
 
 }  // namespace esvr::cuda

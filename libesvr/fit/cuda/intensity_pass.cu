@@ -11,7 +11,8 @@ constexpr int kWarpsOfBrick = kBrickVoxels / kWarp;
 
 enum class Pass { kErrors, kGradient, kNormal };
 
-/// Calls visit(place of the voxel, phi) for a lane's share of a pair.
+/// Calls visit(offset, phi) for the lane's share of a pair's voxels. The offset is that in a padded
+/// brick.
 template <class Visit>
 __device__ void visitVoxels(const IntensityPassArguments& a, std::uint32_t ellipsoid, Coord corner,
                             Visit&& visit) {
@@ -23,7 +24,7 @@ __device__ void visitVoxels(const IntensityPassArguments& a, std::uint32_t ellip
   });
 }
 
-/// Leaves the sum of a brick in `sums`. \return the size of a unit
+/// Computes the sum of the ellipsoids over a brick in `sums`. \return the size of a unit
 template <class Sum>
 __device__ float sumBrick(const IntensityPassArguments& a, const BlockBrick& brick, Sum* sums) {
   const auto ellipsoid = [&](std::uint32_t k) { return a.scene.lists.ellipsoid[k]; };
@@ -37,7 +38,7 @@ __device__ float sumBrick(const IntensityPassArguments& a, const BlockBrick& bri
       });
 }
 
-/// Replaces sums by values, those of exact voxels by 0.
+/// Replaces the sums by floats, and sets voxels that were stored exactly to 0.
 template <class Sum>
 __device__ void clearExact(const IntensityPassArguments& a, std::uint32_t brick, float unit,
                            Sum* sums) {
@@ -50,10 +51,10 @@ __device__ void clearExact(const IntensityPassArguments& a, std::uint32_t brick,
   }
 }
 
-/// One voxel: what a reader has too much, and the residual.
+/// The errors of one voxel.
 struct Missed {
-  double stored;
-  float residual;
+  double stored;   ///< value that a reader gets, minus the source's
+  float residual;  ///< sum minus the source's value; 0 if a reader gets the source's value
 };
 __device__ Missed missedAt(const IntensityPassArguments& a, std::uint32_t brick, int v, float sum) {
   const float wanted = brick < a.scene.targetCount ? a.source[std::size_t(brick) * kBrickVoxels + v]
@@ -63,7 +64,8 @@ __device__ Missed missedAt(const IntensityPassArguments& a, std::uint32_t brick,
   return {stored, stored == 0.0 ? 0.0f : value - wanted};
 }
 
-/// Replaces sums by residuals. Voxels are summed in one order.
+/// Replaces the sums by residuals and computes the brick's error. Squares are always added in the
+/// same order.
 template <bool kMarksExact, class Sum>
 __device__ void toErrors(const IntensityPassArguments& a, const BlockBrick& brick, float unit,
                          Sum* sums) {
@@ -104,7 +106,7 @@ __device__ void project(const IntensityPassArguments& a, const BlockBrick& brick
   });
 }
 
-/// One block a brick, one group of lanes a pair.
+/// Each block works on one brick, and each group of lanes on one pair at a time.
 template <Pass kPass, class Sum>
 __global__ void __launch_bounds__(kBlock) intensityPass(const IntensityPassArguments a) {
   __shared__ Sum sums[kPaddedVoxels];
@@ -129,7 +131,7 @@ void launch(const IntensityPassArguments& a, cudaStream_t stream) {
   check(cudaGetLastError(), "starting a pass of the solve for intensities");
 }
 
-/// A warp an ellipsoid.
+/// Each warp sums the projections of one ellipsoid.
 __global__ void sumProjections(const ProjectionSums s) {
   const std::size_t i = warpNumber();
   if (i >= s.ellipsoidCount) return;

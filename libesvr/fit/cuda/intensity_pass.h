@@ -1,6 +1,6 @@
 #pragma once
-/// Passes over the bricks for a solve of intensities: sums, what a reader makes of them, and back
-/// to the ellipsoids.
+/// Passes over the bricks that a solve for the intensities needs: from intensities to sums and to
+/// the values that a reader gets, and from residuals back to the ellipsoids.
 
 #include <cuda_runtime_api.h>
 
@@ -11,36 +11,36 @@
 
 namespace esvr::cuda {
 
-/// Pointers are to device memory, borrowed.
+/// All pointers are to device memory that the caller owns.
 struct IntensityPassArguments {
-  /// Words of a brick in `exact`: their bit v says that voxel v was stored exactly.
+  /// Number of words for each brick in `exact`. Bit v is set if a reader gets voxel v exactly.
   static constexpr std::uint32_t kMaskWords = kBrickVoxels / 32;
 
-  PassScene scene;       ///< its forms have no intensity
-  const float* heights;  ///< one for each ellipsoid, instead of it
+  PassScene scene;       ///< the intensities of its forms are not used
+  const float* heights;  ///< intensity of each ellipsoid
   KernelConstants<float> kernel;
-  const float* source;  ///< kBrickVoxels a target brick
+  const float* source;  ///< kBrickVoxels values for each target brick
   float sourceBackground, fieldBackground;
   VoxelRule stored;
-  Box box;                      ///< of errors, in the bricks' frame
-  StoredError* errors;          ///< out, a brick's
-  std::uint32_t* exact;         ///< kMaskWords a brick
-  PairProjection* projections;  ///< out, a pair's
+  Box box;                      ///< voxels whose errors count, in the bricks' frame
+  StoredError* errors;          ///< output: error of each brick
+  std::uint32_t* exact;         ///< kMaskWords words for each brick
+  PairProjection* projections;  ///< output: projection of each pair
 };
 
 /// Writes errors.
 void launchStoredErrors(const IntensityPassArguments& arguments, cudaStream_t stream);
 /// Writes errors, exact voxels, and projections of residuals.
 void launchIntensityGradient(const IntensityPassArguments& arguments, cudaStream_t stream);
-/// Writes projections of the sum, less its exact voxels.
+/// Writes projections of the sum, without the voxels that were stored exactly.
 void launchNormalProduct(const IntensityPassArguments& arguments, cudaStream_t stream);
 
-/// Sums of the projections of each ellipsoid's pairs, in one order.
+/// The sums of the projections of each ellipsoid's pairs, always in the same order.
 struct ProjectionSums {
   const PairProjection* projections;
   const std::uint32_t* ellipsoidBegin;
   std::uint32_t ellipsoidCount;
-  double *rPhi, *phi2;  ///< out, an ellipsoid's; null: not wanted
+  double *rPhi, *phi2;  ///< output: sums of each ellipsoid; null: not wanted
 };
 void launchProjectionSums(const ProjectionSums& sums, cudaStream_t stream);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Which ellipsoids to give up where memory is out.
+/// Chooses the ellipsoids that are kept when memory runs out.
 
 #include <algorithm>
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace esvr::cuda {
 
-/// \return the places of all but the `dropped` lowest values, in increasing order; of equal values
-///         the first are dropped
+/// \return the places of all values but the `dropped` lowest ones, in increasing order. If values
+///         are equal, the first ones are dropped.
 [[nodiscard]] inline std::vector<std::size_t> allButLowest(std::span<const double> values,
                                                            std::size_t dropped) {
   std::vector<std::size_t> places(values.size());

@@ -1,5 +1,5 @@
 #pragma once
-/// IntensityPasses on a GPU, in every build; without CUDA there are none and it throws.
+/// Makes IntensityPasses on a GPU. The function exists in every build; without CUDA it throws.
 
 #include <memory>
 

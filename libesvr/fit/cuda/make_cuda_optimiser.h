@@ -1,5 +1,5 @@
 #pragma once
-/// The optimiser on a GPU, free of CUDA's own headers.
+/// Makes the optimiser on a GPU. This header does not include those of CUDA.
 
 #include <memory>
 
@@ -7,7 +7,8 @@
 
 namespace esvr {
 
-/// \throws DeviceError  no such device, a build without CUDA, out of device memory; says which
+/// \throws DeviceError  the device does not exist, the build has no CUDA, or device memory is
+///                      exhausted; the message says which
 [[nodiscard]] std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget& target,
                                                            const OptimiserOptions& options,
                                                            const Tuning& tuning);

@@ -14,10 +14,10 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr double kSpare = 1.25;         // of a GrowingBuffer
-constexpr double kReachedShare = 1.0;   // bricks beyond the target's, to those of the target
-constexpr double kReach = 3.2;          // width of a support over the distance of neighbours
-constexpr double kSlotsPerEntry = 4.0;  // of hash tables, at most
+constexpr double kSpare = 1.25;         // factor by which a GrowingBuffer grows
+constexpr double kReachedShare = 1.0;   // estimate of reached bricks per target brick
+constexpr double kReach = 3.2;          // width of a support / distance between ellipsoids
+constexpr double kSlotsPerEntry = 4.0;  // largest number of slots of a hash table per entry
 
 constexpr double kBytesPerBrick = double(kBrickVoxels * sizeof(float) + sizeof(Coord)) +
                                   sizeof(double) * 5 + sizeof(std::uint64_t) * 2 +
@@ -25,7 +25,7 @@ constexpr double kBytesPerBrick = double(kBrickVoxels * sizeof(float) + sizeof(C
 constexpr double kBytesPerTarget = double(kBrickVoxels * sizeof(float) + sizeof(BrickMask));
 constexpr double kBytesPerReached = kSlotsPerEntry * sizeof(ReachedSlot);
 constexpr double kBytesPerPair =
-    double(kMoments * sizeof(float)) + 8.0 * sizeof(std::uint32_t);  // lists, sorted and not
+    double(kMoments * sizeof(float)) + 8.0 * sizeof(std::uint32_t);  // lists, also sorted
 constexpr double kBytesPerEllipsoid =
     double(sizeof(Ellipsoid) + sizeof(AdamState) + sizeof(PairForm) + sizeof(Usefulness) +
            sizeof(ListedSupport)) +
@@ -44,7 +44,8 @@ double bytesOf(const FitTarget& target, double ellipsoids) {
                    ellipsoids * kBytesPerEllipsoid + pairsOf(target, ellipsoids) * kBytesPerPair);
 }
 
-/// The most ellipsoids whose fit stays within a bound; 0 where the bricks alone exceed it.
+/// The largest number of ellipsoids whose fit takes at most `bound` bytes; 0 if the bricks alone
+/// take more.
 std::size_t maxEllipsoidsIn(const FitTarget& target, double bound) {
   double low = 0.0, high = double(target.activeVoxels);
   for (int i = 0; i < 60; ++i) {

@@ -7,10 +7,10 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kLanes = 16;  // of a chunk: one for each moment, and some to spare
+constexpr int kLanes = 16;  // lanes of a chunk: kMoments, rounded up to a power of two
 static_assert(kLanes >= kMoments);
 
-/// One lane a moment: the pairs of a chunk lie side by side.
+/// Each lane sums one moment over the pairs of a chunk, which lie next to each other in memory.
 __global__ void sumChunks(const MomentSums a) {
   const std::size_t thread = threadNumber();
   const std::size_t chunk = thread / kLanes, lane = thread % kLanes;

@@ -1,12 +1,12 @@
 #pragma once
-/// What the kernels that step have in common.
+/// Device functions that the kernels of a step share.
 
 #include "fit/cuda/moment_sums.h"
 #include "fit/parameter_gradient.h"
 
 namespace esvr::cuda {
 
-/// \return the moments of ellipsoid i; wants launchMomentSums before
+/// \return the moments of ellipsoid i. launchMomentSums must have been called before.
 __device__ inline PairSums sumsOf(const MomentSums& a, std::uint32_t i) {
   PairSums s{};
   for (std::uint32_t c = a.lists.chunkBegin[i]; c < a.lists.chunkBegin[i + 1]; ++c) {
@@ -18,7 +18,7 @@ __device__ inline PairSums sumsOf(const MomentSums& a, std::uint32_t i) {
   return s;
 }
 
-/// A sum over all of an ellipsoid's numbers shows whether one of them is not finite.
+/// False if a parameter is not finite. The sum over all parameters is finite only if all are.
 __device__ inline bool finite(const Ellipsoid& p) {
   double sum = p.intensity;
   for (const double c : p.center) sum += c;

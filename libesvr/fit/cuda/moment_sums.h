@@ -7,16 +7,16 @@
 
 namespace esvr::cuda {
 
-/// Pointers are to device memory, borrowed.
+/// All pointers are to device memory that the caller owns.
 struct MomentSums {
   PairListsView lists;
   std::uint32_t chunkCount;
-  const float* moments;         ///< kMoments for each pair
-  double* chunkSums;            ///< out: kMoments for each chunk
-  const int* halted = nullptr;  ///< isHalted()
+  const float* moments;         ///< kMoments values for each pair
+  double* chunkSums;            ///< output: kMoments values for each chunk
+  const int* halted = nullptr;  ///< flag of isHalted()
 };
 
-/// moment_sums.cuh adds up an ellipsoid's chunks afterwards.
+/// Sums the chunks. sumsOf() (moment_sums.cuh) adds up the chunks of an ellipsoid afterwards.
 void launchMomentSums(const MomentSums& sums, cudaStream_t stream);
 
 }  // namespace esvr::cuda

@@ -1,5 +1,5 @@
 #pragma once
-/// An ellipsoid as the passes over bricks read it.
+/// An ellipsoid in the form that the passes over bricks read.
 
 #include "fit/ellipsoid.h"
 #include "fit/frame.h"
@@ -8,7 +8,7 @@ namespace esvr::cuda {
 
 struct alignas(16) PairForm {
   LineForm form;
-  Coord frame;  ///< origin of the form's center
+  Coord frame;  ///< voxel that the form's center is relative to
   float halfZ;  ///< half width of the support's bounding box along z
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The lines along y on which an ellipsoid meets a brick, shared out among a group of lanes.
+/// Divides the lines along y on which an ellipsoid meets a brick among the lanes of a group.
 
 #include "esvr/sparse_volume.h"
 #include "field/line_math.h"
@@ -7,11 +7,12 @@
 
 namespace esvr::cuda {
 
-/// Lanes that work on one pair. Supports of a few voxels meet a brick on some ten lines.
+/// Number of lanes that work on one pair. A support of a few voxels meets a brick on about ten
+/// lines.
 inline constexpr int kGroup = 8;
 
-/// Slices of a brick in shared memory lie so far apart that the voxels of neighbouring lines are in
-/// different banks.
+/// Distance between the slices (x) of a brick in shared memory. They are padded, so that the voxels
+/// of neighbouring lines lie in different memory banks.
 inline constexpr int kSliceStride = kBrickSide * kBrickSide + kBrickSide;
 inline constexpr int kPaddedVoxels = kSliceStride * kBrickSide;
 
@@ -22,20 +23,21 @@ __device__ inline int paddedOffset(int voxel) {
   return voxel + (voxel >> (2 * kBrickLog2)) * kBrickSide;
 }
 
-/// One line: voxels yBegin .. yEnd - 1.
+/// The voxels of one line that lie in the support: yBegin to yEnd - 1.
 struct PairLine {
-  int offset;  ///< of voxel y = 0, padded
+  int offset;  ///< padded offset of the voxel y = 0
   int yBegin, yEnd;
-  float dx, dz;   ///< from the ellipsoid's center
-  float closest;  ///< m at the closest approach
-  float t;        ///< how far yBegin lies beyond the closest approach
+  float dx, dz;   ///< position relative to the ellipsoid's center
+  float closest;  ///< m at the point of the line that is closest to the center
+  float t;        ///< distance from that point to yBegin
 };
 
 struct Interval {
   int begin, end;
 };
 
-/// Voxels of 0..7 within [middle - half, middle + half], a hundredth more against rounding.
+/// The voxels of 0 to 7 that lie in [middle - half, middle + half]. The interval is widened by a
+/// hundredth of a voxel because of rounding.
 __device__ inline Interval voxelsWithin(float middle, float half) {
   constexpr float kPad = 0.01f;
   const int begin = int(fmaxf(ceilf(middle - half - kPad), 0.0f));
@@ -43,7 +45,7 @@ __device__ inline Interval voxelsWithin(float middle, float half) {
   return {begin, end};
 }
 
-/// Calls visit(line) for the lines that lane `lane` of a group is to work on.
+/// Calls visit(line) for the lines that lane `lane` of a group works on.
 template <class Visit>
 __device__ inline void visitLines(const PairForm& p, Coord corner, float cutoff, int lane,
                                   Visit&& visit) {
@@ -54,7 +56,7 @@ __device__ inline void visitLines(const PairForm& p, Coord corner, float cutoff,
   const Interval xs = voxelsWithin(cx, f.halfX), zs = voxelsWithin(cz, p.halfZ);
   const int depth = zs.end - zs.begin;
   const int count = max(xs.end - xs.begin, 0) * max(depth, 0);
-  const float inverse = 1.0f / float(depth);  // exact enough for n < 64
+  const float inverse = 1.0f / float(depth);  // precise enough for n < 64
   for (int n = lane; n < count; n += kGroup) {
     const int row = int((float(n) + 0.5f) * inverse);
     const int x = xs.begin + row, z = zs.begin + n - row * depth;
@@ -69,7 +71,7 @@ __device__ inline void visitLines(const PairForm& p, Coord corner, float cutoff,
   }
 }
 
-/// phi with the device's own exponential, within some 1e-6 of kernelPhi.
+/// phi with the fast exponential of the device. It differs from kernelPhi by about 1e-6 at most.
 __device__ inline float fastPhi(const KernelConstants<float>& k, float m) {
   if (!(m < k.cutoff)) return 0.0f;
   return __fdividef(k.numerator, k.plateau + __expf(m - k.shift)) - k.base;

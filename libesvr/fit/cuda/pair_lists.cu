@@ -40,8 +40,9 @@ __global__ void countPairsKernel(SupportSource source, BrickTableView bricks, st
   });
 }
 
-/// Entries of a brick stand in the order of their lines, the longest work first and neighbours
-/// alike: lanes of one warp then end together.
+/// Bits of a sort key that rank the entries of a brick by their number of lines. Entries that take
+/// the most work come first, and neighbours take about the same, so that the lanes of a warp end at
+/// the same time.
 constexpr int kLinesBits = 3;
 
 __device__ int voxelsOfBrick(double center, double half, std::int32_t brick) {
@@ -50,7 +51,7 @@ __device__ int voxelsOfBrick(double center, double half, std::int32_t brick) {
   return max(int(high - low) + 1, 1);
 }
 
-/// 0 for all lines of a brick to 7 for few.
+/// The rank of an entry, from 0 for all lines of a brick to 7 for few.
 __device__ std::uint32_t linesRank(const Support& s, Coord brick) {
   const int lines = voxelsOfBrick(s.center[0], s.half[0], brick.x) *
                     voxelsOfBrick(s.center[2], s.half[2], brick.z);
@@ -77,7 +78,7 @@ __global__ void listChunks(const std::uint32_t* begin, std::uint32_t ellipsoids,
   for (std::uint32_t c = begin[i]; c < begin[i + 1]; ++c) owner[c] = std::uint32_t(i);
 }
 
-/// From the sorted keys of all entries to where each brick's begin.
+/// Finds where the entries of each brick begin in the sorted keys.
 __global__ void findBrickBegins(const std::uint32_t* sorted, std::uint32_t entries,
                                 std::uint32_t bricks, std::uint32_t* begin) {
   const std::size_t k = threadNumber();
@@ -144,7 +145,7 @@ void PairLists::countPairs(const SupportSource& supports, const BrickTableView& 
 }
 
 void PairLists::readTotals(std::size_t n) {
-  // 64-bit, so that an overflow of the 32-bit sums is seen.
+  // The totals have 64 bits, so that an overflow of the 32-bit prefix sums is detected.
   total_.reserve(2);
   withTemporary(temporary_, "summing counts", [&](void* memory, std::size_t& bytes) {
     return cub::DeviceReduce::Reduce(memory, bytes, counts_.data(), total_.data(), n + 1,
@@ -181,7 +182,7 @@ void PairLists::sortByBrick(std::size_t bricks) {
   std::uint32_t* const pair = pairSorted_.reserve(pairCount_);
   if (entries > 0)
     withTemporary(temporary_, "sorting pairs", [&](void* memory, std::size_t& bytes) {
-      // Stable: ellipsoids of as many lines keep their order.
+      // The sort is stable: ellipsoids with the same number of lines keep their order.
       return cub::DeviceRadixSort::SortPairs(memory, bytes, key_.data(), sorted, pair_.data(), pair,
                                              pairCount_, 0,
                                              int(std::bit_width(bricks)) + kLinesBits, stream_);
@@ -196,7 +197,8 @@ void PairLists::sortByBrick(std::size_t bricks) {
   check(cudaGetLastError(), "listing the ellipsoids of bricks");
 }
 
-/// Blocks start in order: the fullest bricks first, so that none is left over for the end.
+/// Orders the bricks by their number of pairs, the largest first. Blocks start in this order, so
+/// that no long brick begins when all others are done.
 void PairLists::orderBricks(std::size_t bricks) {
   if (bricks == 0) return;
   std::uint32_t* const pairs = brickPairs_.reserve(bricks);

@@ -1,5 +1,6 @@
 #pragma once
-/// Which ellipsoids reach which bricks, listed both ways on the device.
+/// The lists of pairs on the device: the ellipsoids of each brick, and the bricks of each
+/// ellipsoid.
 
 #include <cstdint>
 
@@ -7,26 +8,26 @@
 
 namespace esvr::cuda {
 
-/// An ellipsoid's pairs are numbered one after the other, in the bricks' order; moments are kept
-/// under these numbers, so that an ellipsoid's own lie side by side. An ellipsoid's pairs are summed
-/// in chunks, so that one which covers half the volume does not keep its thread for long.
+/// The pairs of an ellipsoid have consecutive numbers, in the order of the bricks. Moments are
+/// stored by these numbers, so that those of an ellipsoid lie next to each other. They are summed
+/// in chunks, because an ellipsoid that covers half the volume would take one thread too long.
 struct PairListsView {
-  static constexpr std::uint32_t kChunk = 256;  ///< pairs
+  static constexpr std::uint32_t kChunk = 256;  ///< pairs in a chunk
 
-  const std::uint32_t* brickOrder;      ///< bricks, those with the most pairs first
-  const std::uint32_t* brickBegin;      ///< bricks + 1: range of a brick's entries
-  const std::uint32_t* ellipsoid;       ///< an entry's; those with the most lines first
-  const std::uint32_t* pair;            ///< an entry's number among the ellipsoids' pairs
-  const std::uint32_t* ellipsoidBegin;  ///< ellipsoids + 1: range of an ellipsoid's pairs
-  const std::uint32_t* chunkBegin;      ///< ellipsoids + 1: range of an ellipsoid's chunks
-  const std::uint32_t* chunkOwner;      ///< a chunk's ellipsoid
+  const std::uint32_t* brickOrder;      ///< bricks in decreasing order of their number of pairs
+  const std::uint32_t* brickBegin;      ///< by brick: its entries are [b] to [b + 1] - 1
+  const std::uint32_t* ellipsoid;       ///< by entry: its ellipsoid; most lines first in a brick
+  const std::uint32_t* pair;            ///< by entry: number of its pair
+  const std::uint32_t* ellipsoidBegin;  ///< by ellipsoid: its pairs are [i] to [i + 1] - 1
+  const std::uint32_t* chunkBegin;      ///< by ellipsoid: its chunks are [i] to [i + 1] - 1
+  const std::uint32_t* chunkOwner;      ///< by chunk: its ellipsoid
 };
 
 class PairLists {
  public:
   explicit PairLists(cudaStream_t stream);
 
-  /// \throws DeviceError  2^32 pairs or more, 2^29 bricks or more
+  /// \throws DeviceError  there are 2^32 pairs or more, or 2^29 bricks or more
   void rebuild(const SupportSource& supports, const BrickTable& bricks);
 
   [[nodiscard]] std::size_t pairCount() const { return pairCount_; }

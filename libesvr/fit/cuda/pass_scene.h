@@ -1,5 +1,5 @@
 #pragma once
-/// What every pass over the bricks reads: bricks, ellipsoids, and which of them meet.
+/// The data that every pass over the bricks reads: bricks, ellipsoids and pair lists.
 
 #include <algorithm>
 
@@ -8,9 +8,9 @@
 
 namespace esvr::cuda {
 
-/// Pointers are to device memory, borrowed.
+/// All pointers are to device memory that the caller owns.
 struct PassScene {
-  const Coord* bricks;  ///< the target's first
+  const Coord* bricks;  ///< the target's bricks first
   std::uint32_t brickCount, targetCount;
   std::uint32_t ellipsoidCount, pairCount;
   PairListsView lists;

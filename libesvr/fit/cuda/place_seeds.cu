@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kNeighbours = 27;
 
-/// Residuals around a voxel: the window is smaller than a brick, so 27 bricks hold it. Each lane
-/// knows the number of one.
+/// The residuals around a voxel. The window is smaller than a brick, so it lies in the voxel's
+/// brick and its 26 neighbours. Each lane of a warp holds the number of one of these bricks.
 class Surroundings {
  public:
   __device__ Surroundings(const SeedArguments& a, Coord voxel)
@@ -20,7 +20,7 @@ class Surroundings {
     const Coord step{lane / 9 - 1, lane / 3 % 3 - 1, lane % 3 - 1};
     number_ = lane < kNeighbours ? a.bricks.find(brickOf(voxel) + step) : kNoBrick;
   }
-  /// To be called by all lanes together. \param d  from the voxel
+  /// The residual at an offset. All lanes must call it together. \param d  offset from the voxel
   __device__ float at(Coord d) const {
     const Coord place = local_ + d, step = brickOf(place);
     const int holder = (step.x + 1) * 9 + (step.y + 1) * 3 + step.z + 1;
@@ -50,7 +50,7 @@ __device__ SeedMoments momentsAround(const Surroundings& around, double sign, in
   return m;
 }
 
-/// A warp a seed.
+/// Each warp makes one seed.
 __global__ void placeSeeds(const SeedArguments a) {
   const std::size_t n = warpNumber();
   if (n >= a.count) return;

@@ -1,5 +1,5 @@
 #pragma once
-/// New ellipsoids at drawn voxels.
+/// Makes new ellipsoids at sampled voxels.
 
 #include <cuda_runtime_api.h>
 
@@ -8,17 +8,17 @@
 
 namespace esvr::cuda {
 
-/// Pointers are to device memory, borrowed.
+/// All pointers are to device memory that the caller owns.
 struct SeedArguments {
-  const Coord* voxels;  ///< drawn
+  const Coord* voxels;  ///< sampled voxels
   std::uint32_t count;
   BrickTableView bricks;
-  const float* residual;      ///< kBrickVoxels a brick
-  int window;                 ///< half width of the neighbourhood that shapes a seed, voxels
-  double unitVariance;        ///< of the kernel
-  double intensity;           ///< of the residual at the seed
-  double share;               ///< energy that each draw stood for
-  const std::uint32_t* into;  ///< places of the new ellipsoids; null: firstPlace and on
+  const float* residual;      ///< kBrickVoxels values for each brick
+  int window;                 ///< half width of the window that shapes a seed, voxels
+  double unitVariance;        ///< variance of the kernel
+  double intensity;           ///< intensity of a seed, relative to the residual
+  double share;               ///< energy for each draw
+  const std::uint32_t* into;  ///< places of the seeds; null: firstPlace and those after it
   std::uint32_t firstPlace;
   Ellipsoid* ellipsoids;
   AdamState* states;

@@ -1,5 +1,5 @@
 #pragma once
-/// Which ellipsoids are worth least.
+/// Finds the ellipsoids whose removal adds the least error.
 
 #include <cuda_runtime_api.h>
 
@@ -13,11 +13,11 @@ class EllipsoidRanking {
   explicit EllipsoidRanking(cudaStream_t stream);
 
   struct Chosen {
-    const std::uint32_t* places;  ///< on the device, the least useful first
+    const std::uint32_t* places;  ///< in device memory; the least useful ellipsoid first
     std::size_t count;
   };
-  /// The `count` whose removal would raise the sum of squares least, of those that have taken
-  /// graceSteps steps; fewer where there are fewer.
+  /// The `count` ellipsoids whose removal raises the sum of squares least. Only ellipsoids that
+  /// have taken graceSteps steps are chosen, so the result may be shorter.
   [[nodiscard]] Chosen leastUseful(const StepArguments& fit, std::size_t count, int graceSteps);
 
  private:

@@ -14,7 +14,8 @@
 
 namespace esvr::cuda {
 
-/// Energies as integers, whose running sums have no order and no rounding.
+/// Converts energies to integers. Prefix sums of integers have no rounding, and do not depend on
+/// the order of additions.
 struct EnergyUnits {
   double scale;  ///< a power of two
   __device__ std::uint64_t operator()(float residual, SignsAllowed signs) const {
@@ -35,10 +36,10 @@ namespace {
 
 constexpr int kVoxelsPerLane = kBrickVoxels / kWarp;
 
-/// Of all voxels together at most 2^61.
+/// The units in which the energy of all voxels is at most 2^61.
 EnergyUnits unitsFor(double loss) { return {std::ldexp(1.0, 60 - std::ilogb(loss))}; }
 
-/// A warp a brick.
+/// Each warp sums the energy of one brick.
 __global__ void brickEnergies(const SamplingArguments a, std::uint64_t* energy) {
   const std::size_t b = warpNumber();
   if (b >= a.targetBricks) return;
@@ -49,7 +50,7 @@ __global__ void brickEnergies(const SamplingArguments a, std::uint64_t* energy) 
   if (threadIdx.x % kWarp == 0) energy[b] = sum;
 }
 
-/// First brick whose running sum exceeds `at`.
+/// The first brick whose prefix sum exceeds `at`.
 __device__ std::uint32_t brickAt(const std::uint64_t* sums, std::uint32_t bricks,
                                  std::uint64_t at) {
   std::uint32_t low = 0, high = bricks - 1;
@@ -63,8 +64,8 @@ __device__ std::uint32_t brickAt(const std::uint64_t* sums, std::uint32_t bricks
   return low;
 }
 
-/// The voxel of a brick at which the running energy exceeds `at`. A warp works on it; a lane has
-/// kVoxelsPerLane in a row.
+/// The voxel of a brick at which the cumulative energy exceeds `at`. A warp searches together; each
+/// lane has kVoxelsPerLane consecutive voxels.
 __device__ int voxelAt(const SamplingArguments& a, std::uint32_t brick, std::uint64_t at) {
   const int lane = int(threadIdx.x % kWarp);
   const float* const r =
@@ -81,7 +82,7 @@ __device__ int voxelAt(const SamplingArguments& a, std::uint32_t brick, std::uin
   return warpMin(found);
 }
 
-/// A warp a draw: `count` equal shares of the energy, one voxel from each.
+/// Systematic sampling as in fit/cpu/sample_voxels.h. Each warp draws one voxel.
 __global__ void sampleVoxelsKernel(const SamplingArguments a, const std::uint64_t* sums,
                                    std::uint32_t count, Coord* out) {
   const std::size_t n = warpNumber();
@@ -140,7 +141,7 @@ std::uint64_t VoxelSampling::sumEnergies(const SamplingArguments& a) {
 }
 
 std::uint32_t VoxelSampling::keepEachOnce(std::uint32_t count) {
-  // Draws of one voxel follow each other.
+  // Repeated draws of a voxel are adjacent.
   const SameVoxel same;
   withTemporary(temporary_, "listing drawn voxels", [&](void* memory, std::size_t& bytes) {
     return cub::DeviceSelect::UniqueByKey(memory, bytes, drawn_.data(), drawn_.data(),

@@ -1,5 +1,6 @@
 #pragma once
-/// Draws voxels in proportion to their squared residual (draw_voxels.h), on the device.
+/// Samples voxels in proportion to their squared residual on the device, as fit/cpu/sample_voxels.h
+/// does on the CPU.
 
 #include <cuda_runtime_api.h>
 
@@ -12,19 +13,19 @@ namespace esvr::cuda {
 struct SamplingArguments;
 
 struct DeviceSampling {
-  const Coord* voxels = nullptr;  ///< on the device, each once
+  const Coord* voxels = nullptr;  ///< distinct voxels, in device memory
   std::uint32_t count = 0;
-  double share = 0.0;  ///< energy that each draw stood for
+  double share = 0.0;  ///< energy for each draw
 };
 
 class VoxelSampling {
  public:
   explicit VoxelSampling(cudaStream_t stream);
 
-  /// \param residual  kBrickVoxels a brick; at least options.targetBricks of them
-  /// \param loss      sum of r^2 over all bricks, finite
+  /// \param residual  kBrickVoxels values for each brick; at least options.targetBricks bricks
+  /// \param loss      sum of r^2 over all bricks; must be finite
   /// \param bricks    coordinates of the bricks
-  /// \return none where there is no error to mend
+  /// \return no voxels if seeds cannot reduce any residual
   [[nodiscard]] DeviceSampling draw(const float* residual, double loss, const Coord* bricks,
                                     const SamplingOptions& options);
 

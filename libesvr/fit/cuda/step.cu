@@ -11,10 +11,10 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kStepBlock = 64;  // small: few ellipsoids are to use many processors
+constexpr int kStepBlock = 64;  // small blocks spread few ellipsoids over many multiprocessors
 constexpr int kSumBlock = 1024;
 
-/// Sum of value(0 .. count - 1) by one block.
+/// Sums value(0) to value(count - 1) with one block.
 template <class Value>
 __device__ void sumByOneBlock(std::uint32_t count, const Value& value, double* out) {
   double sum = 0.0;

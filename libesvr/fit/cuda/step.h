@@ -1,5 +1,5 @@
 #pragma once
-/// From moments to gradients to a step, one thread an ellipsoid and so one writer.
+/// Turns moments into gradients and takes a step. One thread writes each ellipsoid.
 
 #include <cuda_runtime_api.h>
 
@@ -10,20 +10,20 @@
 
 namespace esvr::cuda {
 
-/// How the kernel, which all share, changes with kappa.
+/// The derivatives of the shared kernel by kappa.
 struct KernelEdge {
   double slope;        ///< KernelConstants::slope
   double logMByKappa;  ///< KernelWidth::logMByKappa
 };
 
-/// What an ellipsoid is worth, from the last gradients.
+/// Sums of an ellipsoid from the last gradients, from which removalError() follows.
 struct Usefulness {
   float phi2;  ///< sum of phi^2
   float rPhi;  ///< sum of r phi
   float edge;  ///< edgeGradient()
 };
 
-/// Pointers are to device memory, borrowed.
+/// All pointers are to device memory that the caller owns.
 struct StepArguments {
   std::uint32_t ellipsoidCount;
   MomentSums sums;
@@ -31,10 +31,10 @@ struct StepArguments {
   AdamState* states;
   PairForm* forms;
   Usefulness* usefulness;
-  int* diverged;  ///< set to 1 where an ellipsoid is not finite
-  double radius;  ///< of the support in the unit frame
+  int* diverged;  ///< is set to 1 if an ellipsoid is not finite
+  double radius;  ///< radius of the support in the unit frame
   KernelEdge edge;
-  double factor;  ///< of the step sizes
+  double factor;  ///< factor of the step sizes
   StepSizes sizes;
   AdamOptions adam;
   EllipsoidLimits limits;
@@ -51,14 +51,14 @@ struct ListingArguments {
   std::uint32_t count;
   const Ellipsoid* ellipsoids;
   const AdamState* states;
-  ListedSupport* listed;  ///< as they were listed before, and out
-  double radius;          ///< of the support in the unit frame
+  ListedSupport* listed;  ///< input: supports in the last lists; output: in the next lists
+  double radius;          ///< radius of the support in the unit frame
   SlackRule rule;
 };
 
-/// Takes the step; wants launchMomentSums before.
+/// Takes the step. launchMomentSums must have been called before.
 void launchStep(const StepArguments& arguments, cudaStream_t stream);
-/// Writes the gradients of all ellipsoids; wants launchMomentSums before.
+/// Writes the gradients of all ellipsoids. launchMomentSums must have been called before.
 void launchReadGradients(const StepArguments& arguments, EllipsoidGradient* out,
                          cudaStream_t stream);
 
@@ -67,7 +67,7 @@ void launchLossSum(const double* brickLoss, std::uint32_t bricks, double* sum, c
 
 /// Writes listedSupport() of all ellipsoids.
 void launchListing(const ListingArguments& arguments, cudaStream_t stream);
-/// Sums byKappa of `count` ellipsoids, in one order.
+/// Sums Usefulness::edge of `count` ellipsoids, always in the same order.
 void launchEdgeSum(const Usefulness* usefulness, std::uint32_t count, double* sum,
                    cudaStream_t stream);
 

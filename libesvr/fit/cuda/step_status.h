@@ -1,5 +1,5 @@
 #pragma once
-/// What the host hears of the steps that it has started.
+/// The status of the started steps, which the host reads back.
 
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +9,7 @@
 namespace esvr::cuda {
 
 struct StepStatus {
-  static constexpr std::size_t kMaxAhead = 64;  ///< steps that can be started without a look
+  static constexpr std::size_t kMaxAhead = 64;  ///< steps that can be started before it is read
 
   double loss;                ///< sum of r^2 before the last step that was taken
   int diverged;               ///< not 0: an ellipsoid is not finite
@@ -22,7 +22,7 @@ struct StepStatus {
     while (n < started && halted[n] == 0) ++n;
     return n;
   }
-  /// \return whether the lists serve another step
+  /// \return true if the lists are still valid after the started steps
   [[nodiscard]] bool canGoOn(std::size_t started) const { return halted[started] == 0; }
 };
 

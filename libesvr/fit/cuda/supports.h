@@ -1,5 +1,5 @@
 #pragma once
-/// The supports of ellipsoids, as the kernels that build lists need them.
+/// The supports of ellipsoids for the kernels that build lists.
 
 #include <cstddef>
 
@@ -9,15 +9,15 @@
 
 namespace esvr::cuda {
 
-/// Pointers are to device memory, borrowed.
+/// All pointers are to device memory that the caller owns.
 struct SupportSource {
   const Ellipsoid* ellipsoids;
   std::size_t count;
-  double radius;                  ///< of the support in the unit frame
+  double radius;                  ///< radius of the supports in the unit frame
   double slack;                   ///< voxels by which supports are widened
-  const double* radii = nullptr;  ///< an ellipsoid's; null: all have `radius`
-  const ListedSupport* listed =
-      nullptr;  ///< where it is not null, ellipsoids and radii are not read
+  const double* radii = nullptr;  ///< radius of each support; null: all have `radius`
+  /// If it is not null, it is read instead of `ellipsoids` and `radii`.
+  const ListedSupport* listed = nullptr;
 
   [[nodiscard]] ESVR_HD double radiusOf(std::size_t i) const {
     return radii != nullptr ? radii[i] : radius;
@@ -29,8 +29,8 @@ struct SupportSource {
   }
 };
 
-/// \return the bricks of `within` that a support's bounding box overlaps: an ellipsoid over
-///         everything is looked for only where bricks can be. Empty where there are none.
+/// \return the bricks of `within` that the support's bounding box overlaps; empty if there are
+///         none. The limit keeps the search short for a support that is larger than the volume.
 [[nodiscard]] ESVR_HD inline Box clippedRange(const Support& support, const Box& within) {
   const Box range = brickRange(support);
   const auto larger = [](std::int32_t a, std::int32_t b) { return a > b ? a : b; };

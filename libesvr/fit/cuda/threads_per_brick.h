@@ -1,7 +1,8 @@
 #pragma once
-/// How many threads work on one brick: few keep more bricks going at once, many are done sooner
-/// with a full one. Which is better depends on the scene and the device, so a run measures it now
-/// and then. The choice changes no bit of what is computed.
+/// Chooses the number of threads that work on one brick. With few threads more bricks are in work
+/// at the same time; with many threads a brick with a long list is done sooner. The better choice
+/// depends on the scene and the device, so a run measures it from time to time. The choice does not
+/// change any result.
 
 #include <array>
 
@@ -14,8 +15,8 @@ class ThreadsPerBrick {
   static constexpr int kChoices = 3;
   static constexpr int threads(int choice) { return 128 << choice; }
 
-  /// Calls pass(threads), which starts a pass on the stream, with the best threads or, while a
-  /// measurement is going on, with the next to be tried.
+  /// Calls pass(threads), which starts a pass on the stream, with the best number of threads.
+  /// During a measurement it tries the next number instead.
   template <class Pass>
   void run(cudaStream_t stream, const Pass& pass) {
     if (tried_ == kChoices) return pass(threads(best_));
@@ -25,10 +26,10 @@ class ThreadsPerBrick {
     trial.end.record(stream);
   }
 
-  /// To be called where the host waits for the stream anyway, once new lists have been built: takes
-  /// the best of what was measured, and begins anew when it has served for long enough.
-  /// \param passes  calls of run() since the call before that did work; those after them were halted
-  ///                (halt.h) and took no time
+  /// Must be called after new lists have been built, where the host has waited for the stream. It
+  /// takes the fastest of the measured numbers, and starts a new measurement after some lists.
+  /// \param passes  number of calls of run() since the last call that did work. The calls after
+  ///                them were halted (halt.h), so their times are not valid
   void listsChanged(std::size_t passes);
 
  private:
@@ -36,8 +37,8 @@ class ThreadsPerBrick {
     Event begin, end;
   };
   std::array<Trial, kChoices> trials_;
-  int tried_ = 0;        ///< choices of the measurement that is going on
-  int triedBefore_ = 0;  ///< those on the lists before
+  int tried_ = 0;        ///< choices that the current measurement has tried
+  int triedBefore_ = 0;  ///< value of tried_ at the last call of listsChanged()
   int best_ = 1;
   bool measuring_ = true;
   std::size_t served_ = 0;  ///< passes since the last measurement

@@ -1,5 +1,5 @@
 #pragma once
-/// The seeds of the paper's method.
+/// The initial ellipsoids of the paper's method.
 
 #include "fit/paper/paper_ellipsoid.h"
 #include "fit/target.h"

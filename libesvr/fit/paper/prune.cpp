@@ -41,7 +41,8 @@ double volumeOf(const PaperEllipsoid& p) {
   return std::exp(p.logScale[0] + p.logScale[1] + p.logScale[2]);
 }
 
-/// LightGaussian's gamma: the volume divided by its 90th percentile, at most 1, to the power 0.1.
+/// The factors gamma of LightGaussian: the volume of an ellipsoid divided by the 90th percentile of
+/// all volumes, clamped to 1, to the power 0.1.
 std::vector<double> volumeFactors(std::span<const PaperEllipsoid> ellipsoids) {
   constexpr double kPercentile = 0.9, kPower = 0.1;
   std::vector<double> volumes(ellipsoids.size());
@@ -66,7 +67,7 @@ double scoreOf(const PaperEllipsoid& p, PruneScore score, const CoverageOptions&
 }  // namespace
 
 double fractionalAnisotropy(const std::array<double, 3>& logScale) {
-  // relative to the largest, so that fourth powers do not overflow
+  // Scales are taken relative to the largest one, so that fourth powers do not overflow.
   const double largest = *std::max_element(logScale.begin(), logScale.end());
   const auto lambda = [&](int a) { return std::exp(2.0 * (logScale[a] - largest)); };
   const double a = lambda(0), b = lambda(1), c = lambda(2);

@@ -17,10 +17,10 @@ __global__ void clearRanges(int2* ranges, int tiles) {
   if (tile < tiles) ranges[tile] = make_int2(INT_MAX, INT_MIN);
 }
 
-/// The part of the picture that a brick of cells covers.
+/// The part of the picture that a brick of cells may cover, and its distances from the eye.
 struct Cover {
   double firstColumn, lastColumn, firstRow, lastRow;  ///< pixels
-  double nearest, farthest;                           ///< distances
+  double nearest, farthest;                           ///< voxels
 };
 
 __device__ Vec3 cornerOf(const Coord& brick, int corner) {
@@ -54,7 +54,8 @@ __device__ void add(const View& view, const Vec3& corner, Cover& c) {
   c.lastRow = fmax(c.lastRow, before ? row : kAll);
 }
 
-/// If a corner lies behind the eye, nothing is known but the whole picture.
+/// If a corner of the brick lies behind the eye, it cannot be projected, and the result is the
+/// whole picture.
 __device__ Cover coverOf(const View& view, const Coord& brick) {
   constexpr double kAll = 1e9;
   Cover c{kAll, -kAll, kAll, -kAll, view.perspective ? distanceTo(brick, view.eye) : 1e300, -1e300};
@@ -66,7 +67,7 @@ __device__ int tileAt(double pixel, int count) {
   return int(floor(fmin(fmax(pixel, 0.0), double(count - 1)))) / kSide;
 }
 
-/// A warp a brick.
+/// Each warp handles one brick: it widens the sample range of every tile that the brick may cover.
 __global__ void __launch_bounds__(kThreads) findRanges(const BrickDrawArguments a) {
   const int lane = int(threadIdx.x) % kWarp, tileColumns = tilesAlong(a.resolution.width);
   for (std::size_t i = warpNumber(); i < a.count; i += warpCount()) {
@@ -91,7 +92,7 @@ __global__ void __launch_bounds__(kThreads) findRanges(const BrickDrawArguments 
   }
 }
 
-/// A block a tile, a thread a ray; neighbours in a warp are 8 x 4 pixels.
+/// Each block draws one tile and each thread one ray. The rays of a warp are 8 x 4 neighbours.
 __global__ void __launch_bounds__(kTilePixels) marchKernel(const BrickDrawArguments a) {
   const int2 range = a.ranges[blockIdx.x];
   if (range.x > range.y) return;

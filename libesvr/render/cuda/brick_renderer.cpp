@@ -1,4 +1,4 @@
-// Marches through bricks of voxels on a CUDA device.
+// The renderer that marches rays through bricks of cells on a CUDA device.
 
 #include <algorithm>
 #include <cmath>
@@ -66,7 +66,7 @@ class BrickRenderer final : public MarchRenderer {
   float background_;
   Vec3 origin_;
   Coord blocks_;
-  PlaceBox box_;  ///< relative to the atlas
+  PlaceBox box_;  ///< box of the cells, relative to the atlas
   int multiprocessors_;
   DeviceBuffer<std::uint32_t> blockOf_, brickOf_;
   DeviceBuffer<Coord> bricks_;

@@ -10,7 +10,8 @@ namespace esvr::cuda {
 
 class DeviceTable {
  public:
-  /// A table takes longer to make than a picture: views of one transfer function share it.
+  /// Makes the table anew only if the transfer function or its step changed, because making it can
+  /// take longer than drawing a picture.
   void update(const RenderOptions& options, cudaStream_t stream) {
     const double length = opacitySteps(options);
     if (known_ && known_->length == length && known_->transfer == options.transfer) return;
@@ -19,7 +20,7 @@ class DeviceTable {
     makeRoom(entries_, entries.size(), stream);
     entries_.upload(entries);
   }
-  /// After an update.
+  /// Must be called after update().
   [[nodiscard]] TransferTableView view() const { return known_->table.on(entries_.data()); }
   [[nodiscard]] std::size_t bytes() const { return entries_.bytes(); }
 

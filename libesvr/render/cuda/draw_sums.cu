@@ -3,15 +3,16 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kStage = kWarp * kGroups;  // a lane of each warp looks at one staged ellipsoid
+constexpr int kStage = kWarp * kGroups;  // ellipsoids staged at once: one for each lane and group
 constexpr int kRowsOfHalf = kSide / kHalves;
 static_assert(kGroups == 4, "sums and colors of a sample share their place");
 
-/// An ellipsoid placed: from the tile's first pixel and the bin's first sample.
+/// An ellipsoid in shared memory, relative to the tile's first pixel and the bin's first sample.
+/// The members are those that spanOn() (ray_math.h) takes.
 struct alignas(16) Staged {
   float dx, dy;
   float depth, middleAhead;
-  std::uint32_t halves;  ///< bit h: it may cover pixels of half h of the tile
+  std::uint32_t halves;  ///< bit h is set if the ellipsoid may cover pixels of half h of the tile
   std::uint32_t unused;
   RayForm form;
 };
@@ -19,19 +20,20 @@ static_assert(sizeof(Staged) == sizeof(EllipsoidView) &&
                   offsetof(Staged, form) == offsetof(EllipsoidView, form),
               "staged in place of what was read");
 
-/// The groups share a list's ellipsoids among them.
+/// Shared memory of a block. Each group of threads adds its share of a list's ellipsoids.
 struct Shared : WorkShared {
-  /// The partial sums of a sample by each group for all rays; then, in the same place, of each ray
-  /// what the rule made of the whole sum. A warp's rays meet no bank twice.
+  /// First the partial sums of each sample, by group and ray. classify() then overwrites the sums
+  /// of a sample with a PixelColor for each ray. The rays of a warp lie next to each other, so its
+  /// accesses have no bank conflicts.
   alignas(16) float sums[kBinSamples][kGroups][kRays];
   Staged staged[kStage];
   std::uint32_t ids[kThreads], sortedIds[kThreads];
-  std::uint32_t touched;  ///< a bit a sample
+  std::uint32_t touched;  ///< bit i is set if an ellipsoid was added to sample i of any ray
 };
 
-/// A thread's further knowledge of its ray.
+/// What a thread knows of its ray in addition to Work.
 struct SumWork : Work {
-  double middleUnit;  ///< samples for each unit along forward, on the tile's middle ray
+  double middleUnit;  ///< samples per unit of depth along forward, on the tile's middle ray
   RayScale scale;
 };
 
@@ -50,8 +52,8 @@ __device__ SumWork sumWorkOf(const SumArguments& a, std::uint32_t tile, const Pl
   return w;
 }
 
-/// Increasing order, so that sums have one order whatever filled the list: each id goes where the
-/// number of smaller ones says.
+/// Sorts up to kThreads ids, because float sums depend on the order of their terms and lists are
+/// filled in any order. The place of an id is the number of smaller ids.
 __device__ void sortInShared(Shared& s, std::uint32_t n) {
   const std::uint32_t t = threadIdx.x;
   if (t < n) {
@@ -63,7 +65,7 @@ __device__ void sortInShared(Shared& s, std::uint32_t n) {
   __syncthreads();
 }
 
-/// The same for lists longer than the block.
+/// Sorts a list of any length in the same way, from global memory to global memory.
 __device__ void sortInMemory(const std::uint32_t* from, std::uint32_t n, std::uint32_t* to,
                              Shared& s) {
   for (std::uint32_t first = 0; first < n; first += kThreads) {
@@ -89,7 +91,8 @@ __device__ std::uint32_t halvesOf(const Footprint& f, int firstRow) {
   return (upper ? 1u : 0u) | (lower ? 2u : 0u);
 }
 
-/// Copies a view, 16 bytes a thread; the first two replace what only places it.
+/// Copies one 16-byte word of an EllipsoidView into shared memory. The threads of words 0 and 1
+/// replace the ellipsoid's position in the picture by its position relative to tile and bin.
 __device__ void stageOne(const SumArguments& a, Shared& s, const SumWork& work, std::uint32_t id,
                          int slot, int word, double firstSample) {
   float4 v = reinterpret_cast<const float4*>(&a.views[id])[word];
@@ -113,22 +116,23 @@ __device__ void stage(const SumArguments& a, Shared& s, const SumWork& work,
   const int word = int(threadIdx.x) % kWords;
   for (int first = 0; first < count; first += kAtOnce) {
     const int slot = first + int(threadIdx.x) / kWords;
-    // All lanes take part in the exchange: those without an ellipsoid repeat the last.
+    // All lanes of a warp must take part in its shuffles, so those without an ellipsoid copy the
+    // last one again.
     stageOne(a, s, work, ids[min(slot, count - 1)], min(slot, count - 1), word, firstSample);
   }
 }
 
-/// The bits of samples first to last; none where last is before first.
+/// Sets the bits of the samples first to last; no bit if last < first.
 __device__ std::uint32_t samplesFrom(int first, int last) {
   return last < first ? 0u : (0xffffffffu >> (kBinSamples - 1 - (last - first))) << first;
 }
 
-/// \return the samples of the thread's ray that something was added to
+/// Adds an ellipsoid to the thread's ray. \return a bit for each sample that it was added to
 __device__ std::uint32_t addOne(Shared& s, const Staged& e, const Place& place,
                                 const SumWork& work) {
   const RaySpan span = spanOn(e.form, e.dx + float(place.column), e.dy + float(place.row),
                               work.scale, e.depth, e.middleAhead);
-  // Two at a time: the exponentials of one wait for nothing of the other.
+  // Two samples at a time: their exponentials do not depend on each other and can overlap.
   for (int i = span.first; i <= span.last; i += 2) {
     float* const sum = &s.sums[i][place.group][place.ray];
     const float first = valueAt(e.form, span, i), second = valueAt(e.form, span, i + 1);
@@ -138,7 +142,7 @@ __device__ std::uint32_t addOne(Shared& s, const Staged& e, const Place& place,
   return samplesFrom(span.first, span.last);
 }
 
-/// The group's share of what is staged.
+/// Adds the group's share of the staged ellipsoids: every kGroups-th one.
 __device__ std::uint32_t addStaged(Shared& s, const Place& place, const SumWork& work, bool open,
                                    int count) {
   const int own = place.lane * kGroups + place.group;
@@ -152,7 +156,7 @@ __device__ std::uint32_t addStaged(Shared& s, const Place& place, const SumWork&
   return touched;
 }
 
-/// Ids in order.
+/// Adds the ellipsoids of a sorted list, kStage at a time.
 __device__ std::uint32_t addSorted(const SumArguments& a, Shared& s, const Place& place,
                                    const SumWork& work, bool open, const std::uint32_t* ids, int n,
                                    double firstSample) {
@@ -189,8 +193,8 @@ __device__ void addBin(const SumArguments& a, Shared& s, const Place& place, con
   __syncthreads();
 }
 
-/// Applies the rule to each sum, by all threads: a warp takes whole samples, so that it alone
-/// overwrites what it has read.
+/// Turns the sums of all samples into colors. A warp takes whole samples, because colors overwrite
+/// the sums and no other warp may still need them.
 __device__ void classify(const SamplingArguments& a, Shared& s) {
   const int warp = int(threadIdx.x) / kWarp, lane = int(threadIdx.x) % kWarp;
   for (int sample = warp; sample < kBinSamples; sample += kWarps) {
@@ -209,7 +213,7 @@ __device__ void classify(const SamplingArguments& a, Shared& s) {
   __syncthreads();
 }
 
-/// By the threads of the first group; leaves the sums zero.
+/// Composites the colors of a bin, by the threads of the first group, and sets the sums to 0.
 __device__ void composite(const SamplingArguments& a, Shared& s, const Place& place,
                           const SumWork& work, float firstSample, RayState& ray) {
   if (place.group == 0) {

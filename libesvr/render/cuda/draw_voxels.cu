@@ -6,24 +6,27 @@ namespace esvr::cuda {
 namespace {
 
 constexpr int kLanes = DrawTuning::kLanesOfForm, kTeams = kThreads / kLanes;
-/// A block that is split leaves one behind; each side is halved three times, samples five.
+/// Largest number of blocks that wait on the stack. Each split leaves one of the two halves there;
+/// a block of 8 x 8 rays and 32 samples can be halved 3 + 3 + 5 = 11 times.
 constexpr int kMaxBlocks = 12;
 static_assert(kSide == 8 && kBinSamples == 32 && DrawTuning::kWindowSlabs <= 64);
 
-/// Samples of a rectangle of a tile's rays: pixels from the tile's first, samples from the bin's.
+/// A range of samples on a rectangle of rays. Columns and rows count from the tile's first pixel,
+/// samples from the bin's first one.
 struct Block {
   int column, row, columns, rows;
   int firstSample, samples;
 };
 
-/// The part of a tile and a bin that ellipsoids reach, first and last: pixels of the picture, and
-/// depths along forward as the bits of floats, which are none of them negative.
+/// The part of the picture and the range of depths that a list's ellipsoids reach.
 struct Reach {
-  int firstColumn, lastColumn, firstRow, lastRow;
+  int firstColumn, lastColumn, firstRow, lastRow;  ///< pixels of the picture
+  /// Depths along forward, as the bit patterns of floats. No depth is negative, so the patterns
+  /// have the order of the floats, and atomicMin and atomicMax work on them.
   int nearest, farthest;
 };
 
-/// A block is drawn at once: its samples, and the voxels that they lie between.
+/// A block that is drawn at once, and the window of voxels that its samples are interpolated from.
 struct Pass {
   Block block;
   const RayBundle* bundle;
@@ -31,25 +34,26 @@ struct Pass {
   WindowOrigin origin;
 };
 
-/// Its first pixel.
+/// The first pixel of a tile.
 struct Tile {
   int column, row;
 };
 
 struct SampledRay {
-  Vec3 origin, apart;  ///< the first sample and the distance between samples
+  Vec3 origin, apart;  ///< sample n of the frame lies at origin + n apart
 };
 
 struct Shared : WorkShared {
-  /// First the sums of the window's voxels, in units so fine that the sum of all intensities just
-  /// fits: sums of whole numbers have no order. Then what voxels they are, as float.
+  /// First the sums at the window's voxels as integers in a small unit (see Units). Integer sums
+  /// do not depend on the order of their terms. finishVoxels() replaces them by the values of the
+  /// voxels, as floats.
   int values[DrawTuning::kWindowVoxels];
   WindowSlab slabs[DrawTuning::kWindowSlabs];
   SampledRay rays[kRays];
-  RayState behind[kGroups - 1][kRays];  ///< the rays of all groups but the first
-  unsigned long long filled;            ///< a bit a slab that something was added to
+  RayState behind[kGroups - 1][kRays];  ///< samples of each ray taken by all groups but the first
+  unsigned long long filled;            ///< bit s is set if an ellipsoid reaches slab s
   RayBundle ofTile, ofBlock;
-  Block blocks[kMaxBlocks];  ///< that are left, the next one last
+  Block blocks[kMaxBlocks];  ///< stack of the blocks that are not drawn yet
   int left;
   Reach reach;
   Pass pass;
@@ -63,7 +67,7 @@ __device__ void layRay(const VoxelArguments& a, Shared& s, const Place& place, c
                        scaled(view.directionAt(x, y), a.draw.frame.step / view.unitAlong(x, y))};
 }
 
-/// All of a tile that is in the picture, and of a bin.
+/// All samples of a bin, on the rays of a tile that lie in the picture.
 __device__ Block wholeBlock(const TileFrame& frame, const Tile& tile) {
   return {0,
           0,
@@ -81,7 +85,8 @@ __device__ RayBundle bundleOf(const TileFrame& frame, const Tile& tile, const Bl
   return esvr::bundleOf(frame.view, {column, column + b.columns - 1, row, row + b.rows - 1});
 }
 
-/// In front first. One sample of one ray always has a window.
+/// Puts the two halves of a block on the stack, the one in front on top. Splitting ends, because
+/// the window of a single sample always fits.
 __device__ void split(Shared& s, const Block& b) {
   Block one = b, other = b;
   if (b.samples > DrawTuning::kFewSamples || (b.columns * b.rows == 1 && b.samples > 1)) {
@@ -98,7 +103,7 @@ __device__ void split(Shared& s, const Block& b) {
   s.blocks[s.left++] = one;
 }
 
-/// \return false where the block's window is too large
+/// Makes the pass for a block. \return false if the block's window is too large
 __device__ bool planPass(const TileFrame& frame, Shared& s, const Tile& tile, const Block& b,
                          double binSample) {
   const WindowLimits limits{DrawTuning::kWindowSlabs, DrawTuning::kWindowVoxels};
@@ -114,7 +119,8 @@ __device__ bool planPass(const TileFrame& frame, Shared& s, const Tile& tile, co
   return true;
 }
 
-/// The next block that has a window; larger ones are split on the way. By one thread.
+/// Takes blocks from the stack, and splits them, until the window of one fits. It is called by one
+/// thread. \return false if no block is left
 __device__ bool nextPass(const TileFrame& frame, Shared& s, const Tile& tile, double binSample) {
   while (s.left > 0) {
     const Block b = s.blocks[--s.left];
@@ -124,7 +130,7 @@ __device__ bool nextPass(const TileFrame& frame, Shared& s, const Tile& tile, do
   return false;
 }
 
-/// By one thread.
+/// Is called by one thread.
 __device__ void bundleTile(const TileFrame& frame, Shared& s, Tile tile) {
   s.ofTile = bundleOf(frame, tile, wholeBlock(frame, tile));
 }
@@ -133,7 +139,7 @@ __device__ void laySlab(Shared& s, int slab) {
   s.slabs[slab] = slabOf(*s.pass.bundle, s.pass.window, s.pass.origin, slab);
 }
 
-/// Empties the window and says where its slabs lie.
+/// Sets the window to 0 and computes where its slabs lie.
 __device__ void layOut(Shared& s) {
   const VoxelWindow& w = s.pass.window;
   for (int i = int(threadIdx.x); i < w.voxels(); i += kThreads) s.values[i] = 0;
@@ -143,7 +149,7 @@ __device__ void layOut(Shared& s) {
 
 /// Units of a voxel's sum, a power of two of them for 1.
 struct Units {
-  float ofOne, one;
+  float ofOne, one;  ///< number of units in 1.0, and the size of a unit
 };
 __device__ Units unitsFor(float bound, std::uint32_t n) {
   // A value of less than 2^22 units is as fine as float32 is, and all that wholeNearest takes.
@@ -151,7 +157,7 @@ __device__ Units unitsFor(float bound, std::uint32_t n) {
   return {ldexpf(1.0f, e), ldexpf(1.0f, -e)};
 }
 
-/// An ellipsoid in the window, its values in units, for the threads of a team.
+/// An ellipsoid relative to the window, with values in units. A team of kLanes threads adds it.
 struct Placed {
   WindowKernel kernel;
   WindowOrder order;
@@ -172,8 +178,9 @@ __device__ Placed placedIn(const VoxelArguments& a, const Pass& pass, std::uint3
   return p;
 }
 
-/// The values of a run that is long, to `values` from its first on. Its exponentials are each the
-/// one before times a factor, and the factors likewise: after 12 of them some 5e-6 off.
+/// Adds a long run of voxels without one exponential for each. The exponent is quadratic in the
+/// column, so each exponential is the one before times a factor, and each factor is the one before
+/// times a constant. The relative error is about 5e-6 after 12 voxels.
 __device__ void addLongRun(const WindowKernel& k, const WindowRun& run, int* values) {
   const float t = float(run.first) - run.middle;
   float y = exp2f(run.nearest + run.speed * t * t);
@@ -185,10 +192,10 @@ __device__ void addLongRun(const WindowKernel& k, const WindowRun& run, int* val
   }
 }
 
-/// \return true where the support has voxels there
+/// Adds an ellipsoid to a row of voxels. \return true if the support has voxels there
 __device__ bool addRow(Shared& s, const Placed& p, int slab, int row) {
-  constexpr int kLong = 5;  // and so wide a support that nothing overflows
-  constexpr float kMaxCutoff = 60.0f;
+  constexpr int kLong = 5;
+  constexpr float kMaxCutoff = 60.0f;  // a larger exponent could overflow in addLongRun
   const WindowSlab at = s.slabs[slab];
   const int columns = s.pass.window.columns;
   const WindowRun run = runOn(p.kernel, p.order,
@@ -203,7 +210,7 @@ __device__ bool addRow(Shared& s, const Placed& p, int slab, int row) {
   return run.first <= run.last;
 }
 
-/// The rows of voxels that a support meets, slab by slab, a lane each.
+/// Adds an ellipsoid to the window, slab by slab. Each lane of the team takes every kLanes-th row.
 __device__ void addForm(Shared& s, const Placed& p, int lane) {
   const VoxelWindow& w = s.pass.window;
   const WholeRange slabs =
@@ -220,7 +227,8 @@ __device__ void addForm(Shared& s, const Placed& p, int lane) {
   if (filled != 0) atomicOr(&s.filled, filled);
 }
 
-/// Turns the sums into voxels as revoxelise() does, near slabs that have any.
+/// Turns the sums into voxels as revoxelise() does. Only slabs that ellipsoids reach and their
+/// neighbours are read later, so all others are left out.
 __device__ void finishVoxels(const VoxelArguments& a, Shared& s, float one) {
   const VoxelWindow& w = s.pass.window;
   const unsigned long long near = s.filled | s.filled << 1 | s.filled >> 1;
@@ -243,7 +251,7 @@ __device__ WindowPlace inAxes(const Vec3& v, const WindowAxes& axes) {
   return {along(v, axes.slab), along(v, axes.row), along(v, axes.column)};
 }
 
-/// The first sample of the block on the thread's ray, from the window's first voxel.
+/// Position of the block's first sample on the thread's ray, relative to the window's first voxel.
 __device__ WindowPlace firstPlace(const Pass& pass, const SampledRay& ray, double binSample) {
   const WindowAxes& axes = pass.window.axes;
   Vec3 corner;
@@ -254,11 +262,12 @@ __device__ WindowPlace firstPlace(const Pass& pass, const SampledRay& ray, doubl
   return inAxes(difference(sum(ray.origin, scaled(ray.apart, number)), corner), axes);
 }
 
-/// A thread's share of its ray's samples, counted from the block's first.
+/// The samples of a ray that one thread takes, counted from the block's first.
 struct Share {
   int first, end;
 };
-/// Only from front to back is it known how deep a ray comes: then the first group takes all.
+/// The groups divide the samples of a ray among them. In RenderMode::kDepth the first group takes
+/// all, because that mode must stop at a sample that depends on all samples before it.
 __device__ Share shareOf(const VoxelArguments& a, const Pass& pass, const Place& place) {
   const int samples = pass.block.samples;
   if (a.draw.rule.mode == RenderMode::kDepth) return {0, place.group == 0 ? samples : 0};
@@ -272,7 +281,7 @@ __device__ bool hasRay(const Pass& pass, const Place& place) {
          place.row < b.row + b.rows;
 }
 
-/// Adds a thread's share to a ray.
+/// Adds the thread's share of the samples to a ray.
 __device__ void addSamples(const VoxelArguments& a, const Shared& s, const Place& place,
                            const Work& work, int bin, RayState& ray) {
   const SampleRule& rule = a.draw.rule;
@@ -297,7 +306,8 @@ __device__ void addSamples(const VoxelArguments& a, const Shared& s, const Place
   }
 }
 
-/// Each group of threads takes samples behind those of the group before.
+/// Draws the samples of a pass. Each group takes the samples behind those of the group before it;
+/// the first group then joins their results from front to back.
 __device__ void drawSamples(const VoxelArguments& a, Shared& s, const Place& place,
                             const Work& work, int bin, RayState& ray) {
   const bool own = hasRay(s.pass, place) && isOpen(s, place);
@@ -316,7 +326,7 @@ __device__ void drawSamples(const VoxelArguments& a, Shared& s, const Place& pla
   if (place.lane == 0) s.openRays[place.half] = open;
 }
 
-/// A list's ellipsoids, a team of lanes each.
+/// Adds the ellipsoids of a list to the window, each by a team of kLanes threads.
 __device__ void addList(const VoxelArguments& a, Shared& s, const std::uint32_t* ids,
                         std::uint32_t n, float unitsOfOne) {
   const int lane = int(threadIdx.x) % kLanes;
@@ -324,7 +334,7 @@ __device__ void addList(const VoxelArguments& a, Shared& s, const std::uint32_t*
     addForm(s, placedIn(a, s.pass, ids[i], unitsOfOne), lane);
 }
 
-/// Bounds the part that a list's ellipsoids reach, into s.reach.
+/// Computes in s.reach the part of the picture that a list's ellipsoids reach.
 __device__ void findReach(const VoxelArguments& a, Shared& s, const std::uint32_t* ids,
                           std::uint32_t n) {
   constexpr int kMaxInt = 0x7fffffff;
@@ -342,8 +352,8 @@ __device__ void findReach(const VoxelArguments& a, Shared& s, const std::uint32_
   __syncthreads();
 }
 
-/// The part of the tile and the bin that is reached; none of columns, rows or samples where none
-/// is.
+/// The part of the tile and the bin that ellipsoids reach. Its number of columns, rows or samples
+/// is not positive if they reach none.
 __device__ Block reachedBlock(const TileFrame& frame, const Shared& s, const Tile& tile,
                               double binSample) {
   const Block whole = wholeBlock(frame, tile);
@@ -362,8 +372,8 @@ __device__ Block reachedBlock(const TileFrame& frame, const Shared& s, const Til
           last - first + 1};
 }
 
-/// Plans a pass for all of the bin where there is a window for that; else leaves in s.blocks what
-/// the ellipsoids reach. \return true in all threads where there is the pass
+/// Makes one pass for the whole bin if its window fits. Otherwise it puts the part that the
+/// ellipsoids reach on the stack. \return true, in all threads, if there is a pass for the bin
 __device__ bool planBin(const VoxelArguments& a, Shared& s, const Tile& tile,
                         const std::uint32_t* ids, std::uint32_t n, double binSample) {
   const TileFrame& frame = a.draw.frame;
@@ -379,7 +389,7 @@ __device__ bool planBin(const VoxelArguments& a, Shared& s, const Tile& tile,
   return false;
 }
 
-/// \return false in all threads where no block is left
+/// Makes the next pass from the stack. \return false, in all threads, if no block is left
 __device__ bool takePass(const TileFrame& frame, Shared& s, const Tile& tile, double binSample) {
   return __syncthreads_or(threadIdx.x == 0 && nextPass(frame, s, tile, binSample)) != 0;
 }

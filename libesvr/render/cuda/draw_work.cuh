@@ -1,7 +1,8 @@
 #pragma once
-/// How blocks of threads go through the tiles of a picture: parts of tiles come from a queue, their
-/// bins are drawn from front to back, and whoever finishes a tile's last part puts its parts over
-/// each other. What a bin's samples are is the caller's.
+/// Distributes the work of a picture over blocks of threads. A block takes a part of a tile (all of
+/// its depth, or a range of it) from a queue and draws its bins from front to back. The block that
+/// finishes the last part of a tile composites the parts. The caller supplies the function that
+/// draws a bin.
 
 #include "core/cuda/reduce.cuh"
 #include "render/cuda/tile_frame.h"
@@ -15,13 +16,14 @@ static_assert(kRays == 64, "two halves of a tile");
 
 /// The state that a block's threads share while they go through the work.
 struct WorkShared {
-  std::uint32_t openRays[kHalves];  ///< a bit a ray
+  std::uint32_t openRays[kHalves];  ///< a bit for each ray, set while more samples can change it
   TilePart item;
   int hasItem;
   int isLast;
 };
 
-/// Threads of a group are a thread a ray.
+/// The place of a thread in its block. A group has one thread for each ray of the tile, and each
+/// half of a tile's rays is one warp of the group.
 struct Place {
   int group, half, lane;
   int ray, column, row;
@@ -33,11 +35,11 @@ struct Place {
   }
 };
 
-/// A thread's knowledge of its tile and of its ray.
+/// What a thread knows of its tile and of its ray.
 struct Work {
   int firstColumn, firstRow;  ///< pixels of the picture
   bool inPicture;
-  /// Samples that the clip box leaves, counted from the frame's first.
+  /// Range of the samples inside the clip box, counted from the frame's first sample.
   float firstSample, lastSample;
 };
 
@@ -82,7 +84,7 @@ __device__ inline RayState loadResult(const RayState* results, std::uint32_t res
   return {v.x, v.y, v.z, v.w};
 }
 
-/// Whoever finishes a tile's last part puts them over each other.
+/// Composites the parts of a tile. The block that finished the last of them calls it.
 __device__ inline void joinParts(const SamplingArguments& a, const TilePart& item,
                                  const Place& place, const Work& work) {
   if (place.group != 0) return;
@@ -94,7 +96,8 @@ __device__ inline void joinParts(const SamplingArguments& a, const TilePart& ite
   writePixel(a, place, work, ray);
 }
 
-/// \return true in all threads where the other parts of the tile are done, and visible
+/// Stores the result of a part. \return true, in all threads of the block, if all other parts of
+/// the tile are done; their results can then be read
 __device__ inline bool storeResult(const SamplingArguments& a, WorkShared& s, const TilePart& item,
                                    const Place& place, const RayState& ray) {
   const std::uint32_t result = a.lists.resultOf[std::size_t(item.tile) * a.frame.parts + item.part];
@@ -111,7 +114,7 @@ __device__ inline bool storeResult(const SamplingArguments& a, WorkShared& s, co
   return s.isLast != 0;
 }
 
-/// The next item of work, the longest lists first.
+/// Takes the next item from the queue, which begins with the longest lists.
 __device__ inline void takeItem(const SamplingArguments& a, WorkShared& s) {
   FrameCounters& counters = *a.lists.counters;
   std::uint32_t n = atomicAdd(&counters.next, 1u);
@@ -127,15 +130,15 @@ __device__ inline void takeItem(const SamplingArguments& a, WorkShared& s) {
   }
 }
 
-/// True where a part before this one lets nothing through: then this one shows nowhere.
+/// True if a part in front of this one is opaque on all rays, so that this one cannot be seen.
 __device__ inline bool isHidden(const SamplingArguments& a, const TilePart& item) {
   return __ldcg(&a.lists.closedAt[item.tile]) < item.part;
 }
 
-/// The bins of a part, from front to back, until no ray of the tile shows what is behind. The
-/// result is that of the first group's threads.
-/// \param drawBin  (list, bin, ray): adds a bin's samples to the ray, and tells s.openRays which
-///                 rays are still open
+/// Draws the bins of a part from front to back, and stops when all rays of the tile are closed.
+/// Only the threads of the first group return a result.
+/// \param drawBin  called as drawBin(list, bin, ray): it adds a bin's samples to the ray, and
+///                 updates s.openRays
 template <class DrawBin>
 __device__ RayState drawPart(const SamplingArguments& a, WorkShared& s, const TilePart& item,
                              const Place& place, const Work& work, DrawBin&& drawBin) {
@@ -163,7 +166,7 @@ __device__ void drawItem(const SamplingArguments& a, WorkShared& s, const TilePa
   if (storeResult(a, s, item, place, ray)) joinParts(a, item, place, work);
 }
 
-/// Calls draw(item) for items until there are none.
+/// Calls draw(item) for each item that this block takes, until the queue is empty.
 template <class Draw>
 __device__ void forEachItem(const SamplingArguments& a, WorkShared& s, Draw&& draw) {
   while (true) {
@@ -171,13 +174,15 @@ __device__ void forEachItem(const SamplingArguments& a, WorkShared& s, Draw&& dr
     __syncthreads();
     if (s.hasItem == 0) return;
     const TilePart item = s.item;
-    __syncthreads();  // before the next item is written
+    __syncthreads();  // all threads must have copied the item before the next one is written
     draw(item);
     __syncthreads();
   }
 }
 
-/// Starts a kernel with as many blocks as run at once. \param bytes  of shared memory a block
+/// Starts a kernel whose blocks take work from the queue.
+/// \param bytes   shared memory of a block
+/// \param blocks  number of blocks that run at once
 template <class Arguments>
 void launchOverTiles(void (*kernel)(Arguments), const Arguments& arguments, std::size_t bytes,
                      int blocks, cudaStream_t stream) {

@@ -16,10 +16,10 @@ namespace esvr::cuda {
 namespace {
 
 constexpr int kSide = DrawTuning::kTileSide;
-/// Lists count with 32 bits and signs.
+/// Kernels number lists and their entries with signed 32-bit integers.
 constexpr std::int64_t kMaxLists = std::int64_t{1} << 30;
 
-/// Some to spare, so that lists which grow from view to view do not allocate each time.
+/// Adds spare room, so that lists that grow from view to view do not need new memory each time.
 std::size_t withSpare(std::size_t n) { return n + n / 4 + 1024; }
 
 template <class... Buffers>
@@ -35,7 +35,7 @@ float largestIntensity(const Field& field) {
   return largest;
 }
 
-/// \throws DeviceError  kernels number ellipsoids with 32 bits
+/// \throws DeviceError  there are more ellipsoids than 32-bit integers can number
 std::vector<PackedEllipsoid> numbered(std::vector<PackedEllipsoid> ellipsoids) {
   if (ellipsoids.size() > std::size_t(std::numeric_limits<std::int32_t>::max()))
     throw DeviceError("drawing on the GPU: " + std::to_string(ellipsoids.size()) +
@@ -94,7 +94,7 @@ TileLists BandMemory::lists() {
           .resultCapacity = results.size() / DrawTuning::kTilePixels};
 }
 
-/// Checked options, and what follows from them.
+/// The checked options of a picture, and values that are computed from them.
 struct FieldRenderer::Scene {
   explicit Scene(const RenderOptions& o)
       : options(o), view((checkRenderOptions(o), o.camera), o.resolution) {}
@@ -146,7 +146,7 @@ TileFrame FieldRenderer::frameOf(const Scene& scene, Band band) const {
   if (bins > kMaxLists / columns)
     throw UsageError("rays of " + std::to_string(bins * kBinSamples) +
                      " samples are too long for so wide a picture; take a longer step");
-  // How deep a ray comes depends on all that lies before.
+  // The depth at which a ray stops depends on all samples before it, so there are no parts.
   const bool whole = scene.options.mode == RenderMode::kDepth;
   const int parts = whole ? 1 : std::clamp(parts_, 1, int(bins));
   return {.view = scene.view,
@@ -162,8 +162,8 @@ TileFrame FieldRenderer::frameOf(const Scene& scene, Band band) const {
           .between = scene.options.between};
 }
 
-/// Counts the memory that `reserve` makes, without lists and results, whose sizes the scene
-/// decides.
+/// Bytes of the buffers that reserve() makes. Entries of lists and results of parts are not
+/// included, because their number is known only after counting.
 std::size_t FieldRenderer::bandBytes(const TileFrame& f) const {
   const std::size_t tiles = std::size_t(f.tiles());
   const std::size_t ofParts =
@@ -189,7 +189,7 @@ void FieldRenderer::reserve(const TileFrame& f) {
   makeRoom(band_.pixels, std::size_t(rows) * std::size_t(f.resolution.width), stream);
 }
 
-/// Clears what counts, looks at the ellipsoids, counts and plans.
+/// Clears the counters, projects the ellipsoids, counts their list entries and plans the work.
 void FieldRenderer::list(const TileFrame& f) {
   const cudaStream_t stream = stream_.get();
   band_.counters.setZero();
@@ -207,9 +207,10 @@ FrameCounters FieldRenderer::readCounters() {
   return counters;
 }
 
-/// As many as it takes for the longest tile to be no longer than what each block has to do anyway.
-/// Where samples are interpolated, a part that another one hides costs more than a block that
-/// waits.
+/// Number of parts into which the depth of tiles is divided. It is large enough that no tile has
+/// much more work in one part than the average block has. If there are tiles enough for all
+/// blocks, interpolated samples are drawn in one part, because work on a part that turns out to be
+/// hidden costs more than blocks that wait.
 int FieldRenderer::chosenParts(const TileFrame& f) {
   list(f);
   const FrameCounters c = readCounters();

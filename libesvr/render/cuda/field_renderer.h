@@ -1,5 +1,5 @@
 #pragma once
-/// Draws a field by per-ellipsoid ray sampling on a CUDA device.
+/// Draws a field on a CUDA device, by per-ellipsoid ray sampling (paper, algorithm 2).
 
 #include <optional>
 #include <vector>
@@ -14,11 +14,11 @@
 
 namespace esvr::cuda {
 
-/// The part of the scene that stays on the device.
+/// Device memory of a field, which is kept from picture to picture.
 struct SceneMemory {
   SceneMemory(const Field& field, cudaStream_t stream);
 
-  /// Makes what only one kind of picture needs, for the first of that kind.
+  /// Makes the buffers that only this kind of picture needs, unless they exist already.
   void prepare(const Field& field, Between between, cudaStream_t stream);
 
   DeviceBuffer<PackedEllipsoid> ellipsoids;
@@ -34,7 +34,7 @@ struct SceneMemory {
   [[nodiscard]] SeenEllipsoids seen();
 };
 
-/// The memory of a band of a picture. It grows where a band needs more.
+/// Device memory of a band of the picture. It grows when a band needs more.
 struct BandMemory {
   DeviceBuffer<FrameCounters> counters;
   DeviceBuffer<std::uint32_t> counts, ends, entries, sorted;
@@ -57,7 +57,7 @@ class FieldRenderer final : public Renderer {
   FrameStats stats() const override { return stats_; }
 
  private:
-  /// Rows of tiles.
+  /// A band of the picture, in rows of tiles.
   struct Band {
     int first, count;
   };
@@ -89,7 +89,7 @@ class FieldRenderer final : public Renderer {
   BandMemory band_;
   Event begin_, listed_, drawn_;
   DeviceTable table_;
-  int parts_;  ///< 0: not yet chosen
+  int parts_;  ///< parts of the depth; 0: not yet chosen
   std::uint64_t tiles_ = 0, occupied_ = 0;
   FrameStats stats_;
 };

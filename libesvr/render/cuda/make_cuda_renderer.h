@@ -1,20 +1,23 @@
 #pragma once
-/// The renderers of a CUDA device, in every build; free of CUDA's own headers.
+/// Makes the renderers for a CUDA device. The functions exist in every build, and this header does
+/// not include those of CUDA.
 
 #include "esvr/renderer.h"
 
 namespace esvr::cuda {
 
-/// \throws DeviceError  no such device, out of memory; always, in a build without CUDA
+/// \throws DeviceError  the device does not exist, its memory is exhausted, or the build has no
+///                      CUDA
 [[nodiscard]] std::unique_ptr<Renderer> makeCudaFieldRenderer(const Field& field,
                                                               const Device& device,
                                                               const RendererLimits& limits,
                                                               const RevoxeliseOptions& voxels);
-/// From bricks. \throws  as above; UsageError: voxels too far apart
+/// \throws DeviceError  as for makeCudaFieldRenderer
+/// \throws UsageError   the voxels lie too far apart for the tables of a BrickAtlas
 [[nodiscard]] std::unique_ptr<Renderer> makeCudaVolumeRenderer(const SparseVolume& volume,
                                                                const Device& device,
                                                                const RendererLimits& limits);
-/// \throws  as above
+/// \throws DeviceError  as for makeCudaFieldRenderer
 [[nodiscard]] std::unique_ptr<Renderer> makeCudaNanoRenderer(const NanoVolume& volume,
                                                              const Device& device,
                                                              const RendererLimits& limits);

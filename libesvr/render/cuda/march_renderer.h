@@ -1,5 +1,5 @@
 #pragma once
-/// Renderers that march through voxels on a CUDA device share this: bands, pixels, times.
+/// Base class of the CUDA renderers that march through voxels. It manages bands, pixels and times.
 
 #include "core/cuda/event.h"
 #include "core/cuda/stream.h"
@@ -15,7 +15,7 @@ class MarchRenderer : public Renderer {
   [[nodiscard]] FrameStats stats() const override { return stats_; }
 
  protected:
-  /// Rows of pixels. Bands begin at multiples of kBandRows.
+  /// A band of the picture, in rows of pixels. Bands begin at multiples of kBandRows.
   struct Band {
     int firstRow, rows;
   };
@@ -23,11 +23,11 @@ class MarchRenderer : public Renderer {
 
   MarchRenderer(const Device& device, const RendererLimits& limits);
 
-  /// \param pixels  of the band, zero
+  /// Draws a band. \param pixels  pixels of the band, which are zero before
   virtual void launch(const RenderOptions& options, Band band, float4* pixels) = 0;
-  /// Bytes of device memory beside the pixels and the table.
+  /// Bytes of device memory, without the pixels and the transfer function's table.
   [[nodiscard]] virtual std::size_t contentBytes() const = 0;
-  /// Bytes that each row of pixels takes beside them.
+  /// Bytes that each row of pixels takes in addition to the pixels.
   [[nodiscard]] virtual std::size_t bytesOfRow(Resolution) const { return 0; }
 
   [[nodiscard]] cudaStream_t stream() const { return stream_.get(); }

@@ -8,9 +8,9 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr unsigned kColumns = 8, kRows = 16;  // of a block
+constexpr unsigned kColumns = 8, kRows = 16;  // pixels of a block of threads
 
-/// The destination of a band's pixels.
+/// Where the pixels of a band are written.
 struct BandPixels {
   int width, firstRow, rows;
   float4* pixels;

@@ -1,5 +1,5 @@
 #pragma once
-/// Starts the marching of a NanoVDB grid on a CUDA device. Free of NanoVDB's headers.
+/// Draws a NanoVDB grid on a CUDA device. This header does not include those of NanoVDB.
 
 #include <cuda_runtime_api.h>
 
@@ -13,15 +13,15 @@ namespace esvr::cuda {
 
 struct NanoDrawArguments {
   View view;
-  PlaceBox box;  ///< outside of it every sample is the background
+  PlaceBox box;  ///< every sample outside this box is the background
   double step;
   ClipBox clip;
   SampleRule rule;
-  const std::byte* grid;  ///< on the device
+  const std::byte* grid;  ///< the NanoVDB grid, on the device
   NanoValues values;
   Resolution resolution;
-  int firstRow, rows;  ///< the band's
-  float4* pixels;      ///< the band's
+  int firstRow, rows;  ///< rows of pixels of the band
+  float4* pixels;      ///< pixels of the band
 };
 
 void launchNano(const NanoDrawArguments& arguments, cudaStream_t stream);

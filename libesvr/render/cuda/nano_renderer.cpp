@@ -1,4 +1,4 @@
-// Marches a NanoVDB grid on a CUDA device.
+// The renderer that marches rays through a NanoVDB grid on a CUDA device.
 
 #include "render/cuda/make_cuda_renderer.h"
 #include "render/cuda/march_renderer.h"

@@ -1,6 +1,7 @@
 #pragma once
-/// A picture, or a band of it, as the kernels see it: tiles of pixels, and along their rays bins of
-/// kBinSamples samples. Each tile has for each bin a list of the ellipsoids that may reach it.
+/// The data of a picture, or of a band of it, that the CUDA kernels share. The picture is divided
+/// into tiles of 8 x 8 pixels, and the rays of a tile into bins of kBinSamples samples. For each
+/// tile and bin there is a list of the ellipsoids that may reach it.
 
 #include <cuda_runtime_api.h>
 
@@ -14,35 +15,36 @@
 
 namespace esvr::cuda {
 
-/// The numbers by which drawing on CUDA is tuned; none of them decides on more of a picture than
-/// its rounding.
+/// Sizes that were chosen for speed. They affect a picture by rounding only.
 struct DrawTuning {
   static constexpr int kTileSide = 8;  ///< pixels
   static constexpr int kTilePixels = kTileSide * kTileSide;
-  static constexpr int kGroups =
-      4;  ///< groups of threads that share a tile's ellipsoids among them
+  static constexpr int kGroups = 4;  ///< groups of threads that draw a tile together
   static constexpr int kDrawThreads = kTilePixels * kGroups;
   static constexpr int kBlocksPerMultiprocessor = 4;
-  /// The size of a window of voxels: as much as a block of threads can have in shared memory.
+  /// Size of a voxel window. It is limited by the shared memory of a block of threads.
   static constexpr int kWindowVoxels = 8192, kWindowSlabs = 64;
-  static constexpr int kLanesOfForm = 8;  ///< threads that share an ellipsoid's voxels
-  /// Fewer samples at once only where the window of a single ray is too large.
+  static constexpr int kLanesOfForm = 8;  ///< threads that add an ellipsoid's voxels together
+  /// A block of samples is not split below this depth unless the window of a single ray is too
+  /// large.
   static constexpr int kFewSamples = 8;
   static constexpr int kListThreads = 128;
-  /// An ellipsoid in more lists than this is listed by a whole warp.
+  /// An ellipsoid that may be in more lists than this is listed by a whole warp.
   static constexpr int kManyLists = 24;
   static constexpr int kListBlocksPerMultiprocessor = 8;
-  /// Work begins with the tiles of the longest lists; their lengths are told apart by powers of 2.
+  /// Work begins with the parts of tiles that have the longest lists. They are sorted into classes
+  /// of lengths, each a factor of 2.
   static constexpr int kLengthClasses = 12;
-  static constexpr int kMaxParts = 16;  ///< into which the depth is divided at most
+  static constexpr int kMaxParts = 16;  ///< largest number of parts of the depth
 };
 
-/// The place of an ellipsoid in the picture.
+/// The outline of an ellipsoid's support in the picture, and its range of depths. Both are slightly
+/// widened, because they are rounded to float32. See ScreenEllipse and ScreenBounds.
 struct Footprint {
-  double column, row;                                       ///< its outline's middle
-  float xx, xy, yy;                                         ///< its outline, slightly widened
-  float nearest, farthest;                                  ///< along forward, slightly widened
-  std::int16_t firstColumn, lastColumn, firstRow, lastRow;  ///< firstRow > lastRow: not seen
+  double column, row;
+  float xx, xy, yy;
+  float nearest, farthest;
+  std::int16_t firstColumn, lastColumn, firstRow, lastRow;  ///< firstRow > lastRow: not visible
   std::int32_t everywhere;
 };
 
@@ -50,58 +52,59 @@ struct TileFrame {
   View view;
   Resolution resolution;
   double step;
-  int tileColumns, firstTileRow, tileRows;  ///< the band's
+  int tileColumns, firstTileRow, tileRows;  ///< tiles of the band
   std::int64_t firstBin;                    ///< counted from the eye
   int bins;
-  int parts;       ///< parts of the depth that are drawn at once
-  int binsOfPart;  ///< the last part may have less
+  int parts;       ///< parts of the depth that are drawn in parallel
+  int binsOfPart;  ///< the last part may have fewer bins
   Between between;
 
   [[nodiscard]] ESVR_HD int tiles() const { return tileColumns * tileRows; }
 };
 
-/// A part of a tile.
+/// A range of a tile's depth, which one block of threads draws.
 struct TilePart {
   std::uint32_t tile, part;
 };
 
-/// Counters of a frame while it is drawn.
+/// Counters of one frame.
 struct FrameCounters {
   unsigned long long pairs;                         ///< entries of all lists
-  std::uint32_t items[DrawTuning::kLengthClasses];  ///< parts of tiles that have lists
-  std::uint32_t results;  ///< results of parts, in tiles that have several
-  std::uint32_t occupiedTiles;
-  std::uint32_t longestTile;  ///< entries of a tile's lists, at most
-  std::uint32_t longestBin;
-  std::uint32_t next;   ///< item to draw
-  std::uint32_t large;  ///< ellipsoids in many lists
+  std::uint32_t items[DrawTuning::kLengthClasses];  ///< parts of tiles with entries, by class
+  std::uint32_t results;  ///< parts whose results are stored because their tile has several parts
+  std::uint32_t occupiedTiles;  ///< tiles with entries
+  std::uint32_t longestTile;    ///< entries of all lists of a tile, maximum over the tiles
+  std::uint32_t longestBin;     ///< entries of one list, maximum over the lists
+  std::uint32_t next;           ///< number of the next item to draw
+  std::uint32_t large;          ///< ellipsoids in many lists
 };
 
-/// Device memory, borrowed.
+/// Pointers to the device memory of the lists and of the work queue.
 struct TileLists {
   FrameCounters* counters;
-  std::uint32_t* counts;   ///< bins a tile: how long its list is
-  std::uint32_t* ends;     ///< bins a tile: where its list ends, once it is filled
+  std::uint32_t* counts;   ///< by tile and bin: length of the list
+  std::uint32_t* ends;     ///< by tile and bin: end of the list in `entries`, once it is filled
   std::uint32_t* entries;  ///< numbers of ellipsoids
-  std::uint32_t* sorted;   ///< room to sort long lists
+  std::uint32_t* sorted;   ///< entries of long lists after sorting
   std::uint64_t entryCapacity, sortedCapacity;
-  TilePart* items;             ///< tiles * parts for each class of lengths
-  std::uint32_t* partsOfTile;  ///< that have lists
-  std::uint32_t* partsDone;    ///< tiles
-  std::uint32_t* closedAt;     ///< tiles: a part behind which nothing is seen
-  std::uint32_t* resultOf;     ///< parts a tile: place of a result
-  RayState* results;           ///< kTilePixels each
+  TilePart* items;             ///< the queue: room for all parts of all tiles in each class
+  std::uint32_t* partsOfTile;  ///< by tile: number of parts that have entries
+  std::uint32_t* partsDone;    ///< by tile: number of parts that are drawn
+  std::uint32_t* closedAt;     ///< by tile: foremost part known to be opaque on all rays
+  std::uint32_t* resultOf;     ///< by tile and part: number of its result, or kNoResult
+  RayState* results;           ///< kTilePixels for each result
   std::uint64_t resultCapacity;
 };
 
 inline constexpr std::uint32_t kNoResult = 0xffffffffu;
 
-/// Only sums in float32 have an order, and only lists longer than a block are sorted in memory;
-/// there they lie where their entries do.
+/// True if lists are sorted in global memory. Lists need sorting where floats are summed, because
+/// the result depends on the order. Lists of at most kDrawThreads entries are sorted in shared
+/// memory instead.
 ESVR_HD inline bool needSorting(const FrameCounters& c, Between between) {
   return between == Between::kSum && c.longestBin > std::uint32_t(DrawTuning::kDrawThreads);
 }
-/// Whether the room is enough for what a frame counted.
+/// True if the buffers are large enough for the entries and results that a frame counted.
 ESVR_HD inline bool listsFit(const FrameCounters& c, const TileLists& lists, Between between) {
   return c.pairs <= lists.entryCapacity && c.results <= lists.resultCapacity &&
          (!needSorting(c, between) || c.pairs <= lists.sortedCapacity);
@@ -110,37 +113,37 @@ ESVR_HD inline bool listsFit(const FrameCounters& c, const TileLists& lists, Bet
 struct DeviceEllipsoids {
   const PackedEllipsoid* ellipsoids;
   std::uint32_t count;
-  const Vec3* origins;       ///< the chunks' origins
-  const RayKernel* kernels;  ///< one, or an ellipsoid's each
-  std::int32_t ownKernels;
+  const Vec3* origins;       ///< origins of the chunks
+  const RayKernel* kernels;  ///< one for all ellipsoids, or one for each
+  std::int32_t ownKernels;   ///< 1 if each ellipsoid has its own kernel
 };
 
-/// Ellipsoids seen by a frame.
+/// The ellipsoids as the camera of a frame sees them.
 struct SeenEllipsoids {
   EllipsoidView* views;  ///< for Between::kSum
   Footprint* footprints;
-  std::uint32_t* large;  ///< numbers of those in many lists, in any order
+  std::uint32_t* large;  ///< numbers of the ellipsoids in many lists, in any order
 };
 
-/// Looks at the ellipsoids and counts the entries of lists. `lists.counts` and the counters are
-/// zero before.
-/// \param multiprocessors  of the device
+/// Projects the ellipsoids and counts the entries of the lists. `lists.counts` and the counters
+/// must be zero before.
+/// \param multiprocessors  number of multiprocessors of the device
 void launchView(const TileFrame& frame, const DeviceEllipsoids& ellipsoids,
                 const SeenEllipsoids& seen, const TileLists& lists, int multiprocessors,
                 cudaStream_t stream);
-/// Finds room for each list and orders the work.
+/// Gives each list its place in `lists.entries`, and fills the work queue.
 void launchPlan(const TileFrame& frame, const TileLists& lists, cudaStream_t stream);
-/// Does nothing where entries exceed the capacity.
+/// Fills the lists. It does nothing if the entries exceed the capacity.
 void launchFill(const TileFrame& frame, std::uint32_t count, const SeenEllipsoids& seen,
                 const TileLists& lists, int multiprocessors, cudaStream_t stream);
 
-/// The arguments of drawing that do not depend on what is between voxels.
+/// The arguments of drawing that both ways of sampling (RenderOptions::between) share.
 struct SamplingArguments {
   TileFrame frame;
   TileLists lists;
   SampleRule rule;
   ClipBox clip;
-  float4* pixels;  ///< the band's, row after row: red, green, blue, alpha
+  float4* pixels;  ///< pixels of the band, row after row: red, green, blue, alpha
 };
 
 struct SumArguments {
@@ -153,12 +156,13 @@ struct VoxelArguments {
   SamplingArguments draw;
   const WindowForm* forms;
   const Footprint* footprints;
-  const Vec3* origins;  ///< the chunks' origins
-  float bound;          ///< no intensity is larger; sums are exact in a fixed fraction of it
+  const Vec3* origins;  ///< origins of the chunks
+  float bound;          ///< largest |intensity|, which decides the unit of the integer sums
   VoxelRule rule;
 };
 
-/// Both do nothing where the lists did not fit. \param multiprocessors  of the device
+/// Draw the pictures. Both functions do nothing if the lists did not fit.
+/// \param multiprocessors  number of multiprocessors of the device
 void launchDrawSums(const SumArguments& arguments, int multiprocessors, cudaStream_t stream);
 void launchDrawVoxels(const VoxelArguments& arguments, int multiprocessors, cudaStream_t stream);
 

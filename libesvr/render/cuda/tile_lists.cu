@@ -7,7 +7,7 @@ namespace {
 
 constexpr int kSide = DrawTuning::kTileSide;
 
-/// Widened so that rounding to float32 leaves nothing out.
+/// Factors that widen bounds, so that rounding them to float32 never excludes anything.
 constexpr double kWider = 1.0 + 1e-6, kNarrower = 1.0 - 1e-6;
 
 unsigned blocksOf(std::size_t items) { return blocksFor(items, DrawTuning::kListThreads); }
@@ -35,16 +35,17 @@ __device__ Footprint footprintOf(const ScreenEllipse& o, const ScreenBounds& b) 
           o.everywhere ? 1 : 0};
 }
 
-/// Threads that share an ellipsoid.
+/// The number of a thread among those that list an ellipsoid together, and their count.
 struct Lanes {
   int lane, count;
 };
 
-/// The columns of an ellipsoid's pixels in a row of tiles.
+/// A range of pixel columns, or of bins.
 struct Columns {
   int first, last;
 };
-// Not inlined, as binsIn: counting and filling must come to the same lists, to the bit.
+/// The pixel columns that an ellipsoid may cover in a row of tiles. It and binsIn are not inlined,
+/// because counting and filling must get the same result, bit by bit.
 __device__ __noinline__ Columns columnsIn(const TileFrame& frame, const Footprint& p, int tileRow) {
   Columns c{p.firstColumn, p.lastColumn};
   if (p.everywhere) return c;
@@ -56,7 +57,7 @@ __device__ __noinline__ Columns columnsIn(const TileFrame& frame, const Footprin
           min(c.last, ellipsoid_math::lastPixel(span.high, width))};
 }
 
-/// Bins of the frame, counted from its first.
+/// The bins that an ellipsoid may reach in a tile, counted from the frame's first bin.
 __device__ __noinline__ Columns binsIn(const TileFrame& frame, const Footprint& p, int tileColumn,
                                        int tileRow) {
   const int firstColumn = tileColumn * kSide, firstRow = tileRow * kSide;
@@ -71,7 +72,7 @@ __device__ __noinline__ Columns binsIn(const TileFrame& frame, const Footprint& 
           int(min(bins.last, last) - frame.firstBin)};
 }
 
-/// The tiles of the band that an ellipsoid's bounds meet.
+/// The tiles of the band that meet the bounding rectangle of an ellipsoid.
 struct TileRectangle {
   int firstColumn, columns, firstRow, rows;
 };
@@ -82,7 +83,8 @@ __device__ TileRectangle tilesOf(const TileFrame& frame, const Footprint& p) {
   return {firstColumn, p.lastColumn / kSide - firstColumn + 1, firstRow, lastRow - firstRow + 1};
 }
 
-/// Calls visit(number of the tile times bins + bin) for each list that an ellipsoid belongs to.
+/// Calls visit(list) for each list that an ellipsoid belongs to. The number of a list is
+/// tile * bins + bin.
 template <class Visit>
 __device__ void visitLists(const TileFrame& frame, const Footprint& p, Lanes lanes, Visit&& visit) {
   const TileRectangle tiles = tilesOf(frame, p);
@@ -110,7 +112,7 @@ __device__ bool inManyLists(const TileFrame& frame, const Footprint& p) {
   return float(tiles.columns) * float(tiles.rows) * bins > float(DrawTuning::kManyLists);
 }
 
-/// Calls visit(ellipsoid) in all lanes of a warp for each ellipsoid that is in many lists.
+/// Calls visit(ellipsoid) for each ellipsoid that is in many lists, in all lanes of one warp.
 template <class Visit>
 __device__ void visitLarge(const FrameCounters& counters, const std::uint32_t* large,
                            Visit&& visit) {
@@ -179,7 +181,7 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
   });
 }
 
-/// A number of entries of many lists, of which each has less than 2^32.
+/// Number of entries of many lists. Each list has fewer than 2^32 entries, but their sum may not.
 using Entries = unsigned long long;
 
 struct TileTotals {
@@ -206,7 +208,7 @@ __device__ TileTotals totalsOf(const TileFrame& frame, const std::uint32_t* coun
   return totals;
 }
 
-/// 0 for the longest lists.
+/// Class of a number of entries; 0 has the longest lists.
 __device__ int lengthClass(Entries entries) {
   const int log = 63 - __clzll((long long)(entries));
   return max(0, DrawTuning::kLengthClasses - 1 - log);
@@ -231,7 +233,8 @@ __device__ void planTile(const TileFrame& frame, const TileLists& lists, int til
   }
 }
 
-/// A thread a tile. Which tile gets which room does not matter, so no scan over all is needed.
+/// Each thread plans one tile. The lists of a tile may lie anywhere in memory, so a warp reserves
+/// room with one atomic addition and no prefix sum over all tiles is needed.
 __global__ void __launch_bounds__(DrawTuning::kListThreads)
     planKernel(const TileFrame frame, const TileLists lists) {
   const int tile = int(blockIdx.x * blockDim.x + threadIdx.x);
@@ -246,7 +249,7 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
   if (!any) return;
 
   planTile(frame, lists, tile, totals);
-  auto end = std::uint32_t(begin);  // where the entries fit, it fits
+  auto end = std::uint32_t(begin);  // 32 bits suffice wherever the entries fit into the buffer
   for (int bin = 0; bin < frame.bins; ++bin) {
     const std::size_t list = std::size_t(tile) * frame.bins + bin;
     lists.ends[list] = end;

@@ -1,6 +1,7 @@
-// Plan: bricks that supports reach are all found, also where so many are found at once that the
-// first table fills before any thread sees that it is too small; they are numbered in order; bricks
-// beyond a box are not looked for. On the host: sizes of tables, and ranges of bricks cut to a box.
+// Plan: all bricks that supports reach are found, also if so many are found at the same time that
+// the first table is full before a thread notices it. They are numbered in order, and bricks
+// outside a box are not searched. On the host, the tests check the sizes of tables and the clipping
+// of ranges.
 
 #include <algorithm>
 
@@ -30,8 +31,8 @@ Ellipsoid sphereAt(Coord brick, double scale) {
           1.0};
 }
 
-// The paper's method has supports of half the volume: walking all of one's bricks for a subvolume
-// of a few would take longer than the fit.
+// Supports in the paper's method may cover half the volume. To visit all their bricks for a
+// subvolume with few bricks would take longer than the fit.
 TEST(ClippedRange, OfAHugeSupportIsTheBoxOfBricks) {
   const Ellipsoid p = sphereAt({0, 0, 0}, 1e5);
   const Support support = makeSupport(p.center, p.L, 2.0, 0.0);
@@ -65,8 +66,8 @@ class BrickTableOnGpu : public test::CudaTest {
   std::optional<Stream> stream_;
 };
 
-// 200,000 bricks for a table of 4096 slots: without a bound on probes, a thread that finds every
-// slot taken by other bricks goes round for ever.
+// 200,000 bricks are inserted into a table of 4096 slots. Without a limit on probes, a thread that
+// finds every slot taken by other bricks would never end.
 TEST_F(BrickTableOnGpu, FindsMoreBricksAtOnceThanTheFirstTableHolds) {
   std::vector<Ellipsoid> ellipsoids;
   std::vector<Coord> expected;
@@ -94,7 +95,7 @@ TEST_F(BrickTableOnGpu, FindsOnlyTheBricksOfABox) {
   for (const Coord b : bricks) EXPECT_TRUE(within.contains(b));
 }
 
-// The walk over a support that reaches 10^14 bricks ends at those that there are.
+// The walk over a support that reaches 10^14 bricks visits only existing bricks.
 TEST_F(BrickTableOnGpu, AnEllipsoidOverEverythingIsPairedWithEveryBrickOnce) {
   std::vector<Coord> targets;
   for (int n = 0; n < 1000; ++n) targets.push_back({n % 10 * 5, n / 10 % 10 * 7, n / 100});

@@ -1,6 +1,7 @@
-// Plan: gradients, loss and curvature of the GPU against those of the CPU, whose own are checked
-// against float64 differences: over the kernel's edge, needles, ellipsoids that cover everything,
-// narrow bands, bricks that only supports reach, and many ellipsoids in one brick.
+// Plan: gradients, loss and curvature of the GPU agree with those of the CPU, which other tests
+// compare with float64 differences. The cases are kernels from soft to hard, thin ellipsoids,
+// ellipsoids that cover everything, narrow bands, bricks that only supports reach, and many
+// ellipsoids in one brick.
 
 #include <cmath>
 
@@ -27,7 +28,8 @@ double distance(const ParameterVector& a, const ParameterVector& b) {
   return std::sqrt(sum);
 }
 
-/// Every gradient within `tolerance` of the largest one: residuals nearly cancel in some.
+/// Compares all gradients. The tolerance is relative to the largest one, because residuals nearly
+/// cancel in some.
 void expectAgreement(const FitTarget& target, const Kernel& kernel,
                      const std::vector<Ellipsoid>& ellipsoids, double tolerance) {
   CpuPass engine(target, kernelConstants<double>(kernel));
@@ -50,7 +52,7 @@ void expectAgreement(const FitTarget& target, const Kernel& kernel,
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_LT(distance(found[i].byParameter, expected[i].byParameter), tolerance * largest) << i;
     EXPECT_NEAR(found[i].phi2, expected[i].phi2, tolerance * largestPhi2) << i;
-    // the difference of two sums of the size of the other gradients
+    // byKappa is the difference of two sums of the size of the other gradients.
     EXPECT_NEAR(found[i].byKappa, expected[i].byKappa, tolerance * (largestByKappa + largest)) << i;
   }
   EXPECT_NEAR(onGpu.measure().squaredSum, loss, 1e-5 * loss);
@@ -58,7 +60,7 @@ void expectAgreement(const FitTarget& target, const Kernel& kernel,
 
 class GradientOnGpu : public test::CudaTest, public testing::WithParamInterface<Case> {};
 
-// Float32 sums over some thousand voxels on both sides, and an exponential within 1e-6.
+// Both sides are float32 sums over a few thousand voxels, with exponentials precise to 1e-6.
 TEST_P(GradientOnGpu, AgreesWithTheCpu) {
   const Case& c = GetParam();
   const SparseVolume volume = test::denseVolume();

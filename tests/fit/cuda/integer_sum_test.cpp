@@ -1,7 +1,7 @@
-// Plan: units of integer sums on the host: no sum of so many values leaves its bits, units are as
-// fine as that allows, and extreme values keep units that float32 has. On a GPU: a brick with a list
-// of 60,000 entries whose signs nearly cancel, against float64; lists about the length at which sums
-// become 64-bit integers.
+// Plan: on the host, the units of integer sums are such that no sum can overflow; they are as fine
+// as that allows, and stay within the range of floats for extreme values. On a GPU, the sum of a
+// brick with 60,000 entries whose signs nearly cancel agrees with float64, and so do lists of about
+// the length at which sums become 64-bit integers.
 
 #include "core/cuda/integer_sum.cuh"
 
@@ -56,11 +56,11 @@ TEST(WideBricks, AreAtMostAsManyAsThePairsAllow) {
   EXPECT_EQ(cuda::maxWideBricks(scene), 3u);
   scene.pairCount = 4'000'000'000u;
   EXPECT_EQ(cuda::maxWideBricks(scene), 100u);
-  scene.ellipsoidCount = cuda::kMaxNarrowEntries;  // no list is longer
+  scene.ellipsoidCount = cuda::kMaxNarrowEntries;  // no list can be longer
   EXPECT_EQ(cuda::maxWideBricks(scene), 0u);
 }
 
-/// Pairs of ellipsoids in one place whose intensities differ by 2^-18, all about one brick.
+/// Pairs of ellipsoids at the same place whose intensities differ by 2^-18, all near one brick.
 std::vector<Ellipsoid> cancellingPairs(std::size_t count) {
   test::Random random(11);
   std::vector<Ellipsoid> ellipsoids;
@@ -76,7 +76,7 @@ std::vector<Ellipsoid> cancellingPairs(std::size_t count) {
   return ellipsoids;
 }
 
-/// Sum over all voxels of the squared sum, in float64.
+/// The sum over all voxels of the squared sum of ellipsoids, in float64.
 double squaredSum(const std::vector<Ellipsoid>& ellipsoids, const Kernel& kernel) {
   const auto k = kernelConstants<double>(kernel);
   double sum = 0.0;
@@ -96,8 +96,8 @@ double squaredSum(const std::vector<Ellipsoid>& ellipsoids, const Kernel& kernel
 
 class LongListsOnGpu : public test::CudaTest, public testing::WithParamInterface<std::size_t> {};
 
-// In 32 bits, 60,000 entries have units of 2^-13, and the rounding of so many adds 3 % and more to
-// the squares here. Short lists have finer units, whose rounding adds 0.4 % at most.
+// With 32 bits, 60,000 entries have units of 2^-13, and the rounding of all of them would add at
+// least 3 % to the squares. The units of short lists are finer; their rounding adds at most 0.4 %.
 TEST_P(LongListsOnGpu, SumAsPreciselyAsFloat64) {
   const SparseVolume volume = test::volumeOf({}, 3, 0.0f, [](Coord) { return 0.5f; });
   FitTarget target = makeTarget(volume, std::nullopt);

@@ -1,5 +1,5 @@
-// Plan: intensity_cases.h on a GPU; passes over a crowd against those of the CPU; the same bits in
-// every run.
+// Plan: the tests of intensity_cases.h on a GPU. Passes over many overlapping ellipsoids agree with
+// those of the CPU, and have the same bits in every run.
 
 #include "../intensity_cases.h"
 #include "gpu_test.h"
@@ -33,9 +33,9 @@ void expectNear(const std::vector<double>& found, const std::vector<double>& exp
   for (std::size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], expected[i], allowed) << i;
 }
 
-// Float32 sums over some hundred ellipsoids a voxel on both sides, in units of 2^-29 of what they
-// can come to on the GPU. A voxel that is exact on one side only, at the threshold's edge, would
-// show as 1e-3.
+// Both sides are float32 sums over some hundred ellipsoids per voxel. On the GPU the unit of the
+// sums is 2^-29 of their largest value. A voxel at the threshold that is exact on one side only
+// would change the result by 1e-3.
 TEST_F(IntensitiesOnGpu, AreMovedAsOnTheCpu) {
   const Crowd crowd;
   const auto cpu = makeIntensityPasses(crowd.target, {});

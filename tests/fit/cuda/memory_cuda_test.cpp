@@ -1,7 +1,8 @@
-// Plan: a fit whose memory is out goes on with what it has: growth ends, lists are built in what
-// scratch has left, and then with fewer ellipsoids; a fit within --max-vram holds no more than that,
-// and says that it was stopped; one that cannot begin says so. The pool's settings come back, and
-// nothing is held after a fit or a failure. On the host: who is given up.
+// Plan: a fit that runs out of device memory continues. Growth ends, lists are built after scratch
+// memory is freed, and then ellipsoids are dropped. A fit with --max-vram holds no more than
+// allowed and reports that it was limited; a fit that cannot begin reports it. The settings of the
+// memory pool are restored, and nothing is held after a fit or a failure. On the host, a test
+// checks which ellipsoids are dropped.
 
 #include <gmock/gmock.h>
 
@@ -31,7 +32,7 @@ TEST(LeastUseful, AreTheLowestAndOfEqualOnesTheFirst) {
   EXPECT_EQ(cuda::allButLowest(values, 10), std::vector<std::size_t>{});
 }
 
-/// Sets what all buffers together may hold, as long as it lives.
+/// Limits the bytes that all buffers together may hold, during its lifetime.
 class HoldAtMost {
  public:
   explicit HoldAtMost(std::size_t bytes) : before_(memoryAccount().setLimit(bytes)) {}
@@ -86,7 +87,7 @@ TEST_F(MemoryOnGpu, AFitStaysWithinWhatIsAllowedAndSaysThatItWasStopped) {
   options.iterations = 100;
   options.device = device_;
   const FitTarget target = makeTarget(volume, std::nullopt);
-  // enough for the first of them, and for some of the rest
+  // This is enough for the first ellipsoids and for some of the others.
   options.maxDeviceBytes = cuda::predictedBytes(target, 6000);
   const FitResult result = fit(volume, options);
   EXPECT_TRUE(result.deviceFull);

@@ -1,6 +1,6 @@
-// Plan: the GPU against the CPU: a step is the CPU's step, seeds are the CPU's seeds, a whole fit
-// reaches what the CPU reaches; no ellipsoid holds up the others; memory is predicted; what is not
-// finite ends a run. What both devices must do alike is in optimiser_test.cpp.
+// Plan: on a GPU, steps and seeds are those of the CPU, and a whole fit reaches about the same
+// PSNR. No single ellipsoid slows down the others, memory is predicted, and a loss that is not
+// finite ends a run. Properties of both devices are tested in optimiser_test.cpp.
 
 #include <gmock/gmock.h>
 
@@ -48,8 +48,8 @@ TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
            {tuning.smallestScale, tuning.largestScale, tuning.intensityHeadroom * target.lowest,
             tuning.intensityHeadroom * target.highest});
   const auto found = onGpu.ellipsoids();
-  // Adam's first step has the size of the step and the sign of the gradient, so that only where a
-  // gradient is lost in rounding can a component differ, and then by twice the step.
+  // Adam's first step has the given size and the sign of the gradient. A component can differ only
+  // if its gradient is lost in rounding, and then by twice the step.
   int differing = 0;
   for (std::size_t i = 0; i < found.size(); ++i)
     for (int a = 0; a < 3; ++a)
@@ -57,8 +57,9 @@ TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
   EXPECT_LE(differing, 2);
 }
 
-// The rule of motion_bound.h, and not how many steps were started at once, says when lists are built
-// anew: the same bits whatever the batches. Large steps outgrow lists within a batch.
+// The rule of motion_bound.h decides when lists are built again, and not the number of steps that
+// were started at once, so batches do not change the result. With large steps, supports leave the
+// lists within a batch.
 TEST_F(OptimiserOnGpu, StepsAheadOfOutgrownListsAreTakenAgain) {
   const SparseVolume volume = test::tubeVolume();
   const FitTarget target = makeTarget(volume, std::nullopt);
@@ -99,8 +100,8 @@ TEST_F(OptimiserOnGpu, SeedsAsTheCpuDoes) {
   onCpu.growTo(50);
   onGpu.growTo(50);
   const auto expected = onCpu.ellipsoids(), found = onGpu.ellipsoids();
-  // The same draws: running energies are integers here and float64 there, so that a draw next to
-  // the border between two voxels may fall on the other side.
+  // Cumulative energies are integers here and float64 on the CPU. A draw next to the border between
+  // two voxels may therefore fall on the other side.
   int differing = 0;
   for (std::size_t i = 0; i < found.size(); ++i)
     differing += std::abs(found[i].center[0] - expected[i].center[0]) +
@@ -113,11 +114,11 @@ TEST_F(OptimiserOnGpu, ReachesWhatTheCpuReaches) {
   const SparseVolume volume = test::tubeVolume();
   const double onCpu = fitOn({}, volume).curve.back().psnrBox;
   const double onGpu = fitOn(device_, volume).curve.back().psnrBox;
-  // The same method; rounding leads to other optima, which lie within a decibel of each other.
+  // The method is the same, but rounding leads to different optima within a decibel of each other.
   EXPECT_NEAR(onGpu, onCpu, 1.0);
 }
 
-/// (ellipsoid, voxel) pairs of round supports that lie inside the volume.
+/// Number of pairs of an ellipsoid and a voxel, for round supports inside the volume.
 double voxelPairs(const std::vector<Ellipsoid>& ellipsoids) {
   const double radius = supportRadius(kernelConstants<double>(Kernel{}));
   double sum = 0.0;
@@ -125,14 +126,14 @@ double voxelPairs(const std::vector<Ellipsoid>& ellipsoids) {
   return sum;
 }
 
-/// Seconds of an iteration for each of its pairs.
+/// Seconds of an iteration divided by its number of pairs.
 double secondsPerPair(const FitTarget& target, const std::vector<Ellipsoid>& ellipsoids) {
   constexpr int kIterations = 50;
   Tuning tuning;
   tuning.largestScale = 64.0;
   CudaOptimiser optimiser(target, {}, tuning);
   optimiser.setEllipsoids(ellipsoids);
-  const std::vector<double> factors(kIterations, 1e-6);  // lists stay as they are
+  const std::vector<double> factors(kIterations, 1e-6);  // lists do not change
   optimiser.iterate(factors);
   const auto start = std::chrono::steady_clock::now();
   optimiser.iterate(factors);
@@ -148,7 +149,7 @@ TEST_F(OptimiserOnGpu, AnEllipsoidThatCoversHalfHoldsNothingUp) {
   for (Ellipsoid& p : ellipsoids)
     p = {{random(0, 192), random(0, 192), random(0, 192)}, {1, 0, 0, 0, 1, 0, 0, 0, 1}, 0.1};
   const double without = secondsPerPair(target, ellipsoids);
-  constexpr double kInverse = 1.0 / 34.0;  // a support of about 91 voxels' radius
+  constexpr double kInverse = 1.0 / 34.0;  // the radius of the support is about 91 voxels
   ellipsoids.push_back({{96, 96, 96}, {kInverse, 0, 0, 0, kInverse, 0, 0, 0, kInverse}, 0.1});
   EXPECT_LT(secondsPerPair(target, ellipsoids), 1.3 * without);
 }

@@ -40,7 +40,7 @@ DenseValues product(const DenseValues& a, const DenseValues& b) {
   return result;
 }
 
-/// The textbook's SSIM = a1 a2 / (b1 b2) at one voxel.
+/// SSIM = a1 a2 / (b1 b2) at one voxel, as in the textbook.
 struct Ssim {
   double m1, mt, a1, a2, b1, b2;
 

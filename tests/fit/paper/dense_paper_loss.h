@@ -1,6 +1,6 @@
 #pragma once
-/// The paper's loss by its definition: float64 over every voxel of a box, SSIM as the textbook has
-/// it. Independent of the library's bricks and of its way to write SSIM.
+/// The paper's loss by its definition, in float64 over every voxel of a box, with SSIM as in the
+/// textbook. It shares neither the bricks nor the form of SSIM with the library.
 
 #include <optional>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace esvr::test {
 
-/// Values of a box's voxels, zero outside.
+/// The values of a box's voxels, which are zero outside.
 class DenseValues {
  public:
   explicit DenseValues(const Box& box) : box_(box), values_(std::size_t(box.volume())) {}
@@ -36,12 +36,13 @@ struct DenseLossOptions {
   [[nodiscard]] bool counts(Coord v) const { return !windows || windows->contains(v); }
 };
 
-/// The box must reach at least 5 voxels, a window's radius, beyond all that is not zero.
+/// Evaluates the loss. The box must extend at least 5 voxels, the radius of a window, beyond all
+/// values that are not zero.
 double densePaperLoss(const DenseValues& prediction, const DenseValues& target,
                       const DenseLossOptions& options);
 
-/// Its derivative by the prediction's voxels: the chain rule through the moments m1 = w * p, m2 =
-/// w * p^2 and m12 = w * (p t).
+/// Its derivative by the voxels of the prediction, by the chain rule through the moments m1 = w *
+/// p, m2 = w * p^2 and m12 = w * (p t).
 DenseValues densePaperLossGradient(const DenseValues& prediction, const DenseValues& target,
                                    const DenseLossOptions& options);
 

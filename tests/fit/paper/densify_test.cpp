@@ -1,5 +1,6 @@
-// Plan: who is cloned, who is split and who is left; what a clone and a split look like; what is
-// forgotten; the bound on how many there may be; the same choices in every run.
+// Plan: the tests check which ellipsoids are cloned, split or left, the parameters of clones and
+// parts, the state that is reset, the limit on their number, and that every run makes the same
+// choices.
 
 #include "fit/paper/densify.h"
 
@@ -27,7 +28,7 @@ PaperState stateOf(double meanGradient) {
   return state;
 }
 
-/// Small and large ones, still and restless.
+/// Small and large ellipsoids, with small and large gradients.
 Population fourOf() {
   return {{sphere(0, 1.0), sphere(10, 1.0), sphere(20, 3.0), sphere(30, 3.0)},
           {stateOf(0.5), stateOf(2.0), stateOf(0.5), stateOf(2.0)}};
@@ -85,14 +86,15 @@ TEST(Densify, PartsOfASplitAreSmallerAndLieWithinAFewScales) {
   EXPECT_NE(population.ellipsoids[4].center, population.ellipsoids[5].center);
 }
 
-// A normal distribution's mean and deviation over n draws err by s / sqrt(n) and s / sqrt(2 n).
+// Over n draws, the errors of the mean and of the deviation of a normal distribution are s /
+// sqrt(n) and s / sqrt(2 n).
 TEST(Densify, PartsAreDrawnWithTheScalesOfTheWhole) {
   constexpr std::size_t kCount = 4000;
   Population population;
   PaperEllipsoid needle = sphere(0.0, 3.0);
   needle.logScale = {std::log(8.0), std::log(3.0), std::log(1.0)};
   const double half = std::sqrt(0.5);
-  needle.rotation = {half, 0.0, 0.0, half};  // by 90 degrees about z: the long axis along y
+  needle.rotation = {half, 0.0, 0.0, half};  // 90 degrees about z: the long axis along y
   population.ellipsoids.assign(kCount, needle);
   population.states.assign(kCount, stateOf(2.0));
   densify(population, {.threshold = 1.0, .splitAbove = 2.0, .maxCount = 3 * kCount, .seed = 3});

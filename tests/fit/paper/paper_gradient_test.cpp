@@ -1,8 +1,8 @@
 // Plan: on every device, the gradient of the paper's loss over one subvolume by every parameter of
-// the paper (position, log scales, quaternion of any length, intensity, k) against central
-// differences of a float64 loss: the paper's formula at every voxel, the textbook's SSIM. For the
-// paper's ellipsoid, for Gaussians, and for ellipsoids of different k. The forms agree: the paper's
-// ellipsoid and the one that passes take are the same function. A GPU that holds one subvolume at a
+// the paper (position, log scales, quaternion of any length, intensity, k) is compared with central
+// differences of a float64 loss by the paper's formula at every voxel, with the textbook's SSIM.
+// The cases are the paper's ellipsoids, Gaussians, and ellipsoids of different k. The paper's
+// ellipsoid and the form that passes use are the same function. A GPU that holds one subvolume at a
 // time computes the same bits.
 
 #include <cmath>
@@ -16,7 +16,7 @@
 namespace esvr::paper {
 namespace {
 
-constexpr int kSubvolume = 7;  // the last of 2 x 2 x 2 bricks
+constexpr int kSubvolume = 7;  // the last of 2 x 2 x 2 subvolumes, each a brick
 const Box kBrick{{8, 8, 8}, {15, 15, 15}};
 
 SparseVolume smallVolume() {
@@ -41,7 +41,7 @@ Population fewEllipsoids() {
   return population;
 }
 
-/// Paper, eq. 5, or a Gaussian of 3 sigma, shifted so that it ends at 0.
+/// The paper's eq. 5, or a Gaussian that ends at 3 sigma, shifted so that it ends at 0.
 double kernelAt(double q, double k, bool gaussian) {
   const auto sigma = [](double x) { return 1.0 / (1.0 + std::exp(-x)); };
   if (gaussian) {
@@ -104,9 +104,10 @@ double& parameter(PaperEllipsoid& p, int n) {
 
 class PaperGradientOn : public test::OnDevice {
  protected:
-  // The loss is of order 1 in float64, so that differences of step 1e-6 err by 1e-10 or so, against
-  // gradients of 1e-3; the step is that small since the paper's kernel jumps where it ends. The
-  // gradient is a float32 sum over a brick's voxels, with an exponential within 1e-6 on the GPU.
+  // The loss is of order 1 in float64, so differences with a step of 1e-6 have errors of about
+  // 1e-10, for gradients of 1e-3. The step is so small because the paper's kernel jumps at its end.
+  // The gradient is a float32 sum over a brick's voxels, with an exponential precise to 1e-6 on the
+  // GPU.
   void expectDifferences(const KernelKind& kind) const {
     constexpr double kStep = 1e-6, kTolerance = 1e-4, kBeta = 0.2;
     const SparseVolume volume = smallVolume();

@@ -1,6 +1,6 @@
 #pragma once
-/// Bricks with predictions and targets for the tests of the paper's loss, and what the textbook's
-/// formula makes of them.
+/// Bricks with predictions and targets for the tests of the paper's loss, and the loss and gradient
+/// by the textbook's formula.
 
 #include <algorithm>
 #include <cmath>
@@ -14,14 +14,14 @@
 
 namespace esvr::test {
 
-inline constexpr int kMargin = 5;  // voxels beyond the bricks that windows see
+inline constexpr int kMargin = 5;  // voxels beyond the bricks that windows overlap
 
 struct Scene {
   std::vector<Coord> bricks;
   std::size_t targetBricks = 0;
-  std::vector<float> prediction{}, target{};  // of all bricks
+  std::vector<float> prediction{}, target{};  // values of all bricks
   double voxels = 5000.0, beta = 0.2, peak = 1.0;
-  std::optional<Box> within{};  // bricks around whose voxels windows count
+  std::optional<Box> within{};  // bricks whose voxels' windows count
 
   [[nodiscard]] DenseLossOptions denseOptions() const {
     DenseLossOptions options{voxels, beta, peak};
@@ -32,8 +32,8 @@ struct Scene {
   }
 };
 
-/// Bricks that touch by face, edge and corner, one apart, on both sides of zero; the last three
-/// hold a prediction only.
+/// Bricks that touch by face, edge and corner, or have one brick between them, on both sides of
+/// zero. The last three have a prediction only.
 inline std::vector<Coord> mixedBricks() {
   return {{-2, -1, 0}, {-1, -1, 0}, {-1, 0, 1}, {0, 1, 0}, {0, -1, -1}, {-1, -1, 1}, {1, 1, 1}};
 }
@@ -103,7 +103,7 @@ inline DenseValues denseOf(const Scene& scene, const std::vector<float>& values)
   return dense;
 }
 
-/// The prediction as the library sees it: target + residual, the residual in float32.
+/// The prediction as the library gets it: target + residual, with the residual in float32.
 inline DenseValues densePrediction(const Scene& scene) {
   const auto residual = residualOf(scene);
   DenseValues dense = denseOf(scene, scene.target);

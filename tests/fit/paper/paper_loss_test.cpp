@@ -1,12 +1,13 @@
-// Plan: (1) loss and gradient against the textbook's formula over dense float64 boxes; (2) gradient
-// against central differences of that dense loss; (3) the loss against the public metric; (4) what
-// must be exact: identical volumes, bricks of zeros, threads, powers of two, places, earlier calls;
-// (5) flat bright regions, where variances cancel; (6) errors.
+// Plan: (1) loss and gradient agree with the textbook's formula over dense float64 boxes; (2) the
+// gradient agrees with central differences of that dense loss; (3) the loss agrees with the public
+// metric; (4) identical volumes, bricks of zeros, threads, powers of two, positions and earlier
+// calls have exact results; (5) flat bright regions, where variances cancel, are precise; (6) wrong
+// input is refused.
 //
-// Tolerances. The loss is summed in float64: moments are off by a few 2.2e-16 of squared values of
-// order 1 and are divided by C2 = 9e-4 or more, the library's and the textbook's alike: 1e-12.
-// The gradient is float32, and so are two of its three parts: roundings of at most 6e-8 whose signs
-// differ from voxel to voxel, 1e-7 of the norm.
+// Tolerances. The loss is summed in float64. The moments have errors of a few 2.2e-16 of squared
+// values of order 1 and are divided by C2 = 9e-4 or more, in the library and in the textbook's
+// form: 1e-12. The gradient is float32, and so are two of its three parts. Their roundings are at
+// most 6e-8, with signs that differ from voxel to voxel: 1e-7 of the norm.
 
 #include <gtest/gtest.h>
 
@@ -89,7 +90,8 @@ TEST(PaperLoss, OfABoxCountsTheWindowsOfItsVoxelsAlone) {
   expectDenseResult(scene);
 }
 
-// Most voxels are zero, some are predicted exactly: what windows need not see must not be missed.
+// Most voxels are zero, and some are predicted exactly. Windows may skip those voxels, but must not
+// skip others.
 TEST(PaperLoss, OfFewVoxelsIsThatOfTheTextbook) {
   test::Random random(15);
   const auto target = [&](Coord) { return random(0.0, 1.0) < 0.01 ? 0.75f : 0.0f; };
@@ -101,9 +103,10 @@ TEST(PaperLoss, OfFewVoxelsIsThatOfTheTextbook) {
   expectDenseResult(scene);
 }
 
-// Differences of step h err by h^2/6 of the third derivative. SSIM changes over sqrt(C2) = 0.03 of
-// a window's values, of which a voxel has a weight of 0.02 at most: (1e-3 * 0.02 / 0.03)^2 < 1e-6.
-// Rounding: 1e-16 of the loss over 2 h, far less. No residual is within h of L1's kink.
+// Differences with step h have an error of h^2 / 6 times the third derivative. SSIM changes over
+// sqrt(C2) = 0.03 of the values of a window, in which a voxel has a weight of at most 0.02, so the
+// error is below (1e-3 * 0.02 / 0.03)^2 < 1e-6. The rounding, 1e-16 of the loss / (2 h), is far
+// smaller. No residual is within h of the kink of L1.
 TEST(PaperLossGradient, SlowAgreesWithCentralDifferences) {
   constexpr double kStep = 1e-3;
   Scene scene = randomScene(11, {{-1, 0, 0}, {0, -1, 0}});
@@ -146,7 +149,7 @@ TEST(PaperLoss, IsOneMinusTheMetricWhereNoWindowThatSeesABrickIsClipped) {
   const Box box = boxAround(scene.bricks, 2 * kMargin);
   scene.voxels = box.volume();
   scene.beta = 0.0;
-  // Values that are multiples of 2^-10, so that the residual is the volumes' difference exactly.
+  // The values are multiples of 2^-10, so that the residual is the exact difference of the volumes.
   for (auto* values : {&scene.target, &scene.prediction})
     for (float& v : *values) v = std::round(v * 1024.0f) / 1024.0f;
   const double ssim =
@@ -224,27 +227,27 @@ TEST(PaperLoss, OfNoBricksIsZero) {
   EXPECT_TRUE(evaluate(empty).gradient.empty());
 }
 
-// The variance is 3e-9, a tenth of what rounding 0.5^2 to float32 costs.
+// The variance is 3e-9, a tenth of the rounding error of 0.5^2 in float32.
 TEST(PaperLossOnFlatRegions, NoiseOnAnOffsetLosesNoDigits) {
   test::Random random(91);
   const auto noisy = [&](Coord) { return float(0.5 + 1e-4 * random(-1.0, 1.0)); };
   Scene scene = makeScene(cubeOfBricks(3), 27, noisy, noisy);
   scene.beta = 0.0;
   const double reference = denseLoss(scene);
-  // 1 - SSIM is of order 1e-5, and the textbook's own value is off by 1e-12.
+  // 1 - SSIM is about 1e-5, and the textbook's own value has an error of 1e-12.
   EXPECT_NEAR(evaluate(scene).loss, reference, 1e-7 * reference);
   EXPECT_LT(relativeDifference(evaluate(scene).gradient, denseGradient(scene)), kGradientTolerance);
 }
 
-// A constant difference in a bright region: all that is left of the gradient is the mean's share,
-// 1e-3 of each of the two terms that cancel.
+// A constant difference in a bright region. Of the gradient only the share of the means remains,
+// which is 1e-3 of each of the two terms that cancel.
 TEST(PaperLossOnFlatRegions, AConstantDifferenceKeepsItsSmallGradient) {
   Scene scene = makeScene(
       cubeOfBricks(3), 27, [](Coord) { return 0.9f; }, [](Coord) { return 0.91f; });
   scene.beta = 0.0;
   const auto gradient = evaluate(scene).gradient;
   const auto reference = denseGradient(scene);
-  for (int i = 0; i < 64; ++i) {  // the voxels 10..13, around which windows' windows are flat
+  for (int i = 0; i < 64; ++i) {  // the voxels 10 to 13, whose windows overlap flat windows only
     const std::size_t v =
         13 * kBrickVoxels + std::size_t(voxelOffset(Coord{2 + i / 16, 2 + i / 4 % 4, 2 + i % 4}));
     EXPECT_NEAR(gradient[v], reference[v], 2e-7 * std::abs(reference[v]));

@@ -1,7 +1,8 @@
-// Plan: cutting into subvolumes (every brick once, sides by the paper's rule); the points at the
-// start; the schedule's scaling; on every device a run as a whole: it lowers the error, clones and
-// splits, prunes to what was asked, learns k, ends at its time and when it is cancelled, and gives
-// the same bits in three runs and in a far place; what makes no sense is refused.
+// Plan: the tests check the division into subvolumes (every brick is in one, and sides follow the
+// paper's rule), the initial ellipsoids, and the scaling of the schedule. On every device, a run
+// lowers the error, clones and splits, prunes to the wanted count, learns k, ends at its time limit
+// and when it is cancelled, and has the same bits in three runs and at a distant position. Wrong
+// options are refused.
 
 #include <gtest/gtest.h>
 
@@ -45,8 +46,8 @@ TEST(Subvolumes, AreHalfTheLongestAxisOrTheShortest) {
     const Space space{{{0, 0, 0}, {x / 8 - 1, y / 8 - 1, z / 8 - 1}}};
     return subvolumeSide(space, asked);
   };
-  EXPECT_EQ(sideOf(256, 256, 256, 0), 128);    // the paper's for Aneurysm
-  EXPECT_EQ(sideOf(2544, 1296, 136, 0), 136);  // Neuron: the smallest axis, in whole bricks
+  EXPECT_EQ(sideOf(256, 256, 256, 0), 128);    // the paper's side for Aneurysm
+  EXPECT_EQ(sideOf(2544, 1296, 136, 0), 136);  // Neuron: the shortest axis, in whole bricks
   EXPECT_EQ(sideOf(88, 88, 88, 0), 48);        // 44, in whole bricks
   EXPECT_EQ(sideOf(256, 256, 256, 60), 64);
   EXPECT_EQ(sideOf(8, 8, 8, 0), 8);
@@ -73,8 +74,8 @@ TEST(InitialPoints, LieOnVoxelsThatDifferFromTheBackgroundEachOnce) {
 TEST(InitialPoints, OfEveryVoxelAddUpToTheVolume) {
   const SparseVolume volume = test::volumeOf({}, 2, 0.0f, [](Coord) { return 1.0f; });
   const FitTarget target = makeTarget(volume, std::nullopt);
-  // In the middle of the cube the lattice sum of a kernel as wide as its spacing is its integral to
-  // a few percent.
+  // In the middle of the cube, the sum over the lattice of a kernel as wide as its spacing equals
+  // its integral to a few percent.
   const Coord middle{8, 8, 8};
   for (const KernelKind kind : {KernelKind{}, KernelKind{.gaussian = true}}) {
     const auto kernel = kernelConstants<double>(kernelOf(kind));
@@ -93,8 +94,8 @@ TEST(InitialPoints, OfEveryVoxelAddUpToTheVolume) {
 TEST(PaperMethod, IsScaledInAllThatIsSaidInEpochs) {
   const PaperMethod method = scaledTo({}, 280);
   EXPECT_EQ(method.densifyUntil, 40u);
-  EXPECT_EQ(method.densifyFrom, 2u);   // 1.6
-  EXPECT_EQ(method.densifyEvery, 1u);  // 0.4, and at least 1
+  EXPECT_EQ(method.densifyFrom, 2u);   // rounded from 1.6
+  EXPECT_EQ(method.densifyEvery, 1u);  // rounded from 0.4, at least 1
   EXPECT_EQ(method.prunes.front().epoch, 120u);
   EXPECT_EQ(withThreePasses({}).prunes.size(), 3u);
 }
@@ -107,7 +108,7 @@ class PaperRunOn : public test::OnDevice {
     method.epochs = 60;
     method.densifyFrom = 4;
     method.densifyUntil = 16;
-    method.gradientThreshold = 0.02;  // a small volume's mean over few voxels
+    method.gradientThreshold = 0.02;  // the mean over few voxels of a small volume
     method.percentDense = 0.06;       // 1.2 voxels
     method.prunes = {{24, 0.3}};
     return method;
@@ -182,7 +183,8 @@ TEST_P(PaperRunOn, FitsGaussiansWithTheSameMethod) {
   const auto [ellipsoids, ellipsoidRecord] = run(method);
   EXPECT_GT(gaussians.curve.back().psnrBox, gaussianRecord.prunes.front().psnrBoxAfter);
   EXPECT_LT(gaussians.field.kernel.kappa, -20.0f);
-  // Supports of 3 sigma against 1.42 scales: more of them meet a voxel.
+  // Gaussians have supports of 3 sigma, and ellipsoids of 1.42 scales, so more Gaussians reach a
+  // voxel.
   EXPECT_GT(averageHits(gaussians.field), 1.3 * averageHits(ellipsoids.field));
   EXPECT_GT(ellipsoidRecord.prunes.front().hitsBefore, 1.0);
 }

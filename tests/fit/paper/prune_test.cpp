@@ -1,6 +1,6 @@
-// Plan: the anisotropy by its formula at known shapes and sizes that overflow squares; coverage and
-// contribution against a count over every voxel of a box; every score from its terms; what a pass
-// keeps, and that ties and order are those of the population.
+// Plan: the anisotropy follows its formula for known shapes and for sizes whose squares overflow.
+// Coverage and contribution agree with a count over every voxel of a box. Every score is the
+// product of its terms. A pass keeps the right ellipsoids, in the order of the population.
 
 #include "fit/paper/prune.h"
 
@@ -26,17 +26,17 @@ PaperEllipsoid ellipsoid(double a, double b, double c, double intensity = 0.5) {
 
 TEST(FractionalAnisotropy, IsThatOfTheFormula) {
   EXPECT_EQ(fractionalAnisotropy({0.3, 0.3, 0.3}), 0.0);
-  // Eigenvalues 4, 1, 1: sqrt(1/2) sqrt(9 + 0 + 9) / sqrt(18).
+  // The eigenvalues are 4, 1, 1, which gives sqrt(1/2) sqrt(9 + 0 + 9) / sqrt(18).
   EXPECT_NEAR(fractionalAnisotropy({std::log(2.0), 0.0, 0.0}), std::sqrt(0.5), 1e-15);
   EXPECT_NEAR(fractionalAnisotropy({std::log(1e3), 0.0, 0.0}), 1.0, 1e-5);
-  // A disc: 1, 1, 0.
+  // A disc has the eigenvalues 1, 1, 0.
   EXPECT_NEAR(fractionalAnisotropy({0.0, 0.0, -30.0}), std::sqrt(0.5), 1e-15);
 }
 
 TEST(FractionalAnisotropy, IsTheSameForEverySizeAndOrder) {
   const double value = fractionalAnisotropy({1.0, 0.2, -0.4});
   EXPECT_NEAR(fractionalAnisotropy({0.2, -0.4, 1.0}), value, 1e-15);
-  for (const double size : {-150.0, 150.0})  // e^600: eigenvalues squared would overflow
+  for (const double size : {-150.0, 150.0})  // squares of the eigenvalues e^600 would overflow
     EXPECT_NEAR(fractionalAnisotropy({1.0 + size, 0.2 + size, -0.4 + size}), value, 1e-12);
 }
 
@@ -85,7 +85,7 @@ TEST(PruneScores, AreProductsOfTheirTerms) {
              withoutFa = pruneScores(all, PruneScore::kWithoutFa, options),
              onlyFa = pruneScores(all, PruneScore::kOnlyFa, options),
              contribution = pruneScores(all, PruneScore::kContribution, options);
-  // LightGaussian's factor: the 90th percentile of three volumes is the middle one's place.
+  // LightGaussian's factor: the 90th percentile of three volumes is at the place of the middle one.
   const double volumes[3] = {6.0, 8.0, 6.0};
   for (std::size_t i = 0; i < all.size(); ++i) {
     const Coverage coverage = coverageOf(all[i], options);

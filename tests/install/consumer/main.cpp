@@ -1,4 +1,4 @@
-// Builds a volume of two voxels, 16 apart along x, and prints the box around them.
+// Builds a volume of two voxels that are 16 apart along x, and prints their bounding box.
 #include <esvr/device.h>
 #include <esvr/sparse_volume.h>
 

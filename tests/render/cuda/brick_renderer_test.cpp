@@ -1,5 +1,6 @@
-// Plan: a CUDA device marches bricks to the picture of renderVolume on the CPU, within 1/255: every
-// kind of camera, steps, a clip box, bands; tiles that no brick covers stay empty.
+// Plan: the picture of a CUDA device that marches through bricks agrees with renderVolume on the
+// CPU to within 1/255 of a channel, for every kind of camera, step sizes, a clip box and bands.
+// Tiles that no brick covers stay empty.
 #include <gtest/gtest.h>
 
 #include <cmath>

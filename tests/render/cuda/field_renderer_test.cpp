@@ -1,9 +1,9 @@
-// Plan: a CUDA device draws what the CPU draws, voxels or the sum between them, over cameras,
-// kernels, shapes, transfer functions, steps, sizes, parts of the depth and bands: within 1/255 of
-// a channel (the hardware's exponential and division are good to some 1e-6 of an intensity, and a
-// ray may end a sample earlier or later, 1/4096). More lists than there is room for at first, lists
-// longer than a block, and further runs, which must not change a bit. Without a GPU the call must
-// say why.
+// Plan: a CUDA device draws the same pictures as the CPU, with samples between voxels and from the
+// sum, for cameras, kernels, shapes, transfer functions, steps, sizes, parts of the depth and
+// bands. Channels agree to within 1/255: the hardware's exponential and division are precise to
+// about 1e-6 of an intensity, and a ray may end one sample earlier or later, which changes a
+// channel by 1/4096. Lists that are longer than the first buffers or than a block, and further
+// runs, must not change a bit. Without a GPU, the call must say why it fails.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,9 +33,9 @@ double largestDifference(const Image& a, const Image& b) {
   return largest;
 }
 
-/// Rounding decides about a voxel where m is within some 1e-7 of the end of a support: hardly one
-/// voxel of the 64,000 in these scenes. The default camera shows a voxel's samples, which lie up to
-/// one voxel to each side of it, on at most 5 x 5 pixels of four channels.
+/// Rounding decides about a voxel if m is within about 1e-7 of the end of a support. This is hardly
+/// one voxel of the 64,000 in these scenes. With the default camera, the samples of a voxel, which
+/// lie up to one voxel to each side of it, cover at most 5 x 5 pixels of four channels.
 constexpr std::size_t kVoxelsOnAnEnd = 2;
 constexpr std::size_t kChannelsOnAnEnd = kVoxelsOnAnEnd * 25 * 4;
 
@@ -62,8 +62,9 @@ class FieldOnGpu : public OnGpu, public testing::WithParamInterface<Between> {
     o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
     o.opacityLength = 8.0;
     o.between = GetParam();
-    // Whether a voxel at the end of a support is exactly the background is up to rounding. Here its
-    // samples are transparent either way; the linear curve has a test of its own.
+    // Rounding decides whether a voxel at the end of a support is exactly the background. With this
+    // transfer function its samples are transparent in both cases; another test uses the linear
+    // curve.
     if (o.between == Between::kVoxels) o.transfer.opacity = {{-1.0, 1.0}, {0.0, 0.0}, {1.0, 1.0}};
     return o;
   }
@@ -163,7 +164,7 @@ TEST_P(FieldOnGpu, AgreesInEachModeAndClipped) {
       o.mode = mode;
       const Image expected = renderField(field, o);
       const Image image = drawn(field, o, {.depthParts = parts});
-      // A sample on the end of a support, of value 0, may count for one and not for the other.
+      // A sample at the end of a support has the value 0, and may count on one device only.
       EXPECT_LE(channelsThatDiffer(image, expected), kChannelsOnAnEnd) << int(mode) << parts;
     }
   RenderOptions o = optionsFor();

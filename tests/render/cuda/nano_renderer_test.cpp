@@ -1,5 +1,5 @@
-// Plan: a CUDA device marches a NanoVDB grid to the picture of the CPU, within 1/255, for each kind
-// of values; in bands where memory is short.
+// Plan: the picture of a CUDA device that marches through a NanoVDB grid agrees with the CPU's to
+// within 1/255 of a channel, for each value type, and in bands if memory is short.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,8 +25,8 @@ RenderOptions options(double step = 1.0) {
   RenderOptions o;
   o.resolution = {131, 78};
   o.camera = fitCamera({{0, 0, 0}, {39, 39, 39}}, {}, o.resolution);
-  // Opacity begins at the background, which quantised values hit only nearly, and not alike on both
-  // devices.
+  // The opacity begins at the background. Quantised values reach it only approximately, and
+  // differently on both devices.
   o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {0.0f, 1.0f});
   o.opacityLength = 8.0;
   o.step = step;

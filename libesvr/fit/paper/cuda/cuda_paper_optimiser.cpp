@@ -18,7 +18,7 @@ namespace cuda {
 namespace {
 
 double windowBytes(const FitTarget& target) {
-  constexpr double kWithReached = 2.0;  // bricks that supports reach beyond the target's
+  constexpr double kWithReached = 2.0;  // estimate: as many reached bricks as target bricks
   return PaperLoss::bytesFor(kWithReached * double(target.bricks.size()));
 }
 
@@ -102,7 +102,8 @@ void CudaPaperOptimiser::rebuildLists(Part& part, double slack) {
   part.motionLeft = slack;
 }
 
-/// The target's values of a subvolume: there from the start, or for this visit.
+/// Sets values_ to the target's values of a subvolume, which are in device memory from the start or
+/// are uploaded for this visit.
 void CudaPaperOptimiser::bring(const Part& part) {
   values_ = part.values.data();
   const std::span<const float> values(part.volume->target.values);
@@ -111,7 +112,7 @@ void CudaPaperOptimiser::bring(const Part& part) {
   values_ = visited_.data();
 }
 
-/// Room in what all subvolumes use in turn.
+/// Computes the residuals of a subvolume. All subvolumes use the same buffers in turn.
 void CudaPaperOptimiser::takeResiduals(Part& part) {
   moments_.reserve(part.lists.pairCount() * kMoments);
   chunkSums_.reserve(part.lists.chunkCount() * kMoments);

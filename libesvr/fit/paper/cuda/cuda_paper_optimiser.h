@@ -1,5 +1,5 @@
 #pragma once
-/// The paper's method on a GPU.
+/// The optimiser of the paper's method on a GPU.
 
 #include <memory>
 #include <vector>
@@ -32,15 +32,15 @@ class CudaPaperOptimiser final : public paper::PaperOptimiser {
   [[nodiscard]] std::size_t deviceBytes() const override;
 
  private:
-  /// A subvolume and what belongs to it on the device.
+  /// A subvolume and its data on the device.
   struct Part {
     Part(std::unique_ptr<paper::Subvolume> from, bool visitOnly, cudaStream_t stream);
 
     std::unique_ptr<paper::Subvolume> volume;
-    DeviceBuffer<float> values;  ///< empty where it is there for a visit only
+    DeviceBuffer<float> values;  ///< values of the target; empty if they are uploaded on each visit
     BrickTable bricks, windows;
     PairLists lists;
-    double motionLeft = -1.0;  ///< voxels that supports may still move by; below 0: lists are stale
+    double motionLeft = -1.0;  ///< voxels by which supports may still move; < 0: lists are outdated
   };
 
   void requireMemoryFor(std::size_t ellipsoids) const;
@@ -67,7 +67,7 @@ class CudaPaperOptimiser final : public paper::PaperOptimiser {
   GrowingBuffer<double> radii_;
   GrowingBuffer<float> moments_, residual_, visited_;
   GrowingBuffer<BrickMask> active_;
-  const float* values_ = nullptr;  ///< of the subvolume that is visited
+  const float* values_ = nullptr;  ///< target's values of the visited subvolume
   GrowingBuffer<double> chunkSums_;
   DeviceBuffer<int> diverged_;
   ErrorSums errorSums_;

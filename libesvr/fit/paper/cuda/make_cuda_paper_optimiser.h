@@ -1,5 +1,5 @@
 #pragma once
-/// The paper's method on a GPU, free of CUDA's own headers.
+/// Makes the optimiser of the paper's method on a GPU. This header does not include those of CUDA.
 
 #include <memory>
 
@@ -7,7 +7,8 @@
 
 namespace esvr::paper {
 
-/// \throws DeviceError  no such device, a build without CUDA, out of device memory; says which
+/// \throws DeviceError  the device does not exist, the build has no CUDA, or device memory is
+///                      exhausted; the message says which
 [[nodiscard]] std::unique_ptr<PaperOptimiser> makeCudaPaperOptimiser(const FitTarget& target,
                                                                      const PaperOptions& options);
 

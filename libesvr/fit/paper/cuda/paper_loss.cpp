@@ -62,7 +62,8 @@ double PaperLoss::loss() const {
 }
 
 double PaperLoss::bytesFor(double bricks) {
-  // Scattered bricks have 27 around them, dense ones fewer; those of surfaces and tubes about 4.
+  // Bricks with windows for each brick of values: 27 for a single brick, close to 1 in dense
+  // volumes, about 4 for surfaces and tubes.
   constexpr double kWindowBricks = 6.0;
   return bricks * kBrickVoxels *
          (sizeof(float) + kWindowBricks * (sizeof(double) + 2 * sizeof(float)));

@@ -1,9 +1,10 @@
 #pragma once
-/// The paper's loss (fit/paper_loss.h) and its derivative on the device.
+/// The paper's loss (fit/paper/paper_loss.h) and its derivative on the device.
 ///
-/// Windows are summed axis by axis in shared memory, a block a brick, in float64: in a bright flat
-/// region the variances that SSIM divides by are differences of squares. Every value has one writer
-/// and every sum one order: the same bits in every run.
+/// A block of threads sums the windows of a brick axis by axis in shared memory. It computes in
+/// float64, because the variances of SSIM are small differences of large squares in a bright flat
+/// region. Every value has one writer and every sum has one order, so the result has the same bits
+/// in every run.
 
 #include <array>
 
@@ -12,13 +13,13 @@
 
 namespace esvr::cuda {
 
-/// As PaperLossInput, on the device. Pointers and tables are borrowed.
+/// PaperLossInput on the device. The caller owns all pointers and tables.
 struct PaperLossArguments {
   const BrickTable& bricks;   ///< every brick where prediction or target may be non-zero
-  const BrickTable& windows;  ///< around whose voxels windows lie: findAround(bricks), or a part
-  const float* residual;      ///< prediction - target, kBrickVoxels a brick of the table
-  const float* target;        ///< of the table's first bricks; zero in the others
-  std::size_t targetBricks;   ///< how many
+  const BrickTable& windows;  ///< bricks whose voxels have windows: findAround(bricks) or a part
+  const float* residual;      ///< prediction - target, kBrickVoxels values for each brick
+  const float* target;        ///< target in the table's first bricks; it is zero in others
+  std::size_t targetBricks;   ///< number of these first bricks
   double voxels, beta, peak;
 };
 
@@ -26,14 +27,14 @@ class PaperLoss {
  public:
   explicit PaperLoss(cudaStream_t stream);
 
-  /// \return the loss's derivative by the prediction, laid out as the residual, on the device until
-  ///         the next call
+  /// \return the derivative of the loss by the prediction, in device memory and in the layout of
+  ///         the residual; valid until the next call
   const float* derivative(const PaperLossArguments& arguments);
 
-  /// Of the last derivative. Waits for it.
+  /// The loss at the last call of derivative(), for which it waits.
   [[nodiscard]] double loss() const;
 
-  /// Bytes that `bricks` bricks of values take at most.
+  /// Estimate of the device memory for this number of bricks of values, bytes.
   [[nodiscard]] static double bytesFor(double bricks);
 
  private:
@@ -43,7 +44,7 @@ class PaperLoss {
   std::array<double, kSsimTaps> weights_ = ssimWeights();
   GrowingBuffer<double> byR_, windowLoss_, valueLoss_;
   GrowingBuffer<float> byRr_, byTr_, lossByValue_;
-  std::size_t windowShares_ = 0, valueShares_ = 0;  ///< of the loss that the last derivative wrote
+  std::size_t windowShares_ = 0, valueShares_ = 0;  ///< number of partial losses of the last call
 };
 
 }  // namespace esvr::cuda

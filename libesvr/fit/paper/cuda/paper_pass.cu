@@ -14,7 +14,7 @@ __device__ auto kernelsOf(const PaperPassArguments& a) {
     return SharedKernel{a.kernel};
 }
 
-/// One block a brick, one group of lanes a pair.
+/// Each block works on one brick, and each group of lanes on one pair at a time.
 template <bool kOwnKernels, class Sum>
 __global__ void __launch_bounds__(kBlock) residualPass(const PaperPassArguments a) {
   __shared__ Sum sums[kPaddedVoxels];
@@ -24,7 +24,7 @@ __global__ void __launch_bounds__(kBlock) residualPass(const PaperPassArguments 
                         sums);
 }
 
-/// Puts the given derivatives where another pass has its residuals.
+/// Loads the given derivatives into the memory in which the default fit's pass has its residuals.
 __device__ void loadDerivatives(const PaperPassArguments& a, std::uint32_t brick,
                                 NarrowSum* byValue) {
   for (int v = int(threadIdx.x); v < kBrickVoxels; v += kBlock)

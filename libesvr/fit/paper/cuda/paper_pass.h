@@ -1,6 +1,6 @@
 #pragma once
-/// The passes over the bricks of the paper's method: residuals, and the moments of pairs for a loss
-/// whose derivative by every voxel is given.
+/// The passes of the paper's method over the bricks. One computes residuals; the other computes the
+/// moments of pairs from the derivative of a loss by every voxel.
 
 #include <cuda_runtime_api.h>
 
@@ -8,20 +8,20 @@
 
 namespace esvr::cuda {
 
-/// Pointers are to device memory, borrowed.
+/// All pointers are to device memory that the caller owns.
 struct PaperPassArguments {
   PassScene scene;
-  KernelConstants<float> kernel;          ///< of all ellipsoids, where `kernels` is null
-  const KernelConstants<float>* kernels;  ///< one for each ellipsoid, or null
+  KernelConstants<float> kernel;          ///< kernel of all ellipsoids, if `kernels` is null
+  const KernelConstants<float>* kernels;  ///< a kernel for each ellipsoid, or null
   PassTarget target;
-  float* residual;           ///< out: kBrickVoxels for each brick
-  const float* lossByValue;  ///< laid out as the residual
-  float* moments;            ///< out: kMoments for each pair
+  float* residual;           ///< output: kBrickVoxels values for each brick
+  const float* lossByValue;  ///< input of the moments, in the layout of the residual
+  float* moments;            ///< output: kMoments values for each pair
 };
 
-/// Writes residuals.
+/// Writes the residuals.
 void launchPaperResiduals(const PaperPassArguments& arguments, cudaStream_t stream);
-/// Writes moments, from lossByValue.
+/// Writes the moments for the given lossByValue.
 void launchPaperMoments(const PaperPassArguments& arguments, cudaStream_t stream);
 
 }  // namespace esvr::cuda

@@ -7,11 +7,11 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kStepBlock = 64;  // small: few ellipsoids are to use many processors
+constexpr int kStepBlock = 64;  // small blocks spread few ellipsoids over many multiprocessors
 
 __device__ std::uint32_t ownEllipsoid() { return blockIdx.x * kStepBlock + threadIdx.x; }
 
-/// From the paper's form to those that passes and lists take.
+/// Converts an ellipsoid from the paper's parameters to the forms that passes and lists use.
 __device__ void writeForms(const PaperEllipsoids& a, std::uint32_t i,
                            const paper::PaperEllipsoid& p) {
   const Ellipsoid unit = ellipsoidOf(p, a.kind);

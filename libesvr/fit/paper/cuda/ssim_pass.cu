@@ -6,10 +6,10 @@ namespace esvr::cuda {
 namespace {
 
 constexpr int kThreads = 256;
-constexpr int kOwnVoxels = kBrickVoxels / kThreads;  // of a thread
+constexpr int kOwnVoxels = kBrickVoxels / kThreads;  // voxels of a brick for each thread
 constexpr int kNeighbours = 27;
 constexpr int kSlice = kHaloSide * kHaloSide;
-/// Sums along x, then along x and y, of the windows around a brick's voxels.
+/// Numbers of partial sums of a brick's windows: first along x, then along x and y.
 constexpr int kSumsX = kBrickSide * kSlice, kSumsXy = kBrickSide * kBrickSide * kHaloSide;
 constexpr std::size_t kSumBytes = (kSumsX + kSumsXy) * sizeof(double);
 constexpr std::size_t kWindowSideBytes = kSumBytes + 2 * kHaloVoxels * sizeof(float);
@@ -18,14 +18,14 @@ constexpr std::size_t kValueSideBytes = kSumBytes + kHaloVoxels * sizeof(double)
 using Weights = std::array<double, kSsimTaps>;
 using OwnSums = double[kOwnVoxels];
 
-/// Numbers of the bricks around one, itself in the middle. Ends with a barrier.
+/// Finds the numbers of a brick and its 26 neighbours. Ends with a barrier.
 __device__ void findAround(const BrickTableView& table, Coord brick, std::uint32_t* around) {
   const int n = int(threadIdx.x);
   if (n < kNeighbours) around[n] = table.find(brick + Coord{n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1});
   __syncthreads();
 }
 
-/// Where a place of the halo lies: in which of the bricks around, and at which voxel.
+/// The position of a voxel of the halo: which of the 27 bricks it is in, and its offset there.
 struct HaloPlace {
   int brick, voxel;
 };
@@ -36,8 +36,8 @@ __device__ HaloPlace placeOf(int halo) {
   return {(step.x + 1) * 9 + (step.y + 1) * 3 + step.z + 1, voxelOffset(localOf(at))};
 }
 
-/// A window's sum along one axis; it is symmetric, so two values share a multiplication.
-/// \param at  at(tap): the value under a tap
+/// Sums a window along one axis. The window is symmetric, so two values share a multiplication.
+/// \param at  at(tap) returns the value for a weight of the window
 template <class At>
 __device__ double sumTaps(const Weights& weights, At&& at) {
   double sum = weights[kSsimRadius] * at(kSsimRadius);
@@ -57,18 +57,18 @@ __device__ Scratch scratch() {
   return {memory, memory + kSumsX, memory + kSumsX + kSumsXy};
 }
 
-/// The voxel whose sums a thread has in place n.
+/// The voxel of a thread's sum number n.
 __device__ int ownVoxel(int n) { return int(threadIdx.x) + n * kThreads; }
 
-/// Sums of the windows around the brick's voxels, axis by axis.
-/// \param value  value(offset in the halo)
+/// Sums the windows around the brick's voxels axis by axis.
+/// \param value  value(offset) returns the value at an offset of the halo
 template <class Value>
 __device__ void sumWindows(const Weights& weights, const Scratch& s, Value&& value, OwnSums& out) {
   for (int i = int(threadIdx.x); i < kSumsX; i += kThreads)
     s.sumsX[i] = sumTaps(weights, [&](int tap) { return value(i + tap * kSlice); });
   __syncthreads();
   for (int i = int(threadIdx.x); i < kSumsXy; i += kThreads) {
-    constexpr int kRows = kBrickSide * kHaloSide;  // of the result, in a slice
+    constexpr int kRows = kBrickSide * kHaloSide;  // results in a slice
     const double* const from = s.sumsX + i / kRows * kSlice + i % kRows;
     s.sumsXy[i] = sumTaps(weights, [&](int tap) { return from[tap * kHaloSide]; });
   }
@@ -80,7 +80,8 @@ __device__ void sumWindows(const Weights& weights, const Scratch& s, Value&& val
   }
 }
 
-/// Residual and target around a brick. Ends with a barrier. \return whether any is not zero
+/// Loads residual and target of a brick and its surroundings. Ends with a barrier.
+/// \return true if any value is not zero
 __device__ bool fillHalo(const SsimPassArguments& a, const std::uint32_t* around, float* r,
                          float* t) {
   bool any = false;
@@ -95,7 +96,7 @@ __device__ bool fillHalo(const SsimPassArguments& a, const std::uint32_t* around
   return __syncthreads_or(any) != 0;
 }
 
-/// A block a brick of windows.
+/// Each block evaluates the windows around the voxels of one brick.
 __global__ void __launch_bounds__(kThreads) windowSide(const SsimPassArguments a) {
   __shared__ std::uint32_t around[kNeighbours];
   const Scratch s = scratch();
@@ -130,7 +131,7 @@ __global__ void __launch_bounds__(kThreads) windowSide(const SsimPassArguments a
   if (threadIdx.x == 0) a.windowLoss[blockIdx.x] = a.ssimScale * loss;
 }
 
-/// Sums of what the windows around a brick have in `values`.
+/// Sums `values` of the windows that cover each voxel of a brick, with the window's weights.
 template <class T>
 __device__ void sumGradients(const SsimPassArguments& a, const std::uint32_t* around,
                              const T* values, OwnSums& out) {
@@ -147,7 +148,7 @@ __device__ void sumGradients(const SsimPassArguments& a, const std::uint32_t* ar
       a.weights, s, [&](int i) { return halo[i]; }, out);
 }
 
-/// A block a brick of values.
+/// Each block computes the derivatives by the values of one brick.
 __global__ void __launch_bounds__(kThreads) valueSide(const SsimPassArguments a) {
   __shared__ std::uint32_t around[kNeighbours];
   OwnSums byR{}, byRr{}, byTr{};

@@ -1,7 +1,7 @@
-// Plan: the paper's loss on the device against the textbook's formula over dense float64 boxes,
-// with the scenes and tolerances of the CPU's test (paper_loss_test.cpp): shares of L1, few voxels,
-// windows of a box alone, bright flat regions; what must be exact: bricks of zeros, places, three
-// runs. The paper's method on the device: gradients and a run against the CPU's.
+// Plan: the paper's loss on the device agrees with the textbook's formula over dense float64 boxes,
+// with the scenes and tolerances of the CPU's test (paper_loss_test.cpp). Bricks of zeros,
+// positions and repetition do not change a bit. Gradients and a run of the paper's method agree
+// with the CPU's.
 
 #include "fit/paper/cuda/paper_loss.h"
 
@@ -81,7 +81,7 @@ TEST_F(PaperLossOnGpu, OfABoxCountsTheWindowsOfItsVoxelsAlone) {
   expectDenseResult(scene);
 }
 
-// The variance is 3e-9, a tenth of what rounding 0.5^2 to float32 costs; 1 - SSIM is of order 1e-5.
+// The variance is 3e-9, a tenth of the rounding error of 0.5^2 in float32; 1 - SSIM is about 1e-5.
 TEST_F(PaperLossOnGpu, NoiseOnAnOffsetLosesNoDigits) {
   test::Random random(91);
   const auto noisy = [&](Coord) { return float(0.5 + 1e-4 * random(-1.0, 1.0)); };
@@ -159,8 +159,9 @@ class PaperMethodOnGpu : public test::CudaTest {
   std::unique_ptr<paper::PaperOptimiser> cpu_, gpu_;
 };
 
-// Float32 sums over some thousand voxels on both sides, and an exponential within 1e-6. Where the
-// prediction is nearly the target L1's sign may differ: in a voxel of a million here.
+// Both sides are float32 sums over a few thousand voxels, with exponentials precise to 1e-6. If the
+// prediction is nearly the target, the sign of L1's derivative may differ: here in one voxel of a
+// million.
 TEST_F(PaperMethodOnGpu, GradientsAreThoseOfTheCpu) {
   for (const paper::KernelKind kind :
        {paper::KernelKind{}, paper::KernelKind{.gaussian = true}, {.learnK = true}}) {
@@ -187,13 +188,14 @@ TEST_F(PaperMethodOnGpu, ARunFollowsTheCpus) {
       cpu_->iterate(s, step);
       gpu_->iterate(s, step);
     }
-  // Signs of L1 part the two after a while: they agree in what they reach.
+  // Different signs of L1's derivative separate the two runs, but they reach the same error.
   const double expected = cpu_->measure().squaredSum;
   EXPECT_NEAR(gpu_->measure().squaredSum, expected, 0.01 * expected);
 }
 
-// Two bricks 20 bricks apart, and ellipsoids with the largest scale that the method allows, half the
-// longest axis: each reaches nearly all of every subvolume, and a hundred thousand bricks beyond.
+// Two bricks lie 20 bricks apart. The ellipsoids have the largest scale that the method allows,
+// half the longest axis. Each reaches nearly all of every subvolume, and a hundred thousand other
+// bricks.
 TEST_F(PaperMethodOnGpu, ItsLargestEllipsoidsReachAllOfAWideSparseTree) {
   constexpr int kApart = 20;  // bricks
   std::vector<BrickInput> bricks(2);
