@@ -57,7 +57,7 @@ cli::ProgramText programText() {
           "  vdb2esvr smoke.vdb smoke.esvr                       choose everything from the data\n"
           "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          the best file of 100 KB\n"
           "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             the smallest file with 45 dB\n"
-          "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report smoke.json\n"
+          "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report fit.json\n"
           "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            every voxel within the bound\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255"};
 }
