@@ -9,7 +9,9 @@
 namespace esvr::cuda {
 
 /// Calls visit(brick, reached) on all lanes together until every brick of `within` that is near a
-/// support has been visited by one lane, lanes and rounds in increasing order of the bricks.
+/// support has been visited by one lane, lanes and rounds in increasing order of the bricks. The
+/// support's bounding box must have fewer than 2^63 bricks in `within`: a fit bounds the scales of
+/// its ellipsoids, and CudaIntensityPasses refuses fields that reach too far.
 template <class Visit>
 __device__ void visitReachedBricks(const Support& support, const Box& within, Visit&& visit) {
   const Box range = clippedRange(support, within);
