@@ -62,8 +62,7 @@ cli::ProgramText programText() {
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255"};
 }
 
-void addFitOptions(cli::po::options_description& options) {
-  const double defaultLoss = CompactOptions::kDefaultLoss;
+void addGoalOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("count", value<std::int64_t>()->value_name("N"),
@@ -80,7 +79,14 @@ void addFitOptions(cli::po::options_description& options) {
      "or ellipsoids with a residual if these are smaller")
     ("voxels-only", bool_switch(), "with --max-error, store voxels without trying ellipsoids")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
-     "threshold: a voxel's value decides whether it is active; exact: store the active mask")
+     "threshold: a voxel's value decides whether it is active; exact: store the active mask");
+  // clang-format on
+}
+
+void addFitOptions(cli::po::options_description& options) {
+  const double defaultLoss = CompactOptions::kDefaultLoss;
+  // clang-format off
+  options.add_options()
     ("seconds", value<double>()->value_name("S"), "end the fit of each grid after this time")
     ("iterations", value<std::int64_t>()->value_name("N"), "number of iterations of a fit")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
@@ -126,6 +132,7 @@ cli::CommandLine commandLine() {
   line.argument("input", "IN.vdb");
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
+  addGoalOptions(line.options());
   addFitOptions(line.options());
   cli::addMaxMemory(line);
   line.helpTopic("paper", paperHelp());
