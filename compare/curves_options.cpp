@@ -35,8 +35,8 @@ cli::ProgramText programText() {
           "Exit codes: 0 done, 1 failure or interrupted (finished points are written), 2 wrong\n"
           "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
       .examples =
-          "  esvr-compare curves smoke.vdb --output smoke\n"
-          "  esvr-compare curves smoke.vdb 20k.esvr 40k.esvr 80k.esvr --output smoke --fps 400"};
+          "  esvr-compare curves smoke.vdb --output curves\n"
+          "  esvr-compare curves smoke.vdb 20k.esvr 40k.esvr 80k.esvr --output sizes --fps 400"};
 }
 
 cli::CommandLine makeCommandLine() {

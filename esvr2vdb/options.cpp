@@ -63,7 +63,7 @@ cli::CommandLine commandLine() {
      "write the voxels of the box x0,y0,z0,x1,y1,z1 only; parts of IN that cannot reach them are "
      "not read")
     ("half", value<std::string>()->value_name("W")->default_value("auto"),
-     "save values as half floats: on, off, or auto (as the source did)")
+     "save the values of a .vdb as half floats: on, off, or auto (as the source did)")
     ("no-tiles", bool_switch(), "write leaves whose voxels are all equal as leaves, not as tiles")
     ("reference", value<std::string>()->value_name("REF.vdb"),
      "print the errors of the written grids against the grids of this file")

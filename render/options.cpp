@@ -80,12 +80,9 @@ cli::ProgramText programText() {
               "  esvr-render smoke.esvr --bench --ref smoke.vdb   speed, memory, quality"};
 }
 
-cli::CommandLine commandLine() {
-  cli::CommandLine line(programText());
-  line.argument("input", "IN");
-  line.optionalArgument("output", "OUT.png");
-  // clang-format off
-  line.options().add_options()
+// clang-format off
+void addTransferOptions(cli::po::options_description& options) {
+  options.add_options()
     ("grid,g", value<std::string>()->value_name("NAME"),
      "draw this grid; 'density[1]' is the second of that name (default: the first that can be drawn)")
     ("colors", value<std::string>()->value_name("MAP"),
@@ -104,7 +101,11 @@ cli::CommandLine commandLine() {
      "auto (these and the background), own (the range in FILE), or LO,HI")
     ("opacity-length", value<double>()->value_name("L")->default_value(1.0),
      "length in voxels over which a material of constant value has the opacity that the curve "
-     "says; a larger length makes the volume more transparent")
+     "says; a larger length makes the volume more transparent");
+}
+
+void addPictureOptions(cli::po::options_description& options) {
+  options.add_options()
     ("step", value<double>()->value_name("S")->default_value(1.0),
      "distance between the samples of a ray, in voxels")
     ("min-transmittance", value<double>()->value_name("T"),
@@ -123,7 +124,11 @@ cli::CommandLine commandLine() {
     ("slice", value<std::string>()->value_name("A=P"),
      "draw only a slab of one voxel's thickness; 'z=12.5' is perpendicular to z")
     ("depth", value<std::string>()->value_name("FILE.exr"),
-     "write for each pixel the distance, in voxels, at which half of the light is absorbed")
+     "write for each pixel the distance, in voxels, at which half of the light is absorbed");
+}
+
+void addCameraOptions(cli::po::options_description& options) {
+  options.add_options()
     ("camera", value<std::string>()->value_name("CAM.json"),
      "read the camera from a file; the options below replace what the file says")
     ("eye", value<std::string>()->value_name("X,Y,Z"), "position of the camera")
@@ -138,7 +143,11 @@ cli::CommandLine commandLine() {
     ("turntable", value<int>()->value_name("N"),
      "draw N pictures of a full turn about the up axis")
     ("frames", value<std::string>()->value_name("A-B"),
-     "draw only the pictures A to B of a turntable, counted from 0")
+     "draw only the pictures A to B of a turntable, counted from 0");
+}
+
+void addDeviceOptions(cli::po::options_description& options) {
+  options.add_options()
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
      "auto (a GPU where there is one), cpu, cuda or cuda:N")
     ("max-vram", value<double>()->value_name("GB"),
@@ -154,7 +163,11 @@ cli::CommandLine commandLine() {
      "value of ellipsoids between voxels: voxels interpolates the decoded voxels; sum takes the "
      "sum of ellipsoids itself, which is faster where a pixel covers many voxels")
     ("values", value<std::string>()->value_name("T"),
-     "draw voxels from a NanoVDB grid of this type: float, fp4, fp8, fp16 or fpn")
+     "draw voxels from a NanoVDB grid of this type: float, fp4, fp8, fp16 or fpn");
+}
+
+void addMeasuringOptions(cli::po::options_description& options) {
+  options.add_options()
     ("ref", value<std::string>()->value_name("FILE"), "compare each picture with one of this VDB")
     ("sheet", value<std::string>()->value_name("FILE.png"),
      "write the picture, the picture of --ref and their error side by side")
@@ -163,7 +176,18 @@ cli::CommandLine commandLine() {
     ("report", value<std::string>()->value_name("FILE.json"),
      "write the results of --bench or --ref; '-' is the standard output")
     ("force,f", bool_switch(), "replace OUT.png if it exists");
-  // clang-format on
+}
+// clang-format on
+
+cli::CommandLine commandLine() {
+  cli::CommandLine line(programText());
+  line.argument("input", "IN");
+  line.optionalArgument("output", "OUT.png");
+  addTransferOptions(line.options());
+  addPictureOptions(line.options());
+  addCameraOptions(line.options());
+  addDeviceOptions(line.options());
+  addMeasuringOptions(line.options());
   cli::addMaxMemory(line);
   return line;
 }
@@ -333,6 +357,40 @@ RendererLimits limitsOf(const Arguments& a) {
   return limits;
 }
 
+void readTransfer(const Arguments& a, Options& options) {
+  options.transfer = transferOf(a);
+  readRange(a, options);
+  options.opacityLength = a.get<double>("opacity-length");
+  cli::requireRange("opacity-length", options.opacityLength, 1e-6, 1e6);
+  options.saveTransfer = a.find<std::string>("tf-save").value_or("");
+}
+
+void readPicture(const Arguments& a, Options& options) {
+  options.camera = cameraOf(a);
+  options.resolution = resolutionOf(a.get<std::string>("resolution"));
+  options.step = a.get<double>("step");
+  cli::requireRange("step", options.step, kMinStep, 1e6);
+  options.minTransmittance = a.find<double>("min-transmittance");
+  options.background = backgroundOf(a);
+  options.bits = bitsOf(a);
+  options.mode = modeOf(a);
+  options.clip = clipOf(a);
+  options.turntable = turntableOf(a);
+  readFrames(a, options);
+  options.depth = a.find<std::string>("depth").value_or("");
+}
+
+void readDevice(const Arguments& a, Options& options) {
+  options.device = a.get<std::string>("device");
+  options.limits = limitsOf(a);
+  options.values = valuesOf(a);
+  options.method = cli::choose<Method>(
+      "method", a.get<std::string>("method"),
+      {{"ellipsoids", Method::kEllipsoids}, {"bricks", Method::kBricks}, {"auto", Method::kAuto}});
+  options.between = cli::choose<Between>("between", a.get<std::string>("between"),
+                                         {{"voxels", Between::kVoxels}, {"sum", Between::kSum}});
+}
+
 void readMeasuring(const Arguments& a, Options& options) {
   options.reference = a.find<std::string>("ref").value_or("");
   options.sheet = a.find<std::string>("sheet").value_or("");
@@ -365,31 +423,9 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.input = a.get<std::string>("input");
   options.output = a.find<std::string>("output").value_or("");
   options.grid = a.find<std::string>("grid");
-  options.transfer = transferOf(a);
-  readRange(a, options);
-  options.camera = cameraOf(a);
-  options.resolution = resolutionOf(a.get<std::string>("resolution"));
-  options.step = a.get<double>("step");
-  cli::requireRange("step", options.step, kMinStep, 1e6);
-  options.opacityLength = a.get<double>("opacity-length");
-  cli::requireRange("opacity-length", options.opacityLength, 1e-6, 1e6);
-  options.minTransmittance = a.find<double>("min-transmittance");
-  options.background = backgroundOf(a);
-  options.bits = bitsOf(a);
-  options.mode = modeOf(a);
-  options.clip = clipOf(a);
-  options.turntable = turntableOf(a);
-  readFrames(a, options);
-  options.depth = a.find<std::string>("depth").value_or("");
-  options.saveTransfer = a.find<std::string>("tf-save").value_or("");
-  options.device = a.get<std::string>("device");
-  options.limits = limitsOf(a);
-  options.values = valuesOf(a);
-  options.method = cli::choose<Method>(
-      "method", a.get<std::string>("method"),
-      {{"ellipsoids", Method::kEllipsoids}, {"bricks", Method::kBricks}, {"auto", Method::kAuto}});
-  options.between = cli::choose<Between>("between", a.get<std::string>("between"),
-                                         {{"voxels", Between::kVoxels}, {"sum", Between::kSum}});
+  readTransfer(a, options);
+  readPicture(a, options);
+  readDevice(a, options);
   readMeasuring(a, options);
   options.overwrite = a.get<bool>("force");
   options.maxMemory = cli::maxMemoryOf(a);

@@ -57,13 +57,12 @@ cli::ProgramText programText() {
           "  vdb2esvr smoke.vdb smoke.esvr                       choose everything from the data\n"
           "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          the best file of 100 KB\n"
           "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             the smallest file with 45 dB\n"
-          "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report smoke.json\n"
+          "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report fit.json\n"
           "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            every voxel within the bound\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255"};
 }
 
-void addFitOptions(cli::po::options_description& options) {
-  const double defaultLoss = CompactOptions::kDefaultLoss;
+void addGoalOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("count", value<std::int64_t>()->value_name("N"),
@@ -80,7 +79,14 @@ void addFitOptions(cli::po::options_description& options) {
      "or ellipsoids with a residual if these are smaller")
     ("voxels-only", bool_switch(), "with --max-error, store voxels without trying ellipsoids")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
-     "threshold: a voxel's value decides whether it is active; exact: store the active mask")
+     "threshold: a voxel's value decides whether it is active; exact: store the active mask");
+  // clang-format on
+}
+
+void addFitOptions(cli::po::options_description& options) {
+  const double defaultLoss = CompactOptions::kDefaultLoss;
+  // clang-format off
+  options.add_options()
     ("seconds", value<double>()->value_name("S"), "end the fit of each grid after this time")
     ("iterations", value<std::int64_t>()->value_name("N"), "number of iterations of a fit")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
@@ -126,6 +132,7 @@ cli::CommandLine commandLine() {
   line.argument("input", "IN.vdb");
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
+  addGoalOptions(line.options());
   addFitOptions(line.options());
   cli::addMaxMemory(line);
   line.helpTopic("paper", paperHelp());

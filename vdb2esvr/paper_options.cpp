@@ -88,11 +88,9 @@ struct Key {
   std::function<void(const Setting&, PaperMethod&)> read;
 };
 
-/// The keys in the order in which they are applied. Keys that set a whole schedule come before
-/// those that change a part of it.
-std::vector<Key> keys() {
-  const PaperMethod m;
-  const auto text = [](auto number) { return cli::shortNumber(double(number)); };
+std::string text(double number) { return cli::shortNumber(number); }
+
+std::vector<Key> methodKeys(const PaperMethod& m) {
   return {
       {"prunes", "1", "pruning passes: 0, 1, or 3 (the paper's schedule for BigBrain)", readPasses},
       {"epochs", std::to_string(m.epochs),
@@ -121,6 +119,11 @@ std::vector<Key> keys() {
        "learning rates of position, scale, rotation and intensity at the start; all\n"
        "decay to a tenth",
        readRates},
+  };
+}
+
+std::vector<Key> densifyKeys(const PaperMethod& m) {
+  return {
       {"densify", "on", "densification: on, or off (ellipsoids are neither cloned nor split)",
        [](const Setting& s, PaperMethod& p) {
          p.densify = wordOf<bool>(s, {{"on", true}, {"off", false}});
@@ -138,6 +141,11 @@ std::vector<Key> keys() {
        "scale, as a share of half the longest axis, above which ellipsoids are split\n"
        "instead of cloned",
        [](const Setting& s, PaperMethod& p) { p.percentDense = s.number(1e-9, 1.0); }},
+  };
+}
+
+std::vector<Key> pruneKeys(const PaperMethod& m) {
+  return {
       {"prune-score", "full",
        "full (coverage * intensity * FA), no-fa, only-fa, or contribution (the score of\n"
        "LightGaussian)",
@@ -152,6 +160,16 @@ std::vector<Key> keys() {
          for (PrunePass& pass : p.prunes) pass.share = s.number(0.0, 0.999999);
        }},
   };
+}
+
+/// The keys in the order in which they are applied. Keys that set a whole schedule come before
+/// those that change a part of it.
+std::vector<Key> keys() {
+  const PaperMethod m;
+  std::vector<Key> all = methodKeys(m);
+  for (const auto& more : {densifyKeys(m), pruneKeys(m)})
+    all.insert(all.end(), more.begin(), more.end());
+  return all;
 }
 
 /// Reads KEY=VALUE.

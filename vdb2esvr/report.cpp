@@ -124,8 +124,10 @@ Json topologyOf(const StoredGrid& grid) {
 Json fitOf(const ConvertedGrid& grid) {
   const FitResult& fit = grid.conversion.fit;
   return {{"end", nameOf(fit.end)},
+          {"wanted", fit.wanted},
           {"device", grid.device},
           {"device_bytes", fit.deviceBytes},
+          {"device_full", fit.deviceFull},
           {"kappa_learned", fit.kappaLearned},
           {"pairs", fit.pairs},
           {"hits", orNull(grid.hits)},

@@ -53,6 +53,10 @@ void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
   if (grid.nonFiniteReplaced > 0)
     log.warning("grid \"" + grid.uniqueName + "\": " + std::to_string(grid.nonFiniteReplaced) +
                 " NaN or infinite voxels were replaced by 0");
+  if (const FitResult& fit = grid.conversion.fit; fit.deviceFull)
+    log.warning("grid \"" + grid.uniqueName + "\": the memory of the GPU was full: " +
+                std::to_string(grid.stored().field.ellipsoidCount()) + " ellipsoids instead of " +
+                std::to_string(fit.wanted));
   log.detail("grid \"" + grid.uniqueName + "\": kappa " +
              cli::shortNumber(grid.stored().field.kernel.kappa) + ", threshold " +
              cli::shortNumber(grid.stored().activeThreshold) + ", overlap of active voxels " +

@@ -204,6 +204,18 @@ void forward(const LineForm& f, const float corner[3], const KernelConstants<flo
   run<true>(f, corner, k, sum, &tape);
 }
 
+/// Sums of a pair in each lane.
+struct LaneSums {
+  Vec s0, s0x, s0xx, s1, s1x, s2, rPhi, phi2, rEdge;
+};
+
+/// \param dz  distance of each lane's voxels along z
+inline PairMoments momentsOf(const LaneSums& s, Vec dz) {
+  return {sumLanes(s.s0x),          sumLanes(s.s0 * dz), sumLanes(s.s0xx), sumLanes(s.s0x * dz),
+          sumLanes(s.s0 * dz * dz), sumLanes(s.s1),      sumLanes(s.s1x),  sumLanes(s.s1 * dz),
+          sumLanes(s.s2),           sumLanes(s.rPhi),    sumLanes(s.phi2), sumLanes(s.rEdge)};
+}
+
 void backward(const LineForm& f, const float corner[3], const KernelConstants<float>& k,
               const float* r, const PairTape& tape, PairMoments& moments) {
   const Local l = localise(f, corner);
@@ -234,18 +246,7 @@ void backward(const LineForm& f, const float corner[3], const KernelConstants<fl
     s1 += w1;
     s1x += w1 * dx;
   }
-  moments = {sumLanes(s0x),
-             sumLanes(s0 * l.dz),
-             sumLanes(s0xx),
-             sumLanes(s0x * l.dz),
-             sumLanes(s0 * l.dz * l.dz),
-             sumLanes(s1),
-             sumLanes(s1x),
-             sumLanes(s1 * l.dz),
-             sumLanes(s2),
-             sumLanes(rPhi),
-             sumLanes(phi2),
-             sumLanes(rEdge)};
+  moments = momentsOf({s0, s0x, s0xx, s1, s1x, s2, rPhi, phi2, rEdge}, l.dz);
 }
 
 /// Calls visit(phi, row) for every row of a tape in its order; `row` points to the row's values in

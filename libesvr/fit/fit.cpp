@@ -88,6 +88,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   result.kappaLearned = plan.learnKappa;
   result.end = end.end;
   result.curve = recorder.curve();
+  result.wanted = plan.count;
   result.deviceBytes = optimiser->deviceBytes();
   result.deviceFull = optimiser->deviceFull();
   result.pairs = optimiser->pairCount();

@@ -45,6 +45,7 @@ class IntensityPasses {
 
   /// Sets the shapes and the background for all later calls; the field's intensities are ignored.
   /// \throws RuntimeFailure  the ellipsoids have kappas of their own, on a GPU
+  /// \throws DeviceError     the ellipsoids reach more bricks than a GPU can look at
   virtual void setShapes(const Field& field) = 0;
 
   [[nodiscard]] virtual StoredError error(std::span<const float> intensities) = 0;

@@ -141,9 +141,22 @@ TEST_F(Vdb2EsvrOption, maxVramBoundsTheDevicesMemoryOnGpu) {
   Device gpu;
   test::selectOrSkip("cuda", gpu);
   if (IsSkipped()) return;
-  const auto run =
-      test::vdb2esvr({at("in.vdb"), at("none.esvr"), "--device", "cuda", "--max-vram", "0.00001"});
-  EXPECT_EQ(run.exitCode, 5);
+  const std::vector<std::string> onGpu{"--device", "cuda", "--max-vram"};
+  const auto convert = [&](const char* input, std::vector<std::string> options) {
+    options.insert(options.begin(), onGpu.begin(), onGpu.end());
+    options.insert(options.begin(), {at(input), at("out.esvr"), "--report", at("out.json")});
+    return test::vdb2esvr(options);
+  };
+  // The bricks of the large cloud take more than 1 MB; all ellipsoids of the small one more than 3.
+  test::writeInput(at("large.vdb"), {{.voxels = test::cloud(24)}});
+  test::writeInput(at("small.vdb"), {{.voxels = test::cloud(12)}});
+  EXPECT_EQ(convert("large.vdb", {"0.001"}).exitCode, 5);
+  const auto run = convert("small.vdb", {"0.003", "--count", "5000", "--iterations", "50", "-f"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.err, AllOf(HasSubstr("GPU was full"), HasSubstr("instead of 5000")));
+  const Json fit = Json::parse(test::readText(at("out.json")))["grids"][0]["fit"];
+  EXPECT_EQ(fit["device_full"], true);
+  EXPECT_EQ(fit["wanted"], 5000);
 }
 
 // ---- esvr2vdb

@@ -1,6 +1,7 @@
 #include "fit/cuda/cuda_intensity_passes.h"
 
 #include <algorithm>
+#include <string>
 
 #include "core/cuda/copy.h"
 #include "core/cuda/count32.h"
@@ -43,6 +44,20 @@ void requireOneKappa(const Field& field) {
       throw RuntimeFailure("solving for intensities on a GPU takes one kappa for all");
 }
 
+/// Kernels look at every brick of a support's bounding box, and number these bricks in 64 bits.
+/// \param within  the box of bricks that there may be
+/// \throws DeviceError  there are too many to look at
+void requireCountable(std::span<const Ellipsoid> ellipsoids, double radius, const Box& within) {
+  constexpr double kMaxLookedAt = 0x1p40;  // far more than the ellipsoids of a fit reach
+  double bricks = 0.0;
+  for (const Ellipsoid& e : ellipsoids)
+    bricks +=
+        common(brickRange(makeSupport(e.center, e.L, radius, kRoundingSlack)), within).volume();
+  if (bricks > kMaxLookedAt)
+    throw DeviceError("the ellipsoids reach up to " + std::to_string(bricks) +
+                      " bricks, which are too many for a GPU; use the CPU");
+}
+
 }  // namespace
 
 CudaIntensityPasses::CudaIntensityPasses(const IntensityTarget& target)
@@ -66,6 +81,7 @@ void CudaIntensityPasses::setShapes(const Field& field) {
   requireOneKappa(field);
   const auto ellipsoids = importField(field, origin_, 1.0);
   const double radius = supportRadius(kernelConstants<double>(field.kernel));
+  requireCountable(ellipsoids, radius, restricted_ ? bricks_.view().bounds : kAllBricks);
   fieldBackground_ = field.background;
   kernel_ = kernelConstants<float>(field.kernel);
   count_ = count32(ellipsoids.size(), "ellipsoids");

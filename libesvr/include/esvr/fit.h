@@ -63,8 +63,9 @@ struct FitResult {
   /// Wall-clock times. secondsSeed covers the seeding at the start, growth and relocation, and is
   /// not part of secondsOptimise.
   double secondsSeed = 0.0, secondsOptimise = 0.0;
+  std::size_t wanted = 0;          ///< ellipsoids that our method aimed at; 0 by the paper's
   std::size_t deviceBytes = 0;     ///< largest GPU memory held; 0 on the CPU
-  bool deviceFull = false;         ///< true if GPU memory ran out: fewer ellipsoids than wanted
+  bool deviceFull = false;         ///< true if GPU memory ran out: fewer ellipsoids than `wanted`
   std::uint64_t pairs = 0;         ///< (ellipsoid, brick) pairs that the final field evaluates
   bool signedIntensities = false;  ///< true if an intensity is negative
 };

@@ -68,6 +68,16 @@ TEST_F(IntensitiesOnGpu, AreTheSameBitsInEveryRun) {
   EXPECT_EQ(runs[2], runs[0]);
 }
 
+TEST_F(IntensitiesOnGpu, RefuseEllipsoidsThatReachTooManyBricks) {
+  Crowd crowd;
+  const auto passes = makeIntensityPasses(crowd.target, device_);
+  // The bricks of 3 e^14 voxels, cubed, still have a number in 64 bits; those of e^32 have none.
+  for (const float logScale : {14.0f, 32.0f}) {
+    for (auto& plane : crowd.field.chunks[0].ellipsoids.logScale) plane[0] = logScale;
+    EXPECT_THROW(passes->setShapes(crowd.field), DeviceError) << logScale;
+  }
+}
+
 TEST_F(IntensitiesOnGpu, TakeOneKappaForAll) {
   Crowd crowd;
   Ellipsoids& e = crowd.field.chunks[0].ellipsoids;
