@@ -1,26 +1,26 @@
 #pragma once
-/// Device memory that grows and is used again.
+/// Device memory that grows and is reused.
 
 #include "core/cuda/device_buffer.h"
 
 namespace esvr::cuda {
 
-/// Room for n elements. Growing leaves some to spare, so that sizes which creep up from call to
-/// call do not allocate each time.
+/// A buffer that has room for n elements. It allocates more than asked for, so that sizes which
+/// grow slowly from call to call do not allocate each time.
 template <class T>
 class GrowingBuffer {
  public:
   explicit GrowingBuffer(cudaStream_t stream) : stream_(stream) {}
 
-  /// Room for at least n; what was there is lost when it has to grow.
+  /// Makes room for at least n elements. If the buffer grows, its content is lost.
   T* reserve(std::size_t n) {
     if (n > buffer_.size()) {
-      buffer_ = {};  // first freed, so that both are never held at once
+      buffer_ = {};  // freed first, so that both are never allocated at once
       buffer_ = DeviceBuffer<T>(withSpare(n), stream_);
     }
     return buffer_.data();
   }
-  /// Room for at least n; the first `kept` elements stay.
+  /// Makes room for at least n elements and keeps the first `kept` of them.
   T* extend(std::size_t n, std::size_t kept) {
     if (n > buffer_.size()) {
       DeviceBuffer<T> larger(withSpare(n), stream_);
@@ -32,7 +32,7 @@ class GrowingBuffer {
     }
     return buffer_.data();
   }
-  /// Frees the memory. What was there is lost.
+  /// Frees the memory; the content is lost.
   void release() { buffer_ = {}; }
   [[nodiscard]] T* data() { return buffer_.data(); }
   [[nodiscard]] const T* data() const { return buffer_.data(); }

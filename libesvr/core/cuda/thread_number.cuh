@@ -1,5 +1,5 @@
 #pragma once
-/// Which of all threads or warps of a launch this is, in 64 bits.
+/// The 64-bit number of a thread, and of a warp, in its launch.
 
 #include <cstddef>
 
