@@ -83,7 +83,7 @@ class Surveyor {
   Coord rootKey() {
     const auto key = file_.read<Coord>();
     if (key.x % kUpperExtent || key.y % kUpperExtent || key.z % kUpperExtent)
-      damaged(file_, "a node at " + toString(key) + " off the lattice");
+      damaged(file_, "a node at the impossible place " + toString(key));
     if (!rootKeys_.insert(key).second) damaged(file_, "two nodes at " + toString(key));
     return key;
   }

@@ -250,7 +250,7 @@ TEST_F(Voxels, CoordinatesReachTenMillionEitherWay) {
   test::expectSame(readGrid(directory_ / "out.vdb", "density"), grid);
 }
 
-TEST_F(Voxels, BothEndsOfTheLatticeAtOnceAreTooFarApart) {
+TEST_F(Voxels, BothEndsOfIndexSpaceAtOnceAreTooFarApart) {
   auto source = test::smallGrid();
   source->tree().setValue({Box::kMin, 0, 0}, 1.0f);
   source->tree().setValue({Box::kMax, 0, 0}, 1.0f);
