@@ -21,7 +21,7 @@ from fit_benchmarks import convert, run
 SYNTHETIC = ["8area", "empty-sphere", "synth-tube", "synth-wiggle", "diffuse-scalar"]
 CURVES = ["aneurism", "smoke1"]
 CURVE_MAX = 150_000  # ellipsoids before pruning; smoke1 would otherwise grow to a million
-PAPER_EPOCHS = 2800  # of PaperMethod
+PAPER_EPOCHS = 2800  # the default of PaperMethod
 # Ellipsoids in thousands, PSNR, average hits; before and after pruning (tables 'Primitive type').
 PAPER_TYPES = {
     "aneurism": {"ellipsoid": [(93, 51.20, 20.10), (31, 50.70, 9.05)],

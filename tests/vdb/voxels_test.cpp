@@ -53,7 +53,7 @@ class EveryPacking : public testing::TestWithParam<Packing> {
   template <class Grid>
   static typename Grid::Ptr patterned() {
     auto grid = Grid::create(2.0);
-    grid->setName("density");  // of class unknown, since OpenVDB zips no other
+    grid->setName("density");  // its class is unknown: OpenVDB zips no other
     auto accessor = grid->getAccessor();
     for (int i = 0; i < 8000; ++i) {
       const openvdb::Coord at(i / 400 - 10, i / 20 % 20, i % 20);
