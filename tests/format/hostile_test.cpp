@@ -288,7 +288,7 @@ TEST(HostileFile, AKilobyteCannotAskForAGigabyte) {
 }
 
 /// Zeros compress best, so this is the most that a small file can really hold.
-TEST(HostileFile, TheMostThatAKilobyteCanHoldIsBounded) {
+TEST(HostileFile, TheMemoryOfASmallFileIsBounded) {
   StoredGrid grid = test::emptyGrid();
   grid.descriptor.metadata = {{"zeros", "string", std::vector<std::byte>(4 * kMegabyte)}};
   const auto bytes = encodeEsvr(test::fileOf(grid));
