@@ -26,7 +26,7 @@ std::vector<std::size_t> chooseGrids(const std::filesystem::path& path, const Es
   std::iota(places.begin(), places.end(), std::size_t{0});
   if (names.empty()) return places;
   const auto stored = storedNames(file);
-  std::set<std::size_t> chosen;  // a grid asked for twice is written once
+  std::set<std::size_t> chosen;  // a set, so that a grid that is named twice is written once
   for (const auto& name : names) chosen.insert(findGrid(stored, name, path));
   return {chosen.begin(), chosen.end()};
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// Grids of an .esvr file by the names a user gives them.
+/// Chooses grids of an .esvr file by name.
 
 #include <filesystem>
 #include <string>
@@ -9,13 +9,13 @@
 
 namespace esvr::esvr2vdb {
 
-/// The name that --grid takes for each grid, in file order: its own, with "[i]" where several share
-/// it.
+/// The names that --grid takes, in file order: the name of the grid, with "[i]" if several grids
+/// have it.
 [[nodiscard]] std::vector<std::string> uniqueNames(const EsvrFile& file);
 
-/// Places of the named grids in the file, increasing; all of them where none is named.
-/// \param path  for errors
-/// \throws BadInput  no such grid (lists those there are)
+/// Indices of the named grids, increasing; of all grids if none is named.
+/// \param path  file name for error texts
+/// \throws BadInput  a grid does not exist; the text lists the grids
 [[nodiscard]] std::vector<std::size_t> chooseGrids(const std::filesystem::path& path,
                                                    const EsvrFile& file,
                                                    const std::vector<std::string>& names);

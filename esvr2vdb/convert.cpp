@@ -16,7 +16,7 @@
 namespace esvr::esvr2vdb {
 namespace {
 
-/// All that can go wrong without work goes wrong before it.
+/// Checks everything that can be checked before the work begins.
 void checkFiles(const Options& options) {
   std::vector<std::filesystem::path> files{options.input, options.output};
   if (options.reference) files.push_back(*options.reference);
@@ -60,13 +60,13 @@ std::vector<VolumeGrid> decodeAll(const EsvrFile& file, const std::vector<std::s
   for (const std::size_t g : chosen) {
     grids.push_back(decoded(file.grids[g], options, decode));
     tellEmpty(grids.back(), log);
-    // All grids are held, each twice while they are written.
+    // All grids are in memory, and twice while they are written.
     decode.maxBytes -= std::min(decode.maxBytes, 2 * bytesOf(grids.back().volume));
   }
   return grids;
 }
 
-/// A NanoVDB file has no place for metadata.
+/// Warns that a NanoVDB file cannot hold metadata.
 void tellLostMetadata(const EsvrFile& file, const std::vector<VolumeGrid>& grids,
                       const Options& options, const cli::Log& log) {
   if (options.output.extension() != ".nvdb") return;
@@ -77,7 +77,7 @@ void tellLostMetadata(const EsvrFile& file, const std::vector<VolumeGrid>& grids
               std::to_string(items) + " items of " + options.input.string() + " are left out");
 }
 
-/// Finds each grid in the reference, which is looked through before anything is written.
+/// Finds each grid in the reference, before anything is written.
 std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<std::size_t>& chosen,
                                        const Options& options) {
   const auto names = uniqueNames(file);
@@ -98,7 +98,7 @@ std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<s
 }  // namespace
 
 void convert(const Options& options) {
-  const cli::Interrupts interrupts;  // a file that is begun is finished
+  const cli::Interrupts interrupts;  // Ctrl-C lets a file that is being written be completed
   const cli::Log log(kProgram, options.verbosity);
   checkFiles(options);
   const EsvrFile file = read(options, log);

@@ -8,7 +8,7 @@
 namespace esvr::esvr2vdb {
 namespace {
 
-/// The written voxels; none where the grid came back empty, which readGrid would refuse.
+/// The written voxels; none if the grid has no active voxel, which readGrid would refuse.
 SparseVolume readWritten(const Options& options, const std::string& name) {
   for (const auto& grid : inspectVdb(options.output).grids)
     if (grid.uniqueName == name && grid.activeVoxels == 0) return {};

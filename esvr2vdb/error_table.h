@@ -1,5 +1,5 @@
 #pragma once
-/// --reference.
+/// The option --reference.
 
 #include <iosfwd>
 #include <string>
@@ -9,13 +9,13 @@
 
 namespace esvr::esvr2vdb {
 
-/// A written grid and its counterpart in the reference.
+/// A written grid and the grid of the reference that it is compared with.
 struct ComparedGrid {
-  std::string name;         ///< in the reference
-  std::string writtenName;  ///< in the output
+  std::string name;         ///< name in the reference
+  std::string writtenName;  ///< name in the output
 };
 
-/// Compares what was written with the reference, grid by grid, and prints a table.
+/// Compares the written grids with the reference and prints a table.
 /// \throws BadInput  a grid is not in the reference
 void printErrors(const Options& options, const std::vector<ComparedGrid>& grids, std::ostream& out);
 

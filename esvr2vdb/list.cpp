@@ -54,7 +54,7 @@ void addStream(cli::Table& table, const std::string& grid, const char* stream, s
   table.add({grid, stream, std::to_string(bytes), bytesPerEllipsoid(bytes, ellipsoids)});
 }
 
-/// The bytes of the quantised ellipsoids, by stream.
+/// Prints the bytes of the quantised ellipsoids, by stream.
 void printStreams(const Listing& listing) {
   cli::Table table({"grid", "stream", "bytes", "bytes each"});
   for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
@@ -70,7 +70,7 @@ void printStreams(const Listing& listing) {
   table.print(std::cout);
 }
 
-/// The error of the first layers, and the bytes that they take.
+/// Prints the error and the bytes of the first layers.
 void printLayers(const Listing& listing) {
   cli::Table table({"grid", "layers", "ellipsoids", "bytes", "PSNR box", "max error"});
   for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {

@@ -14,7 +14,7 @@ std::string typeOf(const GridSummary& grid) {
   return grid.savedAsHalf ? grid.valueType + " as half" : grid.valueType;
 }
 
-/// A file counts the active voxels of grids that it does not read only where its writer did.
+/// The number of active voxels of a grid that is not read; known only if the writer stored it.
 std::string voxelsOf(const GridSummary& grid) {
   return grid.isScalar || grid.activeVoxels > 0 ? std::to_string(grid.activeVoxels) : "-";
 }

@@ -1,4 +1,4 @@
-// esvr2vdb: turns an .esvr file back into a VDB, or tells what is in it.
+// esvr2vdb: converts an .esvr file back to a VDB, or lists its content.
 
 #include "cli/run_main.h"
 #include "cli/thread_limit.h"

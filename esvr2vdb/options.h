@@ -21,23 +21,23 @@ enum class Job { kConvert, kList, kCheck };
 struct Options {
   Job job = Job::kConvert;
   std::filesystem::path input, output;
-  std::vector<std::string> grids;  ///< empty: all
+  std::vector<std::string> grids;  ///< names of the grids; empty: all
   DecodeOptions decode;
   ReadPart part;                             ///< the part of the file that is read
   std::optional<std::size_t> maxEllipsoids;  ///< keep those of each grid with the largest weight
   WriteOptions write;
   std::optional<std::filesystem::path> reference;
-  std::optional<Box> box;       ///< PSNR against the reference is taken over it
-  std::uint64_t maxMemory = 0;  ///< bytes
-  int threads = 0;              ///< 0: all
+  std::optional<Box> box;       ///< box of the PSNR against the reference
+  std::uint64_t maxMemory = 0;  ///< limit on the memory that the input needs, bytes
+  int threads = 0;              ///< number of threads; 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
 };
 
-/// Whether the whole file is wanted.
+/// True if the whole file is wanted.
 [[nodiscard]] bool readsAll(const Options& options);
 
-/// \return nothing where --help or --version was printed
-/// \throws UsageError
+/// \return nothing if --help or --version was printed
+/// \throws UsageError  an option is invalid
 [[nodiscard]] std::optional<Options> parseOptions(int argc, const char* const* argv);
 
 }  // namespace esvr::esvr2vdb

@@ -1,5 +1,5 @@
 #pragma once
-/// --box.
+/// The option --box.
 
 #include <string>
 
@@ -7,8 +7,8 @@
 
 namespace esvr::cli {
 
-/// "x0,y0,z0,x1,y1,z1": the smallest and the largest voxel, both within the box.
-/// \throws UsageError  another text, an empty box
+/// Parses "x0,y0,z0,x1,y1,z1": the lowest and the highest voxel, both inside the box.
+/// \throws UsageError  the text is not of this form, or the box is empty
 [[nodiscard]] Box parseBox(const std::string& text, const std::string& option = "box");
 
 }  // namespace esvr::cli

@@ -1,13 +1,14 @@
 #pragma once
-/// Sizes of files as people write them.
+/// Sizes of files and memory in options.
 
 #include <cstdint>
 #include <string>
 
 namespace esvr::cli {
 
-/// "50000", "50KB", "2.6MB" (1000s), "48KiB" (1024s), in any case; at least 1.
-/// \throws UsageError  anything else; names the option
+/// Parses "50000", "50KB" or "2.6MB" (units of 1000), or "48KiB" (units of 1024), in upper or lower
+/// case. The size is at least 1.
+/// \throws UsageError  the text is not of this form; the message names the option
 [[nodiscard]] std::uint64_t parseByteSize(const std::string& option, const std::string& text);
 
 }  // namespace esvr::cli

@@ -1,5 +1,5 @@
 #pragma once
-/// An output file whose bytes are all there.
+/// Writes an output file from bytes in memory.
 
 #include <cstddef>
 #include <filesystem>
@@ -7,8 +7,9 @@
 
 namespace esvr::cli {
 
-/// Writes it whole or not at all. \throws RuntimeFailure  exists (without `overwrite`), not
-/// writable, disk full
+/// Writes the whole file or nothing.
+/// \throws RuntimeFailure  the file exists (without `overwrite`) or is not writable; the disk is
+///                         full
 void writeBytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
                 bool overwrite);
 

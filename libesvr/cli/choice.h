@@ -14,7 +14,7 @@ struct Choice {
   T value;
 };
 
-/// The value of the word given. \throws UsageError  another word; the text lists those there are
+/// The value of a word. \throws UsageError  the word is unknown; the message lists the known ones
 template <class T>
 T choose(const std::string& option, const std::string& given,
          std::initializer_list<Choice<T>> choices) {

@@ -70,7 +70,7 @@ std::string CommandLine::helpText() const {
   appendSection(out, "Notes:", text_.notes);
   appendSection(out, "Examples:", text_.examples);
   std::string help = out.str();
-  help.pop_back();  // the last section's empty line
+  help.pop_back();  // removes the empty line after the last section
   return help;
 }
 
@@ -78,7 +78,7 @@ void CommandLine::helpTopic(const std::string& name, const std::string& text) {
   helpTopics_[name] = text;
 }
 
-/// The topic that stands behind --help; else all there is.
+/// The text of the topic that follows --help, or the whole help.
 std::string CommandLine::helpAskedFor(const po::variables_map& values) const {
   for (const Argument& argument : arguments_) {
     if (values.count(argument.name) == 0) continue;

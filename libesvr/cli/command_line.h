@@ -23,16 +23,17 @@ namespace esvr::cli {
 
 namespace po = boost::program_options;
 
-/// The texts of a program's --help. They are printed as they are, lines of 80 at most.
+/// The texts of a program's --help. They are printed unchanged; their lines have at most 80
+/// characters.
 struct ProgramText {
   std::string name;      ///< "esvr-sample"
-  std::string purpose;   ///< the job that it does
-  std::string usage;     ///< command lines, one a line, each beginning with the name
-  std::string notes;     ///< input, output, exit codes of its own; may be empty
-  std::string examples;  ///< commands with a word on each
+  std::string purpose;   ///< what the program does
+  std::string usage;     ///< command lines that begin with the name
+  std::string notes;     ///< input, output and exit codes; may be empty
+  std::string examples;  ///< commands, each with a few words of explanation
 };
 
-/// The arguments that were given, with the options that all programs share.
+/// The arguments of a run, including the options that all programs have.
 struct Arguments {
   po::variables_map values;
   Verbosity verbosity = Verbosity::kNormal;
@@ -43,7 +44,7 @@ struct Arguments {
   [[nodiscard]] const T& get(const std::string& option) const {
     return values[option].as<T>();
   }
-  /// Nothing where the option was not given and has no default.
+  /// Nothing if the option was not given and has no default.
   template <class T>
   [[nodiscard]] std::optional<T> find(const std::string& option) const {
     return has(option) ? std::optional<T>(get<T>(option)) : std::nullopt;
@@ -54,22 +55,23 @@ class CommandLine {
  public:
   explicit CommandLine(ProgramText text);
 
-  /// The program's own options, as they appear in --help.
+  /// The program's own options, as shown by --help.
   po::options_description& options() { return own_; }
 
-  /// Adds an argument without a dash, in order. Its value is a std::string.
-  /// \param shown  as the usage names it: "OUT.vdb"
+  /// Adds an argument without a dash. Arguments are taken in this order; the value is a
+  /// std::string.
+  /// \param shown  name in the usage text: "OUT.vdb"
   void argument(const std::string& name, const std::string& shown);
-  /// The same for one that may be left out; those come last.
+  /// Adds an argument that may be left out. Such arguments come last.
   void optionalArgument(const std::string& name, const std::string& shown);
-  /// All arguments behind those; the value is a std::vector<std::string>.
+  /// Adds an argument for all remaining ones. Its value is a std::vector<std::string>.
   void repeatedArgument(const std::string& name);
 
-  /// Adds a text that `--help NAME` prints in the place of the whole help.
+  /// Adds a text that `--help NAME` prints instead of the whole help.
   void helpTopic(const std::string& name, const std::string& text);
 
-  /// \return nothing where --help or --version was printed to stdout
-  /// \throws UsageError  what was given makes no sense
+  /// \return nothing if --help or --version was printed to stdout
+  /// \throws UsageError  an option or an argument is invalid
   [[nodiscard]] std::optional<Arguments> parse(int argc, const char* const* argv) const;
 
   [[nodiscard]] std::string helpText() const;
@@ -87,10 +89,10 @@ class CommandLine {
   po::options_description own_, common_;
   std::vector<Argument> arguments_;
   std::map<std::string, std::string> helpTopics_;
-  std::string rest_;  ///< the repeated argument, or a name that nothing asks for
+  std::string rest_;  ///< the repeated argument, or a name that is not used
 };
 
-/// \throws UsageError  the option's value lies outside [low, high] or is not a number
+/// \throws UsageError  the value of the option is outside [low, high] or not a number
 template <class T>
 void requireRange(const std::string& option, T value, T low, T high) {
   if (value >= low && value <= high) return;

@@ -1,5 +1,5 @@
 #pragma once
-/// Ctrl-C.
+/// Handles Ctrl-C.
 
 #include <csignal>
 
@@ -7,9 +7,9 @@
 
 namespace esvr::cli {
 
-/// As long as it lives, the first SIGINT or SIGTERM sets the token instead of ending the process,
-/// so that a run can stop at a safe point; the second ends the process as it would without this.
-/// One at a time: a signal handler finds its token through a static pointer, there is no other way.
+/// While it exists, the first SIGINT or SIGTERM sets the token instead of ending the process, so
+/// that a run can stop at a safe point. The second one ends the process. Only one object may exist
+/// at a time, because a signal handler can find its token only through a static pointer.
 class Interrupts {
  public:
   Interrupts();

@@ -1,5 +1,5 @@
 #pragma once
-/// --report.
+/// The option --report.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -9,12 +9,12 @@ namespace esvr::cli {
 inline constexpr const char* kStandardOutput = "-";
 
 struct JsonFile {
-  std::string path;  ///< kStandardOutput for stdout
+  std::string path;  ///< kStandardOutput: stdout
   bool overwrite = false;
 };
 
-/// Writes it whole or not at all; text that is not UTF-8 (file and grid names may be anything) has
-/// its stray bytes replaced. \throws RuntimeFailure  not writable
+/// Writes the whole file or nothing. Bytes of names that are not UTF-8 are replaced.
+/// \throws RuntimeFailure  the file is not writable
 void writeJson(const JsonFile& file, const nlohmann::ordered_json& json);
 
 }  // namespace esvr::cli

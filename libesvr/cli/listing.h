@@ -1,5 +1,5 @@
 #pragma once
-/// Parts of what --list prints.
+/// Parts of the output of --list.
 
 #include <iosfwd>
 #include <string>
@@ -10,10 +10,10 @@
 
 namespace esvr::cli {
 
-/// "(0, 0, 0) to (7, 7, 7)"; "empty".
+/// A box as text, for example "(0, 0, 0) to (7, 7, 7)"; "empty" for an empty box.
 [[nodiscard]] std::string textOf(const Box& box);
 
-/// A line an item: its name and its type. \param title  begins each line
+/// Prints a line with the name and the type of each item. \param title  start of each line
 void printMetadata(const std::string& title, const std::vector<MetaItem>& items, std::ostream& out);
 
 }  // namespace esvr::cli

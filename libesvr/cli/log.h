@@ -1,5 +1,5 @@
 #pragma once
-/// Messages for people, on stderr: stdout is for data.
+/// Messages for people. They go to stderr, because stdout is for data.
 
 #include <string>
 
@@ -12,11 +12,11 @@ class Log {
   Log(std::string program, Verbosity verbosity)
       : program_(std::move(program)), verbosity_(verbosity) {}
 
-  /// Prints what someone at a terminal wants to know; not under --quiet.
+  /// Prints a message unless --quiet was given.
   void info(const std::string& message) const;
-  /// Only under --verbose.
+  /// Prints a message if --verbose was given.
   void detail(const std::string& message) const;
-  /// Something was done otherwise than asked; not under --quiet.
+  /// Prints a warning that something was not done as asked, unless --quiet was given.
   void warning(const std::string& message) const;
 
  private:

@@ -12,9 +12,9 @@
 namespace esvr::cli {
 namespace {
 
-constexpr std::uint64_t kUnit = 1024;  // of the system's figures
+constexpr std::uint64_t kUnit = 1024;  // unit of the system's figures
 
-/// A line of one of the system's tables.
+/// Reads a line of one of the system's tables.
 std::optional<std::uint64_t> bytesIn(const char* table, const std::string& key) {
   std::ifstream lines(table);
   for (std::string word; lines >> word;) {
@@ -28,7 +28,7 @@ std::optional<std::uint64_t> statusBytes(const std::string& key) {
   return bytesIn("/proc/self/status", key);
 }
 
-/// A file that holds one number; nothing where it holds a word, as "max", or is not there.
+/// Reads a file that holds one number; nothing if it holds a word such as "max" or does not exist.
 std::optional<std::uint64_t> numberIn(const char* path) {
   std::ifstream file(path);
   std::uint64_t value = 0;
@@ -39,7 +39,7 @@ std::uint64_t difference(std::uint64_t limit, std::uint64_t held) {
   return limit > held ? limit - held : 0;
 }
 
-/// The memory that the control group of a container leaves.
+/// The memory that the limit of the process's control group (container) leaves.
 std::uint64_t leftInGroup() {
   const auto limit = numberIn("/sys/fs/cgroup/memory.max");
   if (!limit) return std::numeric_limits<std::uint64_t>::max();
@@ -72,7 +72,7 @@ std::uint64_t peakMemory() {
 
 MemoryMeter::MemoryMeter() {
   malloc_trim(0);
-  constexpr const char* kResetPeak = "5";  // proc(5), clear_refs
+  constexpr const char* kResetPeak = "5";  // see proc(5), clear_refs
   std::ofstream record("/proc/self/clear_refs");
   if (record << kResetPeak << std::flush) before_ = statusBytes("VmRSS:");
 }

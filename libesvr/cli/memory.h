@@ -1,5 +1,5 @@
 #pragma once
-/// How much memory the machine has and the process takes.
+/// The memory of the machine and of the process.
 
 #include <cstdint>
 #include <optional>
@@ -13,15 +13,16 @@ namespace esvr::cli {
 /// its control group or of its address space is reached.
 [[nodiscard]] std::uint64_t availableMemory();
 
-/// Bytes of the most memory that the process has held at once.
+/// The largest amount of memory that the process has held, in bytes.
 [[nodiscard]] std::uint64_t peakMemory();
 
-/// Measures the memory that one step of a run holds at most, beyond what was held before it.
+/// Measures by how much the memory of the process grows during a step.
 class MemoryMeter {
  public:
-  /// Begins a step: gives what is free back to the system, and resets the system's own record.
+  /// Starts a step. It returns free memory to the system and resets the system's record of the
+  /// peak.
   MemoryMeter();
-  /// Bytes; nothing where the system keeps no such record.
+  /// The growth in bytes; nothing if the system keeps no such record.
   [[nodiscard]] std::optional<std::uint64_t> peakRise() const;
 
  private:

@@ -7,7 +7,7 @@ namespace esvr::cli {
 namespace {
 
 constexpr const char* kOption = "max-memory";
-constexpr double kShare = 0.75;  // the rest is for what other programs need meanwhile
+constexpr double kShare = 0.75;  // the rest is left to other programs
 
 }  // namespace
 

@@ -1,5 +1,5 @@
 #pragma once
-/// --max-memory, which bounds what an input may ask for.
+/// The option --max-memory, which limits the memory that an input may need.
 
 #include <cstdint>
 
@@ -7,10 +7,11 @@
 
 namespace esvr::cli {
 
-/// Adds the option, as it appears in --help.
+/// Adds the option.
 void addMaxMemory(CommandLine& line);
 
-/// Bytes: the option's, else a share of the memory that is available. \throws UsageError  no size
+/// The limit in bytes: the value of the option, or a share of the memory that is available.
+/// \throws UsageError  the value is not a size
 [[nodiscard]] std::uint64_t maxMemoryOf(const Arguments& arguments);
 
 }  // namespace esvr::cli

@@ -1,5 +1,5 @@
 #pragma once
-/// Words for what a file says in numbers.
+/// Names of the enumerations that files hold.
 
 #include <string>
 
@@ -9,16 +9,16 @@
 
 namespace esvr::cli {
 
-/// As OpenVDB has it: "level set", "fog volume", "staggered", "unknown".
+/// OpenVDB's names: "level set", "fog volume", "staggered", "unknown".
 [[nodiscard]] std::string nameOf(GridClass gridClass);
-/// "float", "half", "double".
+/// "float", "half" or "double".
 [[nodiscard]] std::string nameOf(ValueType type);
-/// "continuous", "paper".
+/// "continuous" or "paper".
 [[nodiscard]] std::string nameOf(KernelForm form);
-/// "threshold", "bricks", "mask".
+/// "threshold", "bricks" or "mask".
 [[nodiscard]] std::string nameOf(TopologyKind kind);
 
-/// Bytes of a grid's sections.
+/// Bytes of the sections of a grid.
 [[nodiscard]] std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid);
 
 }  // namespace esvr::cli

@@ -1,5 +1,5 @@
 #pragma once
-/// The library's parsing of text (core/parse_text.h), under the programs' names.
+/// The library's functions that parse text (core/parse_text.h), in the namespace of the programs.
 
 #include "core/parse_text.h"
 

@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 
 bool sameFile(const fs::path& a, const fs::path& b) {
-  std::error_code ignored;  // what is not there cannot be compared by its inode
+  std::error_code ignored;  // files that do not exist cannot be compared by their inodes
   return fs::equivalent(a, b, ignored) ||
          fs::weakly_canonical(a, ignored) == fs::weakly_canonical(b, ignored);
 }
@@ -35,7 +35,7 @@ void checkOutput(const fs::path& path, std::initializer_list<std::string_view> e
   if (std::find(extensions.begin(), extensions.end(), given) == extensions.end())
     throw UsageError("cannot write " + path.string() + ": its name must end in " +
                      alternatives(extensions));
-  std::error_code unreadable;  // AtomicFile says what is wrong
+  std::error_code unreadable;  // AtomicFile reports the reason
   if (!overwrite && fs::exists(path, unreadable))
     throw RuntimeFailure("cannot write " + path.string() +
                          ": it exists already (--force replaces it)");

@@ -1,5 +1,5 @@
 #pragma once
-/// A program's output file.
+/// The output files of a program.
 
 #include <filesystem>
 #include <initializer_list>
@@ -8,13 +8,13 @@
 
 namespace esvr::cli {
 
-/// Fails before the work where writing would fail after it.
-/// \throws UsageError  another extension; RuntimeFailure: exists (without `overwrite`), not
-/// writable
+/// Checks before the work begins that a file can be written.
+/// \throws UsageError  the extension is another one
+/// \throws RuntimeFailure  the file exists (without `overwrite`) or is not writable
 void checkOutput(const std::filesystem::path& path,
                  std::initializer_list<std::string_view> extensions, bool overwrite);
 
-/// \throws UsageError  two of them are one file, whatever links lie between
+/// \throws UsageError  two of the paths are the same file, also through links
 void requireDistinct(const std::vector<std::filesystem::path>& files);
 
 }  // namespace esvr::cli

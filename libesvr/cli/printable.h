@@ -1,12 +1,12 @@
 #pragma once
-/// Text of unknown origin on its way to a terminal.
+/// Text of unknown origin that is printed to a terminal.
 
 #include <string>
 
 namespace esvr::cli {
 
-/// Control characters become '?': a grid's or a file's name could otherwise move the cursor or
-/// worse. Line ends stay.
+/// Replaces control characters by '?', because the name of a grid or a file could otherwise control
+/// the terminal. Line ends stay.
 [[nodiscard]] std::string printable(std::string text);
 
 }  // namespace esvr::cli

@@ -24,7 +24,7 @@ int runMain(const std::string& program, const std::function<int()>& body) {
   const auto complain = [&](const std::string& text) {
     std::cerr << program << ": " << printable(text) << '\n';
   };
-  std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes is then an error that can be told
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes then gives an error, not a signal
   try {
     return runAndFlush(body);
   } catch (const Error& error) {

@@ -1,5 +1,5 @@
 #pragma once
-/// The time that a run's phases take.
+/// Measures the time of a run's phases.
 
 #include <chrono>
 
@@ -7,7 +7,7 @@ namespace esvr::cli {
 
 class Stopwatch {
  public:
-  /// Seconds since it was made or last asked for a lap.
+  /// Seconds since construction or the last call.
   double lap() {
     const auto now = Clock::now();
     const std::chrono::duration<double> passed = now - start_;

@@ -1,5 +1,5 @@
 #pragma once
-/// Tables for people: columns aligned, numbers as short as they may be.
+/// Tables in the output of programs.
 
 #include <cstdint>
 #include <iosfwd>
@@ -8,7 +8,8 @@
 
 namespace esvr::cli {
 
-/// Rows of one length. The first column is text and flush left, the others numbers and flush right.
+/// Rows of equal length. The first column is text, aligned left; the others are numbers, aligned
+/// right.
 class Table {
  public:
   explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}
@@ -19,11 +20,11 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-/// "51.54"; "exact" for an infinite PSNR.
+/// A PSNR with two decimals, for example "51.54"; "exact" if it is infinite.
 [[nodiscard]] std::string decibels(double value);
-/// Four significant digits, whatever the scale.
+/// A number with four significant digits.
 [[nodiscard]] std::string shortNumber(double value);
-/// "12.3": a decimal, so that a table's column lines up.
+/// A time with one decimal, for example "12.3", so that a column is aligned.
 [[nodiscard]] std::string seconds(double value);
 
 }  // namespace esvr::cli

@@ -1,11 +1,11 @@
 #pragma once
-/// --threads.
+/// The option --threads.
 
 #include <memory>
 
 namespace esvr::cli {
 
-/// As long as it lives, parallel loops use `threads` threads at most; 0 sets no limit.
+/// While it exists, parallel loops use at most `threads` threads; 0 sets no limit.
 class ThreadLimit {
  public:
   explicit ThreadLimit(int threads);

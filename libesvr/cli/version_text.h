@@ -1,14 +1,14 @@
 #pragma once
-/// --version.
+/// The option --version.
 
 #include <string>
 
 namespace esvr::cli {
 
-/// The program's version and those of all that it reads, writes and runs on, one a line.
+/// The versions of the program, the file format and the libraries, one in a line.
 [[nodiscard]] std::string versionText(const std::string& program);
 
-/// "0.1.0".
+/// The version of the program, for example "0.1.0".
 [[nodiscard]] std::string programVersion();
 
 }  // namespace esvr::cli

@@ -7,7 +7,7 @@
 namespace esvr::codec {
 
 /// Finds frequent codes (for floats and halves only) and, along each axis, the mirror under which
-/// the most voxels of a sample are equal, if there is a good one.
+/// the largest number of a sample's voxels are equal, if it is large enough.
 [[nodiscard]] VoxelModel chooseModel(const VoxelLayer& layer);
 
 [[nodiscard]] bool hasMirror(const VoxelModel& model);

@@ -91,7 +91,7 @@ class PsnrSearch {
   }
 
   /// True for attempts that may be the smallest: those near the aim, or, if there are none, the one
-  /// that exceeds the PSNR least.
+  /// whose PSNR exceeds the goal by the smallest amount.
   [[nodiscard]] bool candidate(const Attempt& a) const {
     if (!reached(a)) return false;
     const auto isNearAim = [&](const Attempt& other) { return nearAim(other); };

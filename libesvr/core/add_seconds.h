@@ -1,11 +1,11 @@
 #pragma once
-/// Adds up where time goes.
+/// Adds up the time that parts of a run take.
 
 #include <chrono>
 
 namespace esvr {
 
-/// Adds the seconds of its life to a sum.
+/// Adds the seconds between its construction and its destruction to a sum.
 class AddSeconds {
  public:
   explicit AddSeconds(double& sum) : sum_(sum) {}

@@ -15,18 +15,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr mode_t kNewFileMode = 0666;  // narrowed by the process's umask
+constexpr mode_t kNewFileMode = 0666;  // reduced by the process's umask
 constexpr mode_t kPermissionBits = 07777;
 
-/// The file that a name stands for: a link's target, so that the link itself survives.
+/// Follows symbolic links to the file itself, so that a link is not replaced.
 fs::path followLinks(const fs::path& target) {
-  std::error_code ignored;  // a path that cannot be resolved fails at open, with its own reason
+  std::error_code ignored;  // open() reports a path that cannot be resolved
   const fs::path resolved = fs::weakly_canonical(target, ignored);
   return resolved.empty() ? target : resolved;
 }
 
-/// Makes the new name survive a power cut. Not every file system can, and the file is complete
-/// either way, so errors are not failures.
+/// Writes the directory to the disk, so that the new name survives a power failure. Some file
+/// systems cannot do this. The file is complete in any case, so errors are ignored.
 void flushDirectory(const fs::path& directory) {
   const int fd = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) return;
@@ -51,7 +51,7 @@ AtomicFile::AtomicFile(const fs::path& target, bool overwrite)
 }
 
 AtomicFile::~AtomicFile() {
-  // Without its lock the file may be another process's to remove: it goes first.
+  // Removed before the lock is released, since another process may remove an unlocked file.
   if (!committed_) ::unlink(temporary_.path.c_str());
   if (temporary_.fd >= 0) ::close(temporary_.fd);
 }
@@ -67,7 +67,7 @@ void AtomicFile::write(std::span<const std::byte> bytes) {
 
 void AtomicFile::commit() {
   if (::fsync(temporary_.fd) != 0) fail("cannot flush ", errno);
-  rename();  // while the file is open, and so locked
+  rename();  // while the file is open, and therefore locked
   committed_ = true;
   flushDirectory(temporary_.path.parent_path());
 }
@@ -75,7 +75,7 @@ void AtomicFile::commit() {
 void AtomicFile::rename() {
   const unsigned flags = overwrite_ ? 0u : unsigned(RENAME_NOREPLACE);
   if (::renameat2(AT_FDCWD, temporary_.path.c_str(), AT_FDCWD, target_.c_str(), flags) == 0) return;
-  // A file system without RENAME_NOREPLACE: a hard link refuses an existing name as well.
+  // On a file system without RENAME_NOREPLACE, a hard link refuses an existing name as well.
   const bool unsupported = errno == EINVAL || errno == ENOSYS;
   if (overwrite_ || !unsupported) fail("cannot name ", errno);
   if (::link(temporary_.path.c_str(), target_.c_str()) != 0) fail("cannot name ", errno);

@@ -1,6 +1,6 @@
 #pragma once
-/// A file that appears under its name only when it is complete: written beside the target under a
-/// temporary name, flushed to the disk and renamed.
+/// A file that appears under its name only when it is complete. It is written beside the target
+/// under a temporary name, flushed to the disk and renamed.
 
 #include <cstddef>
 #include <filesystem>
@@ -10,26 +10,27 @@
 
 namespace esvr {
 
-/// One file on its way. Destroyed before commit(), it leaves nothing behind. What a process that was
-/// killed left behind is removed by the next AtomicFile in the same directory.
-/// Every failure is thrown as RuntimeFailure that names the target.
+/// A file that is being written. Nothing is left of it if it is destroyed before commit(). A
+/// temporary file of a process that was killed is removed by the next AtomicFile in the same
+/// directory.
+/// Every failure is a RuntimeFailure that names the target.
 class AtomicFile {
  public:
-  /// Refuses a target that exists (without `overwrite`) or is not a regular file, then creates the
-  /// temporary file exclusively in the target's directory. A symbolic link is followed.
+  /// Refuses a target that exists (without `overwrite`) or is not a regular file, and creates the
+  /// temporary file in the target's directory. A symbolic link is followed.
   AtomicFile(const std::filesystem::path& target, bool overwrite);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// The temporary file: for libraries that write by name.
+  /// The path of the temporary file, for libraries that open files by name.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return temporary_.path; }
 
   /// Appends to the temporary file.
   void write(std::span<const std::byte> bytes);
 
-  /// Flushes and renames. Without `overwrite`, a target that appeared meanwhile is kept and this
-  /// fails.
+  /// Flushes and renames the file. Without `overwrite` it fails if the target has appeared
+  /// meanwhile.
   void commit();
 
  private:

@@ -15,7 +15,7 @@ ESVR_HD inline std::uint64_t hashOf(Coord c) {
   return h ^ (h >> 31);
 }
 
-/// As operator==, which nvcc 13 cannot take from host code when it is defaulted.
+/// The same as operator==, which nvcc 13 cannot call on the device if it is defaulted.
 ESVR_HD inline bool sameBrick(Coord a, Coord b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
 }  // namespace esvr

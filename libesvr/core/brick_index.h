@@ -1,5 +1,6 @@
 #pragma once
-/// Finds a brick by its coordinates: a hash table, so that its size follows the bricks.
+/// A hash table that finds bricks by their coordinates. Its size depends on the number of bricks
+/// only.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,22 +16,22 @@ class BrickIndex {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  /// \throws RuntimeFailure  2^32 bricks or more, as append() does
+  /// \throws RuntimeFailure  there are 2^32 bricks or more; append() throws it too
   explicit BrickIndex(std::span<const Coord> bricks);
 
-  /// Position of a brick, kNone where there is none.
+  /// Position of a brick, or kNone.
   [[nodiscard]] std::uint32_t find(Coord brick) const {
     for (std::size_t slot = hash(brick) & mask_;; slot = (slot + 1) & mask_) {
       if (slots_[slot] == kNone) return kNone;
       if (bricks_[slots_[slot]] == brick) return slots_[slot];
     }
   }
-  /// Appends bricks that are not there yet.
+  /// Appends those of the bricks that are not in the table.
   void append(std::span<const Coord> bricks);
 
   [[nodiscard]] const std::vector<Coord>& bricks() const { return bricks_; }
   [[nodiscard]] std::size_t size() const { return bricks_.size(); }
-  /// The smallest box of brick coordinates around all bricks.
+  /// The smallest box of brick coordinates that contains all bricks.
   [[nodiscard]] const Box& bounds() const { return bounds_; }
 
  private:

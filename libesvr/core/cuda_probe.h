@@ -1,6 +1,7 @@
 #pragma once
-/// The CUDA runtime's view of this machine. It is implemented by cuda/probe.cu, and by no_cuda.cpp
-/// in a build without CUDA, as builtWithCuda() is; device.cpp knows only this.
+/// Lists the devices that the CUDA runtime finds on this machine. It is implemented in
+/// cuda/probe.cu, and in no_cuda.cpp for a build without CUDA, as is builtWithCuda(). device.cpp
+/// depends only on this header.
 
 #include <string>
 #include <vector>
@@ -8,18 +9,18 @@
 namespace esvr {
 
 struct CudaDevice {
-  int index = 0;             ///< the runtime's
+  int index = 0;             ///< number that the runtime gives it
   std::string name;          ///< "NVIDIA H200"
-  std::string whyNotUsable;  ///< empty where kernels of this build run on it
+  std::string whyNotUsable;  ///< empty if kernels of this build can run on it
 };
 
 struct CudaProbe {
-  std::string versions;             ///< as cudaVersions() returns them
-  std::vector<CudaDevice> devices;  ///< all that the driver shows
-  std::string whyNoDevices;         ///< empty where there are some
+  std::string versions;             ///< see cudaVersions()
+  std::vector<CudaDevice> devices;  ///< all devices that the driver shows
+  std::string whyNoDevices;         ///< empty if there are devices
 };
 
-/// Asks the driver; creates no context on any device.
+/// Asks the driver, without creating a context on any device.
 [[nodiscard]] CudaProbe probeCuda();
 
 }  // namespace esvr

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view kCudaPrefix = "cuda:";
 
-/// The N of "cuda:N"; nothing where the text is another.
+/// The N of "cuda:N"; nothing for any other text.
 std::optional<int> cudaIndex(std::string_view text) {
   if (!text.starts_with(kCudaPrefix)) return std::nullopt;
   const auto index = parseWhole(text.substr(kCudaPrefix.size()));
@@ -61,7 +61,7 @@ Device chooseDevice(const std::string& text, const CudaProbe& probe) {
 }
 
 Device selectDevice(const std::string& text) {
-  // "cpu" never wakes the driver.
+  // With "cpu" the driver is not initialised.
   return chooseDevice(text, text == "cpu" ? CudaProbe{} : probeCuda());
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-/// The rule by which a --device text becomes a device, apart from the machine it runs on.
+/// Chooses a device by the text of --device. The choice does not depend on the machine that runs
+/// it, so that it can be tested.
 
 #include <string>
 
@@ -8,8 +9,8 @@
 
 namespace esvr {
 
-/// As selectDevice, on a machine that `probe` describes. "cuda" and "auto" take the first usable
-/// device; "cuda:N" takes that one or nothing.
+/// Chooses as selectDevice does, on a machine that `probe` describes. "cuda" and "auto" take the
+/// first usable device; "cuda:N" takes device N or fails.
 [[nodiscard]] Device chooseDevice(const std::string& text, const CudaProbe& probe);
 
 }  // namespace esvr

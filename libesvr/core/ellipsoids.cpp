@@ -7,7 +7,7 @@
 namespace esvr {
 namespace {
 
-constexpr float kUnitTolerance = 1e-5f;  // float32 normalisation is good to 2e-7
+constexpr float kUnitTolerance = 1e-5f;  // float32 normalisation has an error of 2e-7
 
 bool allFinite(const std::vector<float>& v) {
   return std::all_of(v.begin(), v.end(), [](float x) { return std::isfinite(x); });

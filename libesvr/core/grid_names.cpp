@@ -18,8 +18,8 @@ std::string quotedList(std::span<const std::string> names) {
   return list.empty() ? "none" : list;
 }
 
-/// Place of the first name that equals `wanted` once `asWritten` has dressed it; names.size() where
-/// there is none.
+/// Index of the first name for which asWritten(name) equals `wanted`; names.size() if there is
+/// none.
 template <class AsWritten>
 std::size_t firstWhere(std::span<const std::string> names, const std::string& wanted,
                        AsWritten&& asWritten) {

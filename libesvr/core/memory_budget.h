@@ -1,5 +1,5 @@
 #pragma once
-/// Memory that a reader may use for what a file asks for.
+/// A limit on the memory that a reader takes for the content of a file.
 
 #include <cstdint>
 #include <string>
@@ -12,8 +12,9 @@ class MemoryBudget {
  public:
   explicit MemoryBudget(std::uint64_t maxBytes) : max_(maxBytes) {}
 
-  /// Takes memory before it is allocated. \param what  begins the message
-  /// \throws MemoryExceeded  more is taken than there is
+  /// Takes bytes from the budget, before they are allocated.
+  /// \param what  start of the message
+  /// \throws MemoryExceeded  the budget has fewer bytes
   void take(double bytes, const std::string& what) {
     taken_ += bytes;
     requireWithinMemory(taken_, max_, what);

@@ -7,7 +7,7 @@
 namespace esvr {
 namespace {
 
-/// A number of type T at the beginning of a text, and what is left behind it.
+/// Reads a number of type T at the beginning of a text and removes it from the text.
 template <class T>
 bool takeNumber(std::string_view& text, T& value) {
   const auto [next, error] = std::from_chars(text.data(), text.data() + text.size(), value);

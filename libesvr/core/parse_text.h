@@ -1,5 +1,5 @@
 #pragma once
-/// Takes text apart: lists and numbers as people write them, the same in every locale.
+/// Parses lists and numbers that people write, in the same way in every locale.
 
 #include <cstdint>
 #include <optional>
@@ -9,16 +9,17 @@
 
 namespace esvr {
 
-/// The parts of a text between separators; one part, the text itself, where there is none.
+/// The parts of a text between separators. A text without a separator is one part.
 [[nodiscard]] std::vector<std::string> splitText(const std::string& text, char separator);
 
-/// A finite number that takes the whole text: "3", "-0.5", "2e-4". Nothing for anything else.
+/// A finite number that is the whole text, for example "3", "-0.5" or "2e-4"; else nothing.
 [[nodiscard]] std::optional<double> parseNumber(std::string_view text);
 
-/// A whole number that takes the whole text. Nothing for anything else.
+/// A whole number that is the whole text; else nothing.
 [[nodiscard]] std::optional<std::int64_t> parseWhole(std::string_view text);
 
-/// A number, and the text behind it: "50KB" is 50 and "KB". Nothing where no number begins the text.
+/// A number and the text after it: "50KB" is 50 and "KB". Nothing if the text begins with no
+/// number.
 struct LeadingNumber {
   double value = 0.0;
   std::string_view rest;

@@ -1,5 +1,5 @@
 #pragma once
-/// The CUDA entry points refuse in a build without CUDA.
+/// Refuses CUDA in a build without it.
 
 #include <string>
 
@@ -9,7 +9,7 @@
 
 namespace esvr {
 
-/// \param work  what was to be done there, for the message: "fitting"
+/// \param work  the operation, for the message: "fitting"
 /// \throws DeviceError  always
 [[noreturn]] inline void refuseCuda(const std::string& work, const Device& device) {
   throw DeviceError(work + " on cuda:" + std::to_string(device.index) + ": " +

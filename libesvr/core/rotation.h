@@ -23,7 +23,8 @@ ESVR_HD inline Quaternion normalised(const Quaternion& q) {
   return {q[0] * s, q[1] * s, q[2] * s, q[3] * s};
 }
 
-/// The matrix of a rotation. Its columns are the turned axes. \param q  has unit length
+/// The matrix of a rotation, whose columns are the rotated axes.
+/// \param q  a quaternion of unit length
 ESVR_HD inline Matrix3 rotationOf(const Quaternion& q) {
   const double w = q[0], x = q[1], y = q[2], z = q[3];
   return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),

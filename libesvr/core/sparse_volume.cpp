@@ -28,7 +28,7 @@ void refuseTooFarApart(Coord low, const std::vector<BrickInput>& bricks) {
   }
 }
 
-/// Extremes of an activity mask's bits: the local box of a brick's active voxels.
+/// The box of a brick's active voxels, in local coordinates.
 Box localActiveBox(const BrickMask& mask) {
   Box box;
   for (int offset = 0; offset < kBrickVoxels; ++offset)
@@ -45,7 +45,7 @@ std::optional<std::size_t> findBrick(const SparseVolume& volume, Coord brick) {
 }
 
 float valueAt(const SparseVolume& volume, Coord voxel) {
-  // In bricks: the difference of two voxels need not fit 32 bits.
+  // The difference is formed in bricks, because that of two voxels may exceed 32 bits.
   const auto b = findBrick(volume, brickOf(voxel) - brickOf(volume.origin));
   return b ? volume.brickValues(*b)[voxelOffset(localOf(voxel))] : volume.background;
 }

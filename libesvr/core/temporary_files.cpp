@@ -37,13 +37,14 @@ bool namedAsOurs(const std::string& name) {
   return std::all_of(digits, digits + kDigits, [](unsigned char c) { return std::isxdigit(c); });
 }
 
-/// Waits for the lock. Where a file system has no locks there is none, and nothing is removed.
+/// Waits for the lock. On a file system without locks there is none, and no file is removed.
 void lock(int fd) {
   while (::flock(fd, LOCK_EX) != 0 && errno == EINTR) {
   }
 }
 
-/// Another process may have taken the file for a left-over before it was locked.
+/// True if another process has taken the file for a left-over file and removed it before it was
+/// locked.
 bool removed(int fd) {
   struct stat status {};
   return ::fstat(fd, &status) == 0 && status.st_nlink == 0;

@@ -1,6 +1,6 @@
 #pragma once
-/// Temporary files of AtomicFile. The process that writes one holds a lock on it, which the system
-/// releases when the process ends, however it ends: a file without a lock is left over.
+/// Temporary files of AtomicFile. A process locks the file that it writes, and the system releases
+/// the lock when the process ends for any reason. A file without a lock is therefore left over.
 
 #include <sys/types.h>
 
@@ -10,14 +10,14 @@ namespace esvr {
 
 struct TemporaryFile {
   std::filesystem::path path;
-  int fd = -1;  ///< open for writing and locked; -1: could not be created, and errno says why
+  int fd = -1;  ///< open for writing and locked; -1: creation failed, see errno
 };
 
-/// Creates a file that no other process has, beside the files of a directory.
+/// Creates a file with a new name in a directory.
 [[nodiscard]] TemporaryFile createTemporary(const std::filesystem::path& directory, mode_t mode);
 
-/// Removes this user's temporary files in a directory whose processes have ended. Errors are no
-/// failures: what cannot be removed stays.
+/// Removes this user's temporary files in a directory whose processes have ended. Errors are
+/// ignored; files that cannot be removed stay.
 void removeLeftOvers(const std::filesystem::path& directory);
 
 }  // namespace esvr

@@ -45,8 +45,8 @@ class Optimiser {
   /// Adds seeds at voxels of large error until there are `count` ellipsoids or no error is left.
   virtual void growTo(std::size_t count) = 0;
 
-  /// Replaces the `count` ellipsoids whose removal adds the least error by seeds at voxels of large
-  /// error.
+  /// Replaces the `count` ellipsoids whose removal adds the smallest error by seeds at voxels of
+  /// large error.
   virtual void relocate(std::size_t count) = 0;
 
   /// Makes an iteration (gradients and a step) for each factor of the tuned step sizes.

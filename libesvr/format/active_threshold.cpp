@@ -10,17 +10,18 @@
 namespace esvr::format {
 namespace {
 
-// A bin is a float's exponent and its first 7 bits of mantissa: every scale of values is resolved
-// alike, from 1e-38 to 1e38.
+// A bin holds the activities with the same exponent and the same first 7 bits of the mantissa, so
+// that the resolution relative to the value is the same from 1e-38 to 1e38.
 constexpr int kDroppedBits = 16;
 
-/// Squared error that a better overlap may add, by what is there: 0.004 dB.
+/// Squared error that a better overlap may add, as a share of the error that is there if every
+/// voxel is active: 0.004 dB.
 constexpr double kAllowedShare = 1e-3;
 
 std::size_t binOf(float activity) { return std::bit_cast<std::uint32_t>(activity) >> kDroppedBits; }
 const std::size_t kBins = binOf(std::numeric_limits<float>::max()) + 1;
 
-/// The largest threshold that keeps a bin, and with it all above.
+/// The largest threshold at which all voxels of a bin, and of the bins above it, stay active.
 float thresholdBelow(std::size_t bin) {
   if (bin == 0) return 0.0f;
   return std::bit_cast<float>((std::uint32_t(bin) << kDroppedBits) - 1);
@@ -28,7 +29,7 @@ float thresholdBelow(std::size_t bin) {
 
 struct Tally {
   std::uint64_t active = 0, inactive = 0;  ///< voxels, by the source's mask
-  double cost = 0.0;  ///< squared error that is added where they are not active
+  double cost = 0.0;                       ///< squared error that making these voxels inactive adds
 };
 
 class Histogram {

@@ -1,5 +1,5 @@
 #pragma once
-/// Chooses the threshold that tells active voxels from the rest.
+/// Chooses the threshold of a grid whose voxels are active by value.
 
 #include <span>
 
@@ -11,14 +11,15 @@ namespace esvr::format {
 
 struct ThresholdChoice {
   float threshold = 0.0f;
-  double iou = 0.0;  ///< intersection over union of active voxels, source and result
+  double iou = 0.0;  ///< intersection over union of the active voxels of source and result
 };
 
-/// The best overlap that costs no squared error worth telling (0.004 dB), to 1/128 of the
-/// threshold: one evaluation of the field and a histogram. Where several thresholds do as well, one
-/// amid them, so that rounding on another machine changes nothing. \param bricks  where the field
-/// will be evaluated: increasing index corners
-/// \param rule  its threshold takes no part
+/// Chooses the threshold with the best overlap of the active voxels among those that add no more
+/// than 0.004 dB to the error. It is precise to 1/128 of its value. The search takes one evaluation
+/// of the field and a histogram. If several thresholds are as good, a middle one is taken, so that
+/// rounding on another machine changes no voxel.
+/// \param bricks  index corners, increasing, of the bricks on which the field will be evaluated
+/// \param rule  rule of the voxels; its threshold is ignored
 [[nodiscard]] ThresholdChoice chooseThreshold(const SparseVolume& source, const Field& field,
                                               const VoxelRule& rule, std::span<const Coord> bricks);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Little-endian bytes taken apart; never reads past their end.
+/// Reads little-endian values from bytes, and never past their end.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace esvr::format {
 
 class ByteReader {
  public:
-  /// \param where  "file: section", begins every error
+  /// \param where  start of every error text: "file: section"
   ByteReader(std::span<const std::byte> bytes, std::string where)
       : bytes_(bytes), where_(std::move(where)) {}
 
@@ -27,7 +27,7 @@ class ByteReader {
     return value;
   }
 
-  /// An enumeration stored in one byte, its values 0 to `last`.
+  /// An enumeration in one byte with the values 0 to `last`.
   template <class Enum>
   [[nodiscard]] Enum getEnum(Enum last, const char* what) {
     const auto value = get<std::uint8_t>();
@@ -36,7 +36,7 @@ class ByteReader {
     return static_cast<Enum>(value);
   }
 
-  /// A length in 32 bits, then the bytes.
+  /// A length in 32 bits, and then as many bytes.
   [[nodiscard]] std::span<const std::byte> getSized() { return take(get<std::uint32_t>()); }
   [[nodiscard]] std::string getString() {
     const auto bytes = getSized();
@@ -47,17 +47,17 @@ class ByteReader {
     return {bytes.begin(), bytes.end()};
   }
 
-  /// So many bytes, as they lie there.
+  /// The next n bytes, unchanged.
   [[nodiscard]] std::span<const std::byte> getBytes(std::size_t n) { return take(n); }
 
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
 
-  /// Refuses bytes that nothing has read.
+  /// Refuses bytes that have not been read.
   void finish() const {
     if (left() != 0) fail(std::to_string(left()) + " bytes too many");
   }
 
-  /// The same, but for zeros, which stand for nothing.
+  /// Refuses unread bytes that are not zero.
   void finishZeros() {
     while (left() != 0)
       if (get<std::uint8_t>() != 0) fail("has content after its end");

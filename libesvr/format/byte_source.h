@@ -1,6 +1,6 @@
 #pragma once
-/// Sources of a container's bytes, which are read piece by piece, so that nothing is read that is
-/// not needed and nothing is allocated for what is not there.
+/// Sources from which the bytes of a container are read piece by piece, so that a reader loads only
+/// what it needs, and allocates memory only for bytes that exist.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,10 +21,11 @@ class ByteSource {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] virtual std::uint64_t size() const = 0;
 
-  /// The bytes [offset, offset + n). \throws BadInput  beyond the end (before it allocates)
+  /// Reads the bytes [offset, offset + n).
+  /// \throws BadInput  they reach beyond the end; nothing is allocated then
   [[nodiscard]] std::vector<std::byte> read(std::uint64_t offset, std::uint64_t n) const;
 
-  /// Bytes that have been read so far, again those that were read twice.
+  /// Number of bytes that have been read so far; bytes that are read twice count twice.
   [[nodiscard]] std::uint64_t bytesRead() const { return bytesRead_; }
 
  private:
@@ -34,7 +35,7 @@ class ByteSource {
   mutable std::uint64_t bytesRead_ = 0;
 };
 
-/// Bytes in memory, which must outlive the source.
+/// Reads bytes in memory, which must outlive the source.
 class MemorySource : public ByteSource {
  public:
   MemorySource(std::span<const std::byte> bytes, std::string name)
@@ -47,7 +48,7 @@ class MemorySource : public ByteSource {
   std::span<const std::byte> bytes_;
 };
 
-/// Bytes of its own.
+/// Reads bytes that it owns.
 class BufferSource : public ByteSource {
  public:
   BufferSource(std::vector<std::byte> bytes, std::string name)
@@ -60,7 +61,7 @@ class BufferSource : public ByteSource {
   std::vector<std::byte> bytes_;
 };
 
-/// A part of another source, which must outlive this one.
+/// Reads a part of another source, which must outlive this one.
 class PartSource : public ByteSource {
  public:
   PartSource(const ByteSource& whole, std::uint64_t offset, std::uint64_t size, std::string name)
@@ -74,7 +75,8 @@ class PartSource : public ByteSource {
   std::uint64_t offset_, size_;
 };
 
-/// \throws BadInput  missing, not readable, not a regular file
+/// Reads a file.
+/// \throws BadInput  the file is missing, not readable, or not a regular file
 class FileSource : public ByteSource {
  public:
   explicit FileSource(const std::filesystem::path& path);

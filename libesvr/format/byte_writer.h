@@ -1,5 +1,5 @@
 #pragma once
-/// Little-endian bytes in the making.
+/// Writes values as little-endian bytes.
 
 #include <bit>
 #include <cstddef>
@@ -30,7 +30,8 @@ class ByteWriter {
     append(std::as_bytes(std::span(values)));
   }
 
-  /// A length in 32 bits, then the bytes. \throws RuntimeFailure  4 GiB or more
+  /// Writes a length in 32 bits and then the bytes.
+  /// \throws RuntimeFailure  there are 4 GiB or more
   void putSized(std::span<const std::byte> bytes) {
     if (bytes.size() > std::numeric_limits<std::uint32_t>::max())
       throw RuntimeFailure("a name or a metadata value has 4 GiB or more");

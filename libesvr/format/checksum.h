@@ -1,5 +1,5 @@
 #pragma once
-/// XXH64 with seed 0.
+/// The checksum of the file format: XXH64 with seed 0.
 
 #include <cstddef>
 #include <cstdint>

@@ -32,7 +32,8 @@ void expand(Box& box, const Vec3& center, const Vec3& half) {
                    clampedCeil(center[2] + half[2])});
 }
 
-/// Half widths of an ellipsoid's bounding box at support radius 1: lengths of the rows of R S.
+/// Half widths of an ellipsoid's bounding box for a support radius of 1: the lengths of the rows of
+/// R S.
 Vec3 unitHalfWidths(const Ellipsoids& e, std::size_t i) {
   const Matrix3 R =
       rotationOf({e.rotation[0][i], e.rotation[1][i], e.rotation[2][i], e.rotation[3][i]});
@@ -40,13 +41,13 @@ Vec3 unitHalfWidths(const Ellipsoids& e, std::size_t i) {
   for (std::size_t a = 0; a < 3; ++a) {
     for (std::size_t j = 0; j < 3; ++j)
       half[a] = std::hypot(half[a], R[3 * a + j] * std::exp(double(e.logScale[j][i])));
-    // 0 * inf where a scale overflows: as far as it gets
+    // A scale that overflows gives 0 * inf; the box is then unbounded.
     if (std::isnan(half[a])) half[a] = HUGE_VAL;
   }
   return half;
 }
 
-/// 0 for the paper's kernel at a negative kappa, whose support is empty.
+/// The radius of the support; 0 for the paper's kernel at a negative kappa, whose support is empty.
 double radiusOf(const Kernel& kernel, double kappa) {
   const double radius = supportRadius(kernelConstants<double>(kernel, kappa));
   return radius > 0.0 ? radius : 0.0;

@@ -15,23 +15,24 @@ constexpr const char* kCompressor = BLOSC_ZSTD_COMPNAME;
 constexpr int kLevel = 5;
 constexpr std::size_t kBlockBytes = 256 * 1024;
 
-/// Blosc shuffles the bits of eight numbers at a time, and leaves a block of another length as it
-/// is: content is padded with zeros to eight of the largest numbers.
+/// Blosc shuffles the bits of eight numbers together and leaves a block of another length
+/// unshuffled. Content is therefore padded with zeros to a multiple of eight of the largest
+/// numbers.
 constexpr std::uint64_t kPadding = 8 * sizeof(double);
 
-/// Content of one Blosc buffer; Blosc itself ends at 2^31.
+/// Bytes of content in one Blosc buffer; Blosc's own limit is 2^31.
 constexpr std::size_t kBufferBytes = std::size_t{1} << 30;
 
-/// Bound on the ratio: no more than this is ever written, so no more need be believed. Zeros in
-/// blocks of this size reach half of it.
+/// Limit on the ratio of content to stored bytes. The writer stays below it, so a reader can refuse
+/// higher ratios. Zeros in blocks of this size reach half of it.
 constexpr std::uint64_t kMaxBloscRatio = 16384;
 
-/// Compression that saves less is not worth a decoder.
+/// Bytes that compression must save; otherwise the section is stored raw, which needs no decoder.
 constexpr std::uint64_t kMinSaving = 64;
 
-constexpr int kThreads = 1;  // Blosc's pool of threads would be global
+constexpr int kThreads = 1;  // more threads would use Blosc's global pool
 
-/// How numbers of one size are taken apart before they are compressed.
+/// The shuffle that is applied to numbers of one size before they are compressed.
 struct Filter {
   int shuffle = BLOSC_NOSHUFFLE;
   std::size_t typeSize = 1;
@@ -58,7 +59,8 @@ std::vector<std::byte> compress(std::span<const std::byte> raw, Filter filter) {
   return all;
 }
 
-/// Bytes or bits shuffled, whichever is smaller: which one it is differs from stream to stream.
+/// Shuffles bytes and shuffles bits, and returns the smaller result. Which one it is differs
+/// between streams.
 std::vector<std::byte> compressSmallest(std::vector<std::byte> raw, std::size_t typeSize) {
   raw.resize(padded(raw.size()));
   if (typeSize == 1) return compress(raw, {});
@@ -71,7 +73,7 @@ struct BufferSizes {
   std::size_t raw = 0, stored = 0;
 };
 
-/// Sizes of the first of `stored`'s buffers, as far as they are possible; else nothing.
+/// Sizes of the first buffer in `stored`; zeros if they are impossible.
 BufferSizes frontBuffer(std::span<const std::byte> stored, std::size_t rawLeft) {
   if (stored.size() < BLOSC_MIN_HEADER_LENGTH) return {};
   std::size_t raw = 0, packed = 0, block = 0, validated = 0;

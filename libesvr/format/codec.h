@@ -1,5 +1,5 @@
 #pragma once
-/// Compression of a section's content.
+/// Compresses and decompresses the content of a section.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,22 +11,23 @@
 
 namespace esvr::format {
 
-/// A section's content as it lies in the file.
+/// The content of a section as it is stored in the file.
 struct Packed {
   Codec codec = Codec::kRaw;
   std::vector<std::byte> bytes;
   std::uint64_t rawBytes = 0;
 };
 
-/// Compresses where that pays. The same content gives the same bytes.
-/// \param typeSize  bytes of the content's numbers, which the shuffle takes apart
+/// Compresses content if that saves enough bytes. The same content gives the same bytes.
+/// \param typeSize  size in bytes of the numbers that the content consists of, for the shuffle
 [[nodiscard]] Packed pack(std::vector<std::byte> raw, std::size_t typeSize);
 
-/// Whether a codec can make `rawBytes` from `storedBytes` at all: asked before anything is
-/// allocated.
+/// True if a codec can make `rawBytes` from `storedBytes`. A reader calls this before it allocates
+/// memory.
 [[nodiscard]] bool plausibleSizes(Codec codec, std::uint64_t storedBytes, std::uint64_t rawBytes);
 
-/// The content. Sizes must be plausible. \throws BadInput  damaged; begins with `where`
+/// Decompresses content. The sizes must be plausible.
+/// \throws BadInput  the content is damaged; the text begins with `where`
 [[nodiscard]] std::vector<std::byte> unpack(Codec codec, std::vector<std::byte> stored,
                                             std::uint64_t rawBytes, const std::string& where);
 

@@ -8,7 +8,7 @@ namespace esvr {
 
 std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
                         const ContainerWriteOptions& options) {
-  AtomicFile out(path, options.overwrite);  // refuses before anything is encoded
+  AtomicFile out(path, options.overwrite);  // refuses an existing file before anything is encoded
   const auto bytes = encodeEsvr(file);
   out.write(bytes);
   out.commit();

@@ -19,7 +19,7 @@ bool valid(const CurvePoint& p) {
 }
 constexpr const char* kInvalid = "a point of the curve is not a number";
 
-/// Calls `visit` with each of a point's members in the file's order.
+/// Calls `visit` with each member of a point, in the order of the file.
 template <class Visit>
 void forEachMember(Visit visit) {
   visit(&CurvePoint::ellipsoids);

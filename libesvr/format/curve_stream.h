@@ -1,5 +1,5 @@
 #pragma once
-/// A fit's curve as bytes of a section: one array a quantity.
+/// The curve of a fit as the content of a section: one array for each quantity.
 
 #include <cstddef>
 #include <span>
@@ -10,10 +10,10 @@
 
 namespace esvr::format {
 
-/// \throws RuntimeFailure  a time or an error that is not finite, a PSNR that is not a number
+/// \throws RuntimeFailure  an error is not finite, or a PSNR is NaN
 [[nodiscard]] std::vector<std::byte> putCurve(std::span<const CurvePoint> curve);
 
-/// \throws BadInput  the same; begins with `where`
+/// \throws BadInput  as putCurve, or the size is wrong; the text begins with `where`
 [[nodiscard]] std::vector<CurvePoint> getCurve(std::span<const std::byte> content,
                                                const std::string& where);
 

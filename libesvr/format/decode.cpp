@@ -36,13 +36,14 @@ bool encloses(const Box& outer, const Box& inner) {
   return inner.empty() || (outer.contains(inner.min) && outer.contains(inner.max));
 }
 
-/// A chunk whose ellipsoids lie in layers.
+/// A chunk whose section of layered ellipsoids is open.
 struct OpenChunk {
-  std::unique_ptr<ByteSource> section;  ///< none: it has no layers, or is not wanted
+  std::unique_ptr<ByteSource> section;  ///< null: the chunk has no layers, or is not wanted
   BlockDirectory directory;
 };
 
-/// Reads one grid of a file. \param part  nothing: all of it
+/// Reads one grid of a file.
+/// \param part  the part to read; null: all of it
 class GridDecoder {
  public:
   GridDecoder(SectionReader& sections, std::uint32_t grid, const ReadPart* part)
@@ -104,7 +105,8 @@ class GridDecoder {
     getPlanes(sections_.get(section), count, planes, sections_.place(section));
   }
 
-  /// All of a grid's chunks that have ellipsoids are quantised, or none.
+  /// True if the grid's ellipsoids are quantised. Its chunks are then all quantised, except for
+  /// those without ellipsoids.
   [[nodiscard]] bool anyQuantised(std::size_t chunks) const {
     for (std::uint32_t c = 0; c < chunks; ++c)
       for (const auto kind : {SectionKind::kEllipsoids, SectionKind::kLayered})
@@ -137,7 +139,7 @@ class GridDecoder {
     return open;
   }
 
-  /// How many layers to read of each chunk.
+  /// Number of layers to read of each chunk.
   [[nodiscard]] std::size_t layersWanted(const std::vector<ChunkRecord>& records,
                                          const std::vector<OpenChunk>& open) const {
     const std::size_t maxLayers = part_ && part_->layers ? *part_->layers : kAllLayers;
@@ -239,7 +241,8 @@ class GridDecoder {
       grid.voxels = getVoxels(sections_.get(section), sections_.place(section), sections_.budget());
   }
 
-  /// A residual belongs to all layers together: it is left out where only some are read.
+  /// Reads the residual, unless only some of the layers are read: it corrects the sum of all
+  /// layers.
   void readResidual(StoredGrid& grid) {
     const auto section = id(SectionKind::kResidual);
     if (!sections_.has(section) || layers_ != kAllLayers) return;
@@ -247,7 +250,7 @@ class GridDecoder {
     refuse(residualFaultOf(grid));
   }
 
-  /// Those of the layers that were read; of a box nothing is known.
+  /// Reads the errors of the layers that were read. They hold for whole grids only, not for a box.
   void readLayerErrors(StoredGrid& grid) {
     const auto section = id(SectionKind::kLayerErrors);
     if (!sections_.has(section) || (part_ && part_->box)) return;
@@ -267,8 +270,8 @@ class GridDecoder {
   SectionReader& sections_;
   std::uint32_t g_;
   const ReadPart* part_;
-  std::size_t layers_ = kAllLayers;  ///< to be read
-  std::size_t layersInFile_ = 0;     ///< the largest number of layers of a chunk that was opened
+  std::size_t layers_ = kAllLayers;  ///< number of layers to read
+  std::size_t layersInFile_ = 0;     ///< largest number of layers of a chunk that was opened
 };
 
 std::vector<MetaItem> readFileMetadata(SectionReader& sections) {

@@ -1,15 +1,15 @@
 #pragma once
-/// A container's bytes, wherever they come from, as grids.
+/// Decodes the bytes of a container from any source.
 
 #include "esvr/container.h"
 #include "format/byte_source.h"
 
 namespace esvr::format {
 
-/// \throws BadInput, MemoryExceeded
+/// Decodes a whole container. \throws BadInput, MemoryExceeded
 [[nodiscard]] EsvrFile decode(const ByteSource& source, const ReadLimits& limits = {});
 
-/// \throws BadInput, MemoryExceeded
+/// Decodes a part of a container. \throws BadInput, MemoryExceeded
 [[nodiscard]] EsvrFile decodePart(const ByteSource& source, const ReadPart& part);
 
 }  // namespace esvr::format

@@ -15,7 +15,7 @@
 namespace esvr::format {
 namespace {
 
-/// Values of the ellipsoid before, which the next one's are likely to be near.
+/// Values of the ellipsoid before, which are likely to be similar.
 struct Previous {
   std::uint32_t low = 0, middle = 0, high = 0;
   int width = 0;
@@ -28,7 +28,8 @@ void require(bool holds, const char* what) {
   if (!holds) throw BadInput(std::string(what) + " lies outside the lattice");
 }
 
-/// Codes a run in either direction, ellipsoid by ellipsoid, positions' cells before all.
+/// Encodes or decodes a run: first the position cells of all ellipsoids, then the other values,
+/// ellipsoid by ellipsoid.
 template <class Side>
 class BlockCoder {
  public:
@@ -108,7 +109,8 @@ class BlockCoder {
     }
   }
 
-  /// The highest bit has models; those below are as good as random.
+  /// Codes the lower bits of a scale. The highest one has a model; the others are as good as random
+  /// and are stored raw.
   std::uint32_t codeRest(std::size_t axis, std::uint32_t coarse, std::uint32_t rest, int bits) {
     if (bits == 0) return 0;
     const std::uint32_t top =
@@ -190,7 +192,7 @@ BlockStreams encodeBlock(QuantisedEllipsoids& q, Run run) {
 std::vector<BlockStreams> encodeBlocks(QuantisedEllipsoids q) {
   const std::vector<Run> runs = blockRuns(q);
   std::vector<BlockStreams> blocks(runs.size());
-  // coding writes back what it reads, each block to its own run
+  // The coder writes each value that it reads back to `q`, and each block only to its own run.
   tbb::parallel_for(std::size_t{0}, runs.size(),
                     [&](std::size_t b) { blocks[b] = encodeBlock(q, runs[b]); });
   return blocks;

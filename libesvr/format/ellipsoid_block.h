@@ -1,5 +1,5 @@
 #pragma once
-/// One block of quantised ellipsoids as four streams of a range coder.
+/// One block of quantised ellipsoids as four streams of the range coder.
 
 #include <array>
 #include <cstddef>
@@ -23,30 +23,31 @@ inline constexpr std::size_t kStreams = 4;  ///< positions, scales, rotations, i
 using BlockStreams = std::array<std::vector<std::byte>, kStreams>;
 using BlockBytes = std::array<std::span<const std::byte>, kStreams>;
 
-/// The ellipsoids of each block, layer by layer: without layers full blocks and a rest, in a layer
-/// blocks as equal as can be.
+/// The ellipsoids of each block, layer by layer. Without layers all blocks but the last are full.
+/// The blocks of a layer are of equal size, to within one ellipsoid.
 [[nodiscard]] std::vector<Run> blockRuns(std::size_t count, std::span<const std::size_t> layerEnds);
 [[nodiscard]] inline std::vector<Run> blockRuns(const QuantisedEllipsoids& q) {
   return blockRuns(q.size(), q.layerEnds);
 }
 
-/// Alike ellipsoids cost next to nothing, and a reader must know how many a byte can hold before it
-/// allocates: writers add zeros where there would be more.
+/// Limit on the number of ellipsoids in a byte, so that a reader knows it before it allocates
+/// memory. Equal ellipsoids could take fewer bytes; the writer then adds zeros.
 inline constexpr std::uint64_t kMaxEllipsoidsPerByte = 64;
 void padForEllipsoids(ByteWriter& out, std::size_t count);
 
-/// Refuses a section of `bytes` that says it has `stored` ellipsoids where its chunk has `count`,
-/// or cannot hold them. \throws BadInput
+/// Refuses a section of `bytes` whose number of ellipsoids, `stored`, is not its chunk's `count` or
+/// cannot be in so few bytes. \throws BadInput
 void checkCount(const ByteReader& in, std::uint64_t stored, std::uint64_t count,
                 std::uint64_t bytes);
 
-/// Leaves `q` as it is.
+/// Encodes a run of `q`, which does not change.
 [[nodiscard]] BlockStreams encodeBlock(QuantisedEllipsoids& q, Run run);
 
-/// All of them.
+/// Encodes all blocks.
 [[nodiscard]] std::vector<BlockStreams> encodeBlocks(QuantisedEllipsoids q);
 
-/// Fills a run of `q`, whose lattice and size are set. \throws BadInput  values outside the lattice
+/// Decodes a run of `q`, whose lattice and size are set.
+/// \throws BadInput  values are outside the quantisation lattice
 void decodeBlock(const BlockBytes& streams, Run run, QuantisedEllipsoids& q);
 
 }  // namespace esvr::format

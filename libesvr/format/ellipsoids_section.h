@@ -1,5 +1,6 @@
 #pragma once
-/// A chunk's quantised ellipsoids as the content of a section: lattice, block table, streams.
+/// The quantised ellipsoids of a chunk as the content of a section: quantisation lattice, block
+/// table, streams.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,12 +12,12 @@
 
 namespace esvr::format {
 
-/// \param q  of one layer
+/// \param q  ellipsoids without layers
 [[nodiscard]] std::vector<std::byte> putEllipsoids(const QuantisedEllipsoids& q);
 
-/// \param count  what the chunk's record says; compared with the content before anything is
-///               allocated
-/// \throws BadInput  damaged; begins with `where`
+/// \param count  number of ellipsoids in the chunk's record, which is compared with the content
+///               before memory is allocated
+/// \throws BadInput  the content is damaged; the text begins with `where`
 [[nodiscard]] QuantisedEllipsoids getEllipsoids(std::span<const std::byte> content,
                                                 std::uint64_t count, const std::string& where);
 

@@ -25,7 +25,7 @@ namespace {
 
 using namespace format;
 
-/// Sections on their way into a file, in the order in which they will lie there.
+/// The sections of a file that is being written, in the order of the file.
 class Sections {
  public:
   /// `typeSize`: bytes of the numbers that the content is made of.
@@ -74,7 +74,7 @@ class Sections {
 constexpr std::uint16_t kOptional = 0;
 constexpr std::size_t kByteSize = 1, kFloatSize = sizeof(float), kDoubleSize = sizeof(double);
 
-/// A grid as it is written: its chunks in file order, with their records.
+/// A grid with its chunks in the order of the file, and their records.
 struct SortedGrid {
   const StoredGrid& grid;
   std::vector<Chunk> chunks;
@@ -141,7 +141,8 @@ void addGrid(Sections& out, std::uint32_t g, const SortedGrid& grid) {
   out.add({SectionKind::kGrid, g}, kRequired, content.take(), kByteSize);
 }
 
-/// The grid's own record holds a single chunk's.
+/// Adds the chunk records of a grid with several chunks; the record of a single chunk is in the
+/// grid's own record.
 void addChunkTable(Sections& out, std::uint32_t g, const SortedGrid& grid) {
   if (grid.records.size() < 2) return;
   ByteWriter content;
@@ -201,7 +202,7 @@ std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
     grids.push_back(sorted(grid));
   }
 
-  // Descriptions come first, so that one read at the file's beginning can list it.
+  // Records come first, so that one read at the beginning of the file is enough to list it.
   Sections out;
   addFileMetadata(out, file);
   for (std::uint32_t g = 0; g < grids.size(); ++g) addGrid(out, g, grids[g]);

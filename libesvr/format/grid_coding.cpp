@@ -25,7 +25,8 @@ bool isLevelSet(const GridDescriptor& descriptor, float background) {
   return descriptor.gridClass == GridClass::kLevelSet && background > 0.0f;
 }
 
-/// A distance field may have active voxels beyond its half width, which a narrow band would lose.
+/// True if all values are within the half width of the band. A distance field may have active
+/// voxels beyond it, which a narrow band could not store.
 bool withinBand(const ValueRange& range, float halfWidth) {
   return range.min >= -halfWidth && range.max <= halfWidth;
 }
@@ -36,7 +37,7 @@ std::vector<Coord> brickCorners(const SparseVolume& volume) {
   return corners;
 }
 
-/// The range that holds every value of the source, active or not.
+/// The range of all values of the source, of active and inactive voxels.
 ValueRange rangeOf(const StoredGrid& grid) {
   const float background = grid.field.background;
   return {std::min(grid.valueMin, background), std::max(grid.valueMax, background)};
@@ -86,7 +87,7 @@ bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) 
 
 namespace {
 
-/// All that is known of a grid without its values.
+/// A stored grid with all properties but its values.
 StoredGrid describe(const GridDescriptor& descriptor, const SparseVolume& source) {
   const ValueRange range = activeRange(source);
   StoredGrid grid;
@@ -114,7 +115,7 @@ StoredGrid makeStoredGrid(const GridDescriptor& descriptor, const SparseVolume& 
   grid.field = std::move(field);
   if (isNarrowBand(descriptor, source)) {
     grid.topology = TopologyKind::kLeaves;
-    grid.withinRange = false;  // the band has its own ends, and what is beyond them tells the side
+    grid.withinRange = false;  // values beyond the band's ends tell its sides apart
   }
   if (activity == Activity::kExact)
     storeMask(source, grid);
@@ -131,7 +132,7 @@ bool meets(const Box& box, Coord corner) {
          last.x >= box.min.x && last.y >= box.min.y && last.z >= box.min.z;
 }
 
-/// The bricks on which the field is evaluated; nothing stands for all that supports reach.
+/// The bricks on which the field is evaluated; nothing if these are all that supports reach.
 std::optional<std::vector<Coord>> bricksWanted(const StoredGrid& grid,
                                                const DecodeOptions& options) {
   const bool stored = grid.topology != TopologyKind::kThreshold;
@@ -143,7 +144,7 @@ std::optional<std::vector<Coord>> bricksWanted(const StoredGrid& grid,
   return bricks;
 }
 
-/// Bricks of the sum and those of its residual.
+/// The given bricks and those of the residual, in order.
 std::vector<Coord> withResidualBricks(const VoxelLayer& residual, std::span<const Coord> bricks,
                                       const DecodeOptions& options) {
   std::vector<Coord> own, all;
@@ -167,7 +168,7 @@ void addResidual(const VoxelLayer& residual, SparseVolume& volume) {
   }
 }
 
-/// As revoxelise() would have it, of settled values that are not a field's.
+/// Determines the active voxels of values that are not clamped again, by the rule of revoxelise().
 SparseVolume withActivity(const SparseVolume& volume, const VoxelRule& rule) {
   std::vector<BrickInput> bricks;
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
@@ -207,7 +208,7 @@ SparseVolume evaluated(const StoredGrid& grid, const DecodeOptions& options) {
   return revoxelise(grid.field, revoxel);
 }
 
-/// Voxels that the mask has not become inactive.
+/// Makes all voxels inactive that are not in the mask.
 void applyMask(const StoredGrid& grid, SparseVolume& volume) {
   const VoxelRule rule = ruleOf(grid);
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
@@ -221,7 +222,7 @@ void applyMask(const StoredGrid& grid, SparseVolume& volume) {
   }
 }
 
-/// Voxels outside a box become inactive, bricks without an active voxel go.
+/// Makes voxels outside a box inactive and drops bricks without an active voxel.
 void clip(const Box& box, const VoxelRule& rule, SparseVolume& volume) {
   std::vector<BrickInput> kept;
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {

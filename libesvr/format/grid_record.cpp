@@ -113,7 +113,8 @@ void putMetadata(ByteWriter& out, const std::vector<MetaItem>& items) {
 
 std::vector<MetaItem> getMetadata(ByteReader& in) {
   std::vector<MetaItem> items;
-  // Not reserved: the count is checked by the items' being there.
+  // Memory is not reserved for the stored count, because the count is checked only by reading the
+  // items.
   for (auto left = in.get<std::uint32_t>(); left > 0; --left) {
     auto& item = items.emplace_back();
     item.name = in.getString();

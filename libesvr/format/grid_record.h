@@ -1,5 +1,5 @@
 #pragma once
-/// The records of a file that describe: metadata, grids, chunks.
+/// The records of a file that describe metadata, grids and chunks.
 
 #include <cstdint>
 #include <vector>
@@ -10,18 +10,18 @@
 
 namespace esvr::format {
 
-/// The description of a chunk, which is read before its ellipsoids.
+/// The record of a chunk, which is read before its ellipsoids.
 struct ChunkRecord {
   Coord origin;
-  Box box;  ///< index coordinates: every support lies in it
+  Box box;  ///< index coordinates; contains every support
   std::uint64_t count = 0;
 };
 
-/// A grid without leaves, curve and ellipsoids.
+/// The record of a grid: everything but its leaves, curve and ellipsoids.
 struct GridRecord {
   StoredGrid grid;  ///< its field has no chunks yet
   std::uint32_t chunkCount = 0;
-  std::vector<ChunkRecord> chunks;  ///< the one chunk; none where there is a chunk table
+  std::vector<ChunkRecord> chunks;  ///< a single chunk's record; empty if there are more
 };
 
 void putMetadata(ByteWriter& out, const std::vector<MetaItem>& items);

@@ -1,5 +1,5 @@
 #pragma once
-/// The rule by which the sum of a stored grid becomes voxels.
+/// The rule that determines the voxels of a stored grid from its sum of ellipsoids.
 
 #include "esvr/container.h"
 #include "field/voxel_rule.h"

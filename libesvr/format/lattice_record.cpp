@@ -5,7 +5,7 @@
 namespace esvr::format {
 namespace {
 
-constexpr int kMaxOffset = 1 << 20;  // of bit counts, in 1/256 bit: keeps sums in 32 bits
+constexpr int kMaxOffset = 1 << 20;  // limit on offsets of bits, for sums in 32 bits
 constexpr int kMaxSlope = 1 << 12;
 
 int getWithin(ByteReader& in, int limit, const char* what) {

@@ -1,5 +1,5 @@
 #pragma once
-/// The lattice of a chunk's quantised ellipsoids as bytes.
+/// The quantisation lattice of a chunk's ellipsoids as bytes.
 
 #include "esvr/quantised.h"
 #include "format/byte_reader.h"
@@ -9,7 +9,7 @@ namespace esvr::format {
 
 void putLattice(ByteWriter& out, const Lattice& lattice);
 
-/// \throws BadInput  steps that are not positive, numbers of bits out of range
+/// \throws BadInput  a step is not positive, or a number of bits is out of range
 [[nodiscard]] Lattice getLattice(ByteReader& in);
 
 }  // namespace esvr::format

@@ -19,9 +19,9 @@ constexpr std::uint64_t kBlockEntryBytes =
 constexpr std::uint64_t kChecksumBytes = sizeof(std::uint64_t);
 
 constexpr std::int32_t Coord::*kAxes[] = {&Coord::x, &Coord::y, &Coord::z};
-constexpr std::int64_t kParts = 256;  // of a chunk's box along an axis
+constexpr std::int64_t kParts = 256;  // divisions of a chunk's box along an axis
 
-/// A block's box in parts of its chunk's, rounded outwards.
+/// Writes a block's box in 256ths of its chunk's box, rounded outwards.
 void putBox(ByteWriter& out, const Box& box, const Box& chunk) {
   for (const auto axis : kAxes) {
     const std::int64_t low = chunk.min.*axis, side = std::int64_t(chunk.max.*axis) - low + 1;
@@ -48,7 +48,7 @@ std::vector<std::byte> joined(const BlockStreams& streams) {
   return bytes;
 }
 
-/// All behind the directory's own size and before its checksum.
+/// The directory without its own size before it and its checksum behind it.
 std::vector<std::byte> putDirectory(const QuantisedEllipsoids& q, const Box& chunk,
                                     std::span<const Box> boxes,
                                     std::span<const BlockStreams> blocks) {
@@ -81,7 +81,7 @@ std::size_t layerOf(const std::vector<std::size_t>& ends, std::size_t i) {
   return std::size_t(std::upper_bound(ends.begin(), ends.end(), i) - ends.begin());
 }
 
-/// Offsets are counted from `offset`, where the first block is.
+/// Reads the entries of the directory. \param offset  position of the first block in the section
 std::vector<BlockEntry> getEntries(ByteReader& in, const BlockDirectory& directory,
                                    const ChunkRecord& chunk, std::uint64_t offset) {
   const auto runs = blockRuns(chunk.count, directory.layerEnds);
@@ -98,7 +98,7 @@ std::vector<BlockEntry> getEntries(ByteReader& in, const BlockDirectory& directo
   return entries;
 }
 
-/// The directory without its size and its checksum, which has been checked.
+/// Reads the directory and checks its checksum. \return the bytes between its size and its checksum
 std::vector<std::byte> readDirectory(const ByteSource& section) {
   constexpr std::uint64_t kSizeBytes = sizeof(std::uint32_t);
   auto bytes = section.read(0, kSizeBytes);
@@ -138,7 +138,7 @@ void decodeInto(std::span<const std::byte> bytes, const BlockEntry& entry, Run r
   decodeBlock(streams, run, q);
 }
 
-/// The ends of the layers of some of the blocks; empty where there is but one layer.
+/// The ends of the layers of the chosen blocks; empty if they are of one layer.
 std::vector<std::size_t> endsOf(const BlockDirectory& directory,
                                 std::span<const std::size_t> chosen) {
   std::vector<std::size_t> ends;
@@ -175,7 +175,7 @@ std::vector<std::byte> putLayered(const QuantisedEllipsoids& q, const Box& chunk
 
 std::uint64_t storedBytes(const QuantisedEllipsoids& q) {
   if (q.layerEnds.empty()) return putEllipsoids(q).size();
-  const Box any{{}, {}};  // boxes of any size take as many bytes
+  const Box any{{}, {}};  // the number of bytes does not depend on the boxes
   return putLayered(q, any, std::vector<Box>(blockRuns(q).size(), any)).size();
 }
 

@@ -1,7 +1,7 @@
 #pragma once
-/// A chunk's quantised ellipsoids in importance layers as the content of a section: a directory
-/// that tells which block reaches where, then the blocks, layer by layer. A reader takes what it
-/// needs.
+/// The quantised ellipsoids of a chunk in importance layers, as the content of a section: a
+/// directory with the box of each block, and then the blocks, layer by layer. A reader decodes the
+/// blocks that it needs.
 
 #include <array>
 #include <cstddef>
@@ -19,9 +19,9 @@ namespace esvr::format {
 struct BlockEntry {
   Run run;
   std::size_t layer = 0;
-  Box box;  ///< index coordinates: every support of the block lies in it, and it in the chunk's
+  Box box;  ///< index coordinates; contains the block's supports, lies in the chunk's box
   std::array<std::uint32_t, kStreams> bytes{};  ///< lengths of its streams
-  std::uint64_t offset = 0;                     ///< in the section
+  std::uint64_t offset = 0;                     ///< position in the section
   std::uint64_t checksum = 0;
 
   [[nodiscard]] std::uint64_t size() const;
@@ -33,23 +33,27 @@ struct BlockDirectory {
   std::vector<BlockEntry> blocks;
 };
 
-/// \param chunk  box of the chunk \param boxes  of the supports of blockRuns(q)
+/// \param chunk  box of the chunk
+/// \param boxes  boxes of the supports of blockRuns(q)
 [[nodiscard]] std::vector<std::byte> putLayered(const QuantisedEllipsoids& q, const Box& chunk,
                                                 std::span<const Box> boxes);
 
-/// Bytes of the section that a chunk's ellipsoids make, in layers or not.
+/// Bytes of a chunk's section of ellipsoids, with or without layers.
 [[nodiscard]] std::uint64_t storedBytes(const QuantisedEllipsoids& q);
 
-/// \param section  its name begins errors \throws BadInput  damaged; not of that chunk
+/// \param section  section whose name begins error texts
+/// \throws BadInput  the directory is damaged, or is not that of the chunk
 [[nodiscard]] BlockDirectory getDirectory(const ByteSource& section, const ChunkRecord& chunk);
 
-/// Reads some of the blocks. \param chosen  increasing positions in the directory
-/// \return  of these alone: layers that none of them is of are left out \throws BadInput
+/// Decodes the chosen blocks.
+/// \param chosen  increasing positions in the directory
+/// \return the ellipsoids of these blocks; layers without a chosen block are left out
+/// \throws BadInput  a block is damaged
 [[nodiscard]] QuantisedEllipsoids getBlocks(const ByteSource& section,
                                             const BlockDirectory& directory,
                                             std::span<const std::size_t> chosen);
 
-/// Refuses bytes behind the last block that are not zero. \throws BadInput
+/// Refuses bytes after the last block that are not zero. \throws BadInput
 void checkEnd(const ByteSource& section, const BlockDirectory& directory);
 
 }  // namespace esvr::format

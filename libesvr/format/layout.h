@@ -11,7 +11,8 @@
 
 namespace esvr::format {
 
-/// Not text, and changed by every conversion of line ends: CR LF -> LF, LF -> CR LF, LF -> CR.
+/// The first byte is not text, and CR LF LF changes under every conversion of line ends: CR LF to
+/// LF, LF to CR LF, and LF to CR.
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
 
 inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
@@ -20,9 +21,9 @@ inline constexpr std::uint16_t kVersionMinor = 0;
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
 inline constexpr std::uint64_t kEntryBytes = 56;
-inline constexpr std::uint64_t kAlignment = 8;  ///< the table and every section begin at a multiple
+inline constexpr std::uint64_t kAlignment = 8;  ///< positions of table and sections
 
-/// Grid or chunk of a section that belongs to the whole file or to a whole grid.
+/// The grid or the chunk of a section that belongs to the whole file or to a whole grid.
 inline constexpr std::uint32_t kNone = 0xffffffff;
 
 enum class SectionKind : std::uint32_t {
@@ -50,12 +51,12 @@ enum class Codec : std::uint16_t {
 };
 
 /// Flags of a section.
-inline constexpr std::uint16_t kRequired = 1;  ///< a reader that does not know the kind must stop
+inline constexpr std::uint16_t kRequired = 1;  ///< readers that do not know the kind refuse
 
-/// Sizes of records in their sections.
+/// Sizes of records.
 inline constexpr std::uint64_t kChunkRecordBytes = 44;
 
-/// "centers"; "unknown 0x2a".
+/// The name of a kind, for example "centers" or "unknown 0x2a".
 [[nodiscard]] std::string nameOf(SectionKind kind);
 [[nodiscard]] std::string nameOf(Codec codec);
 [[nodiscard]] bool known(SectionKind kind);

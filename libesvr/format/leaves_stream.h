@@ -1,5 +1,5 @@
 #pragma once
-/// Corners of bricks as bytes of a section: brick positions, one array an axis.
+/// The positions of bricks as the content of a section: one array for each axis.
 
 #include <cstddef>
 #include <span>
@@ -10,13 +10,13 @@
 
 namespace esvr::format {
 
-/// \throws RuntimeFailure  corners that are not multiples of 8 or not increasing
+/// \throws RuntimeFailure  the corners are not multiples of 8, or not increasing
 void requireLeaves(std::span<const Coord> corners);
 
 /// \throws RuntimeFailure  as requireLeaves
 [[nodiscard]] std::vector<std::byte> putLeaves(std::span<const Coord> corners);
 
-/// \throws BadInput  not a list of increasing corners; begins with `where`
+/// \throws BadInput  the content is not a list of increasing corners; the text begins with `where`
 [[nodiscard]] std::vector<Coord> getLeaves(std::span<const std::byte> content,
                                            const std::string& where);
 

@@ -9,7 +9,8 @@
 namespace esvr::format {
 namespace {
 
-/// Corners may be 2^32 apart: a step of that size in bricks still fits.
+/// Positions of the bricks relative to the origin. Corners may be 2^32 voxels apart; as a number of
+/// bricks this difference fits into 32 bits.
 std::vector<Coord> bricksFrom(Coord origin, std::span<const Coord> corners) {
   std::vector<Coord> bricks;
   for (const Coord corner : corners) bricks.push_back(brickOf(corner) - brickOf(origin));
@@ -23,7 +24,8 @@ BrickMask inverse(BrickMask mask) {
 
 }  // namespace
 
-/// Voxels of one value, which then cost nothing but their activity.
+/// Stores the mask as a voxel layer with one value, so that only the activity of voxels takes
+/// bytes.
 std::vector<std::byte> putMask(std::span<const Coord> leaves, std::span<const BrickMask> active) {
   requireLeaves(leaves);
   if (leaves.size() != active.size()) throw RuntimeFailure("a mask without its leaves");

@@ -12,15 +12,16 @@
 namespace esvr::format {
 
 struct Mask {
-  std::vector<Coord> leaves;  ///< index corners of bricks, increasing
+  std::vector<Coord> leaves;  ///< index corners of the bricks, increasing
   std::vector<BrickMask> active;
 };
 
-/// \throws RuntimeFailure  corners that are none, not increasing, too far apart
+/// \throws RuntimeFailure  the corners are not multiples of 8, not increasing, or too far apart
 [[nodiscard]] std::vector<std::byte> putMask(std::span<const Coord> leaves,
                                              std::span<const BrickMask> active);
 
-/// \throws BadInput  damaged; begins with `where`; MemoryExceeded: the budget holds fewer bricks
+/// \throws BadInput  the content is damaged; the text begins with `where`
+/// \throws MemoryExceeded  there are more bricks than the budget allows
 [[nodiscard]] Mask getMask(std::span<const std::byte> content, const std::string& where,
                            MemoryBudget& budget);
 

@@ -10,11 +10,11 @@
 namespace esvr::format {
 namespace {
 
-constexpr int kBitsPerAxis = 21;  // three of them in a 64-bit key
+constexpr int kBitsPerAxis = 21;  // three of these make a 64-bit key
 constexpr double kCellsPerVoxel = 256.0;
-constexpr double kLastCell = double((1u << kBitsPerAxis) - 1);  // 8192 voxels, two chunk extents
+constexpr double kLastCell = double((1u << kBitsPerAxis) - 1);  // at 8192 voxels
 
-/// Adds one coordinate to every ellipsoid's key; cells count from the lowest center.
+/// Adds one coordinate to the keys of all ellipsoids. Cells are counted from the lowest center.
 void addAxis(const std::vector<float>& center, int axis, std::vector<std::uint64_t>& keys) {
   if (center.empty()) return;
   const double low = *std::min_element(center.begin(), center.end());

@@ -1,13 +1,13 @@
 #pragma once
-/// The order of a chunk's ellipsoids in the file: neighbours in space are neighbours in the
-/// streams, which compresses better and evaluates with fewer cache misses.
+/// The order of a chunk's ellipsoids in the file. Neighbours in space are neighbours in the
+/// streams, which then compress better and are evaluated with fewer cache misses.
 
 #include "esvr/ellipsoids.h"
 
 namespace esvr::format {
 
-/// The ellipsoids in Morton order of their centers; those of one cell keep their order, so that
-/// sorting again changes nothing. Centers must be finite.
+/// Returns the ellipsoids in Morton order of their centers, which must be finite. Ellipsoids of one
+/// cell keep their order, so that sorting again changes nothing.
 [[nodiscard]] Ellipsoids inMortonOrder(const Ellipsoids& ellipsoids);
 
 }  // namespace esvr::format

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::array<float, 4> kIdentity{1.0f, 0.0f, 0.0f, 0.0f};
 
-/// Negative zero is not zero here: what was written comes back.
+/// Compares bits, so that negative zero is stored as such and not taken for zero.
 bool sameBits(float a, float b) {
   return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// The ellipsoids' arrays as bytes of a section: one array behind the other.
+/// The arrays of ellipsoids as the content of sections: one array after the other.
 
 #include <array>
 #include <cstddef>
@@ -14,12 +14,13 @@ using Plane = std::vector<float>;
 
 [[nodiscard]] std::vector<std::byte> putPlanes(std::span<const Plane> planes);
 
-/// Fills `planes` with `count` values each. \throws BadInput  the content has another size (checked
-/// before anything is allocated); begins with `where`
+/// Fills each of `planes` with `count` values.
+/// \throws BadInput  the content has another size, which is checked before memory is allocated; the
+///                   text begins with `where`
 void getPlanes(std::span<const std::byte> content, std::uint64_t count, std::span<Plane> planes,
                const std::string& where);
 
-/// True where every quaternion is (1, 0, 0, 0), bit by bit: not worth a section.
+/// True if every quaternion is (1, 0, 0, 0), bit by bit; the section of rotations is then left out.
 [[nodiscard]] bool allIdentity(const std::array<Plane, 4>& rotation);
 void setIdentity(std::array<Plane, 4>& rotation, std::size_t count);
 

@@ -1,11 +1,12 @@
 #pragma once
-/// A voxel of a sum with a residual: computed alike by who writes and by who reads.
+/// The value of a voxel with a residual, computed by the writer and the reader in the same way.
 
 #include <cstdint>
 
 namespace esvr::format {
 
-/// \param value  of the sum, kept within the grid's range where that is asked for
+/// Adds the residual to the value of a voxel.
+/// \param value  value of the sum, clamped to the grid's range if the grid says so
 [[nodiscard]] inline float corrected(float value, std::int32_t code, double divisor) {
   return code == 0 ? value : float(double(value) + double(code) / divisor);
 }

@@ -9,7 +9,7 @@ namespace esvr::format {
 
 namespace {
 
-/// Bytes of memory that a byte of a section's content becomes, at most. An item of metadata may be
+/// Largest number of bytes of memory that a byte of content becomes. An item of metadata may be
 /// three lengths of four bytes each, and becomes three containers.
 double expansionOf(SectionKind kind) {
   constexpr double kOfMetadata = 32.0, kOfArrays = 4.0;

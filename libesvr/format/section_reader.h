@@ -1,5 +1,5 @@
 #pragma once
-/// Hands out a file's sections by what they are of, and knows which were never asked for.
+/// Finds the sections of a file by kind, grid and chunk, and knows which of them were never read.
 
 #include <map>
 #include <memory>
@@ -14,34 +14,36 @@ namespace esvr::format {
 
 class SectionReader {
  public:
-  /// \param maxBytes  of memory that the content may take
-  /// \throws BadInput  header or table damaged
+  /// \param maxBytes  limit on the memory of the content
+  /// \throws BadInput  the header or the section table is damaged
   explicit SectionReader(const ByteSource& source, std::uint64_t maxBytes = kNoMemoryLimit);
 
   [[nodiscard]] const SectionTable& table() const { return table_; }
 
-  /// Number of sections of one kind.
+  /// Number of sections of a kind.
   [[nodiscard]] std::uint32_t count(SectionKind kind) const;
 
-  /// Begins errors about a section, whether it is there or not.
+  /// Start of the text of an error about a section, whether it exists or not.
   [[nodiscard]] std::string place(const SectionId& id) const;
 
   [[nodiscard]] bool has(const SectionId& id) const { return unread_.contains(id); }
 
-  /// The memory that is left for content. get() takes from it.
+  /// The memory that is left for content; get() takes from it.
   [[nodiscard]] MemoryBudget& budget() { return budget_; }
 
-  /// A section's content; each can be had once.
-  /// \throws BadInput  damaged; there is none; MemoryExceeded
+  /// Reads the content of a section. It can be called once for each section.
+  /// \throws BadInput  the section is damaged or does not exist
+  /// \throws MemoryExceeded  the content exceeds the budget
   [[nodiscard]] std::vector<std::byte> get(const SectionId& id);
 
-  /// A section to be read piece by piece; instead of get(), and like it once.
-  /// \param whole  read and check all of it now; else nothing of it is checked yet
-  /// \throws BadInput  damaged; there is none; it is compressed
+  /// Opens a section that is to be read piece by piece. It is called instead of get(), and once.
+  /// \param whole  true: the whole section is read and checked now; false: nothing is checked yet
+  /// \throws BadInput  the section is damaged, does not exist, or is compressed
   [[nodiscard]] std::unique_ptr<ByteSource> open(const SectionId& id, bool whole);
 
-  /// Checks what has not been read: bytes between the sections, checksums of unknown sections.
-  /// \throws BadInput  damaged; a known section that belongs to nothing
+  /// Checks what has not been read: the bytes between the sections, and the checksums of sections
+  /// of unknown kinds.
+  /// \throws BadInput  there is damage, or a section of a known kind belongs to nothing
   void finish();
 
  private:

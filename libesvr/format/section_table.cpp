@@ -45,7 +45,8 @@ void checkMagic(const ByteSource& source) {
   const auto magic = std::as_bytes(std::span(kMagic));
   const auto differs = std::mismatch(bytes.begin(), bytes.end(), magic.begin()).first;
   if (differs - bytes.begin() == std::ptrdiff_t(kMagic.size())) return;
-  // The first five bytes name the format, the line ends behind them tell what happened to it.
+  // The first five bytes name the format; the line ends after them show how a transfer changed
+  // them.
   if (differs - bytes.begin() >= 5 && n == kMagic.size())
     throw BadInput(source.name() + ": damaged by a transfer as text: its line ends were changed");
   throw BadInput(source.name() + ": not an .esvr file");
@@ -59,7 +60,7 @@ Header readHeader(const ByteSource& source) {
   Header h;
   h.versionMajor = in.get<std::uint16_t>();
   h.versionMinor = in.get<std::uint16_t>();
-  if (h.versionMajor != kVersionMajor)  // before the checksum, which may lie elsewhere there
+  if (h.versionMajor != kVersionMajor)  // before the checksum, which may be elsewhere there
     throw BadInput(source.name() + ": " + versions(h.versionMajor, h.versionMinor));
   h.sections = in.get<std::uint32_t>();
   h.fileBytes = in.get<std::uint64_t>();

@@ -1,5 +1,5 @@
 #pragma once
-/// Header and section table: where everything lies in the file.
+/// The header and the section table, which say where everything is in the file.
 
 #include <compare>
 #include <cstddef>
@@ -37,29 +37,29 @@ struct SectionTable {
   std::vector<SectionEntry> entries;
 };
 
-/// "centers of grid 0, chunk 2".
+/// A name for error texts, for example "centers of grid 0, chunk 2".
 [[nodiscard]] std::string describe(const SectionId& id);
 
-/// "format 1.2, this reader knows 1.0": what to say where something is not understood.
+/// The text for something that is not understood: "format 1.2, this reader knows 1.0".
 [[nodiscard]] std::string versions(std::uint16_t versionMajor, std::uint16_t versionMinor);
 
-/// "file: section 3 (centers of grid 0, chunk 2, at byte 640)": begins errors.
+/// The start of error texts: "file: section 3 (centers of grid 0, chunk 2, at byte 640)".
 [[nodiscard]] std::string placeOf(const std::string& file, const SectionTable& table,
                                   std::size_t entry);
 
-/// Header and table as bytes.
+/// Encodes the header and the table.
 [[nodiscard]] std::vector<std::byte> encodeTable(const SectionTable& table);
 
-/// Reads and checks header and table: version, checksums, no two sections of one id or one byte,
-/// sizes that can be. Reads none of the sections.
+/// Reads and checks the header and the table: the version, the checksums, that no two sections have
+/// the same id or share a byte, and that the sizes are possible. It reads no section.
 /// \throws BadInput
 [[nodiscard]] SectionTable readTable(const ByteSource& source);
 
-/// A section as it lies in the file, checksum checked. \throws BadInput
+/// Reads a section as stored in the file and checks its checksum. \throws BadInput
 [[nodiscard]] std::vector<std::byte> readStored(const ByteSource& source, const SectionTable& table,
                                                 std::size_t entry);
 
-/// A section's content. \throws BadInput
+/// Reads the content of a section. \throws BadInput
 [[nodiscard]] std::vector<std::byte> readSection(const ByteSource& source,
                                                  const SectionTable& table, std::size_t entry);
 

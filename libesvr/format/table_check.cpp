@@ -9,13 +9,13 @@
 namespace esvr::format {
 namespace {
 
-/// A run of bytes that something owns.
+/// A range of bytes that belongs to a part of the file.
 struct Region {
   std::uint64_t offset = 0, bytes = 0;
   friend constexpr auto operator<=>(const Region&, const Region&) = default;
 };
 
-/// Header, table and sections in the order in which they lie in the file.
+/// The header, the table and the sections in their order in the file.
 std::vector<Region> regionsOf(const SectionTable& table) {
   std::vector<Region> regions{{0, kHeaderBytes},
                               {table.tableOffset, table.entries.size() * kEntryBytes}};

@@ -1,5 +1,5 @@
 #pragma once
-/// Checks that header, section table and the bytes around the sections agree.
+/// Checks that the header, the section table and the bytes between the sections agree.
 
 #include <string>
 
@@ -8,8 +8,8 @@
 
 namespace esvr::format {
 
-/// Refuses sections that lie outside the file or on each other, two of one id, kinds and codecs
-/// that would have to be understood, sizes that cannot be. \throws BadInput
+/// Refuses sections that reach beyond the file or overlap, two sections with the same id, unknown
+/// kinds that are required, unknown codecs, and impossible sizes. \throws BadInput
 void checkTable(const std::string& file, const SectionTable& table);
 
 /// Refuses bytes that belong to no section and are not zero. \throws BadInput

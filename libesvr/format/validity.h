@@ -1,5 +1,5 @@
 #pragma once
-/// The rules that a grid must obey to be written and to be believed. They are the same both ways.
+/// The rules that a grid must obey to be written. A reader refuses a grid that breaks them.
 
 #include <optional>
 #include <string>
@@ -9,13 +9,14 @@
 
 namespace esvr::format {
 
-/// A broken rule and the section whose content breaks it.
+/// A broken rule, and the section whose content breaks it.
 struct Fault {
   SectionKind section;
   std::string text;
 };
 
-/// All but leaves, curve and chunks: finite numbers, a kernel that can be evaluated, ranges.
+/// Checks all but leaves, curve and chunks: numbers must be finite, the kernel must be possible to
+/// evaluate, and ranges must be in order.
 [[nodiscard]] std::optional<Fault> faultOf(const StoredGrid& grid);
 
 [[nodiscard]] std::optional<Fault> residualFaultOf(const StoredGrid& grid);

@@ -16,12 +16,12 @@
 namespace esvr::format {
 namespace {
 
-/// A reader must know how many bricks a byte can hold before it allocates: the writer adds zeros
-/// where there would be more.
+/// Limit on the number of bricks in a byte, so that a reader knows it before it allocates memory.
+/// The writer adds zeros where there would be more.
 constexpr std::uint64_t kMaxBricksPerByte = 4;
 constexpr int kMaxBrickBits = 21;
 
-/// Bytes of memory that a brick takes while it is read: codes, masks, and values that are checked.
+/// Bytes of memory that a brick takes while it is read: its codes, its masks, and its values.
 constexpr double kBytesPerBrick =
     kBrickVoxels * (sizeof(std::int32_t) + sizeof(float)) + 3.0 * sizeof(BrickMask) + 64.0;
 
@@ -34,7 +34,7 @@ Coord brickAt(std::uint64_t key) {
           std::int32_t(gatherBits(key >> 2))};
 }
 
-/// Bricks in Morton order: none comes before one that is nowhere above it.
+/// The bricks in Morton order, in which no brick comes before one that is lower along every axis.
 std::vector<std::size_t> codingOrder(const std::vector<Coord>& bricks) {
   std::vector<std::size_t> order(bricks.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -79,7 +79,7 @@ VoxelLayer getHeader(ByteReader& in) {
   return layer;
 }
 
-/// Codes that no value belongs to.
+/// Refuses codes that have no value.
 void checkCodes(const VoxelLayer& layer, const ByteReader& in) {
   if (layer.form != VoxelForm::kPalette) return;
   for (const auto code : layer.codes)

@@ -1,5 +1,5 @@
 #pragma once
-/// A voxel layer as the content of a section: coded by what foretells them (voxel_coder.h).
+/// A voxel layer as the content of a section, encoded by voxel_coder.h.
 
 #include <cstddef>
 #include <span>
@@ -13,7 +13,8 @@ namespace esvr::format {
 
 [[nodiscard]] std::vector<std::byte> putVoxels(const VoxelLayer& layer);
 
-/// \throws BadInput  damaged; begins with `where`; MemoryExceeded: the budget holds fewer bricks
+/// \throws BadInput  the content is damaged; the text begins with `where`
+/// \throws MemoryExceeded  there are more bricks than the budget allows
 [[nodiscard]] VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,
                                    MemoryBudget& budget);
 

@@ -22,7 +22,7 @@ std::string withoutSuffix(const std::string& text, const std::string& suffix) {
   return text.ends_with(suffix) ? text.substr(0, text.size() - suffix.size()) : text;
 }
 
-/// An entry and where the next one begins.
+/// An entry and the position of the next one.
 struct DirectoryRow {
   ArchiveEntry entry;
   std::int64_t next = 0;
@@ -36,7 +36,7 @@ DirectoryRow readRow(InputFile& file) {
   row.entry.savedAsHalf = row.entry.treeType != type;
   row.entry.parent = file.readString();
   const auto gridAt = file.read<std::int64_t>();
-  file.read<std::int64_t>();  // where the voxels begin: not needed
+  file.read<std::int64_t>();  // position of the voxels, which is not needed
   row.next = file.read<std::int64_t>();
   if (gridAt < std::int64_t(file.position()) || row.next < gridAt)
     throw BadInput("is damaged: grid \"" + row.entry.name() + "\" has no valid place in the file");

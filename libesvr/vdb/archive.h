@@ -1,7 +1,8 @@
 #pragma once
-/// A .vdb file's directory: header, file metadata and where each grid lies. Voxels are read by
-/// OpenVDB from this stream (tree_reader.h); what leads to them is read here, since OpenVDB's own
-/// directory believes every size, cannot pass over a grid of unknown type and forgets the order.
+/// The directory of a .vdb file: the header, the file metadata and the position of each grid.
+/// OpenVDB reads the voxels from this stream (tree_reader.h). The directory is read here, because
+/// OpenVDB does not check sizes, cannot skip a grid of unknown type and does not keep the order of
+/// grids.
 
 #include <string>
 #include <vector>
@@ -11,37 +12,38 @@
 
 namespace esvr::vdb {
 
-/// One grid's row of the directory.
+/// The directory's entry for one grid.
 struct ArchiveEntry {
   std::string storedName;  ///< OpenVDB's unique name: the name, "\x1e" and a number
   std::string treeType;    ///< "Tree_float_5_4_3"
   bool savedAsHalf = false;
-  std::string parent;  ///< storedName of the grid whose tree this one shares; else empty
+  std::string parent;  ///< storedName of the grid whose tree this grid shares; else empty
   std::uint64_t gridAt = 0;
   std::uint64_t gridBytes = 0;
 
-  [[nodiscard]] std::string name() const;       ///< without the number
+  [[nodiscard]] std::string name() const;       ///< the name without the number
   [[nodiscard]] std::string valueType() const;  ///< "float", "vec3s", "ptdataidx32", ...
 };
 
 /// The part of a grid before its tree.
 struct GridHead {
-  std::vector<MetaItem> metadata;  ///< file statistics included
+  std::vector<MetaItem> metadata;  ///< including the file's statistics
   Transform transform;
   std::uint32_t compression = 0;  ///< OpenVDB's flags
-  std::uint64_t treeAt = 0;       ///< begin of the tree; a grid with a parent has none
+  std::uint64_t treeAt = 0;       ///< position of the tree; a grid with a parent has none
 };
 
 class Archive {
  public:
-  /// \throws BadInput  not a .vdb, too old, damaged
+  /// \throws BadInput  the file is not a .vdb, is too old, or is damaged
   explicit Archive(InputFile& file);
 
   InputFile& file() { return file_; }
   [[nodiscard]] const std::vector<MetaItem>& metadata() const { return metadata_; }
   [[nodiscard]] const std::vector<ArchiveEntry>& entries() const { return entries_; }
   GridHead readHead(const ArchiveEntry& entry);
-  /// The entry that holds this one's tree: itself unless it has a parent. \throws BadInput  none
+  /// The entry that holds an entry's tree, which is the entry itself unless it has a parent.
+  /// \throws BadInput  there is no such entry
   [[nodiscard]] const ArchiveEntry& treeOwner(const ArchiveEntry& entry) const;
 
  private:
@@ -53,7 +55,7 @@ class Archive {
   std::vector<ArchiveEntry> entries_;
 };
 
-/// True where the file begins as a .vdb does.
+/// True if the file begins as a .vdb file does.
 bool beginsAsVdb(InputFile& file);
 
 }  // namespace esvr::vdb

@@ -9,7 +9,7 @@
 namespace esvr::vdb {
 namespace {
 
-/// Bytes of a brick in the volume, and of what it is filled from.
+/// Bytes of a brick in the volume and of its entry in the list of sources.
 constexpr double kBrickBytes =
     kBrickVoxels * sizeof(float) + sizeof(BrickMask) + 2.0 * sizeof(Coord) + 32.0;
 

@@ -1,10 +1,10 @@
 #pragma once
-/// Builds a SparseVolume from the leaves and tiles of a tree, of OpenVDB or NanoVDB, without a copy
-/// in between.
+/// Builds a SparseVolume from the leaves and tiles of a tree of OpenVDB or NanoVDB, without an
+/// intermediate copy.
 ///
-/// Active voxels keep their value, narrowed to float. Inactive voxels
-/// become the background, since hosts leave anything there; in a level set, the background with the
-/// sign they had, which says inside or outside.
+/// Active voxels keep their value, rounded to float. Inactive voxels become the background, because
+/// applications leave arbitrary values there. In a level set they become the background with the
+/// sign that they had, which distinguishes inside from outside.
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@
 
 namespace esvr::vdb {
 
-/// How a grid's voxels become a volume's.
+/// The rules by which the voxels of a grid become those of a volume.
 struct FillRules {
   float background = 0.0f;
   bool levelSet = false;
@@ -25,33 +25,33 @@ struct FillRules {
   bool allowEmpty = false;
 };
 
-/// The background as float. \throws BadInput  not finite there
+/// The background as float. \throws BadInput  it is not finite as float
 float narrowBackground(double background);
 
-/// \throws MemoryExceeded  the bricks and the tree they come from take more than options.maxBytes
+/// \throws MemoryExceeded  the bricks and the tree together take more than options.maxBytes
 void refuseTooLarge(std::uint64_t bricks, std::uint64_t treeBytes, const ReadOptions& options);
 
-/// Active voxels that float cannot hold: NaN, infinite, or a double out of range.
+/// Active voxels that float cannot hold: NaN, infinite values, and doubles out of range.
 struct NonFiniteTally {
   std::uint64_t count = 0;
-  Coord first;  ///< in the order of bricks, then of voxels within one
+  Coord first;  ///< the first one in the order of bricks and of voxels in a brick
 
   void add(Coord voxel) {
     if (count++ == 0) first = voxel;
   }
 };
-/// \throws BadInput  there are some and they are not to be replaced
+/// \throws BadInput  there are such voxels, and they are not to be replaced
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite);
 
-/// The source that a brick is filled from.
+/// The leaf or tile from which a brick is filled.
 template <class Leaf>
 struct BrickSource {
   Coord corner;
-  const Leaf* leaf = nullptr;  ///< null: an active tile, of
+  const Leaf* leaf = nullptr;  ///< null: the source is an active tile
   double tileValue = 0.0;
 };
 
-/// Appends the bricks that a tile of `extent` voxels a side covers.
+/// Appends the bricks that a tile with a side of `extent` voxels covers.
 template <class Leaf>
 void appendTile(Coord corner, std::int32_t extent, double value,
                 std::vector<BrickSource<Leaf>>& sources) {
@@ -61,14 +61,15 @@ void appendTile(Coord corner, std::int32_t extent, double value,
         sources.push_back({corner + Coord{x, y, z}, nullptr, value});
 }
 
-/// A volume with bricks at these corners (increasing), all background and inactive.
-/// \throws BadInput  two of one corner, or corners 2^31 voxels apart
+/// A volume with bricks at these corners (increasing), whose voxels are inactive and have the
+/// background.
+/// \throws BadInput  two corners are equal, or are 2^31 voxels apart
 SparseVolume layOutBricks(const std::vector<Coord>& corners, float background);
 
-/// \throws BadInput  there is no brick, and the rules do not allow that
+/// \throws BadInput  there is no brick, and the rules do not allow this
 void refuseEmpty(std::size_t bricks, const FillRules& rules);
 
-/// An active value as float; counted, and zero, where float cannot hold it.
+/// An active value as float. A value that float cannot hold is counted and becomes 0.
 inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
   const auto narrow = float(value);
   if (std::isfinite(narrow)) return narrow;
@@ -88,9 +89,10 @@ void fillFromLeaf(const Leaf& leaf, const FillRules& rules, Coord corner, std::s
   }
 }
 
-/// Builds the volume. Access::value(leaf, i) is a leaf's voxel in voxelOffset order,
-/// Access::mask(leaf) its active voxels. \throws BadInput  no active voxel, where the rules do not
-/// allow that; non-finite voxels
+/// Builds the volume. Access::value(leaf, i) is a leaf's voxel in voxelOffset order, and
+/// Access::mask(leaf) holds its active voxels.
+/// \throws BadInput  there is no active voxel, and the rules do not allow this; or voxels are not
+///                   finite
 template <class Leaf, class Access>
 SparseVolume buildVolume(std::vector<BrickSource<Leaf>> sources, const FillRules& rules,
                          NonFiniteTally& tally) {

@@ -9,7 +9,7 @@
 namespace esvr::vdb {
 namespace {
 
-/// Errors that mean the same in both directions.
+/// Rethrows errors that mean the same in reading and writing.
 void rethrowCommon(const std::string& where) {
   try {
     throw;
@@ -26,7 +26,7 @@ void rethrowCommon(const std::string& where) {
   } catch (const std::bad_alloc&) {
     throw RuntimeFailure(where + "out of memory");
   } catch (const std::logic_error&) {
-    throw;  // a fault of ours: not to be dressed up as a fault of the file
+    throw;  // an error of this library, which must not look like an error of the file
   } catch (...) {
   }
 }

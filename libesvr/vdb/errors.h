@@ -1,5 +1,5 @@
 #pragma once
-/// The border where errors of OpenVDB, NanoVDB and the streams become the library's own.
+/// Converts errors of OpenVDB, NanoVDB and the streams to the library's own.
 
 #include <filesystem>
 #include <string>
@@ -7,13 +7,13 @@
 
 namespace esvr::vdb {
 
-/// Rethrows the exception in flight as an esvr::Error whose text begins with `where`. The library's
-/// own errors keep their kind; what the VDB libraries throw while reading is BadInput.
+/// Rethrows the current exception as an esvr::Error whose text begins with `where`. The library's
+/// own errors keep their type; exceptions of the VDB libraries become BadInput.
 [[noreturn]] void rethrowWhileReading(const std::string& where);
-/// The same while writing, where it is RuntimeFailure.
+/// The same for writing, where exceptions of the VDB libraries become RuntimeFailure.
 [[noreturn]] void rethrowWhileWriting(const std::string& where);
 
-/// Runs `body`, whose errors are about `path`.
+/// Runs `body` and adds `path` to the text of its errors.
 template <class Body>
 decltype(auto) whileReading(const std::filesystem::path& path, Body&& body) {
   try {
@@ -23,7 +23,8 @@ decltype(auto) whileReading(const std::filesystem::path& path, Body&& body) {
   }
 }
 
-/// Runs `body`, whose errors are about one grid. Nests in whileReading.
+/// Runs `body` and adds the name of a grid to the text of its errors. It is used inside
+/// whileReading.
 template <class Body>
 decltype(auto) inGrid(const std::string& name, Body&& body) {
   try {

@@ -1,5 +1,5 @@
 #pragma once
-/// A file's list of grids: their names, and why one is passed over.
+/// The names of a file's grids, and the reasons why grids are skipped.
 
 #include <string>
 #include <vector>
@@ -8,13 +8,13 @@
 
 namespace esvr::vdb {
 
-/// Fills in uniqueName.
+/// Sets the uniqueName of every grid.
 void assignUniqueNames(std::vector<GridSummary>& grids);
 
-/// Place of the grid asked for. \throws BadInput  none
+/// Index of a grid by its name. \throws BadInput  there is no such grid
 std::size_t findGrid(const std::vector<GridSummary>& grids, const std::string& wanted);
 
-/// Why a grid of this type is passed over, for the user.
+/// The reason, for the user, why a grid of this type is skipped.
 std::string notAFloatType(const std::string& valueType);
 
 }  // namespace esvr::vdb

@@ -9,7 +9,7 @@
 namespace esvr::vdb {
 namespace {
 
-/// Long enough that the many small skips of a tree walk seldom reach the system.
+/// Large enough that the many short skips in a tree seldom need a system call.
 constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
 
 std::uint64_t sizeOfRegularFile(const std::filesystem::path& path) {

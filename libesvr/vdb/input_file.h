@@ -1,7 +1,7 @@
 #pragma once
-/// A file read front to back with every size checked before it is believed: nothing is allocated or
-/// skipped beyond the file's end. Errors are BadInput without the file's name; the callers at the
-/// library's border add it (errors.h).
+/// A file that is read from front to back. Every size is checked before it is used, so that nothing
+/// is allocated or skipped beyond the end of the file. Errors are BadInput without the file's name,
+/// which the callers add (errors.h).
 
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +15,8 @@ namespace esvr::vdb {
 
 class InputFile {
  public:
-  /// \throws BadInput  missing, a directory or other special file, empty, not readable
+  /// \throws BadInput  the file is missing, a directory or another special file, empty, or not
+  ///                   readable
   explicit InputFile(const std::filesystem::path& path);
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
@@ -36,11 +37,11 @@ class InputFile {
     return value;
   }
   std::vector<std::byte> readBytes(std::uint64_t bytes);
-  /// A string as OpenVDB stores it: 32-bit length, then the characters.
+  /// A string as OpenVDB stores it: a 32-bit length and the characters.
   std::string readString();
 
-  /// The stream, at position(), for a library to read from; it throws std::ios_base::failure at the
-  /// file's end. position() holds the old place until followStream() or seek().
+  /// The stream at position(), from which a library may read. It throws std::ios_base::failure at
+  /// the end of the file. position() does not change before followStream() or seek() is called.
   std::istream& stream() { return stream_; }
   void followStream();
 

@@ -1,6 +1,6 @@
 #pragma once
-/// NanoVDB grids of OpenVDB's. The conversions are templates that take a minute to compile: they
-/// are in one translation unit.
+/// Makes NanoVDB grids from OpenVDB grids. The conversions are templates that take a minute to
+/// compile, so they are in one translation unit.
 
 #include <openvdb/Grid.h>
 
@@ -13,11 +13,12 @@ using NanoHandle = nanovdb::GridHandle<nanovdb::HostBuffer>;
 
 struct NanoForm {
   NanoValues values = NanoValues::kFloat;
-  float tolerance = -1.0f;  ///< kFpN: largest error in value units; below 0: NanoVDB's own choice
+  float tolerance = -1.0f;  ///< for kFpN: largest error in value units; below 0: NanoVDB chooses it
 };
 
-/// A grid of floats in the form given, or one of doubles as doubles. Without dithering.
-/// \throws std::logic_error  a grid of another type; doubles in another form than kFloat
+/// Converts a grid of floats to a form, or a grid of doubles to doubles, without dithering.
+/// \throws std::logic_error  the grid has another type, or is one of doubles and the form is not
+///                           kFloat
 [[nodiscard]] NanoHandle makeNano(const openvdb::GridBase& grid, const NanoForm& form = {});
 
 }  // namespace esvr::vdb

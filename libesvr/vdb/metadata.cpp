@@ -24,7 +24,7 @@ MetaItem readItem(InputFile& file) {
 
 bool isTemporary(const MetaItem& item) { return item.type.starts_with("__"); }
 
-/// The item as a stream of its size and bytes: what Metadata::read takes.
+/// A stream with the size and the bytes of an item, as Metadata::read expects.
 std::istringstream sizedBytes(const MetaItem& item) {
   const auto size = std::uint32_t(item.value.size());
   std::string bytes(reinterpret_cast<const char*>(&size), sizeof size);
@@ -32,8 +32,8 @@ std::istringstream sizedBytes(const MetaItem& item) {
   return std::istringstream(bytes, std::ios::binary);
 }
 
-/// OpenVDB's object for an item: typed where the type is registered and the bytes are of its size,
-/// so that hosts' accessors work; else the bytes as they are.
+/// OpenVDB's object for an item. It has its type if OpenVDB knows the type and the number of bytes
+/// is right, so that applications can access it; otherwise it holds the bytes unchanged.
 openvdb::Metadata::Ptr makeMetadata(const MetaItem& item) {
   if (openvdb::Metadata::isRegisteredType(item.type)) {
     auto typed = openvdb::Metadata::createMetadata(item.type);

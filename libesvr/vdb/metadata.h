@@ -1,5 +1,5 @@
 #pragma once
-/// VDB metadata as bytes: read with checked sizes, looked up, and handed back to OpenVDB.
+/// VDB metadata as bytes: reads it with checked sizes, looks up items, and passes it to OpenVDB.
 
 #include <cstring>
 #include <optional>
@@ -16,14 +16,14 @@
 
 namespace esvr::vdb {
 
-/// Reads a metadata block, sorted by name as OpenVDB keeps it. Items that OpenVDB itself calls
-/// temporary (their type begins "__") are left out. \throws BadInput  damaged
+/// Reads a block of metadata, sorted by name as in OpenVDB. Items that OpenVDB calls temporary
+/// (their type begins with "__") are left out. \throws BadInput  the block is damaged
 std::vector<MetaItem> readMetadata(InputFile& file);
 
 const MetaItem* findItem(std::span<const MetaItem> items, const std::string& name);
-/// The text of an item of type "string"; empty where there is none.
+/// The text of an item of type "string"; empty if there is none.
 std::string stringValue(std::span<const MetaItem> items, const std::string& name);
-/// The value of a fixed-size item of that type and size.
+/// The value of an item with this type and the size of T; nothing if there is none.
 template <class T>
 std::optional<T> fixedValue(std::span<const MetaItem> items, const std::string& name,
                             const std::string& type) {
@@ -35,11 +35,11 @@ std::optional<T> fixedValue(std::span<const MetaItem> items, const std::string& 
   return value;
 }
 
-/// True for the statistics that a writer regenerates for each grid (file_voxel_count, ...).
+/// True for statistics that a writer makes anew for each grid (file_voxel_count, ...).
 bool isFileStatistic(const MetaItem& item);
 std::vector<MetaItem> withoutFileStatistics(std::vector<MetaItem> items);
 
-/// Inserts the items so that OpenVDB writes the same bytes again.
+/// Inserts items such that OpenVDB writes the same bytes again.
 void insertItems(std::span<const MetaItem> items, openvdb::MetaMap& to);
 
 }  // namespace esvr::vdb

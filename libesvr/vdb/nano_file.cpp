@@ -13,12 +13,12 @@ namespace esvr::vdb {
 namespace {
 
 constexpr std::uint64_t kMagicOld =
-    0x304244566f6e614eu;  // "NanoVDB0": a file, before 32.6 a grid too
+    0x304244566f6e614eu;  // "NanoVDB0": a file, and before 32.6 also a grid
 constexpr std::uint64_t kMagicGrid = 0x314244566f6e614eu;  // "NanoVDB1"
 constexpr std::uint64_t kMagicFile = 0x324244566f6e614eu;  // "NanoVDB2"
 
 enum Codec : std::uint16_t { kNone = 0, kZip = 1, kBlosc = 2 };
-constexpr std::uint64_t kBloscChunk = std::uint64_t{1} << 30;  // of raw bytes
+constexpr std::uint64_t kBloscChunk = std::uint64_t{1} << 30;  // bytes before compression
 
 struct SegmentHeader {
   std::uint64_t magic;

@@ -1,8 +1,8 @@
 #pragma once
-/// A .nvdb file's directory and the bytes of its grids. Read here and not by NanoVDB, which
-/// believes every size it finds. The layout (NanoVDB's major version 32): segments, each a header
-/// of 16 bytes, per grid 176 bytes and a name, then per grid its buffer, compressed as the header
-/// says.
+/// The directory of a .nvdb file and the bytes of its grids. They are read here, because NanoVDB
+/// does not check sizes. In the layout of NanoVDB's major version 32, a file consists of segments:
+/// each has a header of 16 bytes, then 176 bytes and a name for each grid, and then the buffer of
+/// each grid, compressed as the header says.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace esvr::vdb {
 
-/// One grid's row of the directory. Numbers of type and class are NanoVDB's.
+/// The directory's entry for one grid. The numbers of its type and class are NanoVDB's.
 struct NanoEntry {
   std::string name;
   std::uint32_t gridType = 0;
@@ -24,18 +24,18 @@ struct NanoEntry {
   std::uint64_t activeVoxels = 0;
   Box activeBox;
   std::uint16_t codec = 0;
-  std::uint64_t gridBytes = 0;  ///< in memory
+  std::uint64_t gridBytes = 0;  ///< size in memory
   std::uint64_t storedBytes = 0;
   std::uint64_t at = 0;
 };
 
-/// True where the file begins as one of NanoVDB's does.
+/// True if the file begins as a NanoVDB file does.
 bool beginsAsNanoVdb(InputFile& file);
 
-/// \throws BadInput  another version, a bare grid buffer, damaged
+/// \throws BadInput  the file has another version, is a grid buffer without a header, or is damaged
 std::vector<NanoEntry> readNanoDirectory(InputFile& file);
 
-/// A grid's buffer, aligned as NanoVDB wants it.
+/// The buffer of a grid, with the alignment that NanoVDB needs.
 class NanoBuffer {
  public:
   explicit NanoBuffer(std::size_t bytes)
@@ -52,7 +52,8 @@ class NanoBuffer {
   std::size_t size_;
 };
 
-/// \throws BadInput  damaged; MemoryExceeded: larger than maxBytes
+/// \throws BadInput  the buffer is damaged
+/// \throws MemoryExceeded  the buffer is larger than maxBytes
 NanoBuffer readNanoBuffer(InputFile& file, const NanoEntry& entry, std::uint64_t maxBytes);
 
 }  // namespace esvr::vdb

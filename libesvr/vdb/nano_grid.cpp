@@ -18,8 +18,8 @@ const nanovdb::GridData& gridData(const NanoBuffer& buffer) {
   return *reinterpret_cast<const nanovdb::GridData*>(buffer.data());
 }
 
-/// The nodes of one grid. Coordinates follow from the nodes' places in the tree, not from what the
-/// nodes say of themselves.
+/// The nodes of one grid. Coordinates follow from the positions of the nodes in the tree; the
+/// coordinates that the nodes hold are not used.
 template <class Build>
 class NanoTree {
  public:
@@ -30,7 +30,7 @@ class NanoTree {
   using Leaf = nanovdb::NanoLeaf<Build>;
   using Source = BrickSource<Leaf>;
 
-  /// \throws BadInput  a header, tree or root that reaches beyond the buffer
+  /// \throws BadInput  a header, a tree or a root reaches beyond the buffer
   explicit NanoTree(const NanoBuffer& buffer) : buffer_(buffer) {
     constexpr std::uint64_t kTreeAt = sizeof(nanovdb::GridData);
     using TreeData = std::remove_cvref_t<decltype(*std::declval<Grid>().tree().data())>;
@@ -47,7 +47,7 @@ class NanoTree {
 
   [[nodiscard]] double background() const { return double(root_->background()); }
 
-  /// Calls onLeaf(corner, leaf) and onTile(corner, extent, value) for all that is active.
+  /// Calls onLeaf(corner, leaf) and onTile(corner, extent, value) for all active leaves and tiles.
   template <class OnLeaf, class OnTile>
   void visit(OnLeaf&& onLeaf, OnTile&& onTile) const {
     for (std::uint32_t i = 0; i < root_->data()->mTableSize; ++i) {
@@ -69,7 +69,8 @@ class NanoTree {
     return std::uint64_t(static_cast<const std::byte*>(p) - buffer_.data());
   }
 
-  /// The node at an offset from another. \throws BadInput  not wholly inside, or not aligned
+  /// The node at an offset from another one.
+  /// \throws BadInput  the node is not wholly in the buffer, or not aligned
   template <class Node>
   const Node* node(const void* from, std::int64_t offset) const {
     const std::uint64_t at = place(from) + std::uint64_t(offset);  // wraps for negative offsets
@@ -79,7 +80,7 @@ class NanoTree {
     return reinterpret_cast<const Node*>(buffer_.data() + at);
   }
 
-  /// Corner of a node's n-th cell.
+  /// The corner of the n-th cell of a node.
   template <class Node>
   static Coord cell(Coord corner, std::uint32_t n, std::int32_t extent) {
     constexpr std::uint32_t kLog2 = Node::LOG2DIM, kMask = (1u << kLog2) - 1;
@@ -112,7 +113,7 @@ class NanoTree {
     }
   }
 
-  /// A leaf with the values that follow it where its size varies (FpN).
+  /// A leaf, including the values that follow it if its size varies (FpN).
   const Leaf& leaf(const Lower& lower, std::int64_t offset) const {
     const Leaf* found = node<Leaf>(&lower, offset);
     if constexpr (std::is_same_v<Build, nanovdb::FpN>)
@@ -126,7 +127,7 @@ class NanoTree {
   const Root* root_ = nullptr;
 };
 
-/// How buildVolume sees NanoVDB's leaves, whose voxels are in voxelOffset order.
+/// Access to the leaves of NanoVDB for buildVolume. Their voxels are in voxelOffset order.
 template <class Leaf>
 struct LeafAccess {
   static auto value(const Leaf& leaf, int i) { return leaf.data()->getValue(std::uint32_t(i)); }
@@ -173,7 +174,7 @@ void readVoxelsAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGr
   grid.nonFiniteReplaced = tally.count;
 }
 
-/// The map, which NanoVDB keeps as an affine one only, as the simplest of OpenVDB's that equals it.
+/// The map as the simplest map of OpenVDB that is equal to it. NanoVDB stores an affine map only.
 Transform transformOf(const NanoBuffer& buffer) {
   const auto& map = gridData(buffer).mMap;
   openvdb::math::Mat4d matrix = openvdb::math::Mat4d::identity();

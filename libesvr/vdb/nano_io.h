@@ -1,7 +1,7 @@
 #pragma once
-/// NanoVDB's readers and writers of files. They are templates whose code follows these macros, so
-/// every source that uses them includes them here: two definitions of one function would otherwise
-/// meet in a program.
+/// NanoVDB's readers and writers of files. They are templates that depend on these macros, so every
+/// source file includes them through this header. Otherwise a program could contain two different
+/// definitions of one function.
 
 #include "vdb/versions.h"
 

@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::align_val_t kAlignment{32};
 
-/// Every brick a leaf of floats, and no tiles, whose values a renderer would have to know.
+/// Makes a grid of floats in which every brick is a leaf, without tiles, so that a renderer need
+/// not handle tiles.
 openvdb::GridBase::Ptr asFloats(const VolumeGrid& from) {
   VolumeGrid grid = from;
   grid.descriptor.valueType = ValueType::kFloat;

@@ -9,7 +9,8 @@
 namespace esvr::vdb {
 namespace {
 
-/// NanoVDB numbers the classes it shares with OpenVDB as we do.
+/// Converts NanoVDB's number of a class; the classes shared with OpenVDB have the same numbers
+/// here.
 GridClass gridClassOf(std::uint32_t nanoClass) {
   return nanoClass <= std::uint32_t(GridClass::kStaggered) ? GridClass(nanoClass)
                                                            : GridClass::kUnknown;

@@ -1,5 +1,5 @@
 #pragma once
-/// .nvdb files behind inspectVdb and readGrid; errors lack the file's name.
+/// Implements inspectVdb and readGrid for .nvdb files. Errors do not name the file.
 
 #include <string>
 

@@ -14,14 +14,14 @@ namespace {
 
 using openvdb::GridBase;
 
-/// A file and its list of grids, in the same order.
+/// A file and the list of its grids, in the same order.
 struct ListedArchive {
   Archive archive;
   std::vector<GridHead> heads;
   std::vector<GridSummary> grids;
 };
 
-/// "level set" and so on, as OpenVDB names them; kUnknown for any other text.
+/// The class by OpenVDB's name for it, for example "level set"; kUnknown for any other text.
 GridClass gridClassOf(const std::string& text) {
   switch (GridBase::stringToGridClass(text)) {
     case openvdb::GRID_LEVEL_SET:
@@ -45,7 +45,7 @@ std::string reasonToSkip(const ArchiveEntry& entry) {
   return notAFloatType(type);
 }
 
-/// Counts from the file's statistics where its writer left them.
+/// Takes the counts from the file's statistics, if the writer stored them.
 bool countFromStatistics(const std::vector<MetaItem>& items, GridSummary& grid) {
   using Corner = std::array<std::int32_t, 3>;
   const auto count = fixedValue<std::int64_t>(items, GridBase::META_FILE_VOXEL_COUNT, "int64");
@@ -99,7 +99,7 @@ ValueType valueTypeOf(const GridSummary& grid) {
 VolumeGrid readListedGrid(ListedArchive& listed, std::size_t i, const ReadOptions& options) {
   const GridSummary& summary = listed.grids[i];
   const ArchiveEntry& entry = listed.archive.entries()[i];
-  // Only the type is held against it here: statistics that call it empty may be stale.
+  // Only the type is checked here. Statistics that call the grid empty may be wrong.
   if (!isScalarFloatTree(entry)) throw BadInput(summary.skipReason);
   TreeVoxels voxels = readVoxels(listed.archive, entry, summary.gridClass, options);
   VolumeGrid grid;

@@ -1,5 +1,5 @@
 #pragma once
-/// .vdb files behind inspectVdb and readGrid; errors lack the file's name.
+/// Implements inspectVdb and readGrid for .vdb files. Errors do not name the file.
 
 #include <string>
 

@@ -1,6 +1,6 @@
 #pragma once
-/// OpenVDB's grids of floats and doubles. A source that makes one would compile every virtual
-/// function of their trees; scalar_trees.cpp does it once for all.
+/// OpenVDB's grids of floats and doubles. Every source file that uses them would compile all
+/// virtual functions of their trees; scalar_trees.cpp compiles them once.
 
 #include "vdb/versions.h"
 

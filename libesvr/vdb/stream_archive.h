@@ -1,5 +1,5 @@
 #pragma once
-/// OpenVDB's archives on a stream of ours.
+/// OpenVDB's archives on a stream of this library.
 
 #include "vdb/versions.h"
 
@@ -10,8 +10,8 @@
 
 namespace esvr::vdb {
 
-/// OpenVDB's own File writes to a stream whose errors nobody looks at; this one takes ours, which
-/// throws.
+/// OpenVDB's own class File ignores the errors of the stream that it writes to. This class writes
+/// to a stream that throws.
 class StreamArchive : public openvdb::io::Archive {
  public:
   /// \param compression  OpenVDB's flags

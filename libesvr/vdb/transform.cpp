@@ -13,7 +13,7 @@ namespace {
 
 namespace math = openvdb::math;
 
-/// A frustum's bytes before the name of its second map: a box, taper and depth.
+/// The bytes of a frustum before the name of its second map: a box, a taper and a depth.
 constexpr std::uint64_t kFrustumHead = 8 * sizeof(double);
 
 bool isFrustum(const std::string& mapType) {
@@ -27,8 +27,8 @@ math::MapBase::Ptr createMap(const std::string& mapType) {
   return math::MapRegistry::createMap(mapType);
 }
 
-/// OpenVDB believes the length of the second map's name and reads a frustum within a frustum by
-/// recursion; both would let a damaged file take the process down.
+/// OpenVDB does not check the length of the second map's name, and reads a frustum within a frustum
+/// by recursion. Either could crash the process on a damaged file.
 void checkFrustum(InputFile& file) {
   const auto start = file.position();
   file.skip(kFrustumHead);
@@ -67,7 +67,8 @@ Transform fromMap(const math::MapBase& map) { return {map.type(), serialised(map
 
 Transform fromMatrix(const math::Mat4d& matrix) {
   const math::AffineMap affine(matrix);
-  // OpenVDB's simplification may round: the scale of a translated map is found by a subtraction.
+  // OpenVDB's simplification may round, because it finds the scale of a translated map by
+  // subtraction.
   const auto simple = math::Transform::createLinearTransform(matrix)->baseMap();
   return simple->getAffineMap()->getMat4() == matrix ? fromMap(*simple) : fromMap(affine);
 }
@@ -95,7 +96,7 @@ Transform uniformTransform(double voxelSize) {
     throw UsageError("a voxel size must be positive and finite");
   try {
     return vdb::fromMap(openvdb::math::UniformScaleMap(voxelSize));
-  } catch (const openvdb::Exception& e) {  // below about 1e-5 its cube counts as zero
+  } catch (const openvdb::Exception& e) {  // OpenVDB treats a scale below about 1e-5 as singular
     throw UsageError("a voxel size of " + std::to_string(voxelSize) + ": " + e.what());
   }
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// Index-to-world maps: from a file, from and to OpenVDB's objects.
+/// Reads index-to-world maps from files, and converts them from and to OpenVDB's objects.
 
 #include "esvr/grid_descriptor.h"
 #include "vdb/input_file.h"
@@ -9,18 +9,18 @@
 
 namespace esvr::vdb {
 
-/// Reads the transform that stands at the file's position. The stream is tagged with its version.
-/// \throws BadInput  damaged, a map OpenVDB does not know
+/// Reads the transform at the position of the file. The stream must know the file's version.
+/// \throws BadInput  the transform is damaged, or OpenVDB does not know its map
 Transform readTransform(InputFile& file);
 
 Transform fromMap(const openvdb::math::MapBase& map);
 
-/// The simplest of OpenVDB's maps that equals an affine one.
-/// \throws openvdb::ArithmeticError  singular, or not affine
+/// The simplest of OpenVDB's maps that equals an affine map.
+/// \throws openvdb::ArithmeticError  the matrix is singular or not affine
 Transform fromMatrix(const openvdb::math::Mat4d& matrix);
 
-/// The very map that was read, not OpenVDB's simplification of it.
-/// \throws BadInput  bytes that are no such map
+/// The map as it was read, without OpenVDB's simplification.
+/// \throws BadInput  the bytes are not such a map
 openvdb::math::Transform::Ptr toOpenVdb(const Transform& transform);
 
 }  // namespace esvr::vdb

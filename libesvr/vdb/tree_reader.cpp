@@ -12,7 +12,7 @@
 namespace esvr::vdb {
 namespace {
 
-/// How buildVolume sees OpenVDB's leaves, whose voxels are in voxelOffset order.
+/// Access to the leaves of OpenVDB for buildVolume. Their voxels are in voxelOffset order.
 template <class Leaf>
 struct LeafAccess {
   static auto value(const Leaf& leaf, int i) { return leaf.buffer().data()[i]; }
@@ -26,7 +26,7 @@ struct LeafAccess {
 
 Coord toCoord(const openvdb::Coord& c) { return {c.x(), c.y(), c.z()}; }
 
-/// The place and the content of an entry's tree.
+/// The position and the head of an entry's tree.
 struct LocatedTree {
   const ArchiveEntry& owner;
   GridHead head;
@@ -43,7 +43,7 @@ LocatedTree locateTree(Archive& archive, const ArchiveEntry& entry) {
   return {owner, std::move(head), survey};
 }
 
-/// The voxels are in memory when this returns: the stream is not one OpenVDB could map.
+/// Reads a tree with its voxels. OpenVDB cannot map this stream into memory and load voxels later.
 template <class Tree>
 Tree readTree(Archive& archive, const LocatedTree& located) {
   InputFile& file = archive.file();

@@ -1,5 +1,5 @@
 #pragma once
-/// Voxels from a .vdb archive, by OpenVDB.
+/// Reads the voxels of a .vdb archive with OpenVDB.
 
 #include "esvr/vdb_io.h"
 #include "vdb/archive.h"
@@ -7,20 +7,22 @@
 
 namespace esvr::vdb {
 
-/// True where the grid's tree is one that can be fitted.
+/// True if the grid's tree can be fitted.
 bool isScalarFloatTree(const ArchiveEntry& entry);
 
-/// Walks the tree of an entry whose isScalarFloatTree. \throws BadInput
+/// Surveys the tree of an entry for which isScalarFloatTree is true.
+/// \throws BadInput  the tree is truncated or damaged
 TreeSurvey surveyTree(Archive& archive, const ArchiveEntry& entry);
 
-/// A grid's voxels, and its background in full precision.
+/// The voxels of a grid, and its background in full precision.
 struct TreeVoxels {
   SparseVolume volume;
   double background = 0.0;
   std::uint64_t nonFiniteReplaced = 0;
 };
 
-/// \throws BadInput  damaged; no active voxel; non-finite voxels; more than options.maxBytes
+/// \throws BadInput  the tree is damaged or has no active voxel; voxels are not finite
+/// \throws MemoryExceeded  it takes more than options.maxBytes
 TreeVoxels readVoxels(Archive& archive, const ArchiveEntry& entry, GridClass gridClass,
                       const ReadOptions& options);
 

@@ -22,7 +22,7 @@ namespace io = openvdb::io;
   throw BadInput("is damaged at byte " + std::to_string(file.position()) + ": " + what);
 }
 
-/// One bit a cell of a node, as OpenVDB stores it; cells count z fastest.
+/// One bit for each cell of a node, as OpenVDB stores it, with z fastest.
 template <int kLog2>
 struct NodeMask {
   static constexpr std::size_t kCells = std::size_t{1} << (3 * kLog2);
@@ -55,7 +55,7 @@ using LeafMask = NodeMask<kBrickLog2>;
 using LowerMask = NodeMask<kLowerLog2>;
 using UpperMask = NodeMask<kUpperLog2>;
 
-/// Corner of a node's n-th cell.
+/// The corner of the n-th cell of a node.
 template <int kLog2>
 Coord cellCorner(Coord corner, std::size_t n, std::int32_t cellExtent) {
   constexpr std::size_t kMask = (std::size_t{1} << kLog2) - 1;
@@ -83,7 +83,7 @@ class Surveyor {
   Coord rootKey() {
     const auto key = file_.read<Coord>();
     if (key.x % kUpperExtent || key.y % kUpperExtent || key.z % kUpperExtent)
-      damaged(file_, "a node at " + toString(key) + " off the lattice");
+      damaged(file_, "a node at the impossible place " + toString(key));
     if (!rootKeys_.insert(key).second) damaged(file_, "two nodes at " + toString(key));
     return key;
   }
@@ -122,7 +122,7 @@ class Surveyor {
     valueBlock(mask);
   }
 
-  /// Reads an inner node up to its child nodes. \return which cells have one
+  /// Reads an inner node up to its child nodes. \return the cells that have one
   template <class Mask, int kLog2>
   Mask nodeHead(Coord corner, std::int32_t cellExtent) {
     const auto children = file_.read<Mask>();
@@ -144,7 +144,7 @@ class Surveyor {
     survey_.activeBox.expand(Box{corner, corner + Coord{last, last, last}});
   }
 
-  /// A block of one node's values.
+  /// Skips the block of a node's values.
   template <class Mask>
   void valueBlock(const Mask& active) {
     const auto inactive = file_.read<std::int8_t>();
@@ -168,7 +168,7 @@ class Surveyor {
   }
 
   void valueArray(std::uint64_t count) {
-    if (layout_.savedAsHalf && count == 0) return;  // OpenVDB stores nothing, not even a size
+    if (layout_.savedAsHalf && count == 0) return;  // OpenVDB stores nothing then, not even a size
     const std::uint64_t bytes = count * (layout_.savedAsHalf ? kHalfBytes : layout_.valueBytes);
     if (layout_.compression & (io::COMPRESS_BLOSC | io::COMPRESS_ZIP))
       chunk(bytes);
@@ -176,7 +176,7 @@ class Surveyor {
       file_.skip(bytes);
   }
 
-  /// A size, negative where the bytes are not compressed, and the bytes.
+  /// Skips a size, which is negative if the bytes are not compressed, and the bytes.
   void chunk(std::uint64_t rawBytes) {
     const auto size = file_.read<std::int64_t>();
     if (size <= 0) {
@@ -187,7 +187,7 @@ class Surveyor {
     file_.skip(std::uint64_t(size) - (blosc ? bloscHeader(std::uint64_t(size), rawBytes) : 0));
   }
 
-  /// \return the header's length
+  /// \return the length of the header
   std::uint64_t bloscHeader(std::uint64_t storedBytes, std::uint64_t rawBytes) {
     file_.need(storedBytes);
     if (storedBytes < BLOSC_MIN_HEADER_LENGTH) damaged(file_, "a Blosc chunk without a header");
@@ -201,7 +201,7 @@ class Surveyor {
 
   static constexpr std::uint64_t kHalfBytes = 2;
   static constexpr std::uint64_t kRootTileBytes = 96;  ///< a std::map node of coordinates and tile
-  static constexpr std::uint64_t kLeafOverhead = 160;  ///< a leaf but for its values
+  static constexpr std::uint64_t kLeafOverhead = 160;  ///< a leaf without its values
 
   InputFile& file_;
   ValueLayout layout_;

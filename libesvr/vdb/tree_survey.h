@@ -1,14 +1,15 @@
 #pragma once
-/// A walk over a grid's tree in a .vdb file that reads no voxel. OpenVDB believes the sizes it
-/// finds (a negative chunk size overruns its buffers, a damaged Blosc header its input), so nothing
-/// is handed to it before this walk has checked it all. On the way it learns what the tree holds.
+/// Surveys a grid's tree in a .vdb file without reading voxels. OpenVDB does not check sizes (a
+/// negative chunk size makes it write beyond its buffers, a damaged Blosc header read beyond its
+/// input), so it gets a tree only after this survey has checked all sizes. The survey also finds
+/// what the tree holds.
 ///
-/// The layout, in OpenVDB's format versions 222 and up, of a tree of 32^3, 16^3 and 8^3 nodes:
+/// The layout of a tree of 32^3, 16^3 and 8^3 nodes, in OpenVDB's format versions from 222 on:
 ///   1 (a buffer count), background, tile count, child count, tiles (coordinates, value, active),
 ///   children (coordinates, upper node);
 ///   a node: child mask, value mask, values (block), child nodes; a leaf: value mask;
 ///   then for each leaf: value mask, values (block).
-///   A block: a byte that says how inactive values are kept, up to two of them, up to one mask,
+///   A block: a byte that says how inactive values are stored, up to two of them, up to one mask,
 ///   the values, compressed as the grid's flags say.
 
 #include <cstdint>
@@ -18,22 +19,22 @@
 
 namespace esvr::vdb {
 
-/// How a grid's values lie in the file.
+/// The way in which a grid's values are stored in the file.
 struct ValueLayout {
-  std::uint64_t valueBytes = 4;   ///< in memory: 4 float, 8 double
-  bool savedAsHalf = false;       ///< in blocks only; background and tiles of the root are whole
+  std::uint64_t valueBytes = 4;   ///< size in memory: 4 for float, 8 for double
+  bool savedAsHalf = false;       ///< in blocks, not in the background and the root's tiles
   std::uint32_t compression = 0;  ///< OpenVDB's flags
 };
 
 struct TreeSurvey {
   std::uint64_t leaves = 0;
-  std::uint64_t activeVoxels = 0;  ///< those of tiles included
-  std::uint64_t tileBricks = 0;    ///< 8^3 bricks that the active tiles amount to
+  std::uint64_t activeVoxels = 0;  ///< including those of tiles
+  std::uint64_t tileBricks = 0;    ///< number of 8^3 bricks that the active tiles cover
   Box activeBox;
-  std::uint64_t treeBytes = 0;  ///< that OpenVDB's tree takes in memory
+  std::uint64_t treeBytes = 0;  ///< bytes that OpenVDB's tree takes in memory
 };
 
-/// Walks the tree at the file's position. \throws BadInput  truncated or damaged
+/// Surveys the tree at the position of the file. \throws BadInput  it is truncated or damaged
 TreeSurvey surveyTree(InputFile& file, const ValueLayout& layout);
 
 }  // namespace esvr::vdb

@@ -1,9 +1,10 @@
 #pragma once
-/// The one place that knows how OpenVDB 10 to 13 differ, and how NanoVDB's headers moved. Sources
-/// of this folder include it before any other header of the two libraries.
+/// Handles the differences between OpenVDB 10 to 13 and the positions of NanoVDB's headers. Source
+/// files of this folder include it before any other header of the two libraries.
 ///
-/// OpenVDB 13 drops delayed loading. Nothing here depends on it: grids are read from a stream of
-/// ours (archive.h), which OpenVDB never maps, so voxels are in memory when a read returns.
+/// OpenVDB 13 has no delayed loading. This library does not use it: grids are read from a stream of
+/// its own (archive.h), which OpenVDB cannot map into memory, so all voxels are loaded when a read
+/// returns.
 
 #include <openvdb/version.h>
 
@@ -13,8 +14,8 @@
 #error "ESVR needs OpenVDB 10 or newer"
 #endif
 
-// NanoVDB's writers: headers for `#include ESVR_NANOVDB_...`, the namespace they fill, and whether
-// createNanoGrid() is among them.
+// The headers of NanoVDB's writers for `#include ESVR_NANOVDB_...`, their namespace, and whether
+// they contain createNanoGrid().
 #if __has_include(<nanovdb/io/IO.h>)  // OpenVDB 12 and up
 #define ESVR_NANOVDB_IO <nanovdb/io/IO.h>
 #define ESVR_NANOVDB_CREATE <nanovdb/tools/CreateNanoGrid.h>
@@ -39,10 +40,11 @@ namespace nanotools = nanovdb;
 
 namespace esvr::vdb {
 
-/// Registers OpenVDB's types. Cheap after the first call; safe from any thread.
+/// Registers OpenVDB's types. It is cheap after the first call and safe to call from any thread.
 void initializeOpenVdb();
 
-/// The oldest file format read: that of OpenVDB 1.1 (2013), the first with per-node masks.
+/// The oldest file format that can be read, that of OpenVDB 1.1 (2013), the first with masks for
+/// each node.
 inline constexpr std::uint32_t kOldestFileVersion =
     openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
 

@@ -54,7 +54,7 @@ typename openvdb::Grid<Tree>::Ptr makeGrid(const VolumeGrid& source, const Write
   auto grid = openvdb::Grid<Tree>::create(background);
   Tree& tree = grid->tree();
   addLeaves(source.volume, tree);
-  // The flood fill overwrites active tiles, so it comes before there are any.
+  // The flood fill overwrites active tiles, so it runs before there are any.
   if (source.descriptor.gridClass == GridClass::kLevelSet && background > 0)
     openvdb::tools::signedFloodFill(tree);
   if (options.constantTiles) openvdb::tools::prune(tree);
@@ -79,8 +79,8 @@ void refuseBeyondHalf(const VolumeGrid& grid) {
                      "\" has values beyond 65504, the largest that half precision holds");
 }
 
-/// Restores what the source's metadata said, then what the descriptor says otherwise: a descriptor
-/// made from scratch has no metadata.
+/// Restores the properties in the source's metadata and then those in the descriptor, because a
+/// descriptor that was made from scratch has no metadata.
 void restoreDescriptor(const GridDescriptor& descriptor, GridBase& grid) {
   insertItems(descriptor.metadata, grid);
   if (grid.getName() != descriptor.name) grid.setName(descriptor.name);

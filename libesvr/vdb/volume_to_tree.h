@@ -1,5 +1,5 @@
 #pragma once
-/// OpenVDB grids from volumes.
+/// Makes OpenVDB grids from volumes.
 
 #include "esvr/vdb_io.h"
 #include "vdb/versions.h"
@@ -8,10 +8,10 @@
 
 namespace esvr::vdb {
 
-/// A grid with the volume's voxels and all that the descriptor names: a DoubleGrid where the source
-/// was double, else a FloatGrid. Inactive voxels hold the background; in a level set whose
-/// background is positive they and the space between get their sign by flood fill.
-/// \throws UsageError  values that half cannot hold are to be saved as half
+/// A grid with the voxels of the volume and the properties of the descriptor: a DoubleGrid if the
+/// source was double, else a FloatGrid. Inactive voxels hold the background. In a level set whose
+/// background is positive, a flood fill gives inactive voxels and empty space their sign.
+/// \throws UsageError  the grid is to be saved as half, which cannot hold its values
 openvdb::GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& grid, const WriteOptions& options);
 
 }  // namespace esvr::vdb

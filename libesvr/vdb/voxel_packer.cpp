@@ -47,7 +47,7 @@ void checkPacking(const VoxelPacking& packing, const GridDescriptor& descriptor)
     throw UsageError("NanoVDB holds affine transforms only, not a " + descriptor.transform.mapType);
 }
 
-/// Seconds that body() takes.
+/// Runs body() and returns the seconds that it takes.
 template <class Body>
 double timed(const Body& body) {
   double seconds = 0.0;
@@ -68,13 +68,13 @@ bool fitsHalf(const SparseVolume& volume) {
 }
 
 openvdb::FloatGrid::Ptr makeFloatGrid(VolumeGrid grid) {
-  grid.descriptor.valueType = ValueType::kFloat;  // what the volume holds, be the source of doubles
+  grid.descriptor.valueType = ValueType::kFloat;  // that of the volume, even for a double source
   return openvdb::gridPtrCast<openvdb::FloatGrid>(
       vdb::makeOpenVdbGrid(grid, {.half = HalfMode::kOff}));
 }
 
 void writeOpenVdb(openvdb::FloatGrid& source, const VoxelPacking& packing, std::ostream& stream) {
-  const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(source.copyGrid());  // one tree
+  const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(source.copyGrid());  // shares the tree
   grid->setSaveFloatAsHalf(packing.form == PackedForm::kOpenVdbHalf);
   if (packing.codec == PackedCodec::kZip) grid->setGridClass(openvdb::GRID_UNKNOWN);
   vdb::StreamArchive(openVdbFlags(packing.codec)).writeTo(stream, {grid}, {});

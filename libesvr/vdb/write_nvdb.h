@@ -1,5 +1,5 @@
 #pragma once
-/// .nvdb files behind writeGrids.
+/// Implements writeGrids for .nvdb files.
 
 #include <filesystem>
 #include <span>
@@ -8,8 +8,9 @@
 
 namespace esvr::vdb {
 
-/// Writes into an existing empty file. \throws UsageError  what NanoVDB cannot hold;
-/// std::ios_base::failure: disk full
+/// Writes to an existing empty file.
+/// \throws UsageError  NanoVDB cannot hold the grid
+/// \throws std::ios_base::failure  the disk is full
 void writeNanoVdb(const std::filesystem::path& path, std::span<const VolumeGrid> grids,
                   const WriteOptions& options);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// .vdb files behind writeGrids.
+/// Implements writeGrids for .vdb files.
 
 #include <filesystem>
 #include <span>
@@ -9,11 +9,12 @@
 
 namespace esvr::vdb {
 
-/// Writes into an existing empty file. \throws std::ios_base::failure  disk full
+/// Writes to an existing empty file. \throws std::ios_base::failure  the disk is full
 void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                   std::span<const VolumeGrid> grids, const WriteOptions& options);
 
-/// The source's file metadata and, unless it is there, an item that names us as the writer.
+/// The source's file metadata, with an item that names this library as the writer, unless it has
+/// one.
 std::vector<MetaItem> withWriter(std::span<const MetaItem> fileMetadata);
 
 }  // namespace esvr::vdb

@@ -44,7 +44,7 @@ INSTANTIATE_TEST_SUITE_P(All, RefusedSetting,
                                          "vdb-half,threshold=-1", "vdb-half,threshold=inf", "zfp",
                                          "zfp,rate=4", "zfp,accuracy=0.1,threshold=0.1"));
 
-TEST(Setting, listsWhatThereIs) {
+TEST(Setting, listsTheValidSettings) {
   try {
     (void)parseBaseline("gzip");
     FAIL();

@@ -59,14 +59,14 @@ class Volume:
              '--size', size, '--device', self.options.device, '--report', self.report(part), '-f'])
 
     def time_of(self, part):
-        """Seconds of the whole run and on which device."""
+        """The seconds and the device of the fit."""
         report = json.loads(self.report(part).read_text())
         grid = report['grids'][0]
         return {'seconds': report['seconds']['total'], 'device': grid['fit']['device'],
                 'ellipsoids': grid['ellipsoids']}
 
     def table(self):
-        """All rows; kept in OUT."""
+        """All rows of the volume. They are kept in OUT and read from there the next time."""
         kept = self.options.out / f'{self.name}.table.json'
         if not kept.exists():
             words = [self.compare, 'table', self.path, *[self.esvr(p) for p in PARTS], *self.box,
@@ -76,7 +76,7 @@ class Volume:
 
 
 def psnr(row, key='psnr_box'):
-    """null in a report means no error at all; a row without figures has no key."""
+    """The PSNR of a row. A report has null if there is no error at all, and no key without figures."""
     if key not in row:
         return None
     return float('inf') if row[key] is None else row[key]
@@ -89,7 +89,7 @@ def text(value, digits=2):
 
 
 def external_points(name, budget, peak):
-    """The best point of each system at or under a budget."""
+    """The row of each external compressor with the highest PSNR that takes at most `budget` bytes."""
     best = {}
     with open(HERE / 'external_points.csv', newline='') as stream:
         for row in csv.DictReader(stream):
@@ -166,8 +166,8 @@ def flip_losses(title, sizes):
 
 
 def won(sizes, title, others_of, better_of):
-    """A line that counts the volumes where no other row is better. Only volumes that have another
-    row count: a volume that nothing else can store in this size is no win."""
+    """A line that counts the volumes where no other row is as good or better. Only volumes that have
+    another row count: a volume that nothing else can store in this size is no win."""
     there = {name: size for name, size in sizes.items() if others_of(size)}
     best = [name for name, size in there.items() if not better_of(size)]
     return f'- {title}: {len(best)} of {len(there)} ({", ".join(best) or "none"})'

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Speed and errors of drawing, as the section "Drawing" of docs/benchmarks.md shows them.
+"""Measures the speed and the errors of drawing for the section "Drawing" of docs/benchmarks.md.
 
-    draw_benchmarks.py fit    --bin BUILD --data DIR --out OUT   the files that are drawn
-    draw_benchmarks.py speed  --bin BUILD --data DIR --out OUT   frames a second and errors, against NanoVDB
-    draw_benchmarks.py bins   --bin BUILD --data DIR --out OUT   by --bins and --min-transmittance
-    draw_benchmarks.py sheets --bin BUILD --data DIR --out OUT   pictures: drawn, NanoVDB, difference
-    draw_benchmarks.py large  --bin BUILD --swc FILE --out OUT   a neuron of 50 million voxels
+    draw_benchmarks.py fit    --bin BUILD --data DIR --out OUT   makes the files that are drawn
+    draw_benchmarks.py speed  --bin BUILD --data DIR --out OUT   compares speed and errors with NanoVDB
+    draw_benchmarks.py bins   --bin BUILD --data DIR --out OUT   varies --bins and --min-transmittance
+    draw_benchmarks.py sheets --bin BUILD --data DIR --out OUT   draws ESVR, NanoVDB and their difference
+    draw_benchmarks.py large  --bin BUILD --swc FILE --out OUT   draws a neuron of 50 million voxels
 
-`fit` comes first. The others print the rows of their Markdown tables; `sheets` writes
-OUT/drawing_*.png. --device says where to fit and to draw.
+Run `fit` first. The other commands print the rows of their Markdown tables; `sheets` writes
+OUT/drawing_*.png. --device chooses the device that fits and draws.
 """
 import argparse
 import json

@@ -6,8 +6,8 @@
 
 Each row of external_points.csv names a volume, a method and its parameter. This script makes the dense array
 of the volume, compresses and decompresses it with that parameter, and prints the bytes and the PSNR of the
-row beside those that it gets. Rows whose program was not given are passed over. external_points.md explains
-the columns and says which rows come out the same.
+row beside its own. Rows whose program was not given are skipped. external_points.md explains the columns and
+says for which rows the figures are the same.
 
 Needs the Python modules numpy and pyopenvdb (Debian: python3-numpy, python3-openvdb) and zstd.
 """
@@ -32,7 +32,7 @@ COLUMNS = ['dataset', 'method', 'parameter', 'bytes', 'psnr_box_db', 'psnr_nonze
 
 
 def dense(data, name):
-    """The box as float64, x fastest when flattened in Fortran order."""
+    """The voxels of the box as float64. In Fortran order, x is fastest."""
     path = str(data / f'{name}.vdb')
     grid = pyopenvdb.read(path, pyopenvdb.readAllGridMetadata(path)[0].name)
     low, high = grid.evalActiveVoxelBoundingBox()
@@ -45,7 +45,7 @@ def dense(data, name):
 
 
 def planes(values):
-    """All lowest bytes, then all second bytes, and so on; x fastest."""
+    """The lowest bytes of all values, then the second bytes, and so on, with x fastest."""
     flat = np.ascontiguousarray(values.ravel(order='F'))
     return np.frombuffer(flat.tobytes(), np.uint8).reshape(-1, flat.itemsize).T.tobytes()
 
@@ -80,7 +80,7 @@ class Zstd:
 
 
 def quantised(values, parameter):
-    """Values rounded to L steps of the peak, then xz on their byte planes."""
+    """Rounds values to L steps of the peak and compresses their byte planes by xz."""
     levels, peak = int(parameter.split('=')[1]), values.max()
     codes = np.rint(values / peak * levels).astype(np.uint8 if levels < 256 else np.uint16)
     packed, encode = timed(lambda: Xz.pack(planes(codes)))
@@ -140,7 +140,7 @@ def figures(values, decoded):
 
 
 def measurer(options, method):
-    """What measures a method's rows, or nothing without its program."""
+    """The function that measures the rows of a method; None if its program was not given."""
     programs = dict(word.split('=', 1) for word in options.sz3)
     if method == 'quantise+xz':
         return quantised

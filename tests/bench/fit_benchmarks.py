@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Times and errors of conversions, as docs/benchmarks.md shows them.
+"""Measures the times and the errors of conversions for docs/benchmarks.md.
 
-    fit_benchmarks.py figures --bin BUILD --data DIR --out OUT   files of DIR, one conversion each
-    fit_benchmarks.py gpu --bin BUILD --data DIR --out OUT       the same kind on a GPU, by phase
-    fit_benchmarks.py pairs --bin BUILD --data DIR --out OUT     pairs of ellipsoid and voxel a second
-    fit_benchmarks.py scaling --bin BUILD --out OUT              seconds an iteration against leaves
-    fit_benchmarks.py draw --out OUT                             pictures from what was measured
+    fit_benchmarks.py figures --bin BUILD --data DIR --out OUT   converts volumes of DIR on the CPU
+    fit_benchmarks.py gpu --bin BUILD --data DIR --out OUT       converts them on a GPU, by phase
+    fit_benchmarks.py pairs --bin BUILD --data DIR --out OUT     pairs of ellipsoids and voxels per second
+    fit_benchmarks.py scaling --bin BUILD --out OUT              seconds per iteration at eight resolutions
+    fit_benchmarks.py draw --out OUT                             draws the figures of these results
 
 BUILD is a build folder (build/release). Results are JSON in OUT; `draw` needs matplotlib and writes
-OUT/error_time.svg and OUT/scaling.svg. Every run is a whole process; those on the CPU have two
+OUT/error_time.svg and OUT/scaling.svg. Every run is a whole process; runs on the CPU have two
 threads.
 """
 import argparse
@@ -19,7 +19,7 @@ import subprocess
 import time
 
 THREADS = 2
-# File, options, what is asked of it.
+# File, options and goal of each conversion.
 FIGURES = [
     ("aneurism", ["--count", "12000", "--box", "0,0,0,255,255,255"], ">= 51.5 dB in 60 s"),
     ("aneurism", ["--count", "59000", "--box", "0,0,0,255,255,255"], ">= 62 dB in 120 s"),
@@ -65,7 +65,7 @@ def run(command):
 
 
 def convert(programs, source, out, options, where=("--device", "cpu", "--threads", THREADS)):
-    """One conversion. Returns its report with the whole process's seconds and bytes of memory."""
+    """Converts a file. Returns the report, with the seconds and the memory of the whole process."""
     report = out.with_suffix(".json")
     command = [programs / "vdb2esvr/vdb2esvr", source, out, *where, "--quiet", "--force",
                "--report", report, *options]
@@ -126,7 +126,7 @@ def gpu_row(row):
 
 
 def pairs(arguments):
-    """An iteration's pairs are taken to be those of the fit's end; it goes forward, back and steps."""
+    """Pairs per second. Every iteration is taken to have as many pairs as the finished fit."""
     dense = arguments.out / "dense.vdb"
     run([arguments.bin / "samples/esvr-sample", "diffuse-scalar", dense, "--resolution",
          DENSE_RESOLUTION, "--force"])
@@ -167,7 +167,7 @@ def scaling(arguments):
 
 
 def source_of(programs, source):
-    """What a grid holds, as the report of a fit of one ellipsoid has it."""
+    """The properties of a grid, from the report of a fit of one ellipsoid."""
     report = convert(programs, source, source.with_suffix(".esvr"),
                      ["--count", 1, "--iterations", 1, "--kappa", 2])
     return report["grids"][0]["source"]

@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""The tables of the paper's ablations: our runs of its method beside the paper's own figures.
+"""Repeats the paper's ablations and compares them with the paper's figures.
 
     paper_tables.py run --bin BUILD --data DIR --out OUT [--device cuda] [--epochs N] ...
-    paper_tables.py tables --out OUT     Markdown of what was measured
-    paper_tables.py draw --out OUT       error against run time, the paper's method and ours (matplotlib)
+    paper_tables.py tables --out OUT     prints the results as Markdown
+    paper_tables.py draw --out OUT       plots error against run time of both methods (matplotlib)
 
 `run` runs `vdb2esvr --paper` in its variants on aneurism and on the paper's five synthetic volumes
 (esvr-sample), and the default fit with as many ellipsoids. The paper's frames per second depend on other
-hardware and another renderer; average hits, which they follow from, are measured instead. --epochs
+hardware and another renderer; average hits, on which they depend, are measured instead. --epochs
 shortens every run by the same factor; its default is the paper's own length. --jobs runs several at
-once, whose seconds must then not be quoted.
+once; their seconds are then not meaningful.
 """
 import argparse
 import concurrent.futures
@@ -20,8 +20,8 @@ from fit_benchmarks import convert, run
 
 SYNTHETIC = ["8area", "empty-sphere", "synth-tube", "synth-wiggle", "diffuse-scalar"]
 CURVES = ["aneurism", "smoke1"]
-CURVE_MAX = 150_000  # ellipsoids before pruning; smoke would else grow to a million
-PAPER_EPOCHS = 2800  # of PaperMethod
+CURVE_MAX = 150_000  # ellipsoids before pruning; smoke1 would otherwise grow to a million
+PAPER_EPOCHS = 2800  # the default of PaperMethod
 # Ellipsoids in thousands, PSNR, average hits; before and after pruning (tables 'Primitive type').
 PAPER_TYPES = {
     "aneurism": {"ellipsoid": [(93, 51.20, 20.10), (31, 50.70, 9.05)],
@@ -49,7 +49,7 @@ def whole(resolution):
 
 
 def sources(arguments):
-    """Name, file and box of every volume; makes the synthetic ones."""
+    """The name, file and box of every volume. It makes the synthetic volumes."""
     found = {"aneurism": (arguments.data / "aneurism.vdb", whole(256))}
     for kind in SYNTHETIC:
         file = arguments.out / f"{kind}.vdb"
@@ -67,15 +67,15 @@ def method(arguments, **keys):
 
 
 def paper(arguments, name, **keys):
-    """Densification ends at the number that the paper's table has before pruning: the paper matches
-    numbers by the threshold."""
+    """The options of a run whose densification ends at the number of ellipsoids that the paper's table
+    has before pruning. The paper reaches these numbers by the threshold."""
     count = 1000 * PAPER_TYPES[name]["ellipsoid"][0][0]
     return method(arguments, points=count // 2, max=count, densify_threshold=arguments.threshold,
                   **keys)
 
 
 def variants(arguments, name):
-    """What is run on a volume: key and options."""
+    """The runs of a volume: their keys and options."""
     yield "ellipsoid", paper(arguments, name)
     yield "gaussian", paper(arguments, name, kernel="gaussian")
     if name not in arguments.ablate:
@@ -99,7 +99,7 @@ def measure(arguments, job):
 
 
 def all_of(arguments, jobs, rows):
-    """Appends to the rows, and saves what there is after each: a run may be cut short."""
+    """Appends the results to the rows and saves all rows after each, since a run may be interrupted."""
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         for row in pool.map(lambda job: measure(arguments, job), jobs):
             rows.append(row)
@@ -108,14 +108,14 @@ def all_of(arguments, jobs, rows):
 
 
 def pruned(rows, name):
-    """How many ellipsoids the run with everything on has left."""
+    """The number of ellipsoids that the run without ablations has after pruning."""
     row = next(r for r in rows if r["volume"] == name and r["run"] == "ellipsoid")
     return row["grid"]["ellipsoids"]
 
 
 def second_jobs(arguments, found, rows):
-    """Runs that want as many ellipsoids as others left: the default fit, three passes, and no pruning
-    at all, from half as many points."""
+    """Runs with as many ellipsoids as another run has after pruning: the default fit, a run with three
+    pruning passes, and a run without pruning that starts from half as many points."""
     for name, (source, box) in found.items():
         count = pruned(rows, name)
         yield name, "default", source, box, ["--count", count, "--storage", "float32", "--hits"]
@@ -140,7 +140,7 @@ def measure_all(arguments):
 
 
 def measure_curves(arguments):
-    """One run after the other: their seconds are drawn."""
+    """Makes one run after the other, because their seconds are plotted."""
     rows = []
     for name in CURVES:
         box = whole(256) if name == "aneurism" else []
@@ -186,7 +186,7 @@ def type_rows(rows):
 
 
 def ablation_rows(rows, prefix, theirs, first):
-    """Rows of one ablation; `first` is what the run with everything on stands for."""
+    """The rows of one ablation. `first` is the setting of the run without ablations."""
     for name in dict.fromkeys(r["volume"] for r in rows):
         grids = {r["run"]: r["grid"] for r in rows if r["volume"] == name}
         if not any(key.startswith(prefix) for key in grids):
@@ -248,12 +248,12 @@ def main():
     parser.add_argument("--device", default="cuda")
     parser.add_argument("--threads", type=int)
     parser.add_argument("--epochs", type=int, default=PAPER_EPOCHS)
-    parser.add_argument("--resolution", type=int, default=256, help="of the synthetic volumes")
+    parser.add_argument("--resolution", type=int, default=256, help="resolution of the synthetic volumes")
     parser.add_argument("--volumes", nargs="+", default=["aneurism", *SYNTHETIC])
     parser.add_argument("--ablate", nargs="*", default=["aneurism"],
                         help="volumes of the tables 'Pruning score' and 'k'")
-    parser.add_argument("--threshold", default="1e-4", help="of densification, in the tables")
-    parser.add_argument("--curves", action="store_true", help="and error against time")
+    parser.add_argument("--threshold", default="1e-4", help="densification threshold")
+    parser.add_argument("--curves", action="store_true", help="also measure error against time")
     parser.add_argument("--curve-epochs", type=int, default=PAPER_EPOCHS)
     parser.add_argument("--jobs", type=int, default=1)
     arguments = parser.parse_args()

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Makes docs/resolution.md: one skeleton rasterised at rising resolutions, at 25 dB over the active voxels.
+"""Makes the tables of docs/resolution.md: files of one skeleton at rising resolutions, at about 25 dB.
 
     resolution_series.py fit  --bin BUILD --swc FILE.swc --out OUT [--device cuda] [--resolutions 256 512 ...]
     resolution_series.py page --bin BUILD --swc FILE.swc --out OUT [--resolutions 256 512 ...]
 
-`fit` rasterises the skeleton and fits .esvr files with different numbers of ellipsoids until one is within
-0.3 dB of 25 dB, above or below; it keeps the one that is nearest. `page` prints Markdown tables of these
-files, of the smallest NanoVDB and ZFP files among SETTINGS that reach 25 dB, and of the exponents by which
-files grow with the resolution.
+`fit` rasterises the skeleton and fits .esvr files with different numbers of ellipsoids until the PSNR over
+the active voxels of one is within 0.3 dB of 25 dB, above or below. It keeps the file that is nearest. `page`
+prints Markdown tables of these files, of the smallest NanoVDB and ZFP files among SETTINGS that reach 25 dB,
+and of the exponents by which files grow with the resolution.
 """
 import argparse
 import json
@@ -17,8 +17,8 @@ import subprocess
 import sys
 
 TARGET = 25.0  # dB over the active voxels
-NEAR = 0.3     # dB that the file taken may be off
-FIRST = 1500   # ellipsoids at 256; twice as many at twice the resolution, to begin with
+NEAR = 0.3     # allowed difference from TARGET, dB
+FIRST = 1500   # first number of ellipsoids at a resolution of 256
 STEP = 1.7
 MOST_FITS = 6
 
@@ -46,7 +46,7 @@ class Resolution:
                  '--resolution', self.resolution])
 
     def fit(self, count):
-        """\\return PSNR over the active voxels; the file is kept where it is the nearest so far."""
+        """Fits and returns the PSNR over the active voxels. The file is kept if it is the nearest so far."""
         path = self.options.out / 'attempt.esvr'
         text = run([self.options.bin / 'vdb2esvr/vdb2esvr', self.volume, path, '--count', count,
                     '--device', self.options.device, '--report', '-', '-f'])
@@ -61,7 +61,7 @@ class Resolution:
         return json.loads(self.report.read_text())['grids'][0]['metrics']['psnr_active']
 
     def search(self):
-        """Steps up or down until 25 dB lies between two fits, then secants in log(count)."""
+        """Multiplies or divides the count until 25 dB lies between two fits; then interpolates log(count)."""
         self.make_volume()
         if self.report.exists() and abs(self.psnr() - TARGET) <= NEAR:
             return
@@ -74,7 +74,7 @@ class Resolution:
             count = self.next_count(points)
 
     def first_count(self):
-        """Of half the resolution, where that is known, half as many again."""
+        """1.5 times the number of ellipsoids at half the resolution, if that was fitted."""
         coarser = Resolution(self.options, self.resolution // 2).report
         if not coarser.exists():
             return FIRST * self.resolution // 256
@@ -92,7 +92,7 @@ class Resolution:
         return int(math.exp(below[0] + share * (above[0] - below[0])))
 
     def rows(self):
-        """Ours, and the smallest of each other form that reaches 25 dB over the active voxels."""
+        """The row of ESVR, and the smallest row of each other form that reaches 25 dB."""
         self.make_volume()
         kept = self.options.out / f'tree-{self.resolution}.table.json'
         if not kept.exists():
@@ -111,14 +111,14 @@ class Resolution:
 
 
 def reached(row):
-    """null stands for no error at all; a row that could not be made has no key."""
+    """The PSNR that a row reaches. A report has null if there is no error, and no key without figures."""
     if 'psnr_active' not in row:
         return -math.inf
     return math.inf if row['psnr_active'] is None else row['psnr_active']
 
 
 def exponent(points):
-    """Slope of log(bytes) over log(resolution), least squares."""
+    """The slope of log(bytes) over log(resolution) by least squares."""
     if len(points) < 2:
         return float('nan')
     xs, ys = [math.log(p[0]) for p in points], [math.log(p[1]) for p in points]

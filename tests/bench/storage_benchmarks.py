@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Bytes and errors of stored grids, as the section "Storage" of docs/benchmarks.md shows them.
+"""Measures the bytes and the errors of stored grids for the section "Storage" of docs/benchmarks.md.
 
-    storage_benchmarks.py compact  --bin BUILD --data DIR --out OUT   quantised against float32 ellipsoids
-    storage_benchmarks.py layers   --bin BUILD --data DIR --out OUT   what the first importance layers give
+    storage_benchmarks.py compact  --bin BUILD --data DIR --out OUT   quantised and float32 ellipsoids
+    storage_benchmarks.py layers   --bin BUILD --data DIR --out OUT   the first importance layers
     storage_benchmarks.py targets  --bin BUILD --data DIR --out OUT   files of a given size or PSNR
     storage_benchmarks.py lossless --bin BUILD --data DIR --out OUT   voxels stored exactly
     storage_benchmarks.py bounds   --bin BUILD --data DIR --out OUT   voxels or a residual within a bound
 
-Each prints the rows of its Markdown table. Fits run on two threads of the CPU, or where --device says.
+Each command prints the rows of a Markdown table. Fits run on two threads of the CPU, or on --device.
 """
 import argparse
 import pathlib

@@ -22,7 +22,7 @@ TEST(ByteSize, knowsUnits) {
   EXPECT_EQ(parseByteSize("size", "7b"), 7u);
 }
 
-TEST(ByteSize, refusesWhatIsNone) {
+TEST(ByteSize, refusesTextThatIsNoSize) {
   for (const char* text : {"", "KB", "-5KB", "0", "0.4", "5 KB", "5XB", "1e300", "nan", "inf"})
     EXPECT_THAT([&] { (void)parseByteSize("size", text); },
                 ThrowsMessage<UsageError>(HasSubstr("--size must be a size")))

@@ -102,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Journey{"a sheared map", ballUnder(InputMap::kSheared), kAlike},
                     Journey{"a frustum", ballUnder(InputMap::kFrustum), kAlike}));
 
-TEST(LevelSet, thatIsActiveBeyondItsBandComesBackAsItIs) {
+TEST(LevelSet, withActiveVoxelsBeyondItsBandComesBackUnchanged) {
   const test::TemporaryFolder folder;
   const std::string source = folder / "in.vdb", fitted = folder / "in.esvr";
   test::writeInput(source, {{.voxels = test::distances(12), .background = 1.0f, .levelSet = true}});

@@ -136,7 +136,7 @@ TEST(Quantise, SpendsNoBitsOnTheRotationOfABall) {
   EXPECT_LT(3 * round, stretched);
 }
 
-TEST(Quantise, OfWhatWasQuantisedChangesNothing) {
+TEST(Quantise, IsTheIdentityOnQuantisedValues) {
   const Ellipsoids e = sample();
   const auto choice = chooseLattice(e, curvatureOf(e), {0.05, 0.05, 0.05, 0.05});
   std::vector<std::size_t> order;

@@ -99,7 +99,7 @@ TEST(BoundedLayer, IsExactWhereFloat32IsNoFinerThanTheBound) {
   EXPECT_EQ(largestError(volume, boundedLayer(volume, 1e-3, Activity::kExact)), 0.0);
 }
 
-TEST(BoundedLayer, RefusesABoundThatIsNone) {
+TEST(BoundedLayer, RefusesAnInvalidBound) {
   const SparseVolume volume = test::tubeVolume();
   for (const double bound : {0.0, -1.0, std::nan(""), HUGE_VAL})
     EXPECT_THROW((void)boundedLayer(volume, bound, Activity::kExact), UsageError);

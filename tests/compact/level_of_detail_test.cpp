@@ -57,7 +57,7 @@ double weightOf(const Ellipsoids& e, std::size_t i) {
          std::exp(0.5 * (double(e.logScale[0][i]) + e.logScale[1][i] + e.logScale[2][i]));
 }
 
-TEST(Heaviest, AreSoManyAndNoOtherIsHeavier) {
+TEST(Heaviest, HasTheCountAndTheLargestWeights) {
   const StoredGrid grid = layered(3000);
   const StoredGrid few = heaviest(grid, 700);
   const Ellipsoids &all = grid.field.chunks[0].ellipsoids, &kept = few.field.chunks[0].ellipsoids;
@@ -70,7 +70,7 @@ TEST(Heaviest, AreSoManyAndNoOtherIsHeavier) {
   EXPECT_LT(heavier, 700u);
 }
 
-TEST(Heaviest, OfAsManyAsThereAreIsTheGrid) {
+TEST(Heaviest, OfAllEllipsoidsIsTheGrid) {
   const StoredGrid grid = layered(300);
   EXPECT_EQ(heaviest(grid, 300).quantised, grid.quantised);
 }

@@ -48,7 +48,7 @@ TEST(Trial, HasTheErrorOfItsVoxels) {
   EXPECT_NEAR(trial.error, squares, 1e-6 * squares);  // float32 sums depend on the order
 }
 
-TEST(Trial, OfSeveralIsAsItIsAlone) {
+TEST(Trial, AmongSeveralIsTheSameAsAlone) {
   const Fitted fitted;
   TrialMaker maker(fitted.grid, {fitted.source, activeBox(fitted.source), {}});
   const QuantiserSteps steps[] = {{0.1, 0.1, 0.1, 0.1}, {0.05, 0.1, 0.2, 0.1}};

@@ -52,7 +52,7 @@ TEST(Box, ExpandingByAnEmptyBoxChangesNothing) {
   EXPECT_EQ(box, before);
 }
 
-TEST(Box, CountsTheVoxelsOfTheWholeLattice) {
+TEST(Box, CountsTheVoxelsOfTheWholeIndexSpace) {
   // The volume is 2^32 cubed. Integers would overflow with the first side.
   const Box box{kFarLow, kFarHigh};
   EXPECT_EQ(box.volume(), 0x1p96);

@@ -35,7 +35,7 @@ TEST(GridNames, MeanTheFirstWhereBareAndMayAlwaysBeNumberedZero) {
   EXPECT_EQ(findGrid(names, "x[0]"), 0u);
 }
 
-TEST(GridNames, ThatAreNotThereAreAnsweredWithThoseThatAre) {
+TEST(GridNames, AreListedForAnUnknownName) {
   const Names names{"a", "a", "b"};
   EXPECT_THAT([&] { (void)findGrid(names, "a[2]", "smoke.vdb"); },
               ThrowsMessage<BadInput>(AllOf(HasSubstr("smoke.vdb: "), HasSubstr("\"a[2]\""),

@@ -131,7 +131,7 @@ TEST(MakeVolume, RefusesTwoBricksOfOneCorner) {
       ThrowsMessage<BadInput>(HasSubstr("(8, 0, 0)")));
 }
 
-TEST(MakeVolume, RefusesBricksFurtherApartThanTheLatticeOfAVolume) {
+TEST(MakeVolume, RefusesBricksFurtherApartThanAVolumeAllows) {
   const Coord low{-(1 << 30), 0, 0};
   const auto apart = [&](std::int32_t x) {
     return makeVolume({brickWith(low, {}), brickWith({x, 0, 0}, {})}, 0.0f);
@@ -142,7 +142,7 @@ TEST(MakeVolume, RefusesBricksFurtherApartThanTheLatticeOfAVolume) {
   EXPECT_EQ(valueAt(widest, {(1 << 30) - 16, 0, 0}), 1.0f);
 }
 
-TEST(ValueAt, ReachesFromOneEndOfTheLatticeToTheOther) {
+TEST(ValueAt, ReachesFromOneEndOfIndexSpaceToTheOther) {
   const Coord low = Coord{1, 1, 1} * Box::kMin;
   const auto volume = makeVolume({brickWith(low, {0, 0, 0})}, 0.5f);
   EXPECT_EQ(valueAt(volume, low), 1.0f);

@@ -287,8 +287,8 @@ TEST(HostileFile, AKilobyteCannotAskForAGigabyte) {
   }
 }
 
-/// Zeros compress best, so this is the most that a small file can really hold.
-TEST(HostileFile, TheMostThatAKilobyteCanHoldIsBounded) {
+/// Zeros compress best, so no small file holds more.
+TEST(HostileFile, TheMemoryOfASmallFileIsBounded) {
   StoredGrid grid = test::emptyGrid();
   grid.descriptor.metadata = {{"zeros", "string", std::vector<std::byte>(4 * kMegabyte)}};
   const auto bytes = encodeEsvr(test::fileOf(grid));

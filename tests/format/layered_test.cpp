@@ -102,13 +102,13 @@ class PartOfAFile : public testing::Test {
   std::filesystem::path path_ = folder_ / "part.esvr";
 };
 
-TEST_F(PartOfAFile, OfAllLayersIsAllOfIt) {
+TEST_F(PartOfAFile, WithAllLayersIsTheWholeFile) {
   const PartOfFile part = readEsvrPart(path_, {});
   EXPECT_EQ(test::difference(part.file, {{}, {grid_}}), "");
   EXPECT_LE(part.bytesRead, size());
 }
 
-TEST_F(PartOfAFile, OfTheFirstLayersIsTheGridOfThem) {
+TEST_F(PartOfAFile, WithTheFirstLayersIsTheGridOfTheseLayers) {
   std::uint64_t before = 0;
   for (std::size_t layers = 1; layers <= layerCount(grid_); ++layers) {
     const PartOfFile part = readEsvrPart(path_, {.layers = layers});
@@ -120,7 +120,7 @@ TEST_F(PartOfAFile, OfTheFirstLayersIsTheGridOfThem) {
   EXPECT_LT(readEsvrPart(path_, {.layers = 1}).bytesRead, size() / 2);
 }
 
-TEST_F(PartOfAFile, OfSoManyEllipsoidsHasWholeLayersOfThem) {
+TEST_F(PartOfAFile, WithANumberOfEllipsoidsHasWholeLayers) {
   const auto sizes = layerSizes(grid_);
   const auto two = sizes[0].ellipsoids + sizes[1].ellipsoids;
   const auto countOf = [&](std::size_t n) {
@@ -132,7 +132,7 @@ TEST_F(PartOfAFile, OfSoManyEllipsoidsHasWholeLayersOfThem) {
   EXPECT_EQ(countOf(1u << 30), 18000u);
 }
 
-TEST_F(PartOfAFile, OfABoxGivesTheSameValuesThere) {
+TEST_F(PartOfAFile, WithinABoxHasTheSameValues) {
   // The second chunk lies far away, so it is not needed here.
   const Box box{{0, 0, 0}, {9, 9, 9}};
   const PartOfFile part = readEsvrPart(path_, {.box = box});
@@ -145,7 +145,7 @@ TEST_F(PartOfAFile, OfABoxGivesTheSameValuesThere) {
   EXPECT_EQ(there.active, whole.active);
 }
 
-TEST_F(PartOfAFile, OfABoxWithoutEllipsoidsHasNone) {
+TEST_F(PartOfAFile, WithinABoxWithoutEllipsoidsHasNone) {
   const Box box{{100000, 0, 0}, {100009, 9, 9}};
   const PartOfFile part = readEsvrPart(path_, {.box = box});
   EXPECT_EQ(part.file.grids[0].field.ellipsoidCount(), 0u);
@@ -228,7 +228,7 @@ TEST(LayeredLies, AKilobyteCannotAskForAGigabyte) {
   }
 }
 
-TEST(LayerErrors, AreRefusedWhereTheyAreNoneOfTheLayers) {
+TEST(LayerErrors, AreRefusedWhereTheyDoNotMatchTheLayers) {
   for (const std::size_t size : {24u, 40u}) {
     CraftedFile file(encodeEsvr(layeredFile(20)));
     file.setContent(SectionKind::kLayerErrors, std::vector<std::byte>(size));

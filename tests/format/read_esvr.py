@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reads .esvr files as docs/format.md specifies them, and nothing else: shares no code with libesvr.
+"""Reads .esvr files as docs/format.md specifies them. It shares no code with libesvr.
 
 usage: read_esvr.py FOLDER
 
@@ -31,7 +31,7 @@ def mix(lane, word):
 
 
 def stripes(data):
-    """The four lanes over all whole stripes of 32 bytes, merged."""
+    """Merges the four lanes of XXH64 after all whole stripes of 32 bytes."""
     lanes = [(PRIMES[0] + PRIMES[1]) & MASK, PRIMES[1], 0, -PRIMES[0] & MASK]
     for at in range(0, len(data) // 32 * 32, 32):
         words = struct.unpack_from("<4Q", data, at)
@@ -65,7 +65,7 @@ def xxh64(data):
 
 
 class Record:
-    """Takes a record apart."""
+    """Reads the values of a record one after the other."""
 
     def __init__(self, data):
         self.data, self.at = data, 0
@@ -118,7 +118,7 @@ def leaves(data):
 
 
 class Decoder:
-    """A stream of the range coder."""
+    """Decodes a stream of the range coder."""
 
     def __init__(self, data):
         self.data, self.at, self.code, self.range = data, 0, 0, 0xFFFFFFFF
@@ -206,7 +206,7 @@ def mid(code, bits):
 
 
 def block(lattice, n, streams):
-    """Codes of one block's ellipsoids, and the numbers of their bits."""
+    """Decodes the ellipsoids of one block."""
     places, scales, turns, heights = (Decoder(data) for data in streams)
     before, width = (0, 0), 0
     for key in keys(n, 3 * lattice["cell bits"], places):
@@ -270,7 +270,7 @@ def ellipsoids(data):
 
 
 def layered(data):
-    """[(box in parts, ellipsoids)] of each block, and where the layers end."""
+    """A list of (box in 256ths, ellipsoids) for each block, and the ends of the layers."""
     r = Record(data)
     size = r.get("I")
     count = r.get("Q")
@@ -326,7 +326,7 @@ def header_of_voxels(r):
 
 
 class Voxels:
-    """What has been read of a grid's voxels."""
+    """The voxels of a grid that have been read so far."""
 
     def __init__(self, head, stream, mirrors, common):
         self.head, self.stream, self.mirrors, self.common = head, stream, mirrors, common
@@ -336,14 +336,14 @@ class Voxels:
         return self.codes.get(p, self.head["vacant"])
 
     def image(self, p):
-        """The first that lies before the voxel."""
+        """The image of a voxel: the first one that has been read before."""
         for axis, mirror in enumerate(self.mirrors):
             if mirror >= 0 and mirror - p[axis] < p[axis]:
                 return tuple(mirror - c if a == axis else c for a, c in enumerate(p))
         return None
 
     def each(self):
-        """Every voxel in order, with those before it."""
+        """Yields every voxel in order, with its neighbours that come before it."""
         for key in keys(self.head["bricks"], 3 * self.head["bits"], self.stream):
             corner = [8 * sum((key >> (3 * b + a) & 1) << b for b in range(self.head["bits"]))
                       for a in range(3)]
@@ -421,7 +421,7 @@ def content(name, data):
 
 
 def read(path):
-    """{(kind, grid, chunk): content}; None where the content is compressed."""
+    """A dictionary {(kind, grid, chunk): content}; the content is None if it is compressed."""
     data = path.read_bytes()
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
@@ -505,7 +505,7 @@ QUANTISED = (
 
 
 def check_quantised(sections):
-    """Against numbers that the library's own decoder printed, as f32."""
+    """Compares the ellipsoids with values that the library's own decoder printed as f32."""
     for chunk, expected in enumerate(QUANTISED):
         decoded = sections["ellipsoids", 0, chunk]
         assert len(decoded) == 20
@@ -516,7 +516,7 @@ def check_quantised(sections):
 
 
 def check_layered(sections):
-    """The same ellipsoids as quantised.esvr's, whose lattice does not depend on layers."""
+    """Expects the ellipsoids of quantised.esvr, because the quantisation lattice is the same."""
     assert sections["layer errors", 0, NONE] == [(20.0, 1.0), (25.0, 0.5), (30.0, struct.unpack(
         "<f", struct.pack("<f", 1 / 3))[0]), (35.0, 0.25)]
     for chunk, expected in enumerate(QUANTISED):
@@ -539,7 +539,7 @@ def check_layered(sections):
 
 
 def check_mask(sections):
-    """The activity of voxels.esvr's voxels."""
+    """Expects the active voxels of voxels.esvr."""
     assert sections["grid", 0, NONE]["topology"] == 2
     head, held = sections["mask", 0, NONE]
     assert head["palette"] == [0.0] and all(held[p] == (0, True) for p in held)

@@ -112,10 +112,10 @@ TEST(VoxelFile, TakesNoThreshold) {
   EXPECT_THROW((void)decodeGrid(voxelFile().grids[0], {.threshold = 0.1f}), UsageError);
 }
 
-TEST(Residual, IsRefusedWhereItIsNone) {
+TEST(Residual, IsRefusedWhereItIsInvalid) {
   const SparseVolume tube = test::tubeVolume();
   StoredGrid grid = test::emptyGrid();
-  grid.residual = exactLayer(tube);  // not of the lattice form
+  grid.residual = exactLayer(tube);  // its form is not kLattice
   EXPECT_THROW((void)encodeEsvr({{}, {grid}}), RuntimeFailure);
   grid.residual = boundedLayer(tube, 0.1, Activity::kExact);  // not all voxels active
   EXPECT_THROW((void)encodeEsvr({{}, {grid}}), RuntimeFailure);

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Prints the FLIP values that flip_test.cpp compares with: the paper's equations on whole arrays.
+"""Prints the FLIP values that flip_test.cpp compares with, from the paper's equations.
 
-Needs numpy and scipy (Debian: python3-scipy; the values in the test are of scipy 1.10.1). Andersson
-et al., "FLIP: A Difference Evaluator for Alternating Images", 2020: every filter is the
-two-dimensional kernel that the paper defines, correlated as it stands, where the library takes
-products of one-dimensional ones; colors are converted by numpy's matrix inverse.
+Needs numpy and scipy (Debian: python3-scipy; the values in the test are from scipy 1.10.1). The
+equations are those of Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", 2020.
+Every filter is the two-dimensional kernel of the paper; the library uses products of one-dimensional
+ones instead. Colors are converted by numpy's matrix inverse.
 """
 import numpy as np
 from scipy.ndimage import correlate
@@ -17,12 +17,12 @@ WHITE = XYZ @ np.ones(3)
 
 
 def hashed(index):
-    """A multiple of 2^-24 in [0, 1): exact in float32, the same in C++."""
+    """A multiple of 2^-24 in [0, 1), which is exact in float32 and the same in C++."""
     return ((index * 2654435761) % 2**32 >> 8) / 2**24
 
 
 def pictures():
-    """Blocks of one color, and the same with a quarter of noise."""
+    """A picture of blocks of one color, and the same picture with a quarter of noise."""
     a = np.zeros((HEIGHT, WIDTH, 3))
     b = np.zeros((HEIGHT, WIDTH, 3))
     for y in range(HEIGHT):

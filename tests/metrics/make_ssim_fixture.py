@@ -16,7 +16,7 @@ PAD = 5
 
 
 def hashed(index):
-    """A multiple of 2^-24 in [0, 1): exact in float32, the same in C++."""
+    """A multiple of 2^-24 in [0, 1), which is exact in float32 and the same in C++."""
     return ((index * 2654435761) % 2**32 >> 8) / 2**24
 
 

@@ -106,7 +106,7 @@ constexpr const char* kOldMaps = R"(<?xml version="1.0"?>
   </ColorMap>
 </ColorMaps>)";
 
-TEST_F(ParaViewPreset, OfOldIsRead) {
+TEST_F(ParaViewPreset, InTheOlderXmlIsRead) {
   const auto f = read(kOldMaps);
   EXPECT_EQ(f.colors.space, ColorSpace::kLab);
   EXPECT_EQ(f.colors.nan, (Rgb{0.25, 0, 0}));
@@ -119,7 +119,7 @@ TEST_F(ParaViewPreset, OfOldIsRead) {
   EXPECT_EQ(opacityAt(veil.opacity, 0.0), 0.375);
 }
 
-TEST_F(ParaViewPreset, OfOldThatIsBrokenIsRefused) {
+TEST_F(ParaViewPreset, InDamagedXmlIsRefused) {
   EXPECT_THAT(refusal("<ColorMap><Point"), HasSubstr("p.json: not XML"));
   EXPECT_THAT(refusal("<ColorMap><Point x='a' r='0' g='0' b='0'/></ColorMap>"),
               HasSubstr("not a color map"));

@@ -90,7 +90,7 @@ TEST(RenderNano, QuantisedValuesAreCloseBy) {
   expectTheVolumesPicture(grid, NanoValues::kFp4, o, 0.2);
 }
 
-TEST(RenderNano, NothingIsTransparent) {
+TEST(RenderNano, AnEmptyGridIsTransparent) {
   VolumeGrid grid;
   grid.descriptor.transform = uniformTransform(1.0);
   const NanoVolume nano = makeNanoVolume(grid, NanoValues::kFloat);

@@ -91,7 +91,7 @@ TEST(TubesOf, linkEveryNodeToItsParentAndKeepLonelyNodesAsBalls) {
   EXPECT_EQ(tubes[2].b.z, 9.0);
 }
 
-TEST(LongestPieces, keepsThePiecesOfMostCable) {
+TEST(LongestPieces, keepsThePiecesOfLongestCable) {
   // The pieces have lengths of 1 (nodes 1, 2), 3 (10, 11, 12) and 0 (20), in mixed order.
   const auto s = parse(
       "1 0 0 0 0 1 -1\n11 0 2 0 0 1 10\n2 0 1 0 0 1 1\n10 0 0 0 0 1 -1\n12 0 2 1 0 1 11\n"

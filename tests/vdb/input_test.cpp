@@ -31,16 +31,18 @@ class Input : public testing::Test {
   test::TemporaryFolder directory_;
 };
 
-TEST_F(Input, ThatIsMissing) { expectRefused(directory_ / "missing.vdb", "no such file"); }
-TEST_F(Input, ThatIsADirectory) { expectRefused(directory_.path(), "is a directory"); }
-TEST_F(Input, ThatIsADevice) { expectRefused("/dev/null", "not a regular file"); }
-TEST_F(Input, ThatIsEmpty) { expectRefused(fileWith(""), "is empty"); }
-TEST_F(Input, ThatIsOneByte) { expectRefused(fileWith(" "), "neither an OpenVDB nor a NanoVDB"); }
-TEST_F(Input, ThatIsText) {
+TEST_F(Input, IsRefusedIfItIsMissing) { expectRefused(directory_ / "missing.vdb", "no such file"); }
+TEST_F(Input, IsRefusedIfItIsADirectory) { expectRefused(directory_.path(), "is a directory"); }
+TEST_F(Input, IsRefusedIfItIsADevice) { expectRefused("/dev/null", "not a regular file"); }
+TEST_F(Input, IsRefusedIfItIsEmpty) { expectRefused(fileWith(""), "is empty"); }
+TEST_F(Input, IsRefusedIfItIsOneByte) {
+  expectRefused(fileWith(" "), "neither an OpenVDB nor a NanoVDB");
+}
+TEST_F(Input, IsRefusedIfItIsText) {
   expectRefused(fileWith("#Blender's idea of a volume\n"), "neither an OpenVDB nor a NanoVDB");
 }
 
-TEST_F(Input, ThatIsOlderThanWhatIsRead) {
+TEST_F(Input, IsRefusedIfItIsTooOld) {
   test::save(directory_ / "old.vdb", {test::smallGrid()});
   auto bytes = test::bytesOf(directory_ / "old.vdb");
   bytes[8] = std::byte{221};  // the version follows the magic number
@@ -57,7 +59,7 @@ TEST_F(Input, OfANewerFormatVersionIsTried) {
   EXPECT_EQ(activeVoxelCount(readGrid(directory_ / "new.vdb", "density").volume), 3u);
 }
 
-TEST_F(Input, WithoutATableOfGrids) {
+TEST_F(Input, IsRefusedWithoutATableOfGrids) {
   const auto path = directory_ / "stream.vdb";
   std::ofstream file(path, std::ios::binary);
   openvdb::io::Stream(file).write(openvdb::GridPtrVec{test::smallGrid()});

@@ -78,7 +78,7 @@ TEST_F(Names, MayLookNumbered) {
   EXPECT_EQ(mark("a[1]"), 1.0f);
 }
 
-TEST_F(Names, ThatAreNotThereAreAnsweredWithThoseThatAre) {
+TEST_F(Names, AreListedForAnUnknownName) {
   test::save(path(), gridsNamed({"a", "b", "a"}));
   for (const char* name : {"c", "a[2]", "b[1]", "", "A"})
     EXPECT_THAT([&] { (void)readGrid(path(), name); },

@@ -129,7 +129,7 @@ TEST(UniformTransform, IsWhatOpenVdbMakes) {
               *math::Transform::createLinearTransform(0.1));
 }
 
-TEST(UniformTransform, RefusesSizesThatAreNone) {
+TEST(UniformTransform, RefusesInvalidSizes) {
   for (const double size : {0.0, -1.0, std::numeric_limits<double>::infinity(),
                             std::numeric_limits<double>::quiet_NaN()})
     EXPECT_THROW((void)uniformTransform(size), UsageError) << size;
@@ -143,7 +143,7 @@ TEST(AffineTransform, KeepsTheMatrix) {
   EXPECT_EQ(transform.affine, matrix);
 }
 
-TEST(AffineTransform, RefusesWhatIsNotOne) {
+TEST(AffineTransform, RefusesMatricesThatAreNotAffineOrSingular) {
   std::array<double, 16> singular{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1};
   EXPECT_THROW((void)affineTransform(singular), UsageError);
   std::array<double, 16> projective{1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};

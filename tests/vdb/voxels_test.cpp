@@ -53,7 +53,7 @@ class EveryPacking : public testing::TestWithParam<Packing> {
   template <class Grid>
   static typename Grid::Ptr patterned() {
     auto grid = Grid::create(2.0);
-    grid->setName("density");  // of class unknown, since OpenVDB zips no other
+    grid->setName("density");  // its class is unknown: OpenVDB zips no other
     auto accessor = grid->getAccessor();
     for (int i = 0; i < 8000; ++i) {
       const openvdb::Coord at(i / 400 - 10, i / 20 % 20, i % 20);
@@ -250,7 +250,7 @@ TEST_F(Voxels, CoordinatesReachTenMillionEitherWay) {
   test::expectSame(readGrid(directory_ / "out.vdb", "density"), grid);
 }
 
-TEST_F(Voxels, BothEndsOfTheLatticeAtOnceAreTooFarApart) {
+TEST_F(Voxels, BothEndsOfIndexSpaceAtOnceAreTooFarApart) {
   auto source = test::smallGrid();
   source->tree().setValue({Box::kMin, 0, 0}, 1.0f);
   source->tree().setValue({Box::kMax, 0, 0}, 1.0f);

@@ -12,15 +12,15 @@
 namespace esvr::cuda {
 
 [[noreturn]] inline void refuseAllocation(std::size_t count, std::size_t each, cudaError_t status) {
-  cudaGetLastError();  // else the next check() would report this failure as its own
+  cudaGetLastError();  // clears the error, so that the next check() does not report it
   throw DeviceMemoryError("CUDA, allocating " + std::to_string(count) + " times " +
                           std::to_string(each) + " bytes on the device: " + errorText(status) +
                           " (" + cudaGetErrorName(status) + ")");
 }
 
-/// \return memory for `count` elements of `each` bytes, in the order of a stream; it is to be freed
-///         by cudaFreeAsync and given back to the account
-/// \throws DeviceMemoryError  there is not so much, or the account's limit is lower
+/// \return memory for `count` elements of `each` bytes, in the order of a stream; the caller frees
+///         it with cudaFreeAsync and gives the bytes back to the account
+/// \throws DeviceMemoryError  the device has too little memory, or the account's limit is lower
 inline void* allocate(std::size_t count, std::size_t each, cudaStream_t stream) {
   if (count > std::numeric_limits<std::size_t>::max() / each)
     refuseAllocation(count, each, cudaErrorMemoryAllocation);

@@ -1,5 +1,5 @@
 #pragma once
-/// CUDA's error codes as exceptions, in every build.
+/// Converts CUDA's error codes to exceptions, in every build.
 
 #include <cuda_runtime_api.h>
 
@@ -11,7 +11,8 @@
 
 namespace esvr::cuda {
 
-/// CUDA's own text, save where there is no driver at all, which CUDA calls an insufficient one.
+/// CUDA's own text, except where there is no driver at all, which CUDA calls an insufficient
+/// driver.
 inline std::string errorText(cudaError_t status) {
   int driver = 0;
   if (status == cudaErrorInsufficientDriver && cudaDriverGetVersion(&driver) == cudaSuccess &&
@@ -20,13 +21,14 @@ inline std::string errorText(cudaError_t status) {
   return cudaGetErrorString(status);
 }
 
-/// Wraps every call of the CUDA runtime; after a launch, check(cudaGetLastError(), "name").
-/// \param doing  what failed, for the user: "allocating 12 bytes"
+/// Wraps every call of the CUDA runtime; after a launch, check(cudaGetLastError(), "name") is
+/// called.
+/// \param doing  text for the user that names what failed: "allocating 12 bytes"
 /// \throws DeviceError  status is not cudaSuccess; the text has CUDA's own, the file and the line
 inline void check(cudaError_t status, std::string_view doing,
                   std::source_location where = std::source_location::current()) {
   if (status == cudaSuccess) return;
-  cudaGetLastError();  // else the next check() would report this failure as its own
+  cudaGetLastError();  // clears the error, so that the next check() does not report it
   std::string_view file = where.file_name();
   file.remove_prefix(file.rfind('/') + 1);
   throw DeviceError("CUDA, " + std::string(doing) + ": " + errorText(status) + " (" +

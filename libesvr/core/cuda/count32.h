@@ -1,5 +1,5 @@
 #pragma once
-/// Numbers of things that kernels count in 32 bits.
+/// Checks numbers that kernels count in 32 bits.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace esvr::cuda {
 
-/// A loop that goes on by a block's threads ends before it would wrap around.
+/// Largest count with which a loop that advances by the threads of a block ends before it wraps.
 inline constexpr std::size_t kMaxCount32 = std::numeric_limits<std::uint32_t>::max() - 1024;
 
-/// \param what  names the things in the plural, for the message
-/// \throws DeviceError  there are more than kernels can number
+/// \param what  plural for the message, for example "pairs"
+/// \throws DeviceError  the count is too large for kernels
 [[nodiscard]] inline std::uint32_t count32(std::size_t count, const char* what) {
   if (count > kMaxCount32)
     throw DeviceError("CUDA: " + std::to_string(count) + " " + what +

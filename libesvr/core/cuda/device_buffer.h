@@ -12,15 +12,16 @@
 
 namespace esvr::cuda {
 
-/// n elements of device memory, allocated and freed in the order of a stream. Move-only: a copy is
-/// always an explicit call, so that none happens unseen.
+/// n elements of device memory, allocated and freed in the order of a stream. The class is
+/// move-only, so that every copy is an explicit call.
 template <class T>
 class DeviceBuffer {
   static_assert(std::is_trivially_copyable_v<T>, "copied as bytes");
 
  public:
   DeviceBuffer() = default;
-  /// Uninitialised. \throws DeviceMemoryError  out of memory (says how much was asked for)
+  /// Allocates memory and leaves it uninitialised.
+  /// \throws DeviceMemoryError  there is too little memory (the text says how much was asked for)
   DeviceBuffer(std::size_t size, cudaStream_t stream) : size_(size), stream_(stream) {
     if (size > 0) data_ = static_cast<T*>(allocate(size, sizeof(T), stream));
   }
@@ -43,16 +44,16 @@ class DeviceBuffer {
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] std::size_t bytes() const noexcept { return size_ * sizeof(T); }
 
-  /// Copies size() elements in; `from` may be reused on return.
+  /// Copies size() elements to the device. `from` may be used again after the call.
   void upload(std::span<const T> from) {
     requireSize(from.size());
     if (size_ == 0) return;
     check(cudaMemcpyAsync(data_, from.data(), bytes(), cudaMemcpyHostToDevice, stream_),
           "copying to the device");
-    // Pinned memory would still be read after the call.
+    // The copy from pinned memory may still be running here.
     check(cudaStreamSynchronize(stream_), "copying to the device");
   }
-  /// Copies size() elements out, when all that was put on the stream before is done.
+  /// Copies size() elements to the host, after all earlier work of the stream.
   void download(std::span<T> to) const {
     requireSize(to.size());
     check(cudaMemcpyAsync(to.data(), data_, bytes(), cudaMemcpyDeviceToHost, stream_),

@@ -1,5 +1,5 @@
 #pragma once
-/// A CUDA event that measures time, released with its owner.
+/// A CUDA event that measures time and is released with its owner.
 
 #include <cuda_runtime_api.h>
 
@@ -16,7 +16,7 @@ class Event {
 
   void record(cudaStream_t stream) { check(cudaEventRecord(event_, stream), "recording an event"); }
 
-  /// From `start` to this one; both must have been passed, or are waited for.
+  /// Time from `start` to this event. The call waits until both have happened.
   [[nodiscard]] double millisecondsSince(const Event& start) const {
     check(cudaEventSynchronize(event_), "waiting for an event");
     float milliseconds = 0.0f;

@@ -1,5 +1,5 @@
 #pragma once
-/// Device memory that grows and is used again.
+/// Device memory that grows and is reused.
 
 #include "core/cuda/device_buffer.h"
 
@@ -21,12 +21,12 @@ class GrowingBuffer {
  public:
   explicit GrowingBuffer(cudaStream_t stream) : stream_(stream) {}
 
-  /// Room for at least n; what was there is lost when it has to grow.
+  /// Makes room for at least n elements. If the buffer grows, its content is lost.
   T* reserve(std::size_t n) {
     if (n > buffer_.size()) makeRoom(buffer_, withSpare(n), stream_);
     return buffer_.data();
   }
-  /// Room for at least n; the first `kept` elements stay.
+  /// Makes room for at least n elements and keeps the first `kept` of them.
   T* extend(std::size_t n, std::size_t kept) {
     if (n > buffer_.size()) {
       DeviceBuffer<T> larger(withSpare(n), stream_);
@@ -38,7 +38,7 @@ class GrowingBuffer {
     }
     return buffer_.data();
   }
-  /// Frees the memory. What was there is lost.
+  /// Frees the memory; the content is lost.
   void release() { buffer_ = {}; }
   [[nodiscard]] T* data() { return buffer_.data(); }
   [[nodiscard]] const T* data() const { return buffer_.data(); }

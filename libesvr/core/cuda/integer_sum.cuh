@@ -11,14 +11,14 @@ namespace esvr::cuda {
 
 struct SumLimits {
   int valueBits;  ///< a value is less than 2^(valueBits + 1) units
-  int sumBits;    ///< a sum is less than 2^(sumBits + 1) units, but for rounding
+  int sumBits;    ///< a sum is less than 2^(sumBits + 1) units, apart from rounding
 };
 
-/// Two bits are left for the sign and for what rounding adds, half a unit for each value.
+/// Two bits are left for the sign and for rounding, which adds up to half a unit for each value.
 inline constexpr SumLimits kLimits32{29, 29}, kLimits64{61, 61};
 
-/// \return e, so that the sum of `count` values of at most `largest` keeps the limits in units of
-///         2^-e; within what 2^e and 2^-e are both normal numbers of float32 for
+/// \return e, such that a sum of `count` values of at most `largest` keeps the limits in units of
+///         2^-e and both 2^e and 2^-e are normal numbers of float32
 [[nodiscard]] ESVR_HD inline int unitExponent(float largest, std::uint32_t count,
                                               SumLimits limits) {
   constexpr int kMaxExponent = 126;

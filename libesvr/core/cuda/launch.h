@@ -1,5 +1,5 @@
 #pragma once
-/// Sizes of grids, blocks and warps.
+/// Sizes of launches, blocks and warps.
 
 #include <cstddef>
 #include <limits>
@@ -10,10 +10,10 @@
 namespace esvr::cuda {
 
 inline constexpr int kWarp = 32;
-inline constexpr int kBlock = 256;  ///< threads of a block, where nothing else is said
+inline constexpr int kBlock = 256;  ///< usual number of threads in a block
 
-/// \return the number of blocks that cover `items`, `perBlock` each
-/// \throws DeviceError  a launch cannot have so many
+/// \return the number of blocks that cover `items`, with `perBlock` in each
+/// \throws DeviceError  a launch cannot have so many blocks
 inline unsigned blocksFor(std::size_t items, std::size_t perBlock) {
   const std::size_t blocks = items / perBlock + (items % perBlock != 0);
   if (blocks > std::size_t(std::numeric_limits<int>::max()))

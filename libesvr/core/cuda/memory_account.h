@@ -1,5 +1,5 @@
 #pragma once
-/// How much device memory buffers hold, and how much they may hold.
+/// The device memory that all buffers take, and its limit.
 
 #include <atomic>
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace esvr::cuda {
 
-/// An allocation failed, or went beyond the limit. Nothing was allocated.
+/// An allocation failed or would have exceeded the limit. No memory was allocated.
 struct DeviceMemoryError : DeviceError {
   using DeviceError::DeviceError;
 };
@@ -34,7 +34,7 @@ class MemoryAccount {
   void give(std::size_t bytes) noexcept { held_ -= bytes; }
 
   [[nodiscard]] std::size_t held() const { return held_; }
-  /// \return the limit before
+  /// \return the previous limit
   std::size_t setLimit(std::size_t bytes) { return limit_.exchange(bytes); }
 
  private:
@@ -47,7 +47,7 @@ inline MemoryAccount& memoryAccount() {
   return account;
 }
 
-/// Limits what buffers may hold in addition to what they hold now, as long as it lives.
+/// As long as it lives, limits the memory that buffers take in addition to what they take now.
 class LimitMemory {
  public:
   explicit LimitMemory(std::size_t bytes)

@@ -31,7 +31,7 @@ std::uint64_t attribute(cudaMemPoolAttr which) {
   return value;
 }
 
-/// Who keeps a device's memory, and the threshold to go back to.
+/// The number of objects that keep a device's memory, and the threshold to restore after them.
 struct Keepers {
   std::size_t count = 0;
   std::uint64_t threshold = 0;

@@ -1,13 +1,13 @@
 #pragma once
-/// The pool that stream-ordered allocations of a device come from.
+/// The pool from which the stream-ordered allocations of a device take memory.
 
 #include <cstddef>
 
 namespace esvr::cuda {
 
-/// Keeps freed memory of the current device in its pool as long as one of these lives: a fit
-/// allocates anew at every event, and would else give the memory back and ask for it again at every
-/// synchronisation. The last one restores the setting that the first one found.
+/// As long as one of these lives, freed memory of the current device stays in its pool. A fit
+/// allocates anew at every event; without this, memory would be returned and requested again at
+/// every synchronisation. The last one restores the setting that the first one found.
 class KeepFreedMemory {
  public:
   KeepFreedMemory();
@@ -19,15 +19,15 @@ class KeepFreedMemory {
   int device_ = 0;
 };
 
-/// Gives back to the device what the current device's pool holds and no buffer uses. Waits for all
-/// that was put on the device's streams before.
+/// Returns memory of the current device's pool that no buffer uses to the device. It waits for all
+/// earlier work on the device's streams.
 void trimMemoryPool();
 
-/// \return bytes that the current device has left, and those that its pool holds, in use or not
+/// \return bytes that are free on the current device, plus those that its pool holds, used or not
 [[nodiscard]] std::size_t availableMemory();
 
-/// \return the most bytes that the current device's pool has handed out since the last call of
-///         forgetPeakMemory()
+/// \return the largest number of bytes that the current device's pool has handed out at once since
+///         the last call of forgetPeakMemory()
 [[nodiscard]] std::size_t peakMemory();
 void forgetPeakMemory();
 

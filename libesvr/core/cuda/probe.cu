@@ -11,7 +11,7 @@
 namespace esvr {
 namespace {
 
-// Architectures that this build has code for, increasing: 900 is sm_90.
+// The architectures for which this build has code, increasing; 900 is sm_90.
 constexpr int kArchitectures[] = {__CUDA_ARCH_LIST__};
 
 std::string version(int packed) {
@@ -23,8 +23,8 @@ int attribute(cudaDeviceAttr which, int index) {
   return cudaDeviceGetAttribute(&value, which, index) == cudaSuccess ? value : 0;
 }
 
-/// Devices older than all our code are refused here; whether a newer one takes it is known when a
-/// kernel starts, and says so there.
+/// Refuses devices that are older than all code of this build. Whether a newer device can run the
+/// code is known only when a kernel starts.
 std::string whyNotUsable(int index) {
   const int major = attribute(cudaDevAttrComputeCapabilityMajor, index);
   const int minor = attribute(cudaDevAttrComputeCapabilityMinor, index);
@@ -44,8 +44,8 @@ CudaDevice describe(int index) {
   return {index, properties.name, whyNotUsable(index)};
 }
 
-/// The kernel module's version, as people report it; the runtime only knows the CUDA version that
-/// the driver is made for.
+/// The version of the kernel module, which people know as the driver version. The runtime only
+/// knows the CUDA version that the driver supports.
 std::string driverVersion() {
   int cudaOfDriver = 0;
   if (cudaDriverGetVersion(&cudaOfDriver) != cudaSuccess || cudaOfDriver == 0) return "no driver";
@@ -73,7 +73,7 @@ CudaProbe probeCuda() {
   int count = 0;
   const auto status = cudaGetDeviceCount(&count);
   if (status != cudaSuccess) {
-    cudaGetLastError();  // having no GPU is no error of the calls that follow
+    cudaGetLastError();  // a machine without a GPU must not fail later calls
     probe.whyNoDevices = cuda::errorText(status);
   } else if (count == 0) {
     probe.whyNoDevices = "the driver shows none";

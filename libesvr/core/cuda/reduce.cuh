@@ -12,14 +12,14 @@ namespace esvr::cuda {
 
 inline constexpr unsigned kAllLanes = 0xffffffffu;
 
-/// The mask of this thread's group, where a warp is cut into groups of kLanes, a power of two.
+/// The lanes of this thread's group, if a warp is divided into groups of kLanes (a power of two).
 template <int kLanes>
 __device__ inline unsigned lanesOfGroup() {
   if constexpr (kLanes == kWarp) return kAllLanes;
   return ((1u << kLanes % kWarp) - 1u) << (threadIdx.x % kWarp / kLanes * kLanes);
 }
 
-/// Combines the values of a group's lanes; every lane gets the result.
+/// Combines the values of a group's lanes. Every lane gets the result.
 template <int kLanes, class T, class Combine>
 __device__ inline T reduceLanes(T value, Combine&& combine) {
   const unsigned group = lanesOfGroup<kLanes>();
@@ -39,7 +39,7 @@ template <class T>
 __device__ inline T warpMin(T value) {
   return reduceLanes<kWarp>(value, [](T a, T b) { return a < b ? a : b; });
 }
-/// A value that is not a number is passed over.
+/// The largest value of a warp. NaN is ignored.
 __device__ inline float warpMax(float value) {
   return reduceLanes<kWarp>(value, [](float a, float b) { return fmaxf(a, b); });
 }
@@ -75,7 +75,7 @@ __device__ inline float blockMax(float value) {
   return value;
 }
 
-/// The sum of a block's values; thread 0 gets it. To be called once in a kernel.
+/// The sum of a block's values, which thread 0 gets. A kernel can call it once only.
 template <int kThreads>
 __device__ inline double blockSum(double value) {
   using Reduce = cub::BlockReduce<double, kThreads>;

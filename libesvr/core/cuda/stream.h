@@ -1,5 +1,5 @@
 #pragma once
-/// Ownership of a CUDA stream.
+/// A CUDA stream that is released with its owner.
 
 #include <utility>
 
@@ -7,8 +7,8 @@
 
 namespace esvr::cuda {
 
-/// A stream of the current device, not synchronised with the default stream. Outlives the buffers
-/// that were made with it.
+/// A stream of the current device that is not synchronised with the default stream. It must outlive
+/// the buffers that were made with it.
 class Stream {
  public:
   Stream() { check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "making a stream"); }

@@ -1,12 +1,12 @@
 #pragma once
-/// CUB's temporary memory.
+/// Temporary memory for functions of CUB.
 
 #include "core/cuda/growing_buffer.h"
 
 namespace esvr::cuda {
 
-/// Calls a function of CUB twice, as CUB wants it: for the size, and with memory of that size.
-/// \param call   call(void* temporary, std::size_t& bytes) -> cudaError_t
+/// Calls a function of CUB twice: once to get the size of its temporary memory, and once with it.
+/// \param call  call(void* temporary, std::size_t& bytes) -> cudaError_t
 template <class Call>
 void withTemporary(GrowingBuffer<char>& memory, const char* doing, Call&& call) {
   std::size_t bytes = 0;

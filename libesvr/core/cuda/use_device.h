@@ -1,5 +1,5 @@
 #pragma once
-/// Makes the device that a caller chose the one that CUDA's calls mean.
+/// Makes the selected device the current one of the CUDA runtime.
 
 #include <string>
 
@@ -8,8 +8,9 @@
 
 namespace esvr::cuda {
 
-/// For the calling thread, and for good: going back would wake a device that nobody asked for.
-/// \throws DeviceError  it cannot be used (says why), or is the CPU
+/// Sets the calling thread's device and does not restore the previous one, because that would
+/// initialise a device that nobody asked for.
+/// \throws DeviceError  the device cannot be used (the text says why) or is the CPU
 inline void useDevice(const Device& device) {
   if (device.kind != DeviceKind::kCuda) throw DeviceError("CUDA was asked to use the CPU");
   check(cudaSetDevice(device.index), "using cuda:" + std::to_string(device.index));

@@ -199,8 +199,8 @@ void CudaOptimiser::keep(std::span<const std::size_t> places) {
   stale_ = true;
 }
 
-/// Drops the tenth of the ellipsoids whose removal adds the least error. New ellipsoids, which have
-/// not taken a step yet, are dropped first.
+/// Drops the tenth of the ellipsoids whose removal adds the smallest error. New ellipsoids, which
+/// have not taken a step yet, are dropped first.
 void CudaOptimiser::dropLeastUseful() {
   constexpr std::size_t kShare = 10;
   const auto all = ellipsoids();

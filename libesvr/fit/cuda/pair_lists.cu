@@ -40,9 +40,9 @@ __global__ void countPairsKernel(SupportSource source, BrickTableView bricks, st
   });
 }
 
-/// Bits of a sort key that rank the entries of a brick by their number of lines. Entries that take
-/// the most work come first, and neighbours take about the same, so that the lanes of a warp end at
-/// the same time.
+/// Bits of a sort key that rank the entries of a brick by their number of lines. Entries with the
+/// largest number come first, and neighbours take about the same, so that the lanes of a warp end
+/// at the same time.
 constexpr int kLinesBits = 3;
 
 __device__ int voxelsOfBrick(double center, double half, std::int32_t brick) {

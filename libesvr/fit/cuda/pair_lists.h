@@ -16,7 +16,7 @@ struct PairListsView {
 
   const std::uint32_t* brickOrder;      ///< bricks in decreasing order of their number of pairs
   const std::uint32_t* brickBegin;      ///< by brick: its entries are [b] to [b + 1] - 1
-  const std::uint32_t* ellipsoid;       ///< by entry: its ellipsoid; most lines first in a brick
+  const std::uint32_t* ellipsoid;       ///< by entry: its ellipsoid; in a brick by decreasing lines
   const std::uint32_t* pair;            ///< by entry: number of its pair
   const std::uint32_t* ellipsoidBegin;  ///< by ellipsoid: its pairs are [i] to [i + 1] - 1
   const std::uint32_t* chunkBegin;      ///< by ellipsoid: its chunks are [i] to [i + 1] - 1

@@ -1,5 +1,5 @@
 #pragma once
-/// Finds the ellipsoids whose removal adds the least error.
+/// Finds the ellipsoids whose removal adds the smallest error.
 
 #include <cuda_runtime_api.h>
 
@@ -16,8 +16,8 @@ class EllipsoidRanking {
     const std::uint32_t* places;  ///< in device memory; the least useful ellipsoid first
     std::size_t count;
   };
-  /// The `count` ellipsoids whose removal raises the sum of squares least. Only ellipsoids that
-  /// have taken graceSteps steps are chosen, so the result may be shorter.
+  /// The `count` ellipsoids whose removal adds the smallest error. Only ellipsoids that have
+  /// taken graceSteps steps are chosen, so the result may be shorter.
   [[nodiscard]] Chosen leastUseful(const StepArguments& fit, std::size_t count, int graceSteps);
 
  private:

@@ -118,7 +118,7 @@ struct ReadLimits {
 struct ReadPart {
   /// Selects every ellipsoid whose support meets the box; the result may contain others.
   std::optional<Box> box{};
-  std::optional<std::size_t> layers{};  ///< largest number of importance layers, from the heaviest
+  std::optional<std::size_t> layers{};  ///< largest number of importance layers, from the first
   /// Selects the smallest number of these layers that has at least this many ellipsoids.
   std::optional<std::size_t> ellipsoids{};
   ReadLimits limits{};

@@ -1,5 +1,5 @@
 #pragma once
-/// Integer lattice coordinates and boxes, in voxels of a grid's index space.
+/// Integer coordinates and boxes, in voxels of a grid's index space.
 
 #include <algorithm>
 #include <compare>
@@ -9,7 +9,7 @@
 
 namespace esvr {
 
-/// A point of the integer lattice. Ordered lexicographically by x, y, z.
+/// The integer coordinates of a voxel. They are ordered lexicographically by x, y, z.
 struct Coord {
   std::int32_t x = 0, y = 0, z = 0;
 

@@ -11,7 +11,7 @@ namespace esvr {
 /// layers is returned unchanged.
 [[nodiscard]] StoredGrid firstLayers(StoredGrid grid, std::size_t layers);
 
-/// Keeps the `count` heaviest ellipsoids of a grid, in their order. The weight is
+/// Keeps the `count` ellipsoids of the largest weight of a grid, in their order. The weight is
 /// |I| sqrt(s1 s2 s3): the root of the ellipsoid's sum of squares over voxels, up to a factor that
 /// depends on kappa only. The result has no quantised form, no layers and no residual. A grid that
 /// has no more ellipsoids is returned unchanged.

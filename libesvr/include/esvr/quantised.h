@@ -7,7 +7,7 @@
 /// decoded first: positions depend on the smallest scale, rotations on the ratio of the scales,
 /// intensities on the ellipsoid's volume. The numbers of bits are computed from integers only. The
 /// values are computed with +, -, *, / and sqrt in float64 and rounded once to float32, so they are
-/// bit-identical on every machine (docs/format.md, "The lattice").
+/// bit-identical on every machine (docs/format.md, "The quantisation lattice").
 
 #include <array>
 #include <cstddef>
@@ -48,8 +48,8 @@ struct Lattice {
   friend bool operator==(const Lattice&, const Lattice&) = default;
 };
 
-/// n ellipsoids in the order of the file: the importance layers follow each other, the heaviest
-/// first, and each layer is in Morton order of its cells.
+/// n ellipsoids in the order of the file: the importance layers follow each other, that of the
+/// largest weights first, and each layer is in Morton order of its cells.
 struct QuantisedEllipsoids {
   Lattice lattice;
   std::array<std::vector<std::uint32_t>, 3> position;  ///< (cell << bits) + place in the cell

@@ -1,7 +1,7 @@
 #pragma once
 /// Renderers draw many pictures of one field or volume, on the CPU or on a CUDA device. They
-/// prepare their data once and keep them on the device. The pictures are those of render.h; the
-/// channels of CPU and CUDA pictures differ by at most 1/255.
+/// prepare their data once and keep them on the device. The pictures are those of render.h. CPU and
+/// CUDA round differently; the tests of tests/render/cuda allow a difference of 1/255 in a channel.
 
 #include <cstdint>
 #include <memory>
@@ -68,8 +68,9 @@ class Renderer {
                                                            const RendererLimits& limits = {});
 
 /// Draws a NanoVDB grid by the rule of renderVolume. It is the reference that other renderers are
-/// compared with. Positions along a ray are float32, relative to the point where the ray enters the
-/// grid. The exceptions are those of renderField.
+/// compared with. The position of a sample is computed in float32 as an offset from the point where
+/// its ray enters the grid, so that it is precise for a camera at any distance. The exceptions are
+/// those of renderField.
 [[nodiscard]] Image renderNano(const NanoVolume& volume, const RenderOptions& options);
 
 /// Makes a renderer that draws as renderNano. A CUDA renderer does not need the volume after it was

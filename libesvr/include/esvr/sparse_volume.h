@@ -1,5 +1,5 @@
 #pragma once
-/// A sparse scalar field on the integer lattice: bricks of 8^3 voxels, and one background value
+/// A sparse scalar volume: bricks of 8^3 voxels at integer coordinates, and one background value
 /// elsewhere. It is the library's only container for voxels; vdb_io.h converts OpenVDB and NanoVDB
 /// grids to it and back. Its size depends on the number of bricks and not on the bounding box.
 

@@ -13,7 +13,7 @@ namespace esvr {
 
 /// The meaning of an integer code n.
 enum class VoxelForm {
-  kLattice = 0,  ///< the value float32(n / divisor), divided in float64
+  kLattice = 0,  ///< quantised: the value float32(n / divisor), divided in float64
   kHalf = 1,     ///< half floats in increasing order: n >= 0 has the bits n, n < 0 is -(-1 - n)
   kFloat = 2,    ///< float32 in the same way
   kPalette = 3   ///< palette entry n

@@ -31,7 +31,7 @@ struct Shared : WorkShared {
   std::uint32_t touched;  ///< bit i is set if an ellipsoid was added to sample i of any ray
 };
 
-/// What a thread knows of its ray in addition to Work.
+/// The data of a thread's ray, in addition to Work.
 struct SumWork : Work {
   double middleUnit;  ///< samples per unit of depth along forward, on the tile's middle ray
   RayScale scale;

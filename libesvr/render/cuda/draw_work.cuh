@@ -35,7 +35,7 @@ struct Place {
   }
 };
 
-/// What a thread knows of its tile and of its ray.
+/// The data of a thread's tile and ray.
 struct Work {
   int firstColumn, firstRow;  ///< pixels of the picture
   bool inPicture;

@@ -184,7 +184,7 @@ TEST(PaperLoss, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one.gradient, four.gradient);
 }
 
-TEST(PaperLoss, IsTheSameAtAnyPlaceOfTheLattice) {
+TEST(PaperLoss, IsTheSameAtAnyPlaceOfIndexSpace) {
   const Scene scene = randomScene(61);
   Scene far = scene;
   for (Coord& brick : far.bricks) brick = brick + Coord{-(1 << 20), 1 << 20, 12345};
