@@ -23,8 +23,7 @@ namespace esvr::cli {
 
 namespace po = boost::program_options;
 
-/// The texts of a program's --help. They are printed unchanged; their lines have at most 80
-/// characters.
+/// The texts of a program's --help, which are printed unchanged.
 struct ProgramText {
   std::string name;      ///< "esvr-sample"
   std::string purpose;   ///< what the program does
