@@ -97,20 +97,6 @@ struct Sums {
 
 }  // namespace
 
-TransferFunction withEmptySpace(const TransferFunction& function, double background,
-                                double threshold) {
-  constexpr int kPlaces = 4096;  // resolution of a renderer's table of the function
-  TransferFunction result = function;
-  const double low = function.colors.points.front().x, high = function.colors.points.back().x;
-  result.opacity.clear();
-  for (int i = 0; i <= kPlaces; ++i) {
-    const double x = low + (high - low) * i / kPlaces;
-    const bool empty = std::abs(x - background) <= threshold;
-    result.opacity.push_back({.x = x, .opacity = empty ? 0.0 : opacityAt(function.opacity, x)});
-  }
-  return result;
-}
-
 Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference, const Device& device,
                  const std::filesystem::path& folder, const CancelToken& cancel)
     : views_(viewsOf(options, reference, cancel)), device_(device) {
@@ -122,12 +108,12 @@ Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference, c
   referenceCost_ = clock.cost();
 }
 
-Gallery::Compared Gallery::compare(Renderer& renderer, const OwnView& own) const {
+Gallery::Compared Gallery::compare(Renderer& renderer) const {
   Clock clock(renderer, device_);
   Sums sums;
   Compared result;
   for (std::size_t i = 0; i < views_.size(); ++i) {
-    const Image image = clock.draw(own ? own(views_[i]) : views_[i]);
+    const Image image = clock.draw(views_[i]);
     sums.add(references_[i], image, lpips_);
     if (i == 0)
       result.shown = {report::toPng(image),

@@ -2,7 +2,6 @@
 /// The option --images: compares pictures of every row with pictures of the reference from the same
 /// views.
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,11 +28,6 @@ struct GalleryOptions {
   std::string lpips;  ///< command for PictureMetric; empty: none
 };
 
-/// Makes values that differ from the background by at most `threshold` transparent, so that the
-/// inactive voxels of an .esvr file are empty space.
-[[nodiscard]] TransferFunction withEmptySpace(const TransferFunction& function, double background,
-                                              double threshold);
-
 /// Mean figures over all pictures; the PSNR is that of the mean squared error.
 struct ImageFigures {
   double psnr = 0.0, ssim = 0.0, flip = 0.0;
@@ -46,9 +40,6 @@ struct ImageFigures {
 struct Shown {
   std::string picturePng, errorPng;
 };
-
-/// The changes that a row makes to a view; nothing: no changes.
-using OwnView = std::function<RenderOptions(const RenderOptions&)>;
 
 class Gallery {
  public:
@@ -63,7 +54,7 @@ class Gallery {
     Shown shown;
   };
   /// The exceptions are those of Renderer::draw and PictureMetric.
-  [[nodiscard]] Compared compare(Renderer& renderer, const OwnView& own = {}) const;
+  [[nodiscard]] Compared compare(Renderer& renderer) const;
   [[nodiscard]] const std::string& referencePng() const { return referencePng_; }
   /// The cost of drawing the reference; only fps and deviceBytes are set.
   [[nodiscard]] const ImageFigures& referenceCost() const { return referenceCost_; }

@@ -129,8 +129,8 @@ VolumeMetrics RowMaker::compare(const SparseVolume& volume) const {
                         {.box = scene_.box, .peak = scene_.peak, .ssim = true});
 }
 
-void RowMaker::measurePictures(Renderer& renderer, const OwnView& own, TableRow& row) const {
-  auto compared = scene_.gallery->compare(renderer, own);
+void RowMaker::measurePictures(Renderer& renderer, TableRow& row) const {
+  auto compared = scene_.gallery->compare(renderer);
   row.images = compared.figures;
   row.shown = std::move(compared.shown);
   row.fps = compared.figures.fps;
@@ -139,7 +139,7 @@ void RowMaker::measurePictures(Renderer& renderer, const OwnView& own, TableRow&
 void RowMaker::measureVoxels(const SparseVolume& volume, NanoValues values, TableRow& row) const {
   row.metrics = compare(volume);
   if (!scene_.gallery) return;
-  measurePictures(*makeVoxelRenderer(volume, values, scene_.gallery->device()), {}, row);
+  measurePictures(*makeVoxelRenderer(volume, values, scene_.gallery->device()), row);
 }
 
 std::string RowMaker::command(const std::string& arguments) const {
@@ -238,14 +238,8 @@ void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Draw
                         TableRow& row) const {
   const Device& device = scene_.gallery->device();
   if (drawing == Drawing::kBricks || !saysAll(grid))
-    return measurePictures(*makeVolumeRenderer(voxels, device), {}, row);
-  const auto own = [&](const RenderOptions& view) {
-    RenderOptions result = view;
-    result.transfer =
-        withEmptySpace(view.transfer, grid.descriptor.background, grid.activeThreshold);
-    return result;
-  };
-  measurePictures(*makeFieldRenderer(grid.field, device, {}, voxelRule(grid)), own, row);
+    return measurePictures(*makeVolumeRenderer(voxels, device), row);
+  measurePictures(*makeFieldRenderer(grid.field, device, {}, voxelRule(grid)), row);
 }
 
 TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing) {
