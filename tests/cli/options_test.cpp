@@ -313,8 +313,9 @@ TEST_F(CompareOption, maxDenseSkipsZfpInCurves) {
         test::runProgram(ESVR_COMPARE, {"curves", at("cloud.vdb"), "--fit", "3KB", "--device",
                                         "cpu", "--max-dense", bound, "-o", at("z"), "--force"});
     EXPECT_EQ(ran.exitCode, 0) << ran.err;
+    const Json report = Json::parse(test::readText(at("z.json")));
     int points = 0;
-    for (const auto& point : Json::parse(test::readText(at("z.json")))["points"])
+    for (const auto& point : report["points"])
       points += point["series"].get<std::string>().starts_with("ZFP");
     return points;
   };
