@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Makes the tables of docs/resolution.md: files of one skeleton at rising resolutions, at about 25 dB.
+"""Makes the tables of docs/resolution.md: files of one skeleton at rising resolutions, at 25 dB.
 
     resolution_series.py fit  --bin BUILD --swc FILE.swc --out OUT [--device cuda] [--resolutions 256 512 ...]
     resolution_series.py page --bin BUILD --swc FILE.swc --out OUT [--resolutions 256 512 ...]
 
 `fit` rasterises the skeleton and fits .esvr files with different numbers of ellipsoids until the PSNR over
-the active voxels of one is within 0.3 dB of 25 dB, above or below. It keeps the file that is nearest. `page`
+the active voxels of one reaches 25 dB by at most 0.3 dB. It keeps the smallest file that reaches 25 dB. `page`
 prints Markdown tables of these files, of the smallest NanoVDB and ZFP files among SETTINGS that reach 25 dB,
 and of the exponents by which files grow with the resolution.
 """
@@ -17,10 +17,10 @@ import subprocess
 import sys
 
 TARGET = 25.0  # dB over the active voxels
-NEAR = 0.3     # allowed difference from TARGET, dB
+NEAR = 0.3     # a fit that exceeds TARGET by no more ends the search, dB
 FIRST = 1500   # first number of ellipsoids at a resolution of 256
 STEP = 1.7
-MOST_FITS = 6
+MAX_FITS = 8
 
 SETTINGS = ['nvdb-fp4-zip', *(f'nvdb-fpn-zip,tolerance={t}' for t in (0.4, 0.2, 0.15, 0.1, 0.07)),
             *(f'zfp,accuracy={2.0 ** -k}' for k in range(-2, 4))]
@@ -46,30 +46,27 @@ class Resolution:
                  '--resolution', self.resolution])
 
     def fit(self, count):
-        """Fits and returns the PSNR over the active voxels. The file is kept if it is the nearest so far."""
+        """Fits and returns the PSNR over the active voxels. The smallest file that reaches TARGET is kept."""
         path = self.options.out / 'attempt.esvr'
-        text = run([self.options.bin / 'vdb2esvr/vdb2esvr', self.volume, path, '--count', count,
+        report = run([self.options.bin / 'vdb2esvr/vdb2esvr', self.volume, path, '--count', count,
                     '--device', self.options.device, '--report', '-', '-f'])
-        psnr = json.loads(text)['grids'][0]['metrics']['psnr_active']
+        psnr = json.loads(report)['grids'][0]['metrics']['psnr_active']
         print(self.resolution, count, psnr, file=sys.stderr, flush=True)
-        if not self.report.exists() or abs(psnr - TARGET) < abs(self.psnr() - TARGET):
+        if psnr >= TARGET and (not self.best.exists() or path.stat().st_size < self.best.stat().st_size):
             path.replace(self.best)
-            self.report.write_text(text)
+            self.report.write_text(report)
         return psnr
-
-    def psnr(self):
-        return json.loads(self.report.read_text())['grids'][0]['metrics']['psnr_active']
 
     def search(self):
         """Multiplies or divides the count until 25 dB lies between two fits; then interpolates log(count)."""
         self.make_volume()
-        if self.report.exists() and abs(self.psnr() - TARGET) <= NEAR:
+        if self.report.exists():
             return
         points = []
         count = self.first_count()
-        for _ in range(MOST_FITS):
+        for _ in range(MAX_FITS):
             points.append((math.log(count), self.fit(count)))
-            if abs(points[-1][1] - TARGET) <= NEAR:
+            if TARGET <= points[-1][1] <= TARGET + NEAR:
                 return
             count = self.next_count(points)
 
@@ -88,7 +85,7 @@ class Resolution:
             return int(math.exp(below[0]) * STEP)
         if not below:
             return int(math.exp(above[0]) / STEP)
-        share = (TARGET - below[1]) / (above[1] - below[1])
+        share = (TARGET + NEAR / 2 - below[1]) / (above[1] - below[1])
         return int(math.exp(below[0] + share * (above[0] - below[0])))
 
     def rows(self):
