@@ -365,7 +365,7 @@ TEST_F(EsvrRender, OptionsThatMakeNoSenseAreRefused) {
   expectRefused({"--opacity-length", "0"}, 2, "--opacity-length");
   expectRefused({"--colors", "jet"}, 2, "viridis");
   expectRefused({"--opacity", "cubic"}, 2, "tent");
-  expectRefused({"--range", "3,1"}, 2, "rise");
+  expectRefused({"--range", "3,1"}, 2, "LO <= HI");
   expectRefused({"--range", "1"}, 2, "--range");
   expectRefused({"--eye", "1,2"}, 2, "--eye");
   expectRefused({"--eye", "1,2,nan"}, 2, "--eye");
