@@ -148,7 +148,7 @@ pid_t startWriter(const fs::path& target) {
 
 // If a write is killed at any of a hundred moments, the file is the old one or the complete new
 // one, and the next write removes temporary files.
-TEST_F(AtomicFileTest, SurvivesBeingKilled) {
+TEST_F(AtomicFileTest, SlowSurvivesBeingKilled) {
   const std::string oldContent(1 << 20, 'o'), newContent(1 << 20, 'n');
   int leftOver = 0;
   for (int round = 0; round < 100; ++round) {

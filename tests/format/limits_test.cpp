@@ -92,7 +92,7 @@ TEST(Limits, MetadataThatIsWideInMemoryIsRefused) {
   expectRefused(file, 4 * kMegabyte);
 }
 
-TEST(Limits, VoxelsThatCostNextToNothingAreRefused) {
+TEST(Limits, SlowVoxelsThatCostNextToNothingAreRefused) {
   std::vector<BrickInput> bricks;
   for (int i = 0; i < 2000; ++i) {
     BrickInput brick{{8 * (i % 100), 8 * (i / 100), 0}, {}, {}};

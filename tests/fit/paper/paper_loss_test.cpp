@@ -73,7 +73,7 @@ struct Share {
 };
 class AgainstDense : public testing::TestWithParam<Share> {};
 
-TEST_P(AgainstDense, LossAndGradientAreThoseOfTheTextbook) {
+TEST_P(AgainstDense, SlowLossAndGradientAreThoseOfTheTextbook) {
   Scene scene = randomScene(GetParam().seed);
   scene.beta = GetParam().beta;
   scene.peak = GetParam().peak;
@@ -84,7 +84,7 @@ INSTANTIATE_TEST_SUITE_P(Shares, AgainstDense,
                          testing::Values(Share{1, 0.0, 1.0}, Share{2, 0.2, 1.0}, Share{3, 1.0, 1.0},
                                          Share{4, 0.2, 0.6}, Share{5, 0.5, 37.0}));
 
-TEST(PaperLoss, OfABoxCountsTheWindowsOfItsVoxelsAlone) {
+TEST(PaperLoss, SlowOfABoxCountsTheWindowsOfItsVoxelsAlone) {
   Scene scene = randomScene(13);
   scene.within = Box{{-1, -1, 0}, {0, 1, 1}};
   expectDenseResult(scene);
@@ -92,7 +92,7 @@ TEST(PaperLoss, OfABoxCountsTheWindowsOfItsVoxelsAlone) {
 
 // Most voxels are zero, and some are predicted exactly. Windows may skip those voxels, but must not
 // skip others.
-TEST(PaperLoss, OfFewVoxelsIsThatOfTheTextbook) {
+TEST(PaperLoss, SlowOfFewVoxelsIsThatOfTheTextbook) {
   test::Random random(15);
   const auto target = [&](Coord) { return random(0.0, 1.0) < 0.01 ? 0.75f : 0.0f; };
   Scene scene = makeScene(mixedBricks(), 5, target, [&](Coord) {
@@ -228,7 +228,7 @@ TEST(PaperLoss, OfNoBricksIsZero) {
 }
 
 // The variance is 3e-9, a tenth of the rounding error of 0.5^2 in float32.
-TEST(PaperLossOnFlatRegions, NoiseOnAnOffsetLosesNoDigits) {
+TEST(PaperLossOnFlatRegions, SlowNoiseOnAnOffsetLosesNoDigits) {
   test::Random random(91);
   const auto noisy = [&](Coord) { return float(0.5 + 1e-4 * random(-1.0, 1.0)); };
   Scene scene = makeScene(cubeOfBricks(3), 27, noisy, noisy);
@@ -241,7 +241,7 @@ TEST(PaperLossOnFlatRegions, NoiseOnAnOffsetLosesNoDigits) {
 
 // A constant difference in a bright region. Of the gradient only the share of the means remains,
 // which is 1e-3 of each of the two terms that cancel.
-TEST(PaperLossOnFlatRegions, AConstantDifferenceKeepsItsSmallGradient) {
+TEST(PaperLossOnFlatRegions, SlowAConstantDifferenceKeepsItsSmallGradient) {
   Scene scene = makeScene(
       cubeOfBricks(3), 27, [](Coord) { return 0.9f; }, [](Coord) { return 0.91f; });
   scene.beta = 0.0;
