@@ -83,7 +83,7 @@ double shareOff(const Field& field, const RenderOptions& o, double tolerance) {
   return double(off) / double(drawn.width * drawn.height);
 }
 
-TEST(RenderModes, ShowTheLargestAndTheMeanValue) {
+TEST(RenderModes, SlowShowTheLargestAndTheMeanValue) {
   const Field field = randomField({.count = 40});
   for (const auto projection : {Projection::kPerspective, Projection::kOrthographic})
     for (const auto mode : {RenderMode::kMaximum, RenderMode::kAverage})
@@ -91,7 +91,7 @@ TEST(RenderModes, ShowTheLargestAndTheMeanValue) {
       EXPECT_LE(shareOff(field, optionsFor(mode, projection), 1e-3), 0.02);
 }
 
-TEST(RenderModes, ShowHowDeepHalfOfTheLightComes) {
+TEST(RenderModes, SlowShowHowDeepHalfOfTheLightComes) {
   const Field field = randomField({.count = 200});
   EXPECT_LE(shareOff(field, optionsFor(RenderMode::kDepth), 1e-3), 0.005);
   RenderOptions o = optionsFor(RenderMode::kDepth);

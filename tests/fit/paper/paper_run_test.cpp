@@ -174,7 +174,7 @@ TEST_P(PaperRunOn, LearnsKOfEachEllipsoid) {
   EXPECT_GT(values.size(), 10u);
 }
 
-TEST_P(PaperRunOn, FitsGaussiansWithTheSameMethod) {
+TEST_P(PaperRunOn, SlowFitsGaussiansWithTheSameMethod) {
   PaperMethod method = shortMethod();
   method.gaussian = true;
   method.countHits = true;
