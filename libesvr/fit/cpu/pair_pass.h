@@ -187,7 +187,7 @@ class PairPass {
   Kernels kernels_;
   BrickIndex index_;
   BrickPairs pairs_;
-  std::vector<Support> supports_;  ///< as last listed
+  std::vector<Support> supports_;  ///< supports in the current lists
   std::vector<LineForm> forms_;
   std::vector<Coord> frames_;  ///< origin of each form's center, near it for float32 precision
   std::vector<PairMoments> moments_;

@@ -51,7 +51,7 @@ class BrickTable {
 
   cudaStream_t stream_;
   std::size_t targetCount_, reachedCount_ = 0;
-  Box targetBounds_, bounds_;    ///< in brick coordinates
+  Box targetBounds_, bounds_;    ///< boxes of brick coordinates
   GrowingBuffer<Coord> bricks_;  ///< target bricks, then reached bricks
   std::size_t slotCount_ = 0;
   GrowingBuffer<std::uint32_t> slots_;

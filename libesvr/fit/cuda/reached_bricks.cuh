@@ -1,7 +1,7 @@
 #pragma once
-/// The bricks that ellipsoids reach. A warp goes through those around an ellipsoid, or a whole block
-/// where they are many: else the few largest ellipsoids would keep single warps busy long after all
-/// others have ended.
+/// Visits the bricks that ellipsoids reach. A warp visits the bricks around one ellipsoid. If these
+/// are many, a whole block visits them, because otherwise the few largest ellipsoids would keep
+/// single warps busy long after all others have ended.
 
 #include <cstdint>
 
@@ -59,7 +59,7 @@ struct ReachedBricks {
   Team team;
   std::size_t ellipsoid;
   Support support;
-  Box range;  ///< of bricks
+  Box range;  ///< the bricks to visit; may be empty
 
   /// Calls visit(brick, reached) on all lanes together until every brick of the range has been
   /// visited by one lane, lanes and rounds in increasing order of the bricks.

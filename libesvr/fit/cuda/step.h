@@ -41,8 +41,8 @@ struct StepArguments {
   const ListedSupport* listed;  ///< an ellipsoid's, in the lists
   double core;                  ///< radius within which no list may miss anything
   std::uint32_t* refused;       ///< steps that were refused since the lists were built
-  std::uint32_t maxRefused;     ///< so many end the lists
-  const int* halted;            ///< isHalted()
+  std::uint32_t maxRefused;     ///< number of refused steps that ends the lists
+  const int* halted;            ///< flag of isHalted()
   int* halts;                   ///< set to 1 where the lists do not serve the next step
 };
 
