@@ -15,6 +15,7 @@ struct ListedSupport {
   std::array<double, 3> center;
   Matrix3 L;
   double reach;  ///< radius in the unit frame, including the slack
+  bool refused;  ///< whether a step was refused since
 };
 
 /// How slack is chosen, and when lists end. docs/lab-notes.md has the measurements
@@ -24,7 +25,8 @@ struct SlackRule {
   double minSlack = 0.15;          ///< voxels
   double maxSlack = 0.25;          ///< share of the radius, where minSlack is less
   double slackOverMotion = 0.9;    ///< slack over the motion since the lists before
-  std::uint32_t settledSteps = 4;  ///< an ellipsoid that is younger gets maxSlack
+  std::uint32_t settledSteps = 4;  ///< an ellipsoid that is younger gets maxSlack, as does one
+                                   ///< whose step was refused: it would be refused again
   double refusedShare = 0.03;      ///< lists end after so many refused steps an ellipsoid
 
   /// \return the number of refused steps that ends lists of `count` ellipsoids

@@ -68,9 +68,10 @@ ESVR_HD inline double largestEigenvalueBound(const Matrix3d& S) {
 
 /// Refuses a step that leads an ellipsoid out of its listed support: moves it back, and leaves its
 /// intensity changed. \return whether the step was refused
-[[nodiscard]] ESVR_HD inline bool refuseStep(const ListedSupport& listed, double radius,
+[[nodiscard]] ESVR_HD inline bool refuseStep(ListedSupport& listed, double radius,
                                              const Ellipsoid& before, Ellipsoid& p) {
   if (isHeld(listed, p, radius)) return false;
+  listed.refused = true;
   p.center = before.center;
   p.L = before.L;
   return true;
@@ -94,7 +95,7 @@ ESVR_HD inline double largestEigenvalueBound(const Matrix3d& S) {
   const double meanHalf = radius * std::sqrt(ellipsoid_math::norm2(F) / 3.0);  // voxels
   const double low = rule.minSlack / meanHalf;
   const double high = low > rule.maxSlack ? low : rule.maxSlack;
-  if (steps < rule.settledSteps) return high;
+  if (steps < rule.settledSteps || before.refused) return high;
   const double wanted = rule.slackOverMotion * motionSince(before, p, radius);
   return wanted > low ? (wanted < high ? wanted : high) : low;
 }
@@ -103,7 +104,7 @@ ESVR_HD inline double largestEigenvalueBound(const Matrix3d& S) {
 [[nodiscard]] ESVR_HD inline ListedSupport listedSupport(const Ellipsoid& p, std::uint32_t steps,
                                                          const ListedSupport& before, double radius,
                                                          const SlackRule& rule) {
-  return {p.center, p.L, radius * (1.0 + slackOf(p, steps, before, radius, rule))};
+  return {p.center, p.L, radius * (1.0 + slackOf(p, steps, before, radius, rule)), false};
 }
 
 }  // namespace esvr

@@ -24,7 +24,7 @@ Ellipsoid sphere(double scale) {
 }
 
 ListedSupport listedAs(const Ellipsoid& p, double slack) {
-  return {p.center, p.L, kRadius * (1.0 + slack)};
+  return {p.center, p.L, kRadius * (1.0 + slack), false};
 }
 
 /// The largest distance, in the listed unit frame, of points on the surface of p's support.
@@ -88,15 +88,30 @@ TEST(MotionBound, GrowthAndMovesEndWithTheSlack) {
 
 TEST(MotionBound, AStepOutOfTheListsLeavesThePlaceAndTakesTheIntensity) {
   const Ellipsoid before = sphere(2.0);
-  const ListedSupport listed = listedAs(before, 0.2);
+  ListedSupport listed = listedAs(before, 0.2);
   Ellipsoid inside = sphere(2.1), outside = sphere(3.0);
   outside.intensity = 0.5;
   EXPECT_FALSE(refuseStep(listed, kRadius, before, inside));
   EXPECT_EQ(inside.L, sphere(2.1).L);
+  EXPECT_FALSE(listed.refused);
   EXPECT_TRUE(refuseStep(listed, kRadius, before, outside));
   EXPECT_EQ(outside.center, before.center);
   EXPECT_EQ(outside.L, before.L);
   EXPECT_EQ(outside.intensity, 0.5);
+  EXPECT_TRUE(listed.refused);
+}
+
+TEST(MotionBound, ARefusedStepIsNotRefusedAgain) {
+  // With a hard edge the core is all of the support. This ellipsoid has not moved so far, so that
+  // its slack is that of minSlack, which is less than a step.
+  const SlackRule rule;
+  const Ellipsoid before = sphere(20.0), after = sphere(22.0);
+  ListedSupport listed = listedSupport(before, 100, listedAs(before, 0.1), kRadius, rule);
+  Ellipsoid p = after;
+  ASSERT_TRUE(refuseStep(listed, kRadius, before, p));
+  listed = listedSupport(before, 101, listed, kRadius, rule);
+  p = after;
+  EXPECT_FALSE(refuseStep(listed, kRadius, before, p));
 }
 
 TEST(MotionBound, ListsEndWithAShareOfRefusedSteps) {

@@ -38,12 +38,12 @@ struct StepArguments {
   StepSizes sizes;
   AdamOptions adam;
   EllipsoidLimits limits;
-  const ListedSupport* listed;  ///< an ellipsoid's, in the lists
-  double core;                  ///< radius within which no list may miss anything
-  std::uint32_t* refused;       ///< steps that were refused since the lists were built
-  std::uint32_t maxRefused;     ///< number of refused steps that ends the lists
-  const int* halted;            ///< flag of isHalted()
-  int* halts;                   ///< set to 1 where the lists do not serve the next step
+  ListedSupport* listed;     ///< an ellipsoid's, in the lists
+  double core;               ///< radius within which no list may miss anything
+  std::uint32_t* refused;    ///< steps that were refused since the lists were built
+  std::uint32_t maxRefused;  ///< number of refused steps that ends the lists
+  const int* halted;         ///< flag of isHalted()
+  int* halts;                ///< set to 1 where the lists do not serve the next step
 };
 
 /// The supports that lists are to hold. Pointers are to device memory, borrowed.
