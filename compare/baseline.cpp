@@ -14,8 +14,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kSchema = "esvr-baseline";
-constexpr int kSchemaVersion = 1;
+constexpr const char* kBaselineSchema = "esvr-baseline";
+constexpr int kBaselineVersion = 1;
 constexpr double kBytesTolerance = 0.01;  // default tolerance of the size, as a share of it
 
 [[noreturn]] void notABaseline(const std::filesystem::path& path, const std::string& why) {
@@ -27,10 +27,10 @@ Json readBaseline(const std::filesystem::path& path) {
   if (!stream) throw BadInput(path.string() + ": cannot be read (--update makes it)");
   Json json = Json::parse(stream, nullptr, false);
   if (json.is_discarded() || !json.is_object()) notABaseline(path, "no JSON object");
-  if (json.value("schema", Json()) != kSchema)
-    notABaseline(path, std::string("its \"schema\" is not \"") + kSchema + '"');
-  if (json.value("schema_version", Json()) != kSchemaVersion)
-    notABaseline(path, "its \"schema_version\" is not " + std::to_string(kSchemaVersion));
+  if (json.value("schema", Json()) != kBaselineSchema)
+    notABaseline(path, std::string("its \"schema\" is not \"") + kBaselineSchema + '"');
+  if (json.value("schema_version", Json()) != kBaselineVersion)
+    notABaseline(path, "its \"schema_version\" is not " + std::to_string(kBaselineVersion));
   if (!json.contains("grids") || !json["grids"].is_object()) notABaseline(path, "no \"grids\"");
   return json;
 }
@@ -148,8 +148,8 @@ void updateBaseline(const std::filesystem::path& path, const CheckRecord& record
   for (const auto& grid : record.grids)
     grids[grid.name] = gridEntry(grid, oldGrids.value(grid.name, Json()));
   const Json json{
-      {"schema", kSchema},
-      {"schema_version", kSchemaVersion},
+      {"schema", kBaselineSchema},
+      {"schema_version", kBaselineVersion},
       {"bytes",
        {{"value", record.candidateBytes},
         {"tolerance", toleranceOf(old, "bytes", kBytesTolerance * double(record.candidateBytes))}}},

@@ -12,8 +12,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kSchema = "esvr-check";
-constexpr int kSchemaVersion = 1;
+constexpr const char* kCheckSchema = "esvr-check";
+constexpr int kCheckVersion = 1;
 
 /// The figures that all grids have.
 std::vector<Figure> columns(const CheckRecord& record) {
@@ -102,8 +102,8 @@ void printCheck(const CheckRecord& record, std::ostream& out) {
 Json checkReport(const CheckOptions& options, const CheckRecord& record) {
   Json grids = Json::array();
   for (const auto& grid : record.grids) grids.push_back(toJson(grid));
-  return {{"schema", kSchema},
-          {"schema_version", kSchemaVersion},
+  return {{"schema", kCheckSchema},
+          {"schema_version", kCheckVersion},
           {"command_line", options.commandLine},
           {"reference", options.reference.string()},
           {"candidate", options.candidate.string()},

@@ -24,8 +24,8 @@ using report::Kind;
 using report::Plot;
 using report::Series;
 
-constexpr const char* kSchema = "esvr-curves";
-constexpr int kSchemaVersion = 1;
+constexpr const char* kCurvesSchema = "esvr-curves";
+constexpr int kCurvesVersion = 1;
 constexpr const char* kOurs = "ESVR";
 constexpr const char* kFile = "file";
 
@@ -188,8 +188,8 @@ void writeCurves(const std::string& prefix, const CurvesReport& report, bool ove
   const TableRecord& record = report.record;
   const report::DataTable data = points(record);
   writer.text(".csv", report::toCsv(data));
-  writer.json({{"schema", kSchema},
-               {"schema_version", kSchemaVersion},
+  writer.json({{"schema", kCurvesSchema},
+               {"schema_version", kCurvesVersion},
                {"command_line", report.commandLine},
                {"grid", record.grid},
                {"peak", record.peak},

@@ -24,8 +24,8 @@ using report::Column;
 using report::DataTable;
 using report::Kind;
 
-constexpr const char* kSchema = "esvr-table";
-constexpr int kSchemaVersion = 1;
+constexpr const char* kTableSchema = "esvr-table";
+constexpr int kTableVersion = 1;
 
 /// A column and the function that gets its figure from a row.
 struct TableColumn {
@@ -295,8 +295,8 @@ Json tableJson(const TableOptions& options, const TableRecord& record) {
   Json rows = Json::array();
   for (const auto& row : record.rows) rows.push_back(rowJson(row, record));
   const Coord a = record.box.min, b = record.box.max;
-  return {{"schema", kSchema},
-          {"schema_version", kSchemaVersion},
+  return {{"schema", kTableSchema},
+          {"schema_version", kTableVersion},
           {"command_line", options.commandLine},
           {"versions", versions()},
           {"reference", options.reference.string()},

@@ -11,7 +11,7 @@
 namespace esvr::render {
 namespace {
 
-constexpr int kChannels = 4;
+constexpr int kPngChannels = 4;
 using Bytes = std::vector<std::byte>;
 
 /// Appends a channel with the most significant byte first, as PNG requires.
@@ -37,7 +37,7 @@ void appendPixel(const float* from, const PngForm& form, std::vector<png_byte>& 
 std::vector<png_byte> pixelsOf(const Image& image, const PngForm& form) {
   std::vector<png_byte> pixels;
   pixels.reserve(image.rgba.size() * std::size_t(form.bits / 8));
-  for (std::size_t i = 0; i < image.rgba.size(); i += kChannels)
+  for (std::size_t i = 0; i < image.rgba.size(); i += kPngChannels)
     appendPixel(&image.rgba[i], form, pixels);
   return pixels;
 }
@@ -110,7 +110,7 @@ bool write(const PngStructs& s, Writing& writing, const PngHeader& header, const
 Bytes encodePng(const Image& image, const PngForm& form, const PngText& text) {
   Writing writing{pixelsOf(image, form), {}, {}, {}};
   const std::size_t ofRow =
-      std::size_t(image.width) * std::size_t(kChannels) * std::size_t(form.bits / 8);
+      std::size_t(image.width) * std::size_t(kPngChannels) * std::size_t(form.bits / 8);
   for (int row = 0; row < image.height; ++row)
     writing.rows.push_back(&writing.pixels[std::size_t(row) * ofRow]);
   const PngStructs structs(writing);

@@ -19,7 +19,6 @@ using cli::requireRange;
 using cli::po::bool_switch;
 using cli::po::value;
 
-constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max();
 constexpr std::int64_t kMaxIterations = 10'000'000;
 constexpr double kHighestPsnr = 300.0;  // dB; float32 reaches about 150
 constexpr double kLongestRun = 1e9;     // seconds

@@ -15,7 +15,6 @@ namespace esvr::vdb2esvr {
 namespace {
 
 constexpr std::int64_t kMaxEpochs = 10'000'000, kMaxSide = 1 << 20;
-constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max();
 constexpr double kMinK = 0.5, kMaxK = 1e4, kMaxNumber = 1e30;
 constexpr const char* kDefault = "default";
 

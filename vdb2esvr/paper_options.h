@@ -1,12 +1,17 @@
 #pragma once
 /// The option --paper, which replaces our method by the paper's, with settings KEY=VALUE.
 
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "esvr/paper_method.h"
 
 namespace esvr::vdb2esvr {
+
+/// The largest number of ellipsoids that options may name.
+inline constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max();
 
 /// The text of `--help paper`: every key with its default.
 [[nodiscard]] std::string paperHelp();

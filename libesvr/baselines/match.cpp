@@ -26,7 +26,6 @@ constexpr std::array kTolerances{0.5,    0.35,   0.25,   0.17, 0.12,  0.085, 0.0
 constexpr int kMaxWorseTolerances = 3;  // number of consecutive worse tolerances at which it ends
 
 constexpr int kAccuracySteps = 40;  // number of accuracies, which are powers of two
-constexpr int kMaxPlanes = 32;
 
 /// Tries settings and keeps the best result.
 class Search {
@@ -117,7 +116,7 @@ void matchToleranceAndThreshold(Search& search, const BaselineSetting& like,
 std::vector<BaselineSetting> ladder(ZfpMode mode, double peak) {
   std::vector<BaselineSetting> settings;
   if (mode == ZfpMode::kPrecision) {
-    for (int planes = 1; planes <= kMaxPlanes; ++planes)
+    for (unsigned planes = 1; planes <= baselines::kMaxZfpPlanes; ++planes)
       settings.push_back({.how = ZfpSetting{mode, double(planes)}});
     return settings;
   }

@@ -19,15 +19,13 @@ struct CloseStream {
 struct CloseBits {
   void operator()(bitstream* bits) const { stream_close(bits); }
 };
-using Field = std::unique_ptr<zfp_field, FreeField>;
-using Stream = std::unique_ptr<zfp_stream, CloseStream>;
-using Bits = std::unique_ptr<bitstream, CloseBits>;
+using ZfpField = std::unique_ptr<zfp_field, FreeField>;
+using ZfpStream = std::unique_ptr<zfp_stream, CloseStream>;
+using ZfpBits = std::unique_ptr<bitstream, CloseBits>;
 
-constexpr unsigned kMaxPlanes = 32;  // bit planes of a float
-
-Field fieldOf(baselines::DenseBox& dense) {
+ZfpField fieldOf(baselines::DenseBox& dense) {
   const auto [nx, ny, nz] = dense.side();
-  return Field(zfp_field_3d(dense.values.data(), zfp_type_float, nx, ny, nz));
+  return ZfpField(zfp_field_3d(dense.values.data(), zfp_type_float, nx, ny, nz));
 }
 
 void apply(const ZfpSetting& setting, zfp_stream* stream) {
@@ -36,9 +34,9 @@ void apply(const ZfpSetting& setting, zfp_stream* stream) {
     return;
   }
   const auto planes = unsigned(setting.amount);
-  if (double(planes) != setting.amount || planes < 1 || planes > kMaxPlanes)
+  if (double(planes) != setting.amount || planes < 1 || planes > baselines::kMaxZfpPlanes)
     throw UsageError("zfp: precision must be a whole number from 1 to " +
-                     std::to_string(kMaxPlanes));
+                     std::to_string(baselines::kMaxZfpPlanes));
   zfp_stream_set_precision(stream, planes);
 }
 
@@ -54,11 +52,11 @@ namespace baselines {
 std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& setting,
                                    const std::string& grid) {
   DenseBox& source = const_cast<DenseBox&>(dense);  // ZFP takes no const pointer, but only reads
-  const Field field = fieldOf(source);
-  const Stream stream(zfp_stream_open(nullptr));
+  const ZfpField field = fieldOf(source);
+  const ZfpStream stream(zfp_stream_open(nullptr));
   apply(setting, stream.get());
   std::vector<std::byte> bytes(zfp_stream_maximum_size(stream.get(), field.get()));
-  const Bits bits(stream_open(bytes.data(), bytes.size()));
+  const ZfpBits bits(stream_open(bytes.data(), bytes.size()));
   zfp_stream_set_bit_stream(stream.get(), bits.get());
   zfp_stream_rewind(stream.get());
   if (zfp_write_header(stream.get(), field.get(), ZFP_HEADER_FULL) == 0)
@@ -71,9 +69,9 @@ std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& sett
 
 void decompressZfp(std::span<const std::byte> bytes, const std::filesystem::path& file,
                    DenseBox& dense) {
-  const Field field = fieldOf(dense);
-  const Stream stream(zfp_stream_open(nullptr));
-  const Bits bits(stream_open(const_cast<std::byte*>(bytes.data()), bytes.size()));
+  const ZfpField field = fieldOf(dense);
+  const ZfpStream stream(zfp_stream_open(nullptr));
+  const ZfpBits bits(stream_open(const_cast<std::byte*>(bytes.data()), bytes.size()));
   zfp_stream_set_bit_stream(stream.get(), bits.get());
   zfp_stream_rewind(stream.get());
   const bool read = zfp_read_header(stream.get(), field.get(), ZFP_HEADER_FULL) != 0 &&

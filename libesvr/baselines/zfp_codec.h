@@ -12,6 +12,8 @@
 
 namespace esvr::baselines {
 
+inline constexpr unsigned kMaxZfpPlanes = 32;  ///< bit planes of a float
+
 /// Compresses an array to a ZFP stream with a header.
 /// \param grid  name of the array's grid, for messages
 /// \throws UsageError  the precision is out of range, or the build has no ZFP

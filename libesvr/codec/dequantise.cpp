@@ -12,11 +12,6 @@ namespace esvr {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
-constexpr std::size_t kGrain = 256;  // ellipsoids of a TBB task
-
-/// The three smaller components of a unit quaternion lie within +-sqrt(1/2), an interval of this
-/// length.
-constexpr double kRotationSide = std::numbers::sqrt2;
 
 /// The middle of the interval that a code stands for, with 2^bits intervals in a unit.
 double middle(double code, int bits) { return std::ldexp(code + 0.5, -bits); }
@@ -76,7 +71,7 @@ void QuantisedEllipsoids::resize(std::size_t n) {
 Ellipsoids dequantise(const QuantisedEllipsoids& q) {
   Ellipsoids e;
   e.resize(q.size());
-  tbb::parallel_for(Range(0, q.size(), kGrain), [&](const Range& range) {
+  tbb::parallel_for(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) put(q, i, e);
   });
   return e;

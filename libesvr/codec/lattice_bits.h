@@ -4,10 +4,17 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <numbers>
 
 #include "esvr/quantised.h"
 
 namespace esvr {
+
+/// The three smaller components of a unit quaternion lie within +-sqrt(1/2), an interval of this
+/// length.
+inline constexpr double kRotationSide = std::numbers::sqrt2;
+
+inline constexpr std::size_t kEllipsoidsPerTask = 256;  ///< grain of TBB tasks
 
 /// The scales of an ellipsoid in coarse steps: the low one, the middle one above the low one, and
 /// the high one above the middle one.

@@ -19,8 +19,6 @@ namespace esvr {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
-constexpr std::size_t kGrain = 256;  // ellipsoids of a TBB task
-constexpr double kRotationSide = std::numbers::sqrt2;
 
 /// The code of a value in coarse steps, each of which is divided into 2^bits codes.
 /// \throws RuntimeFailure  the value has no code
@@ -95,7 +93,7 @@ std::vector<std::size_t> fileOrder(const Ellipsoids& e, const LatticeChoice& cho
     auto operator<=>(const Place&) const = default;
   };
   std::vector<Place> places(e.size());
-  tbb::parallel_for(Range(0, e.size(), kGrain), [&](const Range& range) {
+  tbb::parallel_for(Range(0, e.size(), kEllipsoidsPerTask), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i)
       places[i] = {layerOf(choice, i), keyOf(e, i, choice.lattice), i};
   });
@@ -134,7 +132,7 @@ QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
   q.resize(e.size());
   order = fileOrder(e, choice);
   q.layerEnds = layerEnds(choice, order);
-  tbb::parallel_for(Range(0, order.size(), kGrain), [&](const Range& range) {
+  tbb::parallel_for(Range(0, order.size(), kEllipsoidsPerTask), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       q.precision[i] = choice.precision[order[i]];
       put(e, order[i], i, q);
@@ -144,7 +142,7 @@ QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
 }
 
 void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids& q) {
-  tbb::parallel_for(Range(0, q.size(), kGrain), [&](const Range& range) {
+  tbb::parallel_for(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) putIntensity(intensities[i], i, q);
   });
 }

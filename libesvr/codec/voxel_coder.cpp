@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "codec/voxel_predictor.h"
+#include "core/axes.h"
 #include "esvr/error.h"
 
 namespace esvr::codec {
@@ -24,7 +25,6 @@ class Mirrors {
       : model_(model), layer_(layer), index_(index) {}
 
   [[nodiscard]] std::optional<Image> imageOf(Coord voxel) {
-    constexpr std::int32_t Coord::*kAxes[] = {&Coord::x, &Coord::y, &Coord::z};
     for (std::size_t a = 0; a < 3; ++a) {
       const std::int32_t place = model_.mirror[a] - voxel.*kAxes[a];
       if (model_.mirror[a] == VoxelModel::kNoMirror || place >= voxel.*kAxes[a]) continue;

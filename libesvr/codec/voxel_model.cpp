@@ -6,6 +6,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/axes.h"
 #include "core/brick_index.h"
 
 namespace esvr::codec {
@@ -15,8 +16,6 @@ constexpr std::size_t kCommonShare = 512;     // a code is common if 1 of 512 vo
 constexpr std::size_t kSamples = 2048;        // voxels that are compared with their images
 constexpr double kAlike = 0.9;                // share of equal samples above which a mirror is used
 constexpr std::int32_t kMaxExtent = 1 << 14;  // voxels; the search is skipped for larger grids
-
-constexpr std::int32_t Coord::*kAxes[] = {&Coord::x, &Coord::y, &Coord::z};
 
 bool vacantAt(const VoxelLayer& layer, std::size_t i) {
   return layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels));

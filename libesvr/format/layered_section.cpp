@@ -4,6 +4,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/axes.h"
 #include "esvr/error.h"
 #include "format/checksum.h"
 #include "format/ellipsoids_section.h"
@@ -18,7 +19,6 @@ constexpr std::uint64_t kBlockEntryBytes =
     kBoxBytes + kStreams * sizeof(std::uint32_t) + sizeof(std::uint64_t);
 constexpr std::uint64_t kChecksumBytes = sizeof(std::uint64_t);
 
-constexpr std::int32_t Coord::*kAxes[] = {&Coord::x, &Coord::y, &Coord::z};
 constexpr std::int64_t kParts = 256;  // divisions of a chunk's box along an axis
 
 /// Writes a block's box in 256ths of its chunk's box, rounded outwards.

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "core/axes.h"
 #include "esvr/error.h"
 #include "esvr/sparse_volume.h"
 #include "format/byte_reader.h"
@@ -11,7 +12,6 @@ namespace esvr::format {
 namespace {
 
 constexpr std::size_t kLeafBytes = 3 * sizeof(std::int32_t);
-constexpr std::int32_t Coord::*kAxes[] = {&Coord::x, &Coord::y, &Coord::z};
 
 constexpr std::int32_t kBrickMin = Box::kMin / kBrickSide, kBrickMax = Box::kMax / kBrickSide;
 

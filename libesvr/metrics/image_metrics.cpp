@@ -25,9 +25,9 @@ constexpr int kRowsPerTask = 16;
 using Rows = tbb::blocked_range<int>;
 
 /// One color channel, clamped to 0 to 1.
-class Plane {
+class Channel {
  public:
-  Plane(const Image& image, int channel)
+  Channel(const Image& image, int channel)
       : width(image.width), height(image.height), values_(std::size_t(width) * height) {
     for (std::size_t i = 0; i < values_.size(); ++i)
       values_[i] = metrics::shownValue(image.rgba[i * kChannels + channel]);
@@ -72,7 +72,7 @@ struct Means {
 Means productsOf(double a, double b) { return {a, b, a * a, b * b, a * b}; }
 
 /// Sums along the columns for a row of windows.
-std::vector<Means> columnMeans(const Plane& a, const Plane& b, const Window& window, int y) {
+std::vector<Means> columnMeans(const Channel& a, const Channel& b, const Window& window, int y) {
   std::vector<Means> means(a.width);
   const Taps taps = window.within(y, a.height);
   for (int t = taps.first; t <= taps.last; ++t) {
@@ -97,7 +97,7 @@ double ssimOf(const Means& m, const SsimConstants& c) {
          (m.aa + m.bb - squares + c.c2);
 }
 
-double ssimOfRow(const Plane& a, const Plane& b, const Window& window, int y) {
+double ssimOfRow(const Channel& a, const Channel& b, const Window& window, int y) {
   const auto columns = columnMeans(a, b, window, y);
   const SsimConstants constants = ssimConstants(kPeak);
   double sum = 0.0;
@@ -116,7 +116,7 @@ double sumOverRows(int rows, OfRow&& ofRow) {
       std::plus<>());
 }
 
-double squaresOfRow(const Plane& a, const Plane& b, int y) {
+double squaresOfRow(const Channel& a, const Channel& b, int y) {
   double sum = 0.0;
   for (int x = 0; x < a.width; ++x) {
     const double d = a.row(y)[x] - b.row(y)[x];
@@ -125,7 +125,7 @@ double squaresOfRow(const Plane& a, const Plane& b, int y) {
   return sum;
 }
 
-double largestDifference(const Plane& a, const Plane& b) {
+double largestDifference(const Channel& a, const Channel& b) {
   double largest = 0.0;
   for (int y = 0; y < a.height; ++y)
     for (int x = 0; x < a.width; ++x)
@@ -142,7 +142,7 @@ ImageMetrics compareImages(const Image& reference, const Image& candidate) {
   double squares = 0.0, ssim = 0.0;
   ImageMetrics metrics;
   for (int channel = 0; channel < kColors; ++channel) {
-    const Plane a(reference, channel), b(candidate, channel);
+    const Channel a(reference, channel), b(candidate, channel);
     squares += sumOverRows(a.height, [&](int y) { return squaresOfRow(a, b, y); });
     ssim += sumOverRows(a.height, [&](int y) { return ssimOfRow(a, b, window, y); });
     metrics.maxError = std::max(metrics.maxError, largestDifference(a, b));

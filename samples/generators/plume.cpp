@@ -19,7 +19,7 @@ constexpr double kBillowDepth = 1.1;              // depth of eddies, in radii o
 constexpr double kWarpSize = 0.25, kWarp = 0.05;  // size and amplitude of the warp of eddies
 constexpr double kFadeStart = 0.7;                // height at which the top begins to dissolve
 constexpr double kSmallestEddy = 4.0;             // voxels
-constexpr double kFaintest = 1.0 / 512.0;         // smallest value of a voxel that is not empty
+constexpr double kFaintestSmoke = 1.0 / 512.0;    // smallest value of a voxel that is not empty
 
 /// Bound on the slope of (distance to the axis - kBillowDepth * radius of the envelope).
 constexpr double kAxisSlope = kSway * (1.0 + kNoiseSlope / kSwaySize);  // along x, and along z
@@ -49,7 +49,7 @@ Sample PlumeShape::at(Vec3 voxel) const {
   const Vec3 p = place(voxel);
   if (p.y < 0.0 || p.y > 1.0) return {};
   const double density = densityAt(p);
-  if (density < kFaintest) return {};
+  if (density < kFaintestSmoke) return {};
   return {float(density), true};
 }
 
@@ -77,7 +77,7 @@ Vec3 PlumeShape::warped(Vec3 p) const {
 
 double PlumeShape::densityAt(Vec3 p) const {
   const double depth = kBillowDepth - distanceToAxis(p) / envelopeRadius(p.y);
-  if (depth < kFaintest) return 0.0;
+  if (depth < kFaintestSmoke) return 0.0;
   const double billows = fractalNoise(seed_ + 5, warped(p) * (1.0 / kBillowSize), octaves_);
   const double fade = std::min(1.0, (1.0 - p.y) / (1.0 - kFadeStart));
   return std::clamp(depth - kBillowDepth * std::abs(billows), 0.0, 1.0) * fade;
