@@ -325,15 +325,17 @@ TEST_F(CompareOption, maxDenseSkipsZfpInCurves) {
 
 // ---- all programs
 
-struct Program {
+struct ProgramRun {
   const char* name;
   const char* path;
   std::vector<std::string>
       arguments;  ///< arguments of a run of milliseconds; "DIR/x" is in the test's folder
 };
-std::ostream& operator<<(std::ostream& out, const Program& program) { return out << program.name; }
+std::ostream& operator<<(std::ostream& out, const ProgramRun& program) {
+  return out << program.name;
+}
 
-class EveryProgram : public Options, public testing::WithParamInterface<Program> {
+class EveryProgram : public Options, public testing::WithParamInterface<ProgramRun> {
  protected:
   void SetUp() override {
     test::writeInput(at("in.vdb"), {{.voxels = softBall({})}});
@@ -382,19 +384,19 @@ TEST_P(EveryProgram, takesANumberOfThreads) {
 INSTANTIATE_TEST_SUITE_P(
     All, EveryProgram,
     testing::Values(
-        Program{"vdb2esvr",
-                VDB2ESVR,
-                {"DIR/in.vdb", "DIR/o.esvr", "--force", "--count", "9", "--iterations", "30"}},
-        Program{"esvr2vdb", ESVR2VDB, {"DIR/in.esvr", "DIR/o.vdb", "--force"}},
-        Program{
+        ProgramRun{"vdb2esvr",
+                   VDB2ESVR,
+                   {"DIR/in.vdb", "DIR/o.esvr", "--force", "--count", "9", "--iterations", "30"}},
+        ProgramRun{"esvr2vdb", ESVR2VDB, {"DIR/in.esvr", "DIR/o.vdb", "--force"}},
+        ProgramRun{
             "render",
             ESVR_RENDER,
             {"DIR/in.esvr", "DIR/o.png", "--force", "--resolution", "16x16", "--device", "cpu"}},
-        Program{"check", ESVR_COMPARE, {"check", "DIR/in.vdb", "DIR/in.esvr"}},
-        Program{"table",
-                ESVR_COMPARE,
-                {"table", "DIR/in.vdb", "DIR/in.esvr", "--rows", "none", "--runs", "1"}},
-        Program{
+        ProgramRun{"check", ESVR_COMPARE, {"check", "DIR/in.vdb", "DIR/in.esvr"}},
+        ProgramRun{"table",
+                   ESVR_COMPARE,
+                   {"table", "DIR/in.vdb", "DIR/in.esvr", "--rows", "none", "--runs", "1"}},
+        ProgramRun{
             "curves",
             ESVR_COMPARE,
             {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o", "DIR/c", "--force"}}),

@@ -52,7 +52,7 @@ TEST(Raw2Vdb, bringsInNrrdWithItsTransform) {
   EXPECT_EQ(grid.descriptor.transform.affine.value()[10], 3.0);
 }
 
-struct Refusal {
+struct RawRefusal {
   const char* file;
   std::string content;
   std::vector<std::string> options;
@@ -60,7 +60,7 @@ struct Refusal {
   const char* message;
 };
 
-class RefusedImage : public testing::TestWithParam<Refusal> {};
+class RefusedImage : public testing::TestWithParam<RawRefusal> {};
 
 TEST_P(RefusedImage, leavesNoOutput) {
   const TemporaryFolder folder;
@@ -89,22 +89,22 @@ const std::string kFlatNrrd =
 INSTANTIATE_TEST_SUITE_P(
     All, RefusedImage,
     testing::Values(
-        Refusal{"a.raw", ramp(), {}, 2, "--dims"},
-        Refusal{"a.raw", ramp(), {"--dims", "4,3", "--type", "uint8"}, 2, "4,3"},
-        Refusal{"a.raw", ramp(), {"--dims", "4,3,-2", "--type", "uint8"}, 2, "4,3,-2"},
-        Refusal{"a.raw", ramp(), {"--dims", "4,3,2,", "--type", "uint8"}, 2, "4,3,2,"},
-        Refusal{"a.raw", ramp(), {"--dims", "4,3,2", "--type", "byte"}, 2, "uint8, int8"},
-        Refusal{"a.raw", ramp().substr(1), kRamp, 3, "23 bytes"},
-        Refusal{"a.raw", ramp(), rampAnd({"--skip", "1"}), 3, "need 25"},
-        Refusal{"a.raw", ramp(), rampAnd({"--skip", "-1"}), 2, "--skip"},
-        Refusal{"a.raw", ramp(), rampAnd({"--endian", "middle"}), 2, "little or big"},
-        Refusal{"a.raw", ramp(), rampAnd({"--nonfinite", "keep"}), 2, "refuse or zero"},
-        Refusal{"a.raw", ramp(), rampAnd({"--threshold", "999"}), 3, "no active voxel"},
-        Refusal{"a.raw", ramp(), rampAnd({"--voxel-size", "0"}), 2, "--voxel-size"},
-        Refusal{"a.raw", kNan, {"--dims", "1,1,1", "--type", "float32"}, 3, "(0, 0, 0)"},
-        Refusal{"a.nrrd", "NRRD0004\n", {}, 3, "a.nrrd"},
-        Refusal{"a.nrrd", kFlatNrrd, {}, 3, "linearly dependent"},
-        Refusal{"a.nrrd", kFlatNrrd, {"--dims", "1,1,1"}, 2, "--dims is for RAW"}));
+        RawRefusal{"a.raw", ramp(), {}, 2, "--dims"},
+        RawRefusal{"a.raw", ramp(), {"--dims", "4,3", "--type", "uint8"}, 2, "4,3"},
+        RawRefusal{"a.raw", ramp(), {"--dims", "4,3,-2", "--type", "uint8"}, 2, "4,3,-2"},
+        RawRefusal{"a.raw", ramp(), {"--dims", "4,3,2,", "--type", "uint8"}, 2, "4,3,2,"},
+        RawRefusal{"a.raw", ramp(), {"--dims", "4,3,2", "--type", "byte"}, 2, "uint8, int8"},
+        RawRefusal{"a.raw", ramp().substr(1), kRamp, 3, "23 bytes"},
+        RawRefusal{"a.raw", ramp(), rampAnd({"--skip", "1"}), 3, "need 25"},
+        RawRefusal{"a.raw", ramp(), rampAnd({"--skip", "-1"}), 2, "--skip"},
+        RawRefusal{"a.raw", ramp(), rampAnd({"--endian", "middle"}), 2, "little or big"},
+        RawRefusal{"a.raw", ramp(), rampAnd({"--nonfinite", "keep"}), 2, "refuse or zero"},
+        RawRefusal{"a.raw", ramp(), rampAnd({"--threshold", "999"}), 3, "no active voxel"},
+        RawRefusal{"a.raw", ramp(), rampAnd({"--voxel-size", "0"}), 2, "--voxel-size"},
+        RawRefusal{"a.raw", kNan, {"--dims", "1,1,1", "--type", "float32"}, 3, "(0, 0, 0)"},
+        RawRefusal{"a.nrrd", "NRRD0004\n", {}, 3, "a.nrrd"},
+        RawRefusal{"a.nrrd", kFlatNrrd, {}, 3, "linearly dependent"},
+        RawRefusal{"a.nrrd", kFlatNrrd, {"--dims", "1,1,1"}, 2, "--dims is for RAW"}));
 
 TEST(Raw2Vdb, refusesAnImageThatIsNotThere) {
   const TemporaryFolder folder;

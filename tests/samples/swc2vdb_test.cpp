@@ -58,14 +58,14 @@ TEST(Swc2Vdb, keepsTheLongestPieceOnly) {
   EXPECT_DOUBLE_EQ(readGrid(out, "density").descriptor.transform.affine.value()[0], 2.0);
 }
 
-struct Refusal {
+struct SwcRefusal {
   const char* text;
   std::vector<std::string> options;
   int code;
   const char* message;
 };
 
-class RefusedSwcFile : public testing::TestWithParam<Refusal> {};
+class RefusedSwcFile : public testing::TestWithParam<SwcRefusal> {};
 
 TEST_P(RefusedSwcFile, leavesNoOutput) {
   const TemporaryFolder folder;
@@ -81,13 +81,14 @@ TEST_P(RefusedSwcFile, leavesNoOutput) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, RefusedSwcFile,
-    testing::Values(Refusal{"", {}, 3, "no node"}, Refusal{"1 0 0 0\n", {}, 3, "in.swc, line 1"},
-                    Refusal{"1 0 5 5 5 0 -1\n", {}, 3, "no extent"},
-                    Refusal{"1 0 0 0 0 1e-7 -1\n2 0 1e-6 0 0 0 1\n", {}, 3, "too small"},
-                    Refusal{kBar, {"--resolution", "0"}, 2, "--resolution"},
-                    Refusal{kBar, {"--min-radius", "nan"}, 2, "--min-radius"},
-                    Refusal{kBar, {"--edge", "0"}, 2, "--edge"},
-                    Refusal{kBar, {"--longest", "0"}, 2, "--longest"}));
+    testing::Values(SwcRefusal{"", {}, 3, "no node"},
+                    SwcRefusal{"1 0 0 0\n", {}, 3, "in.swc, line 1"},
+                    SwcRefusal{"1 0 5 5 5 0 -1\n", {}, 3, "no extent"},
+                    SwcRefusal{"1 0 0 0 0 1e-7 -1\n2 0 1e-6 0 0 0 1\n", {}, 3, "too small"},
+                    SwcRefusal{kBar, {"--resolution", "0"}, 2, "--resolution"},
+                    SwcRefusal{kBar, {"--min-radius", "nan"}, 2, "--min-radius"},
+                    SwcRefusal{kBar, {"--edge", "0"}, 2, "--edge"},
+                    SwcRefusal{kBar, {"--longest", "0"}, 2, "--longest"}));
 
 TEST(Swc2Vdb, refusesASkeletonThatIsNotThere) {
   const TemporaryFolder folder;
