@@ -43,8 +43,6 @@ std::map<std::string, std::vector<const TableRow*>> rowsBySeries(const TableReco
   return series;
 }
 
-Cell number(std::optional<double> value) { return value ? Cell(*value) : Cell(); }
-
 /// All points: those of kind "fit" are points of a fit's curve, those of kind "file" are files.
 report::DataTable points(const TableRecord& record) {
   report::DataTable table{{},
@@ -66,8 +64,9 @@ report::DataTable points(const TableRecord& record) {
                               at.seconds, at.psnrBox, at.psnrActive, at.maxError, Cell(), Cell()});
       const auto seconds = row->encode ? std::optional(row->encode->median) : std::nullopt;
       table.rows.push_back({std::string(kFile), series, row->name, double(*row->bytes),
-                            number(seconds), row->metrics->psnrBox, row->metrics->psnrActive,
-                            row->metrics->maxError, number(row->fps), row->setting});
+                            report::cellOf(seconds), row->metrics->psnrBox,
+                            row->metrics->psnrActive, row->metrics->maxError,
+                            report::cellOf(row->fps), row->setting});
     }
   return table;
 }

@@ -33,8 +33,6 @@ struct TableColumn {
   Cell (*of)(const TableRow&, const TableRecord&);
 };
 
-Cell number(std::optional<double> value) { return value ? Cell(*value) : Cell(); }
-
 template <auto Member>
 Cell metric(const TableRow& row, const TableRecord&) {
   return row.metrics ? Cell(double((*row.metrics).*Member)) : Cell();
@@ -52,7 +50,7 @@ Cell ratio(const TableRow& row, const TableRecord& record) {
 }
 
 Cell ssim(const TableRow& row, const TableRecord&) {
-  return row.metrics ? number(row.metrics->ssim) : Cell();
+  return row.metrics ? report::cellOf(row.metrics->ssim) : Cell();
 }
 
 template <auto Member>
@@ -99,8 +97,8 @@ const std::vector<TableColumn>& tableColumns() {
       {{"image_ssim", "image SSIM", Kind::kShare}, image<&ImageFigures::ssim>},
       {{"flip", "FLIP", Kind::kShare}, image<&ImageFigures::flip>},
       {{"lpips", "LPIPS"},
-       [](const R& r, const T&) { return r.images ? number(r.images->lpips) : Cell(); }},
-      {{"fps", "FPS"}, [](const R& r, const T&) { return number(r.fps); }},
+       [](const R& r, const T&) { return r.images ? report::cellOf(r.images->lpips) : Cell(); }},
+      {{"fps", "FPS"}, [](const R& r, const T&) { return report::cellOf(r.fps); }},
       {{"vram_bytes", "VRAM MB"}, deviceMegabytes},
       {{"note", "note", Kind::kText}, [](const R& r, const T&) -> Cell { return r.note; }},
       {{"command", "command", Kind::kText}, [](const R& r, const T&) -> Cell { return r.command; }},

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 /// Share of the wanted bytes at which a bisection of the threshold ends.
-constexpr double kSufficientShareOfBytes = 0.98;
+constexpr double kSufficientFill = 0.98;
 constexpr int kMaxBisections = 24;  // enough for 2^24 distinct values
 
 /// FpN's tolerances in the search for a size, as shares of the peak, from coarse to fine in steps
@@ -87,7 +87,7 @@ bool matchThreshold(Search& search, BaselineSetting setting, std::span<const flo
     const std::uint64_t size = search.tryBytes(setting);
     (size > bytes ? low : high) = middle;
     if (size <= bytes) found = setting.threshold;
-    if (size <= bytes && double(size) >= kSufficientShareOfBytes * double(bytes)) break;
+    if (size <= bytes && double(size) >= kSufficientFill * double(bytes)) break;
   }
   if (!found) return false;
   setting.threshold = *found;

@@ -15,8 +15,7 @@ namespace {
 constexpr double kScaleCurvature = 0.75;
 
 constexpr double kCoarsestScale = 0.5;  // the estimates above hold for small changes only
-constexpr double kLog2e = std::numbers::log2e;
-constexpr double kFixed = 256.0;  // Lattice stores numbers of bits in units of 1/256
+constexpr double kFixed = 256.0;        // Lattice stores numbers of bits in units of 1/256
 constexpr std::size_t kMaxThresholds = 16;
 constexpr int kLastRatio = 255;
 
@@ -117,9 +116,9 @@ class Chooser {
     lattice_.lowestCell = {std::int32_t(low[0]), std::int32_t(low[1]), std::int32_t(low[2])};
     while (span >= std::ldexp(1.0, lattice_.cellBits)) ++lattice_.cellBits;
     const double bits =
-        std::log2(lattice_.cell * lightest_ / steps_.position) - lowestLog_ * kLog2e;
+        std::log2(lattice_.cell * lightest_ / steps_.position) - lowestLog_ * std::numbers::log2e;
     lattice_.positionBase = int(std::lround(kFixed * (bits + 0.5)));
-    lattice_.positionSlope = int(std::lround(kFixed * lattice_.scaleStep * kLog2e));
+    lattice_.positionSlope = int(std::lround(kFixed * lattice_.scaleStep * std::numbers::log2e));
   }
 
   /// Number of bits of a rotation component at precision 0, if the coarse steps of the largest and
@@ -144,7 +143,8 @@ class Chooser {
     // step for each difference.
     const double log = 3.0 * lowestLog_ + 1.5 * lattice_.scaleStep;
     lattice_.intensityStep = steps_.intensity / std::sqrt(curvatureOfVolume * std::exp(log));
-    lattice_.intensitySlope = int(std::lround(kFixed * 0.5 * lattice_.scaleStep * kLog2e));
+    lattice_.intensitySlope =
+        int(std::lround(kFixed * 0.5 * lattice_.scaleStep * std::numbers::log2e));
     lattice_.intensityBase = int(kFixed / 2);
     lattice_.signedIntensity = std::any_of(e_.intensity.begin(), e_.intensity.end(),
                                            [](float intensity) { return intensity < 0.0f; });

@@ -9,10 +9,10 @@ namespace esvr::convert {
 namespace {
 
 // Usual values. They decide how many fits a search takes; the bytes of every grid are counted.
-constexpr double kBytesPerEllipsoid = 8.0;  // first guess
-constexpr double kShortFitPrice = 0.94;     // bytes per ellipsoid of a short fit / of a full fit
-constexpr double kMaxUsefulLoss = 2.5;      // loss, dB, above which fewer ellipsoids are better
-constexpr double kRepairFactor = 1.25;  // smallest growth of the bytes per ellipsoid by a repair
+constexpr double kStoredBytesPerEllipsoid = 8.0;  // first guess
+constexpr double kShortFitPrice = 0.94;  // bytes per ellipsoid of a short fit / of a full fit
+constexpr double kMaxUsefulLoss = 2.5;   // loss, dB, above which fewer ellipsoids are better
+constexpr double kRepairFactor = 1.25;   // smallest growth of the bytes per ellipsoid by a repair
 constexpr int kMaxRepairs = 3;
 constexpr std::uint64_t kRefillDivisor = 100;  // a hundredth of the bytes unused: search again
 
@@ -31,7 +31,7 @@ class SizeSearch {
   SizeSearch(const Job& job, std::uint64_t bytes) : job_(job), bytes_(bytes) {}
 
   SizeResult run() {
-    Attempt last = attempt(job_, double(bytes_) / kBytesPerEllipsoid, FitLength::kShort);
+    Attempt last = attempt(job_, double(bytes_) / kStoredBytesPerEllipsoid, FitLength::kShort);
     const Price first = priceOf(last);
     if (!reserve(first.besides)) return refused();
     double each = first.each / kShortFitPrice;

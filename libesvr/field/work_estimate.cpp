@@ -13,10 +13,10 @@ namespace {
 // Bytes that are held at once, at most. Lists that grow hold twice their content while they are
 // copied, and a tree that is written holds a brick again. docs/lab-notes.md, "Memory estimates",
 // compares an estimate with what a program held.
-constexpr double kBytesPerEllipsoid = 512.0;  // parameters, support, prepared form
-constexpr double kBytesPerPair = 16.0;        // both lists of pairs, and intermediate lists
+constexpr double kEvaluationBytesPerEllipsoid = 512.0;  // parameters, support, prepared form
+constexpr double kBytesPerPair = 16.0;  // both lists of pairs, and intermediate lists
 constexpr double kBytesOfValues = kBrickVoxels * sizeof(float);
-constexpr double kBytesPerBrick = 2.0 * (kBytesOfValues + sizeof(BrickMask)) + 96.0;
+constexpr double kEvaluationBytesPerBrick = 2.0 * (kBytesOfValues + sizeof(BrickMask)) + 96.0;
 
 /// An upper bound that counts a brick once for each ellipsoid that reaches it.
 WorkEstimate boundOf(std::span<const Support> supports, const Box& within, double maxOfAll) {
@@ -35,7 +35,8 @@ WorkEstimate boundOf(std::span<const Support> supports, const Box& within, doubl
 }  // namespace
 
 double WorkEstimate::bytes() const {
-  return ellipsoids * kBytesPerEllipsoid + pairs * kBytesPerPair + bricks * kBytesPerBrick +
+  return ellipsoids * kEvaluationBytesPerEllipsoid + pairs * kBytesPerPair +
+         bricks * kEvaluationBytesPerBrick +
          std::min(bricks, double(kBatchBricks)) * kBytesOfValues;
 }
 
@@ -47,8 +48,9 @@ WorkEstimate estimateWork(const Field& field, const EstimateOptions& options) {
   withoutBricks.bricks = 0.0;
   const double left = options.enough - withoutBricks.bytes();
   if (estimate.bytes() <= options.enough || !(left > 0.0)) return estimate;
-  const double counted = countBricks(reach, within, left / kBytesPerBrick);
-  if (counted <= left / kBytesPerBrick) estimate.bricks = std::min(estimate.bricks, counted);
+  const double counted = countBricks(reach, within, left / kEvaluationBytesPerBrick);
+  if (counted <= left / kEvaluationBytesPerBrick)
+    estimate.bricks = std::min(estimate.bricks, counted);
   return estimate;
 }
 

@@ -17,10 +17,10 @@ std::size_t firstCount(const RunPlan& plan, const Tuning& tuning) {
   return std::clamp<std::size_t>(share, 1, plan.count);
 }
 
-class Run {
+class FitRun {
  public:
-  Run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,
-      const Tuning& tuning)
+  FitRun(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,
+         const Tuning& tuning)
       : optimiser_(optimiser),
         target_(target),
         recorder_(recorder),
@@ -115,7 +115,7 @@ class Run {
 
 RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,
            const Tuning& tuning) {
-  return Run(optimiser, target, recorder, plan, tuning).run();
+  return FitRun(optimiser, target, recorder, plan, tuning).run();
 }
 
 }  // namespace esvr

@@ -25,7 +25,7 @@ namespace {
 using namespace format;
 
 /// Bytes that a quantised ellipsoid takes in memory, as integers and as floats.
-constexpr double kBytesPerEllipsoid = 128.0;
+constexpr double kDecodedBytesPerEllipsoid = 128.0;
 
 bool meet(const Box& a, const Box& b) {
   const Coord low = maxCoord(a.min, b.min), high = minCoord(a.max, b.max);
@@ -171,7 +171,7 @@ class GridDecoder {
     for (std::size_t b = 0; b < blocks.size(); ++b)
       if (blocks[b].layer < layers_ && wanted(blocks[b].box)) chosen.push_back(b);
     for (const std::size_t b : chosen)
-      sections_.budget().take(double(blocks[b].run.count) * kBytesPerEllipsoid,
+      sections_.budget().take(double(blocks[b].run.count) * kDecodedBytesPerEllipsoid,
                               open.section->name());
     grid.quantised[c] = getBlocks(*open.section, open.directory, chosen);
     Chunk chunk{record.origin, dequantise(grid.quantised[c])};
@@ -217,7 +217,7 @@ class GridDecoder {
     const auto section = id(SectionKind::kEllipsoids, c);
     const auto content = sections_.get(section);
     const auto held = std::min(count, kMaxEllipsoidsPerByte * content.size());
-    sections_.budget().take(double(held) * kBytesPerEllipsoid, sections_.place(section));
+    sections_.budget().take(double(held) * kDecodedBytesPerEllipsoid, sections_.place(section));
     quantised = getEllipsoids(content, count, sections_.place(section));
     return dequantise(quantised);
   }

@@ -9,10 +9,10 @@
 namespace esvr::format {
 namespace {
 
-constexpr std::uint64_t kBlockEntryBytes = kStreams * sizeof(std::uint32_t);
+constexpr std::uint64_t kTableEntryBytes = kStreams * sizeof(std::uint32_t);
 
 std::vector<std::array<std::uint32_t, kStreams>> getBlockTable(ByteReader& in, std::size_t blocks) {
-  if (in.left() / kBlockEntryBytes < blocks) in.fail("ends within the table of blocks");
+  if (in.left() / kTableEntryBytes < blocks) in.fail("ends within the table of blocks");
   std::vector<std::array<std::uint32_t, kStreams>> table(blocks);
   for (auto& sizes : table)
     for (auto& size : sizes) size = in.get<std::uint32_t>();

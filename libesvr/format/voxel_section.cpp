@@ -22,7 +22,7 @@ constexpr std::uint64_t kMaxBricksPerByte = 4;
 constexpr int kMaxBrickBits = 21;
 
 /// Bytes of memory that a brick takes while it is read: its codes, its masks, and its values.
-constexpr double kBytesPerBrick =
+constexpr double kDecodedBytesPerBrick =
     kBrickVoxels * (sizeof(std::int32_t) + sizeof(float)) + 3.0 * sizeof(BrickMask) + 64.0;
 
 std::uint64_t keyOf(Coord brick) {
@@ -198,7 +198,7 @@ VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& wher
   ByteReader in(content, where);
   VoxelLayer layer = getHeader(in);
   const BrickCount count = getBrickCount(in, content.size());
-  budget.take(double(count.bricks) * kBytesPerBrick, where);
+  budget.take(double(count.bricks) * kDecodedBytesPerBrick, where);
   const codec::VoxelModel model = getModel(in);
   decodeStream(in, count, model, layer);
   checkValues(layer, in);

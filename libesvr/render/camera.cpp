@@ -47,7 +47,7 @@ bool finite(const Vec3& v) {
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
 }
 
-void require(bool good, const char* otherwise) {
+void requireCamera(bool good, const char* otherwise) {
   if (!good) throw UsageError(otherwise);
 }
 
@@ -78,19 +78,19 @@ Camera turned(const Camera& camera, double degrees) {
 }
 
 void checkCamera(const Camera& camera, Resolution resolution) {
-  require(finite(camera.eye) && finite(camera.center) && finite(camera.up),
-          "the camera has a place that is not finite");
+  requireCamera(finite(camera.eye) && finite(camera.center) && finite(camera.up),
+                "the camera has a place that is not finite");
   const Vec3 view = difference(camera.center, camera.eye);
-  require(length(view) > 0.0, "the camera's eye is at the point it looks at");
-  require(length(camera.up) > 0.0, "the camera's up has no length");
-  require(!parallel(view, camera.up), "the camera looks along its up direction");
-  require(camera.fov > 0.0 && camera.fov < 180.0,
-          "the field of view must be from 0 to 180 degrees");
-  require(camera.height > 0.0 && std::isfinite(camera.height),
-          "the height of the picture in voxels must be positive");
-  require(resolution.width > 0 && resolution.height > 0, "a picture needs a pixel at least");
-  require(std::max(resolution.width, resolution.height) <= Resolution::kMaxSide,
-          "a picture may have 32767 pixels a side at most");
+  requireCamera(length(view) > 0.0, "the camera's eye is at the point it looks at");
+  requireCamera(length(camera.up) > 0.0, "the camera's up has no length");
+  requireCamera(!parallel(view, camera.up), "the camera looks along its up direction");
+  requireCamera(camera.fov > 0.0 && camera.fov < 180.0,
+                "the field of view must be from 0 to 180 degrees");
+  requireCamera(camera.height > 0.0 && std::isfinite(camera.height),
+                "the height of the picture in voxels must be positive");
+  requireCamera(resolution.width > 0 && resolution.height > 0, "a picture needs a pixel at least");
+  requireCamera(std::max(resolution.width, resolution.height) <= Resolution::kMaxSide,
+                "a picture may have 32767 pixels a side at most");
 }
 
 View::View(const Camera& camera, Resolution resolution)

@@ -1,6 +1,7 @@
 #pragma once
 /// A table of figures as text, Markdown or comma-separated values.
 
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -27,6 +28,11 @@ struct Column {
 /// A figure or a text; nothing if there is no figure.
 using Cell = std::variant<std::monostate, double, std::string>;
 using Row = std::vector<Cell>;
+
+/// A cell with a number, or an empty one.
+[[nodiscard]] inline Cell cellOf(std::optional<double> value) {
+  return value ? Cell(*value) : Cell();
+}
 
 /// A table whose rows have as many cells as there are columns.
 struct DataTable {

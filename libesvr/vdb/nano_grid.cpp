@@ -129,7 +129,7 @@ class NanoTree {
 
 /// Access to the leaves of NanoVDB for buildVolume. Their voxels are in voxelOffset order.
 template <class Leaf>
-struct LeafAccess {
+struct NanoLeafAccess {
   static auto value(const Leaf& leaf, int i) { return leaf.data()->getValue(std::uint32_t(i)); }
   static BrickMask mask(const Leaf& leaf) {
     BrickMask mask;
@@ -170,7 +170,7 @@ void readVoxelsAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGr
                         grid.descriptor.gridClass == GridClass::kLevelSet, options.nonFinite,
                         options.allowEmpty};
   NonFiniteTally tally;
-  grid.volume = buildVolume<Leaf, LeafAccess<Leaf>>(std::move(sources), rules, tally);
+  grid.volume = buildVolume<Leaf, NanoLeafAccess<Leaf>>(std::move(sources), rules, tally);
   grid.nonFiniteReplaced = tally.count;
 }
 

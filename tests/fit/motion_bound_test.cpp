@@ -19,7 +19,7 @@ using test::Random;
 
 constexpr double kRadius = 2.5;
 
-Ellipsoid sphere(double scale) {
+Ellipsoid roundEllipsoid(double scale) {
   return {{1, 2, 3}, {1 / scale, 0, 0, 0, 1 / scale, 0, 0, 0, 1 / scale}, 1.0};
 }
 
@@ -72,27 +72,27 @@ TEST(MotionBound, WhatIsHeldLiesInsideWhatWasListed) {
 
 TEST(MotionBound, GrowthAndMovesEndWithTheSlack) {
   for (const double scale : {0.2, 3.0, 16.0}) {
-    const Ellipsoid start = sphere(scale);
+    const Ellipsoid start = roundEllipsoid(scale);
     const ListedSupport listed = listedAs(start, 0.2);
-    EXPECT_TRUE(isHeld(listed, sphere(1.199 * scale), kRadius));
-    EXPECT_FALSE(isHeld(listed, sphere(1.201 * scale), kRadius));
+    EXPECT_TRUE(isHeld(listed, roundEllipsoid(1.199 * scale), kRadius));
+    EXPECT_FALSE(isHeld(listed, roundEllipsoid(1.201 * scale), kRadius));
     Ellipsoid moved = start;
     moved.center[1] += 0.199 * kRadius * scale;
     EXPECT_TRUE(isHeld(listed, moved, kRadius));
     moved.center[1] += 0.002 * kRadius * scale;
     EXPECT_FALSE(isHeld(listed, moved, kRadius));
     EXPECT_NEAR(motionSince(listed, moved, kRadius), 0.201, 1e-9);
-    EXPECT_NEAR(motionSince(listed, sphere(1.5 * scale), kRadius), 0.5, 1e-9);
+    EXPECT_NEAR(motionSince(listed, roundEllipsoid(1.5 * scale), kRadius), 0.5, 1e-9);
   }
 }
 
 TEST(MotionBound, AStepOutOfTheListsLeavesThePlaceAndTakesTheIntensity) {
-  const Ellipsoid before = sphere(2.0);
+  const Ellipsoid before = roundEllipsoid(2.0);
   ListedSupport listed = listedAs(before, 0.2);
-  Ellipsoid inside = sphere(2.1), outside = sphere(3.0);
+  Ellipsoid inside = roundEllipsoid(2.1), outside = roundEllipsoid(3.0);
   outside.intensity = 0.5;
   EXPECT_FALSE(refuseStep(listed, kRadius, before, inside));
-  EXPECT_EQ(inside.L, sphere(2.1).L);
+  EXPECT_EQ(inside.L, roundEllipsoid(2.1).L);
   EXPECT_FALSE(listed.refused);
   EXPECT_TRUE(refuseStep(listed, kRadius, before, outside));
   EXPECT_EQ(outside.center, before.center);
@@ -105,7 +105,7 @@ TEST(MotionBound, ARefusedStepIsNotRefusedAgain) {
   // With a hard edge the core is all of the support. This ellipsoid has not moved so far, so that
   // its slack is that of minSlack, which is less than a step.
   const SlackRule rule;
-  const Ellipsoid before = sphere(20.0), after = sphere(22.0);
+  const Ellipsoid before = roundEllipsoid(20.0), after = roundEllipsoid(22.0);
   ListedSupport listed = listedSupport(before, 100, listedAs(before, 0.1), kRadius, rule);
   Ellipsoid p = after;
   ASSERT_TRUE(refuseStep(listed, kRadius, before, p));
@@ -121,11 +121,11 @@ TEST(MotionBound, ListsEndWithAShareOfRefusedSteps) {
 }
 
 TEST(MotionBound, WhatIsNotFiniteIsNotHeld) {
-  Ellipsoid p = sphere(1.0);
+  Ellipsoid p = roundEllipsoid(1.0);
   const ListedSupport listed = listedAs(p, 0.2);
   p.center[0] = std::nan("");
   EXPECT_FALSE(isHeld(listed, p, kRadius));
-  p = sphere(1.0);
+  p = roundEllipsoid(1.0);
   p.L[4] = std::nan("");
   EXPECT_FALSE(isHeld(listed, p, kRadius));
 }
@@ -145,14 +145,14 @@ TEST(MotionBound, SlackFollowsTheMotionBefore) {
                        .maxSlack = 0.3,
                        .slackOverMotion = 1.0,
                        .settledSteps = 4};
-  const Ellipsoid p = sphere(2.0);
+  const Ellipsoid p = roundEllipsoid(2.0);
   const double least = 0.2 / (2.0 * kRadius);
   EXPECT_EQ(slackOf(p, 3, {}, kRadius, rule), rule.maxSlack);
   EXPECT_NEAR(slackOf(p, 4, listedAs(p, 0.1), kRadius, rule), least, 1e-12);
-  EXPECT_NEAR(slackOf(sphere(2.4), 4, listedAs(p, 0.1), kRadius, rule), 0.2, 1e-9);
-  EXPECT_EQ(slackOf(sphere(4.0), 4, listedAs(p, 0.1), kRadius, rule), rule.maxSlack);
+  EXPECT_NEAR(slackOf(roundEllipsoid(2.4), 4, listedAs(p, 0.1), kRadius, rule), 0.2, 1e-9);
+  EXPECT_EQ(slackOf(roundEllipsoid(4.0), 4, listedAs(p, 0.1), kRadius, rule), rule.maxSlack);
   // The ellipsoid is so small that minSlack is the larger of the two.
-  EXPECT_NEAR(slackOf(sphere(0.2), 3, {}, kRadius, rule), 0.4, 1e-12);
+  EXPECT_NEAR(slackOf(roundEllipsoid(0.2), 3, {}, kRadius, rule), 0.4, 1e-12);
 }
 
 }  // namespace

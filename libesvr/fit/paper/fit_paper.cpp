@@ -12,15 +12,15 @@
 namespace esvr::paper {
 namespace {
 
-void require(bool holds, const std::string& otherwise) {
+void requireOption(bool holds, const std::string& otherwise) {
   if (!holds) throw UsageError("the paper's method: " + otherwise);
 }
 
 void checkPrunes(const PaperMethod& method) {
   std::uint32_t last = 0;
   for (const PrunePass& pass : method.prunes) {
-    require(pass.share >= 0.0 && pass.share < 1.0, "a pass must leave some ellipsoids");
-    require(pass.epoch > last, "pruning passes must be in order, from epoch 1 on");
+    requireOption(pass.share >= 0.0 && pass.share < 1.0, "a pass must leave some ellipsoids");
+    requireOption(pass.epoch > last, "pruning passes must be in order, from epoch 1 on");
     last = pass.epoch;
   }
 }
@@ -50,23 +50,23 @@ PaperRecord newRecord(const FitTarget& target, const PaperFitOptions& options) {
 }
 
 void checkMethod(const PaperMethod& m) {
-  require(m.beta >= 0.0 && m.beta <= 1.0, "beta must be within 0 and 1");
-  require(m.k >= kSmallestK && m.k <= 1e4, "k must be from 0.5 to 10000");
-  require(m.points > 0 && m.epochs > 0, "it needs points and epochs");
-  require(m.subvolume >= 0, "subvolumes have a side of voxels");
-  require(m.densifyEvery > 0, "it densifies every so many epochs, at least 1");
-  require(m.gradientThreshold >= 0.0 && std::isfinite(m.gradientThreshold),
-          "the gradient threshold must be a number from 0 on");
-  require(m.percentDense > 0.0 && std::isfinite(m.percentDense),
-          "the share of a dense ellipsoid must be a number above 0");
+  requireOption(m.beta >= 0.0 && m.beta <= 1.0, "beta must be within 0 and 1");
+  requireOption(m.k >= kSmallestK && m.k <= 1e4, "k must be from 0.5 to 10000");
+  requireOption(m.points > 0 && m.epochs > 0, "it needs points and epochs");
+  requireOption(m.subvolume >= 0, "subvolumes have a side of voxels");
+  requireOption(m.densifyEvery > 0, "it densifies every so many epochs, at least 1");
+  requireOption(m.gradientThreshold >= 0.0 && std::isfinite(m.gradientThreshold),
+                "the gradient threshold must be a number from 0 on");
+  requireOption(m.percentDense > 0.0 && std::isfinite(m.percentDense),
+                "the share of a dense ellipsoid must be a number above 0");
   checkPrunes(m);
 }
 
 void check(const PaperFitOptions& options) {
-  require(!options.count || *options.count > 0, "count must be at least 1");
-  require(!options.seconds || *options.seconds > 0.0, "seconds must be positive");
-  require(!options.psnr || std::isfinite(*options.psnr), "psnr must be finite");
-  require(!options.box || !options.box->empty(), "the box is empty");
+  requireOption(!options.count || *options.count > 0, "count must be at least 1");
+  requireOption(!options.seconds || *options.seconds > 0.0, "seconds must be positive");
+  requireOption(!options.psnr || std::isfinite(*options.psnr), "psnr must be finite");
+  requireOption(!options.box || !options.box->empty(), "the box is empty");
   checkMethod(options.method);
 }
 

@@ -19,7 +19,7 @@ namespace esvr {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
-constexpr std::size_t kBrickGrain = 8;
+constexpr std::size_t kBricksPerTask = 8;
 
 void check(const PaperLossInput& in) {
   if (!(in.beta >= 0.0 && in.beta <= 1.0))
@@ -63,7 +63,7 @@ Box rowsThatSee(const Box& support) {
 
 template <class Visit>
 void forEachBrick(std::size_t count, Visit&& visit) {
-  tbb::parallel_for(Range(0, count, kBrickGrain), [&](const Range& range) {
+  tbb::parallel_for(Range(0, count, kBricksPerTask), [&](const Range& range) {
     for (std::size_t b = range.begin(); b != range.end(); ++b) visit(b);
   });
 }

@@ -13,9 +13,9 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kSide = kMarchTileSide;
-
-std::size_t tilesAlong(int pixels) { return std::size_t((pixels + kSide - 1) / kSide); }
+std::size_t marchTilesAlong(int pixels) {
+  return std::size_t((pixels + kMarchTileSide - 1) / kMarchTileSide);
+}
 
 class BrickRenderer final : public MarchRenderer {
  public:
@@ -41,14 +41,14 @@ class BrickRenderer final : public MarchRenderer {
     view.eye = difference(view.eye, origin_);
     ClipBox clip = clipOf(o);
     clip.box = {difference(clip.box.low, origin_), difference(clip.box.high, origin_)};
-    const std::size_t tileRows = tilesAlong(band.rows);
-    makeRoom(ranges_, tileRows * tilesAlong(o.resolution.width), stream());
+    const std::size_t tileRows = marchTilesAlong(band.rows);
+    makeRoom(ranges_, tileRows * marchTilesAlong(o.resolution.width), stream());
     launchBricks({.atlas = {{0, 0, 0}, blocks_, blockOf_.data(), brickOf_.data(), values_.data()},
                   .bricks = bricks_.data(),
                   .count = std::uint32_t(bricks_.size()),
                   .scene = {view, box_, o.step, clip, sampleRule(o, table().view(), background_)},
                   .resolution = o.resolution,
-                  .firstTileRow = band.firstRow / kSide,
+                  .firstTileRow = band.firstRow / kMarchTileSide,
                   .tileRows = int(tileRows),
                   .ranges = ranges_.data(),
                   .firstSample = double(binsWithin(box_, view, o.step).first) * kBinSamples,
@@ -60,7 +60,7 @@ class BrickRenderer final : public MarchRenderer {
            ranges_.bytes();
   }
   std::size_t bytesOfRow(Resolution r) const override {
-    return tilesAlong(r.width) * sizeof(int2) / kSide + 1;
+    return marchTilesAlong(r.width) * sizeof(int2) / kMarchTileSide + 1;
   }
 
   float background_;
