@@ -37,11 +37,14 @@ cli::ProgramText programText() {
       .usage = "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]",
       .notes =
           "Without -g, all float and double grids are fitted; other grids are listed and skipped.\n"
-          "--size and --ratio choose the number of ellipsoids and the quantisation for the best\n"
-          "file that is not larger (and at most 2 % smaller). Several grids share the bytes by\n"
-          "their active voxels. --psnr searches the smallest file that reaches the PSNR; --count\n"
-          "then limits the number of ellipsoids. With --psnr and --seconds there is a single fit,\n"
-          "which ends as soon as it reaches the PSNR.\n"
+          "--size and --ratio search the best file that is not larger (and at most 2 % smaller).\n"
+          "Several grids share the bytes by their active voxels. --psnr searches the smallest "
+          "file\n"
+          "that reaches the PSNR; --count then limits the number of ellipsoids. Both choose for\n"
+          "each grid between ellipsoids and quantised voxels, and a short fit shows which serve "
+          "it\n"
+          "better; --representation insists on one of them. With --psnr and --seconds there is a\n"
+          "single fit, which ends as soon as it reaches the PSNR.\n"
           "The program prints a table on stdout. Its PSNR and largest error are measured on the\n"
           "voxels that are decoded from the written file.\n"
           "\n"
@@ -74,9 +77,11 @@ void addGoalOptions(cli::po::options_description& options) {
      "write the smallest file that reaches this PSNR over the box")
     ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
     ("max-error", value<std::string>()->value_name("E"),
-     "keep every voxel within E of the source, or within E% of its range; the file holds voxels, "
-     "or ellipsoids with a residual if these are smaller")
-    ("voxels-only", bool_switch(), "with --max-error, store voxels without trying ellipsoids")
+     "keep every voxel within E of the source, or within E% of its range; ellipsoids then have a "
+     "residual")
+    ("representation", value<std::string>()->value_name("R")->default_value("auto"),
+     "with --size, --ratio, --psnr or --max-error: ellipsoids, voxels, or auto, the better or "
+     "smaller of the two")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
      "threshold: a voxel's value decides whether it is active; exact: store the active mask");
   // clang-format on
@@ -181,6 +186,13 @@ StorageOptions storageOptions(const Arguments& a) {
           .activity = activity(a)};
 }
 
+Representation representation(const Arguments& a) {
+  return cli::choose<Representation>("representation", a.get<std::string>("representation"),
+                                     {{"auto", Representation::kAuto},
+                                      {"ellipsoids", Representation::kEllipsoids},
+                                      {"voxels", Representation::kVoxels}});
+}
+
 /// \throws UsageError  one of the options was given, which `given` excludes
 void refuseWith(const Arguments& a, const std::string& given,
                 std::initializer_list<const char*> options) {
@@ -197,13 +209,11 @@ Goal losslessGoal(const Arguments& a) {
 Goal boundGoal(const Arguments& a) {
   refuseWith(a, "max-error", {"count", "psnr", "seconds", "size", "ratio", "paper"});
   const cli::ErrorBound bound = cli::parseErrorBound("max-error", a.get<std::string>("max-error"));
-  return BoundGoal{bound.amount, bound.relative, a.get<bool>("voxels-only")};
+  return BoundGoal{bound.amount, bound.relative};
 }
 
 /// The goal of each grid; a size replaces it later.
 Goal goalOf(const Arguments& a, const Options& options) {
-  if (a.get<bool>("voxels-only") && !a.has("max-error"))
-    throw UsageError("--voxels-only needs --max-error");
   if (a.get<bool>("lossless")) return losslessGoal(a);
   if (a.has("max-error")) return boundGoal(a);
   if (options.psnr && !options.convert.fit.seconds && !options.paper)
@@ -238,6 +248,22 @@ void readPaper(const Arguments& a, Options& options) {
         "ellipsoids");
 }
 
+/// \throws UsageError  the goal cannot be served by the representation
+void requireRepresentation(const Arguments& a, const Options& options) {
+  const Representation wanted = options.convert.representation;
+  if (wanted == Representation::kAuto) return;
+  const bool sized = options.size || options.ratio;
+  if (wanted == Representation::kEllipsoids && a.get<bool>("lossless"))
+    throw UsageError("--representation ellipsoids cannot be combined with --lossless");
+  if (wanted != Representation::kVoxels) return;
+  if (std::holds_alternative<FitGoal>(options.convert.goal) && !sized)
+    throw UsageError(
+        "--representation voxels needs --size, --ratio, --psnr (without --seconds), --max-error or "
+        "--lossless");
+  if (options.convert.storage.form == Storage::kFloat32)
+    throw UsageError("--representation voxels cannot be combined with --storage float32");
+}
+
 NonFinite nonFinite(const Arguments& a) {
   return cli::choose<NonFinite>("nonfinite", a.get<std::string>("nonfinite"),
                                 {{"refuse", NonFinite::kRefuse}, {"zero", NonFinite::kZero}});
@@ -265,6 +291,8 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   readPaper(a, options);
   readSize(a, options);
   options.convert.goal = goalOf(a, options);
+  options.convert.representation = representation(a);
+  requireRepresentation(a, options);
   options.read.nonFinite = nonFinite(a);
   options.read.maxBytes = cli::maxMemoryOf(a);
   options.device = a.get<std::string>("device");

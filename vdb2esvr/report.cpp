@@ -45,6 +45,18 @@ const char* nameOf(Preset preset) {
   return "standard";
 }
 
+const char* nameOf(Representation representation) {
+  switch (representation) {
+    case Representation::kEllipsoids:
+      return "ellipsoids";
+    case Representation::kVoxels:
+      return "voxels";
+    case Representation::kAuto:
+      break;
+  }
+  return "auto";
+}
+
 Json toJson(const Box& box) {
   if (box.empty()) return nullptr;
   return {box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z};
@@ -83,6 +95,7 @@ Json asked(const Options& options) {
           {"lossless", std::holds_alternative<LosslessGoal>(options.convert.goal)},
           {"max_error", maxErrorOf(options.convert.goal)},
           {"max_error_is_share", isShare(options.convert.goal)},
+          {"representation", nameOf(options.convert.representation)},
           {"seconds", orNull(fit.seconds)},
           {"iterations", orNull(fit.iterations)},
           {"method", options.paper ? "paper" : "default"},
@@ -134,12 +147,23 @@ Json fitOf(const ConvertedGrid& grid) {
           {"voxel_pairs", orNull(grid.voxelPairs)}};
 }
 
-Json boundOf(const ConvertedGrid& grid) {
-  if (!grid.conversion.bound) return nullptr;
-  const std::uint64_t tried = grid.conversion.bound->ellipsoidBytes;
-  return {{"stored", grid.stored().voxels ? "voxels" : "ellipsoids and residual"},
-          {"voxel_bytes", grid.conversion.bound->voxelBytes},
-          {"ellipsoid_bytes", tried > 0 ? Json(tried) : Json(nullptr)}};
+Json candidateOf(const std::optional<Candidate>& candidate) {
+  if (!candidate) return nullptr;
+  return {{"bytes", candidate->bytes},
+          {"psnr_box", orNull(candidate->psnr)},
+          {"estimated", candidate->estimated}};
+}
+
+const char* representationOf(const StoredGrid& grid) {
+  if (grid.voxels) return "voxels";
+  return grid.residual ? "ellipsoids and residual" : "ellipsoids";
+}
+
+Json choiceOf(const ConvertedGrid& grid) {
+  const ChoiceRecord choice = grid.conversion.choice.value_or(ChoiceRecord{});
+  return {{"stored", representationOf(grid.stored())},
+          {"voxels", candidateOf(choice.voxels)},
+          {"ellipsoids", candidateOf(choice.ellipsoids)}};
 }
 
 Json compactOf(const ConvertedGrid& grid) {
@@ -241,7 +265,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"fit", fitOf(grid)},
           {"paper", grid.paper ? paperJson(*grid.paper) : Json(nullptr)},
           {"compact", compactOf(grid)},
-          {"bound", boundOf(grid)},
+          {"representation", choiceOf(grid)},
           {"layers", layersOf(grid.stored())},
           {"metrics", metricsOf(grid.metrics)},
           {"seconds", secondsOf(grid.seconds)},

@@ -8,6 +8,18 @@ constexpr std::uint64_t kRotationBytes = 4 * kFloatBytes;
 constexpr std::uint64_t kBitsPerByte = 8;
 constexpr std::uint64_t kMaskBytes = sizeof(BrickMask);
 
+/// Bytes that voxels save over ellipsoids.
+std::uint64_t saved(const ChoiceRecord& choice) {
+  if (!choice.ellipsoids || choice.ellipsoids->bytes <= choice.voxels->bytes) return 0;
+  return choice.ellipsoids->bytes - choice.voxels->bytes;
+}
+
+std::string whyVoxels(const ChoiceRecord& choice) {
+  if (!choice.ellipsoids) return "voxels are stored, exactly or quantised";
+  return saved(choice) > 0 ? "voxels serve the goal in fewer bytes"
+                           : "voxels have a smaller error in as many bytes";
+}
+
 }  // namespace
 
 std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
@@ -15,12 +27,15 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   const std::uint64_t ellipsoids = grid.stored().field.ellipsoidCount();
   const auto lacks = [&](const char* kind) { return !hasSection(record.output, g, kind); };
 
-  if (grid.stored().voxels && grid.conversion.bound && grid.conversion.bound->ellipsoidBytes > 0)
-    return {{"ellipsoids", "voxels keep the bound in fewer bytes",
-             grid.conversion.bound->ellipsoidBytes - grid.conversion.bound->voxelBytes}};
-  if (grid.stored().voxels) return {{"ellipsoids", "voxels are stored, exactly or within a bound"}};
+  const ChoiceRecord choice = grid.conversion.choice.value_or(ChoiceRecord{});
+  if (grid.stored().voxels) return {{"ellipsoids", whyVoxels(choice), saved(choice)}};
 
   std::vector<LeftOut> notes;
+  if (choice.voxels)
+    notes.push_back({"voxels", "ellipsoids serve the goal better",
+                     choice.ellipsoids->bytes < choice.voxels->bytes
+                         ? choice.voxels->bytes - choice.ellipsoids->bytes
+                         : 0});
   const bool compact = grid.conversion.compact.has_value();
   if (!grid.conversion.fit.signedIntensities)
     notes.push_back({"signs", "no ellipsoid has a negative intensity",

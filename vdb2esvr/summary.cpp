@@ -1,5 +1,6 @@
 #include "vdb2esvr/summary.h"
 
+#include <cmath>
 #include <ostream>
 
 #include "cli/names.h"
@@ -7,6 +8,29 @@
 #include "cli/table.h"
 
 namespace esvr::vdb2esvr {
+namespace {
+
+std::string toText(const Candidate& candidate) {
+  std::string text = candidate.estimated ? "about " : "";
+  text += std::to_string(candidate.bytes) + " bytes";
+  if (!candidate.psnr) return text;
+  if (std::isinf(*candidate.psnr)) return text + ", exact";
+  return text + ", " + cli::decibels(*candidate.psnr) + " dB";
+}
+
+/// Says which representation was chosen for a grid, and why.
+void printChoice(const ConvertedGrid& grid, std::ostream& out) {
+  const auto& choice = grid.conversion.choice;
+  if (!choice || !choice->voxels || !choice->ellipsoids) return;
+  const bool voxels = grid.stored().voxels.has_value();
+  const Candidate& taken = voxels ? *choice->voxels : *choice->ellipsoids;
+  const Candidate& other = voxels ? *choice->ellipsoids : *choice->voxels;
+  out << cli::printable(grid.uniqueName) << (voxels ? ": voxels (" : ": ellipsoids (")
+      << toText(taken) << ") rather than " << (voxels ? "ellipsoids (" : "voxels (")
+      << toText(other) << ")\n";
+}
+
+}  // namespace
 
 void printSummary(const Options& options, const RunRecord& record, std::ostream& out) {
   cli::Table table({"grid", "ellipsoids", "bytes", "PSNR box", "active", "max error", "seconds"});
@@ -18,6 +42,7 @@ void printSummary(const Options& options, const RunRecord& record, std::ostream&
                cli::shortNumber(grid.metrics.maxError), cli::seconds(grid.seconds.total())});
   }
   table.print(out);
+  for (const ConvertedGrid& grid : record.grids) printChoice(grid, out);
   const Ratio ratio = ratioOf(record);
   out << cli::printable(options.input.string());
   if (!ratio.wholeInput()) out << ", " << ratio.grids << " of " << ratio.gridsOfInput << " grids:";

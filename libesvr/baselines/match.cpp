@@ -6,6 +6,7 @@
 #include <span>
 
 #include "baselines/drop_voxels.h"
+#include "baselines/zfp_codec.h"
 #include "esvr/baseline.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"

@@ -25,12 +25,14 @@ std::size_t within(double count, std::uint64_t voxels) {
       std::clamp(std::floor(count), 1.0, double(std::max<std::uint64_t>(voxels, 1))));
 }
 
-double psnrOf(const Job& job, const StoredGrid& grid) {
+}  // namespace
+
+double psnrOf(const Job& job, const SparseVolume& volume) {
   const CompareOptions options{.box = job.options.fit.box, .peak = {}, .ssim = false};
-  return compareVolumes(job.input.source, decodeGrid(grid), options).psnrBox;
+  return compareVolumes(job.input.source, volume, options).psnrBox;
 }
 
-}  // namespace
+double psnrOf(const Job& job, const StoredGrid& grid) { return psnrOf(job, decodeGrid(grid)); }
 
 FitOptions shortened(FitOptions options) {
   if (options.iterations)

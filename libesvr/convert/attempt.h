@@ -16,6 +16,10 @@ struct Job {
   const ConvertOptions& options;
 };
 
+/// PSNR of a volume or of a decoded grid over the box, dB.
+[[nodiscard]] double psnrOf(const Job& job, const SparseVolume& volume);
+[[nodiscard]] double psnrOf(const Job& job, const StoredGrid& grid);
+
 /// Options of a short fit: a quarter of the iterations if their number is given, else a draft.
 [[nodiscard]] FitOptions shortened(FitOptions options);
 
@@ -37,6 +41,12 @@ struct Attempt {
 /// Loss of PSNR by quantising, dB, at which further bytes gain as much in more ellipsoids as in
 /// more bits (docs/lab-notes.md, "More ellipsoids or more bits").
 inline constexpr double kUsualLoss = 0.9;
+
+/// Usual values that extrapolate from a short fit.
+inline constexpr double kShortFitBehind = 2.5;     // PSNR of a full fit less that of a short one
+inline constexpr double kBytesPerEllipsoid = 8.0;  // in a grid that lost kUsualLoss
+inline constexpr double kMinBytesPerEllipsoid = 5.0;
+inline constexpr double kUncertainty = 0.75;  // error of an extrapolated PSNR, dB
 
 /// The goal of storing an attempt: `loss`, unless a PSNR or a number of bytes is given.
 struct StorageTarget {

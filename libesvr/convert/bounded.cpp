@@ -47,13 +47,14 @@ std::optional<Conversion> withEllipsoids(const Job& job, double bound, std::uint
 /// The smallest conversion so far, and the sizes that were compared.
 struct Smallest {
   Conversion conversion;
-  BoundRecord record;
+  ChoiceRecord choice;
+  bool insists = false;  ///< ellipsoids are taken even if voxels are smaller
 
   void take(Conversion now) {
     const std::uint64_t bytes = bytesAdded(now.grid);
-    if (record.ellipsoidBytes != 0 && bytes >= record.ellipsoidBytes) return;
-    record.ellipsoidBytes = bytes;
-    if (bytes < record.voxelBytes) conversion = std::move(now);
+    if (choice.ellipsoids && bytes >= choice.ellipsoids->bytes) return;
+    choice.ellipsoids = Candidate{bytes};
+    if (insists || bytes < choice.voxels->bytes) conversion = std::move(now);
   }
 };
 
@@ -63,10 +64,10 @@ void tryEllipsoids(const Job& job, double bound, Smallest& best) {
   shortFit.fit = shortened(shortFit.fit);
   for (const ConvertOptions* options : {&std::as_const(shortFit), &job.options}) {
     auto now = withEllipsoids({job.input, *options}, bound,
-                              best.record.voxelBytes / kEllipsoidBytesDivisor);
+                              best.choice.voxels->bytes / kEllipsoidBytesDivisor);
     if (!now) return;
     const bool promising =
-        double(bytesAdded(now->grid)) <= kMaxPromisingRatio * double(best.record.voxelBytes);
+        double(bytesAdded(now->grid)) <= kMaxPromisingRatio * double(best.choice.voxels->bytes);
     best.take(std::move(*now));
     if (!promising) return;
   }
@@ -93,11 +94,15 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   const double bound = absoluteBound(goal, source);
   if (bound == 0.0) return asVoxels(job, exactLayer(source));
   Conversion voxels = asVoxels(job, boundedLayer(source, bound, job.options.storage.activity));
-  if (isNarrowBand(job.input.descriptor, source)) return voxels;
-  Smallest best{std::move(voxels), {}};
-  best.record.voxelBytes = bytesAdded(best.conversion.grid);
-  if (!goal.voxelsOnly) tryEllipsoids(job, bound, best);
-  best.conversion.bound = best.record;
+  const bool insists = job.options.representation == Representation::kEllipsoids;
+  if (isNarrowBand(job.input.descriptor, source) && !insists) return voxels;
+  Smallest best{std::move(voxels), {}, insists};
+  best.choice.voxels = Candidate{bytesAdded(best.conversion.grid)};
+  if (job.options.representation != Representation::kVoxels) tryEllipsoids(job, bound, best);
+  if (insists && !best.choice.ellipsoids)
+    throw UsageError("grid '" + job.input.descriptor.name +
+                     "' has no ellipsoids with a residual that keep the bound");
+  best.conversion.choice = best.choice;
   return std::move(best.conversion);
 }
 

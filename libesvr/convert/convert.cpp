@@ -5,8 +5,7 @@
 
 #include "convert/attempt.h"
 #include "convert/bounded.h"
-#include "convert/psnr_search.h"
-#include "convert/size_search.h"
+#include "convert/choice.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -42,18 +41,18 @@ class Converter {
 
   Conversion operator()(const FitGoal&) const {
     const FitOptions& options = job_.options.fit;
-    return stored(job_.input, fit(job_.input.source, options), options, job_.options.storage);
+    return convert::unlessExactIsSmaller(job_, [&] {
+      return stored(job_.input, fit(job_.input.source, options), options, job_.options.storage);
+    });
   }
   Conversion operator()(const SizeGoal& goal) const {
     if (job_.options.storage.form != Storage::kCompact)
       throw UsageError("a size needs compact storage; the size of float32 storage is fixed");
-    auto result = convert::searchSize(job_, goal.bytes);
-    if (result.conversion) return std::move(*result.conversion);
-    throw UsageError("grid '" + job_.input.descriptor.name + "' takes at least " +
-                     std::to_string(result.needed) + " bytes; the size allows " +
-                     std::to_string(goal.bytes));
+    return convert::convertToSize(job_, goal.bytes);
   }
-  Conversion operator()(const PsnrGoal& goal) const { return convert::searchPsnr(job_, goal.psnr); }
+  Conversion operator()(const PsnrGoal& goal) const {
+    return convert::convertToPsnr(job_, goal.psnr);
+  }
   Conversion operator()(const BoundGoal& goal) const { return convert::convertWithin(job_, goal); }
   Conversion operator()(const LosslessGoal&) const { return convert::convertLossless(job_); }
 
@@ -77,9 +76,20 @@ void requireBound(const ConvertInput& input, const StoredGrid& grid, double boun
                          std::to_string(error) + " exceeds the bound of " + std::to_string(bound));
 }
 
+void requirePossible(const ConvertOptions& options) {
+  const Representation wanted = options.representation;
+  if (wanted == Representation::kVoxels && std::holds_alternative<FitGoal>(options.goal))
+    throw UsageError("voxels need a goal: a PSNR, a size, a bound or lossless storage");
+  if (wanted == Representation::kVoxels && options.storage.form == Storage::kFloat32)
+    throw UsageError("float32 storage is a form of ellipsoids; it excludes voxels");
+  if (wanted == Representation::kEllipsoids && std::holds_alternative<LosslessGoal>(options.goal))
+    throw UsageError("ellipsoids are not lossless");
+}
+
 }  // namespace
 
 Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options) {
+  requirePossible(options);
   ConvertOptions own = options;
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
   Conversion conversion = std::visit(Converter({input, own}), options.goal);

@@ -11,7 +11,6 @@ namespace {
 
 // Usual values. They decide how many fits a search takes; the PSNR of every fit is measured.
 constexpr double kDbPerDoubling = 4.5;        // gain of PSNR by twice the ellipsoids
-constexpr double kShortFitBehind = 2.5;       // PSNR of a full fit less that of a short one, dB
 constexpr double kVoxelsPerEllipsoid = 35.0;  // active voxels per ellipsoid of the first guess
 constexpr double kMaxGrowth = 8.0;            // largest factor of the number between two fits
 constexpr std::size_t kMaxFits = 3;           // the search continues if none reached the PSNR
@@ -26,26 +25,44 @@ constexpr Margin kFloat32Margin{0.3, 0.0, 0.9};
 
 class PsnrSearch {
  public:
-  PsnrSearch(const Job& job, double psnr)
+  PsnrSearch(const Job& job, double psnr, std::optional<std::uint64_t> below)
       : job_(job),
         psnr_(psnr),
+        below_(below),
         compact_(job.options.storage.form == Storage::kCompact),
         margin_(compact_ ? kCompactMargin : kFloat32Margin),
-        maxCount_(job.options.fit.count.value_or(activeVoxelCount(job.input.source))) {}
+        maxCount_(job.options.fit.count.value_or(activeVoxelCount(job.input.source))) {
+    if (below_)
+      maxCount_ = std::min(maxCount_, std::uint64_t(double(*below_) / kMinBytesPerEllipsoid) + 1);
+  }
 
-  Conversion run() {
-    const double guess = double(activeVoxelCount(job_.input.source)) / kVoxelsPerEllipsoid;
-    const Attempt draft = attempt(job_, capped(guess), FitLength::kShort);
-    double count = scaledCount(draft, aim() - kShortFitBehind);
+  PsnrResult run() {
+    const Attempt draft = attempt(job_, firstCount(), FitLength::kShort);
+    const double needed = neededCount(draft, aim() - kShortFitBehind);
+    const auto expected = std::uint64_t(kBytesPerEllipsoid * needed);
+    if (below_ && !draft.cancelled() &&
+        neededCount(draft, aim() - kShortFitBehind - kUncertainty) * kBytesPerEllipsoid >
+            double(*below_))
+      return {std::nullopt, expected};
+    fitUntilReached(scaledCount(draft, aim() - kShortFitBehind));
+    return {anyReached() ? smallest() : best(), expected};
+  }
+
+ private:
+  [[nodiscard]] double firstCount() const {
+    double guess = double(activeVoxelCount(job_.input.source)) / kVoxelsPerEllipsoid;
+    if (below_) guess = std::min(guess, double(*below_) / kBytesPerEllipsoid);
+    return capped(guess);
+  }
+
+  void fitUntilReached(double count) {
     do {
       attempts_.push_back(attempt(job_, capped(count), FitLength::kWhole));
       if (attempts_.back().cancelled() || goodEnough(attempts_.back())) break;
       count = nextCount();
     } while (attempts_.size() < kMaxFits || !anyReached());
-    return anyReached() ? smallest() : best();
   }
 
- private:
   [[nodiscard]] double aim() const { return psnr_ + margin_.aim; }
   [[nodiscard]] double capped(double count) const { return std::min(count, double(maxCount_)); }
   [[nodiscard]] bool reached(const Attempt& a) const { return a.psnr > psnr_; }
@@ -66,10 +83,15 @@ class PsnrSearch {
   }
 
   /// The number of ellipsoids that should reach a PSNR, extrapolated from an attempt.
-  [[nodiscard]] static double scaledCount(const Attempt& from, double psnr) {
-    const double factor = std::exp2((psnr - from.psnr) / kDbPerDoubling);
+  [[nodiscard]] static double neededCount(const Attempt& from, double psnr) {
     return double(std::max<std::size_t>(from.count(), 1)) *
-           std::clamp(factor, 1.0 / kMaxGrowth, kMaxGrowth);
+           std::exp2((psnr - from.psnr) / kDbPerDoubling);
+  }
+
+  /// The number of ellipsoids of the next fit: neededCount(), but not too far from the attempt's.
+  [[nodiscard]] static double scaledCount(const Attempt& from, double psnr) {
+    const double count = double(std::max<std::size_t>(from.count(), 1));
+    return std::clamp(neededCount(from, psnr), count / kMaxGrowth, count * kMaxGrowth);
   }
 
   /// The attempt nearest to the aim, on the given side of it; null if there is none.
@@ -136,6 +158,7 @@ class PsnrSearch {
 
   const Job& job_;
   double psnr_;
+  std::optional<std::uint64_t> below_;
   bool compact_;
   Margin margin_;
   std::uint64_t maxCount_;
@@ -144,6 +167,8 @@ class PsnrSearch {
 
 }  // namespace
 
-Conversion searchPsnr(const Job& job, double psnr) { return PsnrSearch(job, psnr).run(); }
+PsnrResult searchPsnr(const Job& job, double psnr, std::optional<std::uint64_t> below) {
+  return PsnrSearch(job, psnr, below).run();
+}
 
 }  // namespace esvr::convert

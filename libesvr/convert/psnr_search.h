@@ -1,14 +1,25 @@
 #pragma once
 /// The search for the smallest grid that reaches a PSNR.
 
+#include <cstdint>
+#include <optional>
+
 #include "convert/attempt.h"
 
 namespace esvr::convert {
 
+struct PsnrResult {
+  std::optional<Conversion> conversion;  ///< missing if it would be larger than allowed
+  std::uint64_t expected = 0;            ///< bytes to expect according to the short fit
+};
+
 /// Makes a short fit and then full fits, each with a number of ellipsoids that follows from the
 /// PSNR of the fits before. If the PSNR is out of reach, the result is the best of them with
 /// FitEnd::kPsnrMissed.
-/// \param psnr  dB over the box
-[[nodiscard]] Conversion searchPsnr(const Job& job, double psnr);
+/// \param psnr   dB over the box
+/// \param below  the grid must be smaller; no full fit is made if the short fit shows that it is
+///               not
+[[nodiscard]] PsnrResult searchPsnr(const Job& job, double psnr,
+                                    std::optional<std::uint64_t> below = {});
 
 }  // namespace esvr::convert

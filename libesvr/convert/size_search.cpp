@@ -9,7 +9,6 @@ namespace esvr::convert {
 namespace {
 
 // Usual values. They decide how many fits a search takes; the bytes of every grid are counted.
-constexpr double kStoredBytesPerEllipsoid = 8.0;  // first guess
 constexpr double kShortFitPrice = 0.94;  // bytes per ellipsoid of a short fit / of a full fit
 constexpr double kMaxUsefulLoss = 2.5;   // loss, dB, above which fewer ellipsoids are better
 constexpr double kRepairFactor = 1.25;   // smallest growth of the bytes per ellipsoid by a repair
@@ -28,10 +27,14 @@ std::uint64_t bytesBesides(const CompactResult& compact) {
 
 class SizeSearch {
  public:
-  SizeSearch(const Job& job, std::uint64_t bytes) : job_(job), bytes_(bytes) {}
+  SizeSearch(const Job& job, std::uint64_t bytes, std::optional<double> above)
+      : job_(job), bytes_(bytes), above_(above) {}
 
   SizeResult run() {
-    Attempt last = attempt(job_, double(bytes_) / kStoredBytesPerEllipsoid, FitLength::kShort);
+    Attempt last = attempt(job_, double(bytes_) / kBytesPerEllipsoid, FitLength::kShort);
+    const double expected = last.psnr + kShortFitBehind - kUsualLoss;
+    if (above_ && !last.cancelled() && expected + kUncertainty < *above_)
+      return {std::nullopt, 0, expected};
     const Price first = priceOf(last);
     if (!reserve(first.besides)) return refused();
     double each = first.each / kShortFitPrice;
@@ -41,12 +44,12 @@ class SizeSearch {
       if (besides_ >= bytes_) return refused();
       const bool fits = now.bytes <= left_;
       if (fits && (now.loss <= kMaxUsefulLoss || repairs + 1 >= kMaxRepairs))
-        return {conversionOf(std::move(last.fit), std::move(now)), 0};
-      if (!fits && last.asked == 1) return {std::nullopt, besides_ + now.bytes};
+        return {conversionOf(std::move(last.fit), std::move(now)), 0, expected};
+      if (!fits && last.asked == 1) return {std::nullopt, besides_ + now.bytes, expected};
       each = std::max(priceOf(last).each, kRepairFactor * each);
     }
     CompactResult compact = compactFor(last);
-    return {conversionOf(std::move(last.fit), std::move(compact)), 0};
+    return {conversionOf(std::move(last.fit), std::move(compact)), 0, expected};
   }
 
  private:
@@ -68,7 +71,7 @@ class SizeSearch {
     return left_ > 0;
   }
 
-  [[nodiscard]] SizeResult refused() const { return {std::nullopt, besides_}; }
+  [[nodiscard]] SizeResult refused() const { return {std::nullopt, besides_, 0.0}; }
 
   [[nodiscard]] CompactResult compactFor(const Attempt& attempt) const {
     return compacted(job_, attempt, {.bytes = left_});
@@ -87,10 +90,13 @@ class SizeSearch {
 
   const Job& job_;
   std::uint64_t bytes_, besides_ = 0, left_ = 0;
+  std::optional<double> above_;
 };
 
 }  // namespace
 
-SizeResult searchSize(const Job& job, std::uint64_t bytes) { return SizeSearch(job, bytes).run(); }
+SizeResult searchSize(const Job& job, std::uint64_t bytes, std::optional<double> above) {
+  return SizeSearch(job, bytes, above).run();
+}
 
 }  // namespace esvr::convert

@@ -9,14 +9,19 @@
 namespace esvr::convert {
 
 struct SizeResult {
-  std::optional<Conversion> conversion;  ///< missing if even the smallest grid is too large
+  /// Missing if even the smallest grid is too large, or if it would be worse than allowed.
+  std::optional<Conversion> conversion;
   std::uint64_t needed = 0;  ///< bytes of the smallest grid that was tried, if it is too large
+  double expected = 0.0;     ///< PSNR to expect according to the short fit, dB
 };
 
 /// Makes a short fit to measure the bytes per ellipsoid, and then a full fit with as many
 /// ellipsoids as the size allows. If the ellipsoids of the full fit take more bytes than expected,
 /// it is repeated with fewer.
 /// \param bytes  largest number of bytes that the grid may add to a file (bytesAdded)
-[[nodiscard]] SizeResult searchSize(const Job& job, std::uint64_t bytes);
+/// \param above  the PSNR, dB, must be higher; no full fit is made if the short fit shows that it is
+///               not
+[[nodiscard]] SizeResult searchSize(const Job& job, std::uint64_t bytes,
+                                    std::optional<double> above = {});
 
 }  // namespace esvr::convert

@@ -43,12 +43,10 @@ void check(const FitOptions& options) {
 }
 
 RunPlan planFor(const FitTarget& target, const FitOptions& options) {
-  const PresetValues preset = valuesOf(options.preset);
-  const auto voxels = std::size_t(target.activeVoxels);
-  const auto byPreset = std::size_t(double(voxels) / preset.voxelsPerEllipsoid);
   RunPlan plan;
-  plan.count = std::clamp<std::size_t>(options.count.value_or(byPreset), 1, voxels);
-  plan.iterations = options.iterations.value_or(iterationsOf(preset, options.device.kind));
+  plan.count = plannedCount(options, target.activeVoxels);
+  plan.iterations =
+      options.iterations.value_or(iterationsOf(valuesOf(options.preset), options.device.kind));
   plan.psnr = options.psnr;
   plan.seconds = options.seconds;
   plan.learnKappa = !options.kappa;
@@ -63,6 +61,13 @@ bool anyNegative(const Field& field) {
 }
 
 }  // namespace
+
+std::size_t plannedCount(const FitOptions& options, std::uint64_t activeVoxels) {
+  const double each = valuesOf(options.preset).voxelsPerEllipsoid;
+  const auto byPreset = std::size_t(double(activeVoxels) / each);
+  return std::clamp<std::size_t>(options.count.value_or(byPreset), 1,
+                                 std::max<std::size_t>(activeVoxels, 1));
+}
 
 FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   check(options);

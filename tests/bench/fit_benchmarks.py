@@ -64,11 +64,12 @@ def run(command):
     return seconds, usage.ru_maxrss * 1024
 
 
-def convert(programs, source, out, options, where=("--device", "cpu", "--threads", THREADS)):
+def convert(programs, source, out, options, where=("--device", "cpu", "--threads", THREADS),
+            representation="ellipsoids"):
     """Converts a file. Returns the report, with the seconds and the memory of the whole process."""
     report = out.with_suffix(".json")
     command = [programs / "vdb2esvr/vdb2esvr", source, out, *where, "--quiet", "--force",
-               "--report", report, *options]
+               "--report", report, "--representation", representation, *options]
     seconds, memory = run(command)
     result = json.loads(report.read_text())
     result["process"] = {"seconds": seconds, "peak_bytes": memory}

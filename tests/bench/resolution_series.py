@@ -49,6 +49,7 @@ class Resolution:
         """Fits and returns the PSNR over the active voxels. The smallest file that reaches TARGET is kept."""
         path = self.options.out / 'attempt.esvr'
         report = run([self.options.bin / 'vdb2esvr/vdb2esvr', self.volume, path, '--count', count,
+                    '--representation', 'ellipsoids',
                     '--device', self.options.device, '--report', '-', '-f'])
         psnr = json.loads(report)['grids'][0]['metrics']['psnr_active']
         print(self.resolution, count, psnr, file=sys.stderr, flush=True)

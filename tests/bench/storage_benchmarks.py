@@ -30,13 +30,13 @@ BOUNDS = [("smoke1", "0.5%"), ("smoke1", "1%"), ("smoke1", "2%"), ("smoke1", "5%
 STREAMS = ["positions", "scales", "rotations", "intensities"]
 
 
-def fitted(arguments, name, *options):
+def fitted(arguments, name, *options, representation="ellipsoids"):
     """The report of one conversion."""
     where = ["--device", arguments.device]
     if arguments.device == "cpu":
         where += ["--threads", THREADS]
     return convert(arguments.bin, arguments.data / f"{name}.vdb", arguments.out / "storage.esvr",
-                   [*options, *BOXES.get(name, [])], where)
+                   [*options, *BOXES.get(name, [])], where, representation)
 
 
 def kilobytes(report):
@@ -63,16 +63,16 @@ def layers(arguments):
 
 def targets(arguments):
     for name, options in TARGETS:
-        report = fitted(arguments, name, *options)
+        report = fitted(arguments, name, *options, representation="auto")
         grid = report["grids"][0]
-        print(f"| {name} | `{' '.join(options)}` | {grid['ellipsoids']:,} | "
-              f"{report['output']['bytes']:,} | {grid['metrics']['psnr_box']:.2f} | "
+        print(f"| {name} | `{' '.join(options)}` | {grid['representation']['stored']} | "
+              f"{grid['ellipsoids']:,} | {report['output']['bytes']:,} | {grid['metrics']['psnr_box']:.2f} | "
               f"{report['process']['seconds']:.0f} |", flush=True)
 
 
 def lossless(arguments):
     for name in LOSSLESS:
-        report = fitted(arguments, name, "--lossless")
+        report = fitted(arguments, name, "--lossless", representation="auto")
         source = (arguments.data / f"{name}.vdb").stat().st_size
         print(f"| {name} | {source:,} | {report['output']['bytes']:,} | "
               f"{report['process']['seconds']:.1f} |", flush=True)
@@ -80,10 +80,10 @@ def lossless(arguments):
 
 def bounds(arguments):
     for name, bound in BOUNDS:
-        report = fitted(arguments, name, "--max-error", bound)
-        found = report["grids"][0]["bound"]
-        tried = f"{found['ellipsoid_bytes']:,}" if found["ellipsoid_bytes"] else "-"
-        print(f"| {name} | {bound} | {found['voxel_bytes']:,} | {tried} | {found['stored']} | "
+        report = fitted(arguments, name, "--max-error", bound, representation="auto")
+        found = report["grids"][0]["representation"]
+        tried = f"{found['ellipsoids']['bytes']:,}" if found["ellipsoids"] else "-"
+        print(f"| {name} | {bound} | {found['voxels']['bytes']:,} | {tried} | {found['stored']} | "
               f"{report['process']['seconds']:.0f} |", flush=True)
 
 

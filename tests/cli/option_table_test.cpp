@@ -56,14 +56,14 @@ Table vdb2esvrTests() {
           {"--psnr", "Vdb2EsvrOption.psnrIsReached"},
           {"--ratio", "Vdb2EsvrOption.ratioBoundsTheFile"},
           {"--report", "Vdb2Esvr.reportsWhatTheFileHolds"},
+          {"--representation", "Vdb2EsvrOption.representationIsTheOneWanted"},
           {"--seconds", "Vdb2EsvrOption.secondsEndTheFit"},
           {"--seed", "Vdb2EsvrOption.seedsGiveOtherFiles"},
           {"--size", "Vdb2Esvr.keepsToTheSizeAskedFor"},
           {"--storage", "Vdb2EsvrOption.storageIsCompactOrFloat32"},
           {"--storage-loss", "Vdb2EsvrOption.storageLossBuysBytes"},
           {"--threads", "Vdb2Esvr.givesTheSameBytesInEveryRunOnAnyNumberOfThreads"},
-          {"--topology", "Vdb2Esvr.storesTheMaskWhereAsked"},
-          {"--voxels-only", "Vdb2Esvr.triesNoEllipsoidsForABoundWhereTold"}};
+          {"--topology", "Vdb2Esvr.storesTheMaskWhereAsked"}};
 }
 
 Table esvr2vdbTests() {

@@ -49,6 +49,8 @@ class Vdb2EsvrOption : public Options {
   [[nodiscard]] Json quick(std::vector<std::string> options,
                            const std::string& name = "out.esvr") const {
     options.insert(options.end(), {"--iterations", "60", "--device", "cpu"});
+    if (std::find(options.begin(), options.end(), "--representation") == options.end())
+      options.insert(options.end(), {"--representation", "ellipsoids"});
     return convert(options, name)["grids"][0];
   }
 };
@@ -78,6 +80,17 @@ TEST_F(Vdb2EsvrOption, psnrIsReached) {
   EXPECT_LE(coarse["bytes"].get<int>(), fine["bytes"].get<int>());
 }
 
+TEST_F(Vdb2EsvrOption, representationIsTheOneWanted) {
+  for (const std::string wanted : {"ellipsoids", "voxels"}) {
+    const Json grid = quick({"--psnr", "35", "--representation", wanted});
+    EXPECT_EQ(grid["representation"]["stored"], wanted);
+    EXPECT_GE(grid["metrics"]["psnr_box"].get<double>(), 35.0);
+  }
+  const Json chosen = quick({"--psnr", "35", "--representation", "auto"})["representation"];
+  const std::string other = chosen["stored"] == "voxels" ? "ellipsoids" : "voxels";
+  EXPECT_LE(chosen[chosen["stored"].get<std::string>()]["bytes"], chosen[other]["bytes"]);
+}
+
 TEST_F(Vdb2EsvrOption, secondsEndTheFit) {
   const Json grid =
       convert({"--count", "20", "--iterations", "10000000", "--seconds", "0.2"})["grids"][0];
@@ -86,7 +99,8 @@ TEST_F(Vdb2EsvrOption, secondsEndTheFit) {
 
 TEST_F(Vdb2EsvrOption, presetsTakeMoreAndMoreIterations) {
   const auto last = [&](const char* preset) {
-    const Json report = convert({"--preset", preset, "--count", "5"});
+    const Json report =
+        convert({"--preset", preset, "--count", "5", "--representation", "ellipsoids"});
     return report["grids"][0]["curve"].back()["iteration"].get<int>();
   };
   EXPECT_LT(last("draft"), last("standard"));

@@ -174,7 +174,11 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"--size", "9KB", "--ratio", "9"}, 2, "--ratio"},
         Refusal{{"--ratio", "0.5"}, 2, "--ratio"}, Refusal{{"--max-error", "0"}, 2, "--max-error"},
         Refusal{{"--max-error", "1x"}, 2, "--max-error"},
-        Refusal{{"--voxels-only"}, 2, "--max-error"},
+        Refusal{{"--representation", "voxels"}, 2, "--max-error"},
+        Refusal{{"--representation", "cubes"}, 2, "cubes"},
+        Refusal{{"--representation", "ellipsoids", "--lossless"}, 2, "--lossless"},
+        Refusal{
+            {"--representation", "voxels", "--psnr", "40", "--storage", "float32"}, 2, "float32"},
         Refusal{{"--lossless", "--psnr", "40"}, 2, "--psnr"}, Refusal{{"--size", "99"}, 2, "bytes"},
         Refusal{{"--count", "0"}, 2, "--count"}, Refusal{{"--count", "x"}, 2, "x"},
         Refusal{{"--psnr", "-1"}, 2, "--psnr"}, Refusal{{"--psnr", "nan"}, 2, "psnr"},
@@ -209,7 +213,8 @@ TEST_F(Vdb2Esvr, endsWithCodeFourWhereThePsnrIsMissedAndWritesTheFile) {
 }
 
 TEST_F(Vdb2Esvr, keepsToTheSizeAskedFor) {
-  const auto run = vdb2esvr({in(), out(), "--size", "1.5KB", "--iterations", "60", "--kappa", "0"});
+  const auto run = vdb2esvr({in(), out(), "--size", "1.5KB", "--iterations", "60", "--kappa", "0",
+                             "--representation", "ellipsoids"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_LE(std::filesystem::file_size(out()), 1500u);
   EXPECT_GE(std::filesystem::file_size(out()), 1470u);
@@ -300,9 +305,9 @@ TEST_F(Vdb2Esvr, leavesNothingOnAFullDisk) {
 }
 
 TEST_F(Vdb2Esvr, keepsTheFileWhereOnlyTheTableCannotBePrinted) {
-  const auto run =
-      test::runProgram("/bin/sh", {"-c", std::string(VDB2ESVR) + " " + in() + " " + out() +
-                                             " --iterations 10 --kappa 0 > /dev/full"});
+  const auto run = test::runProgram(
+      "/bin/sh", {"-c", std::string(VDB2ESVR) + " " + in() + " " + out() +
+                            " --iterations 10 --representation ellipsoids > /dev/full"});
   EXPECT_EQ(run.exitCode, 1);
   EXPECT_THAT(run.err, HasSubstr("standard output"));
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
@@ -358,12 +363,12 @@ bool storesEllipsoidsWithinABound(const std::string& in, const std::string& out,
   const auto run = vdb2esvr(
       {in, out, "--max-error", "5%", "--kappa", "-6", "--iterations", iterations, "--report", "-"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
-  const Json bound = Json::parse(run.out)["grids"][0]["bound"];
+  const Json made = Json::parse(run.out)["grids"][0]["representation"];
   const StoredGrid grid = readEsvr(out).grids[0];
   EXPECT_NE(grid.voxels.has_value(), grid.residual.has_value());
-  EXPECT_EQ(bound["stored"], grid.voxels ? "voxels" : "ellipsoids and residual");
+  EXPECT_EQ(made["stored"], grid.voxels ? "voxels" : "ellipsoids and residual");
   if (grid.residual) {
-    EXPECT_LT(bound["ellipsoid_bytes"].get<int>(), bound["voxel_bytes"].get<int>());
+    EXPECT_LT(made["ellipsoids"]["bytes"].get<int>(), made["voxels"]["bytes"].get<int>());
     EXPECT_GT(grid.field.ellipsoidCount(), 0u);
   }
   const SparseVolume source = readGrid(in, "density").volume;
@@ -387,12 +392,12 @@ TEST_F(Vdb2Esvr, takesVoxelsForABoundWhereTheyAreSmaller) {
 
 TEST_F(Vdb2Esvr, triesNoEllipsoidsForABoundWhereTold) {
   const std::string report = folder_ / "r.json";
-  const auto run =
-      vdb2esvr({in(), out(), "--max-error", "5%", "--voxels-only", "--report", report});
+  const auto run = vdb2esvr(
+      {in(), out(), "--max-error", "5%", "--representation", "voxels", "--report", report});
   ASSERT_EQ(run.exitCode, 0) << run.err;
-  const Json bound = Json::parse(test::readText(report))["grids"][0]["bound"];
-  EXPECT_EQ(bound["stored"], "voxels");
-  EXPECT_TRUE(bound["ellipsoid_bytes"].is_null());
+  const Json made = Json::parse(test::readText(report))["grids"][0]["representation"];
+  EXPECT_EQ(made["stored"], "voxels");
+  EXPECT_TRUE(made["ellipsoids"].is_null());
   EXPECT_TRUE(readEsvr(out()).grids[0].voxels.has_value());
 }
 

@@ -9,10 +9,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include <array>
-#include <cmath>
-
-#include "../fit/volumes.h"
+#include "convert/volumes.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -25,38 +22,21 @@ const GridDescriptor kDescriptor;
 ConvertOptions optionsFor(const Goal& goal) {
   ConvertOptions options;
   options.goal = goal;
+  options.representation = Representation::kEllipsoids;
   options.fit.iterations = 120;
   options.fit.kappa = 2.0f;
   return options;
 }
 
-Conversion converted(const SparseVolume& volume, const Goal& goal) {
-  return convertVolume({kDescriptor, volume}, optionsFor(goal));
+Conversion converted(const SparseVolume& volume, const Goal& goal,
+                     Representation representation = Representation::kEllipsoids) {
+  ConvertOptions options = optionsFor(goal);
+  options.representation = representation;
+  return convertVolume({kDescriptor, volume}, options);
 }
 
 double psnrOf(const SparseVolume& volume, const StoredGrid& grid) {
   return compareVolumes(volume, decodeGrid(grid)).psnrBox;
-}
-
-/// Noise, which no sum of fewer ellipsoids than voxels approximates.
-SparseVolume noiseVolume(int bricks) {
-  test::Random random(3);
-  return test::volumeOf({}, bricks, 0.0f, [&](Coord) { return float(random(0.5, 1.0)); });
-}
-
-/// Sixteen blobs that are a few voxels wide.
-SparseVolume smoothVolume() {
-  test::Random random(5);
-  std::array<std::array<double, 4>, 16> blobs;  // center and width
-  for (auto& [x, y, z, width] : blobs)
-    x = random(5, 43), y = random(5, 43), z = random(5, 43), width = random(3, 6);
-  return test::volumeOf({}, 6, 0.0f, [&](Coord v) {
-    double sum = 0.0;
-    for (const auto& [x, y, z, width] : blobs)
-      sum += std::exp(-((v.x - x) * (v.x - x) + (v.y - y) * (v.y - y) + (v.z - z) * (v.z - z)) /
-                      (2.0 * width * width));
-    return float(sum);
-  });
 }
 
 TEST(ConvertToSize, LandsWithinTwoPerCentUnderTheSize) {
@@ -119,7 +99,7 @@ TEST(ConvertToPsnr, TakesNoMoreEllipsoidsThanAllowed) {
 }
 
 TEST(ConvertToPsnr, SaysSoWhereItIsOutOfReach) {
-  const SparseVolume volume = noiseVolume(1);
+  const SparseVolume volume = test::noiseVolume(1);
   ConvertOptions options = optionsFor(PsnrGoal{120.0});
   options.fit.iterations = 20;
   EXPECT_EQ(convertVolume({kDescriptor, volume}, options).fit.end, FitEnd::kPsnrMissed);
@@ -127,47 +107,50 @@ TEST(ConvertToPsnr, SaysSoWhereItIsOutOfReach) {
 
 TEST(ConvertWithin, SlowTakesEllipsoidsWhereTheyAreSmallerThanVoxels) {
   const double bound = 0.1;
-  const SparseVolume volume = smoothVolume();
+  const SparseVolume volume = test::smoothVolume();
   ConvertOptions options = optionsFor(BoundGoal{bound});
+  options.representation = Representation::kAuto;
   options.fit.iterations = 200;
   options.fit.kappa = 0.0f;
   const Conversion conversion = convertVolume({kDescriptor, volume}, options);
-  ASSERT_TRUE(conversion.bound);
+  ASSERT_TRUE(conversion.choice);
   ASSERT_TRUE(conversion.grid.residual);
-  EXPECT_EQ(bytesAdded(conversion.grid), conversion.bound->ellipsoidBytes);
-  EXPECT_LT(conversion.bound->ellipsoidBytes, conversion.bound->voxelBytes);
+  EXPECT_EQ(bytesAdded(conversion.grid), conversion.choice->ellipsoids->bytes);
+  EXPECT_LT(conversion.choice->ellipsoids->bytes, conversion.choice->voxels->bytes);
   EXPECT_LE(largestDifference(volume, decodeGrid(conversion.grid)), bound);
 }
 
 TEST(ConvertWithin, TakesVoxelsOfNoise) {
   const double bound = 0.1;
-  const SparseVolume volume = noiseVolume(2);
-  const Conversion conversion = converted(volume, BoundGoal{bound});
-  ASSERT_TRUE(conversion.bound);
+  const SparseVolume volume = test::noiseVolume(2);
+  const Conversion conversion = converted(volume, BoundGoal{bound}, Representation::kAuto);
+  ASSERT_TRUE(conversion.choice);
   EXPECT_TRUE(conversion.grid.voxels);
-  EXPECT_EQ(bytesAdded(conversion.grid), conversion.bound->voxelBytes);
+  EXPECT_EQ(bytesAdded(conversion.grid), conversion.choice->voxels->bytes);
   EXPECT_LE(largestDifference(volume, decodeGrid(conversion.grid)), bound);
 }
 
 TEST(ConvertWithin, TriesNoEllipsoidsWhereVoxelsAloneAreAskedFor) {
-  const SparseVolume volume = smoothVolume();
-  const Conversion conversion = converted(volume, BoundGoal{.bound = 0.1, .voxelsOnly = true});
+  const SparseVolume volume = test::smoothVolume();
+  const Conversion conversion = converted(volume, BoundGoal{0.1}, Representation::kVoxels);
   EXPECT_TRUE(conversion.grid.voxels);
-  EXPECT_EQ(conversion.bound->ellipsoidBytes, 0u);
+  EXPECT_FALSE(conversion.choice->ellipsoids);
 }
 
 TEST(ConvertWithin, TakesAShareOfTheRange) {
-  const SparseVolume volume = noiseVolume(2);  // values from 0.5 to 1
-  const BoundGoal share{.bound = 0.1, .relative = true, .voxelsOnly = true};
+  const SparseVolume volume = test::noiseVolume(2);  // values from 0.5 to 1
+  const BoundGoal share{.bound = 0.1, .relative = true};
   const ValueRange range = activeRange(volume);
-  const double error = largestDifference(volume, decodeGrid(converted(volume, share).grid));
+  const Conversion conversion = converted(volume, share, Representation::kVoxels);
+  const double error = largestDifference(volume, decodeGrid(conversion.grid));
   EXPECT_LE(error, 0.1 * double(range.max - range.min));
   EXPECT_GT(error, 0.0);
 }
 
 TEST(ConvertLossless, GivesEveryVoxelBack) {
-  const SparseVolume volume = noiseVolume(2);
-  const SparseVolume back = decodeGrid(converted(volume, LosslessGoal{}).grid);
+  const SparseVolume volume = test::noiseVolume(2);
+  const SparseVolume back =
+      decodeGrid(converted(volume, LosslessGoal{}, Representation::kAuto).grid);
   EXPECT_EQ(back.values, volume.values);
   EXPECT_EQ(back.active, volume.active);
 }
@@ -176,7 +159,9 @@ TEST(ConvertLossless, RefusesDoubles) {
   const SparseVolume volume = test::tubeVolume();
   GridDescriptor doubles;
   doubles.valueType = ValueType::kDouble;
-  EXPECT_THROW((void)convertVolume({doubles, volume}, optionsFor(LosslessGoal{})), UsageError);
+  ConvertOptions options = optionsFor(LosslessGoal{});
+  options.representation = Representation::kAuto;
+  EXPECT_THROW((void)convertVolume({doubles, volume}, options), UsageError);
 }
 
 TEST(ConvertVolume, KeepsTheCurveOfOneFitInTheFile) {
@@ -223,7 +208,7 @@ TEST(ConvertByPaper, RefusesLevelSets) {
 
 TEST(BytesAdded, IsWhatAGridMakesAFileLonger) {
   const SparseVolume volume = test::tubeVolume();
-  const StoredGrid grid = converted(volume, LosslessGoal{}).grid;
+  const StoredGrid grid = converted(volume, LosslessGoal{}, Representation::kAuto).grid;
   const auto sizeOf = [](const EsvrFile& file) { return encodeEsvr(file).size(); };
   // Sections begin at multiples of 8. The padding counts, so several grids take at most this much.
   EXPECT_LE(sizeOf({{}, {grid}}), sizeOf({}) + bytesAdded(grid));

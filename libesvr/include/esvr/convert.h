@@ -21,8 +21,9 @@ namespace esvr {
 /// A single fit, which ends as FitOptions determine.
 struct FitGoal {};
 
-/// The best grid that adds at most `bytes` to a file (bytesAdded). It uses at least 98 % of them
-/// unless more bytes would not improve it. FitOptions::count, psnr and seconds are ignored.
+/// The best grid that adds at most `bytes` to a file (bytesAdded). Ellipsoids use at least 98 % of
+/// them unless more bytes would not improve the grid. FitOptions::count, psnr and seconds are
+/// ignored.
 struct SizeGoal {
   std::uint64_t bytes = 0;
 };
@@ -36,9 +37,8 @@ struct PsnrGoal {
 /// Every voxel is restored within a bound. The grid holds voxels, or ellipsoids with a residual if
 /// these take fewer bytes. FitOptions::count, psnr and seconds are ignored.
 struct BoundGoal {
-  double bound = 0.0;       ///< largest absolute error, 0 or above
-  bool relative = false;    ///< `bound` is a share of the range of the active values
-  bool voxelsOnly = false;  ///< ellipsoids are not tried
+  double bound = 0.0;     ///< largest absolute error, 0 or above
+  bool relative = false;  ///< `bound` is a share of the range of the active values
 };
 
 /// Every voxel and the active mask are restored bit for bit. The grid holds voxels.
@@ -46,7 +46,16 @@ struct LosslessGoal {};
 
 using Goal = std::variant<FitGoal, SizeGoal, PsnrGoal, BoundGoal, LosslessGoal>;
 
-/// The representation of ellipsoids in a file.
+/// What a stored grid consists of. A LosslessGoal always stores voxels.
+enum class Representation {
+  /// Ellipsoids or voxels, whichever serve the goal better. A FitGoal stores ellipsoids unless
+  /// exact voxels take no more bytes.
+  kAuto,
+  kEllipsoids,  ///< for a BoundGoal with a residual, unless the grid is a narrow band
+  kVoxels
+};
+
+/// The form of ellipsoids in a file. kFloat32 is never replaced by voxels.
 enum class Storage {
   kCompact,  ///< quantised and entropy coded: about 9 bytes per ellipsoid
   kFloat32   ///< float32 parameters: about 34 bytes per ellipsoid
@@ -61,6 +70,7 @@ struct StorageOptions {
 
 struct ConvertOptions {
   Goal goal;
+  Representation representation = Representation::kAuto;
   FitOptions fit;  ///< narrowBand is set by the conversion
   StorageOptions storage;
 };
@@ -77,23 +87,32 @@ struct CompactRecord {
   QuantiserSteps steps;  ///< quantisation steps of the four streams
 };
 
-/// The sizes of the two representations that a BoundGoal compares.
-struct BoundRecord {
-  std::uint64_t voxelBytes = 0;      ///< size of the grid with voxels only
-  std::uint64_t ellipsoidBytes = 0;  ///< size of the smallest grid with ellipsoids; 0: none
+/// A grid that was considered for a goal.
+struct Candidate {
+  std::uint64_t bytes = 0;  ///< bytesAdded
+  /// PSNR over the box, dB; +inf for exact voxels. Nothing for a BoundGoal.
+  std::optional<double> psnr{};
+  bool estimated = false;  ///< the figures were extrapolated from a short fit
+};
+
+/// The candidates for a goal that voxels and ellipsoids can serve.
+struct ChoiceRecord {
+  std::optional<Candidate> voxels;      ///< nothing if no voxels serve the goal or none were tried
+  std::optional<Candidate> ellipsoids;  ///< nothing if no ellipsoids do, or none were tried
 };
 
 struct Conversion {
   StoredGrid grid;                       ///< the grid that a reader of the file gets
   FitResult fit;                         ///< its field is empty; unused if voxels are stored
   std::optional<CompactRecord> compact;  ///< set if ellipsoids are stored as kCompact
-  std::optional<BoundRecord> bound;      ///< set if ellipsoids and voxels were compared
+  std::optional<ChoiceRecord> choice;    ///< set if the goal can be served by voxels, too
 };
 
 /// Converts a volume. The result is as deterministic as that of fit(). If a PSNR is out of reach,
 /// the best fit found is returned with FitEnd::kPsnrMissed.
 /// \throws UsageError  the size cannot hold the grid; a lossless grid is wanted of doubles; a size
-///                     is wanted with kFloat32
+///                     is wanted with kFloat32; the goal and the representation exclude each
+///                     other; no ellipsoids with a residual keep a bound
 /// \throws RuntimeFailure  the stored grid does not keep its bound
 /// Other exceptions are those of fit and compactGrid.
 [[nodiscard]] Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options);

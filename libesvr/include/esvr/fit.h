@@ -70,6 +70,10 @@ struct FitResult {
   bool signedIntensities = false;  ///< true if an intensity is negative
 };
 
+/// The number of ellipsoids that a fit aims at: the given count, or the preset's for this number of
+/// active voxels, but at most one for each of them.
+[[nodiscard]] std::size_t plannedCount(const FitOptions& options, std::uint64_t activeVoxels);
+
 /// Fits ellipsoids to a volume. The result is deterministic: the same volume, options and seed give
 /// the same bits on any number of threads, and in every run on GPUs of one kind, unless `seconds`
 /// ends the run. CPU and GPU use the same method and formulas but round differently, so that their

@@ -1,0 +1,124 @@
+#include "convert/choice.h"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "convert/bounded.h"
+#include "convert/psnr_search.h"
+#include "convert/size_search.h"
+#include "convert/voxel_search.h"
+#include "esvr/error.h"
+
+namespace esvr::convert {
+namespace {
+
+/// The representation of a job. Float32 storage is a form of ellipsoids.
+Representation representationOf(const Job& job) {
+  return job.options.storage.form == Storage::kFloat32 ? Representation::kEllipsoids
+                                                       : job.options.representation;
+}
+
+Candidate record(const VoxelCandidate& voxels) { return {voxels.bytes, voxels.psnr}; }
+
+Candidate record(const Job& job, const Conversion& ellipsoids) {
+  return {bytesAdded(ellipsoids.grid), psnrOf(job, ellipsoids.grid)};
+}
+
+Conversion asConversion(VoxelCandidate voxels, const ChoiceRecord& choice, FitEnd end) {
+  Conversion conversion;
+  conversion.grid = std::move(voxels.grid);
+  conversion.fit.end = end;
+  conversion.choice = choice;
+  return conversion;
+}
+
+UsageError tooSmall(const Job& job, std::uint64_t bytes, const std::string& needs) {
+  return UsageError("grid '" + job.input.descriptor.name + "' " + needs + "; the size allows " +
+                    std::to_string(bytes));
+}
+
+UsageError tooSmall(const Job& job, std::uint64_t bytes, std::uint64_t needed) {
+  return tooSmall(job, bytes, "takes at least " + std::to_string(needed) + " bytes");
+}
+
+Conversion ellipsoidsToSize(const Job& job, std::uint64_t bytes) {
+  auto result = searchSize(job, bytes);
+  if (!result.conversion) throw tooSmall(job, bytes, result.needed);
+  return std::move(*result.conversion);
+}
+
+/// The smaller of `voxels` and ellipsoids, which must reach the PSNR.
+Conversion smallerOf(const Job& job, double psnr, VoxelCandidate voxels) {
+  auto [ellipsoids, expected] = searchPsnr(job, psnr, voxels.bytes);
+  ChoiceRecord choice{record(voxels), Candidate{expected, psnr, true}};
+  if (ellipsoids) {
+    choice.ellipsoids = record(job, *ellipsoids);
+    ellipsoids->choice = choice;
+    if (choice.ellipsoids->psnr >= psnr && choice.ellipsoids->bytes < voxels.bytes)
+      return std::move(*ellipsoids);
+  }
+  return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
+}
+
+/// The better of `voxels` and ellipsoids of a size.
+Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) {
+  auto result = searchSize(job, bytes, voxels.psnr);
+  ChoiceRecord choice{record(voxels), {}};
+  if (result.expected > 0.0) choice.ellipsoids = Candidate{bytes, result.expected, true};
+  if (result.conversion) {
+    choice.ellipsoids = record(job, *result.conversion);
+    result.conversion->choice = choice;
+    if (choice.ellipsoids->psnr > voxels.psnr) return std::move(*result.conversion);
+  }
+  return asConversion(std::move(voxels), choice, FitEnd::kScheduleDone);
+}
+
+}  // namespace
+
+Conversion convertToPsnr(const Job& job, double psnr) {
+  const Representation wanted = representationOf(job);
+  if (wanted == Representation::kEllipsoids) return std::move(*searchPsnr(job, psnr).conversion);
+  auto voxels = voxelsForPsnr(job, psnr);
+  if (wanted == Representation::kVoxels) {
+    if (!voxels) return convertLossless(job);  // says why there are no exact voxels
+    const ChoiceRecord choice{record(*voxels), {}};
+    return asConversion(std::move(*voxels), choice, FitEnd::kPsnrReached);
+  }
+  if (!voxels) return std::move(*searchPsnr(job, psnr).conversion);
+  return smallerOf(job, psnr, std::move(*voxels));
+}
+
+Conversion convertToSize(const Job& job, std::uint64_t bytes) {
+  const Representation wanted = job.options.representation;
+  if (wanted == Representation::kEllipsoids) return ellipsoidsToSize(job, bytes);
+  auto voxels = voxelsForSize(job, bytes);
+  if (!voxels && wanted == Representation::kVoxels)
+    throw tooSmall(job, bytes, "has no voxels of that size");
+  if (!voxels) return ellipsoidsToSize(job, bytes);
+  if (wanted == Representation::kVoxels || std::isinf(voxels->psnr)) {
+    const ChoiceRecord choice{record(*voxels), {}};
+    return asConversion(std::move(*voxels), choice, FitEnd::kScheduleDone);
+  }
+  return betterOf(job, bytes, std::move(*voxels));
+}
+
+Conversion unlessExactIsSmaller(const Job& job, const std::function<Conversion()>& fit) {
+  if (representationOf(job) != Representation::kAuto) return fit();
+  auto exact = exactVoxels(job);
+  if (!exact) return fit();
+  const FitOptions& options = job.options.fit;
+  const double count = double(plannedCount(options, activeVoxelCount(job.input.source)));
+  ChoiceRecord choice{record(*exact), {}};
+  if (double(exact->bytes) <= kMinBytesPerEllipsoid * count) {
+    choice.ellipsoids = Candidate{std::uint64_t(kBytesPerEllipsoid * count), {}, true};
+    return asConversion(std::move(*exact), choice, FitEnd::kScheduleDone);
+  }
+  Conversion fitted = fit();
+  choice.ellipsoids = record(job, fitted);
+  fitted.choice = choice;
+  if (choice.ellipsoids->bytes < exact->bytes) return fitted;
+  return asConversion(std::move(*exact), choice, FitEnd::kScheduleDone);
+}
+
+}  // namespace esvr::convert

@@ -1,0 +1,25 @@
+#pragma once
+/// Chooses between ellipsoids and voxels for a goal.
+
+#include <functional>
+
+#include "convert/attempt.h"
+
+namespace esvr::convert {
+
+/// The smaller of two grids that reach a PSNR: voxels or ellipsoids. Voxels are made first, because
+/// they take the time of a few passes over the volume. A short fit then shows whether ellipsoids
+/// can be smaller; full fits are made only if they can.
+/// \param psnr  dB over the box
+[[nodiscard]] Conversion convertToPsnr(const Job& job, double psnr);
+
+/// The better of two grids of a size: voxels or ellipsoids, which are compared in the same way.
+/// \throws UsageError  neither can be that small
+[[nodiscard]] Conversion convertToSize(const Job& job, std::uint64_t bytes);
+
+/// The result of `fit`, or exact voxels if they take no more bytes. `fit` is not called if its
+/// number of ellipsoids shows that it cannot be smaller.
+[[nodiscard]] Conversion unlessExactIsSmaller(const Job& job,
+                                              const std::function<Conversion()>& fit);
+
+}  // namespace esvr::convert

@@ -1,0 +1,32 @@
+#pragma once
+/// The searches for the voxels that serve a goal: quantised voxels within a bound that is chosen.
+/// No fit is made.
+
+#include <cstdint>
+#include <optional>
+
+#include "convert/attempt.h"
+
+namespace esvr::convert {
+
+/// A grid that holds voxels.
+struct VoxelCandidate {
+  StoredGrid grid;
+  std::uint64_t bytes = 0;  ///< bytesAdded
+  double psnr = 0.0;        ///< dB over the box; +inf if the voxels are exact
+};
+
+/// Exact voxels.
+/// \return nothing if the values are doubles, which were rounded
+[[nodiscard]] std::optional<VoxelCandidate> exactVoxels(const Job& job);
+
+/// The voxels with the widest quantisation found whose PSNR is at least `psnr`; exact voxels if
+/// quantised ones do not reach it.
+/// \return nothing if the values are doubles, which were rounded, and only exact voxels reach it
+[[nodiscard]] std::optional<VoxelCandidate> voxelsForPsnr(const Job& job, double psnr);
+
+/// The best voxels found that add at most `bytes` to a file.
+/// \return nothing if even the coarsest voxels are larger
+[[nodiscard]] std::optional<VoxelCandidate> voxelsForSize(const Job& job, std::uint64_t bytes);
+
+}  // namespace esvr::convert

@@ -1,0 +1,148 @@
+// Plan: for each goal, a volume that ellipsoids suit and one that voxels suit. The better of both is
+// stored, and the record of the choice has the figures of both. Each representation can be
+// insisted on. Searches for voxels keep their goal. Contradictions are refused.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "convert/volumes.h"
+#include "convert/voxel_search.h"
+#include "esvr/convert.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr {
+namespace {
+
+Conversion choose(const SparseVolume& volume, const Goal& goal,
+                  Representation representation = Representation::kAuto) {
+  ConvertOptions options;
+  options.goal = goal;
+  options.representation = representation;
+  options.fit.iterations = 200;
+  options.fit.kappa = 0.0f;
+  return convertVolume({{}, volume}, options);
+}
+
+double psnrOver(const SparseVolume& volume, const Conversion& conversion) {
+  return compareVolumes(volume, decodeGrid(conversion.grid)).psnrBox;
+}
+
+TEST(ChoiceForAPsnr, TakesVoxelsOfNoise) {
+  const SparseVolume volume = test::noiseVolume(2);
+  const Conversion conversion = choose(volume, PsnrGoal{40.0});
+  ASSERT_TRUE(conversion.grid.voxels);
+  EXPECT_EQ(conversion.fit.end, FitEnd::kPsnrReached);
+  EXPECT_GE(psnrOver(volume, conversion), 40.0);
+  ASSERT_TRUE(conversion.choice && conversion.choice->ellipsoids);
+  EXPECT_TRUE(conversion.choice->ellipsoids->estimated)
+      << "a short fit shows that voxels are right";
+  EXPECT_GT(conversion.choice->ellipsoids->bytes, bytesAdded(conversion.grid));
+}
+
+TEST(ChoiceForAPsnr, TakesEllipsoidsOfBlobs) {
+  const SparseVolume volume = test::smoothVolume();
+  const Conversion conversion = choose(volume, PsnrGoal{35.0});
+  EXPECT_FALSE(conversion.grid.voxels);
+  EXPECT_GE(psnrOver(volume, conversion), 35.0);
+  ASSERT_TRUE(conversion.choice && conversion.choice->voxels);
+  EXPECT_EQ(conversion.choice->ellipsoids->bytes, bytesAdded(conversion.grid));
+  EXPECT_LT(bytesAdded(conversion.grid), conversion.choice->voxels->bytes);
+}
+
+TEST(ChoiceForAPsnr, StoresTheRepresentationThatIsInsistedOn) {
+  const SparseVolume volume = test::smoothVolume();
+  const Conversion voxels = choose(volume, PsnrGoal{35.0}, Representation::kVoxels);
+  EXPECT_TRUE(voxels.grid.voxels);
+  EXPECT_FALSE(voxels.choice->ellipsoids);
+  EXPECT_GE(psnrOver(volume, voxels), 35.0);
+  EXPECT_FALSE(choose(volume, PsnrGoal{35.0}, Representation::kEllipsoids).grid.voxels);
+}
+
+TEST(ChoiceForASize, TakesVoxelsOfNoise) {
+  const SparseVolume volume = test::noiseVolume(2);
+  const Conversion conversion = choose(volume, SizeGoal{3000});
+  EXPECT_TRUE(conversion.grid.voxels);
+  EXPECT_LE(bytesAdded(conversion.grid), 3000u);
+  ASSERT_TRUE(conversion.choice && conversion.choice->ellipsoids);
+  EXPECT_GT(*conversion.choice->voxels->psnr, *conversion.choice->ellipsoids->psnr);
+}
+
+TEST(ChoiceForASize, TakesEllipsoidsOfBlobs) {
+  const SparseVolume volume = test::smoothVolume();
+  const Conversion conversion = choose(volume, SizeGoal{2000});
+  EXPECT_FALSE(conversion.grid.voxels);
+  EXPECT_LE(bytesAdded(conversion.grid), 2000u);
+  EXPECT_GT(psnrOver(volume, conversion), *conversion.choice->voxels->psnr);
+}
+
+TEST(ChoiceForASize, TakesExactVoxelsWhereTheyFit) {
+  const SparseVolume volume = test::noiseVolume(1);
+  const Conversion conversion = choose(volume, SizeGoal{1'000'000});
+  EXPECT_EQ(decodeGrid(conversion.grid).values, volume.values);
+}
+
+TEST(ChoiceForAFit, TakesExactVoxelsWhereEllipsoidsWouldTakeMoreBytes) {
+  const SparseVolume flat = test::volumeOf({}, 4, 0.0f, [](Coord) { return 0.5f; });
+  const Conversion conversion = choose(flat, FitGoal{});
+  EXPECT_TRUE(conversion.grid.voxels);
+  EXPECT_EQ(decodeGrid(conversion.grid).values, flat.values);
+  EXPECT_FALSE(choose(test::smoothVolume(), FitGoal{}).grid.voxels);
+}
+
+TEST(Choice, RefusesWhatExcludesEachOther) {
+  const SparseVolume volume = test::noiseVolume(1);
+  EXPECT_THROW((void)choose(volume, FitGoal{}, Representation::kVoxels), UsageError);
+  EXPECT_THROW((void)choose(volume, LosslessGoal{}, Representation::kEllipsoids), UsageError);
+  EXPECT_THROW((void)choose(volume, SizeGoal{40}), UsageError);
+  EXPECT_THROW((void)choose(volume, SizeGoal{40}, Representation::kVoxels), UsageError);
+}
+
+class VoxelSearch : public testing::Test {
+ protected:
+  GridDescriptor descriptor_;
+  SparseVolume volume_ = test::smoothVolume();
+  ConvertInput input_{descriptor_, volume_};
+  ConvertOptions options_;
+  convert::Job job_{input_, options_};
+};
+
+TEST_F(VoxelSearch, ReachesAPsnrAndLittleMore) {
+  for (const double psnr : {20.0, 40.0, 60.0}) {
+    const auto found = convert::voxelsForPsnr(job_, psnr);
+    ASSERT_TRUE(found);
+    EXPECT_GE(found->psnr, psnr);
+    EXPECT_LT(found->psnr, psnr + 0.5);
+    EXPECT_EQ(found->psnr, compareVolumes(volume_, decodeGrid(found->grid)).psnrBox);
+    EXPECT_EQ(found->bytes, bytesAdded(found->grid));
+  }
+}
+
+TEST_F(VoxelSearch, FillsASize) {
+  for (const std::uint64_t bytes : {4000u, 20000u}) {
+    const auto found = convert::voxelsForSize(job_, bytes);
+    ASSERT_TRUE(found);
+    EXPECT_LE(found->bytes, bytes);
+    EXPECT_GE(double(found->bytes), 0.98 * double(bytes));
+  }
+}
+
+TEST_F(VoxelSearch, FindsExactVoxelsWhereNothingElseReachesAPsnr) {
+  const auto found = convert::voxelsForPsnr(job_, 250.0);
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(std::isinf(found->psnr));
+  EXPECT_EQ(decodeGrid(found->grid).values, volume_.values);
+}
+
+TEST_F(VoxelSearch, StoresOneValueInFewBytes) {
+  volume_ = test::volumeOf({}, 4, 0.0f, [](Coord) { return 0.5f; });
+  const auto found = convert::voxelsForPsnr(job_, 40.0);
+  ASSERT_TRUE(found);
+  EXPECT_GE(found->psnr, 40.0);
+  EXPECT_LT(found->bytes, 1000u);
+}
+
+}  // namespace
+}  // namespace esvr
