@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -21,6 +22,20 @@ struct Writer {
   }
   std::uint32_t raw(std::uint32_t value, int bits) {
     coder.raw(value, bits);
+    return value;
+  }
+};
+
+/// Measures the bits that decisions would take. Nothing is written and no model learns.
+struct BitMeter {
+  double bits = 0.0;
+  bool bit(const BitModel& model, bool value) {
+    const std::uint32_t share = value ? BitModel::kOne - model.zero() : model.zero();
+    bits += double(BitModel::kBits) - std::log2(double(share));
+    return value;
+  }
+  std::uint32_t raw(std::uint32_t value, int count) {
+    bits += count;
     return value;
   }
 };

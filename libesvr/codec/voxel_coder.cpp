@@ -64,23 +64,28 @@ constexpr std::size_t kClasses = std::size_t{1} << kClassBits;
 template <class Side>
 class VoxelCoder {
  public:
-  VoxelCoder(Side& side, const VoxelModel& model, VoxelLayer& layer)
+  /// \param thrift  if not null, codes are chosen; otherwise the layer's are coded
+  VoxelCoder(Side& side, const VoxelModel& model, VoxelLayer& layer, const Thrift* thrift = nullptr)
       : side_(side),
         model_(model),
         layer_(layer),
         index_(layer.bricks),
-        mirrors_(model, layer, index_) {}
+        mirrors_(model, layer, index_),
+        thrift_(thrift) {}
 
   void brick(std::size_t b) {
     halo_.fill(layer_, index_, b, model_.vacantCode);
-    for (int v = 0; v < kBrickVoxels; ++v) voxel(b, v);
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      at_ = b * kBrickVoxels + std::size_t(v);
+      voxel(b, v);
+    }
   }
 
  private:
   void voxel(std::size_t b, int v) {
     const auto cell = std::size_t(Halo::cell(voxelLocal(v)));
     const auto image = mirrors_.imageOf(layer_.bricks[b] * kBrickSide + voxelLocal(v));
-    std::int32_t& code = layer_.codes[b * kBrickVoxels + std::size_t(v)];
+    std::int32_t& code = layer_.codes[at_];
     const bool active = codeActive(int(cell), image, layer_.active[b].test(v));
     if (active) layer_.active[b].set(v);
     const bool vacant = !active && codeVacant(image, layer_.vacant[b].test(v));
@@ -133,6 +138,7 @@ class VoxelCoder {
     predictor_.look(&halo_.code[std::size_t(cell)],
                     image ? std::optional(image->code) : std::nullopt);
     const std::size_t context = predictor_.context();
+    if (thrift_) written = thriftyCode(context, written);
     const std::int64_t difference = std::int64_t(written) - predictor_.guess();
     const std::uint64_t magnitude =
         magnitudes_[context].code(side_, std::uint64_t(std::abs(difference)));
@@ -147,6 +153,31 @@ class VoxelCoder {
     return std::int32_t(result);
   }
 
+  /// The code with the least sum of squared error and price of bits: the nearest one, the next one
+  /// towards the prediction, or the prediction itself if it is near.
+  std::int32_t thriftyCode(std::size_t context, std::int32_t nearest) {
+    const std::int64_t guess = predictor_.guess();
+    if (guess == nearest) return nearest;
+    const std::int32_t step = guess > nearest ? 1 : -1;
+    double least = costOf(context, nearest);
+    std::int32_t best = nearest;
+    for (int n = 1; n <= Thrift::kMaxSteps && nearest + (n - 1) * step != guess; ++n) {
+      const std::int32_t code = nearest + n * step;
+      const double cost = costOf(context, code);
+      if (cost < least) least = cost, best = code;
+    }
+    return best;
+  }
+
+  double costOf(std::size_t context, std::int32_t code) {
+    const double error = thrift_->exact[at_] - double(code);
+    const std::int64_t difference = std::int64_t(code) - predictor_.guess();
+    BitMeter meter;
+    (void)magnitudes_[context].code(meter, std::uint64_t(std::abs(difference)));
+    if (difference != 0) (void)meter.bit(sign_[context][lastNegative_], difference < 0);
+    return error * error + thrift_->bitPrice * meter.bits;
+  }
+
   /// Largest distance of a code from its prediction, which is a sum of at most seven codes.
   static constexpr std::uint64_t kMaxDifference = std::uint64_t{1} << 35;
 
@@ -157,6 +188,8 @@ class VoxelCoder {
   Mirrors mirrors_;
   Halo halo_{};
   VoxelPredictor predictor_;
+  const Thrift* thrift_;
+  std::size_t at_ = 0;  ///< index of the voxel in the layer's codes
   bool lastNegative_ = false;
   std::array<std::array<BitModel, kImages>, kActivities> active_;
   std::array<BitModel, kVacancies> vacant_;
@@ -179,6 +212,13 @@ void codeVoxels(Writer& side, std::span<const std::size_t> order, const VoxelMod
                 VoxelLayer& layer) {
   code(side, order, model, layer);
 }
+void chooseCodes(std::span<const std::size_t> order, const VoxelModel& model, const Thrift& thrift,
+                 VoxelLayer& layer) {
+  Writer writer;
+  const auto coder = std::make_unique<VoxelCoder<Writer>>(writer, model, layer, &thrift);
+  for (const std::size_t b : order) coder->brick(b);
+}
+
 void codeVoxels(Reader& side, std::span<const std::size_t> order, const VoxelModel& model,
                 VoxelLayer& layer) {
   code(side, order, model, layer);

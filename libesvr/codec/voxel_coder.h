@@ -23,6 +23,18 @@ struct VoxelModel {
   std::vector<std::int32_t> common;  ///< frequent codes in decreasing order of frequency
 };
 
+/// What chooseCodes() weighs.
+struct Thrift {
+  static constexpr int kMaxSteps = 2;  ///< largest distance of a code from the nearest one
+  std::vector<double> exact;           ///< the voxels in units of the lattice, as the layer's codes
+  double bitPrice = 0.0;               ///< squared error, in the same units, that a bit is worth
+};
+
+/// Replaces the codes of voxels that are not vacant by codes near them that take fewer bits, where
+/// that is worth the error. The layer's form is kLattice; the bricks are visited as by codeVoxels().
+void chooseCodes(std::span<const std::size_t> order, const VoxelModel& model, const Thrift& thrift,
+                 VoxelLayer& layer);
+
 /// Writes the bricks in the given order, and the voxels of a brick in the order of their offsets.
 /// A brick must come after all bricks none of whose coordinates is larger than its own.
 void codeVoxels(Writer& side, std::span<const std::size_t> order, const VoxelModel& model,

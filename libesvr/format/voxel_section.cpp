@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
+#include "codec/brick_order.h"
 #include "codec/cell_tree.h"
-#include "codec/morton.h"
 #include "codec/voxel_model.h"
 #include "esvr/error.h"
 #include "format/byte_reader.h"
@@ -24,24 +23,6 @@ constexpr int kMaxBrickBits = 21;
 /// Bytes of memory that a brick takes while it is read: its codes, its masks, and its values.
 constexpr double kDecodedBytesPerBrick =
     kBrickVoxels * (sizeof(std::int32_t) + sizeof(float)) + 3.0 * sizeof(BrickMask) + 64.0;
-
-std::uint64_t keyOf(Coord brick) {
-  return spreadBits(std::uint64_t(brick.x)) | spreadBits(std::uint64_t(brick.y)) << 1 |
-         spreadBits(std::uint64_t(brick.z)) << 2;
-}
-Coord brickAt(std::uint64_t key) {
-  return {std::int32_t(gatherBits(key)), std::int32_t(gatherBits(key >> 1)),
-          std::int32_t(gatherBits(key >> 2))};
-}
-
-/// The bricks in Morton order, in which no brick comes before one that is lower along every axis.
-std::vector<std::size_t> codingOrder(const std::vector<Coord>& bricks) {
-  std::vector<std::size_t> order(bricks.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return keyOf(bricks[a]) < keyOf(bricks[b]); });
-  return order;
-}
 
 int bitsOf(const std::vector<Coord>& bricks) {
   std::uint32_t all = 0;
@@ -88,7 +69,7 @@ void checkCodes(const VoxelLayer& layer, const ByteReader& in) {
 }
 
 void setBricks(std::span<const std::uint64_t> keys, const ByteReader& in, VoxelLayer& layer) {
-  for (const auto key : keys) layer.bricks.push_back(brickAt(key));
+  for (const auto key : keys) layer.bricks.push_back(codec::brickAt(key));
   std::sort(layer.bricks.begin(), layer.bricks.end());
   if (std::adjacent_find(layer.bricks.begin(), layer.bricks.end()) != layer.bricks.end())
     in.fail("a brick of voxels is there twice");
@@ -137,9 +118,9 @@ BrickCount getBrickCount(ByteReader& in, std::uint64_t bytes) {
 
 std::vector<std::byte> encodeStream(const VoxelLayer& layer, const codec::VoxelModel& model,
                                     int bits) {
-  const auto order = codingOrder(layer.bricks);
+  const auto order = codec::codingOrder(layer.bricks);
   std::vector<std::uint64_t> keys;
-  for (const auto b : order) keys.push_back(keyOf(layer.bricks[b]));
+  for (const auto b : order) keys.push_back(codec::keyOf(layer.bricks[b]));
   codec::Writer writer;
   codec::CellTree<codec::Writer>(writer).code(keys, 3 * bits);
   VoxelLayer written = layer;
@@ -157,7 +138,7 @@ void decodeStream(ByteReader& in, const BrickCount& count, const codec::VoxelMod
     layer.codes.resize(count.bricks * kBrickVoxels);
     layer.active.resize(count.bricks);
     layer.vacant.resize(count.bricks);
-    codec::codeVoxels(reader, codingOrder(layer.bricks), model, layer);
+    codec::codeVoxels(reader, codec::codingOrder(layer.bricks), model, layer);
   } catch (const BadInput& error) {
     in.fail(error.what());
   }

@@ -49,6 +49,18 @@ enum class Activity {
 /// \throws UsageError  the bound is not positive and finite
 [[nodiscard]] VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity);
 
+/// Makes a layer smaller by rate-distortion optimised quantisation: a voxel gets a code near its
+/// value that takes fewer bits, where its squared error grows by less than the bits saved are
+/// worth. Voxels then lie within five halves of the lattice's step, and their errors are
+/// correlated with the coder's predictions. Vacant voxels stay so.
+/// \param layer     a layer that boundedLayer made from `volume`; other forms than kLattice are
+///                  returned unchanged
+/// \param bitPrice  squared error that a bit is worth, in squared steps of the lattice. By the
+///                  theory of fine quantisation it is ln(2) / 6 = 0.1155 (6.02 dB for each bit);
+///                  far above that, the codes spoil the predictions of later voxels
+[[nodiscard]] VoxelLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
+                                      double bitPrice);
+
 [[nodiscard]] SparseVolume volumeOf(const VoxelLayer& layer);
 
 /// Largest absolute difference of two volumes' voxels over the bricks of both, active or not.

@@ -1,0 +1,73 @@
+// Plan: thriftyLayer lowers the sum of squared error and price of bits, as counted in the encoded
+// file, on smooth and on noisy values. It moves codes by two steps at most, towards fewer bits, and
+// changes nothing else. A price of 0 and other forms than a lattice change nothing.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "../fit/volumes.h"
+#include "esvr/grid_coding.h"
+#include "esvr/voxel_layer.h"
+
+namespace esvr {
+namespace {
+
+constexpr double kBound = 0.02;
+
+/// A wave with some noise, which quantising with kBound hides.
+SparseVolume noisyWave(double noise) {
+  test::Random random(7);
+  return test::volumeOf({}, 4, 0.0f, [&](Coord v) {
+    return float(1.0 + std::sin(0.2 * v.x) * std::cos(0.15 * v.y + 0.1 * v.z) +
+                 noise * random(-1.0, 1.0));
+  });
+}
+
+/// The squared error in squared steps of the lattice, with bits at a price.
+double costOf(const SparseVolume& volume, const VoxelLayer& layer, double price) {
+  double error = 0.0;
+  for (std::size_t i = 0; i < layer.codes.size(); ++i)
+    error += std::pow(double(volume.values[i]) * layer.divisor - double(layer.codes[i]), 2);
+  return error + price * 8.0 * double(bytesAdded(makeStoredVoxels({}, volume, layer)));
+}
+
+class ThriftyLayer : public testing::TestWithParam<double> {
+ protected:
+  SparseVolume volume_ = noisyWave(GetParam());
+  VoxelLayer nearest_ = boundedLayer(volume_, kBound, Activity::kExact);
+};
+
+TEST_P(ThriftyLayer, LowersErrorPlusPriceOfBits) {
+  const double price = 0.1;  // near the theory's; far above it, the codes spoil later predictions
+  const VoxelLayer layer = thriftyLayer(volume_, nearest_, price);
+  EXPECT_LT(costOf(volume_, layer, price), costOf(volume_, nearest_, price));
+}
+
+TEST_P(ThriftyLayer, MovesCodesByTwoStepsAtMostAndNothingElse) {
+  VoxelLayer layer = thriftyLayer(volume_, nearest_, 0.3);
+  int moved = 0;
+  for (std::size_t i = 0; i < layer.codes.size(); ++i) {
+    const int steps = std::abs(layer.codes[i] - nearest_.codes[i]);
+    ASSERT_LE(steps, 2);
+    moved += steps > 0;
+  }
+  EXPECT_GT(moved, 0);
+  layer.codes = nearest_.codes;
+  EXPECT_EQ(layer, nearest_);
+}
+
+TEST_P(ThriftyLayer, OfFreeBitsIsTheNearest) {
+  EXPECT_EQ(thriftyLayer(volume_, nearest_, 0.0), nearest_);
+}
+
+TEST_P(ThriftyLayer, LeavesExactValuesAlone) {
+  const VoxelLayer exact = exactLayer(volume_);
+  EXPECT_EQ(thriftyLayer(volume_, exact, 0.3), exact);
+}
+
+INSTANTIATE_TEST_SUITE_P(Noise, ThriftyLayer, testing::Values(0.0, 0.03, 0.3));
+
+}  // namespace
+}  // namespace esvr
