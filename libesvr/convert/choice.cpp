@@ -4,7 +4,6 @@
 #include <string>
 #include <utility>
 
-#include "convert/bounded.h"
 #include "convert/psnr_search.h"
 #include "convert/size_search.h"
 #include "convert/voxel_search.h"
@@ -80,13 +79,9 @@ Conversion convertToPsnr(const Job& job, double psnr) {
   const Representation wanted = representationOf(job);
   if (wanted == Representation::kEllipsoids) return std::move(*searchPsnr(job, psnr).conversion);
   auto voxels = voxelsForPsnr(job, psnr);
-  if (wanted == Representation::kVoxels) {
-    if (!voxels) return convertLossless(job);  // says why there are no exact voxels
-    const ChoiceRecord choice{record(*voxels), {}};
-    return asConversion(std::move(*voxels), choice, FitEnd::kPsnrReached);
-  }
-  if (!voxels) return std::move(*searchPsnr(job, psnr).conversion);
-  return smallerOf(job, psnr, std::move(*voxels));
+  if (wanted == Representation::kAuto) return smallerOf(job, psnr, std::move(voxels));
+  const ChoiceRecord choice{record(voxels), {}};
+  return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
 }
 
 Conversion convertToSize(const Job& job, std::uint64_t bytes) {
@@ -106,19 +101,18 @@ Conversion convertToSize(const Job& job, std::uint64_t bytes) {
 Conversion unlessExactIsSmaller(const Job& job, const std::function<Conversion()>& fit) {
   if (representationOf(job) != Representation::kAuto) return fit();
   auto exact = exactVoxels(job);
-  if (!exact) return fit();
   const FitOptions& options = job.options.fit;
   const double count = double(plannedCount(options, activeVoxelCount(job.input.source)));
-  ChoiceRecord choice{record(*exact), {}};
-  if (double(exact->bytes) <= kMinBytesPerEllipsoid * count) {
+  ChoiceRecord choice{record(exact), {}};
+  if (double(exact.bytes) <= kMinBytesPerEllipsoid * count) {
     choice.ellipsoids = Candidate{std::uint64_t(kBytesPerEllipsoid * count), {}, true};
-    return asConversion(std::move(*exact), choice, FitEnd::kScheduleDone);
+    return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);
   }
   Conversion fitted = fit();
   choice.ellipsoids = record(job, fitted);
   fitted.choice = choice;
-  if (choice.ellipsoids->bytes < exact->bytes) return fitted;
-  return asConversion(std::move(*exact), choice, FitEnd::kScheduleDone);
+  if (choice.ellipsoids->bytes < exact.bytes) return fitted;
+  return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);
 }
 
 }  // namespace esvr::convert

@@ -80,22 +80,24 @@ class VoxelSearch {
     range_ = std::max(double(range.max), background) - std::min(double(range.min), background);
   }
 
-  std::optional<VoxelCandidate> forPsnr(double psnr) const {
-    if (!(range_ > 0.0)) return exactVoxels(job_);
-    const double first = psnr / kDbPerOctave - 1.0;
-    const auto plain = coarsestFor(psnr, first, 0.0, kMaxTrials);
-    if (!plain) return exactVoxels(job_);
-    auto best = smaller(candidateOf(plain),
-                        candidateOf(coarsestFor(psnr, octaveOf(plain->bound) + kThriftOctaves,
-                                                kPrice, kMaxThriftyTrials)));
-    if (plateau_.share >= kPlateauShare)
-      best = smaller(std::move(best), withPlateau(psnr, plain->bound));
+  VoxelCandidate forPsnr(double psnr) const {
+    VoxelCandidate best = exactVoxels(job_);
+    const auto take = [&](std::optional<VoxelCandidate> now) {
+      if (now && now->bytes < best.bytes) best = std::move(*now);
+    };
+    if (!(range_ > 0.0)) return best;
+    auto plain = coarsestFor(psnr, psnr / kDbPerOctave - 1.0, 0.0, kMaxTrials);
+    if (!plain) return best;
+    const double bound = plain->bound, octave = octaveOf(bound) + kThriftOctaves;
+    take(candidateOf(std::move(plain)));
+    take(candidateOf(coarsestFor(psnr, octave, kPrice, kMaxThriftyTrials)));
+    if (plateau_.share >= kPlateauShare) take(withPlateau(psnr, bound));
     return best;
   }
 
   std::optional<VoxelCandidate> forSize(std::uint64_t bytes) const {
     auto exact = exactVoxels(job_);
-    if (exact && exact->bytes <= bytes) return exact;
+    if (exact.bytes <= bytes) return exact;
     if (!(range_ > 0.0)) return std::nullopt;
     auto best = fullest(bytes, false);
     if (plateau_.share < kPlateauShare) return best;
@@ -130,11 +132,6 @@ class VoxelSearch {
     return candidate(job_, std::move(trial->layer), trial->psnr);
   }
 
-  static std::optional<VoxelCandidate> smaller(std::optional<VoxelCandidate> a,
-                                               std::optional<VoxelCandidate> b) {
-    return b && (!a || b->bytes < a->bytes) ? std::move(b) : std::move(a);
-  }
-
   /// The coarsest trial found that reaches a PSNR.
   [[nodiscard]] std::optional<Trial> coarsestFor(double psnr, double firstOctave, double price,
                                                  int maxTrials) const {
@@ -159,9 +156,12 @@ class VoxelSearch {
       if (tryBound(boundOf(levels), 0.0).psnr >= psnr) found = levels;
     if (found == 0.0) return std::nullopt;
     std::optional<VoxelCandidate> best;
-    for (const double price : kPlateauPrices)
-      if (Trial now = tryBound(boundOf(found), price); now.psnr >= psnr)
-        best = smaller(std::move(best), candidate(job_, std::move(now.layer), now.psnr));
+    for (const double price : kPlateauPrices) {
+      Trial trial = tryBound(boundOf(found), price);
+      if (trial.psnr < psnr) continue;
+      VoxelCandidate now = candidate(job_, std::move(trial.layer), trial.psnr);
+      if (!best || now.bytes < best->bytes) best = std::move(now);
+    }
     return best;
   }
 
@@ -192,14 +192,11 @@ class VoxelSearch {
 
 }  // namespace
 
-std::optional<VoxelCandidate> exactVoxels(const Job& job) {
-  if (job.input.descriptor.valueType == ValueType::kDouble) return std::nullopt;
+VoxelCandidate exactVoxels(const Job& job) {
   return candidate(job, exactLayer(job.input.source), std::numeric_limits<double>::infinity());
 }
 
-std::optional<VoxelCandidate> voxelsForPsnr(const Job& job, double psnr) {
-  return VoxelSearch(job).forPsnr(psnr);
-}
+VoxelCandidate voxelsForPsnr(const Job& job, double psnr) { return VoxelSearch(job).forPsnr(psnr); }
 
 std::optional<VoxelCandidate> voxelsForSize(const Job& job, std::uint64_t bytes) {
   return VoxelSearch(job).forSize(bytes);

@@ -16,14 +16,12 @@ struct VoxelCandidate {
   double psnr = 0.0;        ///< dB over the box; +inf if the voxels are exact
 };
 
-/// Exact voxels.
-/// \return nothing if the values are doubles, which were rounded
-[[nodiscard]] std::optional<VoxelCandidate> exactVoxels(const Job& job);
+/// Exact voxels. Doubles are exact as they were read, rounded to float32.
+[[nodiscard]] VoxelCandidate exactVoxels(const Job& job);
 
 /// The voxels with the widest quantisation found whose PSNR is at least `psnr`; exact voxels if
 /// quantised ones do not reach it.
-/// \return nothing if the values are doubles, which were rounded, and only exact voxels reach it
-[[nodiscard]] std::optional<VoxelCandidate> voxelsForPsnr(const Job& job, double psnr);
+[[nodiscard]] VoxelCandidate voxelsForPsnr(const Job& job, double psnr);
 
 /// The best voxels found that add at most `bytes` to a file.
 /// \return nothing if even the coarsest voxels are larger
