@@ -1,6 +1,8 @@
 #include "convert/choice.h"
 
 #include <cmath>
+#include <future>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -12,10 +14,17 @@
 namespace esvr::convert {
 namespace {
 
+/// Largest number of voxels in bricks for which voxels are tried as an alternative. The voxel coder
+/// works on one thread, and takes about ten seconds for so many.
+constexpr std::size_t kMaxVoxels = std::size_t{1} << 25;
+
 /// The representation of a job. Float32 storage is a form of ellipsoids.
 Representation representationOf(const Job& job) {
-  return job.options.storage.form == Storage::kFloat32 ? Representation::kEllipsoids
-                                                       : job.options.representation;
+  if (job.options.storage.form == Storage::kFloat32) return Representation::kEllipsoids;
+  const Representation wanted = job.options.representation;
+  if (wanted == Representation::kAuto && job.input.source.values.size() > kMaxVoxels)
+    return Representation::kEllipsoids;
+  return wanted;
 }
 
 Candidate record(const VoxelCandidate& voxels) { return {voxels.bytes, voxels.psnr}; }
@@ -85,7 +94,7 @@ Conversion convertToPsnr(const Job& job, double psnr) {
 }
 
 Conversion convertToSize(const Job& job, std::uint64_t bytes) {
-  const Representation wanted = job.options.representation;
+  const Representation wanted = representationOf(job);
   if (wanted == Representation::kEllipsoids) return ellipsoidsToSize(job, bytes);
   auto voxels = voxelsForSize(job, bytes);
   if (!voxels && wanted == Representation::kVoxels)
@@ -100,18 +109,24 @@ Conversion convertToSize(const Job& job, std::uint64_t bytes) {
 
 Conversion unlessExactIsSmaller(const Job& job, const std::function<Conversion()>& fit) {
   if (representationOf(job) != Representation::kAuto) return fit();
-  auto exact = exactVoxels(job);
   const FitOptions& options = job.options.fit;
   const double count = double(plannedCount(options, activeVoxelCount(job.input.source)));
-  ChoiceRecord choice{record(exact), {}};
-  if (double(exact.bytes) <= kMinBytesPerEllipsoid * count) {
-    choice.ellipsoids = Candidate{std::uint64_t(kBytesPerEllipsoid * count), {}, true};
+  // The voxel coder has one thread. A GPU does not wait for it where a number of ellipsoids is
+  // wanted, which is usually small.
+  const bool atOnce = options.count && options.device.kind == DeviceKind::kCuda;
+  std::future<VoxelCandidate> coder =
+      std::async(std::launch::async, [&] { return exactVoxels(job); });
+  std::optional<Conversion> fitted;
+  if (atOnce) fitted = fit();
+  VoxelCandidate exact = coder.get();
+  ChoiceRecord choice{record(exact),
+                      Candidate{std::uint64_t(kBytesPerEllipsoid * count), {}, true}};
+  if (!fitted && double(exact.bytes) <= kMinBytesPerEllipsoid * count)
     return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);
-  }
-  Conversion fitted = fit();
-  choice.ellipsoids = record(job, fitted);
-  fitted.choice = choice;
-  if (choice.ellipsoids->bytes < exact.bytes) return fitted;
+  if (!fitted) fitted = fit();
+  choice.ellipsoids = record(job, *fitted);
+  fitted->choice = choice;
+  if (choice.ellipsoids->bytes < exact.bytes) return std::move(*fitted);
   return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);
 }
 

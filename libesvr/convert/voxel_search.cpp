@@ -1,6 +1,8 @@
 #include "convert/voxel_search.h"
 
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -33,6 +35,7 @@ constexpr int kMaxThriftyTrials = 4;
 /// Share of the active voxels with the most frequent value from which on a lattice that has this
 /// value, so that these voxels are exact, is tried.
 constexpr double kPlateauShare = 0.02;
+constexpr std::size_t kVoxelsAtOnce = std::size_t{1} << 25;  // of all trials in memory
 constexpr int kMaxLevels = 24;  // coarser lattices than the first that are tried for a plateau
 
 VoxelCandidate candidate(const Job& job, VoxelLayer layer, double psnr) {
@@ -146,14 +149,31 @@ class VoxelSearch {
     return best;
   }
 
+  /// The smallest number of levels in [to, from] that reaches a PSNR; 0 if there is none.
+  [[nodiscard]] double fewestLevels(double psnr, std::size_t from, std::size_t to) const {
+    std::vector<char> reaches(from + 1 - to);
+    const auto tryLevels = [&](std::size_t n) {
+      reaches[n] = tryBound(boundOf(double(to + n)), 0.0).psnr >= psnr;
+    };
+    tbb::task_arena arena(trialsAtOnce());
+    arena.execute([&] { tbb::parallel_for(std::size_t{0}, reaches.size(), tryLevels); });
+    const auto first = std::find(reaches.begin(), reaches.end(), true);
+    return first == reaches.end() ? 0.0 : double(to + std::size_t(first - reaches.begin()));
+  }
+
+  /// The number of trials that may be in memory at once.
+  [[nodiscard]] int trialsAtOnce() const {
+    const std::size_t voxels = std::max<std::size_t>(job_.input.source.values.size(), 1);
+    const auto most = std::size_t(tbb::this_task_arena::max_concurrency());
+    return int(std::clamp<std::size_t>(kVoxelsAtOnce / voxels, 1, most));
+  }
+
   /// The coarsest lattice found that has the value of the plateau and reaches a PSNR. The PSNR is
   /// not monotone in the number of levels, since there may be other plateaus.
   [[nodiscard]] std::optional<VoxelCandidate> withPlateau(double psnr, double bound) const {
     const double from = levelsOf(bound) + 1.0;
     const double to = std::max(std::floor(0.5 * from), std::max(from - kMaxLevels, 1.0));
-    double found = 0.0;
-    for (double levels = from; levels >= to; --levels)
-      if (tryBound(boundOf(levels), 0.0).psnr >= psnr) found = levels;
+    const double found = fewestLevels(psnr, std::size_t(from), std::size_t(to));
     if (found == 0.0) return std::nullopt;
     std::optional<VoxelCandidate> best;
     for (const double price : kPlateauPrices) {

@@ -49,7 +49,8 @@ using Goal = std::variant<FitGoal, SizeGoal, PsnrGoal, BoundGoal, LosslessGoal>;
 /// What a stored grid consists of. A LosslessGoal always stores voxels.
 enum class Representation {
   /// Ellipsoids or voxels, whichever serve the goal better. A FitGoal stores ellipsoids unless
-  /// exact voxels take no more bytes.
+  /// exact voxels take no more bytes. Voxels are not tried for volumes of more than 2^25 voxels in
+  /// bricks, because coding them takes long.
   kAuto,
   kEllipsoids,  ///< for a BoundGoal with a residual, unless the grid is a narrow band
   kVoxels
