@@ -124,7 +124,7 @@ Conversion unlessExactIsSmaller(const Job& job, const std::function<Conversion()
   if (!fitted && double(exact.bytes) <= kMinBytesPerEllipsoid * count)
     return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);
   if (!fitted) fitted = fit();
-  choice.ellipsoids = record(job, *fitted);
+  choice.ellipsoids = Candidate{bytesAdded(fitted->grid)};  // its PSNR would take a decoding
   fitted->choice = choice;
   if (choice.ellipsoids->bytes < exact.bytes) return std::move(*fitted);
   return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);
