@@ -258,6 +258,7 @@ TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing)
 
 Conversion RowMaker::convert(const FitWish& wish, std::uint64_t head) const {
   ConvertOptions options;
+  options.representation = Representation::kEllipsoids;  // the row is that of a fit
   options.fit.box = scene_.box;
   options.fit.cancel = &scene_.cancel;
   options.fit.device = selectDevice(scene_.options.device);

@@ -14,8 +14,8 @@
 namespace esvr::convert {
 namespace {
 
-/// Largest number of voxels in bricks for which voxels are tried as an alternative. The voxel coder
-/// works on one thread, and takes about ten seconds for so many.
+/// Largest number of voxels in bricks for which voxels are tried as an alternative. Fits of larger
+/// volumes would wait long for the voxel coder, which works on one thread.
 constexpr std::size_t kMaxVoxels = std::size_t{1} << 25;
 
 /// The representation of a job. Float32 storage is a form of ellipsoids.
@@ -56,10 +56,21 @@ Conversion ellipsoidsToSize(const Job& job, std::uint64_t bytes) {
   return std::move(*result.conversion);
 }
 
+/// The result of a search for ellipsoids; an empty one if the search was cancelled before it had a
+/// fit, so that voxels are the best result so far.
+template <class Search>
+auto unlessCancelled(const Search& search) -> decltype(search()) try {
+  return search();
+} catch (const Cancelled&) {
+  return {};
+}
+
 /// The smaller of `voxels` and ellipsoids, which must reach the PSNR.
 Conversion smallerOf(const Job& job, double psnr, VoxelCandidate voxels) {
-  auto [ellipsoids, expected] = searchPsnr(job, psnr, voxels.bytes);
-  ChoiceRecord choice{record(voxels), Candidate{expected, psnr, true}};
+  auto [ellipsoids, expected] =
+      unlessCancelled([&] { return searchPsnr(job, psnr, voxels.bytes); });
+  ChoiceRecord choice{record(voxels), {}};
+  if (expected > 0) choice.ellipsoids = Candidate{expected, psnr, true};
   if (ellipsoids) {
     choice.ellipsoids = record(job, *ellipsoids);
     ellipsoids->choice = choice;
@@ -71,7 +82,7 @@ Conversion smallerOf(const Job& job, double psnr, VoxelCandidate voxels) {
 
 /// The better of `voxels` and ellipsoids of a size.
 Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) {
-  auto result = searchSize(job, bytes, voxels.psnr);
+  auto result = unlessCancelled([&] { return searchSize(job, bytes, voxels.psnr); });
   ChoiceRecord choice{record(voxels), {}};
   if (result.expected > 0.0) choice.ellipsoids = Candidate{bytes, result.expected, true};
   if (result.conversion) {

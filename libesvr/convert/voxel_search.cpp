@@ -25,8 +25,8 @@ constexpr double kSizeTolerance = 0.01;      // share of the bytes that may stay
 constexpr int kMaxTrials = 10;
 
 /// Prices of a bit (thriftyLayer). kPrice is the best one at 40 to 60 dB on the volumes of
-/// docs/benchmarks.md: 0.05 and 0.12 give files that are up to 3 % larger. Where the bound cannot be
-/// chosen freely, higher prices use up the PSNR that is left.
+/// docs/lab-notes.md, "Voxel coding": 0.05 gives files that are up to 1 % larger, 0.12 up to 5 %.
+/// Where the bound cannot be chosen freely, higher prices use up the PSNR that is left.
 constexpr double kPrice = 0.08;
 constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
 constexpr double kThriftOctaves = 0.08;  // bound's octaves that make up for the loss by kPrice

@@ -150,7 +150,7 @@ def names(rows, key):
 
 
 def losses(title, key, lost, ours):
-    return [f'- {title}, {name}: ESVR has {text(psnr(ours(name), key))} dB; better: '
+    return [f'- {title}, {name}: ESVR has {text(psnr(ours(name), key))}; as good or better: '
             f'{names(rows, key)}' for name, rows in lost.items()]
 
 
@@ -236,9 +236,13 @@ def line(row, bold):
     return f"| {name} | {' | '.join(cells)} | {row.get('setting', '')} |"
 
 
+def stored(ellipsoids):
+    return f'{ellipsoids} ellipsoids' if ellipsoids else 'voxels'
+
+
 def section(size):
     ours = dict(size.ours, encode_s=size.time['seconds'], name='ESVR',
-                setting=f"{size.time['ellipsoids']} ellipsoids, {size.time['device']}")
+                setting=f"{stored(size.time['ellipsoids'])}, {size.time['device']}")
     bricks = dict(size.bricks, encode_s=size.time['seconds'], name='ESVR, drawn from voxels')
     rows = [ours, bricks] + size.rows + size.externals
     rows.sort(key=lambda r: -psnr(r))
@@ -272,7 +276,7 @@ is not larger.
   with linear opacity, one voxel between samples. *FPS* is pictures a second. *VRAM* is the device memory that
   drawing held. Voxels are drawn from NanoVDB grids, those of quantised rows from quantised grids.
 - Each ESVR file has two rows: one is drawn from the ellipsoids, the other from the decoded voxels
-  (`esvr-render --method bricks`).
+  (`esvr-render --method bricks`). Files for which `vdb2esvr` chose voxels are drawn from voxels in both.
 - The rows of SZ3, TTHRESH, quantise+xz, xz-lossless and zstd-lossless are *external compressors*. They were
   measured separately, on another machine, and for four of the volumes only
   ([external_points.md](../tests/bench/external_points.md)). Their times cannot be compared with the others, and

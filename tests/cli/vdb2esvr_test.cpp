@@ -467,10 +467,10 @@ class Interrupted : public Vdb2Esvr {
  protected:
   [[nodiscard]] test::ProgramRun interrupted(const std::string& onCancel) const {
     test::writeInput(in(), {{.voxels = softBall({})}, {.name = "heat", .voxels = softBall({})}});
-    return test::runProgram(
-        "/usr/bin/timeout",
-        {"--foreground", "--preserve-status", "--signal=INT", "1", VDB2ESVR, in(), out(),
-         "--seconds", "60", "--kappa", "0", "--on-cancel", onCancel});
+    return test::runProgram("/usr/bin/timeout",
+                            {"--foreground", "--preserve-status", "--signal=INT", "1", VDB2ESVR,
+                             in(), out(), "--seconds", "60", "--kappa", "0", "--representation",
+                             "ellipsoids", "--on-cancel", onCancel});
   }
 };
 

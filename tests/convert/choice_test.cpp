@@ -61,6 +61,20 @@ TEST(ChoiceForAPsnr, StoresTheRepresentationThatIsInsistedOn) {
   EXPECT_FALSE(choose(volume, PsnrGoal{35.0}, Representation::kEllipsoids).grid.voxels);
 }
 
+TEST(ChoiceForAPsnr, KeepsTheVoxelsWhereTheFitIsCancelled) {
+  const SparseVolume volume = test::smoothVolume();
+  CancelToken cancel;
+  cancel.cancel();
+  for (const Goal& goal : {Goal{PsnrGoal{35.0}}, Goal{SizeGoal{20000}}}) {
+    ConvertOptions options;
+    options.goal = goal;
+    options.fit.cancel = &cancel;
+    const Conversion conversion = convertVolume({{}, volume}, options);
+    EXPECT_TRUE(conversion.grid.voxels);
+    EXPECT_GE(psnrOver(volume, conversion), 35.0);
+  }
+}
+
 TEST(ChoiceForASize, TakesVoxelsOfNoise) {
   const SparseVolume volume = test::noiseVolume(2);
   const Conversion conversion = choose(volume, SizeGoal{3000});
