@@ -38,13 +38,12 @@ cli::ProgramText programText() {
       .notes =
           "Without -g, all float and double grids are fitted; other grids are listed and skipped.\n"
           "--size and --ratio search the best file that is not larger (and at most 2 % smaller).\n"
-          "Several grids share the bytes by their active voxels. --psnr searches the smallest "
-          "file\n"
-          "that reaches the PSNR; --count then limits the number of ellipsoids. Both choose for\n"
-          "each grid between ellipsoids and quantised voxels, and a short fit shows which serve "
-          "it\n"
-          "better; --representation insists on one of them. With --psnr and --seconds there is a\n"
-          "single fit, which ends as soon as it reaches the PSNR.\n"
+          "Several grids share the bytes by their active voxels. --psnr searches the smallest\n"
+          "file that reaches the PSNR; --count then limits the number of ellipsoids. Both choose\n"
+          "for each grid between ellipsoids and quantised voxels, and a short fit shows which\n"
+          "serve it better; --representation insists on one of them. Without such a goal,\n"
+          "ellipsoids are stored unless exact voxels take no more bytes. With --psnr and\n"
+          "--seconds there is a single fit, which ends as soon as it reaches the PSNR.\n"
           "The program prints a table on stdout. Its PSNR and largest error are measured on the\n"
           "voxels that are decoded from the written file.\n"
           "\n"
@@ -80,8 +79,8 @@ void addGoalOptions(cli::po::options_description& options) {
      "keep every voxel within E of the source, or within E% of its range; ellipsoids then have a "
      "residual")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
-     "with --size, --ratio, --psnr or --max-error: ellipsoids, voxels, or auto, the better or "
-     "smaller of the two")
+     "ellipsoids, voxels, or auto, which chooses the better or smaller of the two; voxels need "
+     "--size, --ratio, --psnr, --max-error or --lossless")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
      "threshold: a voxel's value decides whether it is active; exact: store the active mask");
   // clang-format on

@@ -8,16 +8,9 @@ constexpr std::uint64_t kRotationBytes = 4 * kFloatBytes;
 constexpr std::uint64_t kBitsPerByte = 8;
 constexpr std::uint64_t kMaskBytes = sizeof(BrickMask);
 
-/// Bytes that voxels save over ellipsoids.
-std::uint64_t saved(const ChoiceRecord& choice) {
-  if (!choice.ellipsoids || choice.ellipsoids->bytes <= choice.voxels->bytes) return 0;
-  return choice.ellipsoids->bytes - choice.voxels->bytes;
-}
-
-std::string whyVoxels(const ChoiceRecord& choice) {
-  if (!choice.ellipsoids) return "voxels are stored, exactly or quantised";
-  return saved(choice) > 0 ? "voxels serve the goal in fewer bytes"
-                           : "voxels have a smaller error in as many bytes";
+/// Bytes by which a candidate is smaller than another; 0 if it is not.
+std::uint64_t saved(const Candidate& taken, const std::optional<Candidate>& other) {
+  return other && other->bytes > taken.bytes ? other->bytes - taken.bytes : 0;
 }
 
 }  // namespace
@@ -28,14 +21,16 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   const auto lacks = [&](const char* kind) { return !hasSection(record.output, g, kind); };
 
   const ChoiceRecord choice = grid.conversion.choice.value_or(ChoiceRecord{});
-  if (grid.stored().voxels) return {{"ellipsoids", whyVoxels(choice), saved(choice)}};
+  if (grid.stored().voxels && !choice.ellipsoids)
+    return {{"ellipsoids", "voxels are stored, exactly or quantised"}};
+  if (grid.stored().voxels)
+    return {
+        {"ellipsoids", "voxels serve the goal better", saved(*choice.voxels, choice.ellipsoids)}};
 
   std::vector<LeftOut> notes;
   if (choice.voxels)
-    notes.push_back({"voxels", "ellipsoids serve the goal better",
-                     choice.ellipsoids->bytes < choice.voxels->bytes
-                         ? choice.voxels->bytes - choice.ellipsoids->bytes
-                         : 0});
+    notes.push_back(
+        {"voxels", "ellipsoids serve the goal better", saved(*choice.ellipsoids, choice.voxels)});
   const bool compact = grid.conversion.compact.has_value();
   if (!grid.conversion.fit.signedIntensities)
     notes.push_back({"signs", "no ellipsoid has a negative intensity",

@@ -30,8 +30,9 @@ struct Thrift {
   double bitPrice = 0.0;               ///< squared error, in the same units, that a bit is worth
 };
 
-/// Replaces the codes of voxels that are not vacant by codes near them that take fewer bits, where
-/// that is worth the error. The layer's form is kLattice; the bricks are visited as by codeVoxels().
+/// Replaces the code of a voxel that is not vacant by a code near it that takes fewer bits, if the
+/// bits saved are worth more than the error added. The layer must have the form kLattice. Bricks are
+/// visited in the same order as by codeVoxels().
 void chooseCodes(std::span<const std::size_t> order, const VoxelModel& model, const Thrift& thrift,
                  VoxelLayer& layer);
 

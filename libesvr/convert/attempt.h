@@ -42,11 +42,16 @@ struct Attempt {
 /// more bits (docs/lab-notes.md, "More ellipsoids or more bits").
 inline constexpr double kUsualLoss = 0.9;
 
-/// Usual values that extrapolate from a short fit.
-inline constexpr double kShortFitBehind = 2.5;     // PSNR of a full fit less that of a short one
-inline constexpr double kBytesPerEllipsoid = 8.0;  // in a grid that lost kUsualLoss
+// Usual values, with which a short fit is extrapolated. They decide which full fits are made; the
+// PSNR and the bytes of every stored grid are measured.
+/// PSNR of a full fit less that of a short fit of as many ellipsoids, dB.
+inline constexpr double kShortFitBehind = 2.5;
+/// Bytes that an ellipsoid takes in a grid that lost kUsualLoss by quantising.
+inline constexpr double kBytesPerEllipsoid = 8.0;
+/// Bytes that an ellipsoid takes at least.
 inline constexpr double kMinBytesPerEllipsoid = 5.0;
-inline constexpr double kUncertainty = 0.75;  // error of an extrapolated PSNR, dB
+/// PSNR, dB, by which a full fit is given the chance to exceed its extrapolation.
+inline constexpr double kUncertainty = 0.75;
 
 /// The goal of storing an attempt: `loss`, unless a PSNR or a number of bytes is given.
 struct StorageTarget {

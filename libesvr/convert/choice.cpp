@@ -125,8 +125,8 @@ Conversion unlessExactIsSmaller(const Job& job, const std::function<Conversion()
   // The voxel coder has one thread. A GPU does not wait for it where a number of ellipsoids is
   // wanted, which is usually small.
   const bool atOnce = options.count && options.device.kind == DeviceKind::kCuda;
-  std::future<VoxelCandidate> coder =
-      std::async(std::launch::async, [&] { return exactVoxels(job); });
+  std::future<VoxelCandidate> coder = std::async(
+      atOnce ? std::launch::async : std::launch::deferred, [&] { return exactVoxels(job); });
   std::optional<Conversion> fitted;
   if (atOnce) fitted = fit();
   VoxelCandidate exact = coder.get();

@@ -35,7 +35,8 @@ constexpr int kMaxThriftyTrials = 4;
 /// Share of the active voxels with the most frequent value from which on a lattice that has this
 /// value, so that these voxels are exact, is tried.
 constexpr double kPlateauShare = 0.02;
-constexpr std::size_t kVoxelsAtOnce = std::size_t{1} << 25;  // of all trials in memory
+/// Largest number of voxels that the trials in memory have together.
+constexpr std::size_t kVoxelsAtOnce = std::size_t{1} << 25;
 constexpr int kMaxLevels = 24;  // coarser lattices than the first that are tried for a plateau
 
 VoxelCandidate candidate(const Job& job, VoxelLayer layer, double psnr) {
@@ -98,9 +99,8 @@ class VoxelSearch {
     return best;
   }
 
+  /// The best quantised voxels of a size.
   std::optional<VoxelCandidate> forSize(std::uint64_t bytes) const {
-    auto exact = exactVoxels(job_);
-    if (exact.bytes <= bytes) return exact;
     if (!(range_ > 0.0)) return std::nullopt;
     auto best = fullest(bytes, false);
     if (plateau_.share < kPlateauShare) return best;
@@ -219,6 +219,8 @@ VoxelCandidate exactVoxels(const Job& job) {
 VoxelCandidate voxelsForPsnr(const Job& job, double psnr) { return VoxelSearch(job).forPsnr(psnr); }
 
 std::optional<VoxelCandidate> voxelsForSize(const Job& job, std::uint64_t bytes) {
+  auto exact = exactVoxels(job);
+  if (exact.bytes <= bytes) return exact;
   return VoxelSearch(job).forSize(bytes);
 }
 

@@ -15,19 +15,20 @@ struct ListedSupport {
   std::array<double, 3> center;
   Matrix3 L;
   double reach;  ///< radius in the unit frame, including the slack
-  bool refused;  ///< whether a step was refused since
+  bool refused;  ///< true if a step was refused since the lists were built
 };
 
 /// How slack is chosen, and when lists end. docs/lab-notes.md has the measurements
 /// ("When lists of pairs are built anew").
 struct SlackRule {
-  double missedShare = 0.05;       ///< share of its intensity that a list may miss of an ellipsoid
-  double minSlack = 0.15;          ///< voxels
-  double maxSlack = 0.25;          ///< share of the radius, where minSlack is less
-  double slackOverMotion = 0.9;    ///< slack over the motion since the lists before
-  std::uint32_t settledSteps = 4;  ///< an ellipsoid that is younger gets maxSlack, as does one
-                                   ///< whose step was refused: it would be refused again
-  double refusedShare = 0.03;      ///< lists end after so many refused steps an ellipsoid
+  double missedShare = 0.05;     ///< share of its intensity that a list may miss of an ellipsoid
+  double minSlack = 0.15;        ///< voxels
+  double maxSlack = 0.25;        ///< share of the radius, where minSlack is less
+  double slackOverMotion = 0.9;  ///< slack over the motion since the lists before
+  /// An ellipsoid that took fewer steps gets maxSlack. So does one whose step was refused, because
+  /// its next step would be refused too.
+  std::uint32_t settledSteps = 4;
+  double refusedShare = 0.03;  ///< lists end after so many refused steps an ellipsoid
 
   /// \return the number of refused steps that ends lists of `count` ellipsoids
   [[nodiscard]] std::uint32_t refusedSteps(std::size_t count) const {

@@ -13,7 +13,7 @@ namespace {
 constexpr int kDigitBits = 16;
 constexpr int kKeyBits = 64;
 constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
-constexpr std::size_t kPairsPerCounter = 4096;  // large, since a task's counters take 512 KB
+constexpr std::size_t kPairsPerCountingTask = 4096;  // large, since a task's counters take 512 KB
 
 using Histogram = std::vector<std::uint64_t>;
 
@@ -55,7 +55,7 @@ Histogram countDigits(std::span<const BrickPair> pairs, const Backgrounds& backg
                       const Prefix& prefix) {
   using Range = tbb::blocked_range<std::size_t>;
   return tbb::parallel_reduce(
-      Range(0, pairs.size(), kPairsPerCounter), Histogram(kDigits),
+      Range(0, pairs.size(), kPairsPerCountingTask), Histogram(kDigits),
       [&](const Range& range, Histogram counts) {
         for (std::size_t i = range.begin(); i != range.end(); ++i)
           visitErrors(pairs[i], backgrounds, [&](double error) {

@@ -339,17 +339,17 @@ TEST_F(CompareOption, maxDenseSkipsZfpInCurves) {
 
 // ---- all programs
 
-struct ProgramRun {
+struct ProgramCommand {
   const char* name;
   const char* path;
   std::vector<std::string>
       arguments;  ///< arguments of a run of milliseconds; "DIR/x" is in the test's folder
 };
-std::ostream& operator<<(std::ostream& out, const ProgramRun& program) {
+std::ostream& operator<<(std::ostream& out, const ProgramCommand& program) {
   return out << program.name;
 }
 
-class EveryProgram : public Options, public testing::WithParamInterface<ProgramRun> {
+class EveryProgram : public Options, public testing::WithParamInterface<ProgramCommand> {
  protected:
   void SetUp() override {
     test::writeInput(at("in.vdb"), {{.voxels = softBall({})}});
@@ -397,23 +397,24 @@ TEST_P(EveryProgram, takesANumberOfThreads) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, EveryProgram,
-    testing::Values(
-        ProgramRun{"vdb2esvr",
-                   VDB2ESVR,
-                   {"DIR/in.vdb", "DIR/o.esvr", "--force", "--count", "9", "--iterations", "30"}},
-        ProgramRun{"esvr2vdb", ESVR2VDB, {"DIR/in.esvr", "DIR/o.vdb", "--force"}},
-        ProgramRun{
-            "render",
-            ESVR_RENDER,
-            {"DIR/in.esvr", "DIR/o.png", "--force", "--resolution", "16x16", "--device", "cpu"}},
-        ProgramRun{"check", ESVR_COMPARE, {"check", "DIR/in.vdb", "DIR/in.esvr"}},
-        ProgramRun{"table",
-                   ESVR_COMPARE,
-                   {"table", "DIR/in.vdb", "DIR/in.esvr", "--rows", "none", "--runs", "1"}},
-        ProgramRun{
-            "curves",
-            ESVR_COMPARE,
-            {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o", "DIR/c", "--force"}}),
+    testing::Values(ProgramCommand{"vdb2esvr",
+                                   VDB2ESVR,
+                                   {"DIR/in.vdb", "DIR/o.esvr", "--force", "--count", "9",
+                                    "--iterations", "30"}},
+                    ProgramCommand{"esvr2vdb", ESVR2VDB, {"DIR/in.esvr", "DIR/o.vdb", "--force"}},
+                    ProgramCommand{"render",
+                                   ESVR_RENDER,
+                                   {"DIR/in.esvr", "DIR/o.png", "--force", "--resolution", "16x16",
+                                    "--device", "cpu"}},
+                    ProgramCommand{"check", ESVR_COMPARE, {"check", "DIR/in.vdb", "DIR/in.esvr"}},
+                    ProgramCommand{
+                        "table",
+                        ESVR_COMPARE,
+                        {"table", "DIR/in.vdb", "DIR/in.esvr", "--rows", "none", "--runs", "1"}},
+                    ProgramCommand{"curves",
+                                   ESVR_COMPARE,
+                                   {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o",
+                                    "DIR/c", "--force"}}),
     [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace

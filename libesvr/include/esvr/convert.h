@@ -52,7 +52,8 @@ enum class Representation {
   /// exact voxels take no more bytes. Voxels are not tried for volumes of more than 2^25 voxels in
   /// bricks, because coding them takes long.
   kAuto,
-  kEllipsoids,  ///< for a BoundGoal with a residual, unless the grid is a narrow band
+  /// Ellipsoids. For a BoundGoal they have a residual, which a narrow band cannot have.
+  kEllipsoids,
   kVoxels
 };
 
