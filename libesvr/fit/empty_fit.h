@@ -15,6 +15,7 @@ namespace esvr {
   FitResult result;
   result.field.background = volume.background;
   result.field.kernel.kappa = kappa;
+  result.range = {volume.background, volume.background};
   TimedCurvePoint point;
   point.psnrBox = point.psnrActive = kPerfectPsnr;
   result.curve.push_back(point);

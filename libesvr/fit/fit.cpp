@@ -53,6 +53,11 @@ RunPlan planFor(const FitTarget& target, const FitOptions& options) {
   return plan;
 }
 
+ValueRange rangeOf(float background, const FitTarget& target) {
+  return {float(background + target.lowest / target.scale),
+          float(background + target.highest / target.scale)};
+}
+
 bool anyNegative(const Field& field) {
   return std::any_of(field.chunks.begin(), field.chunks.end(), [](const Chunk& chunk) {
     const auto& i = chunk.ellipsoids.intensity;
@@ -73,6 +78,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   check(options);
   const Tuning tuning;
   FitTarget target = makeTarget(volume, options.box);
+  target.saturates = true;
   target.narrowBand = options.narrowBand;
   if (isEmpty(target)) return emptyFit(volume, options.kappa.value_or(Kernel{}.kappa));
 
@@ -90,6 +96,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   FitResult result;
   result.field = exportField(optimiser->ellipsoids(),
                              {volume.origin, target.scale, volume.background, optimiser->kernel()});
+  result.range = rangeOf(volume.background, target);
   result.kappaLearned = plan.learnKappa;
   result.end = end.end;
   result.curve = recorder.curve();

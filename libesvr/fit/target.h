@@ -18,6 +18,7 @@ struct FitTarget {
   std::uint64_t activeVoxels = 0;
   double peak = 1.0;                               ///< scaled peakOf(volume)
   double lowest = 0.0, highest = 0.0;              ///< range of `values` and 0
+  bool saturates = false;                          ///< sums are clamped to this range
   bool narrowBand = false;                         ///< see FitOptions
   const std::vector<BrickMask>* active = nullptr;  ///< active masks of the volume's bricks
   std::optional<Box> within{};  ///< box of bricks outside which errors do not count; default: none

@@ -14,8 +14,8 @@ struct Tuning {
   double largestScale = 16.0;   ///< voxels; larger scales take time and do not reduce the error
   double finalStep = 0.2;       ///< factor of the step sizes at the end of the decay
   double tail = 0.15;           ///< last fraction of the run, in which step sizes go to zero
-  double firstShare = 0.2;      ///< share of the ellipsoids that are seeded at the start
-  double growUntil = 0.3;       ///< fraction of the run at which growth ends
+  double firstShare = 0.1;      ///< share of the ellipsoids that are seeded at the start
+  double growUntil = 0.5;       ///< fraction of the run at which growth ends
   double relocateUntil = 0.7;   ///< fraction of the run at which relocation ends
   double relocateShare = 0.05;  ///< share of the ellipsoids that an event relocates
   double eventEvery = 0.01;     ///< fraction of the run between events

@@ -74,7 +74,8 @@ void SumTile::compositeRay(int pixel, double firstSample) {
   for (std::uint32_t left = touched_[pixel]; left != 0; left &= left - 1) {
     const int sample = std::countr_zero(left);
     const float sum = std::exchange(sums[sample], 0.0f);
-    if (sum != 0.0f) add(pixel, scene_.rule.background + sum, firstSample + sample);
+    const float value = scene_.voxelRule.settled(scene_.rule.background + sum);
+    if (value != scene_.rule.background) add(pixel, value, firstSample + sample);
   }
   touched_[pixel] = 0;
 }

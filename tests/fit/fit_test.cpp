@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "esvr/error.h"
@@ -25,10 +26,9 @@ FitOptions quick(std::size_t count = 60) {
 }
 
 double psnrOfFit(const SparseVolume& volume, const FitResult& result, double peak) {
-  RevoxeliseOptions all;
   CompareOptions compare;
   compare.peak = peak;
-  return compareVolumes(volume, revoxelise(result.field, all), compare).psnrBox;
+  return compareVolumes(volume, revoxelise(result.field, {.range = result.range}), compare).psnrBox;
 }
 
 TEST(Fit, ReachesHighQualityOnAFieldOfEllipsoids) {
@@ -44,13 +44,28 @@ TEST(Fit, CurveAgreesWithTheMetricsOfItsField) {
   const SparseVolume volume = test::tubeVolume();
   const FitResult result = fit(volume, quick());
   const CompareOptions compare;
-  const VolumeMetrics m = compareVolumes(volume, revoxelise(result.field, {}), compare);
+  const VolumeMetrics m =
+      compareVolumes(volume, revoxelise(result.field, {.range = result.range}), compare);
   // The curve also counts errors outside the box, and float32 parameters change the error, hence
   // the tolerance.
   EXPECT_NEAR(result.curve.back().psnrBox, m.psnrBox, 0.05);
   EXPECT_LE(result.curve.back().psnrBox, m.psnrBox + 1e-3);
   EXPECT_NEAR(result.curve.back().psnrActive, m.psnrActive, 1e-2);
   EXPECT_NEAR(result.curve.back().maxError, m.maxError, 1e-4);
+}
+
+TEST(Fit, LetsSumsExceedAPlateau) {
+  const SparseVolume ball = test::volumeOf({}, 4, 0.0f, [](Coord v) {
+    return std::clamp(float(12.0 - std::hypot(v.x - 15.5, v.y - 15.5, v.z - 15.5)), 0.0f, 1.0f);
+  });
+  const FitResult result = fit(ball, quick());
+  EXPECT_EQ(result.range.min, 0.0f);
+  EXPECT_EQ(result.range.max, 1.0f);
+  const double clamped =
+      compareVolumes(ball, revoxelise(result.field, {.range = result.range})).psnrBox;
+  const double sums = compareVolumes(ball, revoxelise(result.field, {})).psnrBox;
+  EXPECT_GT(clamped, sums + 3.0);
+  EXPECT_GT(clamped, 30.0);
 }
 
 TEST(Fit, GivesTheSameBitsAgain) {

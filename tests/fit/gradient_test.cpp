@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "fit/cpu/cpu_pass.h"
@@ -46,20 +47,26 @@ double referenceLoss(const std::vector<Ellipsoid>& ellipsoids, const KernelConst
     for (int y = -margin; y < kSide + margin; ++y)
       for (int z = -margin; z < kSide + margin; ++z) {
         const double t = double(esvr::valueAt(volume, {x, y, z})) * target.scale;
-        const double r = valueAt(ellipsoids, k, {x, y, z}) - t;
+        const double sum = valueAt(ellipsoids, k, {x, y, z});
+        const double r =
+            (target.saturates ? std::clamp(sum, target.lowest, target.highest) : sum) - t;
         loss += 0.5 * r * r;
       }
   return loss;
 }
 
-class GradientKappa : public testing::TestWithParam<float> {};
+class GradientKappa : public testing::TestWithParam<float> {
+ protected:
+  void expectCentralDifferences(bool saturates) const;
+};
 
 // The loss is about 1e4 in float64, so differences with a step of 1e-6 have errors near 1e-6. The
 // step is so small because phi has a kink at the end of its support, and few voxels should lie
 // across it. The gradient itself is a float32 sum over a few thousand voxels.
-TEST_P(GradientKappa, SlowAgreesWithCentralDifferences) {
+void GradientKappa::expectCentralDifferences(bool saturates) const {
   const SparseVolume volume = denseVolume();
-  const FitTarget target = makeTarget(volume, std::nullopt);
+  FitTarget target = makeTarget(volume, std::nullopt);
+  target.saturates = saturates;
   const auto k = kernelConstants<double>({.kappa = GetParam()});
   const auto ellipsoids = randomEllipsoids(3, 1.5, 2.0);
   CpuPass engine(target, k);
@@ -86,6 +93,12 @@ TEST_P(GradientKappa, SlowAgreesWithCentralDifferences) {
     EXPECT_LT(std::sqrt(error2), 3e-4 * std::sqrt(norm2)) << "ellipsoid " << i;
   }
 }
+TEST_P(GradientKappa, SlowAgreesWithCentralDifferences) { expectCentralDifferences(false); }
+// A voxel whose sum is clamped has an error but no gradient.
+TEST_P(GradientKappa, SlowAgreesWithCentralDifferencesOfClampedSums) {
+  expectCentralDifferences(true);
+}
+
 // The derivative by kappa is taken at fixed half widths: the scales change as in a run.
 TEST_P(GradientKappa, AgreesWithCentralDifferencesByKappa) {
   const SparseVolume volume = denseVolume();

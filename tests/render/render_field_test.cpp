@@ -7,8 +7,10 @@
 // costs more.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "esvr/error.h"
 #include "esvr/render.h"
@@ -37,11 +39,14 @@ RenderOptions optionsFor(const CameraWish& wish = {}, Resolution resolution = {5
   return o;
 }
 
-double agreement(const Field& field, const RenderOptions& o) {
+double agreement(const Field& field, const RenderOptions& o,
+                 const std::optional<ValueRange>& range = std::nullopt) {
   const double farthest = length(difference(o.camera.eye, o.camera.center)) + 100.0;
-  const SampledScene scene{sumOfEllipsoids(field), field.background, farthest};
-  const Image expected = referencePicture(scene, o);
-  const Image drawn = renderField(field, o);
+  const auto clamped = [&, sum = sumOfEllipsoids(field)](const Vec3& place) {
+    return range ? std::clamp(sum(place), double(range->min), double(range->max)) : sum(place);
+  };
+  const Image expected = referencePicture({clamped, field.background, farthest}, o);
+  const Image drawn = renderField(field, o, {.range = range});
   double light = 0.0;
   for (const float v : drawn.rgba) light += v;
   EXPECT_GT(light, 0.0) << "an empty picture proves nothing";
@@ -63,6 +68,12 @@ TEST(RenderField, AgreesWithACameraInsideTheVolume) {
   CameraWish flat = inside;
   flat.projection = Projection::kOrthographic;
   EXPECT_GE(agreement(randomField({}), optionsFor(flat)), kAsked);
+}
+
+TEST(RenderField, SumsAreClampedToTheRangeOfTheVoxels) {
+  Field field = randomField({.count = 300});
+  field.background = 0.125f;
+  EXPECT_GE(agreement(field, optionsFor(), ValueRange{-0.25f, 0.5f}), kAsked);
 }
 
 TEST(RenderField, AgreesForNeedlesAndPancakes) {

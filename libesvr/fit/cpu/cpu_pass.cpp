@@ -28,7 +28,7 @@ double CpuPass::gradients(std::span<const Ellipsoid> ellipsoids, std::span<Ellip
     alignas(64) float r[kBrickVoxels];
     startFromTarget(b, r);
     forwardBrick(b, scratch, r);
-    if (target().narrowBand) saturate(b, r);
+    if (target().saturates) saturate(b, r);
     brickLoss_[b] = sumOfSquares(r);
     backwardBrick(b, scratch, r);
   });

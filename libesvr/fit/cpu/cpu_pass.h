@@ -29,7 +29,8 @@ class CpuPass : public PairPass<SceneKernel> {
   CpuPass(const FitTarget& target, const KernelConstants<double>& kernel)
       : PairPass(target, SceneKernel(kernel)) {}
 
-  /// Computes the gradients of 1/2 sum r^2 with r = V - target over all bricks of the lists.
+  /// Computes the gradients of 1/2 sum r^2 over all bricks of the lists. r = V - target, where V is
+  /// clamped if FitTarget::saturates; r does not depend on a V that is clamped.
   /// \return sum of r^2
   double gradients(std::span<const Ellipsoid> ellipsoids, std::span<EllipsoidGradient> out);
 

@@ -70,7 +70,7 @@ class PairPass {
         brickKernels().add(forms_[i], cornerIn(frames_[i], corner).data(), kernels_.constants(i),
                            r);
       }
-      if (target_.narrowBand) saturate(b, r);
+      if (target_.saturates) saturate(b, r);
       std::copy_n(r, kBrickVoxels, out.data() + b * kBrickVoxels);
     });
   }
@@ -119,10 +119,14 @@ class PairPass {
     for (int v = 0; v < kBrickVoxels; ++v) r[v] = -t[v];
   }
 
-  /// Sets r = clamp(V, lowest, highest) - target, since a narrow band is clamped when revoxelised.
+  /// Replaces r = V - target by clamp(V, lowest, highest) - target.
   void saturate(std::size_t brick, float* r) const {
-    const float* t = target_.values.data() + brick * kBrickVoxels;
     const auto low = float(target_.lowest), high = float(target_.highest);
+    if (brick >= target_.bricks.size()) {
+      for (int v = 0; v < kBrickVoxels; ++v) r[v] = std::clamp(r[v], low, high);
+      return;
+    }
+    const float* t = target_.values.data() + brick * kBrickVoxels;
     for (int v = 0; v < kBrickVoxels; ++v) r[v] = std::clamp(r[v], low - t[v], high - t[v]);
   }
 

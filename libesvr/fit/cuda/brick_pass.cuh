@@ -43,13 +43,12 @@ __device__ void addPair(const PairForm& p, const KernelConstants<float>& kernel,
   });
 }
 
-/// \return the residual of voxel v, r = V - target
+/// \return the residual of voxel v, r = V - target; V is clamped if the target saturates
 __device__ inline float residualOf(const PassTarget& target, bool inTarget, std::size_t v,
                                    float sum) {
-  if (!inTarget) return sum;
-  const float t = target.values[v];
+  const float t = inTarget ? target.values[v] : 0.0f;
   const float r = sum - t;
-  return target.narrowBand ? fminf(fmaxf(r, target.lowest - t), target.highest - t) : r;
+  return target.saturates ? fminf(fmaxf(r, target.lowest - t), target.highest - t) : r;
 }
 
 /// Replaces the sums by residuals. The order in which squares are added does not depend on the

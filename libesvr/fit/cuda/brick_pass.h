@@ -10,7 +10,7 @@ namespace esvr::cuda {
 /// The values that the sum is compared with.
 struct PassTarget {
   const float* values;    ///< kBrickVoxels values for each target brick, in device memory
-  bool narrowBand;        ///< the sum is clamped to [lowest, highest] before it is compared
+  bool saturates;         ///< the sum is clamped to [lowest, highest] before it is compared
   float lowest, highest;  ///< range of the target
 };
 

@@ -68,7 +68,7 @@ BrickPassArguments CudaOptimiser::passArguments() {
   return {.scene = passScene(bricks_, lists_, count_, forms_.data()),
           .kernel = narrowed(kernel_),
           .target = {.values = targetValues_.data(),
-                     .narrowBand = target_.narrowBand,
+                     .saturates = target_.saturates,
                      .lowest = float(target_.lowest),
                      .highest = float(target_.highest)},
           .brickLoss = brickLoss_.data(),

@@ -47,9 +47,7 @@ struct FitOptions : CommonFitOptions {
   std::optional<std::uint32_t> iterations;  ///< length of the schedule
   Preset preset = Preset::kStandard;
   std::optional<float> kappa;  ///< edge of the kernel; default: it is fitted with the ellipsoids
-  /// The volume is a level set. Values beyond its range then count as the ends of the range,
-  /// because they are clamped when the grid is revoxelised as a narrow band. Voxels outside the
-  /// volume's bricks do not count.
+  /// The volume is a level set: voxels outside its bricks do not count.
   bool narrowBand = false;
 };
 
@@ -57,6 +55,7 @@ enum class FitEnd { kScheduleDone, kPsnrReached, kTimeUp, kCancelled, kPsnrMisse
 
 struct FitResult {
   Field field;
+  ValueRange range{};  ///< range of the volume's values, to which sums are clamped
   std::vector<TimedCurvePoint> curve;
   FitEnd end = FitEnd::kScheduleDone;
   bool kappaLearned = false;  ///< true if kappa was fitted, false if it was given
@@ -74,7 +73,9 @@ struct FitResult {
 /// active voxels, but at most one for each of them.
 [[nodiscard]] std::size_t plannedCount(const FitOptions& options, std::uint64_t activeVoxels);
 
-/// Fits ellipsoids to a volume. The result is deterministic: the same volume, options and seed give
+/// Fits ellipsoids to a volume. Sums are clamped to the range of the volume's values, background
+/// included, before they are compared with the volume: where it saturates, they only have to be
+/// large enough. A reader must clamp them too, as decodeGrid() does. The result is deterministic: the same volume, options and seed give
 /// the same bits on any number of threads, and in every run on GPUs of one kind, unless `seconds`
 /// ends the run. CPU and GPU use the same method and formulas but round differently, so that their
 /// fits differ in detail.

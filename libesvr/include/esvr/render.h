@@ -32,7 +32,7 @@ enum class RenderMode {
 /// The values of a field between its voxels.
 enum class Between {
   kVoxels,  ///< trilinear interpolation of the voxels of revoxelise(), as in renderVolume
-  kSum      ///< the sum of ellipsoids itself, which a fit determines at voxels only
+  kSum      ///< the clamped sum of ellipsoids itself, which a fit determines at voxels only
 };
 
 /// A box with real-valued corners. Voxel (i, j, k) extends half a voxel to each side of (i, j, k).
@@ -64,7 +64,8 @@ struct RenderOptions {
 /// a tile and bin, and the samples are interpolated from these voxels. The result is the picture of
 /// renderVolume(revoxelise(field, voxels)) up to rounding.
 /// \param voxels  rule by which sums become voxels; its bricks are ignored. In a narrow band, the
-///                voxels inside the surface are -background wherever an ellipsoid reaches
+///                voxels inside the surface are -background wherever an ellipsoid reaches.
+///                Between::kSum uses its range only
 /// \throws UsageError  as for checkCamera and checkTransferFunction; step, opacityLength or
 ///                     minTransmittance is out of range; the clip box is invalid; a ray has more
 ///                     than 2^24 samples in the supports

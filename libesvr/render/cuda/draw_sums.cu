@@ -193,6 +193,12 @@ __device__ void addBin(const SumArguments& a, Shared& s, const Place& place, con
   __syncthreads();
 }
 
+/// The color of a sample. One that is the background is empty space.
+__device__ PixelColor colorOf(const SamplingArguments& a, float sum) {
+  const float value = a.voxelRule.settled(a.rule.background + sum);
+  return value != a.rule.background ? a.rule.prepared(value) : PixelColor{0, 0, 0, 0};
+}
+
 /// Turns the sums of all samples into colors. A warp takes whole samples, because colors overwrite
 /// the sums and no other warp may still need them.
 __device__ void classify(const SamplingArguments& a, Shared& s) {
@@ -203,8 +209,7 @@ __device__ void classify(const SamplingArguments& a, Shared& s) {
     PixelColor of[kHalves];
     for (int h = 0; h < kHalves; ++h) {
       const int ray = h * kWarp + lane;
-      const float sum = (sums[0][ray] + sums[1][ray]) + (sums[2][ray] + sums[3][ray]);
-      of[h] = sum != 0.0f ? a.rule.prepared(a.rule.background + sum) : PixelColor{0, 0, 0, 0};
+      of[h] = colorOf(a, (sums[0][ray] + sums[1][ray]) + (sums[2][ray] + sums[3][ray]));
     }
     __syncwarp();
     auto* const colors = reinterpret_cast<PixelColor*>(&s.sums[sample][0][0]);

@@ -238,7 +238,7 @@ __device__ void finishVoxels(const VoxelArguments& a, Shared& s, float one) {
     if ((near >> slab & 1u) == 0) continue;
     for (int i = slab * ofSlab + lane; i < (slab + 1) * ofSlab; i += kWarp) {
       const int sum = s.values[i];
-      const float value = sum == 0 ? background : a.rule(background + float(sum) * one);
+      const float value = sum == 0 ? background : a.draw.voxelRule(background + float(sum) * one);
       s.values[i] = __float_as_int(value);
     }
   }

@@ -227,9 +227,9 @@ void FieldRenderer::launch(const SamplingArguments& a) {
     launchDrawSums({a, scene_.views.data(), scene_.footprints.data()}, multiprocessors_,
                    stream_.get());
   else
-    launchDrawVoxels({a, scene_.forms.data(), scene_.footprints.data(), scene_.origins.data(),
-                      bound_, voxelRule_},
-                     multiprocessors_, stream_.get());
+    launchDrawVoxels(
+        {a, scene_.forms.data(), scene_.footprints.data(), scene_.origins.data(), bound_},
+        multiprocessors_, stream_.get());
 }
 
 FrameCounters FieldRenderer::drawOnce(const Scene& scene, const TileFrame& f) {
@@ -243,6 +243,7 @@ FrameCounters FieldRenderer::drawOnce(const Scene& scene, const TileFrame& f) {
   launch({.frame = f,
           .lists = band_.lists(),
           .rule = sampleRule(scene.options, table_.view(), field_.background),
+          .voxelRule = voxelRule_,
           .clip = clipOf(scene.options),
           .pixels = band_.pixels.data()});
   drawn_.record(stream);

@@ -142,6 +142,8 @@ struct SamplingArguments {
   TileFrame frame;
   TileLists lists;
   SampleRule rule;
+  VoxelRule
+      voxelRule;  ///< the rule by which sums become voxels; sums that are drawn are clamped by it
   ClipBox clip;
   float4* pixels;  ///< pixels of the band, row after row: red, green, blue, alpha
 };
@@ -158,7 +160,6 @@ struct VoxelArguments {
   const Footprint* footprints;
   const Vec3* origins;  ///< origins of the chunks
   float bound;          ///< largest |intensity|, which decides the unit of the integer sums
-  VoxelRule rule;
 };
 
 /// Draw the pictures. Both functions do nothing if the lists did not fit.

@@ -76,14 +76,19 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"subvoxel", 2.0f, 200, 0.1, 2.0}, Case{"huge", 2.0f, 5, 20.0, 2.0},
                     Case{"crowd", 2.0f, 5000, 0.5, 4.0}));
 
-class NarrowBandOnGpu : public test::CudaTest {};
+class SaturationOnGpu : public test::CudaTest, public testing::WithParamInterface<bool> {};
 
-TEST_F(NarrowBandOnGpu, SaturatesAsTheCpuDoes) {
+// Ellipsoids of both signs lead beyond both ends of the range, also in bricks without a target.
+TEST_P(SaturationOnGpu, IsThatOfTheCpu) {
   const SparseVolume volume = test::levelSetVolume();
   FitTarget target = makeTarget(volume, std::nullopt);
-  target.narrowBand = true;
+  target.saturates = true;
+  target.narrowBand = GetParam();
   expectAgreement(target, {.kappa = 2.0f}, test::randomEllipsoids(100, 1.0, 3.0), 1e-4);
 }
+INSTANTIATE_TEST_SUITE_P(Bricks, SaturationOnGpu, testing::Bool(), [](const auto& narrowBand) {
+  return narrowBand.param ? "OfANarrowBand" : "ThatSupportsReach";
+});
 
 }  // namespace
 }  // namespace esvr

@@ -77,7 +77,7 @@ PaperPassArguments CudaPaperOptimiser::passArguments(const Part& part) {
           .kernel = narrowed(constants_),
           .kernels = ellipsoids().kernels,
           .target = {.values = values_,
-                     .narrowBand = false,
+                     .saturates = false,
                      .lowest = float(target_.lowest),
                      .highest = float(target_.highest)},
           .residual = residual_.data(),
