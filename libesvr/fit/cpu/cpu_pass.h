@@ -29,8 +29,10 @@ class CpuPass : public PairPass<SceneKernel> {
   CpuPass(const FitTarget& target, const KernelConstants<double>& kernel)
       : PairPass(target, SceneKernel(kernel)) {}
 
-  /// Computes the gradients of 1/2 sum r^2 over all bricks of the lists. r = V - target, where V is
-  /// clamped if FitTarget::saturates; r does not depend on a V that is clamped.
+  /// Computes the gradients of 1/2 sum r^2 with r = V - target over all bricks of the lists. If
+  /// FitTarget::saturates, V is clamped, and the loss goes on linearly beyond the range: its
+  /// derivative by the sum is r there too, so that a sum far beyond the range is pulled back unless
+  /// the target is the range's end.
   /// \return sum of r^2
   double gradients(std::span<const Ellipsoid> ellipsoids, std::span<EllipsoidGradient> out);
 
