@@ -14,15 +14,17 @@
 namespace esvr::convert {
 namespace {
 
-/// Largest number of voxels in bricks for which voxels are tried as an alternative. Fits of larger
-/// volumes would wait long for the voxel coder, which works on one thread.
+/// Largest number of voxels in bricks for which voxels are tried as an alternative.
 constexpr std::size_t kMaxVoxels = std::size_t{1} << 25;
+
+/// Bytes of voxels below which ellipsoids are not tried: a fit takes seconds and can save little.
+constexpr std::uint64_t kMinBytesForFit = 8192;
 
 /// The representation of a job. Float32 storage is a form of ellipsoids.
 Representation representationOf(const Job& job) {
   if (job.options.storage.form == Storage::kFloat32) return Representation::kEllipsoids;
   const Representation wanted = job.options.representation;
-  if (wanted == Representation::kAuto && job.input.source.values.size() > kMaxVoxels)
+  if (wanted == Representation::kAuto && isTooLargeForVoxels(job))
     return Representation::kEllipsoids;
   return wanted;
 }
@@ -95,11 +97,14 @@ Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) 
 
 }  // namespace
 
+bool isTooLargeForVoxels(const Job& job) { return job.input.source.values.size() > kMaxVoxels; }
+
 Conversion convertToPsnr(const Job& job, double psnr) {
   const Representation wanted = representationOf(job);
   if (wanted == Representation::kEllipsoids) return std::move(*searchPsnr(job, psnr).conversion);
   auto voxels = voxelsForPsnr(job, psnr);
-  if (wanted == Representation::kAuto) return smallerOf(job, psnr, std::move(voxels));
+  if (wanted == Representation::kAuto && voxels.bytes >= kMinBytesForFit)
+    return smallerOf(job, psnr, std::move(voxels));
   const ChoiceRecord choice{record(voxels), {}};
   return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
 }

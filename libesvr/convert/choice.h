@@ -17,6 +17,10 @@ namespace esvr::convert {
 /// \throws UsageError  neither can be that small
 [[nodiscard]] Conversion convertToSize(const Job& job, std::uint64_t bytes);
 
+/// True for volumes whose voxels are not tried as an alternative to ellipsoids. They would keep a
+/// fit waiting, because coding them takes long.
+[[nodiscard]] bool isTooLargeForVoxels(const Job& job);
+
 /// The result of `fit`, or exact voxels if they take no more bytes. `fit` is not called if its
 /// number of ellipsoids shows that it cannot be smaller.
 [[nodiscard]] Conversion unlessExactIsSmaller(const Job& job,

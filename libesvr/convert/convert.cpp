@@ -6,6 +6,7 @@
 #include "convert/attempt.h"
 #include "convert/bounded.h"
 #include "convert/choice.h"
+#include "convert/preset.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -44,6 +45,9 @@ class Converter {
     return convert::unlessExactIsSmaller(job_, [&] {
       return stored(job_.input, fit(job_.input.source, options), options, job_.options.storage);
     });
+  }
+  Conversion operator()(const PresetGoal&) const {
+    return convert::convertToPreset(job_, [&] { return (*this)(FitGoal{}); });
   }
   Conversion operator()(const SizeGoal& goal) const {
     if (job_.options.storage.form != Storage::kCompact)
@@ -87,6 +91,18 @@ void requirePossible(const ConvertOptions& options) {
 }
 
 }  // namespace
+
+double presetPsnr(Preset preset) {
+  switch (preset) {
+    case Preset::kDraft:
+      return 32.0;
+    case Preset::kHigh:
+      return 50.0;
+    case Preset::kStandard:
+      break;
+  }
+  return 40.0;
+}
 
 Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options) {
   requirePossible(options);

@@ -1,6 +1,7 @@
 #include "convert/voxel_search.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_sort.h>
 #include <tbb/task_arena.h>
 
@@ -31,6 +32,9 @@ constexpr double kPrice = 0.08;
 constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
 constexpr double kThriftOctaves = 0.08;  // bound's octaves that make up for the loss by kPrice
 constexpr int kMaxThriftyTrials = 4;
+
+/// Bytes of voxels below which nothing else is tried to make them smaller.
+constexpr std::uint64_t kMinBytesToImprove = 4096;
 
 /// Share of the active voxels with the most frequent value from which on a lattice that has this
 /// value, so that these voxels are exact, is tried.
@@ -85,17 +89,29 @@ class VoxelSearch {
   }
 
   VoxelCandidate forPsnr(double psnr) const {
-    VoxelCandidate best = exactVoxels(job_);
-    const auto take = [&](std::optional<VoxelCandidate> now) {
-      if (now && now->bytes < best.bytes) best = std::move(*now);
-    };
-    if (!(range_ > 0.0)) return best;
+    if (!(range_ > 0.0)) return exactVoxels(job_);
     auto plain = coarsestFor(psnr, psnr / kDbPerOctave - 1.0, 0.0, kMaxTrials);
-    if (!plain) return best;
+    if (!plain) return exactVoxels(job_);
     const double bound = plain->bound, octave = octaveOf(bound) + kThriftOctaves;
-    take(candidateOf(std::move(plain)));
-    take(candidateOf(coarsestFor(psnr, octave, kPrice, kMaxThriftyTrials)));
-    if (plateau_.share >= kPlateauShare) take(withPlateau(psnr, bound));
+    VoxelCandidate best;
+    std::optional<VoxelCandidate> simple, thrifty, plateau;
+    const auto takeSmallest = [&] {
+      for (auto* now : {&simple, &thrifty, &plateau})
+        if (*now && (*now)->bytes < best.bytes) best = std::move(**now);
+    };
+    tbb::task_arena arena(trialsAtOnce());
+    arena.execute([&] {
+      tbb::parallel_invoke([&] { best = exactVoxels(job_); },
+                           [&] { simple = candidateOf(std::move(plain)); });
+      takeSmallest();
+      if (best.bytes < kMinBytesToImprove) return;
+      tbb::parallel_invoke(
+          [&] { thrifty = candidateOf(coarsestFor(psnr, octave, kPrice, kMaxThriftyTrials)); },
+          [&] {
+            if (plateau_.share >= kPlateauShare) plateau = withPlateau(psnr, bound);
+          });
+      takeSmallest();
+    });
     return best;
   }
 
@@ -118,9 +134,15 @@ class VoxelSearch {
     return std::max(std::round(0.5 * plateau_.value / bound), 1.0);
   }
 
+  /// The width of a level set's band is part of its shape, so its mask is always exact.
+  [[nodiscard]] Activity activity() const {
+    const bool levelSet = job_.input.descriptor.gridClass == GridClass::kLevelSet;
+    return levelSet ? Activity::kExact : job_.options.storage.activity;
+  }
+
   [[nodiscard]] VoxelLayer layerAt(double bound, double price) const {
     const SparseVolume& source = job_.input.source;
-    VoxelLayer layer = boundedLayer(source, bound, job_.options.storage.activity);
+    VoxelLayer layer = boundedLayer(source, bound, activity());
     return price > 0.0 ? thriftyLayer(source, std::move(layer), price) : layer;
   }
 
@@ -175,14 +197,15 @@ class VoxelSearch {
     const double to = std::max(std::floor(0.5 * from), std::max(from - kMaxLevels, 1.0));
     const double found = fewestLevels(psnr, std::size_t(from), std::size_t(to));
     if (found == 0.0) return std::nullopt;
-    std::optional<VoxelCandidate> best;
-    for (const double price : kPlateauPrices) {
-      Trial trial = tryBound(boundOf(found), price);
-      if (trial.psnr < psnr) continue;
-      VoxelCandidate now = candidate(job_, std::move(trial.layer), trial.psnr);
-      if (!best || now.bytes < best->bytes) best = std::move(now);
-    }
-    return best;
+    std::array<std::optional<VoxelCandidate>, kPlateauPrices.size()> made;
+    tbb::parallel_for(std::size_t{0}, made.size(), [&](std::size_t k) {
+      Trial trial = tryBound(boundOf(found), kPlateauPrices[k]);
+      if (trial.psnr >= psnr) made[k] = candidate(job_, std::move(trial.layer), trial.psnr);
+    });
+    const auto larger = [](const auto& a, const auto& b) {
+      return a && (!b || a->bytes < b->bytes);
+    };
+    return std::move(*std::min_element(made.begin(), made.end(), larger));
   }
 
   /// The best voxels found that keep to a size. With plateaus, the largest are not always the best.

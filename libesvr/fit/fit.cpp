@@ -27,11 +27,6 @@ PresetValues valuesOf(Preset preset) {
   return {35.0, 1500};
 }
 
-/// The number of iterations. A GPU makes a third more, because they take little time there.
-std::uint32_t iterationsOf(const PresetValues& preset, DeviceKind device) {
-  return device == DeviceKind::kCuda ? preset.iterations * 4 / 3 : preset.iterations;
-}
-
 void check(const FitOptions& options) {
   if (options.count && *options.count == 0) throw UsageError("count must be at least 1");
   if (options.iterations && *options.iterations == 0)
@@ -45,8 +40,7 @@ void check(const FitOptions& options) {
 RunPlan planFor(const FitTarget& target, const FitOptions& options) {
   RunPlan plan;
   plan.count = plannedCount(options, target.activeVoxels);
-  plan.iterations =
-      options.iterations.value_or(iterationsOf(valuesOf(options.preset), options.device.kind));
+  plan.iterations = plannedIterations(options);
   plan.psnr = options.psnr;
   plan.seconds = options.seconds;
   plan.learnKappa = !options.kappa;
@@ -72,6 +66,13 @@ std::size_t plannedCount(const FitOptions& options, std::uint64_t activeVoxels) 
   const auto byPreset = std::size_t(double(activeVoxels) / each);
   return std::clamp<std::size_t>(options.count.value_or(byPreset), 1,
                                  std::max<std::size_t>(activeVoxels, 1));
+}
+
+std::uint32_t plannedIterations(const FitOptions& options) {
+  const std::uint32_t onCpu = valuesOf(options.preset).iterations;
+  // A GPU makes a third more, because they take little time there.
+  const bool onGpu = options.device.kind == DeviceKind::kCuda;
+  return options.iterations.value_or(onGpu ? onCpu * 4 / 3 : onCpu);
 }
 
 FitResult fit(const SparseVolume& volume, const FitOptions& options) {

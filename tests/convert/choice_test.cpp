@@ -98,6 +98,63 @@ TEST(ChoiceForASize, TakesExactVoxelsWhereTheyFit) {
   EXPECT_EQ(decodeGrid(conversion.grid).values, volume.values);
 }
 
+/// The PSNR over the active voxels that a reader gets; errors at inactive voxels count too.
+double psnrOfActive(const SparseVolume& volume, const Conversion& conversion) {
+  const auto box = activeBox(volume).volume();
+  return psnrOver(volume, conversion) - 10.0 * std::log10(box / double(activeVoxelCount(volume)));
+}
+
+TEST(ChoiceForAPreset, HasItsQualityOverTheActiveVoxels) {
+  const SparseVolume volume = test::noiseVolume(3);
+  std::uint64_t before = 0;
+  for (const Preset preset : {Preset::kDraft, Preset::kStandard, Preset::kHigh}) {
+    ConvertOptions options;
+    options.goal = PresetGoal{};
+    options.fit.preset = preset;
+    const Conversion conversion = convertVolume({{}, volume}, options);
+    EXPECT_GE(psnrOfActive(volume, conversion), presetPsnr(preset));
+    EXPECT_LE(psnrOfActive(volume, conversion), presetPsnr(preset) + 1.0);
+    EXPECT_GT(bytesAdded(conversion.grid), before);
+    before = bytesAdded(conversion.grid);
+  }
+}
+
+TEST(ChoiceForAPreset, CountsTheActiveVoxelsOfTheBox) {
+  const SparseVolume volume = test::noiseVolume(2);
+  ConvertOptions options;
+  options.goal = PresetGoal{};
+  options.fit.box = Box{{0, 0, 0}, {63, 63, 63}};
+  const Conversion conversion = convertVolume({{}, volume}, options);
+  const double psnr =
+      compareVolumes(volume, decodeGrid(conversion.grid), {.box = options.fit.box}).psnrBox;
+  const double wider = 10.0 * std::log10(64.0 * 64.0 * 64.0 / double(activeVoxelCount(volume)));
+  EXPECT_GE(psnr, presetPsnr(options.fit.preset) + wider);
+}
+
+TEST(ChoiceForAPreset, StoresTheRepresentationThatIsInsistedOn) {
+  const SparseVolume volume = test::smoothVolume();
+  EXPECT_TRUE(choose(volume, PresetGoal{}, Representation::kVoxels).grid.voxels);
+  EXPECT_FALSE(choose(volume, PresetGoal{}, Representation::kEllipsoids).grid.voxels);
+}
+
+TEST(ChoiceForAPreset, StoresAConstantInAFewBytes) {
+  const SparseVolume flat = test::volumeOf({}, 4, 0.0f, [](Coord) { return 0.5f; });
+  const Conversion conversion = choose(flat, PresetGoal{});
+  EXPECT_EQ(decodeGrid(conversion.grid).values, flat.values);
+  EXPECT_LT(bytesAdded(conversion.grid), 600u);
+}
+
+TEST(ChoiceForAPreset, KeepsTheMaskOfALevelSet) {
+  const SparseVolume band = test::levelSetVolume();
+  GridDescriptor descriptor;
+  descriptor.gridClass = GridClass::kLevelSet;
+  ConvertOptions options;
+  options.goal = PresetGoal{};
+  options.representation = Representation::kVoxels;
+  const Conversion conversion = convertVolume({descriptor, band}, options);
+  EXPECT_EQ(compareVolumes(band, decodeGrid(conversion.grid)).iou, 1.0);
+}
+
 TEST(ChoiceForAFit, TakesExactVoxelsWhereEllipsoidsWouldTakeMoreBytes) {
   const SparseVolume flat = test::volumeOf({}, 4, 0.0f, [](Coord) { return 0.5f; });
   const Conversion conversion = choose(flat, FitGoal{});

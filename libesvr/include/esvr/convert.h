@@ -21,6 +21,13 @@ namespace esvr {
 /// A single fit, which ends as FitOptions determine.
 struct FitGoal {};
 
+/// The smallest grid found whose error is at most that of presetPsnr(FitOptions::preset) over the
+/// active voxels. Errors at inactive voxels of the box count too, so that the PSNR over the active
+/// voxels alone is at least as high. The time is bounded: on the CPU, fits of large volumes have
+/// fewer iterations. A volume of more than 2^25 voxels in bricks is converted as for a FitGoal,
+/// unless voxels are insisted on. FitOptions::count, psnr, seconds and iterations are ignored.
+struct PresetGoal {};
+
 /// The best grid that adds at most `bytes` to a file (bytesAdded). Ellipsoids use at least 98 % of
 /// them unless more bytes would not improve the grid. FitOptions::count, psnr and seconds are
 /// ignored.
@@ -44,7 +51,10 @@ struct BoundGoal {
 /// Every voxel and the active mask are restored bit for bit. The grid holds voxels.
 struct LosslessGoal {};
 
-using Goal = std::variant<FitGoal, SizeGoal, PsnrGoal, BoundGoal, LosslessGoal>;
+using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, BoundGoal, LosslessGoal>;
+
+/// PSNR over the active voxels that a preset stands for, dB.
+[[nodiscard]] double presetPsnr(Preset preset);
 
 /// What a stored grid consists of. A LosslessGoal always stores voxels.
 enum class Representation {

@@ -18,7 +18,7 @@
 namespace esvr {
 
 /// A preset determines the number of ellipsoids and the length of the schedule if they are not
-/// given.
+/// given, and the quality of a PresetGoal (convert.h).
 enum class Preset { kDraft, kStandard, kHigh };
 
 /// The state of a running fit. It is reported about four times a second.
@@ -72,6 +72,9 @@ struct FitResult {
 /// The number of ellipsoids that a fit aims at: the given count, or the preset's for this number of
 /// active voxels, but at most one for each of them.
 [[nodiscard]] std::size_t plannedCount(const FitOptions& options, std::uint64_t activeVoxels);
+
+/// The length of the schedule of a fit: the given number of iterations, or the preset's.
+[[nodiscard]] std::uint32_t plannedIterations(const FitOptions& options);
 
 /// Fits ellipsoids to a volume. Sums are clamped to the range of the volume's values, background
 /// included, before they are compared with the volume: where it saturates, they only have to be

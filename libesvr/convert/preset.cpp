@@ -1,0 +1,56 @@
+#include "convert/preset.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "convert/choice.h"
+
+namespace esvr::convert {
+namespace {
+
+/// Active voxels per ellipsoid at the largest number of ellipsoids. With more of them, voxels take
+/// fewer bytes.
+constexpr double kVoxelsPerEllipsoid = 8.0;
+
+/// Active voxels up to which a fit on the CPU has all iterations of its preset; larger volumes have
+/// fewer in proportion. An iteration takes 24 to 43 ns of one core for each of them
+/// (docs/benchmarks.md, "Scaling with the number of voxels"), so that a fit takes about 20 seconds
+/// of two cores at most.
+constexpr double kVoxelsOfWholeFit = 700'000.0;
+
+std::uint64_t activeVoxelsIn(const SparseVolume& volume, const Box& box) {
+  std::uint64_t count = 0;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (volume.active[b].test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v))) ++count;
+  return count;
+}
+
+/// The PSNR over the box at which the same sum of squares has a PSNR over the active voxels.
+double psnrOverBox(const Job& job, double psnrActive) {
+  const SparseVolume& source = job.input.source;
+  const Box box = job.options.fit.box.value_or(activeBox(source));
+  const auto active = std::max<std::uint64_t>(activeVoxelsIn(source, box), 1);
+  return psnrActive + 10.0 * std::log10(std::max(box.volume() / double(active), 1.0));
+}
+
+FitOptions bounded(FitOptions options, std::uint64_t activeVoxels) {
+  options.count = std::max<std::size_t>(std::size_t(double(activeVoxels) / kVoxelsPerEllipsoid), 1);
+  if (options.device.kind == DeviceKind::kCuda) return options;
+  const double share =
+      std::min(1.0, kVoxelsOfWholeFit / double(std::max<std::uint64_t>(activeVoxels, 1)));
+  options.iterations = std::uint32_t(std::ceil(share * plannedIterations(options)));
+  return options;
+}
+
+}  // namespace
+
+Conversion convertToPreset(const Job& job, const std::function<Conversion()>& fit) {
+  if (isTooLargeForVoxels(job) && job.options.representation != Representation::kVoxels)
+    return fit();
+  ConvertOptions options = job.options;
+  options.fit = bounded(job.options.fit, activeVoxelCount(job.input.source));
+  return convertToPsnr({job.input, options}, psnrOverBox(job, presetPsnr(job.options.fit.preset)));
+}
+
+}  // namespace esvr::convert
