@@ -103,7 +103,7 @@ void addFitOptions(cli::po::options_description& options) {
     ("seed", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(FitOptions{}.seed)),
      "seed of the random choices; the same seed gives the same file")
     ("storage", value<std::string>()->value_name("S")->default_value("compact"),
-     "compact (quantised, 9 to 13 bytes per ellipsoid) or float32 (about 34)")
+     "compact (quantised, 8 to 13 bytes per ellipsoid) or float32 (about 34)")
     ("storage-loss",
      value<double>()->value_name("DB")->default_value(defaultLoss, cli::shortNumber(defaultLoss)),
      "PSNR that --storage compact may lose in a single fit; --size, --psnr and --max-error ignore "

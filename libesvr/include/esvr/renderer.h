@@ -27,8 +27,8 @@ struct FrameStats {
 
 struct RendererLimits {
   /// Parts of a tile's depth that a CUDA device draws in parallel, at most 16. More parts use the
-  /// device better if few tiles have most of the work, but in opaque volumes the samples behind the
-  /// end of a ray are then computed in vain. 0: the number follows from the lists of the first
+  /// device better if few tiles have most of the work, but in opaque volumes samples behind the end
+  /// of a ray are then computed without effect. 0: the number follows from the lists of the first
   /// picture.
   int depthParts = 0;
   /// Limit on device memory; 0: no limit. If necessary, pictures are drawn in bands.

@@ -27,7 +27,7 @@ struct GridSummary {
   std::uint64_t activeVoxels = 0;
   Box activeBox;
   std::uint64_t storedBytes = 0;  ///< bytes in the file; few if the grid shares another's tree
-  std::string skipReason;  ///< message that says why the grid cannot be fitted; else empty
+  std::string skipReason;  ///< reason, for the user, why the grid cannot be fitted; else empty
   bool isScalar = false;   ///< true if readGrid can read the value type, even of an empty grid
 };
 
