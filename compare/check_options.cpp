@@ -21,17 +21,18 @@ cli::ProgramText programText() {
   return {
       .name = std::string(kProgram) + " check",
       .purpose =
-          "Compares the grids of a file with the grids of the same names of a reference, and\n"
-          "fails if a grid exceeds the given limits.",
+          "Compares the grids of a file with the grids of the same names in a reference file,\n"
+          "and fails if a grid exceeds the given limits.",
       .usage =
           "  esvr-compare check REF CAND [--min-psnr DB] [--max-error E] [--max-bytes SIZE] ...\n"
           "  esvr-compare check REF CAND --baseline FILE.json [--update]",
       .notes =
-          "REF and CAND may each be .vdb, .nvdb or .esvr. Grids are compared, not bytes of files,\n"
-          "since the bytes of a .vdb differ whenever it is written. Voxels are compared in index\n"
-          "space. Different transforms, names, classes, value types, backgrounds and metadata are\n"
-          "listed; they fail if --fail-on names them. A grid always fails if CAND does not have\n"
-          "it, or if the active voxels of the two grids have no voxel in common.\n"
+          "REF and CAND may each be a .vdb, .nvdb or .esvr file. Grids are compared and not the\n"
+          "bytes of files, because the bytes of a .vdb file differ whenever it is written. Voxels\n"
+          "are compared in index space. Different transforms, names, classes, value types,\n"
+          "backgrounds and metadata are listed, and the check fails if --fail-on names them. It\n"
+          "always fails if CAND does not have a grid, or if the bounding boxes of the active\n"
+          "voxels of the two grids do not intersect.\n"
           "\n"
           "A baseline holds figures and their tolerances. --update writes the figures of this\n"
           "run and keeps the tolerances of the file.\n"
@@ -57,14 +58,15 @@ cli::CommandLine makeCommandLine() {
     options.add_options()(figure.option, value<std::string>()->value_name("X"), figure.unit);
   // clang-format off
   options.add_options()
-    ("max-bytes", value<std::string>()->value_name("SIZE"), "largest size of the file CAND: 200KB")
+    ("max-bytes", value<std::string>()->value_name("SIZE"),
+     "largest size of the file CAND, for example 200KB")
     ("fail-on", value<std::string>()->value_name("KINDS"),
-     "differences that fail: name, class, type, background, transform, metadata, all; "
-     "separated by commas")
+     "differences for which the check fails, separated by commas: name, class, type, "
+     "background, transform, metadata, or all")
     ("ssim", bool_switch(), "measure and print the SSIM even without a limit on it")
     ("baseline", value<std::string>()->value_name("FILE.json"),
      "compare with the figures of this file")
-    ("update", bool_switch(), "write this run's figures to --baseline instead");
+    ("update", bool_switch(), "write the figures of this run to the file of --baseline instead");
   // clang-format on
   addMeasureOptions(options);
   addJsonReport(options);

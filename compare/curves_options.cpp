@@ -20,17 +20,18 @@ cli::ProgramText programText() {
   return {
       .name = std::string(kProgram) + " curves",
       .purpose =
-          "Draws error over run time, error over bytes and pictures per second over bytes for\n"
-          ".esvr files and of VDB and ZFP files of the same sizes.",
+          "Plots error over run time, error over bytes and pictures per second over bytes, for\n"
+          ".esvr files and for VDB and ZFP files of the same sizes.",
       .usage = "  esvr-compare curves REF.vdb [CAND.esvr ...] --output PREFIX [--fit BYTES]...",
       .notes =
-          "Writes every point to PREFIX.csv and PREFIX.json, the plots to PREFIX-seconds,\n"
-          "PREFIX-bytes and, with --fps, PREFIX-fps as .svg and .png, and all of it to\n"
-          "PREFIX.html.\n"
+          "The program writes every point to PREFIX.csv and PREFIX.json. It writes the plots\n"
+          "PREFIX-seconds, PREFIX-bytes and, with --fps, PREFIX-fps as .svg and .png files. The\n"
+          "page PREFIX.html has all of them.\n"
           "\n"
           "Without CAND and --fit, the program fits ellipsoids for six sizes: the size of the\n"
           "half-float Blosc VDB divided by 10, 20, 50, 100, 200 and 400. PREFIX-seconds shows the\n"
-          "fits that this run makes: the optimisation, and the whole time from voxels to file.\n"
+          "fits that this run makes: the time of the optimisation, and the whole time from the\n"
+          "voxels to the file.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted (finished points are written), 2 wrong\n"
           "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
@@ -48,7 +49,8 @@ cli::CommandLine makeCommandLine() {
     ("fit", value<Words>()->value_name("BYTES")->composing(),
      "fit ellipsoids for a file of this size; may be repeated")
     ("no-baselines", bool_switch(), "do not compare with VDB and ZFP files of the same sizes")
-    ("fps", value<int>()->value_name("PX"), "measure drawing of pictures of PX x PX pixels")
+    ("fps", value<int>()->value_name("PX"),
+     "measure the speed of drawing pictures of PX x PX pixels")
     ("force,f", bool_switch(), "replace files that exist");
   // clang-format on
   addSceneOptions(line);

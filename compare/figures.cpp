@@ -61,7 +61,7 @@ constexpr std::array<Figure, kFigureCount> kFigures{{
      "mass_error",
      "max-mass-error",
      "mass error",
-     "largest relative error of the sum of values",
+     "largest relative error of the sum of (value - background)",
      false,
      false,
      {.absolute = 0.001}},

@@ -12,8 +12,8 @@ void addMeasureOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("box", value<std::string>()->value_name("BOX"),
-     "box x0,y0,z0,x1,y1,z1 over which figures are measured (default: the reference's active "
-     "bounding box)")
+     "box x0,y0,z0,x1,y1,z1 over which figures are measured (default: the bounding box of "
+     "the reference's active voxels)")
     ("peak", value<double>()->value_name("P"),
      "peak of the PSNR (default: the reference's largest value)");
   // clang-format on

@@ -13,12 +13,12 @@ void addSceneOptions(cli::CommandLine& line) {
   line.repeatedArgument("candidates");
   line.options().add_options()(
       "grid,g", value<std::string>()->value_name("NAME"),
-      "the grid to compare, in every file (default: the first with voxels)");
+      "grid to compare, in every file (default: the first grid with active voxels)");
   addMeasureOptions(line.options());
   // clang-format off
   line.options().add_options()
     ("max-dense", value<std::string>()->value_name("BYTES")->default_value("1GB"),
-     "skip ZFP if the box as an array of floats takes more than this")
+     "leave ZFP out if the box as an array of floats takes more than this")
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
      "device for fits and pictures: auto, cpu, cuda or cuda:N");
   // clang-format on

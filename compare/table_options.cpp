@@ -23,25 +23,26 @@ cli::ProgramText programText() {
       .name = std::string(kProgram) + " table",
       .purpose =
           "Compares .esvr files with other ways to store the volume: OpenVDB and NanoVDB files,\n"
-          "lossless, quantised or reduced to the same size, and ZFP. All rows have the same\n"
-          "voxels, box and peak, are timed in the same way, and name the command that makes the\n"
-          "row alone.",
+          "lossless, quantised or reduced to the same size, and ZFP. All rows are measured on the\n"
+          "same voxels, box and peak and timed in the same way. Each row names the command that\n"
+          "makes only this row.",
       .usage =
           "  esvr-compare table REF.vdb [CAND.esvr ...] [--size 50KB]... [--external X]...\n"
           "  esvr-compare table REF.vdb --row SETTING",
       .notes =
-          "For each CAND and each --size, the best baseline that is not larger is searched. For\n"
-          "VDB files, voxels near the background are dropped, empty leaves are removed, and the\n"
-          "other voxels are quantised. The threshold is searched until the size is at most 2 %\n"
-          "smaller, FpN's tolerance and ZFP's settings for the highest PSNR. For the PSNR of each\n"
-          "CAND, FpN's tolerance and ZFP's settings are searched. -v shows the searches, and\n"
-          "--report includes them.\n"
+          "For each CAND and each --size, the program searches for the best file of each baseline\n"
+          "that is not larger. For VDB files, voxels near the background are dropped, empty\n"
+          "leaves are removed, and the other voxels are quantised. The search varies the\n"
+          "threshold until the file is at most 2 % smaller than the size, and takes the tolerance\n"
+          "of FpN and the setting of ZFP with the highest PSNR. For the PSNR of each CAND, it\n"
+          "searches for the smallest FpN and ZFP files. -v shows the searches, and --report\n"
+          "includes them.\n"
           "\n"
-          "The ratio is the size of the half-float Blosc VDB of the same grid divided by that of\n"
-          "the row. Times of encoding and decoding are medians of --runs after a warm-up run:\n"
-          "from the grid in OpenVDB's tree to the file, and from the file to OpenVDB's tree,\n"
-          "NanoVDB's buffer, an array (ZFP) or a sparse volume (.esvr). Memory is the larger of\n"
-          "what encoding and decoding allocate.\n"
+          "The ratio is the size of the half-float Blosc VDB of the same grid divided by the size\n"
+          "of the row. Times are medians of --runs runs after a warm-up run. Encoding goes from\n"
+          "OpenVDB's tree (ZFP: from an array) to the file. Decoding goes from the file to\n"
+          "OpenVDB's tree, NanoVDB's buffer, an array (ZFP) or a sparse volume (.esvr). Memory is\n"
+          "the larger of what encoding and decoding allocate.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted (finished rows are printed), 2 wrong\n"
           "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
@@ -60,26 +61,28 @@ cli::CommandLine makeCommandLine() {
      value<std::string>()->value_name("KINDS")->default_value("lossless,quantised,matched,zfp"),
      "kinds of baselines, separated by commas, or none")
     ("row", value<Words>()->value_name("SETTING")->composing(),
-     "use this baseline instead, with the name in a row's command; may be repeated")
+     "use this baseline instead of --rows; the command of a row has its SETTING; may be repeated")
     ("size", value<Words>()->value_name("BYTES")->composing(),
-     "also match this size; may be repeated")
+     "also search for the best baselines of this size; may be repeated")
     ("fit", value<Words>()->value_name("BYTES")->composing(),
      "fit ellipsoids for a file of this size; --fit default fits with the default options, "
      "--fit paper by the paper's method; may be repeated")
     ("external", value<Words>()->value_name("X")->composing(),
-     "add a row for another system's result: NAME=FILE:BYTES, where FILE is a VDB, or raw with "
-     ":NXxNYxNZ:TYPE; and any of :encode=S, :decode=S, :fps=N; may be repeated")
+     "add a row for the result of another system: NAME=FILE:BYTES, where FILE is a VDB file, or a "
+     "raw file if :NXxNYxNZ:TYPE follows; then any of :encode=S, :decode=S, :fps=N; may be "
+     "repeated")
     ("runs", value<int>()->value_name("N")->default_value(TableOptions{}.runs),
-     "number of runs, of which times are medians")
+     "number of runs; times are their medians")
     ("images", value<int>()->value_name("N"),
      "draw pictures of each row from N views of a full turn, and compare them with the "
      "reference's")
     ("image-size", value<int>()->value_name("PX")->default_value(GalleryOptions{}.resolution.width),
-     "side of a picture in pixels")
+     "width and height of a picture in pixels")
     ("image-step", value<double>()->value_name("S")->default_value(GalleryOptions{}.step),
-     "distance of samples along a ray in voxels, the same for every row")
+     "distance between the samples of a ray in voxels, the same for every row")
     ("lpips", value<std::string>()->value_name("COMMAND"),
-     "also report LPIPS by a program of yours: COMMAND REFERENCE.png PICTURE.png prints it last")
+     "also report LPIPS as COMMAND computes it; COMMAND REFERENCE.png PICTURE.png must print the "
+     "value last")
     ("colors", value<Words>()->value_name("MAP[:CURVE]")->composing(),
      "transfer function, with the names of esvr-render (default: viridis:linear); may be repeated")
     ("tf", value<Words>()->value_name("FILE")->composing(),

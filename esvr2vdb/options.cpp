@@ -17,9 +17,9 @@ using cli::po::value;
 cli::ProgramText programText() {
   return {.name = kProgram,
           .purpose =
-              "Turns an .esvr file back into the VDB that it was made from. Names, transforms,\n"
-              "metadata and background are exactly those of the source; voxels are as close to\n"
-              "it as was asked for. --list prints what a file holds, --check verifies a file.",
+              "Converts an .esvr file back to VDB. Names, transforms, metadata and background\n"
+              "are exactly those of the source; voxels have the accuracy that was chosen when\n"
+              "the file was made. --list lists the contents of a file, --check verifies a file.",
           .usage =
               "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
               "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
@@ -30,7 +30,7 @@ cli::ProgramText programText() {
               "\n"
               "A voxel is active where it differs from the background by more than a threshold,\n"
               "which was chosen when the file was made. In a level set, the voxels of the narrow\n"
-              "band are active. A file made with --topology exact stores which voxels are active.\n"
+              "band are active. A file made with --topology exact stores the active mask.\n"
               "\n"
               "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
               "be used, 5 not enough memory (--max-memory).",
@@ -49,18 +49,20 @@ cli::CommandLine commandLine() {
   line.optionalArgument("output", "OUT.vdb");
   // clang-format off
   line.options().add_options()
-    ("list", bool_switch(), "print the grids of IN, which may be a VDB, and the sections of an .esvr")
-    ("check", bool_switch(), "read all of IN.esvr, compare its checksums and print OK")
+    ("list", bool_switch(),
+     "list the grids of IN, which may be a VDB, and the sections of an .esvr file")
+    ("check", bool_switch(), "read all of IN.esvr, verify its checksums and print OK")
     ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
-     "write this grid only; may be repeated; 'density[1]' is the second of that name")
+     "write this grid only; may be repeated; 'density[1]' is the second grid of that name")
     ("threshold", value<float>()->value_name("T"),
-     "make those voxels active that differ from the background by more (default: as stored)")
+     "make the voxels active that differ from the background by more than T (default: the stored "
+     "threshold)")
     ("lod", value<std::int64_t>()->value_name("N"),
-     "use the first N importance layers only; --list -v prints the error of each layer")
+     "use only the first N importance layers; --list -v prints the error of each layer")
     ("max-ellipsoids", value<std::int64_t>()->value_name("N"),
-     "use the N ellipsoids of each grid that contribute most to its values only")
+     "use only the N ellipsoids of each grid that contribute most to its values")
     ("bbox", value<std::string>()->value_name("BOX"),
-     "write the voxels of the box x0,y0,z0,x1,y1,z1 only; parts of IN that cannot reach them are "
+     "write only the voxels of the box x0,y0,z0,x1,y1,z1; ellipsoids that cannot reach the box are "
      "not read")
     ("half", value<std::string>()->value_name("W")->default_value("auto"),
      "save the values of a .vdb as half floats: on, off, or auto (as the source did)")
@@ -68,8 +70,8 @@ cli::CommandLine commandLine() {
     ("reference", value<std::string>()->value_name("REF.vdb"),
      "print the errors of the written grids against the grids of this file")
     ("box", value<std::string>()->value_name("BOX"),
-     "box of voxels x0,y0,z0,x1,y1,z1 over which PSNR is taken (default: the bounding box of the "
-     "reference's active voxels)")
+     "box of voxels x0,y0,z0,x1,y1,z1 over which PSNR is measured (default: the bounding box of "
+     "the reference's active voxels)")
     ("force,f", bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
   cli::addMaxMemory(line);

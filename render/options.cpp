@@ -34,14 +34,14 @@ std::string listOf(const std::string& title, const std::vector<std::string>& nam
 }
 
 std::string notes() {
-  return "IN may be an .esvr, a .vdb or an .nvdb. All are drawn with the same camera, samples,\n"
-         "transfer function and compositing. Voxels are interpolated trilinearly.\n"
-         "An .esvr that stores voxels is drawn from them. A residual and a stored active mask are\n"
-         "drawn with --method bricks only.\n"
+  return "IN may be an .esvr, a .vdb or an .nvdb file. All are drawn with the same camera,\n"
+         "samples, transfer function and compositing. Voxels are interpolated trilinearly. An\n"
+         ".esvr file that stores voxels is drawn from these voxels. A residual and a stored\n"
+         "active mask are drawn with --method bricks only.\n"
          "\n"
-         "Places and lengths are in voxels of the grid's index space; its transform is not\n"
-         "applied. By default the camera sees all active voxels. Places where the value is\n"
-         "exactly the background are transparent.\n"
+         "Positions and lengths are in voxels of the grid's index space; its transform is not\n"
+         "applied. By default the camera sees all active voxels. Samples whose value is exactly\n"
+         "the background are transparent.\n"
          "\n" +
          listOf("Color maps", builtInColorMaps()) + listOf("Opacity curves", builtInOpacities()) +
          "\n"
@@ -49,12 +49,13 @@ std::string notes() {
          "\"up\": [...], \"fov\": 30}, or \"height\" for an orthographic camera.\n"
          "\n"
          "--ref also draws the voxels of a VDB with the same camera, on the same device, and\n"
-         "prints the error of each picture. OUT.error.png shows the error ten times as bright.\n"
+         "prints the error of each picture. OUT.error.png shows ten times the error.\n"
          "--bench draws a full turn, writes no picture, and reports the frames per second and the\n"
-         "time of each step; with --ref it does so for both files.\n"
+         "times of the parts of a frame; with --ref it does so for both files.\n"
          "\n"
-         "A PNG holds the colors of a screen, not premultiplied. An EXR holds floats in linear\n"
-         "light, premultiplied. Both hold this command line in their metadata.\n"
+         "A PNG file holds sRGB colors that are not premultiplied by alpha. An EXR file holds\n"
+         "floats in linear light that are premultiplied. Both hold the command line in their\n"
+         "metadata.\n"
          "\n"
          "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot be\n"
          "used, 5 no such device or not enough memory (--max-memory, --max-vram).";
@@ -64,8 +65,8 @@ cli::ProgramText programText() {
   return {.name = kProgram,
           .purpose =
               "Draws a picture of an .esvr file, or of a VDB for comparison, through a transfer\n"
-              "function. The ellipsoids of an .esvr are drawn directly, without decoding the\n"
-              "grid to voxels first.",
+              "function. The ellipsoids of an .esvr file are drawn directly, without decoding the\n"
+              "whole grid to voxels first.",
           .usage =
               "  esvr-render IN.esvr OUT.png|OUT.exr [OPTION]...\n"
               "  esvr-render IN.vdb OUT.png|OUT.exr [OPTION]...\n"
@@ -84,7 +85,8 @@ cli::ProgramText programText() {
 void addTransferOptions(cli::po::options_description& options) {
   options.add_options()
     ("grid,g", value<std::string>()->value_name("NAME"),
-     "draw this grid; 'density[1]' is the second of that name (default: the first that can be drawn)")
+     "draw this grid; 'density[1]' is the second grid of that name (default: the first grid that "
+     "can be drawn)")
     ("colors", value<std::string>()->value_name("MAP"),
      "color map, see the notes (default: viridis)")
     ("opacity", value<std::string>()->value_name("CURVE"),
@@ -93,15 +95,15 @@ void addTransferOptions(cli::po::options_description& options) {
      "read colors and opacities from a ParaView preset, in JSON or in the older XML; --opacity "
      "replaces the opacities of the file")
     ("preset", value<std::string>()->value_name("NAME"),
-     "name of the preset in FILE (default: the first)")
+     "name of the preset in the file of --tf (default: the first preset)")
     ("tf-save", value<std::string>()->value_name("FILE.json"),
      "write the transfer function, over its range of values, as a ParaView preset")
     ("range", value<std::string>()->value_name("R")->default_value("auto"),
-     "range of values that the transfer function covers: data (the values of the active voxels), "
-     "auto (these and the background), own (the range in FILE), or LO,HI")
+     "range of values that the transfer function covers: data (the range of the active voxels), "
+     "auto (that range and the background), own (the range in the file of --tf), or LO,HI")
     ("opacity-length", value<double>()->value_name("L")->default_value(1.0),
-     "length in voxels over which a material of constant value has the opacity that the curve "
-     "says; a larger length makes the volume more transparent");
+     "length in voxels over which a constant value has the opacity of the curve; a larger length "
+     "makes the volume more transparent");
 }
 
 void addPictureOptions(cli::po::options_description& options) {
@@ -109,28 +111,28 @@ void addPictureOptions(cli::po::options_description& options) {
     ("step", value<double>()->value_name("S")->default_value(1.0),
      "distance between the samples of a ray, in voxels")
     ("min-transmittance", value<double>()->value_name("T"),
-     "end a ray where less than this part of the light behind it comes through (default: 1/4096; "
-     "0: never)")
+     "end a ray when its transmittance falls below T (default: 1/4096; 0: never)")
     ("resolution", value<std::string>()->value_name("WxH")->default_value("800x800"),
      "width and height of the picture in pixels")
     ("background", value<std::string>()->value_name("R,G,B"),
      "color behind the volume, each channel from 0 to 1 (default: transparent)")
-    ("bits", value<int>()->value_name("B")->default_value(8), "bits of a PNG's channel, 8 or 16")
+    ("bits", value<int>()->value_name("B")->default_value(8), "bits per channel of a PNG, 8 or 16")
     ("mode", value<std::string>()->value_name("M")->default_value("composite"),
-     "composite: composite the samples of a ray from front to back; maximum or average: show this "
-     "value of the samples")
+     "composite: composite the samples of a ray from front to back; maximum or average: show the "
+     "largest or the mean value of the samples")
     ("clip", value<std::string>()->value_name("BOX"),
      "draw only what lies in the box x0,y0,z0,x1,y1,z1")
     ("slice", value<std::string>()->value_name("A=P"),
-     "draw only a slab of one voxel's thickness; 'z=12.5' is perpendicular to z")
+     "draw only a slab of one voxel's thickness; 'z=12.5' is perpendicular to z, with its center "
+     "at 12.5")
     ("depth", value<std::string>()->value_name("FILE.exr"),
-     "write for each pixel the distance, in voxels, at which half of the light is absorbed");
+     "also write, for each pixel, the distance in voxels at which half of the light is absorbed");
 }
 
 void addCameraOptions(cli::po::options_description& options) {
   options.add_options()
     ("camera", value<std::string>()->value_name("CAM.json"),
-     "read the camera from a file; the options below replace what the file says")
+     "read the camera from a file; the options below replace values of the file")
     ("eye", value<std::string>()->value_name("X,Y,Z"), "position of the camera")
     ("center", value<std::string>()->value_name("X,Y,Z"), "point that the camera looks at")
     ("up", value<std::string>()->value_name("X,Y,Z"),
@@ -149,26 +151,27 @@ void addCameraOptions(cli::po::options_description& options) {
 void addDeviceOptions(cli::po::options_description& options) {
   options.add_options()
     ("device", value<std::string>()->value_name("D")->default_value("auto"),
-     "auto (a GPU where there is one), cpu, cuda or cuda:N")
+     "auto (a GPU if one is usable), cpu, cuda or cuda:N")
     ("max-vram", value<double>()->value_name("GB"),
-     "GPU memory to use; where it is small, large pictures are drawn in bands (default: what is "
-     "free)")
+     "GPU memory to use; if it is small, large pictures are drawn in bands (default: all free "
+     "memory)")
     ("bins", value<int>()->value_name("N"),
      "number of parts, 1 to 16, into which a GPU divides the depth of the scene to draw them in "
      "parallel (default: chosen from the first picture)")
     ("method", value<std::string>()->value_name("M")->default_value("ellipsoids"),
-     "how to draw an .esvr: ellipsoids draws them directly; bricks decodes all voxels once and "
-     "draws them; auto tries both and takes the faster one that fits into memory")
+     "ellipsoids: draw the ellipsoids of an .esvr file directly; bricks: decode all voxels once "
+     "and draw them; auto: try both and take the faster one that fits into memory")
     ("between", value<std::string>()->value_name("B")->default_value("voxels"),
-     "value of ellipsoids between voxels: voxels interpolates the decoded voxels; sum takes the "
-     "sum of ellipsoids itself, which is faster where a pixel covers many voxels")
+     "voxels: between voxels, interpolate the decoded voxels; sum: evaluate the sum of ellipsoids "
+     "itself, which is less accurate, and faster where a pixel covers many voxels")
     ("values", value<std::string>()->value_name("T"),
      "draw voxels from a NanoVDB grid of this type: float, fp4, fp8, fp16 or fpn");
 }
 
 void addMeasuringOptions(cli::po::options_description& options) {
   options.add_options()
-    ("ref", value<std::string>()->value_name("FILE"), "compare each picture with one of this VDB")
+    ("ref", value<std::string>()->value_name("FILE"),
+     "compare each picture with a picture of this VDB")
     ("sheet", value<std::string>()->value_name("FILE.png"),
      "write the picture, the picture of --ref and their error side by side")
     ("bench", bool_switch(),

@@ -32,25 +32,26 @@ cli::ProgramText programText() {
       .name = kProgram,
       .purpose =
           "Fits ellipsoids to the sparse grids of a VDB file and writes them to an .esvr file.\n"
-          "esvr2vdb converts it back to VDB: transforms, names and metadata are restored\n"
-          "exactly, voxels with the chosen accuracy.",
+          "esvr2vdb converts the file back to VDB. Transforms, names and metadata are then\n"
+          "exactly those of the source, and voxels have the chosen accuracy.",
       .usage = "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]",
       .notes =
-          "Without -g, all float and double grids are fitted; other grids are listed and skipped.\n"
-          "--size and --ratio search the best file that is not larger (and at most 2 % smaller).\n"
-          "Several grids share the bytes by their active voxels. --psnr searches the smallest\n"
-          "file that reaches the PSNR; --count then limits the number of ellipsoids. Both choose\n"
-          "for each grid between ellipsoids and quantised voxels, and a short fit shows which\n"
-          "serve it better; --representation insists on one of them. Without any goal, the file\n"
-          "has the PSNR of --preset. With --count, --seconds, --iterations or --storage-loss "
-          "there\n"
-          "is a single fit, whose ellipsoids are stored unless exact voxels take no more bytes;\n"
-          "with --psnr and --seconds it ends as soon as it reaches the PSNR.\n"
+          "Without -g, all float and double grids are converted; other grids are listed and\n"
+          "skipped. Without a goal, each grid gets the quality of --preset in as few bytes as\n"
+          "were found. --size and --ratio search for the best file that is not larger. Several\n"
+          "grids share the bytes in proportion to their active voxels. --psnr searches for the\n"
+          "smallest file that reaches the PSNR; --count then limits the number of ellipsoids.\n"
+          "In all these cases, the program chooses for each grid between ellipsoids and quantised\n"
+          "voxels. It makes only a short fit if that shows that voxels are better.\n"
+          "--representation prescribes one of them.\n"
+          "With --count, --seconds, --iterations or --storage-loss there is a single fit. Its\n"
+          "ellipsoids are stored unless exact voxels take no more bytes. With --psnr and\n"
+          "--seconds, it ends as soon as it reaches the PSNR.\n"
           "The program prints a table on stdout. Its PSNR and largest error are measured on the\n"
           "voxels that are decoded from the written file.\n"
           "\n"
-          "Ctrl-C ends the fit with exit code 1. --on-cancel chooses whether the best result so\n"
-          "far is written. A second Ctrl-C ends the program at once. OUT.esvr is never "
+          "Ctrl-C ends the fit, and the exit code is 1. --on-cancel chooses whether the best\n"
+          "result so far is written. A second Ctrl-C ends the program at once. OUT.esvr is never\n"
           "incomplete.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted, 2 wrong options, 3 unusable input,\n"
@@ -78,12 +79,12 @@ void addGoalOptions(cli::po::options_description& options) {
      "write the smallest file that reaches this PSNR over the box")
     ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
     ("max-error", value<std::string>()->value_name("E"),
-     "keep every voxel within E of the source, or within E% of its range; ellipsoids then have a "
-     "residual")
+     "keep the error of every voxel within E, or within E% of the range of values; if ellipsoids "
+     "are stored, they have a residual")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
-     "ellipsoids, voxels, or auto, which chooses the better or smaller of the two")
+     "ellipsoids, voxels, or auto (whichever are better or smaller)")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
-     "threshold: a voxel's value decides whether it is active; exact: store the active mask");
+     "threshold: a voxel's value determines whether it is active; exact: store the active mask");
   // clang-format on
 }
 
@@ -104,10 +105,11 @@ void addFitOptions(cli::po::options_description& options) {
     ("seed", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(FitOptions{}.seed)),
      "seed of the random choices; the same seed gives the same file")
     ("storage", value<std::string>()->value_name("S")->default_value("compact"),
-     "compact (quantised, about 9 bytes per ellipsoid) or float32 (about 34)")
+     "compact (quantised, 8 to 13 bytes per ellipsoid) or float32 (about 34)")
     ("storage-loss",
      value<double>()->value_name("DB")->default_value(defaultLoss, cli::shortNumber(defaultLoss)),
-     "PSNR that --storage compact may lose; --size and --psnr ignore this option")
+     "PSNR that --storage compact may lose in a single fit; --size, --psnr and --max-error ignore "
+     "this option")
     ("paper", value<std::vector<std::string>>()->value_name("KEY=VALUE,...")->composing(),
      "fit by the paper's method, for comparison; --help paper lists the keys")
     ("device", value<std::string>()->value_name("D")->default_value("auto"),

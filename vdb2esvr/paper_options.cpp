@@ -93,8 +93,8 @@ std::vector<Key> methodKeys(const PaperMethod& m) {
   return {
       {"prunes", "1", "pruning passes: 0, 1, or 3 (the paper's schedule for BigBrain)", readPasses},
       {"epochs", std::to_string(m.epochs),
-       "number of epochs; an epoch visits every subvolume once. All numbers of epochs\n"
-       "are scaled with it",
+       "number of epochs; an epoch visits every subvolume once. Settings that are given\n"
+       "in epochs are scaled with it",
        [](const Setting& s, PaperMethod& p) { p = scaledTo(p, s.epochs()); }},
       {"kernel", "ellipsoid", "ellipsoid, or gaussian (Gaussians that end at 3 sigma)",
        [](const Setting& s, PaperMethod& p) {
@@ -134,7 +134,7 @@ std::vector<Key> densifyKeys(const PaperMethod& m) {
       {"densify-every", std::to_string(m.densifyEvery), "epochs between densifications",
        [](const Setting& s, PaperMethod& p) { p.densifyEvery = s.epochs(); }},
       {"densify-threshold", text(m.gradientThreshold),
-       "length of the gradient by position from which an ellipsoid is cloned or split",
+       "length of the gradient by position above which an ellipsoid is cloned or split",
        [](const Setting& s, PaperMethod& p) { p.gradientThreshold = s.number(0.0, kMaxNumber); }},
       {"percent-dense", text(m.percentDense),
        "scale, as a share of half the longest axis, above which ellipsoids are split\n"
@@ -205,7 +205,7 @@ std::string indented(const std::string& text) {
 
 std::string paperHelp() {
   std::ostringstream out;
-  out << "--paper KEY=VALUE[,KEY=VALUE...] fits by the paper's method instead of ours, for\n"
+  out << "--paper KEY=VALUE[,KEY=VALUE...] fits by the paper's method, for\n"
          "comparison. '--paper default' changes no setting. --count is the number of ellipsoids\n"
          "that the last pruning pass keeps. The file stores float32 unless --storage is given.\n"
          "\nKeys:\n";

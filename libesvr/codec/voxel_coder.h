@@ -31,8 +31,8 @@ struct Thrift {
 };
 
 /// Replaces the code of a voxel that is not vacant by a code near it that takes fewer bits, if the
-/// bits saved are worth more than the error added. The layer must have the form kLattice. Bricks are
-/// visited in the same order as by codeVoxels().
+/// bits saved are worth more than the error added. The layer must have the form kLattice. Bricks
+/// are visited in the same order as by codeVoxels().
 void chooseCodes(std::span<const std::size_t> order, const VoxelModel& model, const Thrift& thrift,
                  VoxelLayer& layer);
 

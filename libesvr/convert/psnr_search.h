@@ -17,8 +17,8 @@ struct PsnrResult {
 /// PSNR of the fits before. If the PSNR is out of reach, the result is the best of them with
 /// FitEnd::kPsnrMissed.
 /// \param psnr   dB over the box
-/// \param below  the grid must be smaller; no full fit is made if the short fit shows that it is
-///               not
+/// \param below  bytes below which the grid must stay; no full fit is made if the short fit shows
+///               that it would not
 [[nodiscard]] PsnrResult searchPsnr(const Job& job, double psnr,
                                     std::optional<std::uint64_t> below = {});
 

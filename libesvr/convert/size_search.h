@@ -19,8 +19,8 @@ struct SizeResult {
 /// ellipsoids as the size allows. If the ellipsoids of the full fit take more bytes than expected,
 /// it is repeated with fewer.
 /// \param bytes  largest number of bytes that the grid may add to a file (bytesAdded)
-/// \param above  the PSNR, dB, must be higher; no full fit is made if the short fit shows that it is
-///               not
+/// \param above  PSNR in dB that the result must exceed; no full fit is made if the short fit shows
+///               that it would not
 [[nodiscard]] SizeResult searchSize(const Job& job, std::uint64_t bytes,
                                     std::optional<double> above = {});
 

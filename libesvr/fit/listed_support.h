@@ -18,8 +18,8 @@ struct ListedSupport {
   bool refused;  ///< true if a step was refused since the lists were built
 };
 
-/// How slack is chosen, and when lists end. docs/lab-notes.md has the measurements
-/// ("When lists of pairs are built anew").
+/// The rule that chooses the slack and ends the lists. docs/lab-notes.md has the measurements
+/// ("When pair lists are built again").
 struct SlackRule {
   double missedShare = 0.05;     ///< share of its intensity that a list may miss of an ellipsoid
   double minSlack = 0.15;        ///< voxels
@@ -28,7 +28,7 @@ struct SlackRule {
   /// An ellipsoid that took fewer steps gets maxSlack. So does one whose step was refused, because
   /// its next step would be refused too.
   std::uint32_t settledSteps = 4;
-  double refusedShare = 0.03;  ///< lists end after so many refused steps an ellipsoid
+  double refusedShare = 0.03;  ///< refused steps per ellipsoid that end the lists
 
   /// \return the number of refused steps that ends lists of `count` ellipsoids
   [[nodiscard]] std::uint32_t refusedSteps(std::size_t count) const {

@@ -5,8 +5,9 @@
 /// A list holds every brick that an ellipsoid's support reaches, and some more: the support is
 /// widened by a slack, which is a share of its radius, since steps too are shares of an ellipsoid's
 /// size. A step that would lead the ellipsoid's core out of its listed support is refused. The core
-/// leaves out the rim of a support, where phi is small. Once a small share of all steps was refused
-/// the lists end, so that a rebuild comes as early as steps are large and as late as they are small.
+/// leaves out the rim of a support, where phi is small. The lists end as soon as the number of
+/// refused steps exceeds a share of the number of ellipsoids. They are therefore rebuilt often
+/// while steps are large, and rarely while steps are small.
 
 #include <cmath>
 

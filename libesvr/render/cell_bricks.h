@@ -1,6 +1,6 @@
 #pragma once
-/// The bricks of a volume's cells. A cell is the cube between a voxel and its neighbours above along
-/// x, y and z; it belongs to the brick of that voxel.
+/// The bricks of a volume's cells. A cell is the cube between a voxel and its neighbours above
+/// along x, y and z; it belongs to the brick of that voxel.
 
 #include <vector>
 

@@ -49,7 +49,7 @@ cli::CommandLine commandLine() {
     ("resolution", cli::po::value<int>()->value_name("N")->default_value(kDefaultResolution),
      "voxels along the longest side")
     ("seed", cli::po::value<std::int64_t>()->value_name("N")->default_value(1),
-     "random seed; each seed gives another volume of the kind")
+     "seed of the random choices; each seed gives another volume of the kind")
     ("force,f", cli::po::bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
   return line;

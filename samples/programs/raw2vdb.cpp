@@ -33,10 +33,11 @@ cli::CommandLine commandLine() {
        .usage = "  raw2vdb IN.raw OUT.vdb --dims X,Y,Z --type TYPE [options]\n"
                 "  raw2vdb IN.nrrd|IN.nhdr OUT.vdb [options]",
        .notes =
-           "TYPE is uint8, int8, uint16, int16, uint32, int32, float32 or float64. x is fastest.\n"
-           "The grid has 32-bit floats. A voxel is active if it is not below the threshold, or,\n"
-           "without a threshold, if it differs from the background. An NRRD's space directions,\n"
-           "origin and spacings become the grid's transform.",
+           "TYPE is uint8, int8, uint16, int16, uint32, int32, float32 or float64. In the file, x\n"
+           "varies fastest. The values of the grid are 32-bit floats. A voxel is active if it is\n"
+           "not below the threshold, or, without a threshold, if it differs from the background.\n"
+           "The transform of the grid follows from the space directions, origin and spacings of\n"
+           "an NRRD image.",
        .examples = "  raw2vdb aneurism_256x256x256_uint8.raw aneurism.vdb --dims 256,256,256 \\\n"
                    "      --type uint8 --threshold 32 --normalise\n"
                    "  raw2vdb ct.nhdr ct.vdb --threshold 300"});
@@ -44,11 +45,14 @@ cli::CommandLine commandLine() {
   line.argument("output", "OUT.vdb");
   // clang-format off
   line.options().add_options()
-    ("dims", po::value<std::string>()->value_name("X,Y,Z"), "RAW: voxels along each axis")
+    ("dims", po::value<std::string>()->value_name("X,Y,Z"), "RAW: number of voxels along each axis")
     ("type", po::value<std::string>()->value_name("TYPE"), "RAW: type of the values")
-    ("endian", po::value<std::string>()->value_name("little|big"), "RAW: byte order (little)")
-    ("skip", po::value<std::int64_t>()->value_name("BYTES"), "RAW: length of a header (0)")
-    ("voxel-size", po::value<double>()->value_name("S"), "RAW: edge of a voxel in world units (1)")
+    ("endian", po::value<std::string>()->value_name("little|big"),
+     "RAW: byte order (default: little)")
+    ("skip", po::value<std::int64_t>()->value_name("BYTES"),
+     "RAW: length of a header (default: 0)")
+    ("voxel-size", po::value<double>()->value_name("S"),
+     "RAW: edge of a voxel in world units (default: 1)")
     ("threshold", po::value<double>()->value_name("T"),
      "smallest value of active voxels, in the image's units")
     ("background", po::value<double>()->value_name("B")->default_value(0.0),

@@ -50,7 +50,7 @@ cli::CommandLine commandLine() {
     ("edge", cli::po::value<double>()->value_name("E")->default_value(samples::kDefaultEdge),
      "width of the soft edge in voxels")
     ("longest", cli::po::value<std::int64_t>()->value_name("K"),
-     "keep the K connected pieces with the longest cable only")
+     "keep only the K connected pieces with the longest cable")
     ("force,f", cli::po::bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
   return line;

@@ -199,7 +199,7 @@ def wins(part, sizes):
 
 
 def verdict(low, high):
-    lines = ['## Where another format is better', '']
+    lines = ['## Where another format is as good or better', '']
     for part, sizes in ((LOW, low), (HIGH, high)):
         at = f'1/{part}'
         lines += losses(f'PSNR over the box at {at}', 'psnr_box',
@@ -272,15 +272,16 @@ is not larger.
 - *encode s* of an ESVR row is the run time of the whole command `vdb2esvr --size` on the device that the row
   names. The other forms are encoded, and all forms are decoded, on the CPU of the same machine; these times are
   medians of three runs.
-- *image PSNR* and *FLIP* compare pictures of four views with pictures of the source: 400 x 400 pixels, viridis
-  with linear opacity, one voxel between samples. *FPS* is pictures a second. *VRAM* is the device memory that
-  drawing held. Voxels are drawn from NanoVDB grids, those of quantised rows from quantised grids.
+- *image PSNR* and *FLIP* compare pictures of four views with pictures of the source. Pictures have 400 x 400
+  pixels, the map viridis, linear opacity, and one voxel between samples. *FPS* is the number of pictures per
+  second. *VRAM* is the device memory that drawing held. Voxels are drawn from NanoVDB grids; the rows of quantised
+  NanoVDB files are drawn from grids of their quantised type.
 - Each ESVR file has two rows: one is drawn from the ellipsoids, the other from the decoded voxels
   (`esvr-render --method bricks`). Files for which `vdb2esvr` chose voxels are drawn from voxels in both.
-- The rows of SZ3, TTHRESH, quantise+xz, xz-lossless and zstd-lossless are *external compressors*. They were
-  measured separately, on another machine, and for four of the volumes only
+- SZ3, TTHRESH, quantise+xz, xz-lossless and zstd-lossless are *external compressors*. They were measured
+  separately, on another machine, and for four of the volumes only
   ([external_points.md](../tests/bench/external_points.md)). Their times cannot be compared with the others, and
-  they have no picture figures.
+  their pictures were not measured.
 """
 
 
@@ -293,7 +294,7 @@ def reference_cost(table):
     pictures = table['pictures']
     vram = pictures['reference_vram_bytes']
     held = f' with {vram / 1e6:.1f} MB of device memory' if vram else ''
-    return (f"The source is drawn at {pictures['reference_fps']:.0f} pictures a second{held} "
+    return (f"The source is drawn at {pictures['reference_fps']:.0f} pictures per second{held} "
             f"({pictures['device']}).")
 
 

@@ -1,6 +1,6 @@
-// Plan: `esvr-compare check` is run as in a script. Files of all three formats are compared with
-// their source. The tests check each limit, baselines, --fail-on, and the exit codes and messages
-// of refused input.
+// Plan: `esvr-compare check` is run as a separate process. Files of all three formats are compared
+// with their source. The tests check each limit, baselines, --fail-on, and the exit codes and
+// messages of refused input.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

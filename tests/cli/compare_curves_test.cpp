@@ -1,5 +1,5 @@
-// Plan: `esvr-compare curves` is run as by a user. The tests check the points in both data formats,
-// the pictures that are written, the sizes that the program chooses, and what it refuses.
+// Plan: `esvr-compare curves` is run as a separate process. The tests check the points in both data
+// formats, the pictures that are written, the sizes that the program chooses, and what it refuses.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

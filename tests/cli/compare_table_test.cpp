@@ -1,6 +1,6 @@
-// Plan: `esvr-compare table` is run as by a user, on a small grid. The tests check which rows there
-// are, that figures agree with the files, that the command of a row makes the same row, matched
-// sizes, external results, all report formats, and what the program refuses.
+// Plan: `esvr-compare table` is run as a separate process, on a small grid. The tests check which
+// rows there are, that figures agree with the files, that the command of a row makes the same row,
+// matched sizes, external results, all report formats, and what the program refuses.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // Plan: the commands of README.md run in their order and in one folder, so that later ones find the
-// files of earlier ones. They are made quick first, by small volumes and pictures and few
-// iterations. Commands of other programs (./setup, cmake) are not run, nor commands on smoke1.vdb
-// if ESVR_DATA_DIR does not have it.
+// files of earlier ones. Small volumes, small pictures and few iterations make them quick. Commands
+// of other programs (./setup, cmake) are not run. Commands on smoke1.vdb are not run if
+// ESVR_DATA_DIR does not have it.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

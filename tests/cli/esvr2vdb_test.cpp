@@ -1,5 +1,5 @@
-// Plan: esvr2vdb is run as by a user. The tests check its jobs, and the exit codes and messages of
-// refused input; a failure leaves no file behind.
+// Plan: esvr2vdb is run as a separate process. The tests check its jobs, and the exit codes and
+// messages of refused input; a failure leaves no file behind.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Plan: a blob is drawn from an .esvr and from a .vdb file, as by a user, and the pictures are read
-// back with libpng.
+// Plan: a blob is drawn from an .esvr and from a .vdb file by a separate process, and the pictures
+// are read back with libpng.
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>

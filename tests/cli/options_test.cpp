@@ -1,5 +1,5 @@
-// Plan: the options of the converters and of esvr-compare whose effect no other test shows, each by
-// the change in the output, and the options that all programs share.
+// Plan: the tests cover the options that all programs share, and those options of the converters
+// and of esvr-compare whose effect no other test shows. Each is tested by the change in the output.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

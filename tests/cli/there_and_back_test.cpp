@@ -1,6 +1,6 @@
 // Plan: each kind of extreme grid is fitted, written and decoded by the programs. Name, class,
-// transform, metadata, background and `creator` come back exactly. The voxels come back with a PSNR
-// that shows that the values are in the right places; the fits are short, so the PSNR is low.
+// transform, metadata, background and `creator` come back exactly. The PSNR of the voxels is high
+// enough to show that the values are in the right places; it is low because the fits are short.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
-// Plan: vdb2esvr is run as by a user. The tests check exit codes and messages of refused input,
-// which leaves no file behind, the output and report of a run, and the result of an interrupted
-// run.
+// Plan: vdb2esvr is run as a separate process. The tests check exit codes and messages of refused
+// input, which leaves no file behind, the output and report of a run, and the result of an
+// interrupted run.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Plan: the errors of trials and of their layers agree with those of the decoded voxels, and
-// several trials at once give the same results as each alone.
+// several trials at once give the same results as single trials.
 
 #include "compact/trial.h"
 

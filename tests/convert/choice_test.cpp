@@ -1,6 +1,7 @@
-// Plan: for each goal, a volume that ellipsoids suit and one that voxels suit. The better of both is
-// stored, and the record of the choice has the figures of both. Each representation can be
-// insisted on. Searches for voxels keep their goal. Contradictions are refused.
+// Plan: for each goal, one volume is converted for which ellipsoids are better and one for which
+// voxels are better. The better representation is stored, and the record of the choice has the
+// figures of both. Each representation can be prescribed. Searches for voxels reach their goal.
+// Contradictory options are refused.
 
 #include <gtest/gtest.h>
 

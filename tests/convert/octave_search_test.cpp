@@ -1,5 +1,5 @@
-// Plan: the search finds where a figure reaches its aim: on a straight line, on a curve, on a line
-// with steps, and at both ends of the octaves.
+// Plan: the search finds the octave at which a figure reaches its target: on a straight line, on a
+// curve, on a line with steps, and at both ends of the octaves.
 
 #include "convert/octave_search.h"
 

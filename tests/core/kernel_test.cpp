@@ -1,5 +1,5 @@
 // Plan: kernelPhi, its derivatives by the constants' slope, and the constants, in float and double,
-// against
+// are compared with
 //  - the definition in kernel.h, typed as it stands there, in long double (whose range holds
 //  e^1e4);
 //  - central differences of that definition, and its closed derivative by kappa where differences

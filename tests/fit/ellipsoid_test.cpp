@@ -1,5 +1,5 @@
-// Plan: steps move and scale the semi-axes as stated, limits hold, principal axes describe the same
-// shape for thin and flat ellipsoids too, and export loses only float32 precision.
+// Plan: steps move and scale the semi-axes as ellipsoid.h states, and limits hold. Principal axes
+// describe the same shape, also for thin and flat ellipsoids. Export loses only float32 precision.
 
 #include "fit/ellipsoid_math.h"
 

@@ -1,6 +1,7 @@
-// Plan: the tests check what a user may rely on. Invariances by construction (position, empty
-// space, threads, repetition) hold bit by bit. Goals are met and reported. Degenerate and extreme
-// input gives the exact or a finite result, and wrong options are refused.
+// Plan: the tests check what a user may rely on. The result is the same, bit by bit, at another
+// position, with empty space around, with other numbers of threads, and in a repeated run. Goals
+// are met and reported. Degenerate and extreme input gives the exact or a finite result, and wrong
+// options are refused.
 
 #include "esvr/fit.h"
 

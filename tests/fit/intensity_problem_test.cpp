@@ -1,4 +1,5 @@
-// Plan: the tests of intensity_cases.h on the CPU; the bits do not depend on the number of threads.
+// Plan: the tests of intensity_cases.h run on the CPU; the bits do not depend on the number of
+// threads.
 
 #include <tbb/global_control.h>
 

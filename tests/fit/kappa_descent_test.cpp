@@ -1,5 +1,6 @@
 // Plan: steps go against the slope, whatever its size, and are at most the largest step. Kappa
-// stays within its limits and does not move without a slope. The minimum of a valley is found.
+// stays within its limits and does not change without a slope. The minimum of a convex function is
+// found.
 
 #include "fit/kappa_descent.h"
 

@@ -1,7 +1,8 @@
-// Plan: an ellipsoid that isHeld() has its whole support inside what was listed, over random steps
-// of many sizes; growth by the slack is the most that is held, and a move by the slack is too;
-// motionSince() bounds the slack that holds; a step beyond it is refused; young ellipsoids get the largest slack. What a fit's
-// steps see of ellipsoids that move fast is in optimiser_test.cpp.
+// Plan: if isHeld() is true, the whole support of an ellipsoid is inside its listed support, over
+// random steps of many sizes. Growth by the slack is the largest growth that is held, and a move by
+// the slack is the largest move. motionSince() is an upper bound of the slack that is needed. A
+// step beyond the slack is refused. Young ellipsoids get the largest slack. optimiser_test.cpp
+// tests fits whose ellipsoids move fast.
 
 #include "fit/motion_bound.h"
 

@@ -1,7 +1,7 @@
-// Plan: the operations of a run on every device. Growth reaches its count and places seeds where
-// the error is. Relocation moves the least useful ellipsoids only. Ellipsoids that reach no voxel
-// are dropped, and without an error there are no seeds. A whole fit has the same bits in three runs
-// and at a distant position. Without a GPU, its tests skip.
+// Plan: the operations of a run are tested on every device. Growth reaches its count and places
+// seeds where the error is large. Relocation moves the least useful ellipsoids only. Ellipsoids
+// that reach no voxel are dropped, and without an error there are no seeds. A whole fit has the
+// same bits in three runs and at a distant position. Without a GPU, its tests skip.
 
 #include "fit/optimiser.h"
 

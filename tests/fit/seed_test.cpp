@@ -1,5 +1,5 @@
-// Plan: draws follow the squared residual of the signs allowed and nothing else; a seed takes
-// place, spread and height from the residual around it.
+// Plan: voxels are sampled in proportion to the squared residual of the allowed signs only. The
+// center, the covariance and the height of a seed follow from the residual around it.
 
 #include "fit/cpu/seed.h"
 

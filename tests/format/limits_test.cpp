@@ -1,6 +1,7 @@
-// Plan: small files that ask for much: one huge scale, extreme scales, metadata, voxels and
-// ellipsoids that take almost no bytes. Each is refused before memory is allocated, with the number
-// of bytes in the message. Within the limit, the same content is read.
+// Plan: the tests read small files that need much memory: files with one huge scale, with extreme
+// scales, and with metadata, voxels and ellipsoids that take almost no bytes. Each is refused
+// before memory is allocated, with the number of bytes in the message. Within the limit, the same
+// content is read.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

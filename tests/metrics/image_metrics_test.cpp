@@ -1,7 +1,7 @@
-// Plan: PSNR and the largest difference are checked by hand. SSIM is compared with windows that are
-// summed directly in float64; means of products cancel to 1e-16 of squares below 1, divided by C2 =
-// 9e-4, which gives 1e-12. Constant pictures have closed forms. Alpha and colors outside the range
-// of a screen do not count.
+// Plan: PSNR and the largest difference are compared with values computed by hand. SSIM is compared
+// with windows that are summed directly in float64. Means of products of values below 1 have errors
+// of 1e-16 and are divided by C2 = 9e-4, so the tolerance is 1e-12. Constant pictures have closed
+// forms. Alpha and colors outside the range of a screen do not count.
 #include <gtest/gtest.h>
 
 #include <algorithm>

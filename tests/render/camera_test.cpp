@@ -1,4 +1,5 @@
-// Plan: a fitted camera shows every corner of the box; projections are checked by hand.
+// Plan: a fitted camera shows every corner of the box; projections are compared with values
+// computed by hand.
 #include "esvr/camera.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // Plan: the bounds of an ellipsoid in the picture are compared with the pixels whose rays meet the
 // support, which are found in float64 from the rays. No such pixel may lie outside. For round
-// ellipsoids of ten pixels the bounds are exact to a pixel, because the outline recedes by only
-// 0.5^2 / (2 * 10) pixels between two rows.
+// ellipsoids of ten pixels the bounds are exact to a pixel, because the outline moves inward by
+// only 0.5^2 / (2 * 10) pixels between two rows.
 #include "render/ellipsoid_view.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// Plan: the tests check cells for people and for programs, and tables in each form.
+// Plan: the tests check cells that are formatted for readers and for programs, and tables in each
+// form.
 
 #include "report/data_table.h"
 

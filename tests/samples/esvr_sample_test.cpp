@@ -1,6 +1,6 @@
-// Plan: esvr-sample is run as by a user. Its files are read back, wrong options are refused with
-// exit code and message, no incomplete file is left, and the voxels do not depend on the number of
-// threads.
+// Plan: esvr-sample is run as a separate process. Its files are read back, wrong options are
+// refused with exit code and message, no incomplete file is left, and the voxels do not depend on
+// the number of threads.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Plan: stored constants show any change of the random numbers. The tests also check ranges, and
-// the continuity and slope of noise.
+// Plan: the random numbers are compared with stored constants, which reveals any change. The tests
+// also check ranges, and the continuity and the slope of noise.
 
 #include "generators/hash_noise.h"
 

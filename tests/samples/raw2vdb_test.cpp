@@ -1,5 +1,5 @@
-// Plan: raw2vdb is run as by a user. The tests check RAW and NRRD images, their options, and the
-// exit codes and messages of refused input.
+// Plan: raw2vdb is run as a separate process. The tests check RAW and NRRD images, their options,
+// and the exit codes and messages of refused input.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

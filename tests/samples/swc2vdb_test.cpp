@@ -1,5 +1,5 @@
-// Plan: swc2vdb is run as by a user. A skeleton becomes tubes at its own position, wrong input is
-// refused, and real skeletons are converted if they exist.
+// Plan: swc2vdb is run as a separate process. A skeleton becomes tubes at its own position, wrong
+// input is refused, and real skeletons are converted if they exist.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

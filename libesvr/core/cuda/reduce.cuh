@@ -1,6 +1,7 @@
 #pragma once
-/// Reductions and running sums over the lanes of a warp, and reductions over the threads of a block.
-/// Each has one order, so that sums of floating-point numbers are the same bits in every run.
+/// Reductions and running sums over the lanes of a warp, and reductions over the threads of a
+/// block. Each has one order, so that sums of floating-point numbers are the same bits in every
+/// run.
 
 #include <cub/block/block_reduce.cuh>
 

@@ -1,7 +1,7 @@
 #pragma once
 /// A flag that makes kernels do nothing once the pair lists are outdated (fit/motion_bound.h). The
-/// host starts several steps ahead. A step that finds an ellipsoid outside its listed support sets
-/// the flag of the steps after it; the host starts these again after it has built new lists.
+/// host starts several steps ahead. The step at which the lists end sets the flag of the steps
+/// after it; the host starts these again after it has built new lists.
 
 #include "esvr/kernel.h"
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The lists of pairs on the device: the ellipsoids of each brick, and the bricks of each
+/// The pair lists on the device: the ellipsoids of each brick, and the bricks of each
 /// ellipsoid.
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 #pragma once
-/// Other ways to store a volume, which ESVR is compared with on the same voxels: lossless and
-/// quantised VDB files, and ZFP if the library was built with it.
+/// Other formats with which ESVR is compared on the same voxels: lossless and quantised VDB files,
+/// and ZFP if the library was built with it.
 
 #include <cstdint>
 #include <filesystem>
@@ -32,9 +32,9 @@ struct ZfpSetting {
 
 struct BaselineSetting {
   std::variant<VoxelPacking, ZfpSetting> how;
-  /// For VDB files only. If it is above 0, voxels that differ from the background by no more than
-  /// this are made inactive before encoding, and empty leaves are removed. In a level set these are
-  /// the voxels within this distance of the band's edge.
+  /// For VDB files only. If the threshold is above 0, voxels that differ from the background by no
+  /// more than the threshold are made inactive before encoding, and empty leaves are removed. In a
+  /// level set these are the voxels within this distance of the band's edge.
   double threshold = 0.0;
 };
 
@@ -72,9 +72,9 @@ class BaselineEncoder {
   Encoded encode(const BaselineSetting& setting);
   /// Seconds that the method takes to read the last encoded file into memory.
   [[nodiscard]] double secondsToDecode() const;
-  /// The voxels of the last encoded file. ZFP stores no active mask: a voxel of it is active if it
-  /// differs from the background by more than half of the smallest difference that an active voxel
-  /// of the source has.
+  /// The voxels of the last encoded file. ZFP stores no active mask. A voxel of a ZFP file is
+  /// active if it differs from the background by more than half of the smallest such difference of
+  /// an active voxel of the source.
   [[nodiscard]] SparseVolume decode() const;
 
   [[nodiscard]] const BaselineSource& source() const;
@@ -97,14 +97,14 @@ struct Match {
   std::vector<MatchStep> steps;  ///< all trials, in order
 };
 
-/// Searches the setting of the highest PSNR that takes at most `bytes`. The form and the codec are
-/// those of `like`. The search varies FpN's tolerance, ZFP's amount and, for VDB files, the
-/// threshold; it bisects the threshold until the size is at most 2 % below the limit.
+/// Searches for the setting with the highest PSNR that takes at most `bytes`. The form and the
+/// codec are those of `like`. The search varies FpN's tolerance, ZFP's amount and, for VDB files,
+/// the threshold; it bisects the threshold until the size is at most 2 % below the limit.
 [[nodiscard]] Match matchSize(BaselineEncoder& encoder, const BaselineSetting& like,
                               std::uint64_t bytes);
 
-/// Searches the setting of the fewest bytes that reaches a PSNR, by varying FpN's tolerance or
-/// ZFP's amount.
+/// Searches for the setting with the fewest bytes that reaches a PSNR, by varying FpN's tolerance
+/// or ZFP's amount.
 /// \param psnr  dB over the box
 /// \throws UsageError  the form has neither a tolerance nor an amount
 [[nodiscard]] Match matchPsnr(BaselineEncoder& encoder, const BaselineSetting& like, double psnr);

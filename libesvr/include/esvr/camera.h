@@ -28,16 +28,17 @@ struct Resolution {
   int width = 800, height = 800;  ///< pixels
 };
 
-/// The given parameters of a camera; fitCamera chooses the others so that a box fills the picture.
+/// The parameters of a camera that are given; fitCamera chooses the others so that the picture
+/// shows all of a box.
 struct CameraWish {
   std::optional<Vec3> eye{}, center{}, up{};
   std::optional<double> fov{}, height{};
   Projection projection = Projection::kPerspective;
 };
 
-/// A camera that sees all of a box. By default it points at the middle of the box, from a little
-/// above and from the right, with y upwards, and is as far away as the bounding sphere of the box
-/// requires.
+/// Makes a camera that sees all of a box. By default it looks at the middle of the box from a
+/// little above and from the right, with y upwards, at the distance that the bounding sphere of the
+/// box requires.
 /// \param box  a box that is not empty
 [[nodiscard]] Camera fitCamera(const Box& box, const CameraWish& wish, Resolution resolution);
 

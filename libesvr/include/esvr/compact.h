@@ -1,6 +1,6 @@
 #pragma once
-/// Compacts a fitted grid: chooses the quantisation steps by rate control, quantises the ellipsoids
-/// and solves for their intensities again.
+/// Compacts a fitted grid. Rate control chooses the quantisation steps; the ellipsoids are
+/// quantised, and their intensities are solved for again.
 
 #include <cstdint>
 #include <optional>
@@ -33,11 +33,12 @@ struct CompactResult {
   std::uint64_t bytes = 0;  ///< bytes of the ellipsoids
 };
 
-/// Compacts a grid. The result is deterministic on one device; devices round differently and may
-/// choose different steps. If the wanted PSNR or size is out of reach, the result is the nearest
-/// one found.
+/// Compacts a grid. The result is deterministic on one device. Devices round differently, so that
+/// they may choose different steps. If the wanted PSNR or size is out of reach, the result is the
+/// nearest one found.
 /// \param grid  a grid that makeStoredGrid made from `source`; Ellipsoids::kappa must be empty
-/// \throws RuntimeFailure  no lattice can hold the ellipsoids, or they have kappas of their own
+/// \throws RuntimeFailure  no quantisation lattice can hold the ellipsoids, or each ellipsoid has
+///                         its own kappa
 /// \throws DeviceError  the GPU cannot be used
 [[nodiscard]] CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                                         const CompactOptions& options = {});

@@ -25,14 +25,14 @@ inline constexpr std::uint16_t kFormatVersion = 1;
 /// The rule that determines the active voxels when a grid is revoxelised.
 enum class TopologyKind {
   kThreshold = 0,  ///< a voxel is active if |V - background| > activeThreshold
-  /// The rule of kThreshold within the stored bricks only. A level set has its narrow band there: a
-  /// voxel is active if |V| < background - activeThreshold.
+  /// The rule of kThreshold, within the stored bricks only. If the grid is a narrow band, a voxel
+  /// of these bricks is active if |V| < background - activeThreshold.
   kLeaves = 1,
   kMask = 2,  ///< the voxels of `mask` are active, whatever their values
 };
 
-/// The error of the first importance layers of every chunk against the source. A grid has a row for
-/// each number of layers.
+/// The error of the first k importance layers of every chunk against the source. A grid has a row
+/// for each k.
 struct LayerError {
   float psnrBox = 0.0f;   ///< dB over the box of the conversion; infinite if there is no error
   float maxError = 0.0f;  ///< largest absolute error
@@ -47,14 +47,14 @@ struct StoredGrid {
   float activeThreshold = 0.0f;  ///< threshold of the topology; negative: all voxels are active
   /// Index corners of the source's bricks, increasing, for kLeaves and kMask; otherwise empty.
   std::vector<Coord> leaves;
-  std::vector<BrickMask> mask;     ///< active voxels of each leaf, for kMask; otherwise empty
+  std::vector<BrickMask> mask;     ///< active voxels of each brick, for kMask; else empty
   bool withinRange = true;         ///< decoded values are clamped to the source's range of values
   Box activeBox;                   ///< active bounding box of the source, index coordinates
   std::uint64_t activeVoxels = 0;  ///< number of active voxels of the source
   float valueMin = 0.0f, valueMax = 0.0f;  ///< range of the source's active voxels
   std::vector<CurvePoint> curve;
-  /// Quantised ellipsoids of every chunk of the field, whose ellipsoids are exactly their
-  /// dequantised form. Empty: the ellipsoids are stored as float32.
+  /// The quantised ellipsoids of every chunk. The ellipsoids of `field` are exactly their
+  /// dequantised form. If this is empty, the ellipsoids are stored as float32.
   std::vector<QuantisedEllipsoids> quantised;
   std::vector<LayerError> layerErrors;  ///< empty, or layerCount() rows
   /// Correction that is added to the sum, voxel by voxel, before the active voxels are determined.
@@ -65,14 +65,14 @@ struct StoredGrid {
   std::optional<VoxelLayer> voxels;
 };
 
-/// Bytes of a grid's quantised ellipsoids, by stream.
+/// Bytes of each stream of a grid's quantised ellipsoids.
 struct StreamBytes {
   std::uint64_t positions = 0, scales = 0, rotations = 0, intensities = 0;
 };
 [[nodiscard]] StreamBytes streamBytes(const StoredGrid& grid);
 
-/// Number of importance layers of a grid: the largest number of its chunks, 1 if no chunk has
-/// several layers, 0 without ellipsoids.
+/// Number of importance layers of a grid, which is the largest number of layers of a chunk. It is 1
+/// if no chunk has several layers, and 0 without ellipsoids.
 [[nodiscard]] std::size_t layerCount(const StoredGrid& grid);
 
 /// Ellipsoids and bytes of one importance layer, over all chunks.
@@ -95,13 +95,13 @@ struct ContainerWriteOptions {
 /// then renamed.
 /// \return the number of bytes written
 /// \throws RuntimeFailure  the file exists (without overwrite) or is not writable; the disk is full
-///                         or the limit of a file's size is reached (if SIGXFSZ is ignored); else
-///                         as for encodeEsvr
+///                         or the limit of a file's size is reached (if SIGXFSZ is ignored).
+///                         Other cases are those of encodeEsvr
 std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
                         const ContainerWriteOptions& options = {});
 
-/// Limits of reading. A small file may decode to much more memory, because sections are compressed
-/// and equal ellipsoids or voxels take hardly any bytes.
+/// Limits of reading. The content of a small file may need much more memory than the file has
+/// bytes, because sections are compressed and equal ellipsoids or voxels take hardly any bytes.
 struct ReadLimits {
   std::uint64_t maxBytes = kNoMemoryLimit;
 };
@@ -113,13 +113,13 @@ struct ReadLimits {
 /// \throws MemoryExceeded  the content needs more memory than the limits allow
 [[nodiscard]] EsvrFile readEsvr(const std::filesystem::path& path, const ReadLimits& limits = {});
 
-/// Selects a part of a file. A reader finds it by the section table, the chunk records and the
-/// directories of blocks. A grid that is stored as voxels is read whole.
+/// Selects a part of a file. A reader finds the part by the section table, the chunk records and
+/// the directories of blocks. A grid that is stored as voxels is read completely.
 struct ReadPart {
   /// Selects every ellipsoid whose support meets the box; the result may contain others.
   std::optional<Box> box{};
   std::optional<std::size_t> layers{};  ///< largest number of importance layers, from the first
-  /// Selects the smallest number of these layers that has at least this many ellipsoids.
+  /// Selects the smallest number of these layers that hold at least this many ellipsoids together.
   std::optional<std::size_t> ellipsoids{};
   ReadLimits limits{};
 };
@@ -145,7 +145,7 @@ struct PartOfFile {
 /// Encodes a file in memory. The same content gives the same bytes. The ellipsoids of a chunk are
 /// stored in Morton order of their centers; a reader gets them in that order, bit for bit.
 /// \throws RuntimeFailure  the content is invalid: a number is not finite, a quaternion has no unit
-///                         length, or the leaves are not increasing brick corners
+///                         length, or the bricks' corners are not increasing
 [[nodiscard]] std::vector<std::byte> encodeEsvr(const EsvrFile& file);
 /// Decodes a file in memory.
 /// \param nameForErrors  name of the file in error texts

@@ -1,7 +1,7 @@
 #pragma once
 /// Converts a volume to a stored grid. vdb2esvr and esvr-compare call it for every grid.
 ///
-/// A goal states what the stored grid must satisfy. A conversion may make several fits to reach its
+/// A goal states a condition for the stored grid. A conversion may make several fits to reach its
 /// goal.
 
 #include <cstdint>
@@ -29,8 +29,8 @@ struct FitGoal {};
 struct PresetGoal {};
 
 /// The best grid that adds at most `bytes` to a file (bytesAdded). Ellipsoids use at least 98 % of
-/// them unless more bytes would not improve the grid. FitOptions::count, psnr and seconds are
-/// ignored.
+/// these bytes unless more bytes would not improve the grid. FitOptions::count, psnr and seconds
+/// are ignored.
 struct SizeGoal {
   std::uint64_t bytes = 0;
 };
@@ -41,14 +41,14 @@ struct PsnrGoal {
   double psnr = 0.0;  ///< dB
 };
 
-/// Every voxel is restored within a bound. The grid holds voxels, or ellipsoids with a residual if
-/// these take fewer bytes. FitOptions::count, psnr and seconds are ignored.
+/// A grid that restores every voxel within a bound. The grid holds voxels, or ellipsoids with a
+/// residual if these take fewer bytes. FitOptions::count, psnr and seconds are ignored.
 struct BoundGoal {
   double bound = 0.0;     ///< largest absolute error, 0 or above
   bool relative = false;  ///< `bound` is a share of the range of the active values
 };
 
-/// Every voxel and the active mask are restored bit for bit. The grid holds voxels.
+/// A grid that restores every voxel and the active mask bit for bit. It holds voxels.
 struct LosslessGoal {};
 
 using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, BoundGoal, LosslessGoal>;
@@ -58,9 +58,10 @@ using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, BoundGoal, Lo
 
 /// What a stored grid consists of. A LosslessGoal always stores voxels.
 enum class Representation {
-  /// Ellipsoids or voxels, whichever serve the goal better. A FitGoal stores ellipsoids unless
-  /// exact voxels take no more bytes. Voxels are not tried for volumes of more than 2^25 voxels in
-  /// bricks, because coding them takes long.
+  /// Ellipsoids or voxels: those with the higher PSNR for a SizeGoal, and those that take fewer
+  /// bytes for a PsnrGoal or a BoundGoal. A FitGoal stores ellipsoids unless exact voxels take no
+  /// more bytes. For goals other than a BoundGoal, voxels are not tried if the bricks of the volume
+  /// have more than 2^25 voxels, because encoding them takes long.
   kAuto,
   /// Ellipsoids. For a BoundGoal they have a residual, which a narrow band cannot have.
   kEllipsoids,
@@ -69,7 +70,7 @@ enum class Representation {
 
 /// The form of ellipsoids in a file. kFloat32 is never replaced by voxels.
 enum class Storage {
-  kCompact,  ///< quantised and entropy coded: about 9 bytes per ellipsoid
+  kCompact,  ///< quantised and entropy-coded: 8 to 13 bytes per ellipsoid
   kFloat32   ///< float32 parameters: about 34 bytes per ellipsoid
 };
 
@@ -107,25 +108,26 @@ struct Candidate {
   bool estimated = false;  ///< the figures were extrapolated from a short fit
 };
 
-/// The candidates for a goal that voxels and ellipsoids can serve.
+/// The candidates for a goal that voxels and ellipsoids can both reach.
 struct ChoiceRecord {
-  std::optional<Candidate> voxels;      ///< nothing if no voxels serve the goal or none were tried
-  std::optional<Candidate> ellipsoids;  ///< nothing if no ellipsoids do, or none were tried
+  std::optional<Candidate> voxels;      ///< nothing if they cannot reach the goal or were not tried
+  std::optional<Candidate> ellipsoids;  ///< nothing if they cannot reach the goal or were not tried
 };
 
 struct Conversion {
   StoredGrid grid;                       ///< the grid that a reader of the file gets
   FitResult fit;                         ///< its field is empty; unused if voxels are stored
   std::optional<CompactRecord> compact;  ///< set if ellipsoids are stored as kCompact
-  std::optional<ChoiceRecord> choice;    ///< set if the goal can be served by voxels, too
+  std::optional<ChoiceRecord> choice;    ///< set if voxels were considered for the goal
 };
 
 /// Converts a volume. The result is as deterministic as that of fit(). If a PSNR is out of reach,
 /// the best fit found is returned with FitEnd::kPsnrMissed.
-/// \throws UsageError  the size cannot hold the grid; a lossless grid is wanted of doubles; a size
-///                     is wanted with kFloat32; the goal and the representation exclude each
-///                     other; no ellipsoids with a residual keep a bound
-/// \throws RuntimeFailure  the stored grid does not keep its bound
+/// \throws UsageError  the grid does not fit into the size; the source of a LosslessGoal has
+///                     doubles; a SizeGoal is combined with kFloat32; the goal and the
+///                     representation exclude each other; kEllipsoids is requested for a BoundGoal
+///                     that ellipsoids with a residual cannot reach
+/// \throws RuntimeFailure  the stored grid exceeds its bound
 /// Other exceptions are those of fit and compactGrid.
 [[nodiscard]] Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options);
 

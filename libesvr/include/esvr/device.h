@@ -1,5 +1,5 @@
 #pragma once
-/// Selection of the device that computes.
+/// Selects the device that computes.
 
 #include <string>
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Ellipsoids as a structure of arrays. A fit returns them, a file stores them and a renderer draws
-/// them.
+/// Ellipsoids as a structure of arrays, the form in which a fit returns them, a file stores them
+/// and a renderer draws them.
 
 #include <array>
 #include <cstddef>
@@ -39,7 +39,7 @@ void checkInvariants(const Ellipsoids& e);
 /// Ellipsoids whose centers are relative to one integer origin. A grid that is at most
 /// kChunkExtent voxels wide has one chunk; float32 centers are then exact to 2^-12 voxel.
 struct Chunk {
-  Coord origin;  ///< index coordinates of the voxel whose center is the centers' (0, 0, 0)
+  Coord origin;  ///< index coordinates of the voxel at (0, 0, 0) in the centers' coordinates
   Ellipsoids ellipsoids;
 };
 inline constexpr std::int32_t kChunkExtent = 4096;

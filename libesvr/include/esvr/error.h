@@ -1,6 +1,6 @@
 #pragma once
 /// Errors of the library. Every failure is thrown as esvr::Error or a class derived from it. A
-/// program catches it once, in main(), where kind() becomes the exit code. The text names the file,
+/// program catches it once, in main(), and exits with the code of kind(). The text names the file,
 /// the grid and the voxel if they are known.
 
 #include <stdexcept>

@@ -15,7 +15,7 @@ namespace esvr {
 
 /// Index corners (multiples of 8, increasing) of all bricks that the support of an ellipsoid
 /// reaches. Outside these bricks the field is exactly the background. The test of a brick against
-/// an ellipsoid is exact up to rounding, and includes a brick in case of doubt.
+/// an ellipsoid is exact up to rounding; if rounding makes it uncertain, the brick is included.
 /// \param within  bricks without a voxel in this box are left out
 /// \throws MemoryExceeded  there may be more than 2^32 pairs of an ellipsoid and a brick
 [[nodiscard]] std::vector<Coord> reachedBricks(const Field& field,
@@ -38,8 +38,8 @@ struct EllipsoidHits {
 /// least one support (the paper's 'average ellipsoid hits'); 0 if there is no such voxel.
 [[nodiscard]] double averageHits(const Field& field);
 
-/// V at one voxel in float64, by the definition: the sum over all ellipsoids. It serves tests and
-/// checks.
+/// V at one voxel in float64, by the definition: the sum over all ellipsoids. Tests and checks use
+/// it.
 [[nodiscard]] double evaluateReference(const Field& field, Coord voxel);
 
 /// The rule by which a field becomes voxels.

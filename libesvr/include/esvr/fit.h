@@ -28,7 +28,7 @@ struct FitProgress {
   double secondsLeft = 0.0;  ///< estimated time to the end of the run
 };
 
-/// The options that our method and the paper's have in common.
+/// The options that fit() and fitByPaper() (paper_method.h) have in common.
 struct CommonFitOptions {
   std::optional<std::size_t> count;  ///< number of ellipsoids; default: the method's own number
   std::optional<double> psnr;        ///< dB over the box; the fit ends as soon as it is reached
@@ -41,8 +41,8 @@ struct CommonFitOptions {
   std::function<void(const FitProgress&)> progress;
 };
 
-/// The options of our method. The run ends as soon as one of psnr, seconds and iterations is
-/// reached. Options that are not given follow from the preset and the data.
+/// The options of fit(). The run ends as soon as one of psnr, seconds and iterations is reached.
+/// Options that are not given follow from the preset and the data.
 struct FitOptions : CommonFitOptions {
   std::optional<std::uint32_t> iterations;  ///< length of the schedule
   Preset preset = Preset::kStandard;
@@ -62,7 +62,7 @@ struct FitResult {
   /// Wall-clock times. secondsSeed covers the seeding at the start, growth and relocation, and is
   /// not part of secondsOptimise.
   double secondsSeed = 0.0, secondsOptimise = 0.0;
-  std::size_t wanted = 0;          ///< ellipsoids that our method aimed at; 0 by the paper's
+  std::size_t wanted = 0;          ///< ellipsoids that fit() aimed at; 0 for fitByPaper()
   std::size_t deviceBytes = 0;     ///< largest GPU memory held; 0 on the CPU
   bool deviceFull = false;         ///< true if GPU memory ran out: fewer ellipsoids than `wanted`
   std::uint64_t pairs = 0;         ///< (ellipsoid, brick) pairs that the final field evaluates
@@ -77,11 +77,12 @@ struct FitResult {
 [[nodiscard]] std::uint32_t plannedIterations(const FitOptions& options);
 
 /// Fits ellipsoids to a volume. Sums are clamped to the range of the volume's values, background
-/// included, before they are compared with the volume: where it saturates, they only have to be
-/// large enough. A reader must clamp them too, as decodeGrid() does. The result is deterministic: the same volume, options and seed give
-/// the same bits on any number of threads, and in every run on GPUs of one kind, unless `seconds`
-/// ends the run. CPU and GPU use the same method and formulas but round differently, so that their
-/// fits differ in detail.
+/// included, before they are compared with the volume. Where the volume has its largest value, a
+/// sum may therefore exceed this value. A reader must clamp sums too, as decodeGrid() does.
+///
+/// The result is deterministic: the same volume, options and seed give the same bits on any number
+/// of threads, and in every run on GPUs of one kind, unless `seconds` ends the run. CPU and GPU use
+/// the same method and formulas but round differently, so that their fits differ slightly.
 /// \return a result whose end is kPsnrMissed if options.psnr was given and not reached;
 ///         convertVolume (convert.h) searches for the smallest grid that reaches a PSNR
 /// \throws BadInput    the volume has no active voxel

@@ -1,6 +1,6 @@
 #pragma once
-/// The curve of a fit: its error against its iterations. Files store it without times; FitResult
-/// and reports have times as well.
+/// The curve of a fit: its error after a number of iterations. Files store it without times;
+/// FitResult and reports also have the times.
 
 #include <cstdint>
 #include <vector>

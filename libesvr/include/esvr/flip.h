@@ -1,7 +1,7 @@
 #pragma once
 /// FLIP: the difference that a viewer sees when two pictures alternate (Andersson et al., "FLIP: A
 /// Difference Evaluator for Alternating Images", Proc. ACM Comput. Graph. Interact. Tech. 3(2),
-/// 2020). This is its form for sRGB pictures (LDR-FLIP).
+/// 2020), in the form for sRGB pictures (LDR-FLIP).
 
 #include <numbers>
 #include <vector>

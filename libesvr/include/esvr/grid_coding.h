@@ -16,10 +16,11 @@ namespace esvr {
 
 /// Makes a stored grid from a fitted field and the properties of its source. It chooses the rule by
 /// which a reader determines the active voxels:
-///  - usually a threshold: among those that increase the squared error by at most 0.004 dB, the one
-///    whose active voxels have the largest intersection over union with the source's;
-///  - for a narrow band, the band itself within the source's bricks;
-///  - the source's active mask, if `activity` asks for it, or if no threshold restores a voxel
+///  - usually a threshold. Among the thresholds that increase the squared error by at most
+///    0.004 dB, it is the one whose active voxels have the largest intersection over union with the
+///    source's;
+///  - for a narrow band, the rule of kLeaves (container.h) with the source's bricks;
+///  - the source's active mask, if `activity` is kExact, or if no threshold restores a voxel
 ///    because all values equal the background.
 /// The curve is left empty.
 [[nodiscard]] StoredGrid makeStoredGrid(const GridDescriptor& descriptor,
@@ -28,7 +29,7 @@ namespace esvr {
 
 /// True for a level set whose background (the half width of its band) is above 0 and not exceeded
 /// by an active voxel. makeStoredGrid stores such a grid as a narrow band, and
-/// FitOptions::narrowBand is meant for it. Any other level set is fitted and stored like other
+/// FitOptions::narrowBand is intended for it. Any other level set is fitted and stored like other
 /// grids.
 [[nodiscard]] bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source);
 
@@ -37,7 +38,7 @@ namespace esvr {
 [[nodiscard]] StoredGrid makeStoredVoxels(const GridDescriptor& descriptor,
                                           const SparseVolume& source, VoxelLayer layer);
 
-/// The rule by which decodeGrid() turns the sum into voxels: the grid's threshold, range and band,
+/// The rule by which decodeGrid() makes voxels from the sum: the grid's threshold, range and band,
 /// without its bricks, mask and residual.
 [[nodiscard]] RevoxeliseOptions voxelRule(const StoredGrid& grid);
 

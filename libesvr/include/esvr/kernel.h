@@ -1,5 +1,5 @@
 #pragma once
-/// The kernel family phi of an ellipsoid, in one source for host and device.
+/// The kernel family phi of an ellipsoid. The code is compiled for host and device.
 ///
 ///     phi(m) = ((1 + E) / (E + e^m) - eps) / (1 - eps)   for m < cutoff = ln((1 + E) / eps - E)
 ///     phi(m) = 0                                         otherwise
@@ -12,8 +12,8 @@
 /// makes phi continuous at the end of its support. The paper's own kernel jumps there;
 /// KernelForm::kPaper keeps it for reproduction.
 ///
-/// The evaluation takes out e^-s with s = max(kappa, 0), so that no kappa from -1e4 to 1e4
-/// overflows:
+/// The evaluation multiplies both terms of the fraction by e^-s with s = max(kappa, 0), so that no
+/// kappa from -1e4 to 1e4 causes an overflow:
 ///
 ///     (1 + E) / (E + e^m) = A / (B + e^(m - s)),   A = e^-s + e^(kappa - s),   B = e^(kappa - s)
 

@@ -7,10 +7,10 @@
 
 namespace esvr {
 
-/// The limit that allows everything.
+/// The value of a limit that allows any amount of memory.
 inline constexpr std::uint64_t kNoMemoryLimit = std::numeric_limits<std::uint64_t>::max();
 
-/// Checks a need of memory against a limit.
+/// Checks an amount of memory against a limit.
 /// \param what  subject of the message, for example "grid 'density'"
 /// \throws MemoryExceeded  neededBytes is more than maxBytes; the text gives both numbers
 void requireWithinMemory(double neededBytes, std::uint64_t maxBytes, const std::string& what);

@@ -1,6 +1,6 @@
 #pragma once
 /// Errors of a volume against a reference. Sums are formed in float64 over the bricks of either
-/// volume. Empty space within the box counts as voxels, but takes no time.
+/// volume. Empty space within the box counts as voxels but takes no computing time.
 
 #include <cstdint>
 #include <optional>

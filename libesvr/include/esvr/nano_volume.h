@@ -9,8 +9,8 @@
 namespace esvr {
 
 /// The value type of a NanoVDB grid. Quantised types have a range of values for each leaf; FpN also
-/// has a number of bits for each leaf. The background within a leaf may be off by half a step, and
-/// is then drawn like any other value.
+/// has a number of bits for each leaf. The background within a leaf may have an error of half a
+/// step, and is then drawn like any other value.
 enum class NanoValues { kFloat, kFp4, kFp8, kFp16, kFpN };
 
 /// A NanoVDB grid in the index space of the volume. Voxels outside its leaves are the background.

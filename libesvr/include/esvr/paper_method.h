@@ -9,10 +9,10 @@
 /// pruned once or a few times. Every part can be switched off, so that the paper's ablations can be
 /// repeated.
 ///
-/// Where the paper gives no details, the method follows the framework it builds on (3D Gaussian
-/// Splatting, Kerbl et al. 2023: the rules of cloning and splitting, dense Adam, exponential decay)
-/// and the voxeliser R2-Gaussian (Zha et al. 2024: learning rates). An ellipsoid and its clone
-/// share the intensity, since the field is a sum.
+/// Where the paper gives no details, the method follows the framework that the paper builds on (3D
+/// Gaussian Splatting, Kerbl et al. 2023: the rules of cloning and splitting, dense Adam,
+/// exponential decay) and the voxeliser R2-Gaussian (Zha et al. 2024: learning rates). An ellipsoid
+/// and its clone each get half of the intensity, since the field is a sum.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #pragma once
-/// Cancellation of long calls.
+/// Cancels long calls.
 
 #include <atomic>
 #include <functional>

@@ -1,7 +1,7 @@
 #pragma once
 /// Ellipsoids as integers on a quantisation lattice. A compact file stores each chunk in this form.
 ///
-/// Ellipsoids need different precision, since the cost of an error grows with the ellipsoid's
+/// Ellipsoids need different precisions, since the effect of an error grows with the ellipsoid's
 /// weight w = |I| sqrt(sum phi^2). Each ellipsoid therefore has a precision e, which is the octave
 /// of its weight. The number of bits of a parameter follows from e and from the scales, which are
 /// decoded first: positions depend on the smallest scale, rotations on the ratio of the scales,
@@ -38,7 +38,7 @@ struct Lattice {
   int positionBase = 0, positionSlope = 0;    ///< 1/256 bit; slope for each coarse step of scale
   double scaleStep = 1.0;                     ///< coarse step of a scale's logarithm
   std::int32_t lowestScale = 0;               ///< smallest logarithm, in coarse steps
-  int scaleOffset = 0;                        ///< precision that needs the coarse step only
+  int scaleOffset = 0;                        ///< precision for which coarse steps suffice
   int rotationOffset = 0;                     ///< bits at precision 0 and equal scales
   std::vector<std::uint8_t> rotationFrom;     ///< ratios, in coarse steps, that add one bit each
   double intensityStep = 1.0;                 ///< step at the smallest volume
@@ -75,7 +75,7 @@ struct QuantiserSteps {
   double position = 0.0, scale = 0.0, rotation = 0.0, intensity = 0.0;
 };
 
-/// A lattice and the precisions of the ellipsoids on it.
+/// A quantisation lattice and the precisions of the ellipsoids on it.
 struct LatticeChoice {
   Lattice lattice;
   std::vector<std::uint8_t> precision;
@@ -85,20 +85,20 @@ struct LatticeChoice {
   std::vector<std::uint8_t> layerFrom{};
 };
 
-/// Chooses the lattice for quantisation steps.
+/// Chooses the quantisation lattice for given quantisation steps.
 /// \param phi2  sum over voxels of phi^2 for each ellipsoid
 /// \throws RuntimeFailure  the centers or scales need more bits than a lattice can have
 [[nodiscard]] LatticeChoice chooseLattice(const Ellipsoids& e, std::span<const double> phi2,
                                           const QuantiserSteps& steps);
 
-/// Rounds ellipsoids to a lattice and sorts them into the file's order. The axes of each ellipsoid
-/// are sorted, so that its scales decrease.
+/// Rounds ellipsoids to a quantisation lattice and sorts them into the file's order. The axes of
+/// each ellipsoid are sorted, so that its scales decrease.
 /// \param order  output: the ellipsoids' indices in `e`, in the file's order
 /// \throws RuntimeFailure  a value lies outside the lattice
 [[nodiscard]] QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
                                            std::vector<std::size_t>& order);
 
-/// Replaces the intensities by new ones, rounded to the existing lattice.
+/// Replaces the intensities by new ones, rounded to the existing quantisation lattice.
 /// \param intensities  one for each ellipsoid, in the file's order
 void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids& q);
 

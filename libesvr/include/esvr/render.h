@@ -29,10 +29,10 @@ enum class RenderMode {
   kDepth
 };
 
-/// The values of a field between its voxels.
+/// The rule for the values of a field between its voxels.
 enum class Between {
   kVoxels,  ///< trilinear interpolation of the voxels of revoxelise(), as in renderVolume
-  kSum      ///< the clamped sum of ellipsoids itself, which a fit determines at voxels only
+  kSum      ///< the clamped sum of ellipsoids itself, which a fit constrains at voxels only
 };
 
 /// A box with real-valued corners. Voxel (i, j, k) extends half a voxel to each side of (i, j, k).
@@ -43,7 +43,7 @@ struct PlaceBox {
 struct RenderOptions {
   Camera camera;
   Resolution resolution;
-  TransferFunction transfer;  ///< sampled at 4097 values from its first point to its last
+  TransferFunction transfer;  ///< tabulated at 4097 values from its first point to its last
   double step = 1.0;          ///< distance between samples, voxels
   /// The length, in voxels, over which the transfer function's opacities are reached. The opacity
   /// of a sample is 1 - (1 - opacity)^(step / opacityLength).

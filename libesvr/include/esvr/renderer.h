@@ -26,9 +26,10 @@ struct FrameStats {
 };
 
 struct RendererLimits {
-  /// Parts of a tile's depth that a CUDA device draws in parallel, at most 16. More parts keep the
-  /// device busy if few tiles have most of the work, but a ray then ends later in opaque volumes.
-  /// 0: the number is chosen by the lists of the first picture.
+  /// Parts of a tile's depth that a CUDA device draws in parallel, at most 16. More parts use the
+  /// device better if few tiles have most of the work, but in opaque volumes samples behind the end
+  /// of a ray are then computed without effect. 0: the number follows from the lists of the first
+  /// picture.
   int depthParts = 0;
   /// Limit on device memory; 0: no limit. If necessary, pictures are drawn in bands.
   std::uint64_t maxBytes = 0;
@@ -67,10 +68,10 @@ class Renderer {
                                                            const Device& device,
                                                            const RendererLimits& limits = {});
 
-/// Draws a NanoVDB grid by the rule of renderVolume. It is the reference that other renderers are
-/// compared with. The position of a sample is computed in float32 as an offset from the point where
-/// its ray enters the grid, so that it is precise for a camera at any distance. The exceptions are
-/// those of renderField.
+/// Draws a NanoVDB grid by the rule of renderVolume. Other renderers are compared with this one.
+/// The position of a sample is computed in float32 as an offset from the point where its ray enters
+/// the grid, so that it is precise for a camera at any distance. The exceptions are those of
+/// renderField.
 [[nodiscard]] Image renderNano(const NanoVolume& volume, const RenderOptions& options);
 
 /// Makes a renderer that draws as renderNano. A CUDA renderer does not need the volume after it was

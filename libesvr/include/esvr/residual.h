@@ -1,6 +1,6 @@
 #pragma once
-/// Residuals bound the error of every voxel: they correct the sum of ellipsoids wherever its error
-/// exceeds the bound.
+/// A residual bounds the error of every voxel: it corrects the sum of ellipsoids wherever the error
+/// of the sum exceeds the bound.
 
 #include <cstdint>
 #include <optional>
@@ -16,7 +16,7 @@ namespace esvr {
 /// bound.
 /// \param grid   a grid that makeStoredGrid made from `source`
 /// \param bound  largest absolute error, above 0
-/// \return nothing if the grid is a narrow band, or if the margin takes too much of the bound
+/// \return nothing if the grid is a narrow band, or if the margin exceeds a sixth of the bound
 [[nodiscard]] std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& source,
                                                      double bound);
 

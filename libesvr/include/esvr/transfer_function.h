@@ -1,7 +1,7 @@
 #pragma once
 /// Transfer functions map values to colors and opacities. They are given as points on an axis of
-/// values and are interpolated between the points as in ParaView and VTK, so that a preset looks
-/// the same here as there.
+/// values and are interpolated between the points as in ParaView and VTK, so that a preset gives
+/// the same colors as in these programs.
 
 #include <filesystem>
 #include <string>
@@ -34,7 +34,7 @@ struct ColorPoint {
 };
 
 /// A color map has at least one point, and x does not decrease. Values below the first point have
-/// its color, values above the last point have that one's.
+/// the color of the first point, and values above the last point have the color of the last point.
 struct ColorMap {
   ColorSpace space = ColorSpace::kRgb;
   std::vector<ColorPoint> points;
@@ -42,9 +42,10 @@ struct ColorMap {
   friend bool operator==(const ColorMap&, const ColorMap&) = default;
 };
 
-/// The midpoint and the sharpness shape the curve from a point to the next one, as in
-/// vtkPiecewiseFunction. At the midpoint, a share of the interval, half of the change is reached. A
-/// sharpness of 0 gives straight lines, 1 gives a step at the midpoint.
+/// The midpoint and the sharpness determine the curve from a point to the next one, as in
+/// vtkPiecewiseFunction. The midpoint is the share of the interval at which half of the change is
+/// reached. A sharpness of 0 gives straight lines, and a sharpness of 1 gives a step at the
+/// midpoint.
 struct OpacityPoint {
   double x = 0.0;
   double opacity = 0.0;  ///< 0 to 1, over a length of RenderOptions::opacityLength voxels

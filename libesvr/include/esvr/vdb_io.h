@@ -38,12 +38,12 @@ struct VdbSummary {
   std::vector<GridSummary> grids;  ///< grids in file order
 };
 
-/// Lists a file's grids; where the format allows it, without reading their voxels.
+/// Lists a file's grids. It does not read their voxels if the format allows this.
 /// \throws BadInput  the file is missing, a directory, empty, truncated or not a VDB (the text
 ///                   names the file)
 [[nodiscard]] VdbSummary inspectVdb(const std::filesystem::path& path);
 
-/// Treatment of NaN and infinite voxels: an error, or replacement by 0.
+/// Treatment of NaN and infinite voxels: they are an error, or they are replaced by 0.
 enum class NonFinite { kRefuse, kZero };
 
 struct ReadOptions {
@@ -62,8 +62,9 @@ struct VolumeGrid {
 };
 
 /// Reads one grid with its active tiles. Active voxels of the volume hold the grid's values,
-/// rounded to float32. Inactive voxels hold the background, whatever the file has there; in a level
-/// set they hold the background with the file's sign, which distinguishes inside from outside.
+/// rounded to float32. Inactive voxels hold the background and not the file's inactive values. In a
+/// level set they hold the background with the file's sign, which distinguishes inside from
+/// outside.
 /// \param name  "density" (the first grid of that name) or "density[1]" (the second)
 /// \throws BadInput  as for inspectVdb; the grid does not exist (the text lists the grids); its
 ///                   type cannot be fitted; it has no active voxel (without allowEmpty); voxels are

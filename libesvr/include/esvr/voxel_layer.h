@@ -1,6 +1,6 @@
 #pragma once
-/// A grid's voxels as integer codes, exact or within a bound. A file holds such a layer if
-/// ellipsoids do not reach the wanted accuracy.
+/// A grid's voxels as integer codes, exact or within a bound. A file holds such a layer if voxels
+/// were chosen instead of ellipsoids (convert.h), or as a residual.
 
 #include <cstdint>
 #include <optional>
@@ -14,9 +14,11 @@ namespace esvr {
 /// The meaning of an integer code n.
 enum class VoxelForm {
   kLattice = 0,  ///< quantised: the value float32(n / divisor), divided in float64
-  kHalf = 1,     ///< half floats in increasing order: n >= 0 has the bits n, n < 0 is -(-1 - n)
-  kFloat = 2,    ///< float32 in the same way
-  kPalette = 3   ///< palette entry n
+  /// Half floats in increasing order. n >= 0 is the value with the bits n; n < 0 is the negated
+  /// value with the bits -1 - n.
+  kHalf = 1,
+  kFloat = 2,   ///< float32 in the same way
+  kPalette = 3  ///< palette entry n
 };
 
 struct VoxelLayer {
@@ -41,7 +43,7 @@ struct VoxelLayer {
 /// Storage of the active mask.
 enum class Activity {
   kExact,   ///< the exact active mask
-  kByValue  ///< a voxel is active if its value cannot be the background within the bound
+  kByValue  ///< a voxel is active if its value differs from the background by more than the bound
 };
 
 /// Makes a layer whose voxels are within `bound` of the volume's. If rounding to float32 would
@@ -49,15 +51,15 @@ enum class Activity {
 /// \throws UsageError  the bound is not positive and finite
 [[nodiscard]] VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity);
 
-/// Makes a layer smaller by rate-distortion optimised quantisation: a voxel gets a code near its
-/// value that takes fewer bits, where its squared error grows by less than the bits saved are
-/// worth. Voxels then lie within five halves of the lattice's step, and their errors are
-/// correlated with the coder's predictions. Vacant voxels stay so.
+/// Makes a layer smaller by rate-distortion optimised quantisation. A voxel gets a code at most
+/// two steps away that takes fewer bits, if its squared error grows by less than the saved bits
+/// times `bitPrice`. The error of a voxel is then at most 2.5 steps of the quantisation lattice,
+/// and errors are correlated with the coder's predictions. Vacant voxels remain vacant.
 /// \param layer     a layer that boundedLayer made from `volume`; other forms than kLattice are
 ///                  returned unchanged
-/// \param bitPrice  squared error that a bit is worth, in squared steps of the lattice. By the
-///                  theory of fine quantisation it is ln(2) / 6 = 0.1155 (6.02 dB for each bit);
-///                  far above that, the codes spoil the predictions of later voxels
+/// \param bitPrice  squared error that may be added to save a bit, in squared steps of the lattice.
+///                  By the theory of fine quantisation it is ln(2) / 6 = 0.1155 (6.02 dB for each
+///                  bit); with much larger values, the predictions of later voxels become worse
 [[nodiscard]] VoxelLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
                                       double bitPrice);
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Writes a grid in every form that OpenVDB's and NanoVDB's own files offer, as a baseline for
-/// .esvr files. The two libraries themselves write and read the files, and the times are measured.
-/// To write files for users, call writeGrids (vdb_io.h).
+/// Writes a grid in every form of OpenVDB and NanoVDB files, as baselines for .esvr files. The
+/// files are written and read by the two libraries, and the times are measured. To write files for
+/// users, call writeGrids (vdb_io.h).
 
 #include <filesystem>
 #include <memory>

@@ -1,7 +1,7 @@
 #pragma once
-/// Estimates the work and memory that evaluating a field takes. The estimate follows from the
-/// supports of the ellipsoids and needs no evaluation, so that a program can refuse work that it
-/// could not finish.
+/// Estimates the work and memory that the evaluation of a field needs. The estimate follows from
+/// the supports of the ellipsoids and needs no evaluation, so that a program can refuse work that
+/// it could not finish.
 
 #include <limits>
 
@@ -23,8 +23,8 @@ struct EstimateOptions {
   Box within = Box::whole();
   /// At most this many bricks are evaluated.
   double maxBricks = std::numeric_limits<double>::infinity();
-  /// If the estimate exceeds this number of bytes, a slower and tighter one is made, which counts
-  /// a brick once even if several ellipsoids reach it.
+  /// If the estimate exceeds this number of bytes, a slower and tighter estimate is made, which
+  /// counts a brick once even if several ellipsoids reach it.
   double enough = std::numeric_limits<double>::infinity();
 };
 

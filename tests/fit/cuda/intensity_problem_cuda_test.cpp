@@ -1,5 +1,5 @@
-// Plan: the tests of intensity_cases.h on a GPU. Passes over many overlapping ellipsoids agree with
-// those of the CPU, and have the same bits in every run.
+// Plan: the tests of intensity_cases.h run on a GPU. Passes over many overlapping ellipsoids agree
+// with those of the CPU, and have the same bits in every run.
 
 #include "../intensity_cases.h"
 #include "gpu_test.h"

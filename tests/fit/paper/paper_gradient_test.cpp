@@ -1,6 +1,6 @@
 // Plan: on every device, the gradient of the paper's loss over one subvolume by every parameter of
 // the paper (position, log scales, quaternion of any length, intensity, k) is compared with central
-// differences of a float64 loss by the paper's formula at every voxel, with the textbook's SSIM.
+// differences of a float64 loss by the paper's formula at every voxel, with SSIM by its definition.
 // The cases are the paper's ellipsoids, Gaussians, and ellipsoids of different k. The paper's
 // ellipsoid and the form that passes use are the same function. A GPU that holds one subvolume at a
 // time computes the same bits.

@@ -58,8 +58,8 @@ inline Scene randomScene(std::uint64_t seed, const std::vector<Coord>& bricks = 
   return makeScene(bricks, (bricks.size() + 1) / 2, value, value);
 }
 
-/// The scene with bricks of zeros around its own and between them. The zeros are of both signs, as a
-/// residual 0 - t has the sign of -0.
+/// The scene with bricks of zeros around its own and between them. The zeros are of both signs, as
+/// a residual 0 - t has the sign of -0.
 inline Scene withBricksOfZeros(const Scene& scene) {
   Scene padded = scene;
   for (int i = 0; i < 125; ++i) {

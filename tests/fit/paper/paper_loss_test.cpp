@@ -1,13 +1,14 @@
-// Plan: (1) loss and gradient agree with the textbook's formula over dense float64 boxes; (2) the
+// Plan: (1) loss and gradient agree with the definition of SSIM over dense float64 boxes; (2) the
 // gradient agrees with central differences of that dense loss; (3) the loss agrees with the public
 // metric; (4) identical volumes, bricks of zeros, threads, powers of two, positions and earlier
 // calls have exact results; (5) flat bright regions, where variances cancel, are precise; (6) wrong
 // input is refused.
 //
 // Tolerances. The loss is summed in float64. The moments have errors of a few 2.2e-16 of squared
-// values of order 1 and are divided by C2 = 9e-4 or more, in the library and in the textbook's
-// form: 1e-12. The gradient is float32, and so are two of its three parts. Their roundings are at
-// most 6e-8, with signs that differ from voxel to voxel: 1e-7 of the norm.
+// values of order 1 and are divided by C2 = 9e-4 or more, in the library and in the definition. The
+// tolerance of the loss is therefore 1e-12. The gradient is float32, and so are two of its three
+// parts. Their roundings are at most 6e-8, with signs that differ from voxel to voxel. The
+// tolerance of the gradient is therefore 1e-7 of its norm.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Plan: the paper's loss on the device agrees with the textbook's formula over dense float64 boxes,
+// Plan: the paper's loss on the device agrees with the definition of SSIM over dense float64 boxes,
 // with the scenes and tolerances of the CPU's test (paper_loss_test.cpp). Bricks of zeros,
 // positions and repetition do not change a bit. Gradients and a run of the paper's method agree
 // with the CPU's.
