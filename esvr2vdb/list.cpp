@@ -32,20 +32,28 @@ void printGrids(const Listing& listing) {
   for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
     const StoredGrid& grid = listing.file.grids[g];
     const std::uint64_t bytes = cli::storedBytes(listing.summary, g);
+    const std::uint64_t own = cli::ownBytes(listing.summary, g);
     const std::size_t ellipsoids = grid.field.ellipsoidCount();
     table.add({listing.names[g], cli::nameOf(grid.descriptor.gridClass),
                cli::nameOf(grid.descriptor.valueType), std::to_string(grid.activeVoxels),
                std::to_string(ellipsoids), textOf(grid.field.kernel), cli::nameOf(grid.topology),
-               std::to_string(bytes), bytesPerEllipsoid(bytes, ellipsoids)});
+               std::to_string(own), bytesPerEllipsoid(bytes, ellipsoids)});
   }
   table.print(std::cout);
 }
 
+/// The name of a section's grid; "-" if it belongs to the file.
+std::string gridOf(const Listing& listing, const SectionSummary& section) {
+  return section.grid < listing.names.size() ? listing.names[section.grid] : "-";
+}
+
 void printSections(const Listing& listing) {
-  cli::Table table({"section", "of grid", "codec", "bytes", "raw bytes"});
-  for (const auto& s : listing.summary.sections)
-    table.add({s.kind, s.grid < listing.names.size() ? listing.names[s.grid] : "-", s.codec,
-               std::to_string(s.storedBytes), std::to_string(s.rawBytes)});
+  cli::Table table({"section", "of grid", "codec", "bytes", "raw bytes", "shared with"});
+  const auto& sections = listing.summary.sections;
+  for (const auto& s : sections)
+    table.add({s.kind, gridOf(listing, s), s.codec, std::to_string(s.storedBytes),
+               std::to_string(s.rawBytes),
+               s.sharedWith ? gridOf(listing, sections[*s.sharedWith]) : "-"});
   table.print(std::cout);
 }
 

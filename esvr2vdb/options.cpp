@@ -32,6 +32,9 @@ cli::ProgramText programText() {
               "which was chosen when the file was made. In a level set, the voxels of the narrow\n"
               "band are active. A file made with --topology exact stores the active mask.\n"
               "\n"
+              "--list counts bytes that several grids share for the first of them only. The table\n"
+              "of sections names the grid with which a section is shared.\n"
+              "\n"
               "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
               "be used, 5 not enough memory (--max-memory).",
           .examples =

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "esvr/error.h"
 
@@ -18,29 +19,70 @@ std::optional<std::uint64_t> sizeOf(const Options& options, const VdbSummary& in
 /// The weight of a grid in the division, which is above 0 for empty grids.
 double weightOf(const GridSummary& grid) { return double(grid.activeVoxels) + 1.0; }
 
+StoredGrid withDescriptor(StoredGrid grid, const GridDescriptor& descriptor) {
+  grid.descriptor = descriptor;
+  return grid;
+}
+
+/// The bytes that a twin usually adds: its record, and rows for the ellipsoids of one chunk, for the
+/// leaves or the mask, and for the errors of layers. Voxels have fewer rows.
+std::uint64_t usualBytes(const GridDescriptor& twin) {
+  constexpr std::uint64_t kRows = 3;
+  StoredGrid grid;
+  grid.field.chunks.resize(1);
+  return bytesAdded(withDescriptor(std::move(grid), twin)) + kRows * kSectionRowBytes;
+}
+
+/// Subtracts without passing 0.
+std::uint64_t less(std::uint64_t bytes, std::uint64_t by) { return bytes - std::min(bytes, by); }
+
 }  // namespace
 
 ByteShares::ByteShares(const Options& options, const VdbSummary& input,
-                       const std::vector<GridSummary>& grids)
-    : left_(sizeOf(options, input)) {
-  for (const auto& grid : grids) voxelsLeft_ += weightOf(grid);
+                       const std::vector<GridSummary>& grids, const Twins& twins)
+    : left_(sizeOf(options, input)), shares_(grids.size()) {
   if (!left_) return;
   const std::uint64_t fixed = bytesBesideGrids(input.metadata);
   if (fixed >= *left_)
     throw UsageError("the file takes " + std::to_string(fixed) +
                      " bytes without any grid; the size allows " + std::to_string(*left_));
   *left_ -= fixed;
+  for (std::size_t g = 0; g < grids.size(); ++g) {
+    if (const auto twin = twins.find(g); twin != twins.end())
+      reserve(twin->second);
+    else
+      weightLeft_ += shares_[g].weight = weightOf(grids[g]);
+  }
 }
 
-std::optional<std::uint64_t> ByteShares::of(const GridSummary& grid) const {
+void ByteShares::reserve(const Twin& twin) {
+  Share& share = shares_[twin.of];
+  const std::uint64_t bytes = usualBytes(twin.descriptor);
+  share.twins.push_back(twin.descriptor);
+  share.reserved += bytes;
+  left_ = less(*left_, bytes);
+}
+
+std::optional<std::uint64_t> ByteShares::of(std::size_t grid) const {
   if (!left_) return std::nullopt;
-  return std::uint64_t(double(*left_) * weightOf(grid) / voxelsLeft_);
+  return std::uint64_t(double(*left_) * shares_[grid].weight / weightLeft_);
 }
 
-void ByteShares::take(const GridSummary& grid, const StoredGrid& stored) {
-  voxelsLeft_ -= weightOf(grid);
-  if (!left_) return;
-  *left_ -= std::min(*left_, bytesAdded(stored));
+std::uint64_t ByteShares::take(std::size_t grid, const StoredGrid& stored) {
+  if (!left_) return 0;
+  const Share& share = shares_[grid];
+  const std::uint64_t bytes = bytesOf(share, stored), allowed = *of(grid) + share.reserved;
+  if (bytes > allowed) return bytes - allowed;
+  left_ = less(*left_ + share.reserved, bytes);
+  weightLeft_ -= share.weight;
+  return 0;
+}
+
+std::uint64_t ByteShares::bytesOf(const Share& share, const StoredGrid& stored) {
+  if (share.twins.empty()) return bytesAdded(stored);
+  std::vector<StoredGrid> all{stored};
+  for (const auto& descriptor : share.twins) all.push_back(withDescriptor(stored, descriptor));
+  return bytesAddedTogether(std::move(all));
 }
 
 }  // namespace esvr::vdb2esvr

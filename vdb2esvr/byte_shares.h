@@ -8,24 +8,39 @@
 #include "esvr/container.h"
 #include "esvr/vdb_io.h"
 #include "vdb2esvr/options.h"
+#include "vdb2esvr/twins.h"
 
 namespace esvr::vdb2esvr {
 
 /// Grids share the bytes by their active voxels. Bytes that a grid does not use go to later grids.
+/// Twins of a grid have no share; the bytes of their records are reserved.
 class ByteShares {
  public:
-  ByteShares(const Options& options, const VdbSummary& input,
-             const std::vector<GridSummary>& grids);
+  ByteShares(const Options& options, const VdbSummary& input, const std::vector<GridSummary>& grids,
+             const Twins& twins);
 
-  /// Bytes for the next grid; nothing if no size is wanted.
-  [[nodiscard]] std::optional<std::uint64_t> of(const GridSummary& grid) const;
+  /// Bytes for a grid without its twins; nothing if no size is wanted.
+  [[nodiscard]] std::optional<std::uint64_t> of(std::size_t grid) const;
 
-  /// Subtracts the bytes of a converted grid.
-  void take(const GridSummary& grid, const StoredGrid& stored);
+  /// Subtracts the bytes of a converted grid and of its twins.
+  /// \return the bytes by which they exceed their share; if there are any, nothing is subtracted
+  [[nodiscard]] std::uint64_t take(std::size_t grid, const StoredGrid& stored);
 
  private:
-  std::optional<std::uint64_t> left_;
-  double voxelsLeft_ = 0.0;
+  /// A grid that is not a twin.
+  struct Share {
+    double weight = 0.0;
+    std::vector<GridDescriptor> twins;
+    std::uint64_t reserved = 0;  ///< expected bytes of the twins
+  };
+
+  void reserve(const Twin& twin);
+  /// Bytes of a converted grid with its twins.
+  [[nodiscard]] static std::uint64_t bytesOf(const Share& share, const StoredGrid& stored);
+
+  std::optional<std::uint64_t> left_;  ///< bytes without those reserved
+  double weightLeft_ = 0.0;
+  std::vector<Share> shares_;  ///< one for each grid; that of a twin is not used
 };
 
 }  // namespace esvr::vdb2esvr

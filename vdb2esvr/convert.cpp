@@ -58,4 +58,14 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
   return grid;
 }
 
+ConvertedGrid twinOf(const ConvertedGrid& grid, const std::string& uniqueName, const Twin& twin) {
+  ConvertedGrid made = grid;
+  made.uniqueName = uniqueName;
+  made.conversion.grid.descriptor = twin.descriptor;
+  made.nonFiniteReplaced = twin.nonFiniteReplaced;
+  made.sameAs = grid.uniqueName;
+  made.seconds = {.read = twin.secondsRead};
+  return made;
+}
+
 }  // namespace esvr::vdb2esvr

@@ -8,6 +8,7 @@
 #include "esvr/convert.h"
 #include "esvr/metrics.h"
 #include "vdb2esvr/options.h"
+#include "vdb2esvr/twins.h"
 
 namespace esvr::vdb2esvr {
 
@@ -27,6 +28,7 @@ struct ConvertedGrid {
   std::optional<double> hits;               ///< averageHits, with --hits
   std::optional<std::uint64_t> voxelPairs;  ///< pairs of countHits in the source's bricks, --hits
   std::optional<PaperRecord> paper;         ///< record of the paper's method, with --paper
+  std::optional<std::string> sameAs;        ///< unique name of the grid that this one is a twin of
   PhaseSeconds seconds;
 
   [[nodiscard]] const StoredGrid& stored() const { return conversion.grid; }
@@ -36,5 +38,9 @@ struct ConvertedGrid {
 /// \param bytes  bytes that the grid may add to the file, if a size is wanted
 [[nodiscard]] ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
                                         std::optional<std::uint64_t> bytes);
+
+/// A twin of a converted grid, which takes the time of reading it only.
+[[nodiscard]] ConvertedGrid twinOf(const ConvertedGrid& grid, const std::string& uniqueName,
+                                   const Twin& twin);
 
 }  // namespace esvr::vdb2esvr

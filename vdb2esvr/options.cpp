@@ -47,6 +47,8 @@ cli::ProgramText programText() {
           "With --count, --seconds, --iterations or --storage-loss there is a single fit. Its\n"
           "ellipsoids are stored unless exact voxels take no more bytes. With --psnr and\n"
           "--seconds, it ends as soon as it reaches the PSNR.\n"
+          "Grids with the same voxels are converted and stored once. All but the first of them\n"
+          "take a few hundred bytes for their names, transforms and metadata.\n"
           "The program prints a table on stdout. Its PSNR and largest error are measured on the\n"
           "voxels that are decoded from the written file.\n"
           "\n"

@@ -227,7 +227,8 @@ Json sectionsOf(const EsvrSummary& file, std::size_t grid) {
       sections.push_back({{"kind", s.kind},
                           {"codec", s.codec},
                           {"bytes", s.storedBytes},
-                          {"raw_bytes", s.rawBytes}});
+                          {"raw_bytes", s.rawBytes},
+                          {"shared", s.sharedWith.has_value()}});
   return sections;
 }
 
@@ -256,9 +257,10 @@ Json curveOf(const std::vector<TimedCurvePoint>& curve) {
 Json gridOf(const RunRecord& record, std::size_t g) {
   const ConvertedGrid& grid = record.grids[g];
   return {{"name", grid.uniqueName},
+          {"same_as", orNull(grid.sameAs)},
           {"source", sourceOf(grid)},
           {"ellipsoids", grid.stored().field.ellipsoidCount()},
-          {"bytes", cli::storedBytes(record.output, g)},
+          {"bytes", cli::ownBytes(record.output, g)},
           {"sections", sectionsOf(record.output, g)},
           {"kernel", kernelOf(grid.stored().field.kernel)},
           {"topology", topologyOf(grid.stored())},

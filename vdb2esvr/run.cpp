@@ -1,5 +1,6 @@
 #include "vdb2esvr/run.h"
 
+#include <algorithm>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -18,6 +19,7 @@
 #include "vdb2esvr/report.h"
 #include "vdb2esvr/run_record.h"
 #include "vdb2esvr/summary.h"
+#include "vdb2esvr/twins.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -63,7 +65,8 @@ void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
              cli::shortNumber(grid.metrics.iou));
 }
 
-/// Converts one grid after the other until all are done or the run is interrupted.
+/// Converts one grid after the other until all are done or the run is interrupted. Grids with the
+/// same voxels are converted once.
 class FileConversion {
  public:
   FileConversion(const Options& options, const CancelToken& cancel, const cli::Log& log)
@@ -73,10 +76,16 @@ class FileConversion {
   }
 
   void run(const std::vector<GridSummary>& grids, RunRecord& record) {
-    ByteShares shares(options_, record.input, grids);
-    for (const auto& grid : grids) {
-      if (cancelled() || !convert(grid, shares, record))
-        record.notFitted.push_back(grid.uniqueName);
+    const Twins twins = findTwins(options_, grids);
+    ByteShares shares(options_, record.input, grids, twins);
+    for (std::size_t g = 0; g < grids.size(); ++g) {
+      const std::string& name = grids[g].uniqueName;
+      if (cancelled())
+        record.notFitted.push_back(name);
+      else if (const auto twin = twins.find(g); twin != twins.end())
+        record.grids.push_back(twinOf(record.grids[twin->second.of], name, twin->second));
+      else if (!convert(g, name, shares, record))
+        record.notFitted.push_back(name);
     }
     record.interrupted = cancelled();
     if (record.interrupted && (options_.onCancel == OnCancel::kDiscard || record.grids.empty()))
@@ -87,14 +96,27 @@ class FileConversion {
   [[nodiscard]] bool cancelled() const { return options_.convert.fit.cancel->cancelled(); }
 
   /// \return false if the run was interrupted before the fit had a result
-  bool convert(const GridSummary& grid, ByteShares& shares, RunRecord& record) try {
-    ProgressBar bar(grid.uniqueName, options_.verbosity);
+  bool convert(std::size_t g, const std::string& name, ByteShares& shares, RunRecord& record) try {
+    ProgressBar bar(name, options_.verbosity);
     options_.convert.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
-    record.grids.push_back(convertWhereItFits(grid.uniqueName, shares.of(grid)));
-    shares.take(grid, record.grids.back().stored());
+    record.grids.push_back(convertToShare(g, name, shares));
     return true;
   } catch (const Cancelled&) {
     return false;
+  }
+
+  /// Converts a grid to the bytes of its share. Each of its twins repeats a row of the table for
+  /// every section. How many there are is known after a conversion only; where they exceed what is
+  /// reserved for the twins, the grid is converted again to fewer bytes.
+  ConvertedGrid convertToShare(std::size_t g, const std::string& name, ByteShares& shares) {
+    std::optional<std::uint64_t> bytes = shares.of(g);
+    ConvertedGrid grid = convertWhereItFits(name, bytes);
+    while (const std::uint64_t excess = shares.take(g, grid.stored())) {
+      if (cancelled()) break;
+      bytes = *bytes - std::min(*bytes, excess);
+      grid = convertWhereItFits(name, bytes);
+    }
+    return grid;
   }
 
   /// Converts a grid. If the GPU that "auto" selected fails, for example because its memory is too

@@ -30,6 +30,13 @@ void printChoice(const ConvertedGrid& grid, std::ostream& out) {
       << toText(other) << ")\n";
 }
 
+/// Says how the data of a grid were made.
+void printNote(const ConvertedGrid& grid, std::ostream& out) {
+  if (!grid.sameAs) return printChoice(grid, out);
+  out << cli::printable(grid.uniqueName) << ": stored once with " << cli::printable(*grid.sameAs)
+      << ", which has the same voxels\n";
+}
+
 }  // namespace
 
 void printSummary(const Options& options, const RunRecord& record, std::ostream& out) {
@@ -37,12 +44,12 @@ void printSummary(const Options& options, const RunRecord& record, std::ostream&
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
     const ConvertedGrid& grid = record.grids[g];
     table.add({grid.uniqueName, std::to_string(grid.stored().field.ellipsoidCount()),
-               std::to_string(cli::storedBytes(record.output, g)),
-               cli::decibels(grid.metrics.psnrBox), cli::decibels(grid.metrics.psnrActive),
-               cli::shortNumber(grid.metrics.maxError), cli::seconds(grid.seconds.total())});
+               std::to_string(cli::ownBytes(record.output, g)), cli::decibels(grid.metrics.psnrBox),
+               cli::decibels(grid.metrics.psnrActive), cli::shortNumber(grid.metrics.maxError),
+               cli::seconds(grid.seconds.total())});
   }
   table.print(out);
-  for (const ConvertedGrid& grid : record.grids) printChoice(grid, out);
+  for (const ConvertedGrid& grid : record.grids) printNote(grid, out);
   const Ratio ratio = ratioOf(record);
   out << cli::printable(options.input.string());
   if (!ratio.wholeInput()) out << ", " << ratio.grids << " of " << ratio.gridsOfInput << " grids:";

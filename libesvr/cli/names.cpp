@@ -42,4 +42,11 @@ std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid) {
   return bytes;
 }
 
+std::uint64_t ownBytes(const EsvrSummary& file, std::size_t grid) {
+  std::uint64_t bytes = 0;
+  for (const auto& section : file.sections)
+    if (section.grid == grid && !section.sharedWith) bytes += section.storedBytes;
+  return bytes;
+}
+
 }  // namespace esvr::cli

@@ -18,7 +18,10 @@ namespace esvr::cli {
 /// "threshold", "bricks" or "mask".
 [[nodiscard]] std::string nameOf(TopologyKind kind);
 
-/// Bytes of the sections of a grid.
+/// Bytes of the sections of a grid, whether it shares them with other grids or not.
 [[nodiscard]] std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid);
+/// Bytes of the sections of a grid without those that an earlier section has too. The sum over the
+/// grids of a file counts every byte once.
+[[nodiscard]] std::uint64_t ownBytes(const EsvrSummary& file, std::size_t grid);
 
 }  // namespace esvr::cli

@@ -1,3 +1,6 @@
+#include <map>
+#include <optional>
+
 #include "core/atomic_file.h"
 #include "esvr/container.h"
 #include "format/byte_source.h"
@@ -30,9 +33,13 @@ PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part)
 EsvrSummary inspectEsvr(const std::filesystem::path& path) {
   const auto table = format::readTable(format::FileSource(path));
   EsvrSummary summary{table.versionMajor, table.versionMinor, table.fileBytes, {}};
-  for (const auto& e : table.entries)
-    summary.sections.push_back(
-        {format::nameOf(e.id.kind), format::nameOf(e.codec), e.id.grid, e.storedBytes, e.rawBytes});
+  std::map<format::Placement, std::size_t> first;
+  for (const auto& e : table.entries) {
+    const auto [same, isFirst] = first.emplace(format::placementOf(e), summary.sections.size());
+    summary.sections.push_back({format::nameOf(e.id.kind), format::nameOf(e.codec), e.id.grid,
+                                e.storedBytes, e.rawBytes,
+                                isFirst ? std::nullopt : std::optional(same->second)});
+  }
   return summary;
 }
 

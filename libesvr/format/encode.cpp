@@ -4,9 +4,7 @@
 
 #include "esvr/container.h"
 #include "format/byte_writer.h"
-#include "format/checksum.h"
 #include "format/chunk_box.h"
-#include "format/codec.h"
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
 #include "format/grid_record.h"
@@ -16,60 +14,13 @@
 #include "format/mask_section.h"
 #include "format/morton_order.h"
 #include "format/planes.h"
-#include "format/section_table.h"
+#include "format/section_writer.h"
 #include "format/validity.h"
-#include "format/voxel_section.h"
 
 namespace esvr {
 namespace {
 
 using namespace format;
-
-/// The sections of a file that is being written, in the order of the file.
-class Sections {
- public:
-  /// `typeSize`: bytes of the numbers that the content is made of.
-  void add(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content,
-           std::size_t typeSize) {
-    addPacked(id, flags, pack(std::move(content), typeSize));
-  }
-
-  /// Content that is coded already.
-  void addRaw(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content) {
-    const std::uint64_t bytes = content.size();
-    addPacked(id, flags, {Codec::kRaw, std::move(content), bytes});
-  }
-
-  [[nodiscard]] std::vector<std::byte> assemble() {
-    std::uint64_t end = kHeaderBytes + table_.entries.size() * kEntryBytes;
-    for (auto& entry : table_.entries) {
-      entry.offset = alignUp(end);
-      end = entry.offset + entry.storedBytes;
-    }
-    table_.fileBytes = end;
-
-    ByteWriter file;
-    file.putAll(encodeTable(table_));
-    for (std::size_t i = 0; i < contents_.size(); ++i) {
-      file.padTo(table_.entries[i].offset);
-      file.putAll(contents_[i]);
-    }
-    return file.take();
-  }
-
- private:
-  void addPacked(const SectionId& id, std::uint16_t flags, Packed packed) {
-    SectionEntry entry{id, packed.codec, flags, 0, 0, 0, 0};
-    entry.rawBytes = packed.rawBytes;
-    entry.storedBytes = packed.bytes.size();
-    entry.checksum = checksum(packed.bytes);
-    table_.entries.push_back(entry);
-    contents_.push_back(std::move(packed.bytes));
-  }
-
-  SectionTable table_;
-  std::vector<std::vector<std::byte>> contents_;
-};
 
 constexpr std::uint16_t kOptional = 0;
 constexpr std::size_t kByteSize = 1, kFloatSize = sizeof(float), kDoubleSize = sizeof(double);
@@ -128,14 +79,14 @@ SortedGrid sorted(const StoredGrid& grid) {
   return result;
 }
 
-void addFileMetadata(Sections& out, const EsvrFile& file) {
+void addFileMetadata(SectionWriter& out, const EsvrFile& file) {
   if (file.metadata.empty()) return;
   ByteWriter content;
   putMetadata(content, file.metadata);
   out.add({SectionKind::kFileMetadata}, kRequired, content.take(), kByteSize);
 }
 
-void addGrid(Sections& out, std::uint32_t g, const SortedGrid& grid) {
+void addGrid(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
   ByteWriter content;
   putGrid(content, grid.grid, grid.records);
   out.add({SectionKind::kGrid, g}, kRequired, content.take(), kByteSize);
@@ -143,14 +94,14 @@ void addGrid(Sections& out, std::uint32_t g, const SortedGrid& grid) {
 
 /// Adds the chunk records of a grid with several chunks; the record of a single chunk is in the
 /// grid's own record.
-void addChunkTable(Sections& out, std::uint32_t g, const SortedGrid& grid) {
+void addChunkTable(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
   if (grid.records.size() < 2) return;
   ByteWriter content;
   for (const auto& record : grid.records) putChunk(content, record);
   out.add({SectionKind::kChunks, g}, kRequired, content.take(), kFloatSize);
 }
 
-void addChunk(Sections& out, std::uint32_t g, std::uint32_t c, const Ellipsoids& e) {
+void addChunk(SectionWriter& out, std::uint32_t g, std::uint32_t c, const Ellipsoids& e) {
   const auto add = [&](SectionKind kind, std::span<const Plane> planes) {
     out.add({kind, g, c}, kRequired, putPlanes(planes), kFloatSize);
   };
@@ -169,7 +120,7 @@ std::vector<Box> blockBoxes(const Chunk& chunk, const QuantisedEllipsoids& q,
   return boxes;
 }
 
-void addQuantised(Sections& out, std::uint32_t g, std::uint32_t c, const SortedGrid& grid) {
+void addQuantised(SectionWriter& out, std::uint32_t g, std::uint32_t c, const SortedGrid& grid) {
   const QuantisedEllipsoids& q = grid.grid.quantised[c];
   if (q.size() == 0) return;
   if (q.layerEnds.empty())
@@ -180,22 +131,29 @@ void addQuantised(Sections& out, std::uint32_t g, std::uint32_t c, const SortedG
         putLayered(q, grid.records[c].box, blockBoxes(grid.chunks[c], q, grid.grid.field.kernel)));
 }
 
-void addExtras(Sections& out, std::uint32_t g, const StoredGrid& grid) {
+void addChunks(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
+  const bool quantised = !grid.grid.quantised.empty();
+  for (std::uint32_t c = 0; c < grid.chunks.size(); ++c)
+    if (quantised)
+      addQuantised(out, g, c, grid);
+    else
+      addChunk(out, g, c, grid.chunks[c].ellipsoids);
+}
+
+void addExtras(SectionWriter& out, std::uint32_t g, const StoredGrid& grid) {
   if (grid.topology == TopologyKind::kMask)
     out.addRaw({SectionKind::kMask, g}, kRequired, putMask(grid.leaves, grid.mask));
   else if (!grid.leaves.empty())
     out.add({SectionKind::kLeaves, g}, kRequired, putLeaves(grid.leaves), kFloatSize);
-  if (grid.residual) out.addRaw({SectionKind::kResidual, g}, kRequired, putVoxels(*grid.residual));
-  if (grid.voxels) out.addRaw({SectionKind::kVoxels, g}, kRequired, putVoxels(*grid.voxels));
+  if (grid.residual) out.addVoxels({SectionKind::kResidual, g}, *grid.residual);
+  if (grid.voxels) out.addVoxels({SectionKind::kVoxels, g}, *grid.voxels);
   if (!grid.layerErrors.empty())
     out.addRaw({SectionKind::kLayerErrors, g}, kOptional, putLayerErrors(grid.layerErrors));
   if (!grid.curve.empty())
     out.add({SectionKind::kCurve, g}, kOptional, putCurve(grid.curve), kDoubleSize);
 }
 
-}  // namespace
-
-std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
+SectionWriter sectionsOf(const EsvrFile& file) {
   std::vector<SortedGrid> grids;
   for (const auto& grid : file.grids) {
     checkGrid(grid);
@@ -203,28 +161,32 @@ std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
   }
 
   // Records come first, so that one read at the beginning of the file is enough to list it.
-  Sections out;
+  SectionWriter out;
   addFileMetadata(out, file);
   for (std::uint32_t g = 0; g < grids.size(); ++g) addGrid(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
-    const auto& quantised = grids[g].grid.quantised;
-    for (std::uint32_t c = 0; c < grids[g].chunks.size(); ++c)
-      if (quantised.empty())
-        addChunk(out, g, c, grids[g].chunks[c].ellipsoids);
-      else
-        addQuantised(out, g, c, grids[g]);
+    addChunks(out, g, grids[g]);
     addExtras(out, g, grids[g].grid);
   }
-  return out.assemble();
+  return out;
 }
+
+}  // namespace
+
+std::vector<std::byte> encodeEsvr(const EsvrFile& file) { return sectionsOf(file).assemble(); }
 
 std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata) {
   return alignUp(encodeEsvr({metadata, {}}).size());
 }
 
 std::uint64_t bytesAdded(const StoredGrid& grid) {
-  return alignUp(encodeEsvr({{}, {grid}}).size()) - encodeEsvr({}).size();
+  const EsvrFile file{{}, {grid}};
+  return sectionsOf(file).bytesUnshared();
+}
+
+std::uint64_t bytesAddedTogether(std::vector<StoredGrid> grids) {
+  return alignUp(encodeEsvr({{}, std::move(grids)}).size()) - kHeaderBytes;
 }
 
 }  // namespace esvr

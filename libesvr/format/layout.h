@@ -20,7 +20,7 @@ inline constexpr std::uint16_t kVersionMinor = 0;
 
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
-inline constexpr std::uint64_t kEntryBytes = 56;
+inline constexpr std::uint64_t kEntryBytes = kSectionRowBytes;
 inline constexpr std::uint64_t kAlignment = 8;  ///< positions of table and sections
 
 /// The grid or the chunk of a section that belongs to the whole file or to a whole grid.

@@ -1,6 +1,7 @@
 #include "format/section_reader.h"
 
 #include <algorithm>
+#include <set>
 
 #include "esvr/error.h"
 #include "format/table_check.h"
@@ -56,16 +57,21 @@ std::unique_ptr<ByteSource> SectionReader::open(const SectionId& id, bool whole)
   const SectionEntry& entry = table_.entries[taken];
   const std::string name = placeOf(source_.name(), table_, taken);
   if (entry.codec != Codec::kRaw) throw BadInput(name + ": must not be compressed");
-  if (whole) return std::make_unique<BufferSource>(readStored(source_, table_, taken), name);
+  if (whole) {
+    budget_.take(double(entry.storedBytes), name);
+    return std::make_unique<BufferSource>(readStored(source_, table_, taken), name);
+  }
   return std::make_unique<PartSource>(source_, entry.offset, entry.storedBytes, name);
 }
 
 void SectionReader::finish() {
   checkGaps(source_, table_);
+  std::set<Placement> read;  // shared bytes are read once, however many sections share them
   for (const auto& [id, entry] : unread_) {
     if (known(id.kind))
       throw BadInput(placeOf(source_.name(), table_, entry) + ": belongs to nothing in the file");
-    (void)readStored(source_, table_, entry);
+    if (read.insert(placementOf(table_.entries[entry])).second)
+      (void)readStored(source_, table_, entry);
   }
 }
 

@@ -28,7 +28,8 @@ class SectionReader {
 
   [[nodiscard]] bool has(const SectionId& id) const { return unread_.contains(id); }
 
-  /// The memory that is left for content; get() takes from it.
+  /// The memory that is left for content; get() takes from it. Bytes that sections share count for
+  /// each of them, because each has a content of its own in memory.
   [[nodiscard]] MemoryBudget& budget() { return budget_; }
 
   /// Reads the content of a section. It can be called once for each section.
@@ -39,6 +40,7 @@ class SectionReader {
   /// Opens a section that is to be read piece by piece. It is called instead of get(), and once.
   /// \param whole  true: the whole section is read and checked now; false: nothing is checked yet
   /// \throws BadInput  the section is damaged, does not exist, or is compressed
+  /// \throws MemoryExceeded  the whole section exceeds the budget
   [[nodiscard]] std::unique_ptr<ByteSource> open(const SectionId& id, bool whole);
 
   /// Checks what has not been read: the bytes between the sections, and the checksums of sections

@@ -90,6 +90,10 @@ void checkTablePlace(const ByteSource& source, const Header& h) {
 
 }  // namespace
 
+Placement placementOf(const SectionEntry& e) {
+  return {e.offset, e.storedBytes, e.rawBytes, e.checksum, e.id.kind, e.codec, e.flags};
+}
+
 std::string describe(const SectionId& id) {
   std::string text = nameOf(id.kind);
   if (id.grid != kNone) text += " of grid " + std::to_string(id.grid);

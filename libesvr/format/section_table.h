@@ -30,6 +30,17 @@ struct SectionEntry {
   std::uint64_t offset = 0, storedBytes = 0, rawBytes = 0, checksum = 0;
 };
 
+/// Where and how a section is stored: its row of the table without its id. Rows with the same
+/// placement share their bytes.
+struct Placement {
+  std::uint64_t offset = 0, storedBytes = 0, rawBytes = 0, checksum = 0;
+  SectionKind kind{};
+  Codec codec = Codec::kRaw;
+  std::uint16_t flags = 0;
+  friend constexpr auto operator<=>(const Placement&, const Placement&) = default;
+};
+[[nodiscard]] Placement placementOf(const SectionEntry& entry);
+
 struct SectionTable {
   std::uint16_t versionMajor = kVersionMajor, versionMinor = kVersionMinor;
   std::uint64_t fileBytes = 0;
@@ -51,7 +62,8 @@ struct SectionTable {
 [[nodiscard]] std::vector<std::byte> encodeTable(const SectionTable& table);
 
 /// Reads and checks the header and the table: the version, the checksums, that no two sections have
-/// the same id or share a byte, and that the sizes are possible. It reads no section.
+/// the same id, that sections which share a byte have the same placement, and that the sizes are
+/// possible. It reads no section.
 /// \throws BadInput
 [[nodiscard]] SectionTable readTable(const ByteSource& source);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <compare>
+#include <set>
 
 #include "esvr/error.h"
 #include "format/codec.h"
@@ -15,11 +16,14 @@ struct Region {
   friend constexpr auto operator<=>(const Region&, const Region&) = default;
 };
 
-/// The header, the table and the sections in their order in the file.
+/// The header, the table and the sections in their order in the file. Sections that share their
+/// bytes are one region.
 std::vector<Region> regionsOf(const SectionTable& table) {
+  std::set<Placement> placements;
+  for (const auto& e : table.entries) placements.insert(placementOf(e));
   std::vector<Region> regions{{0, kHeaderBytes},
                               {table.tableOffset, table.entries.size() * kEntryBytes}};
-  for (const auto& e : table.entries) regions.push_back({e.offset, e.storedBytes});
+  for (const auto& p : placements) regions.push_back({p.offset, p.storedBytes});
   std::sort(regions.begin(), regions.end());
   return regions;
 }

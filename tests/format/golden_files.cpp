@@ -79,6 +79,13 @@ StoredGrid masked() {
   return grid;
 }
 
+/// Two grids with the same ellipsoids and the same mask.
+EsvrFile twins() {
+  EsvrFile file{{}, {masked(), masked()}};
+  file.grids[1].descriptor.name = "color";
+  return file;
+}
+
 /// An ellipsoid with a residual that corrects three voxels of a brick.
 StoredGrid corrected() {
   StoredGrid grid = oneEllipsoid();
@@ -110,6 +117,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"voxels", fileOf(fewValues())},
       {"mirrored_voxels", fileOf(mirroredValues())},
       {"mask", fileOf(masked())},
+      {"twins", twins()},
       {"residual", fileOf(corrected())},
       {"unknown_section", fileOf(oneEllipsoid()), true},
   };

@@ -433,12 +433,15 @@ def read(path):
     owned = bytearray(len(data))
     owned[0:48] = b"\1" * 48
     owned[table:table + 56 * count] = b"\1" * 56 * count
-    sections = {}
+    sections, rows = {}, set()
     for i in range(count):
         kind, codec, flags, g, c, frame, layer, at, stored, raw, hashed = struct.unpack_from(
             "<IHHIIIIQQQQ", data, table + 56 * i)
         part = data[at:at + stored]
-        assert at % 8 == 0 and len(part) == stored and not any(owned[at:at + stored]), "place"
+        row = kind, codec, flags, at, stored, raw, hashed
+        assert at % 8 == 0 and len(part) == stored, "place"
+        assert row in rows or not any(owned[at:at + stored]), "overlap"
+        rows.add(row)
         owned[at:at + stored] = b"\1" * stored
         assert hashed == xxh64(part), "section checksum"
         name = KINDS.get(kind)
@@ -595,10 +598,23 @@ def check_two_grids(sections):
     assert sections["curve", 0, NONE] == [(100, 31.25, 20.5, 0.25, 10), (200, 41.25, 30.5, 0.125, 30)]
 
 
+def check_twins(sections):
+    """Expects the same sections in both grids, apart from the names in the records."""
+    check_mask(sections)
+    records = [sections["grid", g, NONE] for g in (0, 1)]
+    assert [r.pop("name") for r in records] == [b"density", b"color"]
+    assert records[0] == records[1]
+    kinds = [{(k, c): v for (k, g, c), v in sections.items() if g == own and k != "grid"}
+             for own in (0, 1)]
+    assert kinds[0].keys() == kinds[1].keys() and ("mask", NONE) in kinds[0]
+    assert kinds[0]["centers", 0] == kinds[1]["centers", 0] == [(1.5,), (-2.25,), (1000.0,)]
+    assert kinds[0]["mask", NONE][1] == kinds[1]["mask", NONE][1]
+
+
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
           "voxels": check_voxels, "mask": check_mask, "residual": check_residual,
-          "mirrored_voxels": check_mirrored, "two_grids": check_two_grids,
+          "mirrored_voxels": check_mirrored, "two_grids": check_two_grids, "twins": check_twins,
           "kappas_and_chunks": check_kappas_and_chunks}
 
 

@@ -211,9 +211,11 @@ StoredGrid emptyGrid() {
 }
 
 EsvrFile everything(std::size_t ellipsoids) {
+  StoredGrid twin = fogGrid(ellipsoids);
+  twin.descriptor.name = "twin of density";
   return {{{"creator", "string", bytesOf("Houdini/GEO_VDBTranslator")}},
           {fogGrid(ellipsoids), levelSetGrid(ellipsoids), chunkedGrid(ellipsoids),
-           quantisedGrid(ellipsoids), layeredGrid(ellipsoids), emptyGrid()}};
+           quantisedGrid(ellipsoids), layeredGrid(ellipsoids), emptyGrid(), twin}};
 }
 
 EsvrFile fileOf(StoredGrid grid) { return {{}, {std::move(grid)}}; }

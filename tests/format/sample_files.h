@@ -41,7 +41,7 @@ struct EllipsoidParts {
 /// A grid with a background and nothing else.
 [[nodiscard]] StoredGrid emptyGrid();
 
-/// A file with all grids above and metadata.
+/// A file with all grids above, a grid that shares the data of the first one, and metadata.
 [[nodiscard]] EsvrFile everything(std::size_t ellipsoids);
 
 [[nodiscard]] EsvrFile fileOf(StoredGrid grid);

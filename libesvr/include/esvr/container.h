@@ -21,6 +21,7 @@
 namespace esvr {
 
 inline constexpr std::uint16_t kFormatVersion = 1;
+inline constexpr std::uint64_t kSectionRowBytes = 56;  ///< a row of a file's section table
 
 /// The rule that determines the active voxels when a grid is revoxelised.
 enum class TopologyKind {
@@ -101,7 +102,8 @@ std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
                         const ContainerWriteOptions& options = {});
 
 /// Limits of reading. The content of a small file may need much more memory than the file has
-/// bytes, because sections are compressed and equal ellipsoids or voxels take hardly any bytes.
+/// bytes, because sections are compressed, equal ellipsoids or voxels take hardly any bytes, and
+/// several grids may share their bytes.
 struct ReadLimits {
   std::uint64_t maxBytes = kNoMemoryLimit;
 };
@@ -135,15 +137,21 @@ struct PartOfFile {
 
 /// Largest number of bytes that a grid adds to a file: its sections, their padding, and its rows of
 /// the section table. A file is at most as large as bytesBesideGrids() plus the sum of bytesAdded()
-/// over its grids.
+/// over its grids. It is smaller where sections are the same, because they are stored once.
 /// \throws RuntimeFailure  as for encodeEsvr
 [[nodiscard]] std::uint64_t bytesAdded(const StoredGrid& grid);
+
+/// Largest number of bytes that several grids add to a file together. Sections that several of them
+/// have count once.
+/// \throws RuntimeFailure  as for encodeEsvr
+[[nodiscard]] std::uint64_t bytesAddedTogether(std::vector<StoredGrid> grids);
 
 /// Bytes of a file without grids, including the padding before the first grid.
 [[nodiscard]] std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata);
 
-/// Encodes a file in memory. The same content gives the same bytes. The ellipsoids of a chunk are
-/// stored in Morton order of their centers; a reader gets them in that order, bit for bit.
+/// Encodes a file in memory. The same content gives the same bytes. Sections of the same kind and
+/// content are stored once. The ellipsoids of a chunk are stored in Morton order of their centers; a
+/// reader gets them in that order, bit for bit.
 /// \throws RuntimeFailure  the content is invalid: a number is not finite, a quaternion has no unit
 ///                         length, or the bricks' corners are not increasing
 [[nodiscard]] std::vector<std::byte> encodeEsvr(const EsvrFile& file);
@@ -159,6 +167,9 @@ struct SectionSummary {
   std::string codec;  ///< "raw" or "blosc"
   std::uint32_t grid = 0;  ///< number of the section's grid, or 0xffffffff for the file
   std::uint64_t storedBytes = 0, rawBytes = 0;
+  /// The first section of the file that has the same bytes, as an index of EsvrSummary::sections;
+  /// nothing for that section itself. The bytes of such a section are not stored again.
+  std::optional<std::size_t> sharedWith;
 };
 struct EsvrSummary {
   std::uint16_t versionMajor = 0, versionMinor = 0;

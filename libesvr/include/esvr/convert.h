@@ -4,6 +4,7 @@
 /// A goal states a condition for the stored grid. A conversion may make several fits to reach its
 /// goal.
 
+#include <compare>
 #include <cstdint>
 #include <optional>
 #include <variant>
@@ -93,6 +94,16 @@ struct ConvertInput {
   const GridDescriptor& descriptor;
   const SparseVolume& source;
 };
+
+/// A hash of all that a conversion depends on besides its options: the volume bit for bit, whether
+/// the grid is a level set, and whether its values were doubles. Inputs with the same key are
+/// converted to grids that differ in their descriptors only, except that a SizeGoal counts the bytes
+/// of the descriptor.
+struct InputKey {
+  std::uint64_t low = 0, high = 0;
+  friend auto operator<=>(const InputKey&, const InputKey&) = default;
+};
+[[nodiscard]] InputKey keyOf(const ConvertInput& input);
 
 /// The outcome of quantising the ellipsoids.
 struct CompactRecord {

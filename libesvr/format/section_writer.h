@@ -1,0 +1,47 @@
+#pragma once
+/// Collects the sections of a file that is being written, and stores equal sections once.
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "esvr/voxel_layer.h"
+#include "format/codec.h"
+#include "format/section_table.h"
+
+namespace esvr::format {
+
+class SectionWriter {
+ public:
+  /// Adds a section. \param typeSize  bytes of the numbers that the content is made of
+  void add(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content,
+           std::size_t typeSize);
+
+  /// Adds a section whose content is coded already.
+  void addRaw(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content);
+
+  /// Codes voxels and adds their section. Voxels that equal those of an earlier call, bit for bit,
+  /// are not coded again, because coding takes long.
+  /// \param layer  must outlive the writer
+  void addVoxels(const SectionId& id, const VoxelLayer& layer);
+
+  /// Encodes the file. Sections that are stored alike share their bytes.
+  [[nodiscard]] std::vector<std::byte> assemble();
+
+  /// Bytes of the sections with their padding and their rows of the table, if none shared bytes.
+  [[nodiscard]] std::uint64_t bytesUnshared() const;
+
+ private:
+  void addPacked(const SectionId& id, std::uint16_t flags, Packed packed);
+  [[nodiscard]] std::size_t indexOf(const SectionEntry& entry, std::vector<std::byte> bytes);
+
+  SectionTable table_;
+  std::vector<std::vector<std::byte>> contents_;      ///< stored bytes without repetitions
+  std::vector<std::size_t> contentOf_;                ///< index in contents_ of each entry
+  std::multimap<Placement, std::size_t> contentsBy_;  ///< index in contents_, by offset 0
+  std::vector<std::pair<const VoxelLayer*, std::size_t>> coded_;  ///< voxels, index in contents_
+};
+
+}  // namespace esvr::format

@@ -1,0 +1,249 @@
+// Plan: sections that are stored alike share their bytes, and no others do. Grids that differ in
+// their descriptors only add a record and rows to the file; each of them comes back with its own
+// descriptor. Tables whose rows overlap in any other way are refused, and damage to shared bytes is
+// reported.
+
+#include "format/section_writer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+
+#include "esvr/container.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "format/sample_files.h"
+#include "support/temporary_folder.h"
+
+namespace esvr {
+namespace {
+
+using format::SectionEntry;
+using format::SectionKind;
+using format::SectionTable;
+using format::SectionWriter;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+using Bytes = std::vector<std::byte>;
+
+constexpr auto kLaterKind = SectionKind(0x1234);
+
+SectionTable tableOf(const Bytes& bytes) {
+  return format::readTable(format::MemorySource(bytes, "twins.esvr"));
+}
+
+Bytes content() { return test::bytesOf("content of a section"); }
+
+/// A file of two sections of kinds that no reader knows.
+Bytes fileOfTwo(const format::SectionId& a, const format::SectionId& b, const Bytes& contentOfB) {
+  SectionWriter out;
+  out.addRaw(a, 0, content());
+  out.addRaw(b, 0, contentOfB);
+  return out.assemble();
+}
+
+bool areShared(const Bytes& file) {
+  const auto entries = tableOf(file).entries;
+  return entries[0].offset == entries[1].offset;
+}
+
+TEST(SectionWriter, StoresEqualSectionsOnce) {
+  const Bytes file = fileOfTwo({kLaterKind, 0}, {kLaterKind, 1}, content());
+  EXPECT_TRUE(areShared(file));
+  EXPECT_EQ(file.size(), format::kHeaderBytes + 2 * format::kEntryBytes + content().size());
+  EXPECT_TRUE(decodeEsvr(file, "twins.esvr").grids.empty());
+}
+
+TEST(SectionWriter, StoresSectionsOfTwoKindsApart) {
+  EXPECT_FALSE(areShared(fileOfTwo({kLaterKind}, {SectionKind(0x1235)}, content())));
+}
+
+TEST(SectionWriter, StoresSectionsThatDifferInABitApart) {
+  Bytes other = content();
+  other.back() ^= std::byte{1};
+  EXPECT_FALSE(areShared(fileOfTwo({kLaterKind, 0}, {kLaterKind, 1}, other)));
+}
+
+StoredGrid voxelGrid(float background) {
+  std::vector<BrickInput> bricks(2);
+  for (std::size_t b = 0; b < bricks.size(); ++b) {
+    bricks[b].corner = {0, 0, std::int32_t(b) * kBrickSide};
+    for (int v = 0; v < kBrickVoxels; ++v)
+      bricks[b].values[std::size_t(v)] = float(v * v % 997) * 0.125f;
+    bricks[b].active.setAll();
+  }
+  const SparseVolume volume = makeVolume(bricks, background);
+  return makeStoredVoxels({}, volume, exactLayer(volume));
+}
+
+TEST(SectionWriter, TellsVoxelsWithZeroFromThoseWithMinusZero) {
+  const EsvrFile file{{}, {voxelGrid(0.0f), voxelGrid(-0.0f)}};
+  const EsvrFile back = decodeEsvr(encodeEsvr(file), "zeros.esvr");
+  EXPECT_FALSE(std::signbit(back.grids[0].voxels->background));
+  EXPECT_TRUE(std::signbit(back.grids[1].voxels->background));
+}
+
+// ---- grids with the same data
+
+StoredGrid twinOf(StoredGrid grid) {
+  grid.descriptor.name = "twin";
+  grid.descriptor.transform.mapType = "AffineMap";
+  grid.descriptor.metadata.push_back({"note", "string", test::bytesOf("of the twin")});
+  return grid;
+}
+EsvrFile withTwin(const StoredGrid& grid) { return {{}, {grid, twinOf(grid)}}; }
+
+struct Sample {
+  const char* name;
+  StoredGrid grid;
+};
+void PrintTo(const Sample& sample, std::ostream* out) { *out << sample.name; }
+
+StoredGrid correctedGrid() {
+  StoredGrid grid = test::quantisedGrid(20);
+  VoxelLayer& residual = grid.residual.emplace();
+  residual.form = VoxelForm::kLattice;
+  residual.divisor = 64.0;
+  residual.bricks = {{}};
+  for (int v = 0; v < kBrickVoxels; ++v) residual.codes.push_back(v * v % 7 - 3);
+  residual.active.resize(1);
+  residual.active[0].setAll();
+  residual.vacant.resize(1);
+  return grid;
+}
+
+class GridWithATwin : public testing::TestWithParam<Sample> {};
+
+TEST_P(GridWithATwin, AddsItsRecordAndRowsOnly) {
+  const StoredGrid& grid = GetParam().grid;
+  const std::size_t alone = encodeEsvr(test::fileOf(grid)).size();
+  const Bytes both = encodeEsvr(withTwin(grid));
+  const auto entries = tableOf(both).entries;
+  const std::size_t rows = entries.size() / 2;
+  ASSERT_EQ(entries[1].id, (format::SectionId{SectionKind::kGrid, 1}));
+  const std::size_t added = rows * format::kEntryBytes + format::alignUp(entries[1].storedBytes);
+  EXPECT_EQ(format::alignUp(both.size()), format::alignUp(alone) + added);
+  EXPECT_EQ(bytesAddedTogether(withTwin(grid).grids), bytesAdded(grid) + added);
+}
+
+TEST_P(GridWithATwin, ComesBackWithBothDescriptors) {
+  const EsvrFile file = withTwin(GetParam().grid);
+  EXPECT_EQ(test::difference(decodeEsvr(encodeEsvr(file), "twins.esvr"), file), "");
+}
+
+INSTANTIATE_TEST_SUITE_P(All, GridWithATwin,
+                         testing::Values(Sample{"planes", test::fogGrid(200)},
+                                         Sample{"leaves", test::levelSetGrid(20)},
+                                         Sample{"chunks", test::chunkedGrid(30)},
+                                         Sample{"quantised", test::quantisedGrid(100)},
+                                         Sample{"layered", test::layeredGrid(100)},
+                                         Sample{"residual", correctedGrid()},
+                                         Sample{"voxels", voxelGrid(0.0f)}));
+
+TEST(GridsWithTheSameData, HaveTheirPartsRead) {
+  const test::TemporaryFolder folder;
+  const StoredGrid grid = test::layeredGrid(9000);
+  writeEsvr(folder / "twins.esvr", withTwin(grid));
+  writeEsvr(folder / "one.esvr", test::fileOf(grid));
+  const auto part = readEsvrPart(folder / "twins.esvr", {.layers = 1});
+  const auto one = readEsvrPart(folder / "one.esvr", {.layers = 1}).file.grids[0];
+  EXPECT_EQ(test::difference(part.file, withTwin(one)), "");
+  EXPECT_LT(part.bytesRead, std::filesystem::file_size(folder / "twins.esvr"));
+}
+
+TEST(GridsWithTheSameData, AreListedWithTheSectionsThatTheyShare) {
+  const test::TemporaryFolder folder;
+  writeEsvr(folder / "twins.esvr", withTwin(voxelGrid(0.0f)));
+  const auto sections = inspectEsvr(folder / "twins.esvr").sections;
+  ASSERT_EQ(sections.size(), 4u);  // the records of both grids come first
+  EXPECT_EQ(sections[1].sharedWith, std::nullopt);
+  EXPECT_EQ(sections[2].sharedWith, std::nullopt);
+  EXPECT_EQ(sections[3].kind, "voxels");
+  EXPECT_EQ(sections[3].grid, 1u);
+  EXPECT_EQ(sections[3].sharedWith, 2u);
+}
+
+TEST(GridsWithTheSameData, CountForEachGridWhereMemoryIsLimited) {
+  const test::TemporaryFolder folder;
+  const StoredGrid grid = test::fogGrid(1000);
+  constexpr std::uint64_t kEnoughForOne = 300'000;  // about 44 bytes * 4 * 1000 for a grid
+  writeEsvr(folder / "one.esvr", test::fileOf(grid));
+  writeEsvr(folder / "twins.esvr", withTwin(grid));
+  EXPECT_EQ(readEsvr(folder / "one.esvr", {kEnoughForOne}).grids.size(), 1u);
+  EXPECT_THROW((void)readEsvr(folder / "twins.esvr", {kEnoughForOne}), MemoryExceeded);
+}
+
+// ---- damaged and hostile files
+
+TEST(SharedBytes, AreReportedWhereTheyAreDamaged) {
+  Bytes file = encodeEsvr(withTwin(voxelGrid(0.0f)));
+  file.back() ^= std::byte{1};
+  EXPECT_THAT(
+      [&] { (void)decodeEsvr(file, "twins.esvr"); },
+      ThrowsMessage<BadInput>(HasSubstr("twins.esvr: section 2 (voxels of grid 0, at byte")));
+}
+
+TEST(SharedBytes, OfKindsThatNoReaderKnowsAreCheckedToo) {
+  Bytes file = fileOfTwo({kLaterKind, 0}, {kLaterKind, 1}, content());
+  file.back() ^= std::byte{1};
+  EXPECT_THAT([&] { (void)decodeEsvr(file, "twins.esvr"); },
+              ThrowsMessage<BadInput>(HasSubstr("checksum")));
+}
+
+/// The file with another table of the same size.
+Bytes withTable(Bytes file, const SectionTable& table) {
+  const Bytes head = format::encodeTable(table);
+  std::copy(head.begin(), head.end(), file.begin());
+  return file;
+}
+
+void expectOverlap(const Bytes& file) {
+  EXPECT_THAT([&] { (void)decodeEsvr(file, "twins.esvr"); },
+              ThrowsMessage<BadInput>(HasSubstr("twins.esvr: sections overlap at byte")));
+}
+
+/// A change to the row of the second section, which shares its bytes with the first one.
+struct RowLie {
+  const char* name;
+  std::function<void(SectionEntry&)> tell;
+};
+void PrintTo(const RowLie& lie, std::ostream* out) { *out << lie.name; }
+
+class RowLies : public testing::TestWithParam<RowLie> {};
+
+TEST_P(RowLies, AreRefusedAsOverlaps) {
+  const Bytes file = fileOfTwo({kLaterKind, 0}, {kLaterKind, 1}, content());
+  SectionTable table = tableOf(file);
+  GetParam().tell(table.entries[1]);
+  expectOverlap(withTable(file, table));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, RowLies,
+    testing::Values(RowLie{"shorter", [](auto& e) { e.storedBytes = e.rawBytes -= 8; }},
+                    RowLie{"begins later", [](auto& e) { e.offset += 8, e.storedBytes -= 8; }},
+                    RowLie{"of another kind", [](auto& e) { e.id.kind = SectionKind(0x1235); }},
+                    RowLie{"of another codec", [](auto& e) { e.codec = format::Codec::kBlosc; }},
+                    RowLie{"of other flags", [](auto& e) { e.flags = 4; }},
+                    RowLie{"of another raw size", [](auto& e) { e.rawBytes += 1; }},
+                    RowLie{"of another checksum", [](auto& e) { e.checksum += 1; }}));
+
+TEST(SharedBytes, AreNotThoseOfTheHeaderOrTheTable) {
+  const Bytes file = fileOfTwo({kLaterKind, 0}, {kLaterKind, 1}, content());
+  const SectionTable good = tableOf(file);
+  for (const bool ofHeader : {true, false}) {
+    SectionTable table = good;
+    for (SectionEntry& e : table.entries) {
+      e.offset = ofHeader ? 0 : table.tableOffset;
+      e.storedBytes = ofHeader ? format::kHeaderBytes : 2 * format::kEntryBytes;
+    }
+    expectOverlap(withTable(file, table));
+  }
+}
+
+}  // namespace
+}  // namespace esvr

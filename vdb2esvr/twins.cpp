@@ -1,0 +1,54 @@
+#include "vdb2esvr/twins.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "cli/stopwatch.h"
+#include "esvr/convert.h"
+
+namespace esvr::vdb2esvr {
+namespace {
+
+/// True if the summaries allow that two grids have the same voxels.
+bool maybeTwins(const GridSummary& a, const GridSummary& b) {
+  return a.activeVoxels == b.activeVoxels && a.activeBox == b.activeBox;
+}
+
+bool maybeHasTwin(const std::vector<GridSummary>& grids, const GridSummary& grid) {
+  return std::count_if(grids.begin(), grids.end(),
+                       [&](const auto& other) { return maybeTwins(grid, other); }) > 1;
+}
+
+/// Reads grids and remembers the keys of those that are the first with their voxels. A key takes 16
+/// bytes, so that no volume has to be kept for a comparison.
+class TwinSearch {
+ public:
+  explicit TwinSearch(const Options& options) : options_(options) {}
+
+  void read(std::size_t index, const std::string& name) {
+    cli::Stopwatch watch;
+    VolumeGrid grid = readGrid(options_.input, name, options_.read);
+    const auto [first, isNew] = firstBy_.emplace(keyOf({grid.descriptor, grid.volume}), index);
+    if (isNew) return;
+    twins_[index] = {first->second, std::move(grid.descriptor), grid.nonFiniteReplaced,
+                     watch.lap()};
+  }
+
+  [[nodiscard]] Twins take() { return std::move(twins_); }
+
+ private:
+  const Options& options_;
+  std::map<InputKey, std::size_t> firstBy_;
+  Twins twins_;
+};
+
+}  // namespace
+
+Twins findTwins(const Options& options, const std::vector<GridSummary>& grids) {
+  TwinSearch search(options);
+  for (std::size_t g = 0; g < grids.size() && !options.convert.fit.cancel->cancelled(); ++g)
+    if (maybeHasTwin(grids, grids[g])) search.read(g, grids[g].uniqueName);
+  return search.take();
+}
+
+}  // namespace esvr::vdb2esvr
