@@ -20,6 +20,13 @@ struct Job {
 [[nodiscard]] double psnrOf(const Job& job, const SparseVolume& volume);
 [[nodiscard]] double psnrOf(const Job& job, const StoredGrid& grid);
 
+/// The target of a search.
+struct PsnrTarget {
+  double psnr = 0.0;  ///< dB over the box
+  /// Bytes of a grid below which nothing further is tried, because it could save little.
+  std::uint64_t smallEnough = 512;
+};
+
 /// Options of a short fit: a quarter of the iterations if their number is given, else a draft.
 [[nodiscard]] FitOptions shortened(FitOptions options);
 

@@ -17,9 +17,6 @@ namespace {
 /// Largest number of voxels in bricks for which voxels are tried as an alternative.
 constexpr std::size_t kMaxVoxels = std::size_t{1} << 25;
 
-/// Bytes of voxels below which ellipsoids are not tried: a fit takes seconds and can save little.
-constexpr std::uint64_t kMinBytesForFit = 8192;
-
 /// The representation of a job. Float32 storage is a form of ellipsoids.
 Representation representationOf(const Job& job) {
   if (job.options.storage.form == Storage::kFloat32) return Representation::kEllipsoids;
@@ -99,12 +96,13 @@ Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) 
 
 bool isTooLargeForVoxels(const Job& job) { return job.input.source.values.size() > kMaxVoxels; }
 
-Conversion convertToPsnr(const Job& job, double psnr) {
+Conversion convertToPsnr(const Job& job, const PsnrTarget& target) {
   const Representation wanted = representationOf(job);
-  if (wanted == Representation::kEllipsoids) return std::move(*searchPsnr(job, psnr).conversion);
-  auto voxels = voxelsForPsnr(job, psnr);
-  if (wanted == Representation::kAuto && voxels.bytes >= kMinBytesForFit)
-    return smallerOf(job, psnr, std::move(voxels));
+  if (wanted == Representation::kEllipsoids)
+    return std::move(*searchPsnr(job, target.psnr).conversion);
+  auto voxels = voxelsForPsnr(job, target);
+  if (wanted == Representation::kAuto && voxels.bytes >= target.smallEnough)
+    return smallerOf(job, target.psnr, std::move(voxels));
   const ChoiceRecord choice{record(voxels), {}};
   return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
 }

@@ -10,8 +10,7 @@ namespace esvr::convert {
 /// The smaller of two grids that reach a PSNR: voxels or ellipsoids. Voxels are made first, because
 /// they take the time of a few passes over the volume. A short fit then shows whether ellipsoids
 /// can be smaller; full fits are made only if they can.
-/// \param psnr  dB over the box
-[[nodiscard]] Conversion convertToPsnr(const Job& job, double psnr);
+[[nodiscard]] Conversion convertToPsnr(const Job& job, const PsnrTarget& target);
 
 /// The better of two grids of a size: voxels or ellipsoids, which are compared in the same way.
 /// \throws UsageError  neither can be that small

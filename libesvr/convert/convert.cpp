@@ -55,7 +55,7 @@ class Converter {
     return convert::convertToSize(job_, goal.bytes);
   }
   Conversion operator()(const PsnrGoal& goal) const {
-    return convert::convertToPsnr(job_, goal.psnr);
+    return convert::convertToPsnr(job_, {goal.psnr});
   }
   Conversion operator()(const BoundGoal& goal) const { return convert::convertWithin(job_, goal); }
   Conversion operator()(const LosslessGoal&) const { return convert::convertLossless(job_); }

@@ -10,13 +10,16 @@ namespace {
 
 /// Active voxels per ellipsoid at the largest number of ellipsoids. With more of them, voxels take
 /// fewer bytes.
-constexpr double kVoxelsPerEllipsoid = 8.0;
+constexpr double kMinVoxelsPerEllipsoid = 8.0;
 
 /// Active voxels up to which a fit on the CPU has all iterations of its preset; larger volumes have
 /// fewer in proportion. An iteration takes 24 to 43 ns of one core for each of them
 /// (docs/benchmarks.md, "Scaling with the number of voxels"), so that a fit takes about 20 seconds
 /// of two cores at most.
 constexpr double kVoxelsOfWholeFit = 700'000.0;
+
+/// Bytes of a grid at which nothing is tried to save some of them. A fit would take seconds.
+constexpr std::uint64_t kSmallEnough = 8192;
 
 std::uint64_t activeVoxelsIn(const SparseVolume& volume, const Box& box) {
   std::uint64_t count = 0;
@@ -35,7 +38,8 @@ double psnrOverBox(const Job& job, double psnrActive) {
 }
 
 FitOptions bounded(FitOptions options, std::uint64_t activeVoxels) {
-  options.count = std::max<std::size_t>(std::size_t(double(activeVoxels) / kVoxelsPerEllipsoid), 1);
+  options.count =
+      std::max<std::size_t>(std::size_t(double(activeVoxels) / kMinVoxelsPerEllipsoid), 1);
   if (options.device.kind == DeviceKind::kCuda) return options;
   const double share =
       std::min(1.0, kVoxelsOfWholeFit / double(std::max<std::uint64_t>(activeVoxels, 1)));
@@ -50,7 +54,8 @@ Conversion convertToPreset(const Job& job, const std::function<Conversion()>& fi
     return fit();
   ConvertOptions options = job.options;
   options.fit = bounded(job.options.fit, activeVoxelCount(job.input.source));
-  return convertToPsnr({job.input, options}, psnrOverBox(job, presetPsnr(job.options.fit.preset)));
+  const double psnr = psnrOverBox(job, presetPsnr(job.options.fit.preset));
+  return convertToPsnr({job.input, options}, {psnr, kSmallEnough});
 }
 
 }  // namespace esvr::convert

@@ -33,9 +33,6 @@ constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
 constexpr double kThriftOctaves = 0.08;  // bound's octaves that make up for the loss by kPrice
 constexpr int kMaxThriftyTrials = 4;
 
-/// Bytes of voxels below which nothing else is tried to make them smaller.
-constexpr std::uint64_t kMinBytesToImprove = 4096;
-
 /// Share of the active voxels with the most frequent value from which on a lattice that has this
 /// value, so that these voxels are exact, is tried.
 constexpr double kPlateauShare = 0.02;
@@ -88,7 +85,8 @@ class VoxelSearch {
     range_ = std::max(double(range.max), background) - std::min(double(range.min), background);
   }
 
-  VoxelCandidate forPsnr(double psnr) const {
+  VoxelCandidate forPsnr(const PsnrTarget& target) const {
+    const double psnr = target.psnr;
     if (!(range_ > 0.0)) return exactVoxels(job_);
     auto plain = coarsestFor(psnr, psnr / kDbPerOctave - 1.0, 0.0, kMaxTrials);
     if (!plain) return exactVoxels(job_);
@@ -104,7 +102,7 @@ class VoxelSearch {
       tbb::parallel_invoke([&] { best = exactVoxels(job_); },
                            [&] { simple = candidateOf(std::move(plain)); });
       takeSmallest();
-      if (best.bytes < kMinBytesToImprove) return;
+      if (best.bytes < target.smallEnough) return;
       tbb::parallel_invoke(
           [&] { thrifty = candidateOf(coarsestFor(psnr, octave, kPrice, kMaxThriftyTrials)); },
           [&] {
@@ -239,7 +237,9 @@ VoxelCandidate exactVoxels(const Job& job) {
   return candidate(job, exactLayer(job.input.source), std::numeric_limits<double>::infinity());
 }
 
-VoxelCandidate voxelsForPsnr(const Job& job, double psnr) { return VoxelSearch(job).forPsnr(psnr); }
+VoxelCandidate voxelsForPsnr(const Job& job, const PsnrTarget& target) {
+  return VoxelSearch(job).forPsnr(target);
+}
 
 std::optional<VoxelCandidate> voxelsForSize(const Job& job, std::uint64_t bytes) {
   auto exact = exactVoxels(job);

@@ -21,7 +21,7 @@ struct VoxelCandidate {
 
 /// The voxels with the widest quantisation found whose PSNR is at least `psnr`; exact voxels if
 /// quantised ones do not reach it.
-[[nodiscard]] VoxelCandidate voxelsForPsnr(const Job& job, double psnr);
+[[nodiscard]] VoxelCandidate voxelsForPsnr(const Job& job, const PsnrTarget& target);
 
 /// The best voxels found that add at most `bytes` to a file.
 /// \return nothing if even the coarsest voxels are larger

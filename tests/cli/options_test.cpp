@@ -86,7 +86,7 @@ TEST_F(Vdb2EsvrOption, representationIsTheOneWanted) {
     EXPECT_EQ(grid["representation"]["stored"], wanted);
     EXPECT_GE(grid["metrics"]["psnr_box"].get<double>(), 35.0);
   }
-  const Json chosen = quick({"--psnr", "35", "--representation", "auto"})["representation"];
+  const Json chosen = quick({"--psnr", "60", "--representation", "auto"})["representation"];
   const std::string other = chosen["stored"] == "voxels" ? "ellipsoids" : "voxels";
   EXPECT_LE(chosen[chosen["stored"].get<std::string>()]["bytes"], chosen[other]["bytes"]);
 }

@@ -174,7 +174,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"--size", "9KB", "--ratio", "9"}, 2, "--ratio"},
         Refusal{{"--ratio", "0.5"}, 2, "--ratio"}, Refusal{{"--max-error", "0"}, 2, "--max-error"},
         Refusal{{"--max-error", "1x"}, 2, "--max-error"},
-        Refusal{{"--representation", "voxels"}, 2, "--max-error"},
+        Refusal{{"--representation", "voxels", "--count", "9"}, 2, "--count"},
         Refusal{{"--representation", "cubes"}, 2, "cubes"},
         Refusal{{"--representation", "ellipsoids", "--lossless"}, 2, "--lossless"},
         Refusal{

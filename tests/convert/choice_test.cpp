@@ -183,7 +183,7 @@ class VoxelSearch : public testing::Test {
 
 TEST_F(VoxelSearch, ReachesAPsnrAndLittleMore) {
   for (const double psnr : {20.0, 40.0, 60.0}) {
-    const auto found = convert::voxelsForPsnr(job_, psnr);
+    const auto found = convert::voxelsForPsnr(job_, {psnr});
     EXPECT_GE(found.psnr, psnr);
     EXPECT_LT(found.psnr, psnr + 0.5);
     EXPECT_EQ(found.psnr, compareVolumes(volume_, decodeGrid(found.grid)).psnrBox);
@@ -201,14 +201,14 @@ TEST_F(VoxelSearch, FillsASize) {
 }
 
 TEST_F(VoxelSearch, FindsExactVoxelsWhereNothingElseReachesAPsnr) {
-  const auto found = convert::voxelsForPsnr(job_, 250.0);
+  const auto found = convert::voxelsForPsnr(job_, {250.0});
   EXPECT_TRUE(std::isinf(found.psnr));
   EXPECT_EQ(decodeGrid(found.grid).values, volume_.values);
 }
 
 TEST_F(VoxelSearch, TakesExactVoxelsOfDoublesAsTheyWereRead) {
   descriptor_.valueType = ValueType::kDouble;
-  const auto found = convert::voxelsForPsnr(job_, 250.0);
+  const auto found = convert::voxelsForPsnr(job_, {250.0});
   EXPECT_EQ(decodeGrid(found.grid).values, volume_.values);
 }
 
@@ -216,7 +216,7 @@ TEST_F(VoxelSearch, PutsAPlateauOnTheLattice) {
   test::Random random(11);
   volume_ = test::volumeOf({}, 3, 0.0f,
                            [&](Coord v) { return v.x < 12 ? 0.731f : float(random(0.1, 0.7)); });
-  const auto found = convert::voxelsForPsnr(job_, 30.0);
+  const auto found = convert::voxelsForPsnr(job_, {30.0});
   const SparseVolume back = decodeGrid(found.grid);
   for (std::size_t i = 0; i < volume_.values.size(); ++i) {
     if (volume_.values[i] != 0.731f) continue;
@@ -226,7 +226,7 @@ TEST_F(VoxelSearch, PutsAPlateauOnTheLattice) {
 
 TEST_F(VoxelSearch, StoresOneValueInFewBytes) {
   volume_ = test::volumeOf({}, 4, 0.0f, [](Coord) { return 0.5f; });
-  const auto found = convert::voxelsForPsnr(job_, 40.0);
+  const auto found = convert::voxelsForPsnr(job_, {40.0});
   EXPECT_GE(found.psnr, 40.0);
   EXPECT_LT(found.bytes, 1000u);
 }
