@@ -97,8 +97,8 @@ void addFitOptions(cli::po::options_description& options) {
     ("seconds", value<double>()->value_name("S"), "end the fit of each grid after this time")
     ("iterations", value<std::int64_t>()->value_name("N"), "number of iterations of a fit")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
-     "draft, standard or high: a PSNR of 32, 40 or 50 dB over the active voxels; with --count, "
-     "--seconds, --iterations or --storage-loss, the iterations and the count that are not given")
+     "quality without another target: draft, standard or high stand for a PSNR of 32, 40 or 50 dB "
+     "over the active voxels; in a single fit, the count and the iterations that are not given")
     ("kappa", value<float>()->value_name("K"),
      "edge of the kernel (default: it is fitted with the ellipsoids)")
     ("box", value<std::string>()->value_name("BOX"),
