@@ -27,7 +27,10 @@ void printChoice(const ConvertedGrid& grid, std::ostream& out) {
   const Candidate& other = voxels ? *choice->ellipsoids : *choice->voxels;
   out << cli::printable(grid.uniqueName) << (voxels ? ": voxels (" : ": ellipsoids (")
       << toText(taken) << ") rather than " << (voxels ? "ellipsoids (" : "voxels (")
-      << toText(other) << ")\n";
+      << toText(other) << ')';
+  if (voxels && other.estimated && other.bytes < taken.bytes)
+    out << ", which may save too little for a longer fit";
+  out << '\n';
 }
 
 /// Says how the data of a grid were made.

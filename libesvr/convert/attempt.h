@@ -25,6 +25,8 @@ struct PsnrTarget {
   double psnr = 0.0;  ///< dB over the box
   /// Bytes of a grid below which nothing further is tried, because it could save little.
   std::uint64_t smallEnough = 512;
+  /// Share of the bytes of voxels that ellipsoids must be expected to stay below to be fitted.
+  double worthwhileShare = 1.0;
 };
 
 /// Options of a short fit: a quarter of the iterations if their number is given, else a draft.

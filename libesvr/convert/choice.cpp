@@ -65,9 +65,10 @@ auto unlessCancelled(const Search& search) -> decltype(search()) try {
 }
 
 /// The smaller of `voxels` and ellipsoids, which must reach the PSNR.
-Conversion smallerOf(const Job& job, double psnr, VoxelCandidate voxels) {
-  auto [ellipsoids, expected] =
-      unlessCancelled([&] { return searchPsnr(job, psnr, voxels.bytes); });
+Conversion smallerOf(const Job& job, const PsnrTarget& target, VoxelCandidate voxels) {
+  const double psnr = target.psnr;
+  const auto below = std::uint64_t(target.worthwhileShare * double(voxels.bytes));
+  auto [ellipsoids, expected] = unlessCancelled([&] { return searchPsnr(job, psnr, below); });
   ChoiceRecord choice{record(voxels), {}};
   if (expected > 0) choice.ellipsoids = Candidate{expected, psnr, true};
   if (ellipsoids) {
@@ -102,7 +103,7 @@ Conversion convertToPsnr(const Job& job, const PsnrTarget& target) {
     return std::move(*searchPsnr(job, target.psnr).conversion);
   auto voxels = voxelsForPsnr(job, target);
   if (wanted == Representation::kAuto && voxels.bytes >= target.smallEnough)
-    return smallerOf(job, target.psnr, std::move(voxels));
+    return smallerOf(job, target, std::move(voxels));
   const ChoiceRecord choice{record(voxels), {}};
   return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
 }

@@ -21,6 +21,10 @@ constexpr double kVoxelsOfWholeFit = 700'000.0;
 /// Bytes of a grid at which nothing is tried to save some of them. A fit would take seconds.
 constexpr std::uint64_t kSmallEnough = 8192;
 
+/// Share of the bytes of voxels that ellipsoids must be expected to stay below: full fits, which
+/// take most of the time, are made only if they save something.
+constexpr double kWorthwhileShare = 0.85;
+
 std::uint64_t activeVoxelsIn(const SparseVolume& volume, const Box& box) {
   std::uint64_t count = 0;
   for (std::size_t b = 0; b < volume.brickCount(); ++b)
@@ -55,7 +59,7 @@ Conversion convertToPreset(const Job& job, const std::function<Conversion()>& fi
   ConvertOptions options = job.options;
   options.fit = bounded(job.options.fit, activeVoxelCount(job.input.source));
   const double psnr = psnrOverBox(job, presetPsnr(job.options.fit.preset));
-  return convertToPsnr({job.input, options}, {psnr, kSmallEnough});
+  return convertToPsnr({job.input, options}, {psnr, kSmallEnough, kWorthwhileShare});
 }
 
 }  // namespace esvr::convert
