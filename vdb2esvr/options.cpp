@@ -38,7 +38,8 @@ cli::ProgramText programText() {
       .notes =
           "Without -g, all float and double grids are converted; other grids are listed and\n"
           "skipped. Without a goal, each grid gets the quality of --preset in as few bytes as\n"
-          "were found. --size and --ratio search for the best file that is not larger. Several\n"
+          "were found; a grid of more than 33 million voxels in bricks gets a single fit instead.\n"
+          "--size and --ratio search for the best file that is not larger. Several\n"
           "grids share the bytes in proportion to their active voxels. --psnr searches for the\n"
           "smallest file that reaches the PSNR; --count then limits the number of ellipsoids.\n"
           "In all these cases, the program chooses for each grid between ellipsoids and quantised\n"

@@ -27,6 +27,11 @@ std::size_t within(double count, std::uint64_t voxels) {
 
 }  // namespace
 
+Activity voxelActivity(const Job& job) {
+  const bool levelSet = job.input.descriptor.gridClass == GridClass::kLevelSet;
+  return levelSet ? Activity::kExact : job.options.storage.activity;
+}
+
 double psnrOf(const Job& job, const SparseVolume& volume) {
   const CompareOptions options{.box = job.options.fit.box, .peak = {}, .ssim = false};
   return compareVolumes(job.input.source, volume, options).psnrBox;

@@ -20,6 +20,10 @@ struct Job {
 [[nodiscard]] double psnrOf(const Job& job, const SparseVolume& volume);
 [[nodiscard]] double psnrOf(const Job& job, const StoredGrid& grid);
 
+/// How voxels store the active mask of a grid: as StorageOptions say, but exactly for a level set,
+/// because the width of its band is part of its shape.
+[[nodiscard]] Activity voxelActivity(const Job& job);
+
 /// The target of a search.
 struct PsnrTarget {
   double psnr = 0.0;  ///< dB over the box

@@ -93,7 +93,7 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   const SparseVolume& source = job.input.source;
   const double bound = absoluteBound(goal, source);
   if (bound == 0.0) return asVoxels(job, exactLayer(source));
-  Conversion voxels = asVoxels(job, boundedLayer(source, bound, job.options.storage.activity));
+  Conversion voxels = asVoxels(job, boundedLayer(source, bound, voxelActivity(job)));
   const bool insists = job.options.representation == Representation::kEllipsoids;
   if (isNarrowBand(job.input.descriptor, source) && !insists) return voxels;
   Smallest best{std::move(voxels), {}, insists};

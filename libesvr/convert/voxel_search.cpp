@@ -132,15 +132,9 @@ class VoxelSearch {
     return std::max(std::round(0.5 * plateau_.value / bound), 1.0);
   }
 
-  /// The width of a level set's band is part of its shape, so its mask is always exact.
-  [[nodiscard]] Activity activity() const {
-    const bool levelSet = job_.input.descriptor.gridClass == GridClass::kLevelSet;
-    return levelSet ? Activity::kExact : job_.options.storage.activity;
-  }
-
   [[nodiscard]] VoxelLayer layerAt(double bound, double price) const {
     const SparseVolume& source = job_.input.source;
-    VoxelLayer layer = boundedLayer(source, bound, activity());
+    VoxelLayer layer = boundedLayer(source, bound, voxelActivity(job_));
     return price > 0.0 ? thriftyLayer(source, std::move(layer), price) : layer;
   }
 

@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+#include "convert/choice.h"
 #include "convert/volumes.h"
 #include "convert/voxel_search.h"
 #include "esvr/convert.h"
@@ -145,15 +146,21 @@ TEST(ChoiceForAPreset, StoresAConstantInAFewBytes) {
   EXPECT_LT(bytesAdded(conversion.grid), 600u);
 }
 
-TEST(ChoiceForAPreset, KeepsTheMaskOfALevelSet) {
+TEST(Choice, VoxelsKeepTheMaskOfALevelSetOnly) {
   const SparseVolume band = test::levelSetVolume();
-  GridDescriptor descriptor;
-  descriptor.gridClass = GridClass::kLevelSet;
-  ConvertOptions options;
-  options.goal = PresetGoal{};
-  options.representation = Representation::kVoxels;
-  const Conversion conversion = convertVolume({descriptor, band}, options);
-  EXPECT_EQ(compareVolumes(band, decodeGrid(conversion.grid)).iou, 1.0);
+  const auto iou = [&](GridClass gridClass, const Goal& goal) {
+    GridDescriptor descriptor;
+    descriptor.gridClass = gridClass;
+    ConvertOptions options;
+    options.goal = goal;
+    options.representation = Representation::kVoxels;
+    const Conversion conversion = convertVolume({descriptor, band}, options);
+    return compareVolumes(band, decodeGrid(conversion.grid)).iou;
+  };
+  for (const Goal& goal : {Goal{PsnrGoal{25.0}}, Goal{BoundGoal{0.1, true}}}) {
+    EXPECT_EQ(iou(GridClass::kLevelSet, goal), 1.0);
+    EXPECT_LT(iou(GridClass::kFogVolume, goal), 1.0);
+  }
 }
 
 TEST(ChoiceForAFit, TakesExactVoxelsWhereEllipsoidsWouldTakeMoreBytes) {
@@ -180,6 +187,20 @@ class VoxelSearch : public testing::Test {
   ConvertOptions options_;
   convert::Job job_{input_, options_};
 };
+
+TEST_F(VoxelSearch, DoesNotFitWhereLittleCanBeSaved) {
+  options_.fit.iterations = 200;
+  const auto converted = [&](const convert::PsnrTarget& target) {
+    return convert::convertToPsnr(job_, target);
+  };
+  EXPECT_FALSE(converted({35.0}).grid.voxels);
+  const Conversion small = converted({.psnr = 35.0, .smallEnough = 1'000'000});
+  EXPECT_TRUE(small.grid.voxels);
+  EXPECT_FALSE(small.choice->ellipsoids) << "not even a short fit is made";
+  const Conversion worthless = converted({.psnr = 35.0, .worthwhileShare = 0.01});
+  EXPECT_TRUE(worthless.grid.voxels);
+  EXPECT_TRUE(worthless.choice->ellipsoids && worthless.choice->ellipsoids->estimated);
+}
 
 TEST_F(VoxelSearch, ReachesAPsnrAndLittleMore) {
   for (const double psnr : {20.0, 40.0, 60.0}) {

@@ -25,8 +25,9 @@ struct FitGoal {};
 /// The smallest grid found whose error is at most that of presetPsnr(FitOptions::preset) over the
 /// active voxels. Errors at inactive voxels of the box count too, so that the PSNR over the active
 /// voxels alone is at least as high. The time is bounded: on the CPU, fits of large volumes have
-/// fewer iterations. A volume of more than 2^25 voxels in bricks is converted as for a FitGoal,
-/// unless voxels are insisted on. FitOptions::count, psnr, seconds and iterations are ignored.
+/// fewer iterations. FitOptions::count, psnr and seconds are ignored. A volume of more than 2^25
+/// voxels in bricks is converted as for a FitGoal, unless the representation is kVoxels; its
+/// quality then is that of its fit.
 struct PresetGoal {};
 
 /// The best grid that adds at most `bytes` to a file (bytesAdded). Ellipsoids use at least 98 % of
