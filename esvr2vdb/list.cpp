@@ -26,9 +26,14 @@ struct Listing {
   std::vector<std::string> names;
 };
 
+const char* purposeOf(const Field& field) {
+  if (field.ellipsoidCount() == 0) return "-";
+  return field.fitFor == FitFor::kDrawing ? "drawing" : "voxels";
+}
+
 void printGrids(const Listing& listing) {
-  cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "kernel, kappa",
-                    "active by", "bytes", "bytes each"});
+  cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "fitted for",
+                    "kernel, kappa", "active by", "bytes", "bytes each"});
   for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
     const StoredGrid& grid = listing.file.grids[g];
     const std::uint64_t bytes = cli::storedBytes(listing.summary, g);
@@ -36,8 +41,9 @@ void printGrids(const Listing& listing) {
     const std::size_t ellipsoids = grid.field.ellipsoidCount();
     table.add({listing.names[g], cli::nameOf(grid.descriptor.gridClass),
                cli::nameOf(grid.descriptor.valueType), std::to_string(grid.activeVoxels),
-               std::to_string(ellipsoids), textOf(grid.field.kernel), cli::nameOf(grid.topology),
-               std::to_string(own), bytesPerEllipsoid(bytes, ellipsoids)});
+               std::to_string(ellipsoids), purposeOf(grid.field), textOf(grid.field.kernel),
+               cli::nameOf(grid.topology), std::to_string(own),
+               bytesPerEllipsoid(bytes, ellipsoids)});
   }
   table.print(std::cout);
 }

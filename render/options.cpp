@@ -161,9 +161,10 @@ void addDeviceOptions(cli::po::options_description& options) {
     ("method", value<std::string>()->value_name("M")->default_value("ellipsoids"),
      "ellipsoids: draw the ellipsoids of an .esvr file directly; bricks: decode all voxels once "
      "and draw them; auto: try both and take the faster one that fits into memory")
-    ("between", value<std::string>()->value_name("B")->default_value("voxels"),
+    ("between", value<std::string>()->value_name("B")->default_value("auto"),
      "voxels: between voxels, interpolate the decoded voxels; sum: evaluate the sum of ellipsoids "
-     "itself, which is less accurate, and faster where a pixel covers many voxels")
+     "itself, which is faster where a pixel covers many voxels, but less accurate unless the file "
+     "was made with --fit-for drawing; auto: sum for such a file, otherwise voxels")
     ("values", value<std::string>()->value_name("T"),
      "draw voxels from a NanoVDB grid of this type: float, fp4, fp8, fp16 or fpn");
 }
@@ -390,8 +391,9 @@ void readDevice(const Arguments& a, Options& options) {
   options.method = cli::choose<Method>(
       "method", a.get<std::string>("method"),
       {{"ellipsoids", Method::kEllipsoids}, {"bricks", Method::kBricks}, {"auto", Method::kAuto}});
-  options.between = cli::choose<Between>("between", a.get<std::string>("between"),
-                                         {{"voxels", Between::kVoxels}, {"sum", Between::kSum}});
+  options.between = cli::choose<std::optional<Between>>(
+      "between", a.get<std::string>("between"),
+      {{"auto", std::nullopt}, {"voxels", Between::kVoxels}, {"sum", Between::kSum}});
 }
 
 void readMeasuring(const Arguments& a, Options& options) {

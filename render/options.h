@@ -34,7 +34,7 @@ struct Options {
   std::optional<double> minTransmittance;  ///< default: that of RenderOptions
   std::optional<Rgb> background;           ///< default: the picture is transparent
   int bits = 8;                            ///< bits of a PNG's channel
-  Between between = Between::kVoxels;
+  std::optional<Between> between;          ///< default: what the ellipsoids were fitted for
   RenderMode mode = RenderMode::kComposite;
   std::optional<PlaceBox> clip;
   int turntable = 0;             ///< number of pictures of a full turn; 0: one picture

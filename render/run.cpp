@@ -105,6 +105,12 @@ ValueRange rangeOf(const Options& options, const Scene& scene) {
   return {std::min(scene.data.min, scene.background), std::max(scene.data.max, scene.background)};
 }
 
+/// The rule between voxels for which the scene's ellipsoids were fitted.
+Between ownBetween(const Scene& scene) {
+  const auto* field = std::get_if<Field>(&scene.content);
+  return field && field->fitFor == FitFor::kDrawing ? Between::kSum : Between::kVoxels;
+}
+
 RenderOptions renderOptions(const Options& options, const Scene& scene) {
   RenderOptions r;
   r.resolution = options.resolution;
@@ -116,7 +122,7 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
   r.opacityLength = options.opacityLength;
   r.minTransmittance = options.minTransmittance.value_or(r.minTransmittance);
   r.mode = options.mode;
-  r.between = options.between;
+  r.between = options.between.value_or(ownBetween(scene));
   r.clip = options.clip;
   return r;
 }

@@ -100,6 +100,13 @@ void addFitOptions(cli::po::options_description& options) {
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
      "quality without another target: draft, standard or high stand for a PSNR of 32, 40 or 50 dB "
      "over the active voxels; in a single fit, the count and the iterations that are not given")
+    ("fit-for", value<std::string>()->value_name("F")->default_value("voxels"),
+     "voxels: fit the voxels; drawing: fit the values between voxels too, so that esvr-render can "
+     "draw the sum of ellipsoids itself; the error at the voxels is then larger")
+    ("voxel-share", value<double>()->value_name("S")
+         ->default_value(FitOptions{}.voxelShare, cli::shortNumber(FitOptions{}.voxelShare)),
+     "with --fit-for drawing: share of the iterations, 0 to 1, that compare at the voxels; the "
+     "others compare between them")
     ("kappa", value<float>()->value_name("K"),
      "edge of the kernel (default: it is fitted with the ellipsoids)")
     ("box", value<std::string>()->value_name("BOX"),
@@ -167,6 +174,11 @@ FitOptions fitOptions(const Arguments& a) {
   fit.preset = cli::choose<Preset>(
       "preset", a.get<std::string>("preset"),
       {{"draft", Preset::kDraft}, {"standard", Preset::kStandard}, {"high", Preset::kHigh}});
+  fit.fitFor = cli::choose<FitFor>("fit-for", a.get<std::string>("fit-for"),
+                                   {{"voxels", FitFor::kVoxels}, {"drawing", FitFor::kDrawing}});
+  fit.voxelShare = *bounded<double>(a, "voxel-share", 0.0, 1.0);
+  if (!a.values["voxel-share"].defaulted() && fit.fitFor != FitFor::kDrawing)
+    throw UsageError("--voxel-share needs --fit-for drawing");
   if (const auto gigabytes = bounded<double>(a, "max-vram", kMinVram, kMaxVram))
     fit.maxDeviceBytes = std::size_t(*gigabytes * 1e9);
   fit.kappa = bounded<float>(a, "kappa", -kLargestKappa, kLargestKappa);
@@ -249,7 +261,7 @@ void readSize(const Arguments& a, Options& options) {
 void readPaper(const Arguments& a, Options& options) {
   const auto given = a.find<std::vector<std::string>>("paper");
   if (!given) return;
-  refuseWith(a, "paper", {"kappa", "iterations", "preset"});
+  refuseWith(a, "paper", {"kappa", "iterations", "preset", "fit-for"});
   options.paper = readPaperMethod(*given);
   options.paper->countHits = a.get<bool>("hits");
   StorageOptions& storage = options.convert.storage;
@@ -263,8 +275,12 @@ void readPaper(const Arguments& a, Options& options) {
 /// \throws UsageError  the goal cannot be served by the representation
 void requireRepresentation(const Arguments& a, const Options& options) {
   const Representation wanted = options.convert.representation;
-  if (wanted == Representation::kAuto) return;
   const bool sized = options.size || options.ratio;
+  const bool forDrawing = options.convert.fit.fitFor == FitFor::kDrawing;
+  if (forDrawing && wanted == Representation::kVoxels)
+    throw UsageError("--fit-for drawing cannot be combined with --representation voxels");
+  if (forDrawing && a.get<bool>("lossless"))
+    throw UsageError("--fit-for drawing cannot be combined with --lossless");
   if (wanted == Representation::kEllipsoids && a.get<bool>("lossless"))
     throw UsageError("--representation ellipsoids cannot be combined with --lossless");
   if (wanted != Representation::kVoxels) return;

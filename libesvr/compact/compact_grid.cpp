@@ -1,6 +1,7 @@
 #include "esvr/compact.h"
 
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "compact/choose_steps.h"
@@ -46,6 +47,13 @@ void requireOneKappa(const StoredGrid& grid) {
                            "': its ellipsoids have kappas of their own");
 }
 
+/// The voxels of a grid whose ellipsoids are meant to be drawn. Intensities that are solved for the
+/// voxels of the source instead would draw a worse picture between them.
+std::optional<SparseVolume> ownVoxels(const StoredGrid& grid) {
+  if (grid.field.fitFor == FitFor::kVoxels) return std::nullopt;
+  return decodeGrid(grid);
+}
+
 }  // namespace
 
 CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
@@ -54,7 +62,10 @@ CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
   CompactResult result{grid, {}, 0.0, 0};
   if (grid.field.ellipsoidCount() == 0) return result;
   const Box box = options.box.value_or(activeBox(source));
-  TrialMaker maker(grid, {source, box, options.device});
+  const auto own = ownVoxels(grid);
+  TrialMaker maker(
+      grid,
+      {.source = source, .box = box, .device = options.device, .solvedFor = own ? &*own : nullptr});
   Trial chosen = choose(maker, options);
   // with a mask, the layers' errors depend on more than the trial's values
   const bool byValues = grid.topology != TopologyKind::kMask;

@@ -102,20 +102,33 @@ std::vector<float> intensitiesOfFirstLayers(const Trial& trial, std::size_t laye
 
 TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
     : bricks_(grid.leaves),
-      target_{target.source, format::ruleOf(grid), target.box, bricks_,
-              grid.topology != TopologyKind::kThreshold},
+      target_{target.solvedFor ? *target.solvedFor : target.source, format::ruleOf(grid),
+              target.box, bricks_, grid.topology != TopologyKind::kThreshold},
       sampleBricks_(sampleOf(knownCorners(target_))),
-      sampleTarget_{target.source, target_.rule, target.box, sampleBricks_, true},
+      sampleTarget_{target_.source, target_.rule, target.box, sampleBricks_, true},
       problem_(target_, target.device),
       sampleProblem_(sampleTarget_, target.device),
       field_(grid.field),
       peak_(peakOf(target.source)) {
-  problem_.setShapes(field_);
+  if (target.solvedFor) {
+    sourceTarget_.emplace(IntensityTarget{target.source, target_.rule, target.box, bricks_,
+                                          target_.restrictToBricks});
+    sourceProblem_.emplace(*sourceTarget_, target.device);
+  }
   auto intensities = intensitiesOf(field_);
-  error_ = problem_.error(intensities).squares;
-  leastError_ = problem_.solve(intensities, kFirstIterations);
+  error_ = errorOf(field_, intensities).squares;
+  problem_.setShapes(field_);
+  (void)problem_.solve(intensities, kFirstIterations);
+  leastError_ = errorOf(field_, intensities).squares;
   setIntensities(intensities, field_);
   curvature_ = byChunk(field_, problem_.curvature());
+}
+
+/// The error of a field against the source.
+StoredError TrialMaker::errorOf(const Field& field, std::span<const float> intensities) {
+  IntensityProblem& problem = sourceProblem_ ? *sourceProblem_ : problem_;
+  problem.setShapes(field);
+  return problem.error(intensities);
 }
 
 double TrialMaker::squaresOf(double psnr) const {
@@ -143,7 +156,11 @@ Trial TrialMaker::make(const QuantiserSteps& steps) {
 }
 
 std::vector<Trial> TrialMaker::make(std::span<const QuantiserSteps> steps) {
-  return make(steps, problem_);
+  auto trials = make(steps, problem_);
+  if (!sourceProblem_) return trials;
+  for (Trial& trial : trials)
+    trial.error = errorOf(trial.field, intensitiesOf(trial.field)).squares;
+  return trials;
 }
 
 std::vector<Trial> TrialMaker::sample(std::span<const QuantiserSteps> steps) {
@@ -167,9 +184,8 @@ std::vector<LayerError> TrialMaker::layerErrors(const Trial& trial) {
   std::vector<LayerError> errors;
   const std::size_t layers = layersOf(trial);
   if (layers < 2) return errors;
-  problem_.setShapes(trial.field);
   for (std::size_t k = 1; k <= layers; ++k) {
-    const StoredError error = problem_.error(intensitiesOfFirstLayers(trial, k));
+    const StoredError error = errorOf(trial.field, intensitiesOfFirstLayers(trial, k));
     errors.push_back(
         {float(psnr(error.squares / target_.box.volume(), peak_)), float(error.largest)});
   }

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,11 +28,13 @@ struct TrialTarget {
   const SparseVolume& source;
   Box box;
   Device device;
+  /// The voxels for which intensities are solved, if these are not the source's.
+  const SparseVolume* solvedFor = nullptr;
 };
 
 class TrialMaker {
  public:
-  /// The source must outlive the maker. \throws DeviceError  the GPU cannot be used
+  /// The volumes must outlive the maker. \throws DeviceError  the GPU cannot be used
   TrialMaker(const StoredGrid& grid, const TrialTarget& target);
   TrialMaker(const TrialMaker&) = delete;
   TrialMaker& operator=(const TrialMaker&) = delete;
@@ -63,6 +66,7 @@ class TrialMaker {
 
  private:
   void quantiseChunks(Trial& trial) const;
+  [[nodiscard]] StoredError errorOf(const Field& field, std::span<const float> intensities);
   [[nodiscard]] std::vector<Trial> make(std::span<const QuantiserSteps> steps,
                                         IntensityProblem& problem) const;
 
@@ -72,6 +76,8 @@ class TrialMaker {
   std::vector<Coord> sampleBricks_;
   IntensityTarget sampleTarget_;
   IntensityProblem problem_, sampleProblem_;
+  std::optional<IntensityTarget> sourceTarget_;    ///< if intensities are not solved for the source
+  std::optional<IntensityProblem> sourceProblem_;  ///< as above; measures errors
   Field field_;  ///< float32 field with optimal intensities, from which the trials' solver starts
   std::vector<std::vector<double>> curvature_;  ///< sum of phi^2 of each ellipsoid, by chunk
   double peak_, error_ = 0.0, leastError_ = 0.0;

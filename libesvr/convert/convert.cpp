@@ -86,6 +86,8 @@ void requirePossible(const ConvertOptions& options) {
     throw UsageError("voxels need a goal: a PSNR, a size, a bound or lossless storage");
   if (wanted == Representation::kVoxels && options.storage.form == Storage::kFloat32)
     throw UsageError("float32 storage is a form of ellipsoids; it excludes voxels");
+  if (wanted == Representation::kVoxels && options.fit.fitFor == FitFor::kDrawing)
+    throw UsageError("a fit for drawing needs ellipsoids; it excludes voxels");
   if (wanted == Representation::kEllipsoids && std::holds_alternative<LosslessGoal>(options.goal))
     throw UsageError("ellipsoids are not lossless");
 }
@@ -108,6 +110,7 @@ Conversion convertVolume(const ConvertInput& input, const ConvertOptions& option
   requirePossible(options);
   ConvertOptions own = options;
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
+  if (own.fit.fitFor == FitFor::kDrawing) own.representation = Representation::kEllipsoids;
   Conversion conversion = std::visit(Converter({input, own}), options.goal);
   conversion.grid = throughTheFormat(std::move(conversion.grid));
   if (const auto bound = convert::boundOf(options.goal, input.source))

@@ -16,7 +16,7 @@ struct Support {
   std::array<double, 3> center;  ///< voxels in the frame of the bricks
   Matrix3 L;
   double radius;               ///< radius in the unit frame
-  double slack;                ///< voxels by which every face is moved outwards
+  double slack;                ///< voxels by which the support may move along every axis
   std::array<double, 3> half;  ///< half widths of the bounding box, including the slack
 };
 
@@ -39,8 +39,7 @@ struct Support {
   constexpr double kHalf = (kBrickSide - 1) / 2.0;  // voxels are points, so a brick spans 7 voxels
   const double* row = &s.L[3 * j];
   const double reach = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
-  const double length2 = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
-  return s.radius + kHalf * reach + s.slack * std::sqrt(length2);
+  return s.radius + (kHalf + s.slack) * reach;
 }
 
 /// Tests bricks against the planes that bound a support perpendicular to the rows of L, which are

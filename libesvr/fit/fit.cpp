@@ -34,6 +34,8 @@ void check(const FitOptions& options) {
   if (options.seconds && !(*options.seconds > 0.0)) throw UsageError("seconds must be positive");
   if (options.psnr && !std::isfinite(*options.psnr)) throw UsageError("psnr must be finite");
   if (options.kappa && !std::isfinite(*options.kappa)) throw UsageError("kappa must be finite");
+  if (!(options.voxelShare >= 0.0 && options.voxelShare <= 1.0))
+    throw UsageError("the share of iterations at voxels must be between 0 and 1");
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
 }
 
@@ -81,6 +83,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   FitTarget target = makeTarget(volume, options.box);
   target.saturates = true;
   target.narrowBand = options.narrowBand;
+  if (options.fitFor == FitFor::kDrawing) target.voxelShare = options.voxelShare;
   if (isEmpty(target)) return emptyFit(volume, options.kappa.value_or(Kernel{}.kappa));
 
   Recorder recorder(target, options);
@@ -97,6 +100,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   FitResult result;
   result.field = exportField(optimiser->ellipsoids(),
                              {volume.origin, target.scale, volume.background, optimiser->kernel()});
+  result.field.fitFor = options.fitFor;
   result.range = rangeOf(volume.background, target);
   result.kappaLearned = plan.learnKappa;
   result.end = end.end;

@@ -39,6 +39,7 @@ Table vdb2esvrTests() {
   return {{"--box", "Vdb2EsvrOption.boxIsWherePsnrIsTaken"},
           {"--count", "Vdb2EsvrOption.countIsTheNumberOfEllipsoids"},
           {"--device", "Vdb2EsvrOption.devicesAreTakenAsNamed"},
+          {"--fit-for", "Vdb2EsvrOption.fitForDrawingIsStoredInTheFile"},
           {"--force", "Vdb2Esvr.keepsAnExistingFileUnlessForced"},
           {"--grid", "Vdb2Esvr.fitsTheGridsThatAreNamedOnly"},
           {"--help", "Vdb2Esvr.listsTheKeysOfThePapersMethod"},
@@ -63,7 +64,8 @@ Table vdb2esvrTests() {
           {"--storage", "Vdb2EsvrOption.storageIsCompactOrFloat32"},
           {"--storage-loss", "Vdb2EsvrOption.storageLossBuysBytes"},
           {"--threads", "Vdb2Esvr.givesTheSameBytesInEveryRunOnAnyNumberOfThreads"},
-          {"--topology", "Vdb2Esvr.storesTheMaskWhereAsked"}};
+          {"--topology", "Vdb2Esvr.storesTheMaskWhereAsked"},
+          {"--voxel-share", "Vdb2EsvrOption.voxelSharesLowerTheErrorAtTheVoxels"}};
 }
 
 Table esvr2vdbTests() {

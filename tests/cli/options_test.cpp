@@ -11,6 +11,7 @@
 #include "cli/converters.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/baseline.h"
+#include "esvr/container.h"
 #include "esvr/vdb_io.h"
 #include "support/on_device.h"
 
@@ -89,6 +90,23 @@ TEST_F(Vdb2EsvrOption, representationIsTheOneWanted) {
   const Json chosen = quick({"--psnr", "60", "--representation", "auto"})["representation"];
   const std::string other = chosen["stored"] == "voxels" ? "ellipsoids" : "voxels";
   EXPECT_LE(chosen[chosen["stored"].get<std::string>()]["bytes"], chosen[other]["bytes"]);
+}
+
+TEST_F(Vdb2EsvrOption, fitForDrawingIsStoredInTheFile) {
+  for (const FitFor fitFor : {FitFor::kVoxels, FitFor::kDrawing}) {
+    const Json grid = quick({"--fit-for", fitFor == FitFor::kDrawing ? "drawing" : "voxels"});
+    EXPECT_EQ(grid["representation"]["stored"], "ellipsoids");
+    EXPECT_EQ(readEsvr(at("out.esvr")).grids[0].field.fitFor, fitFor);
+  }
+}
+
+TEST_F(Vdb2EsvrOption, voxelSharesLowerTheErrorAtTheVoxels) {
+  const auto psnrAt = [&](const std::string& share) {
+    const Json grid = convert({"--count", "40", "--iterations", "100", "--fit-for", "drawing",
+                               "--voxel-share", share})["grids"][0];
+    return grid["metrics"]["psnr_box"].get<double>();
+  };
+  EXPECT_GT(psnrAt("1"), psnrAt("0"));
 }
 
 TEST_F(Vdb2EsvrOption, secondsEndTheFit) {

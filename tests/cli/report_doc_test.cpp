@@ -22,7 +22,7 @@ using Keys = std::set<std::string>;
 using Table = std::map<std::string, std::string>;  // meaning of each key
 
 /// Words in backticks in the document that are values, or keys of another object.
-const Keys kNoKeys{"default", "learned", "mask", "null", "paper", "voxels"};
+const Keys kNoKeys{"default", "drawing", "learned", "mask", "null", "paper", "voxels"};
 
 /// Words in backticks that may be keys: options have dashes, and values capitals or spaces.
 Keys namedIn(const std::string& text) {

@@ -1,15 +1,19 @@
 // Plan: the operations of a run are tested on every device. Growth reaches its count and places
 // seeds where the error is large. Relocation moves the least useful ellipsoids only. Ellipsoids
-// that reach no voxel are dropped, and without an error there are no seeds. A whole fit has the
-// same bits in three runs and at a distant position. Without a GPU, its tests skip.
+// that reach no voxel are dropped, and without an error there are no seeds. A fit for drawing is
+// closer to the volume between voxels. A whole fit has the same bits in three runs and at a distant
+// position. Without a GPU, its tests skip.
 
 #include "fit/optimiser.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "esvr/metrics.h"
+#include "interpolate.h"
 #include "support/on_device.h"
 #include "volumes.h"
 
@@ -48,12 +52,15 @@ TEST_P(OptimiserOn, GrowsToTheCountAndLowersTheLoss) {
 }
 
 TEST_P(OptimiserOn, ManyIterationsInACallAreThoseOfManyCalls) {
-  const auto inOne = make(), inMany = make();
-  inOne->growTo(30);
-  inMany->growTo(30);
-  inOne->iterate(std::vector<double>(25, 0.5));
-  for (int i = 0; i < 25; ++i) inMany->iterate(std::array{0.5});
-  EXPECT_EQ(inOne->measure().squaredSum, inMany->measure().squaredSum);
+  for (const double voxelShare : {1.0, 0.25}) {
+    target_.voxelShare = voxelShare;
+    const auto inOne = make(), inMany = make();
+    inOne->growTo(30);
+    inMany->growTo(30);
+    inOne->iterate(std::vector<double>(25, 0.5));
+    for (int i = 0; i < 25; ++i) inMany->iterate(std::array{0.5});
+    EXPECT_EQ(inOne->measure().squaredSum, inMany->measure().squaredSum) << voxelShare;
+  }
 }
 
 // If lists were used for too long, they would miss the parts by which supports have grown. The loss
@@ -68,6 +75,44 @@ TEST_P(OptimiserOn, LargeStepsSeeTheWholeOfEveryEllipsoid) {
     const double exact = stopped->measure().squaredSum;
     EXPECT_NEAR(going->iterate(std::array{2.0}), exact, 2e-3 * exact) << "after " << done;
   }
+}
+
+/// The PSNR of a field at positions half-way between voxels, against the interpolated volume.
+double psnrBetween(const SparseVolume& volume, const FitResult& result) {
+  constexpr Offset kHalfWay{0.5, 0.5, 0.5};
+  constexpr std::int32_t kStride = 3;  // voxels; a float64 sum of all ellipsoids takes long
+  Field moved = result.field;
+  for (Chunk& chunk : moved.chunks)
+    for (auto& plane : chunk.ellipsoids.center)
+      for (float& c : plane) c -= 0.5f;
+  const auto source = [&](Coord v) { return double(valueAt(volume, v)); };
+  const Box box = activeBox(volume);
+  double squares = 0.0, count = 0.0;
+  for (std::int32_t x = box.min.x; x < box.max.x; x += kStride)
+    for (std::int32_t y = box.min.y; y < box.max.y; y += kStride)
+      for (std::int32_t z = box.min.z; z < box.max.z; z += kStride) {
+        const double sum = std::clamp(evaluateReference(moved, {x, y, z}), double(result.range.min),
+                                      double(result.range.max));
+        squares += std::pow(sum - test::interpolate(kHalfWay, {x, y, z}, source), 2);
+        count += 1.0;
+      }
+  return psnr(squares / count, peakOf(volume));
+}
+
+// The tube has soft walls of one voxel. A fit for voxels follows them with small ellipsoids, whose
+// sum between voxels is far from the interpolated voxels.
+TEST_P(OptimiserOn, AFitForDrawingIsCloserBetweenVoxels) {
+  FitOptions options;
+  options.count = 300;
+  options.iterations = 200;
+  options.device = options_.device;
+  const FitResult forVoxels = fit(volume_, options);
+  options.fitFor = FitFor::kDrawing;
+  const FitResult forDrawing = fit(volume_, options);
+  EXPECT_EQ(forVoxels.field.fitFor, FitFor::kVoxels);
+  EXPECT_EQ(forDrawing.field.fitFor, FitFor::kDrawing);
+  EXPECT_GT(psnrBetween(volume_, forDrawing), psnrBetween(volume_, forVoxels) + 3.0);
+  EXPECT_LT(forDrawing.curve.back().psnrBox, forVoxels.curve.back().psnrBox);
 }
 
 TEST_P(OptimiserOn, RelocatesTheLeastUsefulAndKeepsTheCount) {

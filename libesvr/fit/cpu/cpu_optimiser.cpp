@@ -117,7 +117,9 @@ void CpuOptimiser::relocate(std::size_t count) {
 
 double CpuOptimiser::iterateOnce(double factor) {
   if (stale_) rebuildLists();
+  if (target_.betweenVoxels()) pass_.setOffset(offsetOf(iterations_++, target_.voxelShare));
   const double loss = pass_.gradients(ellipsoids_, gradients_);
+  pass_.setOffset(kAtVoxels);
   if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
   step(factor);
   return loss;

@@ -25,10 +25,11 @@ double CpuPass::gradients(std::span<const Ellipsoid> ellipsoids, std::span<Ellip
   brickLoss_.resize(brickCount());
   forEachBrick([&](std::size_t b) {
     PairTapes& scratch = tapes_.local();
-    alignas(64) float r[kBrickVoxels];
-    startFromTarget(b, r);
+    alignas(64) float r[kBrickVoxels], t[kBrickVoxels];
+    readTarget(b, t);
+    startFrom(t, r);
     forwardBrick(b, scratch, r);
-    if (target().saturates) saturate(b, r);
+    if (target().saturates) saturate(t, r);
     brickLoss_[b] = sumOfSquares(r);
     backwardBrick(b, scratch, r);
   });

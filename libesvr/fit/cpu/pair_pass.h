@@ -15,6 +15,7 @@
 #include "field/brick_pairs.h"
 #include "field/gather.h"
 #include "fit/adam.h"
+#include "fit/cpu/interpolated_brick.h"
 #include "fit/cpu/pair_tapes.h"
 #include "fit/ellipsoid.h"
 #include "fit/frame.h"
@@ -47,14 +48,19 @@ class PairPass {
     });
     listSupports();
   }
-  /// Builds the lists anew, of supports as they are to be listed.
+  /// Builds the lists anew, of supports as they are to be listed, for all offsets of the fit.
   void rebuild(std::span<const ListedSupport> listed) {
+    const double slack = kRoundingSlack + (target_.betweenVoxels() ? kMaxOffset : 0.0);
     supports_.resize(listed.size());
     forEachEllipsoid(listed.size(), [&](std::size_t i) {
-      supports_[i] = makeSupport(listed[i].center, listed[i].L, listed[i].reach, kRoundingSlack);
+      supports_[i] = makeSupport(listed[i].center, listed[i].L, listed[i].reach, slack);
     });
     listSupports();
   }
+
+  /// Sets the positions at which the following passes compare. The lists must hold all supports
+  /// that are moved by this offset.
+  void setOffset(const Offset& offset) { offset_ = offset; }
 
   /// Writes r = V - target for every brick: the target's bricks first, then other bricks that
   /// supports reach.
@@ -62,15 +68,16 @@ class PairPass {
     prepare(ellipsoids);
     out.resize(brickCount() * kBrickVoxels);
     forEachBrick([&](std::size_t b) {
-      alignas(64) float r[kBrickVoxels];
-      startFromTarget(b, r);
+      alignas(64) float r[kBrickVoxels], t[kBrickVoxels];
+      readTarget(b, t);
+      startFrom(t, r);
       const Coord corner = index_.bricks()[b] * kBrickSide;
       for (auto pair = pairs_.brickBegin[b]; pair != pairs_.brickBegin[b + 1]; ++pair) {
         const auto i = pairs_.ellipsoid[pair];
         brickKernels().add(forms_[i], cornerIn(frames_[i], corner).data(), kernels_.constants(i),
                            r);
       }
-      if (target_.saturates) saturate(b, r);
+      if (target_.saturates) saturate(t, r);
       std::copy_n(r, kBrickVoxels, out.data() + b * kBrickVoxels);
     });
   }
@@ -106,27 +113,30 @@ class PairPass {
     forEachEllipsoid(ellipsoids.size(), [&](std::size_t i) {
       const Ellipsoid& p = ellipsoids[i];
       frames_[i] = frameOf(p.center);
-      forms_[i] = makeLineForm(inFrame(p.center, frames_[i]), p.L, kernels_.radius(i), p.intensity);
+      const auto center = inFrame(movedBack(p.center, offset_), frames_[i]);
+      forms_[i] = makeLineForm(center, p.L, kernels_.radius(i), p.intensity);
     });
   }
 
-  void startFromTarget(std::size_t brick, float* r) const {
-    if (brick >= target_.bricks.size()) {
-      std::fill_n(r, kBrickVoxels, 0.0f);
-      return;
+  /// Reads the target's values of a brick at the current offset.
+  void readTarget(std::size_t brick, float* t) const {
+    if (offset_ != kAtVoxels) {
+      const Missing missing = target_.narrowBand ? Missing::kNearest : Missing::kZero;
+      interpolateBrick(around(brick), offset_, missing, {t, std::size_t(kBrickVoxels)});
+    } else if (const float* const values = valuesOf(brick)) {
+      std::copy_n(values, kBrickVoxels, t);
+    } else {
+      std::fill_n(t, kBrickVoxels, 0.0f);
     }
-    const float* t = target_.values.data() + brick * kBrickVoxels;
+  }
+
+  static void startFrom(const float* t, float* r) {
     for (int v = 0; v < kBrickVoxels; ++v) r[v] = -t[v];
   }
 
-  /// Replaces r = V - target by clamp(V, lowest, highest) - target.
-  void saturate(std::size_t brick, float* r) const {
+  /// Replaces r = V - t by clamp(V, lowest, highest) - t.
+  void saturate(const float* t, float* r) const {
     const auto low = float(target_.lowest), high = float(target_.highest);
-    if (brick >= target_.bricks.size()) {
-      for (int v = 0; v < kBrickVoxels; ++v) r[v] = std::clamp(r[v], low, high);
-      return;
-    }
-    const float* t = target_.values.data() + brick * kBrickVoxels;
     for (int v = 0; v < kBrickVoxels; ++v) r[v] = std::clamp(r[v], low - t[v], high - t[v]);
   }
 
@@ -181,6 +191,22 @@ class PairPass {
     moments_.resize(pairs_.pairCount());
   }
 
+  /// The values of a brick by its number; null if it is not one of the target's.
+  [[nodiscard]] const float* valuesOf(std::size_t brick) const {
+    if (brick >= target_.bricks.size()) return nullptr;
+    return target_.values.data() + brick * kBrickVoxels;
+  }
+
+  /// The bricks that an interpolation at the current offset reads.
+  [[nodiscard]] InterpolatedBricks around(std::size_t brick) const {
+    const Coord at = index_.bricks()[brick];
+    const auto axes = offsetAxes(offset_);
+    InterpolatedBricks bricks;
+    for (int n = 0; n < kInterpolatedBricks; ++n)
+      bricks[std::size_t(n)] = valuesOf(index_.find(interpolatedBrick(at, axes.data(), n)));
+    return bricks;
+  }
+
   template <class SupportOf>
   void appendReached(std::size_t ellipsoids, const SupportOf& supportOf) {
     const Box within = target_.within.value_or(bricksOf(Box::whole()));
@@ -189,6 +215,7 @@ class PairPass {
 
   const FitTarget& target_;
   Kernels kernels_;
+  Offset offset_ = kAtVoxels;
   BrickIndex index_;
   BrickPairs pairs_;
   std::vector<Support> supports_;  ///< supports in the current lists

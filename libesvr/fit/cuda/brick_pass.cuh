@@ -44,9 +44,9 @@ __device__ void addPair(const PairForm& p, const KernelConstants<float>& kernel,
 }
 
 /// \return the residual of voxel v, r = V - target; V is clamped if the target saturates
-__device__ inline float residualOf(const PassTarget& target, bool inTarget, std::size_t v,
+__device__ inline float residualOf(const PassTarget& target, bool hasValues, std::size_t v,
                                    float sum) {
-  const float t = inTarget ? target.values[v] : 0.0f;
+  const float t = hasValues ? target.values[v] : 0.0f;
   const float r = sum - t;
   return target.saturates ? fminf(fmaxf(r, target.lowest - t), target.highest - t) : r;
 }
@@ -54,13 +54,13 @@ __device__ inline float residualOf(const PassTarget& target, bool inTarget, std:
 /// Replaces the sums by residuals. The order in which squares are added does not depend on the
 /// number of threads.
 template <class Sum, int kThreads>
-__device__ void toResiduals(const PassScene& scene, const PassTarget& target,
-                            const ResidualOutput& out, std::uint32_t brick, float unit, Sum* sums) {
+__device__ void toResiduals(const PassTarget& target, const ResidualOutput& out,
+                            std::uint32_t brick, float unit, Sum* sums) {
   __shared__ double parts[kBrickVoxels / kWarp];
   const std::size_t first = std::size_t(brick) * kBrickVoxels;
   for (int v = int(threadIdx.x); v < kBrickVoxels; v += kThreads) {
     Sum& sum = sums[paddedOffset(v)];
-    const float r = residualOf(target, brick < scene.targetCount, first + v, float(sum) * unit);
+    const float r = residualOf(target, brick < target.bricks, first + v, float(sum) * unit);
     putValue(sum, r);
     if (out.residual != nullptr) out.residual[first + v] = r;
     const double squares = warpSum(double(r) * double(r));
@@ -87,7 +87,7 @@ __device__ void sumBrick(const PassScene& scene, const Kernels& kernels, const P
         const PairForm p = scene.forms[i];
         addPair(p, kernels.of(i), brick.corner, units, sums);
       });
-  toResiduals<Sum, kThreads>(scene, target, out, brick.number, unit, sums);
+  toResiduals<Sum, kThreads>(target, out, brick.number, unit, sums);
 }
 
 /// Computes the moments over the lane's share of a pair's voxels, in the order of PairMoments.

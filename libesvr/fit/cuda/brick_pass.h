@@ -9,7 +9,8 @@ namespace esvr::cuda {
 
 /// The values that the sum is compared with.
 struct PassTarget {
-  const float* values;    ///< kBrickVoxels values for each target brick, in device memory
+  const float* values;    ///< kBrickVoxels values for each of the first `bricks` bricks
+  std::uint32_t bricks;   ///< bricks that have values; the values of all others are 0
   bool saturates;         ///< the sum is clamped to [lowest, highest] before it is compared
   float lowest, highest;  ///< range of the target
 };

@@ -86,7 +86,10 @@ void CudaIntensityPasses::setShapes(const Field& field) {
   kernel_ = kernelConstants<float>(field.kernel);
   count_ = count32(ellipsoids.size(), "ellipsoids");
   uploadTo(ellipsoids_.reserve(count_), std::span<const Ellipsoid>(ellipsoids), stream_.get());
-  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius, forms_.reserve(count_),
+  launchForms({.ellipsoids = ellipsoids_.data(),
+               .count = std::uint32_t(count_),
+               .radius = radius,
+               .forms = forms_.reserve(count_)},
               stream_.get());
   const SupportSource supports{ellipsoids_.data(), count_, radius, kRoundingSlack};
   if (!restricted_) bricks_.findReached(supports);

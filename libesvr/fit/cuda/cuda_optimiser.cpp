@@ -46,6 +46,7 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       listed_(stream_.get()),
       moments_(stream_.get()),
       residual_(stream_.get()),
+      offsetTarget_(stream_.get()),
       brickLoss_(stream_.get()),
       chunkSums_(stream_.get()),
       slope_(stream_.get()),
@@ -68,6 +69,7 @@ BrickPassArguments CudaOptimiser::passArguments() {
   return {.scene = passScene(bricks_, lists_, count_, forms_.data()),
           .kernel = narrowed(kernel_),
           .target = {.values = targetValues_.data(),
+                     .bricks = std::uint32_t(bricks_.targetCount()),
                      .saturates = target_.saturates,
                      .lowest = float(target_.lowest),
                      .highest = float(target_.highest)},
@@ -98,6 +100,7 @@ StepArguments CudaOptimiser::stepArguments(double factor, std::size_t n) {
           .radius = radius_,
           .edge = {kernel_.slope, kernelWidth(kernel_).logMByKappa},
           .factor = factor,
+          .nextOffset = offsetAfter(n + 1),
           .sizes = tuning_.steps,
           .adam = tuning_.adam,
           .limits = limitsOf(target_, tuning_),
@@ -109,8 +112,39 @@ StepArguments CudaOptimiser::stepArguments(double factor, std::size_t n) {
           .halts = &status->halted[n + 1]};
 }
 
-void CudaOptimiser::writeForms() {
-  launchForms(ellipsoids_.data(), std::uint32_t(count_), radius_, forms_.data(), stream_.get());
+void CudaOptimiser::writeForms(const Offset& offset) {
+  launchForms({.ellipsoids = ellipsoids_.data(),
+               .count = std::uint32_t(count_),
+               .radius = radius_,
+               .offset = offset,
+               .forms = forms_.data()},
+              stream_.get());
+  formsOffset_ = offset;
+}
+
+/// Writes the forms unless they have this offset already.
+void CudaOptimiser::useForms(const Offset& offset) {
+  if (formsOffset_ != offset) writeForms(offset);
+}
+
+/// The offset of the iteration after `n` more.
+Offset CudaOptimiser::offsetAfter(std::size_t n) const {
+  return target_.betweenVoxels() ? offsetOf(iterations_ + n, target_.voxelShare) : kAtVoxels;
+}
+
+/// Makes a pass compare between voxels.
+void CudaOptimiser::compareBetween(const Offset& offset, BrickPassArguments& pass) {
+  if (offset == kAtVoxels) return;
+  launchOffsetTarget({.bricks = bricks_.view(),
+                      .brickCount = pass.scene.brickCount,
+                      .values = targetValues_.data(),
+                      .nearest = target_.narrowBand,
+                      .offset = offset,
+                      .out = offsetTarget_.data(),
+                      .halted = pass.halted},
+                     stream_.get());
+  pass.target.values = offsetTarget_.data();
+  pass.target.bricks = pass.scene.brickCount;
 }
 
 void CudaOptimiser::buildLists(const SupportSource& supports) {
@@ -119,6 +153,7 @@ void CudaOptimiser::buildLists(const SupportSource& supports) {
   moments_.reserve(lists_.pairCount() * kMoments);
   chunkSums_.reserve(lists_.chunkCount() * kMoments);
   brickLoss_.reserve(bricks_.size());
+  if (target_.betweenVoxels()) offsetTarget_.reserve(bricks_.size() * kBrickVoxels);
 }
 
 /// Builds the lists for the following steps, and clears their halt flags.
@@ -133,7 +168,7 @@ void CudaOptimiser::rebuildLists() {
   buildLists({.ellipsoids = nullptr,
               .count = count_,
               .radius = radius_,
-              .slack = kRoundingSlack,
+              .slack = kRoundingSlack + (target_.betweenVoxels() ? kMaxOffset : 0.0),
               .listed = listed_.data()});
   status_.setZero();
   threads_.listsChanged(served_);
@@ -151,6 +186,7 @@ void CudaOptimiser::buildTightLists() {
 }
 
 void CudaOptimiser::writeResiduals() {
+  useForms(kAtVoxels);
   BrickPassArguments pass = passArguments();
   pass.residual = residual_.reserve(bricks_.size() * kBrickVoxels);
   launchResiduals(pass, stream_.get());
@@ -172,7 +208,7 @@ void CudaOptimiser::releaseScratch() {
   sampling_ = VoxelSampling(stream_.get());
   ranking_ = EllipsoidRanking(stream_.get());
   errorSums_ = ErrorSums(stream_.get());
-  for (auto* buffer : {&moments_, &residual_}) buffer->release();
+  for (auto* buffer : {&moments_, &residual_, &offsetTarget_}) buffer->release();
   for (auto* buffer : {&brickLoss_, &chunkSums_}) buffer->release();
   trimMemoryPool();
 }
@@ -309,6 +345,7 @@ void CudaOptimiser::step(double factor, std::size_t n) {
   StepArguments arguments = stepArguments(factor, n);
   BrickPassArguments pass = passArguments();
   pass.halted = arguments.sums.halted = arguments.halted;
+  compareBetween(offsetAfter(n), pass);
   threads_.run(stream_.get(), [&](int best) { launchGradients(pass, best, stream_.get()); });
   launchMomentSums(arguments.sums, stream_.get());
   launchStep(arguments, stream_.get());
@@ -324,6 +361,8 @@ std::size_t CudaOptimiser::look(std::size_t started) {
   loss_ = status.loss;
   stepped_ = count_;
   served_ += taken;
+  iterations_ += taken;
+  formsOffset_ = offsetAfter(0);
   stale_ = !status.canGoOn(started);
   ahead_ = std::min(stale_ ? served_ : 2 * ahead_, StepStatus::kMaxAhead);
   return taken;
@@ -332,6 +371,7 @@ std::size_t CudaOptimiser::look(std::size_t started) {
 double CudaOptimiser::iterate(std::span<const double> factors) {
   while (!factors.empty()) {
     if (stale_) withFewer([&] { rebuildLists(); });
+    useForms(offsetAfter(0));
     const std::size_t started = std::min(factors.size(), ahead_);
     for (std::size_t n = 0; n < started; ++n) step(factors[n], n);
     factors = factors.subspan(look(started));
@@ -393,6 +433,7 @@ void CudaOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
 
 std::vector<EllipsoidGradient> CudaOptimiser::gradients(int threads) {
   rebuildLists();
+  useForms(kAtVoxels);
   launchGradients(passArguments(), threads, stream_.get());
   launchMomentSums(momentSums(), stream_.get());
   DeviceBuffer<EllipsoidGradient> out(count_, stream_.get());

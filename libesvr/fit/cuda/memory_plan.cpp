@@ -19,10 +19,11 @@ constexpr double kReachedShare = 1.0;   // estimate of reached bricks per target
 constexpr double kReach = 3.2;          // width of a support / distance between ellipsoids
 constexpr double kSlotsPerEntry = 4.0;  // largest number of slots of a hash table per entry
 
-constexpr double kBytesPerBrick = double(kBrickVoxels * sizeof(float) + sizeof(Coord)) +
-                                  sizeof(double) * 5 + sizeof(std::uint64_t) * 2 +
+constexpr double kBytesOfValues = double(kBrickVoxels * sizeof(float));  // of a brick
+constexpr double kBytesPerBrick = kBytesOfValues + sizeof(Coord) + sizeof(double) * 5 +
+                                  sizeof(std::uint64_t) * 2 +
                                   sizeof(std::uint32_t) * (5 + kSlotsPerEntry);
-constexpr double kBytesPerTarget = double(kBrickVoxels * sizeof(float) + sizeof(BrickMask));
+constexpr double kBytesPerTarget = kBytesOfValues + sizeof(BrickMask);
 constexpr double kBytesPerReached = kSlotsPerEntry * sizeof(ReachedSlot);
 constexpr double kBytesPerPair =
     double(kMoments * sizeof(float)) + 8.0 * sizeof(std::uint32_t);  // lists, also sorted
@@ -39,8 +40,9 @@ double pairsOf(const FitTarget& target, double ellipsoids) {
 double bytesOf(const FitTarget& target, double ellipsoids) {
   const auto targets = double(target.bricks.size());
   const double reached = target.narrowBand ? 0.0 : kReachedShare * targets;
+  const double between = target.betweenVoxels() ? (targets + reached) * kBytesOfValues : 0.0;
   return targets * kBytesPerTarget +
-         kSpare * ((targets + reached) * kBytesPerBrick + reached * kBytesPerReached +
+         kSpare * (between + (targets + reached) * kBytesPerBrick + reached * kBytesPerReached +
                    ellipsoids * kBytesPerEllipsoid + pairsOf(target, ellipsoids) * kBytesPerPair);
 }
 

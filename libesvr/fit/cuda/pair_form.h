@@ -3,6 +3,7 @@
 
 #include "fit/ellipsoid.h"
 #include "fit/frame.h"
+#include "fit/offset.h"
 
 namespace esvr::cuda {
 
@@ -13,10 +14,12 @@ struct alignas(16) PairForm {
 };
 
 #if defined(__CUDACC__)
-__device__ inline PairForm pairForm(const Ellipsoid& p, double radius) {
+/// \param offset  of the voxels at which the form is evaluated
+__device__ inline PairForm pairForm(const Ellipsoid& p, double radius, const Offset& offset = {}) {
   const Coord frame = frameOf(p.center);
   const Matrix3 F = inverse(p.L);
-  return {makeLineForm(inFrame(p.center, frame), p.L, radius, p.intensity), frame,
+  const auto center = inFrame(movedBack(p.center, offset), frame);
+  return {makeLineForm(center, p.L, radius, p.intensity), frame,
           float(radius * std::sqrt(sigma(F, 2, 2)))};
 }
 #endif

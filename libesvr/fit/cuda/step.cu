@@ -57,7 +57,7 @@ __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
     *a.halts = 1;
   a.ellipsoids[i] = p;
   a.states[i] = adam;
-  a.forms[i] = pairForm(p, a.radius);
+  a.forms[i] = pairForm(p, a.radius, a.nextOffset);
   a.usefulness[i] = {float(sums.phi2), float(sums.rPhi),
                      float(edgeGradient(gradient, a.edge.logMByKappa))};
 }
@@ -75,10 +75,9 @@ __global__ void __launch_bounds__(kStepBlock)
   out[i] = ellipsoidGradient(a.forms[i].form, sumsOf(a.sums, i), a.edge.slope);
 }
 
-__global__ void __launch_bounds__(kStepBlock)
-    writeForms(const Ellipsoid* ellipsoids, std::uint32_t count, double radius, PairForm* forms) {
+__global__ void __launch_bounds__(kStepBlock) writeForms(const FormArguments a) {
   const std::uint32_t i = ownEllipsoid();
-  if (i < count) forms[i] = pairForm(ellipsoids[i], radius);
+  if (i < a.count) a.forms[i] = pairForm(a.ellipsoids[i], a.radius, a.offset);
 }
 
 __global__ void __launch_bounds__(kStepBlock) shrink(const ShrinkArguments a) {
@@ -126,11 +125,9 @@ void launchShrink(const ShrinkArguments& a, cudaStream_t stream) {
   check(cudaGetLastError(), "starting to shrink ellipsoids");
 }
 
-void launchForms(const Ellipsoid* ellipsoids, std::uint32_t count, double radius, PairForm* forms,
-                 cudaStream_t stream) {
-  if (count == 0) return;
-  writeForms<<<blocksFor(count, kStepBlock), kStepBlock, 0, stream>>>(ellipsoids, count, radius,
-                                                                      forms);
+void launchForms(const FormArguments& a, cudaStream_t stream) {
+  if (a.count == 0) return;
+  writeForms<<<blocksFor(a.count, kStepBlock), kStepBlock, 0, stream>>>(a);
   check(cudaGetLastError(), "starting to prepare ellipsoids");
 }
 

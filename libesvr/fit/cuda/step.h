@@ -34,7 +34,8 @@ struct StepArguments {
   int* diverged;  ///< is set to 1 if an ellipsoid is not finite
   double radius;  ///< radius of the support in the unit frame
   KernelEdge edge;
-  double factor;  ///< factor of the step sizes
+  double factor;      ///< factor of the step sizes
+  Offset nextOffset;  ///< offset of the next iteration, for the forms
   StepSizes sizes;
   AdamOptions adam;
   EllipsoidLimits limits;
@@ -82,8 +83,14 @@ struct ShrinkArguments {
 };
 void launchShrink(const ShrinkArguments& arguments, cudaStream_t stream);
 
-/// Writes the forms of `count` ellipsoids.
-void launchForms(const Ellipsoid* ellipsoids, std::uint32_t count, double radius, PairForm* forms,
-                 cudaStream_t stream);
+/// Pointers are to device memory, borrowed.
+struct FormArguments {
+  const Ellipsoid* ellipsoids;
+  std::uint32_t count;
+  double radius;              ///< radius of the support in the unit frame
+  Offset offset = kAtVoxels;  ///< of the voxels at which the forms are evaluated
+  PairForm* forms;            ///< output
+};
+void launchForms(const FormArguments& arguments, cudaStream_t stream);
 
 }  // namespace esvr::cuda

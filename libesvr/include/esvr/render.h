@@ -32,7 +32,9 @@ enum class RenderMode {
 /// The rule for the values of a field between its voxels.
 enum class Between {
   kVoxels,  ///< trilinear interpolation of the voxels of revoxelise(), as in renderVolume
-  kSum      ///< the clamped sum of ellipsoids itself, which a fit constrains at voxels only
+  /// The clamped sum of ellipsoids itself. A fit constrains it at voxels only, unless it was made
+  /// for drawing (Field::fitFor).
+  kSum
 };
 
 /// A box with real-valued corners. Voxel (i, j, k) extends half a voxel to each side of (i, j, k).

@@ -29,9 +29,12 @@ FitResult fitOn(const Device& device, const SparseVolume& volume) {
   return fit(volume, options);
 }
 
-TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
+class StepOnGpu : public test::CudaTest, public testing::WithParamInterface<double> {};
+
+TEST_P(StepOnGpu, IsThatOfTheCpu) {
   const SparseVolume volume = test::denseVolume();
-  const FitTarget target = makeTarget(volume, std::nullopt);
+  FitTarget target = makeTarget(volume, std::nullopt);
+  target.voxelShare = GetParam();
   const auto start = test::randomEllipsoids(50, 1.0, 3.0);
   const Tuning tuning;
   CudaOptimiser onGpu(target, {}, tuning);
@@ -39,7 +42,8 @@ TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
   onGpu.iterate(std::array{0.5});
 
   CpuPass engine(target, kernelConstants<double>(Kernel{}));
-  engine.rebuild(start, 0.5);
+  engine.rebuild(start, 0.5 + kMaxOffset);
+  engine.setOffset(offsetOf(0, target.voxelShare));
   std::vector<EllipsoidGradient> gradients(start.size());
   engine.gradients(start, gradients);
   auto expected = start;
@@ -56,24 +60,30 @@ TEST_F(OptimiserOnGpu, TakesTheCpusStep) {
       differing += std::abs(found[i].center[a] - expected[i].center[a]) > 1e-6;
   EXPECT_LE(differing, 2);
 }
+INSTANTIATE_TEST_SUITE_P(VoxelShare, StepOnGpu, testing::Values(1.0, 0.0), [](const auto& share) {
+  return share.param == 1.0 ? "AtVoxels" : "BetweenVoxels";
+});
 
 // The rule of motion_bound.h decides when lists are built again, and not the number of steps that
 // were started at once, so batches do not change the result. With large steps, supports leave the
 // lists within a batch.
 TEST_F(OptimiserOnGpu, StepsAheadOfOutgrownListsAreTakenAgain) {
   const SparseVolume volume = test::tubeVolume();
-  const FitTarget target = makeTarget(volume, std::nullopt);
-  CudaOptimiser inOne(target, {}, {}), inMany(target, {}, {});
-  inOne.growTo(200);
-  inMany.growTo(200);
-  inOne.iterate(std::vector<double>(60, 1.0));
-  for (int n = 0; n < 60; ++n) inMany.iterate(std::array{1.0});
-  const auto a = inOne.ellipsoids(), b = inMany.ellipsoids();
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_EQ(a[i].center, b[i].center) << i;
-    EXPECT_EQ(a[i].L, b[i].L) << i;
-    EXPECT_EQ(a[i].intensity, b[i].intensity) << i;
+  FitTarget target = makeTarget(volume, std::nullopt);
+  for (const double voxelShare : {1.0, 0.25}) {
+    target.voxelShare = voxelShare;
+    CudaOptimiser inOne(target, {}, {}), inMany(target, {}, {});
+    inOne.growTo(200);
+    inMany.growTo(200);
+    inOne.iterate(std::vector<double>(60, 1.0));
+    for (int n = 0; n < 60; ++n) inMany.iterate(std::array{1.0});
+    const auto a = inOne.ellipsoids(), b = inMany.ellipsoids();
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_EQ(a[i].center, b[i].center) << i;
+      EXPECT_EQ(a[i].L, b[i].L) << i;
+      EXPECT_EQ(a[i].intensity, b[i].intensity) << i;
+    }
   }
 }
 
