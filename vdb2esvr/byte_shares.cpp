@@ -25,7 +25,7 @@ StoredGrid withDescriptor(StoredGrid grid, const GridDescriptor& descriptor) {
 }
 
 /// The bytes that a twin usually adds: its record, and rows for the ellipsoids of one chunk, for the
-/// leaves or the mask, and for the errors of layers. Voxels have fewer rows.
+/// bricks or the mask, and for the errors of layers. Voxels have fewer rows.
 std::uint64_t usualBytes(const GridDescriptor& twin) {
   constexpr std::uint64_t kRows = 3;
   StoredGrid grid;

@@ -133,7 +133,7 @@ Json kernelOf(const Kernel& kernel) {
 Json topologyOf(const StoredGrid& grid) {
   return {{"kind", cli::nameOf(grid.topology)},
           {"threshold", grid.activeThreshold},
-          {"bricks", grid.leaves.size()}};
+          {"bricks", grid.bricks.size()}};
 }
 
 Json fitOf(const ConvertedGrid& grid) {

@@ -44,7 +44,7 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   if (lacks("chunks")) notes.push_back({"chunk table", "the grid fits in one chunk"});
   if (grid.stored().topology != TopologyKind::kMask)
     notes.push_back({"voxel masks",
-                     lacks("leaves")
+                     lacks("bricks")
                          ? "a threshold determines the active voxels"
                          : "the values determine the active voxels in the stored bricks",
                      grid.bricks * kMaskBytes});

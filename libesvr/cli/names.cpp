@@ -32,7 +32,7 @@ std::string nameOf(KernelForm form) { return form == KernelForm::kPaper ? "paper
 
 std::string nameOf(TopologyKind kind) {
   if (kind == TopologyKind::kMask) return "mask";
-  return kind == TopologyKind::kLeaves ? "bricks" : "threshold";
+  return kind == TopologyKind::kBricks ? "bricks" : "threshold";
 }
 
 std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid) {

@@ -9,7 +9,7 @@
 namespace esvr {
 
 VoxelLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer, double bitPrice) {
-  if (layer.form != VoxelForm::kLattice) return layer;
+  if (layer.form != VoxelForm::kQuantised) return layer;
   codec::Thrift thrift{std::vector<double>(layer.codes.size()), bitPrice};
   for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
     const auto at = findBrick(volume, layer.bricks[b]);

@@ -31,7 +31,7 @@ struct Thrift {
 };
 
 /// Replaces the code of a voxel that is not vacant by a code near it that takes fewer bits, if the
-/// bits saved are worth more than the error added. The layer must have the form kLattice. Bricks
+/// bits saved are worth more than the error added. The layer must have the form kQuantised. Bricks
 /// are visited in the same order as by codeVoxels().
 void chooseCodes(std::span<const std::size_t> order, const VoxelModel& model, const Thrift& thrift,
                  VoxelLayer& layer);

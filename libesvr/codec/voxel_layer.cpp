@@ -62,7 +62,7 @@ std::int32_t orderOfHalf(float v) {
 
 float valueAt(const VoxelLayer& layer, std::int32_t n) {
   switch (layer.form) {
-    case VoxelForm::kLattice:
+    case VoxelForm::kQuantised:
       return float(double(n) / layer.divisor);
     case VoxelForm::kHalf:
       return halfAt(n);
@@ -76,7 +76,7 @@ float valueAt(const VoxelLayer& layer, std::int32_t n) {
 
 std::int32_t codeOf(const VoxelLayer& layer, float v) {
   switch (layer.form) {
-    case VoxelForm::kLattice:
+    case VoxelForm::kQuantised:
       return std::int32_t(
           std::lround(std::clamp(double(v) * layer.divisor, -kLargestCode, kLargestCode)));
     case VoxelForm::kHalf:
@@ -168,7 +168,7 @@ VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activ
   if (!(std::isfinite(bound) && bound > 0.0))
     throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
   VoxelLayer layer;
-  layer.form = VoxelForm::kLattice;
+  layer.form = VoxelForm::kQuantised;
   layer.divisor = 0.5 / (bound * kMargin);
   fill(volume, layer);
   if (activity == Activity::kByValue) activateByValue(volume, bound * kMargin, layer);

@@ -61,7 +61,7 @@ std::vector<Coord> cornersOf(const SparseVolume& volume) {
 
 /// All bricks that may contain an active voxel of the source or of the sum.
 std::vector<Coord> bricksOfEither(const StoredGrid& grid, const SparseVolume& source) {
-  if (grid.topology != TopologyKind::kThreshold) return grid.leaves;
+  if (grid.topology != TopologyKind::kThreshold) return grid.bricks;
   const auto own = cornersOf(source), reached = reachedBricks(grid.field);
   std::vector<Coord> all;
   std::set_union(own.begin(), own.end(), reached.begin(), reached.end(), std::back_inserter(all));
@@ -128,7 +128,7 @@ bool fillCodes(const Bounded& bounded, std::span<const float> wanted, const Bric
 
 VoxelLayer layerOf(const std::vector<BrickCodes>& bricks, double divisor) {
   VoxelLayer layer;
-  layer.form = VoxelForm::kLattice;
+  layer.form = VoxelForm::kQuantised;
   layer.divisor = divisor;
   if (!bricks.empty()) layer.origin = bricks.front().corner;
   for (const BrickCodes& brick : bricks) layer.origin = minCoord(layer.origin, brick.corner);
@@ -153,7 +153,7 @@ SparseVolume sumIn(const StoredGrid& grid, std::span<const Coord> corners) {
 }  // namespace
 
 std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& source, double bound) {
-  if (grid.topology == TopologyKind::kLeaves) return std::nullopt;
+  if (grid.topology == TopologyKind::kBricks) return std::nullopt;
   const auto corners = bricksOfEither(grid, source);
   const auto margins = marginsOf(grid.field, corners);
   const double margin = margins.empty() ? 0.0 : *std::max_element(margins.begin(), margins.end());

@@ -101,7 +101,7 @@ std::vector<float> intensitiesOfFirstLayers(const Trial& trial, std::size_t laye
 }  // namespace
 
 TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
-    : bricks_(grid.leaves),
+    : bricks_(grid.bricks),
       target_{target.solvedFor ? *target.solvedFor : target.source, format::ruleOf(grid),
               target.box, bricks_, grid.topology != TopologyKind::kThreshold},
       sampleBricks_(sampleOf(knownCorners(target_))),

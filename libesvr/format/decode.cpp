@@ -6,13 +6,13 @@
 #include <utility>
 
 #include "esvr/error.h"
+#include "format/bricks_stream.h"
 #include "format/chunk_box.h"
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
 #include "format/grid_record.h"
 #include "format/layer_errors_stream.h"
 #include "format/layered_section.h"
-#include "format/leaves_stream.h"
 #include "format/mask_section.h"
 #include "format/planes.h"
 #include "format/section_reader.h"
@@ -54,7 +54,7 @@ class GridDecoder {
     StoredGrid grid = std::move(record.grid);
     if (record.chunkCount > 1) record.chunks = readChunkTable(record.chunkCount);
     readChunks(record.chunks, grid);
-    if (grid.topology == TopologyKind::kLeaves) readLeaves(grid);
+    if (grid.topology == TopologyKind::kBricks) readBricks(grid);
     if (grid.topology == TopologyKind::kMask) readMask(grid);
     readVoxels(grid);
     readResidual(grid);
@@ -222,16 +222,16 @@ class GridDecoder {
     return dequantise(quantised);
   }
 
-  void readLeaves(StoredGrid& grid) {
-    const auto section = id(SectionKind::kLeaves);
+  void readBricks(StoredGrid& grid) {
+    const auto section = id(SectionKind::kBricks);
     if (sections_.has(section))
-      grid.leaves = getLeaves(sections_.get(section), sections_.place(section));
+      grid.bricks = getBricks(sections_.get(section), sections_.place(section));
   }
 
   void readMask(StoredGrid& grid) {
     const auto section = id(SectionKind::kMask);
     Mask mask = getMask(sections_.get(section), sections_.place(section), sections_.budget());
-    grid.leaves = std::move(mask.leaves);
+    grid.bricks = std::move(mask.bricks);
     grid.mask = std::move(mask.active);
   }
 

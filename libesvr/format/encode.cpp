@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "esvr/container.h"
+#include "format/bricks_stream.h"
 #include "format/byte_writer.h"
 #include "format/chunk_box.h"
 #include "format/curve_stream.h"
@@ -10,7 +11,6 @@
 #include "format/grid_record.h"
 #include "format/layer_errors_stream.h"
 #include "format/layered_section.h"
-#include "format/leaves_stream.h"
 #include "format/mask_section.h"
 #include "format/morton_order.h"
 #include "format/planes.h"
@@ -50,9 +50,9 @@ void checkLayers(const StoredGrid& grid) {
 
 void checkGrid(const StoredGrid& grid) {
   if (const auto fault = faultOf(grid)) refuse(grid, fault->text);
-  if (grid.topology == TopologyKind::kThreshold && !grid.leaves.empty())
-    refuse(grid, "it has leaves, but a topology without");
-  if (grid.mask.size() != (grid.topology == TopologyKind::kMask ? grid.leaves.size() : 0))
+  if (grid.topology == TopologyKind::kThreshold && !grid.bricks.empty())
+    refuse(grid, "it has bricks, but a topology without");
+  if (grid.mask.size() != (grid.topology == TopologyKind::kMask ? grid.bricks.size() : 0))
     refuse(grid, "its mask is not that of its topology");
   if (!grid.quantised.empty() && grid.quantised.size() != grid.field.chunks.size())
     refuse(grid, "its quantised chunks are not those of its field");
@@ -142,9 +142,9 @@ void addChunks(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
 
 void addExtras(SectionWriter& out, std::uint32_t g, const StoredGrid& grid) {
   if (grid.topology == TopologyKind::kMask)
-    out.addRaw({SectionKind::kMask, g}, kRequired, putMask(grid.leaves, grid.mask));
-  else if (!grid.leaves.empty())
-    out.add({SectionKind::kLeaves, g}, kRequired, putLeaves(grid.leaves), kFloatSize);
+    out.addRaw({SectionKind::kMask, g}, kRequired, putMask(grid.bricks, grid.mask));
+  else if (!grid.bricks.empty())
+    out.add({SectionKind::kBricks, g}, kRequired, putBricks(grid.bricks), kFloatSize);
   if (grid.residual) out.addVoxels({SectionKind::kResidual, g}, *grid.residual);
   if (grid.voxels) out.addVoxels({SectionKind::kVoxels, g}, *grid.voxels);
   if (!grid.layerErrors.empty())

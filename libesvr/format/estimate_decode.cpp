@@ -16,8 +16,8 @@ EstimateOptions optionsFor(const StoredGrid& grid, const DecodeOptions& options)
   EstimateOptions estimate{.within = options.box.value_or(Box::whole()),
                            .enough = double(options.maxBytes)};
   if (grid.topology == TopologyKind::kThreshold) return estimate;
-  estimate.within = common(estimate.within, boxAround(grid.leaves));
-  estimate.maxBricks = double(grid.leaves.size());
+  estimate.within = common(estimate.within, boxAround(grid.bricks));
+  estimate.maxBricks = double(grid.bricks.size());
   return estimate;
 }
 
@@ -26,7 +26,7 @@ EstimateOptions optionsFor(const StoredGrid& grid, const DecodeOptions& options)
 WorkEstimate estimateDecode(const StoredGrid& grid, const DecodeOptions& options) {
   if (grid.voxels) return {.bricks = double(grid.voxels->bricks.size())};
   WorkEstimate work = estimateWork(grid.field, optionsFor(grid, options));
-  if (grid.topology != TopologyKind::kThreshold) work.bricks = double(grid.leaves.size());
+  if (grid.topology != TopologyKind::kThreshold) work.bricks = double(grid.bricks.size());
   // Adding a residual copies the bricks.
   if (grid.residual) work.bricks = 2.0 * (work.bricks + double(grid.residual->bricks.size()));
   return work;

@@ -45,7 +45,7 @@ ValueRange rangeOf(const StoredGrid& grid) {
 
 void storeMask(const SparseVolume& source, StoredGrid& grid) {
   grid.topology = TopologyKind::kMask;
-  grid.leaves = brickCorners(source);
+  grid.bricks = brickCorners(source);
   grid.mask = source.active;
   grid.activeThreshold = kAlwaysActive;
 }
@@ -54,9 +54,9 @@ void chooseTopology(const SparseVolume& source, StoredGrid& grid) {
   const auto fitsBest = [&](std::span<const Coord> bricks) {
     return format::chooseThreshold(source, grid.field, ruleOf(grid), bricks);
   };
-  if (grid.topology == TopologyKind::kLeaves) grid.leaves = brickCorners(source);
-  const ThresholdChoice choice = grid.topology == TopologyKind::kLeaves
-                                     ? fitsBest(grid.leaves)
+  if (grid.topology == TopologyKind::kBricks) grid.bricks = brickCorners(source);
+  const ThresholdChoice choice = grid.topology == TopologyKind::kBricks
+                                     ? fitsBest(grid.bricks)
                                      : fitsBest(reachedBricks(grid.field));
   grid.activeThreshold = choice.threshold;
   if (!(choice.iou > 0.0)) storeMask(source, grid);
@@ -114,7 +114,7 @@ StoredGrid makeStoredGrid(const GridDescriptor& descriptor, const SparseVolume& 
   StoredGrid grid = describe(descriptor, source);
   grid.field = std::move(field);
   if (isNarrowBand(descriptor, source)) {
-    grid.topology = TopologyKind::kLeaves;
+    grid.topology = TopologyKind::kBricks;
     grid.withinRange = false;  // values beyond the band's ends tell its sides apart
   }
   if (activity == Activity::kExact)
@@ -138,7 +138,7 @@ std::optional<std::vector<Coord>> bricksWanted(const StoredGrid& grid,
   const bool stored = grid.topology != TopologyKind::kThreshold;
   if (!stored && !options.box) return std::nullopt;
   if (!stored) return reachedBricks(grid.field, *options.box);
-  std::vector<Coord> bricks = grid.leaves;
+  std::vector<Coord> bricks = grid.bricks;
   if (options.box)
     std::erase_if(bricks, [&](Coord corner) { return !meets(*options.box, corner); });
   return bricks;
@@ -212,10 +212,10 @@ SparseVolume evaluated(const StoredGrid& grid, const DecodeOptions& options) {
 void applyMask(const StoredGrid& grid, SparseVolume& volume) {
   const VoxelRule rule = ruleOf(grid);
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    const auto leaf =
-        std::lower_bound(grid.leaves.begin(), grid.leaves.end(), volume.brickCorner(b));
-    const bool stored = leaf != grid.leaves.end() && *leaf == volume.brickCorner(b);
-    volume.active[b] = stored ? grid.mask[std::size_t(leaf - grid.leaves.begin())] : BrickMask{};
+    const auto place =
+        std::lower_bound(grid.bricks.begin(), grid.bricks.end(), volume.brickCorner(b));
+    const bool stored = place != grid.bricks.end() && *place == volume.brickCorner(b);
+    volume.active[b] = stored ? grid.mask[std::size_t(place - grid.bricks.begin())] : BrickMask{};
     for (int v = 0; v < kBrickVoxels; ++v)
       if (!volume.active[b].test(v))
         volume.brickValues(b)[v] = rule.inactiveValue(volume.brickValues(b)[v]);

@@ -17,7 +17,7 @@ struct ChunkRecord {
   std::uint64_t count = 0;
 };
 
-/// The record of a grid: everything but its leaves, curve and ellipsoids.
+/// The record of a grid: everything but its bricks, curve and ellipsoids.
 struct GridRecord {
   StoredGrid grid;  ///< its field has no chunks yet
   std::uint32_t chunkCount = 0;

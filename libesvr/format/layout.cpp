@@ -15,7 +15,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kFileMetadata, "file metadata"},
     {SectionKind::kGrid, "grid"},
     {SectionKind::kChunks, "chunks"},
-    {SectionKind::kLeaves, "leaves"},
+    {SectionKind::kBricks, "bricks"},
     {SectionKind::kCurve, "curve"},
     {SectionKind::kLayerErrors, "layer errors"},
     {SectionKind::kCenters, "centers"},

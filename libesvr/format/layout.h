@@ -30,7 +30,7 @@ enum class SectionKind : std::uint32_t {
   kFileMetadata = 1,
   kGrid = 2,
   kChunks = 3,
-  kLeaves = 4,
+  kBricks = 4,
   kLayerErrors = 6,
   kCurve = 7,
   kCenters = 16,

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "esvr/error.h"
-#include "format/leaves_stream.h"
+#include "format/bricks_stream.h"
 #include "format/voxel_section.h"
 
 namespace esvr::format {
@@ -26,16 +26,16 @@ BrickMask inverse(BrickMask mask) {
 
 /// Stores the mask as a voxel layer with one value, so that only the activity of voxels takes
 /// bytes.
-std::vector<std::byte> putMask(std::span<const Coord> leaves, std::span<const BrickMask> active) {
-  requireLeaves(leaves);
-  if (leaves.size() != active.size()) throw RuntimeFailure("a mask without its leaves");
+std::vector<std::byte> putMask(std::span<const Coord> bricks, std::span<const BrickMask> active) {
+  requireBricks(bricks);
+  if (bricks.size() != active.size()) throw RuntimeFailure("a mask without its bricks");
   VoxelLayer layer;
   layer.form = VoxelForm::kPalette;
   layer.palette = {0.0f};
-  layer.origin = leaves.empty() ? Coord{} : leaves.front();
-  for (const Coord leaf : leaves) layer.origin = minCoord(layer.origin, leaf);
-  layer.bricks = bricksFrom(layer.origin, leaves);
-  layer.codes.resize(leaves.size() * kBrickVoxels);
+  layer.origin = bricks.empty() ? Coord{} : bricks.front();
+  for (const Coord brick : bricks) layer.origin = minCoord(layer.origin, brick);
+  layer.bricks = bricksFrom(layer.origin, bricks);
+  layer.codes.resize(bricks.size() * kBrickVoxels);
   layer.active.assign(active.begin(), active.end());
   for (const BrickMask& mask : active) layer.vacant.push_back(inverse(mask));
   return putVoxels(layer);
@@ -46,7 +46,7 @@ Mask getMask(std::span<const std::byte> content, const std::string& where, Memor
   if (layer.form != VoxelForm::kPalette || layer.palette.size() != 1)
     throw BadInput(where + ": a mask of voxels with values");
   Mask mask;
-  for (const Coord brick : layer.bricks) mask.leaves.push_back(layer.origin + brick * kBrickSide);
+  for (const Coord brick : layer.bricks) mask.bricks.push_back(layer.origin + brick * kBrickSide);
   mask.active = std::move(layer.active);
   return mask;
 }

@@ -12,12 +12,12 @@
 namespace esvr::format {
 
 struct Mask {
-  std::vector<Coord> leaves;  ///< index corners of the bricks, increasing
+  std::vector<Coord> bricks;  ///< index corners of the bricks, increasing
   std::vector<BrickMask> active;
 };
 
 /// \throws RuntimeFailure  the corners are not multiples of 8, not increasing, or too far apart
-[[nodiscard]] std::vector<std::byte> putMask(std::span<const Coord> leaves,
+[[nodiscard]] std::vector<std::byte> putMask(std::span<const Coord> bricks,
                                              std::span<const BrickMask> active);
 
 /// \throws BadInput  the content is damaged; the text begins with `where`

@@ -66,7 +66,8 @@ std::optional<Fault> residualFaultOf(const StoredGrid& grid) {
   const auto fault = [](const char* text) { return Fault{SectionKind::kResidual, text}; };
   if (!grid.residual) return std::nullopt;
   if (grid.voxels) return fault("a residual to voxels that are stored themselves");
-  if (grid.residual->form != VoxelForm::kLattice) return fault("a residual that is not quantised");
+  if (grid.residual->form != VoxelForm::kQuantised)
+    return fault("a residual that is not quantised");
   for (const BrickMask& mask : grid.residual->active)
     if (mask.count() != kBrickVoxels) return fault("a residual with voxels that are not active");
   return std::nullopt;

@@ -15,7 +15,7 @@ struct Fault {
   std::string text;
 };
 
-/// Checks all but leaves, curve and chunks: numbers must be finite, the kernel must be possible to
+/// Checks all but bricks, curve and chunks: numbers must be finite, the kernel must be possible to
 /// evaluate, and ranges must be in order.
 [[nodiscard]] std::optional<Fault> faultOf(const StoredGrid& grid);
 

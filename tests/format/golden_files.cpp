@@ -74,7 +74,7 @@ StoredGrid masked() {
   const SparseVolume volume = volumeOf(*fewValues().voxels);
   grid.topology = TopologyKind::kMask;
   for (std::size_t b = 0; b < volume.brickCount(); ++b)
-    grid.leaves.push_back(volume.brickCorner(b));
+    grid.bricks.push_back(volume.brickCorner(b));
   grid.mask = volume.active;
   return grid;
 }
@@ -90,7 +90,7 @@ EsvrFile twins() {
 StoredGrid corrected() {
   StoredGrid grid = oneEllipsoid();
   VoxelLayer& residual = grid.residual.emplace();
-  residual.form = VoxelForm::kLattice;
+  residual.form = VoxelForm::kQuantised;
   residual.divisor = 64.0;
   residual.origin = {8, -24, 1024};
   residual.bricks = {{}};

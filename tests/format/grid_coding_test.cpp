@@ -97,7 +97,7 @@ TEST(GridCoding, FactsOfTheSourceAreStored) {
   EXPECT_EQ(grid.valueMax, range.max);
   EXPECT_TRUE(grid.withinRange);
   EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
-  EXPECT_TRUE(grid.leaves.empty());
+  EXPECT_TRUE(grid.bricks.empty());
 }
 
 // The thresholds are edges of bins, which floats represent exactly, so that the source's threshold
@@ -184,8 +184,8 @@ TEST(GridCoding, ALevelSetGivesItsBandAndItsInsideBack) {
   EXPECT_TRUE(isNarrowBand(kLevelSet, source));
   EXPECT_FALSE(isNarrowBand(kFog, source));
   const StoredGrid grid = makeStoredGrid(kLevelSet, source, field);
-  EXPECT_EQ(grid.topology, TopologyKind::kLeaves);
-  EXPECT_EQ(grid.leaves.size(), source.brickCount());
+  EXPECT_EQ(grid.topology, TopologyKind::kBricks);
+  EXPECT_EQ(grid.bricks.size(), source.brickCount());
 
   const SparseVolume decoded = decodeGrid(grid);
   expectSame(source, decoded);

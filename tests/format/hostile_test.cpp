@@ -41,11 +41,11 @@ constexpr std::size_t kNameLength = 0, kClass = 4, kValueType = 5, kBackground =
                       kEpsilon = 82, kFitFor = 86, kChunkCount = 87, kChunkBox = 103, kCount = 127;
 }  // namespace at
 
-/// A grid with one chunk of four ellipsoids with all attributes, leaves and a curve.
+/// A grid with one chunk of four ellipsoids with all attributes, bricks and a curve.
 StoredGrid plainGrid() {
   StoredGrid grid = test::emptyGrid();
-  grid.topology = TopologyKind::kLeaves;
-  grid.leaves = {{0, 0, 0}, {0, 0, 8}, {8, 0, 0}};
+  grid.topology = TopologyKind::kBricks;
+  grid.bricks = {{0, 0, 0}, {0, 0, 8}, {8, 0, 0}};
   grid.field.chunks = {{{}, test::sampleEllipsoids(4, 1, {.kappas = true})}};
   grid.curve = {{10, 4, 31.25, 20.5, 0.25}};
   return grid;
@@ -172,7 +172,7 @@ const ContentLie kContentLies[] = {
      "belongs to nothing"},
     {"StrayChunk", stray(K::kCenters, 0, 1), "belongs to nothing"},
     {"StrayGrid", stray(K::kCurve, 1, kNone), "belongs to nothing"},
-    {"LeavesOfAThresholdGrid", pokeGrid(at::kTopology, std::uint8_t{0}), "belongs to nothing"},
+    {"BricksOfAThresholdGrid", pokeGrid(at::kTopology, std::uint8_t{0}), "belongs to nothing"},
     {"GridGap", setEntry(K::kGrid, [](Entry& e) { e.id.grid = 1; }), "there is no grid of grid 0"},
     {"LongName", pokeGrid(at::kNameLength, 0xffffffffu), "ends within a value"},
     {"UnknownClass", pokeGrid(at::kClass, kNoEnumerator), "unknown grid class 200"},
@@ -207,9 +207,9 @@ const ContentLie kContentLies[] = {
     {"EllipsoidKappaNan", poke(K::kKappas, 0, kNan), "the kappa of ellipsoid 0"},
     {"KappasTooFew", resized(K::kKappas, -4), "12 bytes of content for 4"},
     {"RotationsTooMany", resized(K::kRotations, 16), "bytes of content for 4"},
-    {"LeavesOutOfOrder", poke(K::kLeaves, 8, 0), "leaf 2 is out of order"},
-    {"LeavesOutOfRange", poke(K::kLeaves, 0, 1 << 30), "outside the index space"},
-    {"LeavesCutOff", resized(K::kLeaves, -1), "whole number of leaves"},
+    {"BricksOutOfOrder", poke(K::kBricks, 8, 0), "brick 2 is out of order"},
+    {"BricksOutOfRange", poke(K::kBricks, 0, 1 << 30), "outside the index space"},
+    {"BricksCutOff", resized(K::kBricks, -1), "whole number of bricks"},
     {"CurveCutOff", resized(K::kCurve, 4), "whole number of points"},
     {"CurveNan", poke(K::kCurve, sizeof(std::uint64_t), double(kNan)), "curve"},
 };
@@ -274,7 +274,7 @@ TEST(HostileFile, BytesBetweenTheSectionsMustBeZero) {
 TEST(HostileFile, AKilobyteCannotAskForAGigabyte) {
   CraftedFile file(plainFile());
   for (const auto kind : {K::kCenters, K::kScales, K::kRotations, K::kIntensities, K::kKappas,
-                          K::kLeaves, K::kCurve, K::kGrid}) {
+                          K::kBricks, K::kCurve, K::kGrid}) {
     auto& section = file.section(kind);
     section.entry.codec = Codec::kBlosc;
     for (std::uint64_t raw = std::uint64_t{1} << 50; raw > 0; raw /= 2) {

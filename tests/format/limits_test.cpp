@@ -66,11 +66,11 @@ TEST(Limits, ABoxOfAHugeScaleIsDecoded) {
   EXPECT_EQ(decodeGrid(grid, options).brickCount(), 2u);
 }
 
-TEST(Limits, StoredLeavesBoundTheWorkOfAHugeScale) {
+TEST(Limits, StoredBricksBoundTheWorkOfAHugeScale) {
   StoredGrid grid = gridOfScale(0.0f);
   for (auto& scale : grid.field.chunks[0].ellipsoids.logScale) scale[2] = 30.0f;
-  grid.topology = TopologyKind::kLeaves;
-  grid.leaves = {{0, 0, 0}, {0, 0, 8}, {8000, 0, 0}};
+  grid.topology = TopologyKind::kBricks;
+  grid.bricks = {{0, 0, 0}, {0, 0, 8}, {8000, 0, 0}};
   EXPECT_LE(decodeGrid(grid, {.maxBytes = 100 * kMegabyte}).brickCount(), 3u);
 }
 

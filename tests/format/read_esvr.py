@@ -15,7 +15,7 @@ MASK = (1 << 64) - 1
 PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 9650029242287828579,
           2870177450012600261)
 NONE = 0xFFFFFFFF
-KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "leaves", 6: "layer errors",
+KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "bricks", 6: "layer errors",
          7: "curve", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
          20: "kappas", 32: "ellipsoids", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
          37: "residual"}
@@ -111,7 +111,7 @@ def chunks(data):
     return table
 
 
-def leaves(data):
+def bricks(data):
     n = len(data) // 12
     values = struct.unpack(f"<{3 * n}i", data)
     return [tuple(8 * v for v in values[i::n]) for i in range(n)]
@@ -414,7 +414,7 @@ def content(name, data):
         n = len(data) // 4 // PLANES[name]
         values = struct.unpack(f"<{n * PLANES[name]}f", data)
         return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
-    readers = {"grid": grid, "chunks": chunks, "leaves": leaves, "ellipsoids": ellipsoids,
+    readers = {"grid": grid, "chunks": chunks, "bricks": bricks, "ellipsoids": ellipsoids,
                "voxels": voxels, "mask": voxels, "residual": voxels,
                "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve}
     return readers[name](data) if name in readers else data
@@ -476,7 +476,7 @@ def check_level_set(sections):
     assert g["background"] == 0.3 and g["map type"] == b"NonlinearFrustumMap"
     assert g["affine"] is None and g["kernel"] == 1 and g["active voxels"] == 4
     assert g["fit for"] == 1
-    assert sections["leaves", 0, NONE] == [(-8, -8, 1 << 20), (-8, 0, 0), (0, -16, 8), (0, 0, -8)]
+    assert sections["bricks", 0, NONE] == [(-8, -8, 1 << 20), (-8, 0, 0), (0, -16, 8), (0, 0, -8)]
     assert ("rotations", 0, 0) not in sections
 
 

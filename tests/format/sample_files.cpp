@@ -77,7 +77,7 @@ std::string difference(const Field& a, const Field& b) {
 std::string difference(const StoredGrid& a, const StoredGrid& b) {
   if (!(a.descriptor == b.descriptor)) return "descriptor";
   if (!sameBits(a.descriptor.background, b.descriptor.background)) return "background";
-  if (a.topology != b.topology || a.leaves != b.leaves || a.mask != b.mask) return "topology";
+  if (a.topology != b.topology || a.bricks != b.bricks || a.mask != b.mask) return "topology";
   if (!sameBits(a.activeThreshold, b.activeThreshold)) return "threshold";
   if (a.withinRange != b.withinRange) return "withinRange";
   if (!(a.activeBox == b.activeBox) || a.activeVoxels != b.activeVoxels) return "active voxels";
@@ -140,8 +140,8 @@ StoredGrid levelSetGrid(std::size_t ellipsoids) {
   grid.field.kernel = {KernelForm::kPaper, 5.0f, Kernel::kDefaultEpsilon};
   grid.field.fitFor = FitFor::kDrawing;
   grid.field.chunks = {{{}, sampleEllipsoids(ellipsoids, 2, {.rotations = false})}};
-  grid.topology = TopologyKind::kLeaves;
-  grid.leaves = {{-8, -8, 1 << 20}, {-8, 0, 0}, {0, -16, 8}, {0, 0, -8}};
+  grid.topology = TopologyKind::kBricks;
+  grid.bricks = {{-8, -8, 1 << 20}, {-8, 0, 0}, {0, -16, 8}, {0, 0, -8}};
   grid.withinRange = false;
   grid.activeBox = {{-8, -16, -8}, {7, 7, (1 << 20) + 7}};
   grid.activeVoxels = 4;

@@ -26,7 +26,7 @@ struct EllipsoidParts {
 /// A fog volume with one chunk, metadata and a curve.
 [[nodiscard]] StoredGrid fogGrid(std::size_t ellipsoids);
 
-/// A level set with leaves, a double background, a frustum map (not affine) and no rotations.
+/// A level set with bricks, a double background, a frustum map (not affine) and no rotations.
 [[nodiscard]] StoredGrid levelSetGrid(std::size_t ellipsoids);
 
 /// Three chunks; the middle one is empty, and the last one has a kappa for each ellipsoid.

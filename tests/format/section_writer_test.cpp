@@ -106,7 +106,7 @@ void PrintTo(const Sample& sample, std::ostream* out) { *out << sample.name; }
 StoredGrid correctedGrid() {
   StoredGrid grid = test::quantisedGrid(20);
   VoxelLayer& residual = grid.residual.emplace();
-  residual.form = VoxelForm::kLattice;
+  residual.form = VoxelForm::kQuantised;
   residual.divisor = 64.0;
   residual.bricks = {{}};
   for (int v = 0; v < kBrickVoxels; ++v) residual.codes.push_back(v * v % 7 - 3);
@@ -137,7 +137,7 @@ TEST_P(GridWithATwin, ComesBackWithBothDescriptors) {
 
 INSTANTIATE_TEST_SUITE_P(All, GridWithATwin,
                          testing::Values(Sample{"planes", test::fogGrid(200)},
-                                         Sample{"leaves", test::levelSetGrid(20)},
+                                         Sample{"bricks", test::levelSetGrid(20)},
                                          Sample{"chunks", test::chunkedGrid(30)},
                                          Sample{"quantised", test::quantisedGrid(100)},
                                          Sample{"layered", test::layeredGrid(100)},

@@ -115,7 +115,7 @@ TEST(VoxelFile, TakesNoThreshold) {
 TEST(Residual, IsRefusedWhereItIsInvalid) {
   const SparseVolume tube = test::tubeVolume();
   StoredGrid grid = test::emptyGrid();
-  grid.residual = exactLayer(tube);  // its form is not kLattice
+  grid.residual = exactLayer(tube);  // its form is not kQuantised
   EXPECT_THROW((void)encodeEsvr({{}, {grid}}), RuntimeFailure);
   grid.residual = boundedLayer(tube, 0.1, Activity::kExact);  // not all voxels active
   EXPECT_THROW((void)encodeEsvr({{}, {grid}}), RuntimeFailure);

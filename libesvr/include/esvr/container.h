@@ -28,7 +28,7 @@ enum class TopologyKind {
   kThreshold = 0,  ///< a voxel is active if |V - background| > activeThreshold
   /// The rule of kThreshold, within the stored bricks only. If the grid is a narrow band, a voxel
   /// of these bricks is active if |V| < background - activeThreshold.
-  kLeaves = 1,
+  kBricks = 1,
   kMask = 2,  ///< the voxels of `mask` are active, whatever their values
 };
 
@@ -46,8 +46,8 @@ struct StoredGrid {
   Field field;
   TopologyKind topology = TopologyKind::kThreshold;
   float activeThreshold = 0.0f;  ///< threshold of the topology; negative: all voxels are active
-  /// Index corners of the source's bricks, increasing, for kLeaves and kMask; otherwise empty.
-  std::vector<Coord> leaves;
+  /// Index corners of the source's bricks, increasing, for kBricks and kMask; otherwise empty.
+  std::vector<Coord> bricks;
   std::vector<BrickMask> mask;     ///< active voxels of each brick, for kMask; else empty
   bool withinRange = true;         ///< decoded values are clamped to the source's range of values
   Box activeBox;                   ///< active bounding box of the source, index coordinates
@@ -59,7 +59,7 @@ struct StoredGrid {
   std::vector<QuantisedEllipsoids> quantised;
   std::vector<LayerError> layerErrors;  ///< empty, or layerCount() rows
   /// Correction that is added to the sum, voxel by voxel, before the active voxels are determined.
-  /// Its form is VoxelForm::kLattice with all voxels active; it is 0 in other bricks. A grid cannot
+  /// Its form is VoxelForm::kQuantised with all voxels active; it is 0 in other bricks. A grid cannot
   /// have both `residual` and `voxels`.
   std::optional<VoxelLayer> residual;
   /// The voxels themselves, exact or within a bound. If present, decodeGrid() returns them.

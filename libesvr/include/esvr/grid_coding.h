@@ -19,7 +19,7 @@ namespace esvr {
 ///  - usually a threshold. Among the thresholds that increase the squared error by at most
 ///    0.004 dB, it is the one whose active voxels have the largest intersection over union with the
 ///    source's;
-///  - for a narrow band, the rule of kLeaves (container.h) with the source's bricks;
+///  - for a narrow band, the rule of kBricks (container.h) with the source's bricks;
 ///  - the source's active mask, if `activity` is kExact, or if no threshold restores a voxel
 ///    because all values equal the background.
 /// The curve is left empty.

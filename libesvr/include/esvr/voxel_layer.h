@@ -13,7 +13,7 @@ namespace esvr {
 
 /// The meaning of an integer code n.
 enum class VoxelForm {
-  kLattice = 0,  ///< quantised: the value float32(n / divisor), divided in float64
+  kQuantised = 0,  ///< quantised: the value float32(n / divisor), divided in float64
   /// Half floats in increasing order. n >= 0 is the value with the bits n; n < 0 is the negated
   /// value with the bits -1 - n.
   kHalf = 1,
@@ -23,7 +23,7 @@ enum class VoxelForm {
 
 struct VoxelLayer {
   VoxelForm form = VoxelForm::kFloat;
-  double divisor = 1.0;             ///< divisor of kLattice
+  double divisor = 1.0;             ///< divisor of kQuantised
   std::vector<float> palette;       ///< values of kPalette, in the order of kFloat
   Coord origin;                     ///< see SparseVolume
   float background = 0.0f;          ///< exact background
@@ -55,7 +55,7 @@ enum class Activity {
 /// two steps away that takes fewer bits, if its squared error grows by less than the saved bits
 /// times `bitPrice`. The error of a voxel is then at most 2.5 steps of the quantisation lattice,
 /// and errors are correlated with the coder's predictions. Vacant voxels remain vacant.
-/// \param layer     a layer that boundedLayer made from `volume`; other forms than kLattice are
+/// \param layer     a layer that boundedLayer made from `volume`; other forms than kQuantised are
 ///                  returned unchanged
 /// \param bitPrice  squared error that may be added to save a bit, in squared steps of the lattice.
 ///                  By the theory of fine quantisation it is ln(2) / 6 = 0.1155 (6.02 dB for each

@@ -11,13 +11,13 @@
 namespace esvr::format {
 
 /// \throws RuntimeFailure  the corners are not multiples of 8, or not increasing
-void requireLeaves(std::span<const Coord> corners);
+void requireBricks(std::span<const Coord> corners);
 
-/// \throws RuntimeFailure  as requireLeaves
-[[nodiscard]] std::vector<std::byte> putLeaves(std::span<const Coord> corners);
+/// \throws RuntimeFailure  as requireBricks
+[[nodiscard]] std::vector<std::byte> putBricks(std::span<const Coord> corners);
 
 /// \throws BadInput  the content is not a list of increasing corners; the text begins with `where`
-[[nodiscard]] std::vector<Coord> getLeaves(std::span<const std::byte> content,
+[[nodiscard]] std::vector<Coord> getBricks(std::span<const std::byte> content,
                                            const std::string& where);
 
 }  // namespace esvr::format
