@@ -85,7 +85,7 @@ constexpr Offset kOffsets[] = {{0.3, 0.2, 0.4},   {-0.3, 0.2, 0.4},   {0.3, -0.2
                                {0.3, 0.2, -0.4},  {-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5},
                                {-0.1, 0.0, 0.25}, {0.0, 0.0, 0.0}};
 // Three interpolations in float32 of values up to 1, each with two roundings.
-constexpr double kTolerance = 6 * 0x1p-23;
+constexpr double kRounding = 6 * 0x1p-23;
 
 TEST(InterpolatedBrick, AgreesWithFloat64) {
   const Neighbourhood around;
@@ -94,7 +94,7 @@ TEST(InterpolatedBrick, AgreesWithFloat64) {
     for (int v = 0; v < kBrickVoxels; ++v)
       ASSERT_NEAR(double(found[std::size_t(v)]),
                   test::interpolate(offset, voxelLocal(v), [&](Coord c) { return around.at(c); }),
-                  kTolerance)
+                  kRounding)
           << offset[0] << ' ' << offset[1] << ' ' << offset[2] << ", voxel " << v;
   }
 }
@@ -112,9 +112,9 @@ TEST(InterpolatedBrick, TakesZeroOrTheNearestVoxelForAMissingBrick) {
       const auto orNearest = [&](Coord c) {
         return around.at({clamped(c.x), clamped(c.y), clamped(c.z)});
       };
-      ASSERT_NEAR(double(zero[std::size_t(v)]), test::interpolate(offset, at, orZero), kTolerance);
+      ASSERT_NEAR(double(zero[std::size_t(v)]), test::interpolate(offset, at, orZero), kRounding);
       ASSERT_NEAR(double(nearest[std::size_t(v)]), test::interpolate(offset, at, orNearest),
-                  kTolerance);
+                  kRounding);
     }
   }
 }

@@ -7,20 +7,20 @@
 namespace esvr {
 namespace {
 
-constexpr int kHaloSide = kBrickSide + 1;
-constexpr int kRows = kHaloSide * kHaloSide;
+constexpr int kReadSide = kBrickSide + 1;
+constexpr int kReadRows = kReadSide * kReadSide;
 
-/// The voxels that an interpolation reads, kHaloSide along each axis, z fastest.
+/// The voxels that an interpolation reads, kReadSide along each axis, z fastest.
 class Halo {
  public:
   Halo(const InterpolatedBricks& around, const std::array<OffsetAxis, 3>& axes, Missing missing)
       : around_(around), axes_(axes), missing_(missing) {
-    for (int x = 0; x < kHaloSide; ++x)
-      for (int y = 0; y < kHaloSide; ++y)
+    for (int x = 0; x < kReadSide; ++x)
+      for (int y = 0; y < kReadSide; ++y)
         fillRow(offsetPlace(axes[0], x), offsetPlace(axes[1], y),
-                values_ + (x * kHaloSide + y) * kHaloSide);
+                values_ + (x * kReadSide + y) * kReadSide);
   }
-  [[nodiscard]] const float* row(int n) const { return values_ + n * kHaloSide; }
+  [[nodiscard]] const float* row(int n) const { return values_ + n * kReadSide; }
 
  private:
   /// Fills a row: the voxels that lie in one brick, and a voxel of the next brick along z.
@@ -31,6 +31,8 @@ class Halo {
     const bool exists = around_[std::size_t(column) + 1] != nullptr;
     const bool before = axes_[2].first < 0;
     std::copy_n(own, kBrickSide, before ? to + 1 : to);
+    // The next brick touches this one with its last voxel if it lies before it. A row that stands
+    // for a missing one has the nearest voxel at its other end.
     (before ? to[0] : to[kBrickSide]) = next[before == exists ? kBrickSide - 1 : 0];
   }
 
@@ -47,7 +49,7 @@ class Halo {
   const InterpolatedBricks& around_;
   const std::array<OffsetAxis, 3>& axes_;
   Missing missing_;
-  float values_[kRows * kHaloSide];
+  float values_[kReadRows * kReadSide];
 };
 
 /// Writes a + weight (b - a).
@@ -61,12 +63,12 @@ void interpolateBrick(const InterpolatedBricks& around, const Offset& offset, Mi
                       std::span<float> out) {
   const auto axes = offsetAxes(offset);
   const Halo halo(around, axes, missing);
-  float plane[kRows], column[kBrickSide * kHaloSide];
+  float plane[kReadRows], column[kBrickSide * kReadSide];
   for (int x = 0; x < kBrickSide; ++x) {
-    mix(halo.row(x * kHaloSide), halo.row((x + 1) * kHaloSide), axes[0].weight, kRows, plane);
-    mix(plane, plane + kHaloSide, axes[1].weight, kBrickSide * kHaloSide, column);
+    mix(halo.row(x * kReadSide), halo.row((x + 1) * kReadSide), axes[0].weight, kReadRows, plane);
+    mix(plane, plane + kReadSide, axes[1].weight, kBrickSide * kReadSide, column);
     for (int y = 0; y < kBrickSide; ++y) {
-      const float* const row = column + y * kHaloSide;
+      const float* const row = column + y * kReadSide;
       mix(row, row + 1, axes[2].weight, kBrickSide,
           &out[std::size_t((x * kBrickSide + y) * kBrickSide)]);
     }
