@@ -108,12 +108,14 @@ Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference, c
   referenceCost_ = clock.cost();
 }
 
-Gallery::Compared Gallery::compare(Renderer& renderer) const {
+Gallery::Compared Gallery::compare(Renderer& renderer, Between between) const {
   Clock clock(renderer, device_);
   Sums sums;
   Compared result;
   for (std::size_t i = 0; i < views_.size(); ++i) {
-    const Image image = clock.draw(views_[i]);
+    RenderOptions view = views_[i];
+    view.between = between;
+    const Image image = clock.draw(view);
     sums.add(references_[i], image, lpips_);
     if (i == 0)
       result.shown = {report::toPng(image),

@@ -129,8 +129,8 @@ VolumeMetrics RowMaker::compare(const SparseVolume& volume) const {
                         {.box = scene_.box, .peak = scene_.peak, .ssim = true});
 }
 
-void RowMaker::measurePictures(Renderer& renderer, TableRow& row) const {
-  auto compared = scene_.gallery->compare(renderer);
+void RowMaker::measurePictures(Renderer& renderer, TableRow& row, Between between) const {
+  auto compared = scene_.gallery->compare(renderer, between);
   row.images = compared.figures;
   row.shown = std::move(compared.shown);
   row.fps = compared.figures.fps;
@@ -239,7 +239,8 @@ void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Draw
   const Device& device = scene_.gallery->device();
   if (drawing == Drawing::kBricks || !saysAll(grid))
     return measurePictures(*makeVolumeRenderer(voxels, device), row);
-  measurePictures(*makeFieldRenderer(grid.field, device, {}, voxelRule(grid)), row);
+  measurePictures(*makeFieldRenderer(grid.field, device, {}, voxelRule(grid)), row,
+                  fittedBetween(grid.field));
 }
 
 TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing) {

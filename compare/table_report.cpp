@@ -99,7 +99,7 @@ const std::vector<TableColumn>& tableColumns() {
       {{"lpips", "LPIPS"},
        [](const R& r, const T&) { return r.images ? report::cellOf(r.images->lpips) : Cell(); }},
       {{"fps", "FPS"}, [](const R& r, const T&) { return report::cellOf(r.fps); }},
-      {{"vram_bytes", "VRAM MB"}, deviceMegabytes},
+      {{"device_bytes", "device MB"}, deviceMegabytes},
       {{"note", "note", Kind::kText}, [](const R& r, const T&) -> Cell { return r.note; }},
       {{"command", "command", Kind::kText}, [](const R& r, const T&) -> Cell { return r.command; }},
   };
@@ -122,8 +122,8 @@ const std::vector<std::string> kQuality{"name",        "bytes",     "ratio",    
                                         "iou",         "mass_error"};
 const std::vector<std::string> kCost{"name",     "encode_s",     "encode_min_s", "encode_max_s",
                                      "decode_s", "decode_min_s", "decode_max_s", "memory_bytes"};
-const std::vector<std::string> kLooks{"name",  "image_psnr", "image_ssim", "flip",
-                                      "lpips", "fps",        "vram_bytes"};
+const std::vector<std::string> kLooks{"name",  "image_psnr", "image_ssim",  "flip",
+                                      "lpips", "fps",        "device_bytes"};
 
 /// The consecutive rows of each group.
 std::vector<std::span<const TableRow>> groups(const TableRecord& record) {
@@ -274,7 +274,7 @@ Json rowJson(const TableRow& row, const TableRecord& record) {
   }
   if (row.memory) json["memory_bytes"] = *row.memory;
   if (row.bytes) json["bytes"] = *row.bytes;
-  if (row.images && row.images->deviceBytes) json["vram_bytes"] = *row.images->deviceBytes;
+  if (row.images && row.images->deviceBytes) json["device_bytes"] = *row.images->deviceBytes;
   json["encode"] = toJson(row.encode);
   json["decode"] = toJson(row.decode);
   json["search"] = searchJson(row);
@@ -286,7 +286,7 @@ Json picturesJson(const TableRecord& record) {
   const auto bytes = record.referenceCost->deviceBytes;
   return {{"device", record.drawnOn},
           {"reference_fps", record.referenceCost->fps},
-          {"reference_vram_bytes", bytes ? Json(*bytes) : Json()}};
+          {"reference_device_bytes", bytes ? Json(*bytes) : Json()}};
 }
 
 Json tableJson(const TableOptions& options, const TableRecord& record) {

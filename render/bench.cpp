@@ -90,9 +90,9 @@ std::string summary(const std::string& what, const Json& f) {
          cli::shortNumber(f["device_bytes"].get<double>() / 1e6) + " MB";
 }
 
-Json meanAndLeast(const std::vector<double>& v) {
+Json meanAndMin(const std::vector<double>& v) {
   return {{"mean", jsonNumber(std::accumulate(v.begin(), v.end(), 0.0) / double(v.size()))},
-          {"least", jsonNumber(*std::min_element(v.begin(), v.end()))}};
+          {"min", jsonNumber(*std::min_element(v.begin(), v.end()))}};
 }
 
 Json compared(const Benched& benched, const RenderOptions& options, int views) {
@@ -107,8 +107,8 @@ Json compared(const Benched& benched, const RenderOptions& options, int views) {
     maxError = std::max(maxError, m.maxError);
   }
   return {{"views", count},
-          {"psnr", meanAndLeast(psnrs)},
-          {"ssim", meanAndLeast(ssims)},
+          {"psnr", meanAndMin(psnrs)},
+          {"ssim", meanAndMin(ssims)},
           {"max_error", maxError}};
 }
 

@@ -412,12 +412,6 @@ void readMeasuring(const Arguments& a, Options& options) {
     throw UsageError("--report writes the results of --bench or --ref; give one of them");
 }
 
-std::string joined(int argc, const char* const* argv) {
-  std::string text = kProgram;
-  for (int i = 1; i < argc; ++i) text += std::string(" ") + argv[i];
-  return text;
-}
-
 }  // namespace
 
 std::optional<Options> parseOptions(int argc, const char* const* argv) {
@@ -436,7 +430,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.maxMemory = cli::maxMemoryOf(a);
   options.threads = a.threads;
   options.verbosity = a.verbosity;
-  options.commandLine = joined(argc, argv);
+  options.commandLine.assign(argv, argv + argc);
   return options;
 }
 

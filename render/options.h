@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "cli/log.h"
 #include "esvr/renderer.h"
@@ -54,7 +55,7 @@ struct Options {
   std::uint64_t maxMemory = 0;  ///< bytes
   int threads = 0;              ///< 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
-  std::string commandLine;  ///< for the picture's metadata
+  std::vector<std::string> commandLine;  ///< for the picture's metadata and the report
 };
 
 /// Parses the command line. \return nothing if --help or --version was printed

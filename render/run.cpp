@@ -26,6 +26,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kReportSchema = "esvr-picture";
+constexpr int kReportVersion = 1;
+
 /// The file name of a frame: "turn.0007.png" for "turn.png" and 7.
 fs::path frameName(const fs::path& output, int frame) {
   constexpr std::size_t kDigits = 4;
@@ -105,10 +108,10 @@ ValueRange rangeOf(const Options& options, const Scene& scene) {
   return {std::min(scene.data.min, scene.background), std::max(scene.data.max, scene.background)};
 }
 
-/// The rule between voxels for which the scene's ellipsoids were fitted.
-Between ownBetween(const Scene& scene) {
+/// The rule between voxels unless --between was given.
+Between usualBetween(const Scene& scene) {
   const auto* field = std::get_if<Field>(&scene.content);
-  return field && field->fitFor == FitFor::kDrawing ? Between::kSum : Between::kVoxels;
+  return field ? fittedBetween(*field) : Between::kVoxels;
 }
 
 RenderOptions renderOptions(const Options& options, const Scene& scene) {
@@ -122,7 +125,7 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
   r.opacityLength = options.opacityLength;
   r.minTransmittance = options.minTransmittance.value_or(r.minTransmittance);
   r.mode = options.mode;
-  r.between = options.between.value_or(ownBetween(scene));
+  r.between = options.between.value_or(usualBetween(scene));
   r.clip = options.clip;
   return r;
 }
@@ -170,8 +173,7 @@ class Frames {
   }
   void drawDepth(RenderOptions r, const fs::path& file) {
     r.mode = RenderMode::kDepth;
-    const auto bytes =
-        encodeDepthExr(drawing_.renderer->draw(r), {software(), options_.commandLine});
+    const auto bytes = encodeDepthExr(drawing_.renderer->draw(r), {software(), commandText()});
     cli::writeBytes(file, bytes, options_.overwrite);
     log_.info(file.string() + ": distances in voxels");
   }
@@ -179,11 +181,18 @@ class Frames {
 
  private:
   void write(const fs::path& file, const Image& image, const std::optional<Rgb>& background) {
-    const auto bytes =
-        file.extension() == ".exr"
-            ? encodeExr(image, {software(), options_.commandLine})
-            : encodePng(image, {background, options_.bits}, {software(), options_.commandLine});
+    const auto bytes = file.extension() == ".exr" ? encodeExr(image, {software(), commandText()})
+                                                  : encodePng(image, {background, options_.bits},
+                                                              {software(), commandText()});
     cli::writeBytes(file, bytes, options_.overwrite);
+  }
+
+  /// The command line in one text, with the program's name instead of its path.
+  [[nodiscard]] std::string commandText() const {
+    std::string text = kProgram;
+    for (std::size_t i = 1; i < options_.commandLine.size(); ++i)
+      text += " " + options_.commandLine[i];
+    return text;
   }
 
   static std::string software() { return std::string(kProgram) + " " + cli::programVersion(); }
@@ -213,8 +222,11 @@ class Frames {
 };
 
 nlohmann::ordered_json reportHead(const Options& options, const Device& device) {
-  return {{"program", std::string(kProgram) + " " + cli::programVersion()},
-          {"command", options.commandLine},
+  return {{"schema", kReportSchema},
+          {"schema_version", kReportVersion},
+          {"program", kProgram},
+          {"command_line", options.commandLine},
+          {"versions", {{"esvr", cli::programVersion()}}},
           {"device", deviceName(device)},
           {"input", options.input.string()}};
 }

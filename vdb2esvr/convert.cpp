@@ -6,6 +6,7 @@
 #include "cli/stopwatch.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
+#include "esvr/psnr_between.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -33,6 +34,15 @@ void countHits(const SparseVolume& source, ConvertedGrid& grid) {
   grid.voxelPairs = esvr::countHits(grid.stored().field, corners).pairs;
 }
 
+/// The error of the sum between voxels, where it is meant to be drawn.
+std::optional<double> errorBetween(const SparseVolume& source, const StoredGrid& grid,
+                                   const std::optional<Box>& box) {
+  if (grid.field.fitFor == FitFor::kVoxels || grid.field.ellipsoidCount() == 0) return std::nullopt;
+  const RevoxeliseOptions rule = voxelRule(grid);
+  return psnrBetween(source, grid.field,
+                     {.box = box, .range = rule.range, .narrowBand = rule.narrowBand});
+}
+
 }  // namespace
 
 ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
@@ -53,6 +63,7 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
 
   grid.metrics = compareVolumes(source.volume, decodeGrid(grid.stored()), {.box = fit.box});
+  grid.psnrBetween = errorBetween(source.volume, grid.stored(), fit.box);
   grid.seconds.measure = watch.lap();
   if (options.countHits) countHits(source.volume, grid);
   return grid;

@@ -21,8 +21,9 @@ struct PhaseSeconds {
 struct ConvertedGrid {
   std::string uniqueName;  ///< name in the input (GridSummary::uniqueName)
   Conversion conversion;
-  VolumeMetrics metrics;   ///< errors of the decoded grid
-  std::size_t bricks = 0;  ///< bricks of the source
+  VolumeMetrics metrics;              ///< errors of the decoded grid
+  std::optional<double> psnrBetween;  ///< of ellipsoids that were fitted for drawing, dB
+  std::size_t bricks = 0;             ///< bricks of the source
   std::uint64_t nonFiniteReplaced = 0;
   std::string device;                       ///< name of the device that fitted the grid
   std::optional<double> hits;               ///< averageHits, with --hits

@@ -201,11 +201,13 @@ Json layersOf(const StoredGrid& grid) {
   return layers;
 }
 
-Json metricsOf(const VolumeMetrics& m) {
+Json metricsOf(const ConvertedGrid& grid) {
+  const VolumeMetrics& m = grid.metrics;
   return {{"peak", m.peak},
           {"box_voxels", m.boxVoxels},
           {"psnr_box", m.psnrBox},
           {"psnr_active", m.psnrActive},
+          {"psnr_between", orNull(grid.psnrBetween)},
           {"max_error", m.maxError},
           {"max_error_at", {m.maxErrorAt.x, m.maxErrorAt.y, m.maxErrorAt.z}},
           {"p999_error", m.p999Error},
@@ -271,7 +273,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"compact", compactOf(grid)},
           {"representation", choiceOf(grid)},
           {"layers", layersOf(grid.stored())},
-          {"metrics", metricsOf(grid.metrics)},
+          {"metrics", metricsOf(grid)},
           {"seconds", secondsOf(grid.seconds)},
           {"left_out", leftOutOf(record, g)},
           {"curve", curveOf(grid.conversion.fit.curve)}};

@@ -35,6 +35,9 @@ void printChoice(const ConvertedGrid& grid, std::ostream& out) {
 
 /// Says how the data of a grid were made.
 void printNote(const ConvertedGrid& grid, std::ostream& out) {
+  if (grid.psnrBetween)
+    out << cli::printable(grid.uniqueName) << ": the sum between voxels has "
+        << cli::decibels(*grid.psnrBetween) << " dB\n";
   if (!grid.sameAs) return printChoice(grid, out);
   out << cli::printable(grid.uniqueName) << ": stored once with " << cli::printable(*grid.sameAs)
       << ", which has the same voxels\n";

@@ -217,15 +217,15 @@ def verdict(low, high):
 
 COLUMNS = [('bytes', 0), ('psnr_box', 2), ('psnr_active', 2), ('max_error', 4), ('ssim', 4),
            ('iou', 4), ('mass_error', 4), ('image_psnr', 2), ('flip', 4), ('encode_s', 3),
-           ('decode_s', 4), ('fps', 0), ('vram_mb', 1)]
+           ('decode_s', 4), ('fps', 0), ('device_mb', 1)]
 HEADER = ('| row | bytes | PSNR box | active | max error | SSIM | IoU | mass error | image PSNR | '
-          'FLIP | encode s | decode s | FPS | VRAM MB | setting |\n'
+          'FLIP | encode s | decode s | FPS | device MB | setting |\n'
           '|---|' + '--:|' * len(COLUMNS) + '---|')
 
 
 def figure(row, key, digits):
-    if key == 'vram_mb':
-        return text(row['vram_bytes'] / 1e6, digits) if row.get('vram_bytes') else '-'
+    if key == 'device_mb':
+        return text(row['device_bytes'] / 1e6, digits) if row.get('device_bytes') else '-'
     value = psnr(row, key) if 'psnr' in key else row.get(key)
     return text(value, digits)
 
@@ -292,8 +292,8 @@ def introduction(tables):
 
 def reference_cost(table):
     pictures = table['pictures']
-    vram = pictures['reference_vram_bytes']
-    held = f' with {vram / 1e6:.1f} MB of device memory' if vram else ''
+    held_bytes = pictures['reference_device_bytes']
+    held = f' with {held_bytes / 1e6:.1f} MB of device memory' if held_bytes else ''
     return (f"The source is drawn at {pictures['reference_fps']:.0f} pictures per second{held} "
             f"({pictures['device']}).")
 

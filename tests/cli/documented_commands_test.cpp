@@ -1,7 +1,8 @@
 // Plan: the commands of README.md run in their order and in one folder, so that later ones find the
 // files of earlier ones. Small volumes, small pictures and few iterations make them quick. Commands
 // of other programs (./setup, cmake) are not run. Commands on smoke1.vdb are not run if
-// ESVR_DATA_DIR does not have it.
+// ESVR_DATA_DIR does not have it. The C++ program of README.md writes a file of the size that it
+// names.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -90,16 +91,28 @@ bool isInput(const std::string& word) {
   return word.ends_with(".vdb") || word.ends_with(".nvdb") || word.ends_with(".esvr");
 }
 
-class DocumentedCommands : public testing::TestWithParam<const char*> {
+/// A test whose current folder is a temporary one.
+class InAFolder : public testing::Test {
  protected:
   void SetUp() override {
-    const fs::path data = ESVR_DATA_DIR;
-    if (fs::exists(data / "smoke1.vdb"))
-      fs::create_symlink(data / "smoke1.vdb", folder_ / "smoke1.vdb");
     before_ = fs::current_path();
     fs::current_path(folder_ / "");
   }
   void TearDown() override { fs::current_path(before_); }
+
+  test::TemporaryFolder folder_;
+
+ private:
+  fs::path before_;
+};
+
+class DocumentedCommands : public InAFolder, public testing::WithParamInterface<const char*> {
+ protected:
+  void SetUp() override {
+    InAFolder::SetUp();
+    const fs::path data = ESVR_DATA_DIR;
+    if (fs::exists(data / "smoke1.vdb")) fs::create_symlink(data / "smoke1.vdb", "smoke1.vdb");
+  }
 
   /// True if the command makes its first file, or if that file exists.
   [[nodiscard]] static bool canRun(const Words& words) {
@@ -113,9 +126,6 @@ class DocumentedCommands : public testing::TestWithParam<const char*> {
         test::runProgram(programs().at(quick[0]), Words(quick.begin() + 1, quick.end()));
     EXPECT_EQ(result.exitCode, 0) << testing::PrintToString(quick) << "\n" << result.err;
   }
-
-  test::TemporaryFolder folder_;
-  fs::path before_;
 };
 
 TEST_P(DocumentedCommands, run) {
@@ -134,6 +144,17 @@ TEST_P(DocumentedCommands, run) {
 
 INSTANTIATE_TEST_SUITE_P(Documents, DocumentedCommands, testing::Values("README.md"),
                          [](const auto&) { return std::string("readme"); });
+
+using DocumentedProgram = InAFolder;
+
+TEST_F(DocumentedProgram, SlowWritesAFileOfItsSize) {
+  ASSERT_EQ(test::runProgram(ESVR_SAMPLE, {"plume", "smoke.vdb", "--resolution", "64"}).exitCode,
+            0);
+  const auto run = test::runProgram(README_PROGRAM, {});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_LE(fs::file_size("smoke.esvr"), 20'000u + 500u);  // the size is that of the grid
+  EXPECT_EQ(test::runProgram(ESVR2VDB, {"smoke.esvr", "back.vdb"}).exitCode, 0);
+}
 
 }  // namespace
 }  // namespace esvr

@@ -177,5 +177,39 @@ TEST_F(ReportDoc, namesTheKeysOfAPicture) {
   for (const auto& object : timed) expectTable(all_[object], figures, {}, object);
 }
 
+class ComparisonDoc : public ReportDoc {
+ protected:
+  void SetUp() override {
+    test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
+    ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
+  }
+};
+
+TEST_F(ComparisonDoc, namesTheKeysOfACheck) {
+  // NanoVDB has no place for some metadata, which gives differences.
+  ASSERT_EQ(test::esvr2vdb({at("in.esvr"), at("back.nvdb")}).exitCode, 0);
+  add(ESVR_COMPARE, {"check", at("in.vdb"), at("back.nvdb"), "--ssim"});
+  expectTable(all_, tableAfter(document_, "The report of `check`"), {}, "check");
+}
+
+TEST_F(ComparisonDoc, namesTheKeysOfATable) {
+  add(ESVR_COMPARE, {"table", at("in.vdb"), at("in.esvr"), "--runs", "1", "--images", "1",
+                     "--image-size", "16", "--device", "cpu"});
+  expectTable(all_, tableAfter(document_, "The report of `table`"), {"rows"}, "table");
+  const Table row = tableAfter(document_, "A row has only the keys");
+  EXPECT_EQ(keysOf(all_["rows"]), without(keysOf(row), {"device_bytes", "lpips"}));
+  for (const char* object : {"encode", "decode", "search"})
+    expectNamed(all_["rows"][object], row.at(object), object);
+}
+
+TEST_F(ComparisonDoc, namesTheKeysOfCurves) {
+  const auto run =
+      test::runProgram(ESVR_COMPARE, {"curves", at("in.vdb"), at("in.esvr"), "--output", at("c"),
+                                      "--fit", "1KB", "--fps", "16", "--device", "cpu"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  merge(all_, Json::parse(test::readText(at("c.json"))));
+  expectTable(all_, tableAfter(document_, "The report of `curves`"), {}, "curves");
+}
+
 }  // namespace
 }  // namespace esvr

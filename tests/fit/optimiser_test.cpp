@@ -8,12 +8,10 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "esvr/metrics.h"
-#include "interpolate.h"
+#include "esvr/psnr_between.h"
 #include "support/on_device.h"
 #include "volumes.h"
 
@@ -77,28 +75,6 @@ TEST_P(OptimiserOn, LargeStepsSeeTheWholeOfEveryEllipsoid) {
   }
 }
 
-/// The PSNR of a field at positions half-way between voxels, against the interpolated volume.
-double psnrBetween(const SparseVolume& volume, const FitResult& result) {
-  constexpr Offset kHalfWay{0.5, 0.5, 0.5};
-  constexpr std::int32_t kStride = 3;  // voxels; a float64 sum of all ellipsoids takes long
-  Field moved = result.field;
-  for (Chunk& chunk : moved.chunks)
-    for (auto& plane : chunk.ellipsoids.center)
-      for (float& c : plane) c -= 0.5f;
-  const auto source = [&](Coord v) { return double(valueAt(volume, v)); };
-  const Box box = activeBox(volume);
-  double squares = 0.0, count = 0.0;
-  for (std::int32_t x = box.min.x; x < box.max.x; x += kStride)
-    for (std::int32_t y = box.min.y; y < box.max.y; y += kStride)
-      for (std::int32_t z = box.min.z; z < box.max.z; z += kStride) {
-        const double sum = std::clamp(evaluateReference(moved, {x, y, z}), double(result.range.min),
-                                      double(result.range.max));
-        squares += std::pow(sum - test::interpolate(kHalfWay, {x, y, z}, source), 2);
-        count += 1.0;
-      }
-  return psnr(squares / count, peakOf(volume));
-}
-
 // The tube has soft walls of one voxel. A fit for voxels follows them with small ellipsoids, whose
 // sum between voxels is far from the interpolated voxels.
 TEST_P(OptimiserOn, AFitForDrawingIsCloserBetweenVoxels) {
@@ -111,7 +87,8 @@ TEST_P(OptimiserOn, AFitForDrawingIsCloserBetweenVoxels) {
   const FitResult forDrawing = fit(volume_, options);
   EXPECT_EQ(forVoxels.field.fitFor, FitFor::kVoxels);
   EXPECT_EQ(forDrawing.field.fitFor, FitFor::kDrawing);
-  EXPECT_GT(psnrBetween(volume_, forDrawing), psnrBetween(volume_, forVoxels) + 3.0);
+  EXPECT_GT(psnrBetween(volume_, forDrawing.field, {.range = forDrawing.range}),
+            psnrBetween(volume_, forVoxels.field, {.range = forVoxels.range}) + 3.0);
   EXPECT_LT(forDrawing.curve.back().psnrBox, forVoxels.curve.back().psnrBox);
 }
 

@@ -37,6 +37,11 @@ enum class Between {
   kSum
 };
 
+/// The rule for which the ellipsoids of a field were fitted.
+[[nodiscard]] inline Between fittedBetween(const Field& field) {
+  return field.fitFor == FitFor::kDrawing ? Between::kSum : Between::kVoxels;
+}
+
 /// A box with real-valued corners. Voxel (i, j, k) extends half a voxel to each side of (i, j, k).
 struct PlaceBox {
   Vec3 low, high;

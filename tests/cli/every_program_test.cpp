@@ -1,0 +1,101 @@
+// Plan: the options that all programs share are tested with every program.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "cli/converters.h"
+#include "cli/options_fixture.h"
+#include "cli/vdb_inputs.h"
+
+namespace esvr {
+namespace {
+
+using test::softBall;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+struct ProgramCommand {
+  const char* name;
+  const char* path;
+  std::vector<std::string>
+      arguments;  ///< arguments of a run of milliseconds; "DIR/x" is in the test's folder
+};
+std::ostream& operator<<(std::ostream& out, const ProgramCommand& program) {
+  return out << program.name;
+}
+
+class EveryProgram : public test::OptionsTest, public testing::WithParamInterface<ProgramCommand> {
+ protected:
+  void SetUp() override {
+    test::writeInput(at("in.vdb"), {{.voxels = softBall({})}});
+    ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
+  }
+  [[nodiscard]] test::ProgramRun run(const std::vector<std::string>& more) const {
+    std::vector<std::string> arguments = GetParam().arguments;
+    for (auto& argument : arguments)
+      if (argument.starts_with("DIR/")) argument = at(argument.substr(4));
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    auto result = test::runProgram(GetParam().path, arguments);
+    EXPECT_EQ(result.exitCode, 0) << result.err;
+    return result;
+  }
+};
+
+TEST_P(EveryProgram, helpAndVersionNeedNoFiles) {
+  std::vector<std::string> job;
+  if (std::string(GetParam().path) == ESVR_COMPARE) job = {GetParam().arguments[0]};
+  for (const char* option : {"--help", "-h"}) {
+    auto arguments = job;
+    arguments.emplace_back(option);
+    EXPECT_THAT(test::runProgram(GetParam().path, arguments).out,
+                AllOf(HasSubstr("Usage:"), HasSubstr("--version")));
+  }
+  job.emplace_back("--version");
+  EXPECT_THAT(test::runProgram(GetParam().path, job).out,
+              AllOf(HasSubstr("0."), HasSubstr("OpenVDB")));
+}
+
+TEST_P(EveryProgram, saysNothingWhereQuietAndMoreWhereVerbose) {
+  const auto quiet = run({"--quiet"}), usual = run({}), verbose = run({"--verbose"});
+  EXPECT_THAT(quiet.out + quiet.err, IsEmpty());
+  EXPECT_GE((verbose.out + verbose.err).size(), (usual.out + usual.err).size());
+}
+
+TEST_P(EveryProgram, takesANumberOfThreads) {
+  (void)run({"--threads", "1"});
+  auto arguments = GetParam().arguments;
+  arguments.insert(arguments.end(), {"--threads", "0"});
+  const auto none = test::runProgram(GetParam().path, arguments);
+  EXPECT_EQ(none.exitCode, 2);
+  EXPECT_THAT(none.err, HasSubstr("threads"));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, EveryProgram,
+    testing::Values(ProgramCommand{"vdb2esvr",
+                                   VDB2ESVR,
+                                   {"DIR/in.vdb", "DIR/o.esvr", "--force", "--count", "9",
+                                    "--iterations", "30"}},
+                    ProgramCommand{"esvr2vdb", ESVR2VDB, {"DIR/in.esvr", "DIR/o.vdb", "--force"}},
+                    ProgramCommand{"render",
+                                   ESVR_RENDER,
+                                   {"DIR/in.esvr", "DIR/o.png", "--force", "--resolution", "16x16",
+                                    "--device", "cpu"}},
+                    ProgramCommand{"check", ESVR_COMPARE, {"check", "DIR/in.vdb", "DIR/in.esvr"}},
+                    ProgramCommand{
+                        "table",
+                        ESVR_COMPARE,
+                        {"table", "DIR/in.vdb", "DIR/in.esvr", "--rows", "none", "--runs", "1"}},
+                    ProgramCommand{"curves",
+                                   ESVR_COMPARE,
+                                   {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o",
+                                    "DIR/c", "--force"}}),
+    [](const auto& tested) { return std::string(tested.param.name); });
+
+}  // namespace
+}  // namespace esvr
