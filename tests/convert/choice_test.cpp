@@ -44,7 +44,7 @@ TEST(ChoiceForAPsnr, TakesVoxelsOfNoise) {
   EXPECT_GT(conversion.choice->ellipsoids->bytes, bytesAdded(conversion.grid));
 }
 
-TEST(ChoiceForAPsnr, TakesEllipsoidsOfBlobs) {
+TEST(ChoiceForAPsnr, SlowTakesEllipsoidsOfBlobs) {
   const SparseVolume volume = test::smoothVolume();
   const Conversion conversion = choose(volume, PsnrGoal{35.0});
   EXPECT_FALSE(conversion.grid.voxels);
@@ -54,7 +54,7 @@ TEST(ChoiceForAPsnr, TakesEllipsoidsOfBlobs) {
   EXPECT_LT(bytesAdded(conversion.grid), conversion.choice->voxels->bytes);
 }
 
-TEST(ChoiceForAPsnr, StoresTheRepresentationThatIsInsistedOn) {
+TEST(ChoiceForAPsnr, SlowStoresTheRepresentationThatIsInsistedOn) {
   const SparseVolume volume = test::smoothVolume();
   const Conversion voxels = choose(volume, PsnrGoal{35.0}, Representation::kVoxels);
   EXPECT_TRUE(voxels.grid.voxels);
@@ -86,7 +86,7 @@ TEST(ChoiceForASize, TakesVoxelsOfNoise) {
   EXPECT_GT(*conversion.choice->voxels->psnr, *conversion.choice->ellipsoids->psnr);
 }
 
-TEST(ChoiceForASize, TakesEllipsoidsOfBlobs) {
+TEST(ChoiceForASize, SlowTakesEllipsoidsOfBlobs) {
   const SparseVolume volume = test::smoothVolume();
   const Conversion conversion = choose(volume, SizeGoal{2000});
   EXPECT_FALSE(conversion.grid.voxels);
@@ -106,7 +106,7 @@ double psnrOfActive(const SparseVolume& volume, const Conversion& conversion) {
   return psnrOver(volume, conversion) - 10.0 * std::log10(box / double(activeVoxelCount(volume)));
 }
 
-TEST(ChoiceForAPreset, HasItsQualityOverTheActiveVoxels) {
+TEST(ChoiceForAPreset, SlowHasItsQualityOverTheActiveVoxels) {
   const SparseVolume volume = test::noiseVolume(3);
   std::uint64_t before = 0;
   for (const Preset preset : {Preset::kDraft, Preset::kStandard, Preset::kHigh}) {
@@ -133,7 +133,7 @@ TEST(ChoiceForAPreset, CountsTheActiveVoxelsOfTheBox) {
   EXPECT_GE(psnr, presetPsnr(options.fit.preset) + wider);
 }
 
-TEST(ChoiceForAPreset, StoresTheRepresentationThatIsInsistedOn) {
+TEST(ChoiceForAPreset, SlowStoresTheRepresentationThatIsInsistedOn) {
   const SparseVolume volume = test::smoothVolume();
   EXPECT_TRUE(choose(volume, PresetGoal{}, Representation::kVoxels).grid.voxels);
   EXPECT_FALSE(choose(volume, PresetGoal{}, Representation::kEllipsoids).grid.voxels);
@@ -163,7 +163,7 @@ TEST(Choice, VoxelsKeepTheMaskOfALevelSetOnly) {
   }
 }
 
-TEST(ChoiceForAFit, TakesExactVoxelsWhereEllipsoidsWouldTakeMoreBytes) {
+TEST(ChoiceForAFit, SlowTakesExactVoxelsWhereEllipsoidsWouldTakeMoreBytes) {
   const SparseVolume flat = test::volumeOf({}, 4, 0.0f, [](Coord) { return 0.5f; });
   const Conversion conversion = choose(flat, FitGoal{});
   EXPECT_TRUE(conversion.grid.voxels);
@@ -188,7 +188,7 @@ class VoxelSearch : public testing::Test {
   convert::Job job_{input_, options_};
 };
 
-TEST_F(VoxelSearch, DoesNotFitWhereLittleCanBeSaved) {
+TEST_F(VoxelSearch, SlowDoesNotFitWhereLittleCanBeSaved) {
   options_.fit.iterations = 200;
   const auto converted = [&](const convert::PsnrTarget& target) {
     return convert::convertToPsnr(job_, target);

@@ -70,7 +70,7 @@ TEST(RenderField, AgreesWithACameraInsideTheVolume) {
   EXPECT_GE(agreement(randomField({}), optionsFor(flat)), kAsked);
 }
 
-TEST(RenderField, SumsAreClampedToTheRangeOfTheVoxels) {
+TEST(RenderField, SlowClampsSumsToTheRangeOfTheVoxels) {
   Field field = randomField({.count = 300});
   field.background = 0.125f;
   EXPECT_GE(agreement(field, optionsFor(), ValueRange{-0.25f, 0.5f}), kAsked);
