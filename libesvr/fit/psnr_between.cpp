@@ -1,6 +1,7 @@
 #include "esvr/psnr_between.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "core/brick_index.h"
@@ -31,11 +32,19 @@ std::vector<Coord> bricksIn(const SparseVolume& volume) {
   return bricks;
 }
 
+/// The range to which a reader clamps sums.
+std::optional<ValueRange> rangeOf(const SparseVolume& volume, const BetweenOptions& options) {
+  if (!options.narrowBand) return options.range;
+  const float halfWidth = std::abs(volume.background);
+  return ValueRange{-halfWidth, halfWidth};
+}
+
 class BetweenError {
  public:
   BetweenError(const SparseVolume& volume, const BetweenOptions& options)
       : options_(options),
         box_(options.box.value_or(activeBox(volume))),
+        range_(rangeOf(volume, options)),
         background_(volume.background),
         index_(bricksIn(volume)),
         relative_(volume.values) {
@@ -85,7 +94,7 @@ class BetweenError {
   }
 
   [[nodiscard]] float settled(float sum) const {
-    return options_.range ? std::clamp(sum, options_.range->min, options_.range->max) : sum;
+    return range_ ? std::clamp(sum, range_->min, range_->max) : sum;
   }
 
   [[nodiscard]] InterpolatedBricks around(Coord brick, const Offset& offset) const {
@@ -102,6 +111,7 @@ class BetweenError {
 
   const BetweenOptions& options_;
   Box box_;
+  std::optional<ValueRange> range_;
   float background_;
   BrickIndex index_;
   std::vector<float> relative_;  ///< values of the volume less its background

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "esvr/field.h"
+#include "esvr/fit.h"
 #include "esvr/metrics.h"
 #include "interpolate.h"
 #include "volumes.h"
@@ -80,6 +81,19 @@ TEST(PsnrBetween, CountsTheBricksOfANarrowBandOnly) {
   none.chunks.clear();
   const BetweenOptions options{.narrowBand = true};
   EXPECT_EQ(psnrBetween(band, far, options), psnrBetween(band, none, options));
+}
+
+// Inside the surface, a fit leaves sums far below the band, because a reader clamps them.
+TEST(PsnrBetween, ClampsSumsToANarrowBand) {
+  const SparseVolume band = test::levelSetVolume();
+  FitOptions options;
+  options.count = 150;
+  options.iterations = 200;
+  options.narrowBand = true;
+  options.fitFor = FitFor::kDrawing;
+  const FitResult result = fit(band, options);
+  EXPECT_NEAR(psnrBetween(band, result.field, {.narrowBand = true}), result.curve.back().psnrBox,
+              6.0);
 }
 
 }  // namespace

@@ -12,7 +12,9 @@ namespace esvr {
 struct BetweenOptions {
   std::optional<Box> box{};  ///< box of voxels whose surroundings count; default: the active box
   std::optional<ValueRange> range{};  ///< sums are clamped to this range, as a reader does
-  bool narrowBand = false;            ///< as in FitOptions: only the volume's bricks count
+  /// As in FitOptions: only the volume's bricks count. Sums are clamped to the band instead of
+  /// `range`.
+  bool narrowBand = false;
 };
 
 /// PSNR, in dB, of the sum of a field against the trilinear interpolation of a volume. It is
