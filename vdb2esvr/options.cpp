@@ -102,7 +102,8 @@ void addFitOptions(cli::po::options_description& options) {
      "over the active voxels; in a single fit, the count and the iterations that are not given")
     ("fit-for", value<std::string>()->value_name("F")->default_value("voxels"),
      "voxels: fit the voxels; drawing: fit the values between voxels too, so that esvr-render can "
-     "draw the sum of ellipsoids itself; the error at the voxels is then larger")
+     "draw the sum of ellipsoids itself; the error at the voxels is then larger; level sets are "
+     "always fitted for their voxels")
     ("voxel-share", value<double>()->value_name("S")
          ->default_value(FitOptions{}.voxelShare, cli::shortNumber(FitOptions{}.voxelShare)),
      "with --fit-for drawing: share of the iterations, 0 to 1, that compare at the voxels; the "

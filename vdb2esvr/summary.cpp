@@ -34,7 +34,12 @@ void printChoice(const ConvertedGrid& grid, std::ostream& out) {
 }
 
 /// Says how the data of a grid were made.
-void printNote(const ConvertedGrid& grid, std::ostream& out) {
+void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& out) {
+  const bool forDrawing = options.convert.fit.fitFor == FitFor::kDrawing;
+  const bool levelSet = grid.stored().descriptor.gridClass == GridClass::kLevelSet;
+  if (forDrawing && levelSet && grid.stored().field.fitFor == FitFor::kVoxels)
+    out << cli::printable(grid.uniqueName)
+        << ": fitted for voxels, because the sum of a level set cannot be drawn\n";
   if (grid.psnrBetween)
     out << cli::printable(grid.uniqueName) << ": the sum between voxels has "
         << cli::decibels(*grid.psnrBetween) << " dB\n";
@@ -55,7 +60,7 @@ void printSummary(const Options& options, const RunRecord& record, std::ostream&
                cli::seconds(grid.seconds.total())});
   }
   table.print(out);
-  for (const ConvertedGrid& grid : record.grids) printNote(grid, out);
+  for (const ConvertedGrid& grid : record.grids) printNote(options, grid, out);
   const Ratio ratio = ratioOf(record);
   out << cli::printable(options.input.string());
   if (!ratio.wholeInput()) out << ", " << ratio.grids << " of " << ratio.gridsOfInput << " grids:";

@@ -110,6 +110,7 @@ Conversion convertVolume(const ConvertInput& input, const ConvertOptions& option
   requirePossible(options);
   ConvertOptions own = options;
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
+  if (own.fit.narrowBand) own.fit.fitFor = FitFor::kVoxels;
   if (own.fit.fitFor == FitFor::kDrawing) own.representation = Representation::kEllipsoids;
   Conversion conversion = std::visit(Converter({input, own}), options.goal);
   conversion.grid = throughTheFormat(std::move(conversion.grid));

@@ -86,7 +86,9 @@ struct StorageOptions {
 struct ConvertOptions {
   Goal goal;
   Representation representation = Representation::kAuto;
-  FitOptions fit;  ///< narrowBand is set by the conversion
+  /// narrowBand is set by the conversion. A narrow band is always fitted for its voxels, because its
+  /// sum cannot be drawn: it means nothing outside the stored bricks.
+  FitOptions fit;
   StorageOptions storage;
 };
 
