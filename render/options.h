@@ -55,7 +55,7 @@ struct Options {
   std::uint64_t maxMemory = 0;  ///< bytes
   int threads = 0;              ///< 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
-  std::vector<std::string> commandLine;  ///< for the picture's metadata and the report
+  std::vector<std::string> commandLine;  ///< the command as given, which pictures and reports hold
 };
 
 /// Parses the command line. \return nothing if --help or --version was printed

@@ -77,7 +77,7 @@ class TrialMaker {
   IntensityTarget sampleTarget_;
   IntensityProblem problem_, sampleProblem_;
   std::optional<IntensityTarget> sourceTarget_;    ///< if intensities are not solved for the source
-  std::optional<IntensityProblem> sourceProblem_;  ///< as above; measures errors
+  std::optional<IntensityProblem> sourceProblem_;  ///< measures errors against sourceTarget_
   Field field_;  ///< float32 field with optimal intensities, from which the trials' solver starts
   std::vector<std::vector<double>> curvature_;  ///< sum of phi^2 of each ellipsoid, by chunk
   double peak_, error_ = 0.0, leastError_ = 0.0;

@@ -11,7 +11,7 @@
 
 namespace esvr {
 
-/// In voxels along each axis, at most kMaxOffset in magnitude.
+/// A displacement in voxels along each axis, at most kMaxOffset in magnitude.
 using Offset = std::array<double, 3>;
 inline constexpr Offset kAtVoxels{};
 inline constexpr double kMaxOffset = 0.5;
@@ -22,8 +22,8 @@ inline constexpr double kMaxOffset = 0.5;
   return {center[0] - offset[0], center[1] - offset[1], center[2] - offset[2]};
 }
 
-/// The offset of an iteration. Offsets form the additive recurrence of the root g of g^4 = g + 1,
-/// which covers a cube evenly after any number of iterations.
+/// The offset of an iteration. Offsets form the additive recurrence of the root g of g^4 = g + 1.
+/// This sequence covers a cube evenly after any number of iterations.
 /// \param voxelShare  share of the iterations that compare at the voxels themselves, which are
 ///                    spread evenly over the run
 [[nodiscard]] inline Offset offsetOf(std::uint64_t iteration, double voxelShare) {
@@ -39,7 +39,7 @@ inline constexpr double kMaxOffset = 0.5;
 struct OffsetAxis {
   int first;     ///< -1 or 0
   int side;      ///< -1 or 1
-  float weight;  ///< of the second voxel
+  float weight;  ///< weight of the second voxel
 };
 [[nodiscard]] ESVR_HD inline OffsetAxis offsetAxis(double offset) {
   const int first = offset < 0.0 ? -1 : 0;

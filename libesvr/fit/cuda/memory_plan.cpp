@@ -19,7 +19,7 @@ constexpr double kReachedShare = 1.0;   // estimate of reached bricks per target
 constexpr double kReach = 3.2;          // width of a support / distance between ellipsoids
 constexpr double kSlotsPerEntry = 4.0;  // largest number of slots of a hash table per entry
 
-constexpr double kBytesOfValues = double(kBrickVoxels * sizeof(float));  // of a brick
+constexpr double kBytesOfValues = double(kBrickVoxels * sizeof(float));  // values of a brick
 constexpr double kBytesPerBrick = kBytesOfValues + sizeof(Coord) + sizeof(double) * 5 +
                                   sizeof(std::uint64_t) * 2 +
                                   sizeof(std::uint32_t) * (5 + kSlotsPerEntry);

@@ -5,7 +5,7 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kThreads = 128;  // for each brick
+constexpr int kThreads = 128;  // threads of a block, which writes one brick
 
 /// The bricks that the interpolation in one brick reads.
 struct BricksToRead {

@@ -14,7 +14,7 @@ struct alignas(16) PairForm {
 };
 
 #if defined(__CUDACC__)
-/// \param offset  of the voxels at which the form is evaluated
+/// \param offset  offset of the voxels at which the form is evaluated
 __device__ inline PairForm pairForm(const Ellipsoid& p, double radius, const Offset& offset = {}) {
   const Coord frame = frameOf(p.center);
   const Matrix3 F = inverse(p.L);

@@ -88,7 +88,7 @@ struct FormArguments {
   const Ellipsoid* ellipsoids;
   std::uint32_t count;
   double radius;              ///< radius of the support in the unit frame
-  Offset offset = kAtVoxels;  ///< of the voxels at which the forms are evaluated
+  Offset offset = kAtVoxels;  ///< offset of the voxels at which the forms are evaluated
   PairForm* forms;            ///< output
 };
 void launchForms(const FormArguments& arguments, cudaStream_t stream);
