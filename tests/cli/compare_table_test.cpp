@@ -250,16 +250,13 @@ TEST_F(CompareTable, SlowPutsPicturesOnThePage) {
 
 TEST_F(CompareTable, SlowKeepsTheRowsThatAreMadeWhenInterrupted) {
   // With this number of runs a row takes seconds. The program is interrupted when it has made one.
-  const char* const script =
-      "\"$1\" table \"$2/ref.vdb\" \"$2/fit.esvr\" --runs 200 --csv \"$2/t.csv\" -v "
-      "> \"$2/out\" 2> \"$2/err\" &\n"
-      "until grep -q 'made ESVR' \"$2/err\"; do kill -0 $! || break; sleep 0.05; done\n"
-      "kill -TERM $!; wait $!";
-  const auto run = test::runProgram("/bin/sh", {"-c", script, "sh", ESVR_COMPARE, at("")});
+  const auto run = test::runInterrupted(
+      ESVR_COMPARE,
+      {"table", at("ref.vdb"), at("fit.esvr"), "--runs", "200", "--csv", at("t.csv"), "-v"},
+      "made ESVR");
   EXPECT_EQ(run.exitCode, 1);
-  const std::string out = test::readText(at("out"));
-  EXPECT_THAT(test::readText(at("err")), AllOf(HasSubstr("interrupted"), HasSubstr("rows were")));
-  EXPECT_THAT(out, AllOf(HasSubstr("fit.esvr"), Not(HasSubstr("NanoVDB FpN/64 Zip"))));
+  EXPECT_THAT(run.err, AllOf(HasSubstr("interrupted"), HasSubstr("rows were")));
+  EXPECT_THAT(run.out, AllOf(HasSubstr("fit.esvr"), Not(HasSubstr("NanoVDB FpN/64 Zip"))));
   EXPECT_THAT(test::readText(at("t.csv")), HasSubstr("\nfit.esvr,ESVR,"));
 }
 

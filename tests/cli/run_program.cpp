@@ -1,14 +1,17 @@
 #include "cli/run_program.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 #include <system_error>
+#include <thread>
 
 extern char** environ;
 
@@ -34,36 +37,72 @@ class SpawnActions {
   posix_spawn_file_actions_t actions_;
 };
 
-int spawnAndWait(const std::vector<std::string>& command, const SpawnActions& actions) {
-  std::vector<char*> argv;
-  for (const auto& word : command) argv.push_back(const_cast<char*>(word.c_str()));
-  argv.push_back(nullptr);
-  pid_t child = 0;
-  const int error = posix_spawn(&child, argv[0], actions.get(), nullptr, argv.data(), environ);
-  if (error != 0)
-    throw std::runtime_error(command[0] + ": " + std::generic_category().message(error));
-  int status = 0;
-  waitpid(child, &status, 0);
+int exitCodeOf(int status) {
   constexpr int kSignalBase = 128;
   return WIFEXITED(status) ? WEXITSTATUS(status) : kSignalBase + WTERMSIG(status);
 }
 
+/// A program that runs, and the files of its output.
+class Process {
+ public:
+  Process(const fs::path& program, const std::vector<std::string>& arguments)
+      : out_(folder_ / "out"), err_(folder_ / "err") {
+    SpawnActions actions;
+    actions.open(STDIN_FILENO, "/dev/null", O_RDONLY);
+    actions.open(STDOUT_FILENO, out_, O_WRONLY | O_CREAT);
+    actions.open(STDERR_FILENO, err_, O_WRONLY | O_CREAT);
+    std::string name = program.string();
+    std::vector<std::string> words = arguments;
+    std::vector<char*> argv{name.data()};
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    const int error = posix_spawn(&id_, name.c_str(), actions.get(), nullptr, argv.data(), environ);
+    if (error != 0) throw std::runtime_error(name + ": " + std::generic_category().message(error));
+  }
+
+  [[nodiscard]] bool runs() const {
+    siginfo_t info{};
+    return ::waitid(P_PID, id_t(id_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
+  }
+  [[nodiscard]] std::string err() const { return readText(err_); }
+  void interrupt() const { ::kill(id_, SIGINT); }
+
+  /// True if the program has a handler for SIGINT (proc(5), SigCgt).
+  [[nodiscard]] bool handlesInterrupts() const {
+    std::ifstream status("/proc/" + std::to_string(id_) + "/status");
+    for (std::string line; std::getline(status, line);)
+      if (line.starts_with("SigCgt:"))
+        return (std::stoull(line.substr(line.find('\t')), nullptr, 16) >> (SIGINT - 1)) & 1u;
+    return false;
+  }
+
+  ProgramRun wait() {
+    int status = 0;
+    ::waitpid(id_, &status, 0);
+    return {exitCodeOf(status), readText(out_), err()};
+  }
+
+ private:
+  TemporaryFolder folder_;
+  std::string out_, err_;
+  pid_t id_ = 0;
+};
+
 }  // namespace
 
 ProgramRun runProgram(const fs::path& program, const std::vector<std::string>& arguments) {
-  const TemporaryFolder folder;
-  const std::string out = folder / "out", err = folder / "err";
-  SpawnActions actions;
-  actions.open(STDIN_FILENO, "/dev/null", O_RDONLY);
-  actions.open(STDOUT_FILENO, out, O_WRONLY | O_CREAT);
-  actions.open(STDERR_FILENO, err, O_WRONLY | O_CREAT);
-  std::vector<std::string> command{program.string()};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  ProgramRun run;
-  run.exitCode = spawnAndWait(command, actions);
-  run.out = readText(out);
-  run.err = readText(err);
-  return run;
+  return Process(program, arguments).wait();
+}
+
+ProgramRun runInterrupted(const fs::path& program, const std::vector<std::string>& arguments,
+                          const std::string& sign) {
+  Process process(program, arguments);
+  const auto ready = [&] {
+    return process.handlesInterrupts() && process.err().find(sign) != std::string::npos;
+  };
+  while (process.runs() && !ready()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  process.interrupt();
+  return process.wait();
 }
 
 void writeText(const fs::path& path, const std::string& text) {

@@ -18,6 +18,11 @@ struct ProgramRun {
 ProgramRun runProgram(const std::filesystem::path& program,
                       const std::vector<std::string>& arguments);
 
+/// Interrupts the program with SIGINT as soon as it handles this signal and its error output
+/// contains `sign`.
+ProgramRun runInterrupted(const std::filesystem::path& program,
+                          const std::vector<std::string>& arguments, const std::string& sign = "");
+
 void writeText(const std::filesystem::path& path, const std::string& text);
 [[nodiscard]] std::string readText(const std::filesystem::path& path);
 

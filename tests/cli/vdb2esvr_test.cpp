@@ -467,15 +467,15 @@ TEST_F(Vdb2Esvr, reportsTheErrorOfTheVoxelsThatComeBack) {
 
 // ---- Ctrl-C
 
-/// A fit of a minute, which is stopped after a second.
+/// A fit of a minute, which is interrupted after its first message about progress.
 class Interrupted : public Vdb2Esvr {
  protected:
   [[nodiscard]] test::ProgramRun interrupted(const std::string& onCancel) const {
     test::writeInput(in(), {{.voxels = softBall({})}, {.name = "heat", .voxels = softBall({})}});
-    return test::runProgram("/usr/bin/timeout",
-                            {"--foreground", "--preserve-status", "--signal=INT", "1", VDB2ESVR,
-                             in(), out(), "--seconds", "60", "--kappa", "0", "--representation",
-                             "ellipsoids", "--on-cancel", onCancel});
+    return test::runInterrupted(VDB2ESVR,
+                                {in(), out(), "--seconds", "60", "--kappa", "0", "--representation",
+                                 "ellipsoids", "--on-cancel", onCancel, "-v"},
+                                " left\n");
   }
 };
 

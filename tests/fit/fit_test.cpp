@@ -13,6 +13,7 @@
 
 #include "esvr/error.h"
 #include "esvr/metrics.h"
+#include "esvr/voxel_layer.h"
 #include "volumes.h"
 
 namespace esvr {
@@ -44,15 +45,14 @@ TEST(Fit, ReachesHighQualityOnAFieldOfEllipsoids) {
 TEST(Fit, CurveAgreesWithTheMetricsOfItsField) {
   const SparseVolume volume = test::tubeVolume();
   const FitResult result = fit(volume, quick());
-  const CompareOptions compare;
-  const VolumeMetrics m =
-      compareVolumes(volume, revoxelise(result.field, {.range = result.range}), compare);
+  const SparseVolume made = revoxelise(result.field, {.range = result.range});
+  const VolumeMetrics m = compareVolumes(volume, made);
   // The curve also counts errors outside the box, and float32 parameters change the error, hence
   // the tolerance.
   EXPECT_NEAR(result.curve.back().psnrBox, m.psnrBox, 0.05);
   EXPECT_LE(result.curve.back().psnrBox, m.psnrBox + 1e-3);
   EXPECT_NEAR(result.curve.back().psnrActive, m.psnrActive, 1e-2);
-  EXPECT_NEAR(result.curve.back().maxError, m.maxError, 1e-4);
+  EXPECT_NEAR(result.curve.back().maxError, largestDifference(volume, made), 1e-4);
 }
 
 TEST(Fit, LetsSumsExceedAPlateau) {

@@ -26,6 +26,12 @@ using testing::HasSubstr;
 constexpr double kPsnrTolerance = 0.35;    // dB
 constexpr double kBytesTolerance = 0.025;  // share of the bytes
 
+/// Tolerances of the other figures, which depend on a few voxels. With AVX2 instead of AVX-512,
+/// these fits differ by up to 0.004 in IoU, 0.003 in mass, 12 % in the 99.9th percentile of the
+/// error, and a factor of 2.7 in the largest error.
+constexpr double kIouTolerance = 0.02, kMassTolerance = 0.01;
+constexpr double kP999Tolerance = 0.3, kMaxErrorTolerance = 3.0;  // share of the figure
+
 struct RealFile {
   const char* name;
   const char* path;  ///< path in ESVR_DATA_DIR
@@ -39,14 +45,22 @@ std::string baselineOf(const RealFile& file) {
   return std::string(ESVR_SOURCE_DIR "/tests/quality/") + file.name + ".json";
 }
 
-/// A baseline keeps its tolerances. A new one gets those of this test.
-void setTolerances(const std::string& path) {
+double valueOf(const json& figure) { return figure["value"].get<double>(); }
+
+void setTolerances(json& grid) {
+  for (const char* psnr : {"psnr_box", "psnr_active"}) grid[psnr]["tolerance"] = kPsnrTolerance;
+  grid["iou"]["tolerance"] = kIouTolerance;
+  grid["mass_error"]["tolerance"] = kMassTolerance;
+  grid["p999_error"]["tolerance"] = kP999Tolerance * valueOf(grid["p999_error"]);
+  grid["max_error"]["tolerance"] = kMaxErrorTolerance * valueOf(grid["max_error"]);
+}
+
+/// Replaces the tolerances that `esvr-compare check --update` chose by those of this test.
+void setTolerancesIn(const std::string& path) {
   json baseline = json::parse(test::readText(path));
-  baseline["bytes"]["tolerance"] =
-      std::round(baseline["bytes"]["value"].get<double>() * kBytesTolerance);
-  for (auto& grid : baseline["grids"])
-    for (const char* figure : {"psnr_box", "psnr_active"})
-      grid[figure]["tolerance"] = kPsnrTolerance;
+  json& bytes = baseline["bytes"];
+  bytes["tolerance"] = std::round(kBytesTolerance * valueOf(bytes));
+  for (json& grid : baseline["grids"]) setTolerances(grid);
   test::writeText(path, baseline.dump(2) + "\n");
 }
 
@@ -81,7 +95,7 @@ TEST_P(RealFileQuality, HasNotFallen) {
   convert(1.0);
   if (isUpdating()) {
     ASSERT_EQ(check({"--update"}).exitCode, 0);
-    setTolerances(baselineOf(GetParam()));
+    setTolerancesIn(baselineOf(GetParam()));
   }
   const auto run = check();
   EXPECT_EQ(run.exitCode, 0) << run.err;
