@@ -25,18 +25,19 @@ void putScales(const QuantisedEllipsoids& q, std::size_t i, Ellipsoids& e) {
   }
 }
 
-void putCenter(const QuantisedEllipsoids& q, std::size_t i, int bits, Ellipsoids& e) {
+void putCenter(const QuantisedEllipsoids& q, std::size_t i, const AxisBits& bits, Ellipsoids& e) {
   const Coord& low = q.lattice.lowestCell;
   const double lowest[] = {double(low.x), double(low.y), double(low.z)};
   for (std::size_t a = 0; a < 3; ++a)
-    e.center[a][i] = float((lowest[a] + middle(q.position[a][i], bits)) * q.lattice.cell);
+    e.center[a][i] = float((lowest[a] + middle(q.position[a][i], bits[a])) * q.lattice.cell);
 }
 
-void putRotation(const QuantisedEllipsoids& q, std::size_t i, int bits, Ellipsoids& e) {
+void putRotation(const QuantisedEllipsoids& q, std::size_t i, const AxisBits& bits, Ellipsoids& e) {
   std::array<double, 4> r{1.0, 0.0, 0.0, 0.0};
   double norm2 = 0.0;
   for (std::size_t a = 0; a < 3; ++a) {
-    r[a + 1] = (middle(q.rotation[a][i], bits) - 0.5) * kRotationSide;
+    const int unused = Lattice::kMaxRotationBits - bits[a];
+    r[a + 1] = (middle(q.rotation[a][i] >> unused, bits[a]) - 0.5) * kRotationSide;
     norm2 = norm2 + r[a + 1] * r[a + 1];
   }
   r[0] = std::sqrt(std::max(0.0, 1.0 - norm2));
@@ -51,11 +52,11 @@ void putIntensity(const QuantisedEllipsoids& q, std::size_t i, int shift, Ellips
 }
 
 void put(const QuantisedEllipsoids& q, std::size_t i, Ellipsoids& e) {
-  const CoarseScales s = coarseScales(q, i);
+  const ShapeBits bits = shapeBits(q, i);
   putScales(q, i, e);
-  putCenter(q, i, positionBits(q.lattice, q.precision[i], s), e);
-  putRotation(q, i, rotationBits(q.lattice, q.precision[i], s), e);
-  putIntensity(q, i, intensityShift(q.lattice, s), e);
+  putCenter(q, i, bits.position, e);
+  putRotation(q, i, bits.rotation, e);
+  putIntensity(q, i, intensityShift(q.lattice, coarseScales(q, i)), e);
 }
 
 }  // namespace

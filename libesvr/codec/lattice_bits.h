@@ -1,8 +1,16 @@
 #pragma once
 /// Computes the number of bits of each parameter of an ellipsoid. Only integers are used, so that
 /// writer and reader get the same numbers (docs/format.md, "The quantisation lattice").
+///
+/// An error of a center matters less along a long axis of its ellipsoid than along a short one, and
+/// an error of a rotation less about some axes than about others. The errors of the three
+/// coordinates are therefore coupled by a covariance C: coordinate 0 may have the error sqrt(C_00);
+/// the others then follow it, and may deviate by the square roots of their variances under the
+/// condition of the coordinates before them. The product of these is the least possible one, sqrt(det
+/// C).
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <numbers>
 
@@ -22,22 +30,30 @@ struct CoarseScales {
   std::uint32_t low, middle, high;
 };
 
+/// Bits of the three coordinates of a center or of the three components of a rotation.
+using AxisBits = std::array<int, 3>;
+
+/// The components x, y and z of a rotation as in QuantisedEllipsoids.
+using RotationCodes = std::array<std::uint16_t, 3>;
+
+/// Every component of a rotation has this number of bits or fewer that come first. The number of
+/// its other bits depends on them.
+inline constexpr int kMaxCoarseRotationBits = 3;
+
 inline int scaleBits(const Lattice& lattice, int precision) {
   return std::clamp(precision - lattice.scaleOffset, 0, Lattice::kMaxScaleBits);
 }
 
-inline int positionBits(const Lattice& lattice, int precision, const CoarseScales& s) {
-  const int bits =
-      (256 * precision + lattice.positionBase - lattice.positionSlope * int(s.low)) >> 8;
-  return std::clamp(bits, 0, Lattice::kMaxPositionBits - lattice.cellBits);
-}
+/// The number of the coarse bits of a rotation's components.
+[[nodiscard]] int coarseRotationBits(const Lattice& lattice, int precision, const CoarseScales& s);
 
-inline int rotationBits(const Lattice& lattice, int precision, const CoarseScales& s) {
-  const std::uint32_t ratio = s.middle + s.high;
-  int bits = precision + lattice.rotationOffset;
-  for (const auto from : lattice.rotationFrom) bits += ratio >= from ? 1 : 0;
-  return std::clamp(bits, 0, Lattice::kMaxRotationBits);
-}
+/// \param rotation  codes of which only the coarse bits are used
+[[nodiscard]] AxisBits rotationBits(const Lattice& lattice, int precision, const CoarseScales& s,
+                                    const RotationCodes& rotation);
+
+/// \param bits  the bits of the rotation's components
+[[nodiscard]] AxisBits positionBits(const Lattice& lattice, int precision, const CoarseScales& s,
+                                    const RotationCodes& rotation, const AxisBits& bits);
 
 /// The number of times that the lattice's intensity step is halved for an ellipsoid.
 inline int intensityShift(const Lattice& lattice, const CoarseScales& s) {
@@ -51,5 +67,15 @@ inline CoarseScales coarseScales(const QuantisedEllipsoids& q, std::size_t i) {
   const int bits = scaleBits(q.lattice, q.precision[i]);
   return {q.scale[0][i] >> bits, q.scale[1][i] >> bits, q.scale[2][i] >> bits};
 }
+
+inline RotationCodes rotationCodes(const QuantisedEllipsoids& q, std::size_t i) {
+  return {q.rotation[0][i], q.rotation[1][i], q.rotation[2][i]};
+}
+
+/// The bits of ellipsoid i, whose scales and rotation are set.
+struct ShapeBits {
+  AxisBits rotation, position;
+};
+[[nodiscard]] ShapeBits shapeBits(const QuantisedEllipsoids& q, std::size_t i);
 
 }  // namespace esvr

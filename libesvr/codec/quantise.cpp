@@ -11,6 +11,7 @@
 
 #include "codec/lattice_bits.h"
 #include "codec/morton.h"
+#include "codec/rounding.h"
 #include "codec/sorted_axes.h"
 #include "esvr/error.h"
 #include "esvr/quantised.h"
@@ -47,17 +48,51 @@ std::array<double, 3> cellsOf(const Ellipsoids& e, std::size_t i, const Lattice&
           e.center[2][i] / lattice.cell - low.z};
 }
 
-void putCenter(const std::array<double, 3>& cells, std::size_t i, int bits,
-               QuantisedEllipsoids& q) {
-  for (std::size_t a = 0; a < 3; ++a)
-    q.position[a][i] = codeOf(cells[a], bits, (1u << q.lattice.cellBits) - 1, "a center");
+/// Rounds the coordinates one after the other (rounding.h).
+void putCenter(const std::array<double, 3>& cells, const CoupledErrors& errors,
+               const AxisBits& bits, std::size_t i, QuantisedEllipsoids& q) {
+  const std::uint32_t lastCell = (1u << q.lattice.cellBits) - 1;
+  std::array<double, 3> error{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    (void)codeOf(cells[a], bits[a], lastCell, "a center");
+    const double last = std::ldexp(double(lastCell) + 1.0, bits[a]) - 1.0;
+    const double code = std::floor(std::ldexp(cells[a] + errors.shift(a, error), bits[a]));
+    q.position[a][i] = std::uint32_t(std::clamp(code, 0.0, last));
+    error[a] = std::ldexp(double(q.position[a][i]) + 0.5, -bits[a]) - cells[a];
+  }
 }
 
-void putRotation(const std::array<double, 4>& r, std::size_t i, int bits, QuantisedEllipsoids& q) {
+/// The code of a rotation's component without limits, in units of the last bit.
+double rotationCode(double component) {
+  return std::ldexp(component / kRotationSide + 0.5, Lattice::kMaxRotationBits);
+}
+
+/// Sets the coarse bits of a rotation; the others are 0.
+void putCoarseRotation(const SortedAxes& axes, std::size_t i, int bits, QuantisedEllipsoids& q) {
+  const double step = std::ldexp(1.0, Lattice::kMaxRotationBits - bits);
   const double last = std::ldexp(1.0, bits) - 1.0;
   for (std::size_t a = 0; a < 3; ++a) {
-    const double code = std::floor(std::ldexp(r[a + 1] / kRotationSide + 0.5, bits));
-    q.rotation[a][i] = std::uint16_t(std::clamp(code, 0.0, last));
+    const double code = std::floor(rotationCode(axes.rotation[a + 1]) / step);
+    q.rotation[a][i] = std::uint16_t(std::clamp(code, 0.0, last) * step);
+  }
+}
+
+/// Rounds the components one after the other (rounding.h). Their coarse bits remain.
+void putRotation(const SortedAxes& axes, std::size_t i, QuantisedEllipsoids& q) {
+  const CoarseScales s = coarseScales(q, i);
+  const int coarse = coarseRotationBits(q.lattice, q.precision[i], s);
+  putCoarseRotation(axes, i, coarse, q);
+  const AxisBits bits = rotationBits(q.lattice, q.precision[i], s, rotationCodes(q, i));
+  const CoupledErrors errors = rotationErrors(axes);
+  std::array<double, 3> error{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double step = std::ldexp(1.0, Lattice::kMaxRotationBits - bits[a]);
+    const double first = double(q.rotation[a][i]) / step;
+    const double last = first + std::ldexp(1.0, bits[a] - coarse) - 1.0;
+    const double exact = rotationCode(axes.rotation[a + 1]);
+    const double code = std::floor((exact + errors.shift(a, error)) / step);
+    q.rotation[a][i] = std::uint16_t(std::clamp(code, first, last) * step);
+    error[a] = double(q.rotation[a][i]) + 0.5 * step - exact;
   }
 }
 
@@ -71,11 +106,10 @@ void putIntensity(double intensity, std::size_t i, QuantisedEllipsoids& q) {
   q.intensity[i] = negative ? -1 - clamped : clamped;
 }
 
-std::uint64_t keyOf(const Ellipsoids& e, std::size_t i, const Lattice& lattice) {
-  const auto cells = cellsOf(e, i, lattice);
+std::uint64_t keyOf(const QuantisedEllipsoids& q, std::size_t i) {
+  const AxisBits bits = shapeBits(q, i).position;
   std::uint64_t key = 0;
-  for (std::size_t a = 0; a < 3; ++a)
-    key |= spreadBits(codeOf(cells[a], 0, (1u << lattice.cellBits) - 1, "a center")) << a;
+  for (std::size_t a = 0; a < 3; ++a) key |= spreadBits(q.position[a][i] >> bits[a]) << a;
   return key;
 }
 
@@ -85,21 +119,21 @@ std::size_t layerOf(const LatticeChoice& choice, std::size_t i) {
                                    [&](auto from) { return choice.precision[i] < from; }));
 }
 
-std::vector<std::size_t> fileOrder(const Ellipsoids& e, const LatticeChoice& choice) {
+std::vector<std::size_t> fileOrder(const QuantisedEllipsoids& q, const LatticeChoice& choice) {
   struct Place {
     std::size_t layer;
     std::uint64_t key;
     std::size_t ellipsoid;  // decides between equal keys
     auto operator<=>(const Place&) const = default;
   };
-  std::vector<Place> places(e.size());
-  tbb::parallel_for(Range(0, e.size(), kEllipsoidsPerTask), [&](const Range& range) {
+  std::vector<Place> places(q.size());
+  tbb::parallel_for(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i)
-      places[i] = {layerOf(choice, i), keyOf(e, i, choice.lattice), i};
+      places[i] = {layerOf(choice, i), keyOf(q, i), i};
   });
   tbb::parallel_sort(places.begin(), places.end());
-  std::vector<std::size_t> order(e.size());
-  for (std::size_t i = 0; i < e.size(); ++i) order[i] = places[i].ellipsoid;
+  std::vector<std::size_t> order(q.size());
+  for (std::size_t i = 0; i < q.size(); ++i) order[i] = places[i].ellipsoid;
   return order;
 }
 
@@ -113,14 +147,28 @@ std::vector<std::size_t> layerEnds(const LatticeChoice& choice,
   return ends;
 }
 
-/// Quantises ellipsoid `from` to place i, where its precision is already set.
-void put(const Ellipsoids& e, std::size_t from, std::size_t i, QuantisedEllipsoids& q) {
-  const SortedAxes axes = sortedAxes(e, from);
+/// Quantises ellipsoid i, whose precision is already set.
+void put(const Ellipsoids& e, std::size_t i, QuantisedEllipsoids& q) {
+  const SortedAxes axes = sortedAxes(e, i);
   putScales(axes.logScale, i, q);
-  const CoarseScales s = coarseScales(q, i);
-  putCenter(cellsOf(e, from, q.lattice), i, positionBits(q.lattice, q.precision[i], s), q);
-  putRotation(axes.rotation, i, rotationBits(q.lattice, q.precision[i], s), q);
-  putIntensity(e.intensity[from], i, q);
+  putRotation(axes, i, q);
+  putCenter(cellsOf(e, i, q.lattice), centerErrors(axes), shapeBits(q, i).position, i, q);
+  putIntensity(e.intensity[i], i, q);
+}
+
+template <class T>
+void permute(const std::vector<std::size_t>& order, std::vector<T>& values) {
+  std::vector<T> permuted(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) permuted[i] = values[order[i]];
+  values = std::move(permuted);
+}
+
+void permute(const std::vector<std::size_t>& order, QuantisedEllipsoids& q) {
+  for (auto* planes : {&q.position, &q.scale})
+    for (auto& plane : *planes) permute(order, plane);
+  for (auto& plane : q.rotation) permute(order, plane);
+  permute(order, q.precision);
+  permute(order, q.intensity);
 }
 
 }  // namespace
@@ -130,14 +178,13 @@ QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
   QuantisedEllipsoids q;
   q.lattice = choice.lattice;
   q.resize(e.size());
-  order = fileOrder(e, choice);
-  q.layerEnds = layerEnds(choice, order);
-  tbb::parallel_for(Range(0, order.size(), kEllipsoidsPerTask), [&](const Range& range) {
-    for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      q.precision[i] = choice.precision[order[i]];
-      put(e, order[i], i, q);
-    }
+  q.precision = choice.precision;
+  tbb::parallel_for(Range(0, e.size(), kEllipsoidsPerTask), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) put(e, i, q);
   });
+  order = fileOrder(q, choice);
+  q.layerEnds = layerEnds(choice, order);
+  permute(order, q);
   return q;
 }
 

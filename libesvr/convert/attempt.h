@@ -60,9 +60,9 @@ inline constexpr double kUsualLoss = 0.9;
 /// PSNR of a full fit less that of a short fit of as many ellipsoids, dB.
 inline constexpr double kShortFitBehind = 2.5;
 /// Bytes that an ellipsoid takes in a grid that lost kUsualLoss by quantising.
-inline constexpr double kBytesPerEllipsoid = 8.0;
+inline constexpr double kBytesPerEllipsoid = 7.5;
 /// Bytes that an ellipsoid takes at least.
-inline constexpr double kMinBytesPerEllipsoid = 5.0;
+inline constexpr double kMinBytesPerEllipsoid = 4.5;
 /// PSNR, dB, by which a full fit is given the chance to exceed its extrapolation.
 inline constexpr double kUncertainty = 0.75;
 

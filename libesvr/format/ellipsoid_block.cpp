@@ -15,14 +15,14 @@
 namespace esvr::format {
 namespace {
 
-/// Values of the ellipsoid before, which are likely to be similar.
-struct Previous {
-  std::uint32_t low = 0, middle = 0, high = 0;
-  int width = 0;
-};
-
 constexpr std::size_t kContexts = 8;
 std::size_t context(std::uint32_t value) { return std::min<std::size_t>(value, kContexts - 1); }
+
+/// The size of an ellipsoid as a context of its intensity: large ellipsoids are usually faint.
+constexpr std::size_t kSizes = 24;
+std::size_t sizeContext(const CoarseScales& s) {
+  return std::min<std::size_t>((3 * s.low + 2 * s.middle + s.high) / 2, kSizes - 1);
+}
 
 void require(bool holds, const char* what) {
   if (!holds) throw BadInput(std::string(what) + " lies outside the lattice");
@@ -41,11 +41,11 @@ class BlockCoder {
     for (std::size_t k = 0; k < run.count; ++k) {
       const std::size_t i = run.first + k;
       const CoarseScales s = codeCoarseScales(i);
-      codeIntensity(i);
+      codeIntensity(s, i);
       codePrecision(i);
       codeScaleRests(s, i);
-      codeRotation(rotationBits(q_.lattice, q_.precision[i], s), i);
-      codePlace(positionBits(q_.lattice, q_.precision[i], s), keys[k], i);
+      codeRotation(s, i);
+      codePlace(shapeBits(q_, i).position, keys[k], i);
     }
   }
 
@@ -60,9 +60,9 @@ class BlockCoder {
   }
 
   [[nodiscard]] std::uint64_t keyOf(std::size_t i) const {
-    const int bits = positionBits(q_.lattice, q_.precision[i], coarseScales(q_, i));
+    const AxisBits bits = shapeBits(q_, i).position;
     std::uint64_t key = 0;
-    for (std::size_t a = 0; a < 3; ++a) key |= spreadBits(q_.position[a][i] >> bits) << a;
+    for (std::size_t a = 0; a < 3; ++a) key |= spreadBits(q_.position[a][i] >> bits[a]) << a;
     return key;
   }
 
@@ -75,27 +75,27 @@ class BlockCoder {
   CoarseScales codeCoarseScales(std::size_t i) {
     CoarseScales s{};
     if constexpr (!kReads) s = coarseScales(q_, i);
-    s.low = codeCoarse(low_[context(previous_.low)], s.low);
-    s.middle = codeCoarse(middle_[context(previous_.middle)], s.middle);
-    s.high = codeCoarse(high_[context(s.middle)], s.high);
-    previous_.low = s.low, previous_.middle = s.middle, previous_.high = s.high;
+    s.low = codeCoarse(low_[context(lowBefore_)], s.low);
+    s.middle = codeCoarse(middle_[context(s.low)], s.middle);
+    s.high = codeCoarse(high_[context(s.low + s.middle)], s.high);
+    lowBefore_ = s.low;
     return s;
   }
 
-  void codeIntensity(std::size_t i) {
+  void codeIntensity(const CoarseScales& s, std::size_t i) {
     std::int32_t& value = q_.intensity[i];
     bool negative = value < 0;
     if (q_.lattice.signedIntensity) negative = sides_[3].bit(sign_, negative);
     const auto written = std::uint32_t(value < 0 ? -1 - value : value);
-    const std::uint32_t magnitude =
-        magnitude_[std::size_t(previous_.width)].code(sides_[3], written);
+    const std::uint32_t magnitude = magnitude_[sizeContext(s)].code(sides_[3], written);
     require(magnitude <= Lattice::kMaxIntensity, "an intensity");
     value = negative ? -1 - std::int32_t(magnitude) : std::int32_t(magnitude);
-    previous_.width = std::bit_width(magnitude);
   }
 
   void codePrecision(std::size_t i) {
-    auto& model = precision_[std::size_t(previous_.width)];
+    const std::int32_t value = q_.intensity[i];
+    const auto magnitude = std::uint32_t(value < 0 ? -1 - value : value);
+    auto& model = precision_[std::size_t(std::bit_width(magnitude))];
     q_.precision[i] = std::uint8_t(model.code(sides_[3], q_.precision[i]));
   }
 
@@ -118,37 +118,45 @@ class BlockCoder {
     return top << (bits - 1) | sides_[1].raw(rest & ((1u << (bits - 1)) - 1u), bits - 1);
   }
 
-  void codeRotation(int bits, std::size_t i) {
+  void codeRotation(const CoarseScales& s, std::size_t i) {
+    const int coarse = coarseRotationBits(q_.lattice, q_.precision[i], s);
+    RotationCodes known{};
+    for (std::size_t a = 0; a < 3; ++a) known[a] = codeCoarseRotation(a, coarse, i);
+    const AxisBits bits = rotationBits(q_.lattice, q_.precision[i], s, known);
     for (std::size_t a = 0; a < 3; ++a) {
-      const int modelled = std::min(bits, kRotationModelled);
-      const int raw = bits - modelled;
-      std::uint32_t node = 1;
-      for (int b = modelled - 1; b >= 0; --b)
-        node = node << 1 | std::uint32_t(sides_[2].bit(rotation_[a][node],
-                                                       (q_.rotation[a][i] >> (raw + b)) & 1u));
-      const std::uint32_t rest = sides_[2].raw(q_.rotation[a][i] & ((1u << raw) - 1u), raw);
-      q_.rotation[a][i] = std::uint16_t((node - (1u << modelled)) << raw | rest);
+      const int below = Lattice::kMaxRotationBits - bits[a], rest = bits[a] - coarse;
+      const auto written = std::uint32_t(q_.rotation[a][i] >> below) & ((1u << rest) - 1u);
+      q_.rotation[a][i] = std::uint16_t(known[a] | sides_[2].raw(written, rest) << below);
     }
   }
 
-  void codePlace(int bits, std::uint64_t key, std::size_t i) {
+  std::uint16_t codeCoarseRotation(std::size_t axis, int bits, std::size_t i) {
+    constexpr int kTop = Lattice::kMaxRotationBits;
+    std::uint32_t node = 1;
+    for (int b = 1; b <= bits; ++b) {
+      const bool bit = (q_.rotation[axis][i] >> (kTop - b)) & 1u;
+      node = node << 1 | std::uint32_t(sides_[2].bit(rotation_[axis][node], bit));
+    }
+    return std::uint16_t((node - (1u << bits)) << (kTop - bits));
+  }
+
+  void codePlace(const AxisBits& bits, std::uint64_t key, std::size_t i) {
     for (std::size_t a = 0; a < 3; ++a) {
-      const std::uint32_t place = q_.position[a][i] & ((1u << bits) - 1u);
-      q_.position[a][i] = gatherBits(key >> a) << bits | sides_[0].raw(place, bits);
+      const std::uint32_t place = q_.position[a][i] & ((1u << bits[a]) - 1u);
+      q_.position[a][i] = gatherBits(key >> a) << bits[a] | sides_[0].raw(place, bits[a]);
     }
   }
 
-  static constexpr int kRotationModelled = 2;
   static constexpr std::size_t kWidths = 32;
 
   std::array<Side, kStreams>& sides_;
   QuantisedEllipsoids& q_;
-  Previous previous_;
+  std::uint32_t lowBefore_ = 0;  ///< of the ellipsoid before, which is likely to be similar
   std::array<codec::NumberModel, kContexts> low_, middle_, high_;
   std::array<std::array<codec::BitModel, kContexts>, 3> rest_;
-  std::array<std::array<codec::BitModel, std::size_t{1} << kRotationModelled>, 3> rotation_;
+  std::array<std::array<codec::BitModel, std::size_t{1} << kMaxCoarseRotationBits>, 3> rotation_;
   codec::BitModel sign_;
-  std::array<codec::NumberModel, kWidths> magnitude_;
+  std::array<codec::NumberModel, kSizes> magnitude_;
   std::array<codec::TreeModel<4>, kWidths> precision_;
 };
 

@@ -1,5 +1,7 @@
-// Plan: dequantised parameters are within half a step of the originals, sorted axes describe the
-// same ellipsoid, and quantising dequantised values changes nothing.
+// Plan: dequantised parameters are within half a step of the originals, where the coordinates of a
+// center and the components of a rotation follow the errors of those before them. Sorted axes
+// describe the same ellipsoid, quantising dequantised values changes nothing, and numbers of bits
+// agree with a float64 reference.
 
 #include "esvr/quantised.h"
 
@@ -9,6 +11,7 @@
 
 #include "../field/random_field.h"
 #include "codec/lattice_bits.h"
+#include "codec/rounding.h"
 #include "codec/sorted_axes.h"
 #include "esvr/error.h"
 
@@ -87,53 +90,150 @@ TEST(Quantise, KeepsEveryParameterWithinHalfItsStep) {
     const Ellipsoids back = dequantise(q);
     ASSERT_TRUE(wellFormed(back));
     for (std::size_t i = 0; i < q.size(); ++i) {
-      const CoarseScales s = coarseScales(q, i);
       const SortedAxes axes = sortedAxes(e, order[i]);
-      const double place =
-          std::ldexp(0.5 * q.lattice.cell, -positionBits(q.lattice, q.precision[i], s));
       const double scale =
           std::ldexp(0.5 * q.lattice.scaleStep, -scaleBits(q.lattice, q.precision[i]));
       const double intensity =
-          std::ldexp(0.5 * q.lattice.intensityStep, -intensityShift(q.lattice, s));
-      for (std::size_t a = 0; a < 3; ++a) {
-        EXPECT_NEAR(back.center[a][i], e.center[a][order[i]], place + 1e-5);
-        // A scale that rounding makes smaller than the one before it is cut off there, which adds
-        // half a step.
+          std::ldexp(0.5 * q.lattice.intensityStep, -intensityShift(q.lattice, coarseScales(q, i)));
+      // A scale that rounding makes smaller than the one before it is cut off there, which adds
+      // half a step.
+      for (std::size_t a = 0; a < 3; ++a)
         EXPECT_NEAR(back.logScale[a][i], axes.logScale[a], 2.0 * scale + 1e-6);
-      }
       EXPECT_NEAR(back.intensity[i], e.intensity[order[i]], intensity * (1.0 + 1e-5));
     }
   }
 }
 
-TEST(Quantise, TurnsAnAxisByNoMoreThanItsBitsAllow) {
+TEST(Quantise, KeepsEachCoordinateWithinHalfItsStepOfItsTarget) {
+  const Ellipsoids e = sample();
+  std::size_t atTheEdge = 0;
+  for (const double step : {0.3, 0.05, 0.005}) {
+    const auto [q, order] = rounded(e, step);
+    const Ellipsoids back = dequantise(q);
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      const CoupledErrors errors = centerErrors(sortedAxes(e, order[i]));
+      const AxisBits bits = shapeBits(q, i).position;
+      std::array<double, 3> error{};
+      for (std::size_t a = 0; a < 3; ++a) {
+        error[a] = double(back.center[a][i]) - e.center[a][order[i]];
+        const std::uint32_t last = (1u << (q.lattice.cellBits + bits[a])) - 1;
+        if (q.position[a][i] == 0 || q.position[a][i] == last)
+          ++atTheEdge;  // the lattice ends there
+        else
+          // centers of up to 50 have errors of up to 2e-6 each as float32
+          EXPECT_NEAR(error[a], errors.shift(a, error), std::ldexp(0.5, -bits[a]) + 1e-4);
+      }
+    }
+  }
+  EXPECT_LT(atTheEdge, 50u);  // of 2700
+}
+
+TEST(Quantise, KeepsEachComponentOfARotationWithinHalfItsStepOfItsTarget) {
+  const Ellipsoids e = sample();
+  const auto [q, order] = rounded(e, 0.0003);
+  const Ellipsoids back = dequantise(q);
+  std::size_t atTheEdge = 0;
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    const SortedAxes axes = sortedAxes(e, order[i]);
+    const CoupledErrors errors = rotationErrors(axes);
+    const AxisBits bits = shapeBits(q, i).rotation;
+    const int coarse = coarseRotationBits(q.lattice, q.precision[i], coarseScales(q, i));
+    std::array<double, 3> error{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      error[a] = double(back.rotation[a + 1][i]) - axes.rotation[a + 1];
+      const int rest = bits[a] - coarse, below = Lattice::kMaxRotationBits - bits[a];
+      const unsigned place = (q.rotation[a][i] >> below) & ((1u << rest) - 1u);
+      if (place == 0 || place == (1u << rest) - 1u)
+        ++atTheEdge;  // the interval of the coarse bits ends there
+      else
+        EXPECT_NEAR(error[a], errors.shift(a, error),
+                    std::ldexp(0.5 * kRotationSide, -bits[a]) + 1e-5);
+    }
+  }
+  EXPECT_LT(atTheEdge, 90u);  // of 900
+}
+
+/// The variance of each coordinate under the condition of those before it.
+std::array<double, 3> conditional(const std::array<double, 9>& precision) {
+  const auto& p = precision;
+  const double lower = p[4] * p[8] - p[5] * p[7];
+  const double all =
+      p[0] * lower - p[1] * (p[3] * p[8] - p[5] * p[6]) + p[2] * (p[3] * p[7] - p[4] * p[6]);
+  return {lower / all, p[8] / lower, 1.0 / p[8]};
+}
+
+TEST(LatticeBits, OfACenterAreThoseOfItsConditionalVariances) {
   const Ellipsoids e = sample();
   const auto [q, order] = rounded(e, 0.01);
   const Ellipsoids back = dequantise(q);
   for (std::size_t i = 0; i < q.size(); ++i) {
-    const SortedAxes axes = sortedAxes(e, order[i]);
-    double dot = 0.0;
-    for (std::size_t c = 0; c < 4; ++c) dot += axes.rotation[c] * back.rotation[c][i];
-    const int bits = rotationBits(q.lattice, q.precision[i], coarseScales(q, i));
-    // Three components are within half a step each, and the largest one follows: the error is at
-    // most twice the length of the first three.
-    const double angle = 2.0 * std::sqrt(3.0) * std::ldexp(std::sqrt(0.5), -bits);
-    if (bits > 2) {
-      EXPECT_GT(dot, std::cos(angle) - 1e-6) << i;
+    const CoarseScales s = coarseScales(q, i);
+    const double ball = (256.0 * q.precision[i] + q.lattice.positionBase -
+                         q.lattice.positionSlope * double(s.low)) /
+                            256.0 -
+                        0.5;
+    const auto variances = conditional(precisionMatrix(
+        {back.logScale[0][i], back.logScale[1][i], back.logScale[2][i]},
+        {back.rotation[0][i], back.rotation[1][i], back.rotation[2][i], back.rotation[3][i]}));
+    const AxisBits bits = shapeBits(q, i).position;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double wanted = ball - 0.5 * std::log2(variances[a]) + back.logScale[2][i] * 1.442695;
+      // rounding to whole bits, coarse scales (half a step of up to 0.7 octaves each), and
+      // logarithms that are interpolated
+      EXPECT_NEAR(bits[a], std::max(wanted, 0.0), 1.5) << i;
     }
   }
 }
 
-TEST(Quantise, SpendsNoBitsOnTheRotationOfABall) {
-  Ellipsoids e = sample(50, 1.0);
-  const auto q = rounded(e, 0.05).q;
-  const auto long_ = rounded(sample(50, 50.0), 0.05).q;
-  int round = 0, stretched = 0;
-  for (std::size_t i = 0; i < 50; ++i) {
-    round += rotationBits(q.lattice, q.precision[i], coarseScales(q, i));
-    stretched += rotationBits(long_.lattice, long_.precision[i], coarseScales(long_, i));
+TEST(LatticeBits, AreFewerForAnEllipsoidThanForABall) {
+  const auto total = [](double aspect) {
+    const auto q = rounded(sample(300, aspect), 0.01).q;
+    int bits = 0;
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      const AxisBits position = shapeBits(q, i).position;
+      // a ball of the smallest scale would have this many in each coordinate
+      bits += 3 * ((256 * q.precision[i] + q.lattice.positionBase -
+                    q.lattice.positionSlope * int(coarseScales(q, i).low)) >>
+                   8);
+      bits -= position[0] + position[1] + position[2];
+    }
+    return bits / 300.0;
+  };
+  EXPECT_GT(total(20.0), total(2.0) + 1.0);
+}
+
+TEST(CoupledErrors, MoveTheOthersToTheLeastWeightedError) {
+  const Ellipsoids e = sample(50);
+  for (std::size_t i = 0; i < e.size(); ++i) {
+    const SortedAxes axes = sortedAxes(e, i);
+    const auto p = precisionMatrix(axes.logScale, axes.rotation);
+    const CoupledErrors errors = centerErrors(axes);
+    const auto slope = [&](std::size_t a, const std::array<double, 3>& d) {
+      return p[3 * a] * d[0] + p[3 * a + 1] * d[1] + p[3 * a + 2] * d[2];
+    };
+    std::array<double, 3> d{0.3, 0.0, 0.0};
+    d[1] = errors.shift(1, d);
+    d[2] = errors.shift(2, d);
+    // quaternions have unit length to within 2e-7
+    const double tolerance = 1e-6 * std::exp(-2.0 * axes.logScale[2]);
+    EXPECT_NEAR(slope(1, d), 0.0, tolerance);
+    EXPECT_NEAR(slope(2, d), 0.0, tolerance);
+    d[1] += 0.2;  // an error of coordinate 1 moves coordinate 2 again
+    d[2] = errors.shift(2, d);
+    EXPECT_NEAR(slope(2, d), 0.0, tolerance);
   }
-  EXPECT_LT(3 * round, stretched);
+}
+
+TEST(Quantise, SpendsNoBitsOnTheRotationOfABall) {
+  const auto q = rounded(sample(50, 1.0), 0.05).q;
+  const auto long_ = rounded(sample(50, 50.0), 0.05).q;
+  const auto bitsOf = [](const QuantisedEllipsoids& all) {
+    int bits = 0;
+    for (std::size_t i = 0; i < all.size(); ++i)
+      for (const int component : shapeBits(all, i).rotation) bits += component;
+    return bits;
+  };
+  EXPECT_LT(3 * bitsOf(q), bitsOf(long_));
 }
 
 TEST(Quantise, IsTheIdentityOnQuantisedValues) {

@@ -7,6 +7,7 @@ Reads every golden file in the folder: header, table and checksums of all, the c
 that are stored raw, and compares what is known of them. Exits 1 where the page and a file disagree.
 """
 
+import math
 import struct
 import sys
 from pathlib import Path
@@ -205,43 +206,94 @@ def mid(code, bits):
     return (code + 0.5) / 2**bits
 
 
+def lg(value):
+    value = max(value, 1)
+    k = value.bit_length() - 1
+    return 256 * (k - 1) + (256 * value >> k)
+
+
+def turn_of(codes, bits):
+    """W, X, Y and Z of a rotation."""
+    xyz = [2 * (code << (14 - b)) + (1 << (14 - b)) - (1 << 14) for code, b in zip(codes, bits)]
+    return (math.isqrt(max((1 << 29) - sum(c * c for c in xyz), 1 << 27)), *xyz)
+
+
+def rotation_bits(lattice, all_bits, coarse, middle, high):
+    """The bits of each component, from its coarse bits."""
+    k = min(all_bits, 3)
+    if all_bits == k:
+        return [k] * 3
+    n = lambda r: sum(t <= r for t in lattice["thresholds"])
+    a, c = (min(n(middle + high) - n(r), 5) for r in (middle, high))
+    w, x, y, z = turn_of(coarse, [k] * 3)
+    first = (w * w << 2 * a) + z * z + (y * y << 2 * c)
+    last = ((x * z - w * y >> 14)**2 * 4**(5 - a) + (y * z + w * x >> 14)**2 * 4**5
+            + (w * w + z * z >> 14)**2 * 4**(5 - c))
+    lg_w = lg(w * w) - 256 * 29
+    fx, fz = lg(first) - 256 * 29, lg_w - lg(last) + 256 * 40
+    fy = lg_w + 512 * (a + c) - fx - fz
+    return [clamp(256 * all_bits - (f >> 1) + 128 >> 8, k, 14) for f in (fx, fy, fz)]
+
+
+def power(t):
+    return (256, 304, 362, 431)[(2 * t >> 6) & 3] << (2 * t >> 8)
+
+
+def position_bits(lattice, e, scales, turn):
+    low, middle, high = scales
+    slope = lattice["position slope"]
+    u = clamp((2 * middle + 1) * slope >> 1, 0, 2560)
+    v = clamp(u + ((2 * high + 1) * slope >> 1), u, 2560)
+    w, x, y, z = turn
+    one = 1 << 29
+    row0 = [r >> 17 for r in (one - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y))]
+    row2 = [r >> 17 for r in (2 * (x * z - w * y), 2 * (y * z + w * x), one - 2 * (x * x + y * y))]
+    first = sum(power(t) * r * r for t, r in zip((v, u, 0), row0))
+    last = sum(power(t) * r * r for t, r in zip((0, v - u, v), row2))
+    cx, cz = lg(first) - 256 * 32 >> 1, v - (lg(last) - 256 * 32 >> 1)
+    ball = 256 * e + lattice["position base"] - slope * low
+    return [clamp(ball - c >> 8, 0, 22 - lattice["cell bits"]) for c in (cx, u + v - cx - cz, cz)]
+
+
+def code_rotation(lattice, e, middle, high, turns):
+    """The codes of x, y and z, and their bits."""
+    n = sum(t <= middle + high for t in lattice["thresholds"])
+    all_bits = clamp(e + lattice["rotation offset"] + n, 0, 14)
+    k = min(all_bits, 3)
+    coarse = [turns.tree(k, "turn", axis) for axis in range(3)]
+    bits = rotation_bits(lattice, all_bits, coarse, middle, high)
+    return [c << b - k | turns.raw(b - k) for c, b in zip(coarse, bits)], bits
+
+
 def block(lattice, n, streams):
     """Decodes the ellipsoids of one block."""
     places, scales, turns, heights = (Decoder(data) for data in streams)
-    before, width = (0, 0), 0
+    low = 0
     for key in keys(n, 3 * lattice["cell bits"], places):
-        low = scales.number("low", min(7, before[0]))
-        middle = scales.number("middle", min(7, before[1]))
-        high = scales.number("high", min(7, middle))
-        before = low, middle
+        low = scales.number("low", min(7, low))
+        middle = scales.number("middle", min(7, low))
+        high = scales.number("high", min(7, low + middle))
         sign = lattice["signs"] and heights.decision("sign")
-        height = heights.number("height", width)
-        width = height.bit_length()
-        e = heights.tree(4, "precision", width)
+        volume = 3 * low + 2 * middle + high
+        height = heights.number("height", min(volume // 2, 23))
+        e = heights.tree(4, "precision", height.bit_length())
         bs = clamp(e - lattice["scale offset"], 0, 16)
-        bp = clamp((256 * e + lattice["position base"] - lattice["position slope"] * low) >> 8,
-                   0, 22 - lattice["cell bits"])
-        br = clamp(e + lattice["rotation offset"]
-                   + sum(t <= middle + high for t in lattice["thresholds"]), 0, 14)
-        bi = clamp((lattice["intensity base"]
-                    + lattice["intensity slope"] * (3 * low + 2 * middle + high)) >> 8, 0, 24)
+        bi = clamp((lattice["intensity base"] + lattice["intensity slope"] * volume) >> 8, 0, 24)
         logs, below = [], lattice["lowest scale"]
         for axis, coarse in enumerate((low, middle, high)):
             top = scales.decision("rest", axis, min(7, coarse)) << (bs - 1) if bs else 0
             below += mid(coarse << bs | top | scales.raw(max(0, bs - 1)), bs)
             logs.insert(0, below * lattice["scale step"])
-        turn = []
-        for axis in range(3):
-            top = turns.tree(min(2, br), "turn", axis)
-            rest = max(0, br - 2)
-            turn.append((mid(top << rest | turns.raw(rest), br) - 0.5) * 2**0.5)
+        codes, br = code_rotation(lattice, e, middle, high, turns)
+        turn = [(mid(code, b) - 0.5) * 2**0.5 for code, b in zip(codes, br)]
         norm2 = turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]
         w = max(0.0, 1.0 - norm2)**0.5
         norm = (norm2 + w * w)**0.5
+        bp = position_bits(lattice, e, (low, middle, high), turn_of(codes, br))
         cell = [sum((key >> (3 * b + a) & 1) << b for b in range(lattice["cell bits"]))
                 for a in range(3)]
-        center = [(low_ + mid(c << bp | places.raw(bp), bp)) * lattice["cell"]
-                  for low_, c in zip(lattice["lowest cell"], cell)]
+        center = [(low_ + mid(c << b | places.raw(b), b)) * lattice["cell"]
+                  for low_, c, b in zip(lattice["lowest cell"], cell, bp)]
         height = mid(height, bi) * lattice["intensity step"]
         yield center, logs, [c / norm for c in (w, *turn)], -height if sign else height
 
@@ -493,17 +545,17 @@ def check_kappas_and_chunks(sections):
 
 # Ellipsoids of quantised.esvr: center, logarithms of scales, rotation, intensity.
 QUANTISED = (
-    {0: (36.9375, 23.5625, 0.0625, 2.24971008, 1.77249873,
+    {0: (36.875, 23.625, 0.1875, 2.24971008, 1.77249873,
          1.06804419, 0.901184678, 0.0994368941, 0.298310667, 0.298310667, 0.544600427),
-     7: (37.0625, 62.8125, 4.1875, 2.27243423, 0.545384228,
-         -0.272692114, 0.999954224, 0.00552427163, 0.00552427163, 0.00552427163, 0.176346809),
-     19: (58.4375, 47.0625, 52.8125, 2.63602376, 1.81794751,
-         -0.63628161, 0.70984745, 0.00276213582, 0.00276213582, 0.70434463, 0.197093487)},
-    {0: (25.78125, 13.96875, 13.90625, 2.28232002, 1.85052979,
-         0.843019128, 0.800452471, 0.00276213582, 0.00276213582, -0.599383473, 0.993603051),
-     7: (48.25, 47.25, 24.75, 1.15144074, 0.986949205,
+     7: (37.5, 62.875, 4.1875, 2.27243423, 0.545384228,
+         -0.272692114, 0.998946607, 0.0441941731, 0.00552427163, 0.0110485433, 0.176346809),
+     19: (58.5, 47.5, 52.8125, 2.63602376, 1.81794751,
+         -0.63628161, 0.717942834, 0.00552427163, 0.00552427163, 0.696058214, 0.197093487)},
+    {0: (25.875, 13.75, 13.90625, 2.28232002, 1.85052979,
+         0.843019128, 0.794165671, 0.00552427163, 0.00276213582, -0.60766989, 0.993603051),
+     7: (48.25, 47.5, 24.5, 1.15144074, 0.986949205,
          -0.164491534, 0.775604606, -0.0883883461, -0.618718445, -0.0883883461, -0.0285928939),
-     19: (60.625, 47.375, 62.875, 2.34400439, 1.72716117,
+     19: (60.625, 47.25, 62.875, 2.34400439, 1.72716117,
          1.19256365, 0.727863431, 0.0220970865, 0.0220970865, -0.685009718, 0.436041623)},
 )
 

@@ -3,8 +3,8 @@
 ///
 /// Ellipsoids need different precisions, since the effect of an error grows with the ellipsoid's
 /// weight w = |I| sqrt(sum phi^2). Each ellipsoid therefore has a precision e, which is the octave
-/// of its weight. The number of bits of a parameter follows from e and from the scales, which are
-/// decoded first: positions depend on the smallest scale, rotations on the ratio of the scales,
+/// of its weight. The number of bits of a parameter follows from e and from what is decoded before
+/// it: rotations depend on the ratios of the scales, positions on the scales and the rotation,
 /// intensities on the ellipsoid's volume. The numbers of bits are computed from integers only. The
 /// values are computed with +, -, *, / and sqrt in float64 and rounded once to float32, so they are
 /// bit-identical on every machine (docs/format.md, "The quantisation lattice").
@@ -57,8 +57,10 @@ struct QuantisedEllipsoids {
   /// Differences of logarithms: smallest scale less `lowestScale`, middle scale less smallest,
   /// largest less middle. Each is (coarse << bits) + rest.
   std::array<std::vector<std::uint32_t>, 3> scale;
-  std::array<std::vector<std::uint16_t>, 3> rotation;  ///< x, y, z of the quaternion
-  std::vector<std::int32_t> intensity;                 ///< m for +m, -1 - m for -m
+  /// x, y, z of the quaternion, in units of 2^-kMaxRotationBits of their interval. Bits that a
+  /// component does not have are 0.
+  std::array<std::vector<std::uint16_t>, 3> rotation;
+  std::vector<std::int32_t> intensity;  ///< m for +m, -1 - m for -m
   /// End index of each importance layer, increasing; the last one is size(). Empty: there is one
   /// layer only.
   std::vector<std::size_t> layerEnds;
