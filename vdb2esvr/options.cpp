@@ -116,7 +116,7 @@ void addFitOptions(cli::po::options_description& options) {
     ("seed", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(FitOptions{}.seed)),
      "seed of the random choices; the same seed gives the same file")
     ("storage", value<std::string>()->value_name("S")->default_value("compact"),
-     "compact (quantised, 8 to 13 bytes per ellipsoid) or float32 (about 34)")
+     "compact (quantised, 7 to 12 bytes per ellipsoid) or float32 (about 34)")
     ("storage-loss",
      value<double>()->value_name("DB")->default_value(defaultLoss, cli::shortNumber(defaultLoss)),
      "PSNR that --storage compact may lose in a single fit; --size, --psnr and --max-error ignore "
@@ -139,7 +139,7 @@ void addFileOptions(cli::po::options_description& options) {
     ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
      "keep or discard the best result so far if the run is interrupted")
     ("report", value<std::string>()->value_name("FILE"),
-     "write a JSON report to FILE.json; '-' is stdout")
+     "write a JSON report to FILE, whose name ends in .json; '-' is stdout")
     ("hits", bool_switch(), "report the average number of ellipsoids that reach a voxel")
     ("force,f", bool_switch(), "replace OUT.esvr and the report if they exist");
   // clang-format on

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 
@@ -11,6 +12,7 @@ namespace esvr::convert {
 namespace {
 
 constexpr std::uint32_t kShortFitDivisor = 4;  // a full fit has 4 times the iterations
+constexpr double kShortFitPrice = 0.94;        // bytes per ellipsoid of a short fit / of a full fit
 
 FitOptions optionsFor(const Job& job, std::size_t count, FitLength length) {
   FitOptions options = job.options.fit;
@@ -18,6 +20,56 @@ FitOptions optionsFor(const Job& job, std::size_t count, FitLength length) {
   options.psnr.reset();
   options.seconds.reset();
   return length == FitLength::kWhole ? options : shortened(std::move(options));
+}
+
+/// Share of the active voxels with the largest or the smallest value of the volume, other than the
+/// background, from which on it saturates.
+constexpr double kSaturatedShare = 0.05;
+
+bool saturates(const SparseVolume& volume) {
+  const ValueRange range = activeRange(volume);
+  const auto isExtreme = [&](float v) {
+    return (v == range.max && v > volume.background) || (v == range.min && v < volume.background);
+  };
+  std::uint64_t extreme = 0;
+  for (std::size_t i = 0; i < volume.values.size(); ++i)
+    extreme +=
+        isExtreme(volume.values[i]) && volume.active[i / kBrickVoxels].test(int(i % kBrickVoxels));
+  return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
+}
+
+// Whether both signs are better (docs/lab-notes.md, "Signs").
+/// dB by which a fit with both signs must be better than one with the signs of the values.
+constexpr double kSignsGain = 0.25;
+/// Iterations of a short fit for each of a probe. Probes tell where a second short fit is useless.
+constexpr std::uint32_t kProbeDivisor = 4;
+
+ConvertOptions withBothSigns(ConvertOptions options) {
+  options.fit.bothSigns = true;
+  return options;
+}
+
+double psnrOfProbe(const ConvertInput& input, ConvertOptions options, double count) {
+  options.fit.iterations = std::max(plannedIterations(shortened(options.fit)) / kProbeDivisor, 1u);
+  return attempt({input, options}, count, FitLength::kWhole).psnr;
+}
+
+/// The PSNR of an attempt if it is quantised to as many bytes as others. Terms that cancel each
+/// other need more bits, so that the PSNR alone would not do.
+double psnrForItsBytes(const Job& job, const Attempt& attempt) {
+  const CompactResult compact = compacted(job, attempt, {});
+  const double doublings = std::log2(double(std::max<std::uint64_t>(compact.bytes, 1)));
+  return attempt.psnr - compact.loss - kDbPerDoubling * doublings;
+}
+
+/// A short fit with both signs if it is better than `own`, which has the signs of the values.
+std::optional<Attempt> betterSigned(const Job& job, double count, const Attempt& own) {
+  const ConvertOptions both = withBothSigns(job.options);
+  if (psnrOfProbe(job.input, both, count) < psnrOfProbe(job.input, job.options, count) + kSignsGain)
+    return std::nullopt;
+  Attempt found = attempt({job.input, both}, count, FitLength::kShort);
+  if (psnrForItsBytes(job, found) < psnrForItsBytes(job, own) + kSignsGain) return std::nullopt;
+  return found;
 }
 
 std::size_t within(double count, std::uint64_t voxels) {
@@ -58,6 +110,21 @@ Attempt attempt(const Job& job, double count, FitLength length) {
   return result;
 }
 
+Attempt firstAttempt(const ConvertInput& input, double count, ConvertOptions& options) {
+  const Job job{input, options};
+  Attempt own = attempt(job, count, FitLength::kShort);
+  const FitOptions& fit = options.fit;
+  if (own.cancelled() || fit.bothSigns || fit.narrowBand || !saturates(input.source)) return own;
+  try {
+    auto found = betterSigned(job, count, own);
+    options.fit.bothSigns = found.has_value();
+    return found ? std::move(*found) : std::move(own);
+  } catch (const Cancelled&) {
+    own.fit.end = FitEnd::kCancelled;
+    return own;
+  }
+}
+
 CompactResult compacted(const Job& job, const Attempt& attempt, const StorageTarget& target) {
   const FitOptions& fit = job.options.fit;
   return compactGrid(attempt.grid, job.input.source,
@@ -66,6 +133,11 @@ CompactResult compacted(const Job& job, const Attempt& attempt, const StorageTar
                       .bytes = target.bytes,
                       .box = fit.box,
                       .device = fit.device});
+}
+
+double priceOf(const Attempt& attempt, const CompactResult& compact) {
+  const double count = double(std::max<std::size_t>(attempt.count(), 1));
+  return std::max(double(compact.bytes) / count, 1.0);
 }
 
 Conversion conversionOf(FitResult fit, CompactResult compact) {

@@ -51,6 +51,13 @@ struct Attempt {
 /// Fits about `count` ellipsoids: at least one, and at most the number of active voxels.
 [[nodiscard]] Attempt attempt(const Job& job, double count, FitLength length);
 
+/// The first attempt of a search: a short fit. It also decides whether intensities have both signs
+/// (FitOptions::bothSigns in `options`), unless this is already set: where many voxels have an
+/// extreme value and the volume is no narrow band, a second short fit with both signs is compared,
+/// if two very short fits show that it could be better.
+[[nodiscard]] Attempt firstAttempt(const ConvertInput& input, double count,
+                                   ConvertOptions& options);
+
 /// Loss of PSNR by quantising, dB, at which further bytes gain as much in more ellipsoids as in
 /// more bits (docs/lab-notes.md, "More ellipsoids or more bits").
 inline constexpr double kUsualLoss = 0.9;
@@ -59,10 +66,14 @@ inline constexpr double kUsualLoss = 0.9;
 // PSNR and the bytes of every stored grid are measured.
 /// PSNR of a full fit less that of a short fit of as many ellipsoids, dB.
 inline constexpr double kShortFitBehind = 2.5;
+/// Gain of PSNR by twice the ellipsoids, dB.
+inline constexpr double kDbPerDoubling = 4.5;
 /// Bytes that an ellipsoid takes in a grid that lost kUsualLoss by quantising.
 inline constexpr double kBytesPerEllipsoid = 7.5;
 /// Bytes that an ellipsoid takes at least.
 inline constexpr double kMinBytesPerEllipsoid = 4.5;
+/// Bytes per ellipsoid of a short fit, relative to those of a full fit.
+inline constexpr double kShortFitPrice = 0.94;
 /// PSNR, dB, by which a full fit is given the chance to exceed its extrapolation.
 inline constexpr double kUncertainty = 0.75;
 
@@ -74,6 +85,9 @@ struct StorageTarget {
 };
 [[nodiscard]] CompactResult compacted(const Job& job, const Attempt& attempt,
                                       const StorageTarget& target);
+
+/// Bytes per ellipsoid, at least 1.
+[[nodiscard]] double priceOf(const Attempt& attempt, const CompactResult& compact);
 
 /// Makes a conversion from a fit and its compact grid.
 [[nodiscard]] Conversion conversionOf(FitResult fit, CompactResult compact);

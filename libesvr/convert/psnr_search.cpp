@@ -10,7 +10,6 @@ namespace esvr::convert {
 namespace {
 
 // Usual values. They decide how many fits a search takes; the PSNR of every fit is measured.
-constexpr double kDbPerDoubling = 4.5;        // gain of PSNR by twice the ellipsoids
 constexpr double kVoxelsPerEllipsoid = 35.0;  // active voxels per ellipsoid of the first guess
 constexpr double kMaxGrowth = 8.0;            // largest factor of the number between two fits
 constexpr std::size_t kMaxFits = 3;           // the search continues if none reached the PSNR
@@ -26,7 +25,8 @@ constexpr Margin kFloat32Margin{0.3, 0.0, 0.9};
 class PsnrSearch {
  public:
   PsnrSearch(const Job& job, double psnr, std::optional<std::uint64_t> below)
-      : job_(job),
+      : options_(job.options),
+        job_{job.input, options_},
         psnr_(psnr),
         below_(below),
         compact_(job.options.storage.form == Storage::kCompact),
@@ -37,13 +37,14 @@ class PsnrSearch {
   }
 
   PsnrResult run() {
-    const Attempt draft = attempt(job_, firstCount(), FitLength::kShort);
-    const double needed = neededCount(draft, aim() - kShortFitBehind);
-    const auto expected = std::uint64_t(kBytesPerEllipsoid * needed);
-    if (below_ && !draft.cancelled() &&
-        neededCount(draft, aim() - kShortFitBehind - kUncertainty) * kBytesPerEllipsoid >
-            double(*below_))
-      return {std::nullopt, expected};
+    const Attempt draft = firstAttempt(job_.input, firstCount(), options_);
+    std::uint64_t expected = 0;
+    if (below_ && !draft.cancelled()) {
+      const double price = priceOf(draft, compacted(job_, draft, {})) / kShortFitPrice;
+      expected = std::uint64_t(price * neededCount(draft, aim() - kShortFitBehind));
+      if (price * neededCount(draft, aim() - kShortFitBehind - kUncertainty) > double(*below_))
+        return {std::nullopt, expected};
+    }
     fitUntilReached(scaledCount(draft, aim() - kShortFitBehind));
     return {anyReached() ? smallest() : best(), expected};
   }
@@ -156,7 +157,8 @@ class PsnrSearch {
                   FitEnd::kPsnrMissed);
   }
 
-  const Job& job_;
+  ConvertOptions options_;
+  Job job_;
   double psnr_;
   std::optional<std::uint64_t> below_;
   bool compact_;

@@ -9,9 +9,8 @@ namespace esvr::convert {
 namespace {
 
 // Usual values. They decide how many fits a search takes; the bytes of every grid are counted.
-constexpr double kShortFitPrice = 0.94;  // bytes per ellipsoid of a short fit / of a full fit
-constexpr double kMaxUsefulLoss = 2.5;   // loss, dB, above which fewer ellipsoids are better
-constexpr double kRepairFactor = 1.25;   // smallest growth of the bytes per ellipsoid by a repair
+constexpr double kMaxUsefulLoss = 2.5;  // loss, dB, above which fewer ellipsoids are better
+constexpr double kRepairFactor = 1.25;  // smallest growth of the bytes per ellipsoid by a repair
 constexpr int kMaxRepairs = 3;
 constexpr std::uint64_t kRefillDivisor = 100;  // a hundredth of the bytes unused: search again
 
@@ -28,16 +27,16 @@ std::uint64_t bytesBesides(const CompactResult& compact) {
 class SizeSearch {
  public:
   SizeSearch(const Job& job, std::uint64_t bytes, std::optional<double> above)
-      : job_(job), bytes_(bytes), above_(above) {}
+      : options_(job.options), job_{job.input, options_}, bytes_(bytes), above_(above) {}
 
   SizeResult run() {
-    Attempt last = attempt(job_, double(bytes_) / kBytesPerEllipsoid, FitLength::kShort);
+    Attempt last = firstAttempt(job_.input, double(bytes_) / kBytesPerEllipsoid, options_);
     const double expected = last.psnr + kShortFitBehind - kUsualLoss;
     if (above_ && !last.cancelled() && expected + kUncertainty < *above_)
       return {std::nullopt, 0, expected};
-    const Price first = priceOf(last);
-    if (!reserve(first.besides)) return refused();
-    double each = first.each / kShortFitPrice;
+    const CompactResult first = compacted(job_, last, {});
+    if (!reserve(bytesBesides(first))) return refused();
+    double each = priceOf(last, first) / kShortFitPrice;
     for (int repairs = 0; !last.cancelled(); ++repairs) {
       last = attempt(job_, double(left_) / each, FitLength::kWhole);
       CompactResult now = filled(last);
@@ -46,24 +45,13 @@ class SizeSearch {
       if (fits && (now.loss <= kMaxUsefulLoss || repairs + 1 >= kMaxRepairs))
         return {conversionOf(std::move(last.fit), std::move(now)), 0, expected};
       if (!fits && last.asked == 1) return {std::nullopt, besides_ + now.bytes, expected};
-      each = std::max(priceOf(last).each, kRepairFactor * each);
+      each = std::max(priceOf(last, compacted(job_, last, {})), kRepairFactor * each);
     }
     CompactResult compact = compactFor(last);
     return {conversionOf(std::move(last.fit), std::move(compact)), 0, expected};
   }
 
  private:
-  /// The bytes of an attempt at the usual loss.
-  struct Price {
-    double each = 0.0;          ///< bytes per ellipsoid
-    std::uint64_t besides = 0;  ///< bytes of the grid's other sections
-  };
-  [[nodiscard]] Price priceOf(const Attempt& attempt) const {
-    const CompactResult compact = compacted(job_, attempt, {});
-    const double count = double(std::max<std::size_t>(attempt.count(), 1));
-    return {std::max(double(compact.bytes) / count, 1.0), bytesBesides(compact)};
-  }
-
   /// Reserves bytes for the grid's other sections. \return false if no bytes remain
   bool reserve(std::uint64_t besides) {
     besides_ = besides;
@@ -88,7 +76,8 @@ class SizeSearch {
     return now;
   }
 
-  const Job& job_;
+  ConvertOptions options_;
+  Job job_;
   std::uint64_t bytes_, besides_ = 0, left_ = 0;
   std::optional<double> above_;
 };

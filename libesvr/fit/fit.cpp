@@ -83,6 +83,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   FitTarget target = makeTarget(volume, options.box);
   target.saturates = true;
   target.narrowBand = options.narrowBand;
+  target.bothSigns = options.bothSigns.value_or(false);
   if (options.fitFor == FitFor::kDrawing) target.voxelShare = options.voxelShare;
   if (isEmpty(target)) return emptyFit(volume, options.kappa.value_or(Kernel{}.kappa));
 

@@ -18,12 +18,16 @@ namespace esvr {
 }
 
 [[nodiscard]] inline SignsAllowed signsOf(const FitTarget& target) {
-  return {.positive = target.highest > 0.0, .negative = target.lowest < 0.0};
+  return {.positive = target.bothSigns || target.highest > 0.0,
+          .negative = target.bothSigns || target.lowest < 0.0};
 }
 
 [[nodiscard]] inline EllipsoidLimits limitsOf(const FitTarget& target, const Tuning& tuning) {
-  return {tuning.smallestScale, tuning.largestScale, tuning.intensityHeadroom * target.lowest,
-          tuning.intensityHeadroom * target.highest};
+  const double range = target.highest - target.lowest;
+  const double lowest = target.bothSigns ? -range : target.lowest;
+  const double highest = target.bothSigns ? range : target.highest;
+  return {tuning.smallestScale, tuning.largestScale, tuning.intensityHeadroom * lowest,
+          tuning.intensityHeadroom * highest};
 }
 
 /// Half width of a seed's window: Tuning::seedWindow times the distance that the ellipsoids would

@@ -20,6 +20,7 @@ struct FitTarget {
   double lowest = 0.0, highest = 0.0;  ///< range of `values` and 0
   bool saturates = false;              ///< sums are clamped to this range
   bool narrowBand = false;             ///< see FitOptions
+  bool bothSigns = false;              ///< see FitOptions
   /// Share of the iterations that compare at the voxels; the others compare between them.
   double voxelShare = 1.0;
   const std::vector<BrickMask>* active = nullptr;  ///< active masks of the volume's bricks

@@ -72,7 +72,7 @@ enum class Representation {
 
 /// The form of ellipsoids in a file. kFloat32 is never replaced by voxels.
 enum class Storage {
-  kCompact,  ///< quantised and entropy-coded: 8 to 13 bytes per ellipsoid
+  kCompact,  ///< quantised and entropy-coded: 7 to 12 bytes per ellipsoid
   kFloat32   ///< float32 parameters: about 34 bytes per ellipsoid
 };
 

@@ -54,6 +54,12 @@ struct FitOptions : CommonFitOptions {
   std::optional<float> kappa;  ///< edge of the kernel; default: it is fitted with the ellipsoids
   /// The volume is a level set: voxels outside its bricks do not count.
   bool narrowBand = false;
+  /// Intensities may have both signs, also if all values have one. A sum can then end sharply at the
+  /// border of a plateau, which it exceeds inside. This gains up to 4 dB on some volumes and loses up
+  /// to 2 dB on others, and a fit takes about twice as long (docs/lab-notes.md, "Signs"). Default:
+  /// fit() allows the signs of the values. The searches of convertVolume() for a SizeGoal or a
+  /// PsnrGoal choose by short fits if many voxels have an extreme value.
+  std::optional<bool> bothSigns;
 };
 
 enum class FitEnd { kScheduleDone, kPsnrReached, kTimeUp, kCancelled, kPsnrMissed };
