@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "esvr/error.h"
@@ -12,7 +13,6 @@ namespace esvr::convert {
 namespace {
 
 constexpr std::uint32_t kShortFitDivisor = 4;  // a full fit has 4 times the iterations
-constexpr double kShortFitPrice = 0.94;        // bytes per ellipsoid of a short fit / of a full fit
 
 FitOptions optionsFor(const Job& job, std::size_t count, FitLength length) {
   FitOptions options = job.options.fit;
@@ -44,11 +44,7 @@ constexpr double kSignsGain = 0.25;
 /// Iterations of a short fit for each of a probe. Probes tell where a second short fit is useless.
 constexpr std::uint32_t kProbeDivisor = 4;
 
-ConvertOptions withBothSigns(ConvertOptions options) {
-  options.fit.bothSigns = true;
-  return options;
-}
-
+/// The PSNR after a very short fit.
 double psnrOfProbe(const ConvertInput& input, ConvertOptions options, double count) {
   options.fit.iterations = std::max(plannedIterations(shortened(options.fit)) / kProbeDivisor, 1u);
   return attempt({input, options}, count, FitLength::kWhole).psnr;
@@ -64,7 +60,8 @@ double psnrForItsBytes(const Job& job, const Attempt& attempt) {
 
 /// A short fit with both signs if it is better than `own`, which has the signs of the values.
 std::optional<Attempt> betterSigned(const Job& job, double count, const Attempt& own) {
-  const ConvertOptions both = withBothSigns(job.options);
+  ConvertOptions both = job.options;
+  both.fit.bothSigns = true;
   if (psnrOfProbe(job.input, both, count) < psnrOfProbe(job.input, job.options, count) + kSignsGain)
     return std::nullopt;
   Attempt found = attempt({job.input, both}, count, FitLength::kShort);
@@ -115,14 +112,16 @@ Attempt firstAttempt(const ConvertInput& input, double count, ConvertOptions& op
   Attempt own = attempt(job, count, FitLength::kShort);
   const FitOptions& fit = options.fit;
   if (own.cancelled() || fit.bothSigns || fit.narrowBand || !saturates(input.source)) return own;
+  std::optional<Attempt> found;
   try {
-    auto found = betterSigned(job, count, own);
-    options.fit.bothSigns = found.has_value();
-    return found ? std::move(*found) : std::move(own);
+    found = betterSigned(job, count, own);
   } catch (const Cancelled&) {
-    own.fit.end = FitEnd::kCancelled;
-    return own;
+    // the token, which is read below, tells so
   }
+  options.fit.bothSigns = found.has_value();
+  Attempt& best = found ? *found : own;
+  if (fit.cancel && fit.cancel->cancelled()) best.fit.end = FitEnd::kCancelled;
+  return std::move(best);
 }
 
 CompactResult compacted(const Job& job, const Attempt& attempt, const StorageTarget& target) {
