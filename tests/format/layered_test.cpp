@@ -162,7 +162,6 @@ TEST_F(PartOfAFile, DamagedInABlockIsRefusedWhereTheBlockIsRead) {
 /// Offsets in the section (docs/format.md, "Layered ellipsoids"), without rotation thresholds.
 namespace at {
 constexpr std::size_t kSize = 0, kCount = 4, kCell = 12, kThresholds = 78, kLayers = 79;
-constexpr std::size_t kEntry = 30;  // bytes of a block's entry
 }  // namespace at
 
 /// The content with a corrected checksum of its directory.
