@@ -36,6 +36,9 @@ struct RealFile {
   const char* name;
   const char* path;  ///< path in ESVR_DATA_DIR
   int count;         ///< number of ellipsoids in each grid
+  /// Share of the bytes. Few ellipsoids make large steps in it: the level set's 300 take 8 % more
+  /// with AVX2 than with AVX-512.
+  double bytesTolerance = kBytesTolerance;
 };
 std::ostream& operator<<(std::ostream& out, const RealFile& file) { return out << file.path; }
 
@@ -56,10 +59,10 @@ void setTolerances(json& grid) {
 }
 
 /// Replaces the tolerances that `esvr-compare check --update` chose by those of this test.
-void setTolerancesIn(const std::string& path) {
+void setTolerancesIn(const std::string& path, double bytesTolerance) {
   json baseline = json::parse(test::readText(path));
   json& bytes = baseline["bytes"];
-  bytes["tolerance"] = std::round(kBytesTolerance * valueOf(bytes));
+  bytes["tolerance"] = std::round(bytesTolerance * valueOf(bytes));
   for (json& grid : baseline["grids"]) setTolerances(grid);
   test::writeText(path, baseline.dump(2) + "\n");
 }
@@ -95,7 +98,7 @@ TEST_P(RealFileQuality, HasNotFallen) {
   convert(1.0);
   if (isUpdating()) {
     ASSERT_EQ(check({"--update"}).exitCode, 0);
-    setTolerancesIn(baselineOf(GetParam()));
+    setTolerancesIn(baselineOf(GetParam()), GetParam().bytesTolerance);
   }
   const auto run = check();
   EXPECT_EQ(run.exitCode, 0) << run.err;
@@ -108,7 +111,7 @@ INSTANTIATE_TEST_SUITE_P(
                     RealFile{"wdas_cloud_sixteenth", "wdas_cloud_sixteenth.vdb", 1000},
                     RealFile{"aneurism", "aneurism.vdb", 1000},
                     RealFile{"dragon_with_xform", "dragon_with_xform.vdb", 1000},
-                    RealFile{"cube_levelset", "cube_levelset.vdb", 300},
+                    RealFile{"cube_levelset", "cube_levelset.vdb", 300, 0.1},
                     RealFile{"fluid_data_0041", "fire/fluid_data_0041.vdb", 400}),
     [](const auto& tested) { return std::string(tested.param.name); });
 
