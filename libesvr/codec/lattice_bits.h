@@ -6,8 +6,8 @@
 /// an error of a rotation less about some axes than about others. The errors of the three
 /// coordinates are therefore coupled by a covariance C: coordinate 0 may have the error sqrt(C_00);
 /// the others then follow it, and may deviate by the square roots of their variances under the
-/// condition of the coordinates before them. The product of these is the least possible one, sqrt(det
-/// C).
+/// condition of the coordinates before them. The product of these three is sqrt(det C), the least
+/// possible one.
 
 #include <algorithm>
 #include <array>

@@ -15,7 +15,7 @@ class CoupledErrors {
   /// \param covariance  C; the weighted error of a vector d is d^T C^-1 d
   explicit CoupledErrors(const std::array<std::array<double, 3>, 3>& covariance);
 
-  /// What to add to coordinate `a` before it is rounded.
+  /// Returns the number that is added to coordinate `a` before it is rounded.
   /// \param error  errors of the coordinates before it: rounded value less exact value
   [[nodiscard]] double shift(std::size_t a, const std::array<double, 3>& error) const;
 

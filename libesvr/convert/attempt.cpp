@@ -116,7 +116,7 @@ Attempt firstAttempt(const ConvertInput& input, double count, ConvertOptions& op
   try {
     found = betterSigned(job, count, own);
   } catch (const Cancelled&) {
-    // the token, which is read below, tells so
+    // The search continues with `own`, which the token marks as cancelled below.
   }
   options.fit.bothSigns = found.has_value();
   Attempt& best = found ? *found : own;

@@ -151,7 +151,7 @@ class BlockCoder {
 
   std::array<Side, kStreams>& sides_;
   QuantisedEllipsoids& q_;
-  std::uint32_t lowBefore_ = 0;  ///< of the ellipsoid before, which is likely to be similar
+  std::uint32_t lowBefore_ = 0;  ///< low scale of the previous ellipsoid, often a similar one
   std::array<codec::NumberModel, kContexts> low_, middle_, high_;
   std::array<std::array<codec::BitModel, kContexts>, 3> rest_;
   std::array<std::array<codec::BitModel, std::size_t{1} << kMaxCoarseRotationBits>, 3> rotation_;

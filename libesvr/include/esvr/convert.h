@@ -31,8 +31,8 @@ struct FitGoal {};
 struct PresetGoal {};
 
 /// The best grid that adds at most `bytes` to a file (bytesAdded). Ellipsoids use at least 98 % of
-/// these bytes, less 7 for the padding of each chunk, unless more bytes would not improve the grid. FitOptions::count, psnr and seconds
-/// are ignored.
+/// these bytes, less 7 for the padding of each chunk, unless more bytes would not improve the grid.
+/// FitOptions::count, psnr and seconds are ignored.
 struct SizeGoal {
   std::uint64_t bytes = 0;
 };

@@ -57,8 +57,9 @@ struct FitOptions : CommonFitOptions {
   /// Intensities may have both signs, also if all values have one. A sum can then end sharply at the
   /// border of a plateau, which it exceeds inside. This gains up to 4 dB on some volumes and loses up
   /// to 2 dB on others, and a fit takes about twice as long (docs/lab-notes.md, "Signs"). Default:
-  /// fit() allows the signs of the values. The searches of convertVolume() for a SizeGoal or a
-  /// PsnrGoal choose by short fits if many voxels have an extreme value.
+  /// fit() allows the signs of the values. The searches of convertVolume() for a size or a PSNR, which
+  /// all goals but FitGoal and LosslessGoal use, choose by short fits if many voxels have an extreme
+  /// value.
   std::optional<bool> bothSigns;
 };
 
