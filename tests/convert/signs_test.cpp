@@ -16,7 +16,7 @@
 namespace esvr {
 namespace {
 
-/// A gyroid whose inside is a gyroidau. Many of its borders are concave.
+/// A gyroid whose inside is a plateau. Many of its borders are concave.
 SparseVolume gyroidVolume() {
   constexpr double kTurns = 2.0 * std::numbers::pi / 22.0;  // a period of 22 voxels
   return test::volumeOf({}, 4, 0.0f, [](Coord v) {

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -90,6 +91,23 @@ TEST_P(OptimiserOn, AFitForDrawingIsCloserBetweenVoxels) {
   EXPECT_GT(psnrBetween(volume_, forDrawing.field, {.range = forDrawing.range}),
             psnrBetween(volume_, forVoxels.field, {.range = forVoxels.range}) + 3.0);
   EXPECT_LT(forDrawing.curve.back().psnrBox, forVoxels.curve.back().psnrBox);
+}
+
+// The volume's values have one sign. Only with both signs may ellipsoids subtract from the sum.
+TEST_P(OptimiserOn, SignsOfIntensitiesAreThoseThatAreAllowed) {
+  for (const bool both : {false, true}) {
+    target_.bothSigns = both;
+    const auto optimiser = make();
+    optimiser->growTo(100);
+    const double seeded = optimiser->measure().squaredSum;
+    optimiser->iterate(std::vector<double>(100, 0.5));
+    optimiser->growTo(200);  // the second seeds also see where the sum is too large
+    optimiser->iterate(std::vector<double>(100, 0.5));
+    const auto found = optimiser->ellipsoids();
+    const auto isNegative = [](const Ellipsoid& e) { return e.intensity < 0.0f; };
+    EXPECT_EQ(std::any_of(found.begin(), found.end(), isNegative), both);
+    EXPECT_LT(optimiser->measure().squaredSum, 0.2 * seeded) << both;
+  }
 }
 
 TEST_P(OptimiserOn, RelocatesTheLeastUsefulAndKeepsTheCount) {
