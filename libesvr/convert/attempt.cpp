@@ -107,14 +107,13 @@ Attempt attempt(const Job& job, double count, FitLength length) {
   return result;
 }
 
-Attempt firstAttempt(const ConvertInput& input, double count, ConvertOptions& options) {
+Attempt withBetterSigns(const ConvertInput& input, Attempt own, ConvertOptions& options) {
   const Job job{input, options};
-  Attempt own = attempt(job, count, FitLength::kShort);
   const FitOptions& fit = options.fit;
   if (own.cancelled() || fit.bothSigns || fit.narrowBand || !saturates(input.source)) return own;
   std::optional<Attempt> found;
   try {
-    found = betterSigned(job, count, own);
+    found = betterSigned(job, double(own.asked), own);
   } catch (const Cancelled&) {
     // The search continues with `own`, which the token marks as cancelled below.
   }

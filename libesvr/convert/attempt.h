@@ -51,12 +51,13 @@ struct Attempt {
 /// Fits about `count` ellipsoids: at least one, and at most the number of active voxels.
 [[nodiscard]] Attempt attempt(const Job& job, double count, FitLength length);
 
-/// The first attempt of a search: a short fit. It also decides whether intensities have both signs
-/// (FitOptions::bothSigns in `options`), unless this is already set: where many voxels have an
-/// extreme value and the volume is no narrow band, a second short fit with both signs is compared,
-/// if two very short fits show that it could be better.
-[[nodiscard]] Attempt firstAttempt(const ConvertInput& input, double count,
-                                   ConvertOptions& options);
+/// Decides whether intensities have both signs (FitOptions::bothSigns in `options`), unless this is
+/// already set: where many voxels have an extreme value and the volume is no narrow band, a second
+/// short fit with both signs is compared, if two very short fits show that it could be better.
+/// \param own  a short fit with the signs of the values, with about as many ellipsoids as are wanted
+/// \return the better of the short fits
+[[nodiscard]] Attempt withBetterSigns(const ConvertInput& input, Attempt own,
+                                      ConvertOptions& options);
 
 /// Loss of PSNR by quantising, dB, at which further bytes gain as much in more ellipsoids as in
 /// more bits (docs/lab-notes.md, "More ellipsoids or more bits").

@@ -6,13 +6,17 @@
 #include <utility>
 #include <vector>
 
+#include "convert/psnr_slope.h"
+#include "esvr/error.h"
+
 namespace esvr::convert {
 namespace {
 
 // Usual values. They decide how many fits a search takes; the PSNR of every fit is measured.
 constexpr double kVoxelsPerEllipsoid = 35.0;  // active voxels per ellipsoid of the first guess
 constexpr double kMaxGrowth = 8.0;            // largest factor of the number between two fits
-constexpr std::size_t kMaxFits = 3;           // the search continues if none reached the PSNR
+constexpr double kNear = 1.3;        // factor of the number up to which a short fit is extrapolated
+constexpr std::size_t kMaxFits = 3;  // the search continues if none reached the PSNR
 
 /// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
 /// the size hardly differs.
@@ -37,7 +41,7 @@ class PsnrSearch {
   }
 
   PsnrResult run() {
-    const Attempt draft = firstAttempt(job_.input, firstCount(), options_);
+    Attempt draft = nearDraft();
     std::uint64_t expected = 0;
     if (below_ && !draft.cancelled()) {
       const double price = priceOf(draft, compacted(job_, draft, {})) / kShortFitPrice;
@@ -45,7 +49,8 @@ class PsnrSearch {
       if (price * neededCount(draft, aim() - kShortFitBehind - kUncertainty) > double(*below_))
         return {std::nullopt, expected};
     }
-    fitUntilReached(scaledCount(draft, aim() - kShortFitBehind));
+    if (!draft.cancelled()) fitUntilReached(scaledCount(draft, aim() - kShortFitBehind));
+    if (attempts_.empty()) return {marked(std::move(draft), FitEnd::kCancelled), expected};
     return {anyReached() ? smallest() : best(), expected};
   }
 
@@ -56,9 +61,49 @@ class PsnrSearch {
     return capped(guess);
   }
 
+  /// An attempt, or nothing if the search was cancelled before it had an ellipsoid.
+  [[nodiscard]] std::optional<Attempt> unlessCancelled(double count, FitLength length) const try {
+    return attempt(job_, count, length);
+  } catch (const Cancelled&) {
+    return std::nullopt;
+  }
+
+  [[nodiscard]] static Attempt cancelled(Attempt attempt) {
+    attempt.fit.end = FitEnd::kCancelled;
+    return attempt;
+  }
+
+  void markCancelled() {
+    for (Attempt& a : attempts_) a.fit.end = FitEnd::kCancelled;
+  }
+
+  /// True if the number of ellipsoids may suffice, even if the PSNR grows steeply.
+  [[nodiscard]] bool canReach(const Attempt& draft) const {
+    const double psnr = aim() - kShortFitBehind - kUncertainty;
+    return convert::neededCount(pointOf(draft), psnr, kMaxDbPerDoubling) <= double(maxCount_);
+  }
+
+  /// A short fit whose number of ellipsoids is near the one that the PSNR needs, with the better
+  /// signs. The first guess can be far from it, where signs and prices differ.
+  [[nodiscard]] Attempt nearDraft() {
+    Attempt draft = attempt(job_, firstCount(), FitLength::kShort);
+    const double count = capped(scaledCount(draft, aim() - kShortFitBehind));
+    const double ratio = count / pointOf(draft).count;
+    const bool isFar = std::max(ratio, 1.0 / ratio) > kNear;
+    if (!draft.cancelled() && isFar && canReach(draft)) {
+      auto nearer = unlessCancelled(count, FitLength::kShort);
+      if (!nearer) return cancelled(std::move(draft));
+      slope_ = dbPerDoubling(pointOf(draft), pointOf(*nearer));
+      draft = std::move(*nearer);
+    }
+    return withBetterSigns(job_.input, std::move(draft), options_);
+  }
+
   void fitUntilReached(double count) {
     do {
-      attempts_.push_back(attempt(job_, capped(count), FitLength::kWhole));
+      auto next = unlessCancelled(capped(count), FitLength::kWhole);
+      if (!next) return markCancelled();
+      attempts_.push_back(std::move(*next));
       if (attempts_.back().cancelled() || goodEnough(attempts_.back())) break;
       count = nextCount();
     } while (attempts_.size() < kMaxFits || !anyReached());
@@ -83,15 +128,18 @@ class PsnrSearch {
     return nearAim(a) || (a.psnr < psnr_ + margin_.min && allThereIs);
   }
 
+  [[nodiscard]] static CountPoint pointOf(const Attempt& a) {
+    return {double(std::max<std::size_t>(a.count(), 1)), a.psnr};
+  }
+
   /// The number of ellipsoids that should reach a PSNR, extrapolated from an attempt.
-  [[nodiscard]] static double neededCount(const Attempt& from, double psnr) {
-    return double(std::max<std::size_t>(from.count(), 1)) *
-           std::exp2((psnr - from.psnr) / kDbPerDoubling);
+  [[nodiscard]] double neededCount(const Attempt& from, double psnr) const {
+    return convert::neededCount(pointOf(from), psnr, slope_);
   }
 
   /// The number of ellipsoids of the next fit: neededCount(), but not too far from the attempt's.
-  [[nodiscard]] static double scaledCount(const Attempt& from, double psnr) {
-    const double count = double(std::max<std::size_t>(from.count(), 1));
+  [[nodiscard]] double scaledCount(const Attempt& from, double psnr) const {
+    const double count = pointOf(from).count;
     return std::clamp(neededCount(from, psnr), count / kMaxGrowth, count * kMaxGrowth);
   }
 
@@ -164,6 +212,7 @@ class PsnrSearch {
   bool compact_;
   Margin margin_;
   std::uint64_t maxCount_;
+  double slope_ = kDbPerDoubling;
   std::vector<Attempt> attempts_;
 };
 

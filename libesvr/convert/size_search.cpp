@@ -30,7 +30,8 @@ class SizeSearch {
       : options_(job.options), job_{job.input, options_}, bytes_(bytes), above_(above) {}
 
   SizeResult run() {
-    Attempt last = firstAttempt(job_.input, double(bytes_) / kBytesPerEllipsoid, options_);
+    Attempt last = attempt(job_, double(bytes_) / kBytesPerEllipsoid, FitLength::kShort);
+    last = withBetterSigns(job_.input, std::move(last), options_);
     const double expected = last.psnr + kShortFitBehind - kUsualLoss;
     if (above_ && !last.cancelled() && expected + kUncertainty < *above_)
       return {std::nullopt, 0, expected};

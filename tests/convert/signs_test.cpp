@@ -63,25 +63,31 @@ TEST(Signs, SlowAreBothForAGyroidOfAGivenSize) {
   EXPECT_GT(psnrOf(gyroid, free), psnrOf(gyroid, positive) + 1.0);
 }
 
-TEST(Signs, AreChosenByTheFirstAttempt) {
+/// A short fit, and the same with the better signs.
+convert::Attempt withBetterSigns(const SparseVolume& volume, double count,
+                                 ConvertOptions& options) {
+  const ConvertInput input{descriptor(), volume};
+  return convert::withBetterSigns(
+      input, attempt({input, options}, count, convert::FitLength::kShort), options);
+}
+
+TEST(Signs, AreChosenAfterAShortFit) {
   ConvertOptions options = searching(PsnrGoal{40.0});
-  const auto first = convert::firstAttempt({descriptor(), gyroidVolume()}, 800, options);
+  const auto first = withBetterSigns(gyroidVolume(), 800, options);
   EXPECT_TRUE(options.fit.bothSigns.value_or(false));
   EXPECT_TRUE(first.fit.signedIntensities);
 }
 
 TEST(Signs, AreThoseOfTheValuesWhereFewAreExtreme) {
   ConvertOptions options = searching(SizeGoal{6000});
-  const SparseVolume smooth = test::smoothVolume();
-  (void)convert::firstAttempt({descriptor(), smooth}, 50, options);
+  (void)withBetterSigns(test::smoothVolume(), 50, options);
   EXPECT_FALSE(options.fit.bothSigns);
 }
 
 TEST(Signs, OfAnOptionAreKept) {
   ConvertOptions options = searching(SizeGoal{6000});
   options.fit.bothSigns = false;
-  const SparseVolume gyroid = gyroidVolume();
-  (void)convert::firstAttempt({descriptor(), gyroid}, 50, options);
+  (void)withBetterSigns(gyroidVolume(), 50, options);
   EXPECT_FALSE(*options.fit.bothSigns);
 }
 
