@@ -14,9 +14,14 @@ namespace {
 
 constexpr std::uint32_t kShortFitDivisor = 4;  // a full fit has 4 times the iterations
 
-FitOptions optionsFor(const Job& job, std::size_t count, FitLength length) {
+std::size_t within(double count, std::uint64_t voxels) {
+  return std::size_t(
+      std::clamp(std::floor(count), 1.0, double(std::max<std::uint64_t>(voxels, 1))));
+}
+
+FitOptions optionsFor(const Job& job, double count, FitLength length) {
   FitOptions options = job.options.fit;
-  options.count = count;
+  options.count = within(count, activeVoxelCount(job.input.source));
   options.psnr.reset();
   options.seconds.reset();
   return length == FitLength::kWhole ? options : shortened(std::move(options));
@@ -69,11 +74,6 @@ std::optional<Attempt> betterSigned(const Job& job, double count, const Attempt&
   return found;
 }
 
-std::size_t within(double count, std::uint64_t voxels) {
-  return std::size_t(
-      std::clamp(std::floor(count), 1.0, double(std::max<std::uint64_t>(voxels, 1))));
-}
-
 }  // namespace
 
 Activity voxelActivity(const Job& job) {
@@ -96,15 +96,30 @@ FitOptions shortened(FitOptions options) {
   return options;
 }
 
-Attempt attempt(const Job& job, double count, FitLength length) {
+namespace {
+
+Attempt attempted(const Job& job, const FitOptions& options) {
   const SparseVolume& source = job.input.source;
   Attempt result;
-  result.asked = within(count, activeVoxelCount(source));
-  result.fit = fit(source, optionsFor(job, result.asked, length));
+  result.asked = *options.count;
+  result.fit = fit(source, options);
   result.grid = makeStoredGrid(job.input.descriptor, source, std::move(result.fit.field),
                                job.options.storage.activity);
   result.psnr = psnrOf(job, result.grid);
   return result;
+}
+
+}  // namespace
+
+Attempt attempt(const Job& job, double count, FitLength length) {
+  return attempted(job, optionsFor(job, count, length));
+}
+
+Attempt continued(const Job& job, const Attempt& from, double count) {
+  const double more = std::max(count, double(from.count()));
+  FitOptions options = optionsFor(job, more, FitLength::kShort);
+  options.start = &from.grid.field;
+  return attempted(job, options);
 }
 
 Attempt withBetterSigns(const ConvertInput& input, Attempt own, ConvertOptions& options) {

@@ -15,8 +15,9 @@ namespace {
 // Usual values. They decide how many fits a search takes; the PSNR of every fit is measured.
 constexpr double kVoxelsPerEllipsoid = 35.0;  // active voxels per ellipsoid of the first guess
 constexpr double kMaxGrowth = 8.0;            // largest factor of the number between two fits
-constexpr double kNear = 1.3;        // factor of the number up to which a short fit is extrapolated
-constexpr std::size_t kMaxFits = 3;  // the search continues if none reached the PSNR
+constexpr double kNear = 1.3;  // factor of the number up to which a short fit is extrapolated
+constexpr double kMaxContinued = 1.5;  // largest growth of the number by a continued fit
+constexpr std::size_t kMaxFits = 4;    // the search continues if none reached the PSNR
 
 /// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
 /// the size hardly differs.
@@ -61,11 +62,28 @@ class PsnrSearch {
     return capped(guess);
   }
 
-  /// An attempt, or nothing if the search was cancelled before it had an ellipsoid.
-  [[nodiscard]] std::optional<Attempt> unlessCancelled(double count, FitLength length) const try {
-    return attempt(job_, count, length);
+  /// The result of a fit, or nothing if it was cancelled before it had an ellipsoid.
+  template <class Fit>
+  [[nodiscard]] static std::optional<Attempt> unlessCancelled(const Fit& fit) try {
+    return fit();
   } catch (const Cancelled&) {
     return std::nullopt;
+  }
+
+  /// The attempt with the most ellipsoids from which a fit can continue; null if there is none.
+  [[nodiscard]] const Attempt* startFor(double count) const {
+    const Attempt* start = nullptr;
+    for (const Attempt& a : attempts_) {
+      const double from = pointOf(a).count;
+      const bool fits = from <= count && kMaxContinued * from >= count;
+      if (fits && (!start || a.count() > start->count())) start = &a;
+    }
+    return start;
+  }
+
+  [[nodiscard]] Attempt next(double count) const {
+    const Attempt* start = startFor(count);
+    return start ? continued(job_, *start, count) : attempt(job_, count, FitLength::kWhole);
   }
 
   [[nodiscard]] static Attempt cancelled(Attempt attempt) {
@@ -91,7 +109,7 @@ class PsnrSearch {
     const double ratio = count / pointOf(draft).count;
     const bool isFar = std::max(ratio, 1.0 / ratio) > kNear;
     if (!draft.cancelled() && isFar && canReach(draft)) {
-      auto nearer = unlessCancelled(count, FitLength::kShort);
+      auto nearer = unlessCancelled([&] { return attempt(job_, count, FitLength::kShort); });
       if (!nearer) return cancelled(std::move(draft));
       slope_ = dbPerDoubling(pointOf(draft), pointOf(*nearer));
       draft = std::move(*nearer);
@@ -101,9 +119,9 @@ class PsnrSearch {
 
   void fitUntilReached(double count) {
     do {
-      auto next = unlessCancelled(capped(count), FitLength::kWhole);
-      if (!next) return markCancelled();
-      attempts_.push_back(std::move(*next));
+      auto found = unlessCancelled([&] { return next(capped(count)); });
+      if (!found) return markCancelled();
+      attempts_.push_back(std::move(*found));
       if (attempts_.back().cancelled() || goodEnough(attempts_.back())) break;
       count = nextCount();
     } while (attempts_.size() < kMaxFits || !anyReached());

@@ -6,6 +6,7 @@
 #include "esvr/error.h"
 #include "fit/empty_fit.h"
 #include "fit/export_field.h"
+#include "fit/import_field.h"
 #include "fit/run.h"
 
 namespace esvr {
@@ -37,6 +38,16 @@ void check(const FitOptions& options) {
   if (!(options.voxelShare >= 0.0 && options.voxelShare <= 1.0))
     throw UsageError("the share of iterations at voxels must be between 0 and 1");
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
+}
+
+std::vector<Ellipsoid> startOf(const FitOptions& options, Coord origin, double scale) {
+  if (!options.start) return {};
+  return importField(*options.start, origin, scale);
+}
+
+float firstKappa(const FitOptions& options, const Tuning& tuning) {
+  if (options.kappa) return *options.kappa;
+  return options.start ? options.start->kernel.kappa : tuning.firstKappa;
 }
 
 RunPlan planFor(const FitTarget& target, const FitOptions& options) {
@@ -88,9 +99,14 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   if (isEmpty(target)) return emptyFit(volume, options.kappa.value_or(Kernel{}.kappa));
 
   Recorder recorder(target, options);
-  const RunPlan plan = planFor(target, options);
+  const auto start = startOf(options, volume.origin, target.scale);
+  RunPlan plan = planFor(target, options);
+  plan.start = start;
+  if (start.size() > plan.count)
+    throw UsageError("a fit of " + std::to_string(plan.count) +
+                     " ellipsoids cannot continue from " + std::to_string(start.size()));
   OptimiserOptions optimiserOptions{{}, options.seed, options.device, options.maxDeviceBytes};
-  optimiserOptions.kernel.kappa = options.kappa.value_or(tuning.firstKappa);
+  optimiserOptions.kernel.kappa = firstKappa(options, tuning);
 
   const auto optimiser = makeOptimiser(target, optimiserOptions, tuning);
   const RunEnd end = run(*optimiser, target, recorder, plan, tuning);

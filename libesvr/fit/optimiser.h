@@ -42,6 +42,9 @@ class Optimiser {
  public:
   virtual ~Optimiser() = default;
 
+  /// Replaces the ellipsoids. The new ones have taken no step yet.
+  virtual void setEllipsoids(std::span<const Ellipsoid> ellipsoids) = 0;
+
   /// Adds seeds at voxels of large error until there are `count` ellipsoids or no error is left.
   virtual void growTo(std::size_t count) = 0;
 

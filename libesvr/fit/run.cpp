@@ -13,6 +13,7 @@ constexpr std::uint32_t kCurvePoints = 32;
 constexpr double kReachedMargin = 1e-3;  // dB, more than the rounding to float32 can cost
 
 std::size_t firstCount(const RunPlan& plan, const Tuning& tuning) {
+  if (!plan.start.empty()) return plan.start.size();
   const auto share = std::size_t(std::llround(tuning.firstShare * double(plan.count)));
   return std::clamp<std::size_t>(share, 1, plan.count);
 }
@@ -28,7 +29,10 @@ class FitRun {
         schedule_{firstCount(plan, tuning), plan.count, plan.iterations, tuning},
         kappa_(tuning.kappaStep) {}
 
-  RunEnd run() { return {iterateToEnd(), done_}; }
+  RunEnd run() {
+    if (!plan_.start.empty()) optimiser_.setEllipsoids(plan_.start);
+    return {iterateToEnd(), done_};
+  }
 
  private:
   FitEnd iterateToEnd() {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "fit/recorder.h"
 #include "fit/schedule.h"
@@ -15,7 +16,8 @@ struct RunPlan {
   std::uint32_t iterations = 0;   ///< length of the schedule
   std::optional<double> psnr;     ///< dB over the box; the run ends as soon as it is reached
   std::optional<double> seconds;  ///< time limit; replaces `iterations` as length of the schedule
-  bool learnKappa = false;        ///< whether kappa is fitted or stays the same
+  std::span<const Ellipsoid> start{};  ///< ellipsoids to begin with; empty: seeds
+  bool learnKappa = false;             ///< whether kappa is fitted or stays the same
 };
 
 struct RunEnd {

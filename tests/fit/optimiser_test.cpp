@@ -12,6 +12,7 @@
 #include <array>
 #include <cmath>
 
+#include "esvr/error.h"
 #include "esvr/psnr_between.h"
 #include "support/on_device.h"
 #include "volumes.h"
@@ -35,6 +36,9 @@ class OptimiserOn : public test::OnDevice {
     options.device = options_.device;
     return fit(test::tubeVolume(shift), options).field;
   }
+
+  /// PSNR of a fit's last state over the box, dB.
+  static double psnrOf(const FitResult& result) { return result.curve.back().psnrBox; }
 
   OptimiserOptions options_;
   SparseVolume volume_ = test::tubeVolume();
@@ -108,6 +112,33 @@ TEST_P(OptimiserOn, SignsOfIntensitiesAreThoseThatAreAllowed) {
     EXPECT_EQ(std::any_of(found.begin(), found.end(), isNegative), both);
     EXPECT_LT(optimiser->measure().squaredSum, 0.2 * seeded) << both;
   }
+}
+
+TEST_P(OptimiserOn, AContinuedFitIsBetterThanItsStartAndThanOneFromSeeds) {
+  FitOptions options;
+  options.device = options_.device;
+  options.count = 150;
+  options.iterations = 400;
+  const FitResult start = fit(volume_, options);
+  options.count = 200;
+  options.iterations = 100;
+  const double fromSeeds = psnrOf(fit(volume_, options));
+  options.start = &start.field;
+  const FitResult continued = fit(volume_, options);
+  EXPECT_GT(continued.field.ellipsoidCount(), start.field.ellipsoidCount());
+  EXPECT_GT(psnrOf(continued), psnrOf(start) + 0.5);
+  EXPECT_GT(psnrOf(continued), fromSeeds + 0.5);
+}
+
+TEST_P(OptimiserOn, AFitDoesNotContinueFromMoreEllipsoidsThanWanted) {
+  FitOptions options;
+  options.count = 20;
+  options.iterations = 60;
+  options.device = options_.device;
+  const FitResult first = fit(volume_, options);
+  options.start = &first.field;
+  options.count = 10;
+  EXPECT_THROW((void)fit(volume_, options), UsageError);
 }
 
 TEST_P(OptimiserOn, RelocatesTheLeastUsefulAndKeepsTheCount) {

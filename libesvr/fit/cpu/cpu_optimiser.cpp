@@ -82,6 +82,13 @@ std::vector<Ellipsoid> CpuOptimiser::newSeeds(std::size_t count) {
   return seedsFromResidual({pass_.index(), residuals_}, options);
 }
 
+void CpuOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
+  ellipsoids_.assign(ellipsoids.begin(), ellipsoids.end());
+  states_.assign(ellipsoids_.size(), {});
+  gradients_.assign(ellipsoids_.size(), {});
+  stale_ = true;
+}
+
 void CpuOptimiser::growTo(std::size_t count) {
   if (count <= ellipsoids_.size()) return;
   const auto seeds = newSeeds(count - ellipsoids_.size());

@@ -18,6 +18,7 @@ class CpuOptimiser final : public Optimiser {
   /// The target must outlive the optimiser.
   CpuOptimiser(const FitTarget& target, const OptimiserOptions& options, const Tuning& tuning);
 
+  void setEllipsoids(std::span<const Ellipsoid> ellipsoids) override;
   void growTo(std::size_t count) override;
   void relocate(std::size_t count) override;
   double iterate(std::span<const double> factors) override;

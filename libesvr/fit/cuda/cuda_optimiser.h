@@ -27,6 +27,7 @@ class CudaOptimiser final : public Optimiser {
   /// The device of the options must be the current one.
   CudaOptimiser(const FitTarget& target, const OptimiserOptions& options, const Tuning& tuning);
 
+  void setEllipsoids(std::span<const Ellipsoid> ellipsoids) override;
   void growTo(std::size_t count) override;
   void relocate(std::size_t count) override;
   double iterate(std::span<const double> factors) override;
@@ -47,8 +48,6 @@ class CudaOptimiser final : public Optimiser {
   /// The gradients of 1/2 sum r^2 for the current ellipsoids.
   /// \param threads  threads for each brick, which do not change the result
   [[nodiscard]] std::vector<EllipsoidGradient> gradients(int threads = ThreadsPerBrick::threads(1));
-  /// Replaces the ellipsoids. The new ones have taken no step yet.
-  void setEllipsoids(std::span<const Ellipsoid> ellipsoids);
 
  private:
   void setKernel();

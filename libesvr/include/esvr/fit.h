@@ -61,6 +61,10 @@ struct FitOptions : CommonFitOptions {
   /// all goals but FitGoal and LosslessGoal use, choose by short fits if many voxels have an extreme
   /// value.
   std::optional<bool> bothSigns;
+  /// A field that was fitted to the same volume. The fit continues from its ellipsoids and its edge,
+  /// and adds ellipsoids until there are `count`. The field must outlive the call. Null: the fit
+  /// begins with seeds.
+  const Field* start = nullptr;
 };
 
 enum class FitEnd { kScheduleDone, kPsnrReached, kTimeUp, kCancelled, kPsnrMissed };
@@ -98,7 +102,7 @@ struct FitResult {
 /// \return a result whose end is kPsnrMissed if options.psnr was given and not reached;
 ///         convertVolume (convert.h) searches for the smallest grid that reaches a PSNR
 /// \throws BadInput    the volume has no active voxel
-/// \throws UsageError  count is 0, or options contradict each other
+/// \throws UsageError  count is 0 or less than options.start has, or options contradict each other
 /// \throws Cancelled   the fit was cancelled before it had a result
 /// \throws DeviceError  the GPU cannot be used or has too little memory
 /// \throws RuntimeFailure  the fit diverged
