@@ -279,9 +279,15 @@ is not larger.
 """
 
 
+def version_lines(versions):
+    lines = [f"esvr-compare {versions['esvr']}", f".esvr format {versions['format']}",
+             versions['vdb'], versions['cuda']]
+    return lines + ([versions['zfp']] if versions['zfp'] else [])
+
+
 def introduction(tables):
     table = next(iter(tables.values()))
-    return [INTRODUCTION, '    ' + '\n    '.join(table['versions']), '']
+    return [INTRODUCTION, '    ' + '\n    '.join(version_lines(table['versions'])), '']
 
 
 def reference_cost(table):
