@@ -9,7 +9,6 @@ namespace {
 using cli::Arguments;
 using cli::po::value;
 
-constexpr int kMaxBins = 16;
 constexpr double kMinVram = 0.001, kMaxVram = 1e4;  // GB
 
 std::optional<NanoValues> valuesOf(const Arguments& a) {
@@ -25,8 +24,8 @@ std::optional<NanoValues> valuesOf(const Arguments& a) {
 
 RendererLimits limitsOf(const Arguments& a) {
   RendererLimits limits;
-  if (const auto parts = a.find<int>("bins")) {
-    cli::requireRange("bins", *parts, 1, kMaxBins);
+  if (const auto parts = a.find<int>("depth-parts")) {
+    cli::requireRange("depth-parts", *parts, 1, RendererLimits::kMaxDepthParts);
     limits.depthParts = *parts;
   }
   if (const auto gigabytes = a.find<double>("max-vram")) {
@@ -45,7 +44,7 @@ void addDeviceOptions(cli::po::options_description& options) {
     ("max-vram", value<double>()->value_name("GB"),
      "GPU memory to use; if it is small, large pictures are drawn in bands (default: all free "
      "memory)")
-    ("bins", value<int>()->value_name("N"),
+    ("depth-parts", value<int>()->value_name("N"),
      "number of parts, 1 to 16, into which a GPU divides the depth of the scene to draw them in "
      "parallel (default: chosen from the first picture)")
     ("method", value<std::string>()->value_name("M")->default_value("ellipsoids"),

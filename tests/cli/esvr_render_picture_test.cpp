@@ -118,7 +118,7 @@ TEST_F(EsvrRender, PartsOfTheDepthAndMemoryChangeNothingOnGpu) {
   selectOrSkip("cuda", gpu);
   if (IsSkipped()) return;
   const auto usual = picture("in.esvr", {"--device", "cuda"});
-  EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--bins", "3"}), usual), 48.0);
+  EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--depth-parts", "3"}), usual), 48.0);
   EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--max-vram", "1"}), usual), 48.0);
   // A row of tiles of the widest picture takes more than 1 MB.
   const auto refused = draw("in.esvr", "none.png",

@@ -42,7 +42,7 @@ TEST_F(EsvrRender, OptionsThatMakeNoSenseAreRefused) {
   expectRefused({"--frames", "0-1"}, 2, "--turntable");
   expectRefused({"--turntable", "3", "--frames", "2-3"}, 2, "--frames");
   expectRefused({"--depth", "z.png"}, 2, ".exr");
-  expectRefused({"--bins", "17"}, 2, "--depth-parts");
+  expectRefused({"--depth-parts", "17"}, 2, "--depth-parts");
   expectRefused({"--values", "fp32"}, 2, "fp16");
   expectRefused({"--sheet", "s.png"}, 2, "--ref");
   expectRefused({"--min-transmittance", "1"}, 2, "transmittance");
