@@ -167,7 +167,7 @@ std::string page(const CurvesReport& report, const report::DataTable& data,
   for (const auto& [ending, plot] : plots)
     page.pictures.push_back({plot.title, "image/svg+xml", report::toSvg(plot)});
   page.tables = {filesOf(data)};
-  page.commands = versions();
+  page.commands = versionLines();
   page.commands.insert(page.commands.begin(), joined(report.commandLine));
   return report::toHtml(page);
 }

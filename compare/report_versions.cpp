@@ -1,7 +1,9 @@
 #include "compare/report_versions.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
+#include "cli/version_json.h"
 #include "cli/version_text.h"
 #include "compare/program.h"
 #include "esvr/baseline.h"
@@ -14,7 +16,7 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-std::vector<std::string> versions() {
+std::vector<std::string> versionLines() {
   std::vector<std::string> lines;
   std::string text = cli::versionText(kProgram);
   for (std::size_t begin = 0; begin < text.size();) {
@@ -24,6 +26,14 @@ std::vector<std::string> versions() {
   }
   if (!zfpVersion().empty()) lines.push_back(zfpVersion());
   return lines;
+}
+
+nlohmann::ordered_json versionJson() {
+  using Json = nlohmann::ordered_json;
+  Json versions = cli::versionJson();
+  const std::string zfp = zfpVersion();
+  versions["zfp"] = zfp.empty() ? Json() : Json(zfp);
+  return versions;
 }
 
 }  // namespace esvr::compare

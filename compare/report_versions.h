@@ -1,6 +1,7 @@
 #pragma once
 /// The programs and versions that a report names.
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,9 @@ namespace esvr::compare {
 [[nodiscard]] std::string joined(const std::vector<std::string>& words);
 
 /// One line for the program, the format and each library.
-[[nodiscard]] std::vector<std::string> versions();
+[[nodiscard]] std::vector<std::string> versionLines();
+
+/// The versions that reports of all programs have, and that of ZFP; null if there is none.
+[[nodiscard]] nlohmann::ordered_json versionJson();
 
 }  // namespace esvr::compare

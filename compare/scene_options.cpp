@@ -1,6 +1,7 @@
 #include "compare/scene_options.h"
 
 #include "cli/byte_size.h"
+#include "cli/device_option.h"
 #include "cli/memory_limit.h"
 #include "compare/measure_options.h"
 
@@ -18,10 +19,9 @@ void addSceneOptions(cli::CommandLine& line) {
   // clang-format off
   line.options().add_options()
     ("max-dense", value<std::string>()->value_name("BYTES")->default_value("1GB"),
-     "leave ZFP out if the box as an array of floats takes more than this")
-    ("device", value<std::string>()->value_name("D")->default_value("auto"),
-     "device for fits and pictures: auto, cpu, cuda or cuda:N");
+     "leave ZFP out if the box as an array of floats takes more than this");
   // clang-format on
+  cli::addDevice(line.options(), "device for fits and pictures: ");
   cli::addMaxMemory(line);
 }
 
@@ -34,7 +34,7 @@ void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
   options.box = boxOption(a);
   options.peak = peakOption(a);
   options.maxDense = cli::parseByteSize("max-dense", a.get<std::string>("max-dense"));
-  options.device = a.get<std::string>("device");
+  options.device = cli::deviceOf(a);
   options.maxMemory = cli::maxMemoryOf(a);
   options.threads = a.threads;
   options.verbosity = a.verbosity;

@@ -210,7 +210,7 @@ std::string markdown(const TableOptions& options, const TableRecord& record) {
     text += report::toMarkdown(table) + '\n';
   }
   text += "Made by `" + joined(options.commandLine) + "` with\n\n";
-  for (const auto& line : versions()) text += "    " + line + '\n';
+  for (const auto& line : versionLines()) text += "    " + line + '\n';
   return text;
 }
 
@@ -240,7 +240,7 @@ std::string html(const TableOptions& options, const TableRecord& record) {
                      pictureLine(record), interruption(record)};
   page.tables = {withoutEmptyColumns(dataTable(record, record.rows))};
   addPictures(record, page);
-  page.commands = versions();
+  page.commands = versionLines();
   page.commands.insert(page.commands.begin(), joined(options.commandLine));
   return report::toHtml(page);
 }
@@ -296,7 +296,7 @@ Json tableJson(const TableOptions& options, const TableRecord& record) {
   return {{"schema", kTableSchema},
           {"schema_version", kTableVersion},
           {"command_line", options.commandLine},
-          {"versions", versions()},
+          {"versions", versionJson()},
           {"reference", options.reference.string()},
           {"grid", record.grid},
           {"active_voxels", record.activeVoxels},

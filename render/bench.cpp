@@ -24,7 +24,7 @@ constexpr double kSlowest = 0.01;  // share of the frames that "1 % low" average
 /// The times of all frames after the warm-up.
 struct Times {
   std::vector<double> frameMs, listMs, drawMs;
-  double pairs = 0.0, occupancy = 0.0;  ///< means over the frames
+  double listEntries = 0.0, occupancy = 0.0;  ///< means over the frames
   FrameStats last;
 };
 
@@ -50,7 +50,7 @@ void count(const FrameStats& stats, double seconds, int views, Times& times) {
   times.frameMs.push_back(seconds * 1e3);
   times.listMs.push_back(stats.listMs);
   times.drawMs.push_back(stats.drawMs);
-  times.pairs += double(stats.pairs) / views;
+  times.listEntries += double(stats.listEntries) / views;
   times.occupancy += stats.occupancy / views;
   times.last = stats;
 }
@@ -77,9 +77,9 @@ Json figures(const Times& t) {
           {"draw_ms", drawMs},
           {"device_bytes", t.last.deviceBytes},
           {"occupancy", t.occupancy},
-          {"pairs", t.pairs},
-          {"pairs_per_second", drawMs > 0.0 ? t.pairs / drawMs * 1e3 : 0.0},
-          {"bins", t.last.depthParts}};
+          {"list_entries", t.listEntries},
+          {"list_entries_per_second", drawMs > 0.0 ? t.listEntries / drawMs * 1e3 : 0.0},
+          {"depth_parts", t.last.depthParts}};
 }
 
 std::string summary(const std::string& what, const Json& f) {

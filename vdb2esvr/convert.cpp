@@ -31,7 +31,7 @@ void countHits(const SparseVolume& source, ConvertedGrid& grid) {
   std::vector<Coord> corners;
   for (std::size_t b = 0; b < source.brickCount(); ++b) corners.push_back(source.brickCorner(b));
   grid.hits = averageHits(grid.stored().field);
-  grid.voxelPairs = esvr::countHits(grid.stored().field, corners).pairs;
+  grid.voxelPairs = esvr::countHits(grid.stored().field, corners).voxelPairs;
 }
 
 /// The error of the sum between voxels, where it is meant to be drawn.

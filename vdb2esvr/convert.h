@@ -27,7 +27,7 @@ struct ConvertedGrid {
   std::uint64_t nonFiniteReplaced = 0;
   std::string device;                       ///< name of the device that fitted the grid
   std::optional<double> hits;               ///< averageHits, with --hits
-  std::optional<std::uint64_t> voxelPairs;  ///< pairs of countHits in the source's bricks, --hits
+  std::optional<std::uint64_t> voxelPairs;  ///< those of countHits in the source's bricks, --hits
   std::optional<PaperRecord> paper;         ///< record of the paper's method, with --paper
   std::optional<std::string> sameAs;        ///< unique name of the grid that this one is a twin of
   PhaseSeconds seconds;

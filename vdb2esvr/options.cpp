@@ -6,6 +6,7 @@
 #include "cli/byte_size.h"
 #include "cli/choice.h"
 #include "cli/command_line.h"
+#include "cli/device_option.h"
 #include "cli/error_bound.h"
 #include "cli/memory_limit.h"
 #include "cli/table.h"
@@ -122,11 +123,11 @@ void addFitOptions(cli::po::options_description& options) {
      "PSNR that --storage compact may lose in a single fit; --size, --psnr and --max-error ignore "
      "this option")
     ("paper", value<std::vector<std::string>>()->value_name("KEY=VALUE,...")->composing(),
-     "fit by the paper's method, for comparison; --help paper lists the keys")
-    ("device", value<std::string>()->value_name("D")->default_value("auto"),
-     "auto (a GPU if one is usable), cpu, cuda or cuda:N")
-    ("max-vram", value<double>()->value_name("GB"), "GPU memory to use (default: all free memory)");
+     "fit by the paper's method, for comparison; --help paper lists the keys");
   // clang-format on
+  cli::addDevice(options);
+  options.add_options()("max-vram", value<double>()->value_name("GB"),
+                        "GPU memory to use (default: all free memory)");
 }
 
 void addFileOptions(cli::po::options_description& options) {
@@ -324,7 +325,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   requireRepresentation(a, options);
   options.read.nonFinite = nonFinite(a);
   options.read.maxBytes = cli::maxMemoryOf(a);
-  options.device = a.get<std::string>("device");
+  options.device = cli::deviceOf(a);
   options.onCancel = onCancel(a);
   options.report = a.find<std::string>("report").value_or("");
   options.countHits = a.get<bool>("hits");

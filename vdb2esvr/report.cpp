@@ -4,8 +4,7 @@
 
 #include "cli/memory.h"
 #include "cli/names.h"
-#include "cli/version_text.h"
-#include "esvr/device.h"
+#include "cli/version_json.h"
 #include "vdb2esvr/paper_report.h"
 #include "vdb2esvr/scene_notes.h"
 
@@ -65,13 +64,6 @@ Json toJson(const Box& box) {
 template <class T>
 Json orNull(const std::optional<T>& value) {
   return value ? Json(*value) : Json(nullptr);
-}
-
-Json versions() {
-  return {{"esvr", cli::programVersion()},
-          {"format", kFormatVersion},
-          {"vdb", vdbVersions()},
-          {"cuda", cudaVersions()}};
 }
 
 /// The wanted bound on the error.
@@ -330,9 +322,12 @@ const char* nameOf(ErrorKind kind) {
 
 /// The first items of every report, also of a failed run.
 Json head(const Options& options) {
-  return {{"schema", kSchema},      {"schema_version", kSchemaVersion},
-          {"program", kProgram},    {"command_line", options.commandLine},
-          {"versions", versions()}, {"asked", asked(options)}};
+  return {{"schema", kSchema},
+          {"schema_version", kSchemaVersion},
+          {"program", kProgram},
+          {"command_line", options.commandLine},
+          {"versions", cli::versionJson()},
+          {"asked", asked(options)}};
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ void addHits(const LineForm& f, const std::array<float, 3>& corner, float cutoff
 EllipsoidHits totalOf(const Counts& counts) {
   EllipsoidHits total;
   for (const std::uint32_t count : counts) {
-    total.pairs += count;
+    total.voxelPairs += count;
     total.voxels += count > 0 ? 1 : 0;
   }
   return total;
@@ -55,13 +55,13 @@ EllipsoidHits countHits(const Field& field, std::span<const Coord> corners) {
   tbb::parallel_for(std::size_t(0), corners.size(),
                     [&](std::size_t b) { hits[b] = hitsInBrick(plan, b, corners[b]); });
   EllipsoidHits total;
-  for (const EllipsoidHits& h : hits) total.pairs += h.pairs, total.voxels += h.voxels;
+  for (const EllipsoidHits& h : hits) total.voxelPairs += h.voxelPairs, total.voxels += h.voxels;
   return total;
 }
 
 double averageHits(const Field& field) {
   const EllipsoidHits total = countHits(field, reachedBricks(field));
-  return total.voxels > 0 ? double(total.pairs) / double(total.voxels) : 0.0;
+  return total.voxels > 0 ? double(total.voxelPairs) / double(total.voxels) : 0.0;
 }
 
 }  // namespace esvr

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "core/brick_index.h"
+#include "core/cell_corner.h"
 #include "esvr/error.h"
 #include "render/cell_bricks.h"
 
@@ -13,14 +14,17 @@ namespace {
 
 constexpr double kMaxBlocks = double(1 << 28);  // 1 GB
 
+/// The values of a brick and of its upper neighbours by the number of the corner; null: no brick.
+using CornerBricks = std::array<const float*, kCellCorners>;
+
 class CellReader {
  public:
   explicit CellReader(const SparseVolume& volume) : volume_(volume), index_(volume.bricks) {}
 
   /// Reads the voxels at the corners of a brick's cells. \return false if all are the background
   bool read(Coord brick, float* values) const {
-    std::array<const float*, 8> from{};
-    for (int c = 0; c < 8; ++c) from[c] = find(brick + stepToCorner(c));
+    CornerBricks from{};
+    for (int c = 0; c < kCellCorners; ++c) from[c] = find(brick + stepToCorner(c));
     bool any = false;
     for (int x = 0; x < kCellBrickSide; ++x)
       for (int y = 0; y < kCellBrickSide; ++y)
@@ -37,7 +41,7 @@ class CellReader {
     const std::uint32_t at = index_.find(brick);
     return at == BrickIndex::kNone ? nullptr : volume_.brickValues(at).data();
   }
-  [[nodiscard]] float value(const std::array<const float*, 8>& from, Coord at) const {
+  [[nodiscard]] float value(const CornerBricks& from, Coord at) const {
     const float* values = from[cornerAt(brickOf(at))];
     return values == nullptr ? volume_.background : values[voxelOffset(localOf(at))];
   }

@@ -10,8 +10,6 @@
 namespace esvr {
 namespace {
 
-constexpr int kMaxDepthParts = 16;
-
 /// A renderer on the CPU, which calls a function of render.h for each picture.
 template <class Draw>
 class CpuRenderer final : public Renderer {
@@ -43,9 +41,9 @@ std::unique_ptr<Renderer> makeCpuRenderer(Draw draw) {
 std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& device,
                                             const RendererLimits& limits,
                                             const RevoxeliseOptions& voxels) {
-  if (limits.depthParts < 0 || limits.depthParts > kMaxDepthParts)
-    throw UsageError("parts of the depth must be from 1 to " + std::to_string(kMaxDepthParts) +
-                     ", or 0 to have them chosen");
+  if (limits.depthParts < 0 || limits.depthParts > RendererLimits::kMaxDepthParts)
+    throw UsageError("parts of the depth must be from 1 to " +
+                     std::to_string(RendererLimits::kMaxDepthParts) + ", or 0 to have them chosen");
   if (device.kind == DeviceKind::kCuda)
     return cuda::makeCudaFieldRenderer(field, device, limits, voxels);
   return makeCpuRenderer(

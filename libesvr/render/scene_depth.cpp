@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "core/cell_corner.h"
 #include "esvr/error.h"
 #include "render/ellipsoid_view.h"
 
@@ -26,8 +27,9 @@ void expand(PlaceBox& box, const PackedEllipsoid& e, const Vec3& origin, double 
 }
 
 Vec3 corner(const PlaceBox& box, int number) {
-  return {(number & 1 ? box.high : box.low)[0], (number & 2 ? box.high : box.low)[1],
-          (number & 4 ? box.high : box.low)[2]};
+  const Coord step = stepToCorner(number);
+  return {(step.x ? box.high : box.low)[0], (step.y ? box.high : box.low)[1],
+          (step.z ? box.high : box.low)[2]};
 }
 
 double distanceTo(const PlaceBox& box, const Vec3& eye) {
@@ -38,14 +40,14 @@ double distanceTo(const PlaceBox& box, const Vec3& eye) {
 
 Distances fromEye(const PlaceBox& box, const View& view) {
   Distances d{distanceTo(box, view.eye), 0.0};
-  for (int c = 0; c < 8; ++c)
+  for (int c = 0; c < kCellCorners; ++c)
     d.farthest = std::max(d.farthest, length(difference(corner(box, c), view.eye)));
   return d;
 }
 
 Distances alongForward(const PlaceBox& box, const View& view) {
   Distances d{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-  for (int c = 0; c < 8; ++c) {
+  for (int c = 0; c < kCellCorners; ++c) {
     const double depth = inner(view.forward, difference(corner(box, c), view.eye));
     d.nearest = std::min(d.nearest, depth), d.farthest = std::max(d.farthest, depth);
   }

@@ -19,7 +19,7 @@ VoxelSampler::VoxelSampler(const SparseVolume& volume)
   const BrickIndex stored(volume.bricks);
   for (const Coord brick : index_.bricks()) {
     Corners corners;
-    for (int c = 0; c < 8; ++c) corners[c] = stored.find(brick + stepToCorner(c));
+    for (int c = 0; c < kCellCorners; ++c) corners[c] = stored.find(brick + stepToCorner(c));
     corners_.push_back(corners);
   }
   Box box;
@@ -36,8 +36,8 @@ float VoxelSampler::value(const Corners& corners, Coord local) const {
 
 float VoxelSampler::interpolate(const Corners& corners, const Cell& cell) const {
   const Coord local = localOf(cell.voxel);
-  float v[8];
-  for (int c = 0; c < 8; ++c) v[c] = value(corners, local + stepToCorner(c));
+  float v[kCellCorners];
+  for (int c = 0; c < kCellCorners; ++c) v[c] = value(corners, local + stepToCorner(c));
   const auto [x, y, z] = cell.fraction;
   const float low = between(between(v[0], v[1], z), between(v[2], v[3], z), y);
   const float high = between(between(v[4], v[5], z), between(v[6], v[7], z), y);

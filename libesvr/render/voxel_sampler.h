@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/brick_index.h"
+#include "core/cell_corner.h"
 #include "esvr/camera.h"
 #include "esvr/sparse_volume.h"
 
@@ -28,9 +29,9 @@ struct Cell {
 /// volume's origin.
 class VoxelSampler {
  public:
-  /// The numbers of a brick and of its seven upper neighbours. The bits of the array index say
-  /// along which axes a neighbour lies above: 4 for x, 2 for y, 1 for z. kNone: no such brick.
-  using Corners = std::array<std::uint32_t, 8>;
+  /// The numbers of a brick and of its seven upper neighbours, by the number of the corner. kNone:
+  /// no such brick.
+  using Corners = std::array<std::uint32_t, kCellCorners>;
 
   explicit VoxelSampler(const SparseVolume& volume);
 

@@ -15,7 +15,8 @@ import argparse
 import csv
 import json
 import pathlib
-import subprocess
+
+from run_program import run
 
 BOXES = {'aneurism': '0,0,0,255,255,255', 'hydrogen_atom': '0,0,0,127,127,127'}
 FILES = {'aneurism': 'aneurism', 'smoke1': 'smoke1', 'wdas': 'wdas_cloud_sixteenth',
@@ -27,13 +28,6 @@ LOW, HIGH = PARTS
 IMAGES = ['--images', '4', '--image-size', '400']
 MEASURE = ['--rows', 'matched,zfp', '--runs', '3', '--max-dense', '1GB']
 HERE = pathlib.Path(__file__).parent
-
-
-def run(words):
-    done = subprocess.run([str(w) for w in words], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise SystemExit(f'{" ".join(map(str, words))}\n{done.stderr}')
-    return done.stdout
 
 
 class Volume:
@@ -285,9 +279,15 @@ is not larger.
 """
 
 
+def version_lines(versions):
+    lines = [f"esvr-compare {versions['esvr']}", f".esvr format {versions['format']}",
+             versions['vdb'], versions['cuda']]
+    return lines + ([versions['zfp']] if versions['zfp'] else [])
+
+
 def introduction(tables):
     table = next(iter(tables.values()))
-    return [INTRODUCTION, '    ' + '\n    '.join(table['versions']), '']
+    return [INTRODUCTION, '    ' + '\n    '.join(version_lines(table['versions'])), '']
 
 
 def reference_cost(table):

@@ -4,7 +4,7 @@
     draw_benchmarks.py fit    --bin BUILD --data DIR --out OUT   makes the files that are drawn
     draw_benchmarks.py speed  --bin BUILD --data DIR --out OUT   compares speed and errors with NanoVDB
     draw_benchmarks.py purpose --bin BUILD --data DIR --out OUT  compares fits for voxels and for drawing
-    draw_benchmarks.py bins   --bin BUILD --data DIR --out OUT   varies --bins and --min-transmittance
+    draw_benchmarks.py parts  --bin BUILD --data DIR --out OUT   varies --depth-parts and --min-transmittance
     draw_benchmarks.py sheets --bin BUILD --data DIR --out OUT   draws ESVR, NanoVDB and their difference
     draw_benchmarks.py large  --bin BUILD --swc FILE --out OUT   draws a neuron of 50 million voxels
 
@@ -26,8 +26,7 @@ PURPOSES = [[], *(["--fit-for", "drawing", "--voxel-share", share]
                   for share in ["0.75", "0.5", "0.25", "0.125", "0"])]
 PURPOSE_VIEWS = ["--turntable", "36"]
 METHODS = {"ellipsoids": [], "sum": ["--between", "sum"], "bricks": ["--method", "bricks"]}
-BINS = [["--bins", "1"], ["--bins", "4"], ["--bins", "8"], ["--bins", "16"],
-        ["--min-transmittance", "0"]]
+PARTS = [*(["--depth-parts", parts] for parts in ["1", "4", "8", "16"]), ["--min-transmittance", "0"]]
 
 
 def box_of(name):
@@ -105,13 +104,13 @@ def purpose(arguments):
                   + " | ".join(f"{value:.1f}" for value in row) + " |", flush=True)
 
 
-def bins(arguments):
+def parts(arguments):
     for method in ["sum", "ellipsoids"]:
         print(f"\n{method}")
         for name, count in SCENES:
             file = esvr(arguments, name, count)
             reports = [bench(arguments, file, "--turntable", "180", *METHODS[method], *options)
-                       for options in BINS]
+                       for options in PARTS]
             print(f"| {label(name, count)} | "
                   + " | ".join(f"{r['drawn']['fps_median']:.0f}" for r in reports) + " |", flush=True)
 
@@ -147,7 +146,7 @@ def large(arguments):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    jobs = {"fit": fit, "speed": speed, "purpose": purpose, "bins": bins, "sheets": sheets, "large": large}
+    jobs = {"fit": fit, "speed": speed, "purpose": purpose, "parts": parts, "sheets": sheets, "large": large}
     parser.add_argument("what", choices=jobs)
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
     parser.add_argument("--data", type=pathlib.Path)

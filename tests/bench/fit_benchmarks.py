@@ -3,7 +3,7 @@
 
     fit_benchmarks.py figures --bin BUILD --data DIR --out OUT   converts volumes of DIR on the CPU
     fit_benchmarks.py gpu --bin BUILD --data DIR --out OUT       converts them on a GPU, by phase
-    fit_benchmarks.py pairs --bin BUILD --data DIR --out OUT     pairs of ellipsoids and voxels per second
+    fit_benchmarks.py pairs --bin BUILD --data DIR --out OUT     voxel pairs per second
     fit_benchmarks.py scaling --bin BUILD --out OUT              seconds per iteration at eight resolutions
     fit_benchmarks.py draw --out OUT                             draws the figures of these results
 
@@ -127,7 +127,7 @@ def gpu_row(row):
 
 
 def pairs(arguments):
-    """Pairs per second. Every iteration is taken to have as many pairs as the finished fit."""
+    """Voxel pairs per second. Every iteration is taken to have as many as the finished fit."""
     dense = arguments.out / "dense.vdb"
     run([arguments.bin / "samples/esvr-sample", "diffuse-scalar", dense, "--resolution",
          DENSE_RESOLUTION, "--force"])

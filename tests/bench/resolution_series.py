@@ -13,8 +13,9 @@ import argparse
 import json
 import math
 import pathlib
-import subprocess
 import sys
+
+from run_program import run
 
 TARGET = 25.0  # dB over the active voxels
 NEAR = 0.3     # a fit that exceeds TARGET by no more ends the search, dB
@@ -24,13 +25,6 @@ MAX_FITS = 8
 
 SETTINGS = ['nvdb-fp4-zip', *(f'nvdb-fpn-zip,tolerance={t}' for t in (0.4, 0.2, 0.15, 0.1, 0.07)),
             *(f'zfp,accuracy={2.0 ** -k}' for k in range(-2, 4))]
-
-
-def run(words):
-    done = subprocess.run([str(w) for w in words], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise SystemExit(f'{" ".join(map(str, words))}\n{done.stderr}')
-    return done.stdout
 
 
 class Resolution:

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "cli/compare_fixture.h"
 #include "cli/converters.h"
 #include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
@@ -26,13 +27,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-test::ProgramRun compare(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "check");
-  return test::runProgram(ESVR_COMPARE, arguments);
-}
-
 /// A folder with a source file of two grids.
-class CompareCheck : public testing::Test {
+class CompareCheck : public test::FolderTest {
  protected:
   void SetUp() override { write("ref.vdb", {ball(), heat()}); }
 
@@ -49,11 +45,10 @@ class CompareCheck : public testing::Test {
   void write(const std::string& name, const std::vector<InputGrid>& grids) const {
     test::writeInput(folder_ / name, grids);
   }
-  [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
   [[nodiscard]] test::ProgramRun check(const std::string& candidate,
                                        std::vector<std::string> more = {}) const {
     more.insert(more.begin(), {at("ref.vdb"), at(candidate)});
-    return compare(more);
+    return test::compare("check", more);
   }
   [[nodiscard]] json reportOf(const std::string& candidate,
                               std::vector<std::string> more = {}) const {
@@ -61,8 +56,6 @@ class CompareCheck : public testing::Test {
     const auto run = check(candidate, more);
     return json::parse(run.out, nullptr, false);
   }
-
-  test::TemporaryFolder folder_;
 };
 
 TEST_F(CompareCheck, refusesWhatTakesMoreMemoryThanAllowed) {
@@ -99,7 +92,8 @@ TEST_F(CompareCheck, readsEsvrAndNanoVdbToo) {
   for (const char* figure : {"psnr_box", "max_error", "iou"})
     EXPECT_EQ(esvr["grids"][0][figure], nano["grids"][0][figure]) << figure;
   EXPECT_TRUE(esvr["grids"][0]["differences"].empty());
-  const auto reversed = compare({at("back.nvdb"), at("fit.esvr"), "--min-psnr", "200"});
+  const auto reversed =
+      test::compare("check", {at("back.nvdb"), at("fit.esvr"), "--min-psnr", "200"});
   EXPECT_EQ(reversed.exitCode, 0) << reversed.err << "the same voxels";
 }
 
@@ -207,7 +201,7 @@ TEST_F(CompareCheck, failsWhereTheCandidateIsEmpty) {
 
 TEST_F(CompareCheck, passesOverGridsThatHoldNothingToCompare) {
   test::writeMixedInput(at("mixed.vdb"), {ball(), {.name = "none"}});
-  const auto run = compare({at("mixed.vdb"), at("mixed.vdb")});
+  const auto run = test::compare("check", {at("mixed.vdb"), at("mixed.vdb")});
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.out, AllOf(HasSubstr("skipped grid \"vec3s\""), HasSubstr("type int32"),
                              HasSubstr("skipped grid \"none\"")));
@@ -277,7 +271,7 @@ TEST_P(RefusedCheck, isExplainedAndLeavesNoFile) {
   write("else.vdb", {{.name = "fuel", .voxels = softBall({})}});
   test::writeText(at("broken.vdb"), "no such thing");
   test::writeText(at("notes.json"), "[1, 2]");
-  GetParam().expectOf(compare(GetParam().argumentsIn(folder_)));
+  GetParam().expectOf(test::compare("check", GetParam().argumentsIn(folder_)));
   EXPECT_THAT(folder_.names(), ElementsAre("broken.vdb", "else.vdb", "none.vdb", "notes.json",
                                            "ref.vdb", "zero.vdb"));
 }

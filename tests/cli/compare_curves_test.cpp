@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "cli/compare_fixture.h"
 #include "cli/converters.h"
 #include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
@@ -20,20 +21,13 @@ using test::Refusal;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-test::ProgramRun curves(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "curves");
-  return test::runProgram(ESVR_COMPARE, arguments);
+test::ProgramRun curves(const std::vector<std::string>& arguments) {
+  return test::compare("curves", arguments);
 }
 
-class CompareCurves : public testing::Test {
+class CompareCurves : public test::FittedBall {
  protected:
-  void SetUp() override {
-    test::writeInput(at("ref.vdb"), {{.voxels = test::softBall({})}});
-    ASSERT_EQ(test::quickFit(at("ref.vdb"), at("fit.esvr")).exitCode, 0);
-  }
-  [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
   [[nodiscard]] json points() const { return json::parse(test::readText(at("c.json")))["points"]; }
-  test::TemporaryFolder folder_;
 };
 
 std::set<std::string> seriesOf(const json& points) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cli/converters.h"
-#include "cli/options_fixture.h"
+#include "cli/folder_test.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/baseline.h"
 
@@ -21,7 +21,7 @@ using Json = nlohmann::json;
 using test::softBall;
 using testing::HasSubstr;
 
-class CompareOption : public test::OptionsTest {
+class CompareOption : public test::FolderTest {
  protected:
   void SetUp() override {
     auto off = softBall({});

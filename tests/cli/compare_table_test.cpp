@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "cli/compare_fixture.h"
 #include "cli/converters.h"
 #include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
@@ -25,19 +26,12 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-test::ProgramRun table(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "table");
-  return test::runProgram(ESVR_COMPARE, arguments);
+test::ProgramRun table(const std::vector<std::string>& arguments) {
+  return test::compare("table", arguments);
 }
 
-/// A folder with a grid and a fit of it. The ball extends from (-4, -4, -4) to (4, 4, 4).
-class CompareTable : public testing::Test {
+class CompareTable : public test::FittedBall {
  protected:
-  void SetUp() override {
-    test::writeInput(at("ref.vdb"), {{.voxels = softBall({})}});
-    ASSERT_EQ(test::quickFit(at("ref.vdb"), at("fit.esvr")).exitCode, 0);
-  }
-  [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
   [[nodiscard]] json reportOf(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), at("ref.vdb"));
     arguments.insert(arguments.end(), {"--runs", "1", "--report", "-"});
@@ -45,7 +39,8 @@ class CompareTable : public testing::Test {
     EXPECT_EQ(run.exitCode, 0) << run.err;
     return json::parse(run.out, nullptr, false);
   }
-  /// Writes the ball's box as raw float32, with `error` added to every voxel.
+  /// Writes the ball's box, from (-4, -4, -4) to (4, 4, 4), as raw float32, with `error` added to
+  /// every voxel.
   void writeRaw(const std::string& name, float error) const {
     std::ofstream stream(at(name), std::ios::binary);
     for (int z = -4; z <= 4; ++z)
@@ -55,8 +50,6 @@ class CompareTable : public testing::Test {
           stream.write(reinterpret_cast<const char*>(&value), sizeof value);
         }
   }
-
-  test::TemporaryFolder folder_;
 };
 
 const json* rowOf(const json& report, const std::string& name, const std::string& group = {}) {
@@ -190,7 +183,7 @@ TEST_F(CompareTable, SlowFitsHundredColumns) {
 }
 
 TEST_F(CompareTable, leavesRowsThatCannotBeWithTheirReason) {
-  if (reportOf({"--rows", "none"})["versions"].dump().find("ZFP") == std::string::npos)
+  if (reportOf({"--rows", "none"})["versions"]["zfp"].is_null())
     GTEST_SKIP() << "built without ZFP";
   const auto report = reportOf({"--rows", "zfp", "--size", "2KB", "--max-dense", "100"});
   const json* row = rowOf(report, "ZFP accuracy", "at 2000 bytes");

@@ -7,14 +7,14 @@
 #include <vector>
 
 #include "cli/converters.h"
-#include "cli/options_fixture.h"
+#include "cli/folder_test.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr {
 namespace {
 
-class Esvr2VdbOption : public test::OptionsTest {
+class Esvr2VdbOption : public test::FolderTest {
  protected:
   /// A cube of 16^3 equal voxels, stored losslessly, which a tree can hold as tiles.
   void SetUp() override {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cli/converters.h"
-#include "cli/options_fixture.h"
+#include "cli/folder_test.h"
 #include "cli/vdb_inputs.h"
 
 namespace esvr {
@@ -29,7 +29,7 @@ std::ostream& operator<<(std::ostream& out, const ProgramCommand& program) {
   return out << program.name;
 }
 
-class EveryProgram : public test::OptionsTest, public testing::WithParamInterface<ProgramCommand> {
+class EveryProgram : public test::FolderTest, public testing::WithParamInterface<ProgramCommand> {
  protected:
   void SetUp() override {
     test::writeInput(at("in.vdb"), {{.voxels = softBall({})}});

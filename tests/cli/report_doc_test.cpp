@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "cli/converters.h"
+#include "cli/folder_test.h"
 #include "cli/vdb_inputs.h"
 
 namespace esvr {
@@ -113,9 +114,8 @@ void expectTable(const Json& object, const Table& table, const Keys& others,
       expectNamed(object[key], meaning, where + "." + key);
 }
 
-class ReportDoc : public testing::Test {
+class ReportDoc : public test::FolderTest {
  protected:
-  [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
   /// Runs a program and merges its report into `all_`.
   void add(const char* program, std::vector<std::string> arguments, int exitCode = 0) {
     arguments.insert(arguments.end(), {"--report", at("r.json"), "--force"});
@@ -124,7 +124,6 @@ class ReportDoc : public testing::Test {
     merge(all_, Json::parse(test::readText(at("r.json"))));
   }
 
-  test::TemporaryFolder folder_;
   std::string document_ = test::readText(ESVR_SOURCE_DIR "/docs/report.md");
   Json all_;
 };

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "cli/converters.h"
-#include "cli/options_fixture.h"
+#include "cli/folder_test.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
 #include "support/on_device.h"
@@ -23,7 +23,7 @@ using Json = nlohmann::json;
 using testing::AllOf;
 using testing::HasSubstr;
 
-class Vdb2EsvrOption : public test::OptionsTest {
+class Vdb2EsvrOption : public test::FolderTest {
  protected:
   void SetUp() override { test::writeInput(at("in.vdb"), {{.voxels = test::cloud(8)}}); }
   /// Converts to NAME and returns the report.

@@ -78,7 +78,7 @@ TEST(CountHits, CountsInTheBricksAskedForOnly) {
     for (const Shape& s : shapes) pairs += holds(s, corner + voxelLocal(v)) ? 1.0 : 0.0;
   const EllipsoidHits counted = countHits(field, std::array{corner, Coord{800, 0, 0}});
   EXPECT_GT(pairs, 100.0);
-  EXPECT_NEAR(double(counted.pairs), pairs, 1.0);
+  EXPECT_NEAR(double(counted.voxelPairs), pairs, 1.0);
   EXPECT_LE(counted.voxels, std::uint64_t(kBrickVoxels));
 }
 

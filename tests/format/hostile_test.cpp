@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <limits>
 #include <string>
 
 #include "esvr/container.h"
@@ -15,6 +14,7 @@
 #include "format/byte_writer.h"
 #include "format/crafted_file.h"
 #include "format/sample_files.h"
+#include "support/non_finite.h"
 
 namespace esvr {
 namespace {
@@ -24,12 +24,12 @@ using format::kNone;
 using format::SectionKind;
 using format::SectionTable;
 using test::CraftedFile;
+using test::kInf;
+using test::kNan;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
 constexpr std::uint32_t kUnknownKind = 0x1234;
 constexpr std::size_t kMegabyte = 1 << 20;
 

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "esvr/error.h"
+#include "support/non_finite.h"
 #include "vdb/expect_same.h"
 #include "vdb/made_files.h"
 #include "vdb/test_files.h"
@@ -18,12 +19,11 @@ namespace esvr {
 namespace {
 
 using openvdb::FloatGrid;
+using test::kInf;
+using test::kNan;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 class Voxels : public testing::Test {
  protected:
@@ -173,8 +173,8 @@ TEST_F(Voxels, InactiveVoxelsOfALevelSetKeepOnlyTheirSign) {
 TEST_F(Voxels, NonFiniteOnesAreRefusedWithTheFirstAndTheirCount) {
   auto source = test::smallGrid();
   source->tree().setValue({9, 1, 1}, kNan);
-  source->tree().setValue({-8, 70, 3}, kInfinity);
-  source->tree().setValue({9, 1, 2}, -kInfinity);
+  source->tree().setValue({-8, 70, 3}, kInf);
+  source->tree().setValue({9, 1, 2}, -kInf);
   test::save(path(), {source});
   EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
               ThrowsMessage<BadInput>(AllOf(HasSubstr("3 voxels"), HasSubstr("(-8, 70, 3)"),
@@ -184,7 +184,7 @@ TEST_F(Voxels, NonFiniteOnesAreRefusedWithTheFirstAndTheirCount) {
 TEST_F(Voxels, NonFiniteOnesBecomeZeroWhenAsked) {
   auto source = test::smallGrid(0.5f);
   source->tree().setValue({9, 1, 1}, kNan);
-  source->tree().addTile(1, {64, 0, 0}, kInfinity, true);
+  source->tree().addTile(1, {64, 0, 0}, kInf, true);
   const auto grid = saveAndRead(source, {.nonFinite = NonFinite::kZero});
   EXPECT_EQ(grid.nonFiniteReplaced, 1u + 512u);
   EXPECT_EQ(valueAt(grid.volume, {9, 1, 1}), 0.0f);
@@ -193,7 +193,7 @@ TEST_F(Voxels, NonFiniteOnesBecomeZeroWhenAsked) {
 }
 
 TEST_F(Voxels, ABackgroundThatIsNotFiniteIsRefused) {
-  const auto source = test::smallGrid(kInfinity);
+  const auto source = test::smallGrid(kInf);
   EXPECT_THROW((void)saveAndRead(source), BadInput);
   EXPECT_THROW((void)saveAndRead(source, {.nonFinite = NonFinite::kZero}), BadInput);
 }

@@ -28,8 +28,8 @@ namespace esvr {
 void evaluateBricks(const Field& field, std::span<const Coord> corners, std::span<float> out);
 
 struct EllipsoidHits {
-  std::uint64_t pairs = 0;   ///< pairs of an ellipsoid and a voxel in its support
-  std::uint64_t voxels = 0;  ///< voxels that lie in at least one support
+  std::uint64_t voxelPairs = 0;  ///< pairs of an ellipsoid and a voxel in its support
+  std::uint64_t voxels = 0;      ///< voxels that lie in at least one support
 };
 /// \param corners  index corners of the bricks whose voxels count, multiples of 8
 [[nodiscard]] EllipsoidHits countHits(const Field& field, std::span<const Coord> corners);

@@ -2,6 +2,7 @@
 
 #include <climits>
 
+#include "core/cell_corner.h"
 #include "core/cuda/thread_number.cuh"
 
 namespace esvr::cuda {
@@ -24,13 +25,13 @@ struct Cover {
 };
 
 __device__ Vec3 cornerOf(const Coord& brick, int corner) {
-  return {double((brick.x + (corner & 1)) * kBrickSide),
-          double((brick.y + (corner >> 1 & 1)) * kBrickSide),
-          double((brick.z + (corner >> 2)) * kBrickSide)};
+  const Coord step = stepToCorner(corner);
+  return {double((brick.x + step.x) * kBrickSide), double((brick.y + step.y) * kBrickSide),
+          double((brick.z + step.z) * kBrickSide)};
 }
 
 __device__ double distanceTo(const Coord& brick, const Vec3& eye) {
-  const Vec3 low = cornerOf(brick, 0), high = cornerOf(brick, 7);
+  const Vec3 low = cornerOf(brick, 0), high = cornerOf(brick, kCellCorners - 1);
   double squares = 0.0;
   for (int a = 0; a < 3; ++a) {
     const double away = fmax(fmax(low[a] - eye[a], eye[a] - high[a]), 0.0);
@@ -59,7 +60,7 @@ __device__ void add(const View& view, const Vec3& corner, Cover& c) {
 __device__ Cover coverOf(const View& view, const Coord& brick) {
   constexpr double kAll = 1e9;
   Cover c{kAll, -kAll, kAll, -kAll, view.perspective ? distanceTo(brick, view.eye) : 1e300, -1e300};
-  for (int corner = 0; corner < 8; ++corner) add(view, cornerOf(brick, corner), c);
+  for (int corner = 0; corner < kCellCorners; ++corner) add(view, cornerOf(brick, corner), c);
   return c;
 }
 

@@ -214,12 +214,12 @@ FrameCounters FieldRenderer::readCounters() {
 int FieldRenderer::chosenParts(const TileFrame& f) {
   list(f);
   const FrameCounters c = readCounters();
-  if (c.pairs == 0) return 1;
+  if (c.entries == 0) return 1;
   const double blocks = double(multiprocessors_) * DrawTuning::kBlocksPerMultiprocessor;
   if (f.between == Between::kVoxels && c.occupiedTiles >= blocks) return 1;
-  const double share = double(c.pairs) / blocks;
+  const double share = double(c.entries) / blocks;
   return int(std::clamp(std::ceil(double(c.longestTile) / (2.0 * share)), 1.0,
-                        double(DrawTuning::kMaxParts)));
+                        double(RendererLimits::kMaxDepthParts)));
 }
 
 void FieldRenderer::launch(const SamplingArguments& a) {
@@ -251,11 +251,11 @@ FrameCounters FieldRenderer::drawOnce(const Scene& scene, const TileFrame& f) {
 }
 
 void FieldRenderer::grow(const FrameCounters& c, Between between) {
-  if (c.pairs > std::uint64_t(kMaxLists))
-    throw DeviceError("drawing on the GPU: " + std::to_string(c.pairs) +
-                      " pairs of ellipsoids and tiles are more than the lists can hold");
+  if (c.entries > std::uint64_t(kMaxLists))
+    throw DeviceError("drawing on the GPU: " + std::to_string(c.entries) +
+                      " entries are more than the lists of ellipsoids can hold");
   const cudaStream_t stream = stream_.get();
-  if (c.pairs > band_.entries.size()) makeRoom(band_.entries, withSpare(c.pairs), stream);
+  if (c.entries > band_.entries.size()) makeRoom(band_.entries, withSpare(c.entries), stream);
   if (needSorting(c, between)) makeRoom(band_.sorted, band_.entries.size(), stream);
   if (std::uint64_t(c.results) * DrawTuning::kTilePixels > band_.results.size())
     makeRoom(band_.results, std::size_t(c.results + c.results / 4) * DrawTuning::kTilePixels,
@@ -298,7 +298,7 @@ void FieldRenderer::count(const TileFrame& f, const FrameCounters& c) {
   tiles_ += std::uint64_t(f.tiles()), occupied_ += c.occupiedTiles;
   stats_.listMs += listed_.millisecondsSince(begin_);
   stats_.drawMs += drawn_.millisecondsSince(listed_);
-  stats_.pairs += c.pairs;
+  stats_.listEntries += c.entries;
   stats_.occupancy = double(occupied_) / double(tiles_);
   stats_.depthParts = f.parts;
   stats_.deviceBytes = std::max<std::uint64_t>(stats_.deviceBytes, fixedBytes() + band_.bytes());

@@ -35,7 +35,6 @@ struct DrawTuning {
   /// Work begins with the parts of tiles that have the longest lists. They are sorted into classes
   /// of lengths, each a factor of 2.
   static constexpr int kLengthClasses = 12;
-  static constexpr int kMaxParts = 16;  ///< largest number of parts of the depth
 };
 
 /// The outline of an ellipsoid's support in the picture, and its range of depths. Both are slightly
@@ -69,7 +68,7 @@ struct TilePart {
 
 /// Counters of one frame.
 struct FrameCounters {
-  unsigned long long pairs;                         ///< entries of all lists
+  unsigned long long entries;                       ///< entries of all lists
   std::uint32_t items[DrawTuning::kLengthClasses];  ///< parts of tiles with entries, by class
   std::uint32_t results;  ///< parts whose results are stored because their tile has several parts
   std::uint32_t occupiedTiles;  ///< tiles with entries
@@ -106,8 +105,8 @@ ESVR_HD inline bool needSorting(const FrameCounters& c, Between between) {
 }
 /// True if the buffers are large enough for the entries and results that a frame counted.
 ESVR_HD inline bool listsFit(const FrameCounters& c, const TileLists& lists, Between between) {
-  return c.pairs <= lists.entryCapacity && c.results <= lists.resultCapacity &&
-         (!needSorting(c, between) || c.pairs <= lists.sortedCapacity);
+  return c.entries <= lists.entryCapacity && c.results <= lists.resultCapacity &&
+         (!needSorting(c, between) || c.entries <= lists.sortedCapacity);
 }
 
 struct DeviceEllipsoids {

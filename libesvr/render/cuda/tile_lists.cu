@@ -166,7 +166,7 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
     fillKernel(const TileFrame frame, std::uint32_t count, const SeenEllipsoids seen,
                const TileLists lists) {
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
-  if (i >= count || lists.counters->pairs > lists.entryCapacity) return;
+  if (i >= count || lists.counters->entries > lists.entryCapacity) return;
   const Footprint own = seen.footprints[i];
   if (isSeen(frame, own) && !inManyLists(frame, own))
     visitLists(frame, own, {0, 1}, [&](int list) { enter(lists, list, i); });
@@ -174,7 +174,7 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
 
 __global__ void __launch_bounds__(DrawTuning::kListThreads)
     fillLargeKernel(const TileFrame frame, const SeenEllipsoids seen, const TileLists lists) {
-  if (lists.counters->pairs > lists.entryCapacity) return;
+  if (lists.counters->entries > lists.entryCapacity) return;
   visitLarge(*lists.counters, seen.large, [&](std::uint32_t ellipsoid) {
     visitLists(frame, seen.footprints[ellipsoid], {int(threadIdx.x) % kWarp, kWarp},
                [&](int list) { enter(lists, list, ellipsoid); });
@@ -244,7 +244,7 @@ __global__ void __launch_bounds__(DrawTuning::kListThreads)
 
   const Entries ofWarp = warpSum(totals.entries), below = warpSumBelow(totals.entries);
   Entries begin = 0;
-  if (threadIdx.x % kWarp == 0 && ofWarp > 0) begin = atomicAdd(&lists.counters->pairs, ofWarp);
+  if (threadIdx.x % kWarp == 0 && ofWarp > 0) begin = atomicAdd(&lists.counters->entries, ofWarp);
   begin = __shfl_sync(kAllLanes, begin, 0) + below;
   if (!any) return;
 

@@ -220,7 +220,7 @@ TEST_P(FieldOnGpu, CountsItsWork) {
   const auto renderer = makeFieldRenderer(field, device_);
   renderer->drawOnDevice(optionsFor());
   const FrameStats stats = renderer->stats();
-  EXPECT_GE(stats.pairs, 50u);
+  EXPECT_GE(stats.listEntries, 50u);
   EXPECT_GT(stats.occupancy, 0.0);
   EXPECT_LE(stats.occupancy, 1.0);
   EXPECT_GT(stats.drawMs, 0.0);

@@ -1,5 +1,5 @@
 #pragma once
-/// The folder of a test of options.
+/// A test that has a folder.
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 namespace esvr::test {
 
-class OptionsTest : public testing::Test {
+class FolderTest : public testing::Test {
  protected:
   [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
   [[nodiscard]] std::uintmax_t sizeOf(const std::string& name) const {

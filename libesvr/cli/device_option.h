@@ -1,0 +1,16 @@
+#pragma once
+/// The option --device.
+
+#include <string>
+
+#include "cli/command_line.h"
+
+namespace esvr::cli {
+
+/// Adds the option. Its help text begins with `purpose`.
+void addDevice(po::options_description& options, const std::string& purpose = {});
+
+/// The value of the option, as selectDevice() takes it.
+[[nodiscard]] std::string deviceOf(const Arguments& arguments);
+
+}  // namespace esvr::cli

@@ -1,0 +1,87 @@
+#include "render/option_groups.h"
+
+#include "cli/number_list.h"
+#include "render/camera_file.h"
+#include "render/vector_option.h"
+
+namespace esvr::render {
+namespace {
+
+using cli::Arguments;
+using cli::po::bool_switch;
+using cli::po::value;
+
+constexpr int kMaxFrames = 9999;  // the number in a frame's file name has four digits
+
+CameraWish cameraOf(const Arguments& a) {
+  const auto file = a.find<std::string>("camera");
+  CameraWish wish = file ? readCamera(*file) : CameraWish{};
+  const auto replace = [](auto& wished, auto given) {
+    if (given) wished = given;
+  };
+  replace(wish.eye, findVector(a, "eye"));
+  replace(wish.center, findVector(a, "center"));
+  replace(wish.up, findVector(a, "up"));
+  replace(wish.fov, a.find<double>("fov"));
+  replace(wish.height, a.find<double>("height"));
+  if (a.get<bool>("orthographic")) wish.projection = Projection::kOrthographic;
+  const bool orthographic = wish.projection == Projection::kOrthographic;
+  if (wish.height && !orthographic)
+    throw UsageError("--height says nothing without --orthographic");
+  if (wish.fov && orthographic)
+    throw UsageError("--fov says nothing with --orthographic; --height does");
+  return wish;
+}
+
+int turntableOf(const Arguments& a) {
+  const auto frames = a.find<int>("turntable");
+  if (frames) cli::requireRange("turntable", *frames, 1, kMaxFrames);
+  return frames.value_or(0);
+}
+
+void readFrames(const Arguments& a, Options& options) {
+  const auto text = a.find<std::string>("frames");
+  if (!text) return;
+  if (options.turntable == 0) throw UsageError("--frames needs --turntable");
+  const auto dash = text->find('-');
+  if (dash == std::string::npos || dash == 0)
+    throw UsageError("--frames must be like 0-35, not '" + *text + "'");
+  const auto first = cli::parseNumbers("frames", text->substr(0, dash), 1)[0];
+  const auto last = cli::parseNumbers("frames", text->substr(dash + 1), 1)[0];
+  const bool whole = first == double(int(first)) && last == double(int(last));
+  if (!whole || !(first >= 0.0 && first <= last && last < options.turntable))
+    throw UsageError("--frames must be two of the turntable's numbers, from 0 to " +
+                     std::to_string(options.turntable - 1) + ", not '" + *text + "'");
+  options.firstFrame = int(first), options.lastFrame = int(last);
+}
+
+}  // namespace
+
+void addCameraOptions(cli::po::options_description& options) {
+  // clang-format off
+  options.add_options()
+    ("camera", value<std::string>()->value_name("CAM.json"),
+     "read the camera from a file; the options below replace values of the file")
+    ("eye", value<std::string>()->value_name("X,Y,Z"), "position of the camera")
+    ("center", value<std::string>()->value_name("X,Y,Z"), "point that the camera looks at")
+    ("up", value<std::string>()->value_name("X,Y,Z"),
+     "direction that points upwards in the picture (default: y)")
+    ("fov", value<double>()->value_name("DEGREES"),
+     "angle between the lower and the upper edge of the picture (default: 30)")
+    ("orthographic", bool_switch(), "use parallel rays")
+    ("height", value<double>()->value_name("H"),
+     "height of an orthographic picture in voxels")
+    ("turntable", value<int>()->value_name("N"),
+     "draw N pictures of a full turn about the up axis")
+    ("frames", value<std::string>()->value_name("A-B"),
+     "draw only the pictures A to B of a turntable, counted from 0");
+  // clang-format on
+}
+
+void readCameraOptions(const Arguments& a, Options& options) {
+  options.camera = cameraOf(a);
+  options.turntable = turntableOf(a);
+  readFrames(a, options);
+}
+
+}  // namespace esvr::render

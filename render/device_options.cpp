@@ -1,0 +1,74 @@
+#include "render/option_groups.h"
+
+#include "cli/choice.h"
+#include "cli/device_option.h"
+
+namespace esvr::render {
+namespace {
+
+using cli::Arguments;
+using cli::po::value;
+
+constexpr double kMinVram = 0.001, kMaxVram = 1e4;  // GB
+
+std::optional<NanoValues> valuesOf(const Arguments& a) {
+  const auto word = a.find<std::string>("values");
+  if (!word) return std::nullopt;
+  return cli::choose<NanoValues>("values", *word,
+                                 {{"float", NanoValues::kFloat},
+                                  {"fp4", NanoValues::kFp4},
+                                  {"fp8", NanoValues::kFp8},
+                                  {"fp16", NanoValues::kFp16},
+                                  {"fpn", NanoValues::kFpN}});
+}
+
+RendererLimits limitsOf(const Arguments& a) {
+  RendererLimits limits;
+  if (const auto parts = a.find<int>("depth-parts")) {
+    cli::requireRange("depth-parts", *parts, 1, RendererLimits::kMaxDepthParts);
+    limits.depthParts = *parts;
+  }
+  if (const auto gigabytes = a.find<double>("max-vram")) {
+    cli::requireRange("max-vram", *gigabytes, kMinVram, kMaxVram);
+    limits.maxBytes = std::uint64_t(*gigabytes * 1e9);
+  }
+  return limits;
+}
+
+}  // namespace
+
+void addDeviceOptions(cli::po::options_description& options) {
+  cli::addDevice(options);
+  // clang-format off
+  options.add_options()
+    ("max-vram", value<double>()->value_name("GB"),
+     "GPU memory to use; if it is small, large pictures are drawn in bands (default: all free "
+     "memory)")
+    ("depth-parts", value<int>()->value_name("N"),
+     "number of parts, 1 to 16, into which a GPU divides the depth of the scene to draw them in "
+     "parallel (default: chosen from the first picture)")
+    ("method", value<std::string>()->value_name("M")->default_value("ellipsoids"),
+     "ellipsoids: draw the ellipsoids of an .esvr file directly; bricks: decode all voxels once "
+     "and draw them; auto: try both and take the faster one that fits into memory")
+    ("between", value<std::string>()->value_name("B")->default_value("auto"),
+     "voxels: between voxels, interpolate the decoded voxels; sum: evaluate the sum of ellipsoids "
+     "itself, which is faster where a pixel covers many voxels, but less accurate unless the file "
+     "was made with --fit-for drawing; auto: sum for such a file, otherwise voxels")
+    ("values", value<std::string>()->value_name("T"),
+     "draw voxels from a NanoVDB grid of this type: float, fp4, fp8, fp16 or fpn");
+  // clang-format on
+}
+
+void readDeviceOptions(const Arguments& a, Options& options) {
+  options.device = cli::deviceOf(a);
+  options.limits = limitsOf(a);
+  options.values = valuesOf(a);
+  options.method = cli::choose<Method>(
+      "method", a.get<std::string>("method"),
+      {{"ellipsoids", Method::kEllipsoids}, {"bricks", Method::kBricks}, {"auto", Method::kAuto}});
+  options.between = cli::choose<std::optional<Between>>(
+      "between", a.get<std::string>("between"),
+      {{"auto", std::nullopt}, {"voxels", Between::kVoxels}, {"sum", Between::kSum}});
+}
+
+}  // namespace esvr::render

@@ -1,0 +1,115 @@
+#include "render/option_groups.h"
+
+#include <charconv>
+
+#include "cli/choice.h"
+#include "cli/number_list.h"
+#include "render/vector_option.h"
+
+namespace esvr::render {
+namespace {
+
+using cli::Arguments;
+using cli::po::value;
+
+constexpr int kMaxSide = Resolution::kMaxSide;
+constexpr double kMinStep = 1e-3;  // voxels
+
+Resolution resolutionOf(const std::string& text) {
+  const auto refuse = [&] {
+    throw UsageError("--resolution must be WIDTHxHEIGHT, each from 1 to " +
+                     std::to_string(kMaxSide) + ", not '" + text + "'");
+  };
+  Resolution r;
+  const char* const end = text.data() + text.size();
+  const auto width = std::from_chars(text.data(), end, r.width);
+  if (width.ec != std::errc{} || width.ptr == end || *width.ptr != 'x') refuse();
+  const auto height = std::from_chars(width.ptr + 1, end, r.height);
+  if (height.ec != std::errc{} || height.ptr != end) refuse();
+  if (r.width < 1 || r.width > kMaxSide || r.height < 1 || r.height > kMaxSide) refuse();
+  return r;
+}
+
+std::optional<Rgb> backgroundOf(const Arguments& a) {
+  const auto color = findVector(a, "background");
+  if (!color) return std::nullopt;
+  for (const double channel : *color) cli::requireRange("background", channel, 0.0, 1.0);
+  return Rgb{(*color)[0], (*color)[1], (*color)[2]};
+}
+
+constexpr double kEverywhere = 1e9;  // voxels; larger than any coordinate in a grid
+
+PlaceBox sliceOf(const std::string& text) {
+  const std::string axes = "xyz";
+  const auto axis = text.size() > 2 && text[1] == '=' ? axes.find(text[0]) : std::string::npos;
+  if (axis == std::string::npos)
+    throw UsageError("--slice must be like z=12.5, not '" + text + "'");
+  const double place = cli::parseNumbers("slice", text.substr(2), 1)[0];
+  PlaceBox box{{-kEverywhere, -kEverywhere, -kEverywhere}, {kEverywhere, kEverywhere, kEverywhere}};
+  box.low[axis] = place - 0.5, box.high[axis] = place + 0.5;
+  return box;
+}
+
+std::optional<PlaceBox> clipOf(const Arguments& a) {
+  const auto clip = a.find<std::string>("clip"), slice = a.find<std::string>("slice");
+  if (clip && slice) throw UsageError("--clip and --slice cannot be given together");
+  if (slice) return sliceOf(*slice);
+  if (!clip) return std::nullopt;
+  const auto v = cli::parseNumbers("clip", *clip, 6);
+  return PlaceBox{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+}
+
+int bitsOf(const Arguments& a) {
+  const int bits = a.get<int>("bits");
+  if (bits != 8 && bits != 16)
+    throw UsageError("--bits must be 8 or 16, not " + std::to_string(bits));
+  return bits;
+}
+
+RenderMode modeOf(const Arguments& a) {
+  return cli::choose<RenderMode>("mode", a.get<std::string>("mode"),
+                                 {{"composite", RenderMode::kComposite},
+                                  {"maximum", RenderMode::kMaximum},
+                                  {"average", RenderMode::kAverage}});
+}
+
+}  // namespace
+
+void addPictureOptions(cli::po::options_description& options) {
+  // clang-format off
+  options.add_options()
+    ("step", value<double>()->value_name("S")->default_value(1.0),
+     "distance between the samples of a ray, in voxels")
+    ("min-transmittance", value<double>()->value_name("T"),
+     "end a ray when its transmittance falls below T (default: 1/4096; 0: never)")
+    ("resolution", value<std::string>()->value_name("WxH")->default_value("800x800"),
+     "width and height of the picture in pixels")
+    ("background", value<std::string>()->value_name("R,G,B"),
+     "color behind the volume, each channel from 0 to 1 (default: transparent)")
+    ("bits", value<int>()->value_name("B")->default_value(8), "bits per channel of a PNG, 8 or 16")
+    ("mode", value<std::string>()->value_name("M")->default_value("composite"),
+     "composite: composite the samples of a ray from front to back; maximum or average: show the "
+     "largest or the mean value of the samples")
+    ("clip", value<std::string>()->value_name("BOX"),
+     "draw only what lies in the box x0,y0,z0,x1,y1,z1")
+    ("slice", value<std::string>()->value_name("A=P"),
+     "draw only a slab of one voxel's thickness; 'z=12.5' is perpendicular to z, with its center "
+     "at 12.5")
+    ("depth", value<std::string>()->value_name("FILE.exr"),
+     "also write, for each pixel, the distance in voxels at which half of the light is absorbed");
+  // clang-format on
+}
+
+void readPictureOptions(const Arguments& a, Options& options) {
+  options.resolution = resolutionOf(a.get<std::string>("resolution"));
+  options.step = a.get<double>("step");
+  cli::requireRange("step", options.step, kMinStep, 1e6);
+  options.minTransmittance = a.find<double>("min-transmittance");
+  options.background = backgroundOf(a);
+  options.bits = bitsOf(a);
+  options.mode = modeOf(a);
+  options.clip = clipOf(a);
+  options.depth = a.find<std::string>("depth").value_or("");
+}
+
+}  // namespace esvr::render

@@ -1,0 +1,133 @@
+// Plan: vdb2esvr is run on files that it cannot read, on grids that it cannot convert, and on
+// several grids. The tests check exit codes and messages, and that refused input leaves no file
+// behind.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+
+#include "cli/vdb2esvr_fixture.h"
+#include "esvr/container.h"
+#include "support/non_finite.h"
+
+namespace esvr {
+namespace {
+
+using test::InputGrid;
+using test::kInf;
+using test::kNan;
+using test::quickFit;
+using test::softBall;
+using test::Vdb2Esvr;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+struct BadFile {
+  const char* name;
+  std::function<void(const std::string& path)> make;
+  const char* words;
+};
+std::ostream& operator<<(std::ostream& out, const BadFile& file) { return out << file.name; }
+
+class BadInputFile : public testing::TestWithParam<BadFile> {};
+
+TEST_P(BadInputFile, isRefusedByNameWithCodeThreeAndNothingIsWritten) {
+  const test::TemporaryFolder folder;
+  const std::string in = folder / "in.vdb";
+  GetParam().make(in);
+  const auto run = quickFit(in, folder / "out.esvr");
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("in.vdb"), HasSubstr(GetParam().words)));
+  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_THAT(folder.names(), Not(testing::Contains(HasSubstr("esvr"))));
+}
+
+/// A grid with voxels that are not finite. The first of them in index order is (1, 2, 3).
+InputGrid withNonFinite() {
+  InputGrid grid{.voxels = softBall({})};
+  grid.voxels.push_back({{9, 9, 9}, kInf});
+  grid.voxels.push_back({{1, 2, 3}, kNan});
+  return grid;
+}
+
+void truncated(const std::string& path) {
+  test::writeInput(path, {{.voxels = softBall({})}});
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, BadInputFile,
+    testing::Values(
+        BadFile{"missing", [](const std::string&) {}, "no such file"},
+        BadFile{"directory", [](const auto& path) { std::filesystem::create_directory(path); },
+                "is a directory"},
+        BadFile{"empty", [](const auto& path) { test::writeText(path, ""); }, "is empty"},
+        BadFile{"text", [](const auto& path) { test::writeText(path, "density 1 2 3\n"); },
+                "neither an OpenVDB nor a NanoVDB"},
+        BadFile{"truncated", truncated, "in.vdb"},
+        BadFile{"no grid", [](const auto& path) { test::writeInput(path, {}); },
+                "no grid that can be fitted"},
+        BadFile{"no active voxel", [](const auto& path) { test::writeInput(path, {InputGrid{}}); },
+                "has no active voxel"},
+        BadFile{"only grids of other types",
+                [](const auto& path) { test::writeMixedInput(path, {}); }, "ptdataidx32"},
+        BadFile{"not finite", [](const auto& path) { test::writeInput(path, {withNonFinite()}); },
+                "2 voxels are NaN, infinite or too large for float; the first is at (1, 2, 3)"}));
+
+TEST_F(Vdb2Esvr, listsTheGridsWhereTheOneAskedForIsNotThere) {
+  test::writeInput(in(), {{.name = "a", .voxels = softBall({})}, {.name = "b"}});
+  const auto run = quickFit(in(), out(), {"-g", "c"});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("no grid \"c\""), HasSubstr("\"a\""), HasSubstr("\"b\"")));
+  EXPECT_FALSE(outIsThere());
+}
+
+TEST_F(Vdb2Esvr, listsGridsOfOtherTypesAsSkippedAndGoesOn) {
+  test::writeMixedInput(in(), {{.voxels = softBall({})}});
+  const auto run = quickFit(in(), out());
+  EXPECT_EQ(run.exitCode, 0);
+  for (const char* type : {"bool", "int32", "vec3s", "ptdataidx32"})
+    EXPECT_THAT(run.err, HasSubstr(type));
+  EXPECT_EQ(readEsvr(out()).grids.size(), 1u);
+}
+
+TEST_F(Vdb2Esvr, refusesAGridOfAnotherTypeThatIsAskedFor) {
+  test::writeMixedInput(in(), {{.voxels = softBall({})}});
+  const auto run = quickFit(in(), out(), {"-g", "vec3s"});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, HasSubstr("vec3s"));
+  EXPECT_FALSE(outIsThere());
+}
+
+TEST_F(Vdb2Esvr, takesNonFiniteVoxelsAsZeroWhereAskedAndSaysHowMany) {
+  test::writeInput(in(), {withNonFinite()});
+  const auto run = quickFit(in(), out(), {"--nonfinite", "zero"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("2 NaN or infinite voxels were replaced by 0"));
+  EXPECT_TRUE(outIsThere());
+}
+
+TEST_F(Vdb2Esvr, fitsTheGridsThatAreNamedOnly) {
+  test::writeInput(in(), {{.voxels = softBall({})},
+                          {.voxels = softBall({30, 0, 0})},
+                          {.name = "heat", .voxels = softBall({})}});
+  ASSERT_EQ(quickFit(in(), out(), {"-g", "heat", "-g", "density[1]"}).exitCode, 0);
+  const EsvrFile file = readEsvr(out());
+  ASSERT_EQ(file.grids.size(), 2u);
+  EXPECT_EQ(file.grids[0].activeBox.min.x, 26);
+  EXPECT_EQ(file.grids[1].descriptor.name, "heat");
+}
+
+TEST_F(Vdb2Esvr, refusesWhatTakesMoreMemoryThanAllowed) {
+  const auto run = quickFit(in(), out(), {"--max-memory", "1KB"});
+  EXPECT_EQ(run.exitCode, 5);
+  EXPECT_THAT(run.err, HasSubstr("density"));
+  EXPECT_FALSE(outIsThere());
+}
+
+}  // namespace
+}  // namespace esvr

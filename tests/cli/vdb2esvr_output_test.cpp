@@ -1,0 +1,104 @@
+// Plan: vdb2esvr is run where its output cannot or must not be written, and is interrupted. The
+// tests check the files that are there afterwards.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "cli/vdb2esvr_fixture.h"
+#include "esvr/container.h"
+
+namespace esvr {
+namespace {
+
+using test::quickFit;
+using test::softBall;
+using test::Vdb2Esvr;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST_F(Vdb2Esvr, keepsAnExistingFileUnlessForced) {
+  test::writeText(out(), "precious");
+  const auto refused = quickFit(in(), out());
+  EXPECT_EQ(refused.exitCode, 1);
+  EXPECT_THAT(refused.err, HasSubstr("--force"));
+  EXPECT_EQ(test::readText(out()), "precious");
+  EXPECT_EQ(quickFit(in(), out(), {"--force"}).exitCode, 0);
+  EXPECT_THAT(checkEsvr(out()), IsEmpty());
+}
+
+TEST_F(Vdb2Esvr, refusesOutputsThatCannotBeWrittenBeforeAnyWork) {
+  std::filesystem::create_directory(folder_ / "folder.esvr");
+  for (const std::string name : {"none/out.esvr", "folder.esvr"}) {
+    const auto run = quickFit(in(), folder_ / name, {"--force"});
+    EXPECT_EQ(run.exitCode, 1) << name;
+    EXPECT_THAT(run.err, HasSubstr(name));
+  }
+  EXPECT_THAT(quickFit(in(), "/proc/out.esvr").err, HasSubstr("/proc/out.esvr"));
+  const auto wrongEnding = quickFit(in(), folder_ / "out.vdb");
+  EXPECT_EQ(wrongEnding.exitCode, 2);
+  EXPECT_THAT(wrongEnding.err, HasSubstr(".esvr"));
+  EXPECT_THAT(folder_.names(), ElementsAre("folder.esvr", "in.vdb"));
+}
+
+TEST_F(Vdb2Esvr, refusesToWriteOverItsInput) {
+  std::filesystem::create_hard_link(in(), out());
+  const auto run = quickFit(in(), out(), {"--force"});
+  EXPECT_EQ(run.exitCode, 2);
+  EXPECT_THAT(run.err, HasSubstr("one file"));
+}
+
+TEST_F(Vdb2Esvr, leavesNothingOnAFullDisk) {
+  test::writeText(folder_ / "old.esvr", "precious");
+  for (const std::string name : {"out.esvr", "old.esvr"}) {
+    const auto run =
+        test::runOnFullDisk(std::string(VDB2ESVR) + " " + in() + " " + (folder_ / name).string() +
+                            " --force --iterations 10 --kappa 0");
+    EXPECT_EQ(run.exitCode, 1);
+    EXPECT_THAT(run.err, AllOf(HasSubstr(name), HasSubstr("File too large")));
+  }
+  EXPECT_THAT(folder_.names(), ElementsAre("in.vdb", "old.esvr"));
+  EXPECT_EQ(test::readText(folder_ / "old.esvr"), "precious");
+}
+
+TEST_F(Vdb2Esvr, keepsTheFileWhereOnlyTheTableCannotBePrinted) {
+  const auto run = test::runProgram(
+      "/bin/sh", {"-c", std::string(VDB2ESVR) + " " + in() + " " + out() +
+                            " --iterations 10 --representation ellipsoids > /dev/full"});
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("standard output"));
+  EXPECT_THAT(checkEsvr(out()), IsEmpty());
+}
+
+/// A fit of a minute, which is interrupted after its first message about progress.
+class Interrupted : public Vdb2Esvr {
+ protected:
+  [[nodiscard]] test::ProgramRun interrupted(const std::string& onCancel) const {
+    test::writeInput(in(), {{.voxels = softBall({})}, {.name = "heat", .voxels = softBall({})}});
+    return test::runInterrupted(VDB2ESVR,
+                                {in(), out(), "--seconds", "60", "--kappa", "0", "--representation",
+                                 "ellipsoids", "--on-cancel", onCancel, "-v"},
+                                " left\n");
+  }
+};
+
+TEST_F(Interrupted, writesTheBestSoFarAndEndsWithCodeOne) {
+  const auto run = interrupted("keep");
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("out.esvr has the best result so far, without grid \"heat\""));
+  EXPECT_THAT(checkEsvr(out()), IsEmpty());
+  EXPECT_THAT(folder_.names(), ElementsAre("in.vdb", "out.esvr"));
+}
+
+TEST_F(Interrupted, writesNothingWhereAskedTo) {
+  const auto run = interrupted("discard");
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("nothing was written"));
+  EXPECT_THAT(folder_.names(), ElementsAre("in.vdb"));
+}
+
+}  // namespace
+}  // namespace esvr
