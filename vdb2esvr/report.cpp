@@ -5,6 +5,7 @@
 #include "cli/memory.h"
 #include "cli/names.h"
 #include "cli/version_json.h"
+#include "vdb2esvr/left_out_report.h"
 #include "vdb2esvr/paper_report.h"
 #include "vdb2esvr/scene_notes.h"
 
@@ -228,16 +229,6 @@ Json sectionsOf(const EsvrSummary& file, std::size_t grid) {
   return sections;
 }
 
-Json leftOutOf(const RunRecord& record, std::size_t grid) {
-  Json notes = Json::array();
-  for (const auto& note : leftOut(record, grid)) {
-    Json entry{{"part", note.part}, {"why", note.why}};
-    if (note.bytesSaved > 0) entry["raw_bytes_saved"] = note.bytesSaved;
-    notes.push_back(entry);
-  }
-  return notes;
-}
-
 Json curveOf(const std::vector<TimedCurvePoint>& curve) {
   Json points = Json::array();
   for (const auto& p : curve)
@@ -267,7 +258,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"layers", layersOf(grid.stored())},
           {"metrics", metricsOf(grid)},
           {"seconds", secondsOf(grid.seconds)},
-          {"left_out", leftOutOf(record, g)},
+          {"left_out", leftOutJson(leftOut(record, g))},
           {"curve", curveOf(grid.conversion.fit.curve)}};
 }
 

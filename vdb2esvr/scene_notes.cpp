@@ -1,5 +1,7 @@
 #include "vdb2esvr/scene_notes.h"
 
+#include "vdb2esvr/decision_notes.h"
+
 namespace esvr::vdb2esvr {
 namespace {
 
@@ -13,9 +15,7 @@ std::uint64_t saved(const Candidate& taken, const std::optional<Candidate>& othe
   return other && other->bytes > taken.bytes ? other->bytes - taken.bytes : 0;
 }
 
-}  // namespace
-
-std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
+std::vector<LeftOut> partsLeftOut(const RunRecord& record, std::size_t g) {
   const ConvertedGrid& grid = record.grids[g];
   const std::uint64_t ellipsoids = grid.stored().field.ellipsoidCount();
   const auto lacks = [&](const char* kind) { return !hasSection(record.output, g, kind); };
@@ -51,8 +51,14 @@ std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
   if (lacks("curve") && !grid.conversion.fit.curve.empty())
     notes.push_back({"curve", "files with a wanted size or PSNR do not store it; the report has it",
                      grid.conversion.fit.curve.size() * sizeof(TimedCurvePoint)});
-  if (!grid.stored().residual)
-    notes.push_back({"residual", "no bound on the largest error was given"});
+  return notes;
+}
+
+}  // namespace
+
+std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t g) {
+  std::vector<LeftOut> notes = partsLeftOut(record, g);
+  for (auto& note : decisionNotes(record.grids[g].conversion)) notes.push_back(std::move(note));
   return notes;
 }
 

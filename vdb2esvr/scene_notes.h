@@ -1,7 +1,9 @@
 #pragma once
-/// Lists the parts that a written file does not need to have.
+/// Lists the parts that a written file does not need to have, and what the conversion decided about
+/// four means of making it smaller (decision_notes.h).
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +14,9 @@ namespace esvr::vdb2esvr {
 struct LeftOut {
   std::string part, why;
   std::uint64_t bytesSaved = 0;  ///< bytes before compression; 0 if unknown
+  bool used = false;             ///< the file has the part; only decisionNotes() lists such parts
+  std::optional<std::uint64_t> bytesWith{}, bytesWithout{};  ///< measured bytes of the grid
+  std::optional<double> seconds{};                           ///< time that deciding took
 };
 
 [[nodiscard]] std::vector<LeftOut> leftOut(const RunRecord& record, std::size_t grid);

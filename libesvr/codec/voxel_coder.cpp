@@ -4,7 +4,9 @@
 #include <cstdlib>
 #include <memory>
 #include <optional>
+#include <type_traits>
 
+#include "codec/voxel_model.h"
 #include "codec/voxel_predictor.h"
 #include "core/axes.h"
 #include "esvr/error.h"
@@ -22,9 +24,10 @@ struct Image {
 class Mirrors {
  public:
   Mirrors(const VoxelModel& model, const VoxelLayer& layer, const BrickIndex& index)
-      : model_(model), layer_(layer), index_(index) {}
+      : model_(model), layer_(layer), index_(index), any_(hasMirror(model)) {}
 
   [[nodiscard]] std::optional<Image> imageOf(Coord voxel) {
+    if (!any_) return std::nullopt;
     for (std::size_t a = 0; a < 3; ++a) {
       const std::int32_t place = model_.mirror[a] - voxel.*kAxes[a];
       if (model_.mirror[a] == VoxelModel::kNoMirror || place >= voxel.*kAxes[a]) continue;
@@ -52,6 +55,7 @@ class Mirrors {
   const BrickIndex& index_;
   Coord lastBrick_{Box::kMin, 0, 0};
   std::uint32_t last_ = BrickIndex::kNone;
+  bool any_;
 };
 
 // Numbers of contexts. The image of a voxel is missing, inactive or active. For vacancy it is
@@ -65,53 +69,88 @@ template <class Side>
 class VoxelCoder {
  public:
   /// \param thrift  if not null, codes are chosen; otherwise the layer's are coded
-  VoxelCoder(Side& side, const VoxelModel& model, VoxelLayer& layer, const Thrift* thrift = nullptr)
-      : side_(side),
-        model_(model),
+  VoxelCoder(const VoxelModel& model, VoxelLayer& layer, const Thrift* thrift = nullptr)
+      : model_(model),
         layer_(layer),
         index_(layer.bricks),
         mirrors_(model, layer, index_),
+        vacantClass_(std::uint8_t(classOf(model.vacantCode))),
         thrift_(thrift) {}
 
-  void brick(std::size_t b) {
+  /// The side is an argument and not a member, so that the compiler can keep the state of a range
+  /// decoder in registers.
+  void brick(Side& side, std::size_t b) {
     halo_.fill(layer_, index_, b, model_.vacantCode);
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      at_ = b * kBrickVoxels + std::size_t(v);
-      voxel(b, v);
-    }
+    fillClasses();
+    for (int first = 0; first < kBrickVoxels; first += kBrickSide) line(side, b, first);
   }
 
  private:
-  void voxel(std::size_t b, int v) {
+  /// Codes the voxels of a line along z.
+  void line(Side& side, std::size_t b, int first) {
+    const int cell = Halo::cell(voxelLocal(first));
+    std::size_t around = halo_.activityAround(cell);
+    for (int z = 0; z < kBrickSide; ++z) {
+      at_ = b * kBrickVoxels + std::size_t(first + z);
+      const bool active = voxel(side, {b, first + z}, around);
+      if (z + 1 < kBrickSide) around = halo_.activityAfter(around, active, cell + z + 1);
+    }
+  }
+
+  struct Place {
+    std::size_t brick;
+    int offset;
+  };
+
+  /// \param around  Halo::activityAround()
+  /// \return whether the voxel is active
+  bool voxel(Side& side, const Place& place, std::size_t around) {
+    const auto [b, v] = place;
     const auto cell = std::size_t(Halo::cell(voxelLocal(v)));
     const auto image = mirrors_.imageOf(layer_.bricks[b] * kBrickSide + voxelLocal(v));
     std::int32_t& code = layer_.codes[at_];
-    const bool active = codeActive(int(cell), image, layer_.active[b].test(v));
+    const bool active = codeActive(side, around, image, layer_.active[b].test(v));
     if (active) layer_.active[b].set(v);
-    const bool vacant = !active && codeVacant(image, layer_.vacant[b].test(v));
+    const bool vacant = !active && codeVacant(side, image, layer_.vacant[b].test(v));
     if (vacant) layer_.vacant[b].set(v);
-    code = vacant ? model_.vacantCode : codeValue(int(cell), image, code);
+    if (vacant)
+      code = model_.vacantCode, class_[cell] = vacantClass_;
+    else
+      code = codeValue(side, int(cell), image, code);
     halo_.code[cell] = code;
     halo_.active[cell] = active;
+    return active;
   }
 
-  bool codeActive(int cell, const std::optional<Image>& image, bool active) {
+  /// Sets the classes of the voxels before the brick.
+  void fillClasses() {
+    if (model_.common.empty()) return;
+    Halo::forEachBefore([&](std::size_t cell) {
+      const std::int32_t code = halo_.code[cell];
+      class_[cell] = code == model_.vacantCode ? vacantClass_ : std::uint8_t(classOf(code));
+    });
+  }
+
+  bool codeActive(Side& side, std::size_t around, const std::optional<Image>& image, bool active) {
     const std::size_t state = image ? (image->active ? 2u : 1u) : 0u;
-    return side_.bit(active_[halo_.activityAround(cell)][state], active);
+    return side.bit(active_[around][state], active);
   }
 
-  bool codeVacant(const std::optional<Image>& image, bool vacant) {
+  bool codeVacant(Side& side, const std::optional<Image>& image, bool vacant) {
     std::size_t state = 0;
     if (image)
       state = 1u + 2u * std::size_t(image->active) + std::size_t(image->code == model_.vacantCode);
-    return side_.bit(vacant_[state], vacant);
+    return side.bit(vacant_[state], vacant);
   }
 
-  std::int32_t codeValue(int cell, const std::optional<Image>& image, std::int32_t written) {
-    if (!model_.common.empty())
-      if (const std::uint32_t known = codeClass(cell, image, written); known > 0)
-        return model_.common[known - 1];
-    return codeDistance(cell, image, written);
+  std::int32_t codeValue(Side& side, int cell, const std::optional<Image>& image,
+                         std::int32_t written) {
+    if (!model_.common.empty()) {
+      const std::uint32_t known = codeClass(side, cell, image, written);
+      class_[std::size_t(cell)] = std::uint8_t(known);
+      if (known > 0) return model_.common[known - 1];
+    }
+    return codeDistance(side, cell, image, written);
   }
 
   /// The number of a common code, counted from 1; 0 for all other codes.
@@ -120,9 +159,10 @@ class VoxelCoder {
     return it == model_.common.end() ? 0u : std::uint32_t(it - model_.common.begin()) + 1u;
   }
 
-  std::uint32_t codeClass(int cell, const std::optional<Image>& image, std::int32_t written) {
+  std::uint32_t codeClass(Side& side, int cell, const std::optional<Image>& image,
+                          std::int32_t written) {
     auto& model = image ? imageClasses_[classOf(image->code)] : classes_[classesAround(cell)];
-    const std::uint32_t coded = model.code(side_, classOf(written));
+    const std::uint32_t coded = model.code(side, kReads ? 0u : classOf(written));
     if (coded > model_.common.size()) throw BadInput("a voxel is none of the common ones");
     return coded;
   }
@@ -130,21 +170,21 @@ class VoxelCoder {
   [[nodiscard]] std::size_t classesAround(int cell) const {
     std::size_t classes = 0;
     for (const int back : {Halo::kStepX, Halo::kStepY, Halo::kStepZ})
-      classes = classes * kClasses + classOf(halo_.code[std::size_t(cell - back)]);
+      classes = classes * kClasses + class_[std::size_t(cell - back)];
     return classes;
   }
 
-  std::int32_t codeDistance(int cell, const std::optional<Image>& image, std::int32_t written) {
+  std::int32_t codeDistance(Side& side, int cell, const std::optional<Image>& image,
+                            std::int32_t written) {
     predictor_.look(&halo_.code[std::size_t(cell)],
                     image ? std::optional(image->code) : std::nullopt);
     const std::size_t context = predictor_.context();
     if (thrift_) written = thriftyCode(context, written);
     const std::int64_t difference = std::int64_t(written) - predictor_.guess();
     const std::uint64_t magnitude =
-        magnitudes_[context].code(side_, std::uint64_t(std::abs(difference)));
+        magnitudes_[context].code(side, std::uint64_t(std::abs(difference)));
     if (magnitude > kMaxDifference) throw BadInput("a voxel is further off than can be");
-    const bool negative =
-        magnitude != 0 && side_.bit(sign_[context][lastNegative_], difference < 0);
+    const bool negative = magnitude != 0 && side.bit(sign_[context][lastNegative_], difference < 0);
     if (magnitude != 0) lastNegative_ = negative;
     const auto coded = std::int64_t(magnitude);
     const std::int64_t result = predictor_.guess() + (negative ? -coded : coded);
@@ -181,12 +221,16 @@ class VoxelCoder {
   /// Largest distance of a code from its prediction, which is a sum of at most seven codes.
   static constexpr std::uint64_t kMaxDifference = std::uint64_t{1} << 35;
 
-  Side& side_;
+  static constexpr bool kReads = std::is_same_v<Side, Reader>;
+
   const VoxelModel& model_;
   VoxelLayer& layer_;
   BrickIndex index_;
   Mirrors mirrors_;
   Halo halo_{};
+  /// The numbers of the codes in the halo (classOf), if there are common codes.
+  std::array<std::uint8_t, Halo::kCells> class_{};
+  std::uint8_t vacantClass_;
   VoxelPredictor predictor_;
   const Thrift* thrift_;
   std::size_t at_ = 0;  ///< index of the voxel in the layer's codes
@@ -202,8 +246,8 @@ class VoxelCoder {
 template <class Side>
 void code(Side& side, std::span<const std::size_t> order, const VoxelModel& model,
           VoxelLayer& layer) {
-  const auto coder = std::make_unique<VoxelCoder<Side>>(side, model, layer);
-  for (const std::size_t b : order) coder->brick(b);
+  const auto coder = std::make_unique<VoxelCoder<Side>>(model, layer);
+  for (const std::size_t b : order) coder->brick(side, b);
 }
 
 }  // namespace
@@ -215,13 +259,15 @@ void codeVoxels(Writer& side, std::span<const std::size_t> order, const VoxelMod
 void chooseCodes(std::span<const std::size_t> order, const VoxelModel& model, const Thrift& thrift,
                  VoxelLayer& layer) {
   Writer writer;
-  const auto coder = std::make_unique<VoxelCoder<Writer>>(writer, model, layer, &thrift);
-  for (const std::size_t b : order) coder->brick(b);
+  const auto coder = std::make_unique<VoxelCoder<Writer>>(model, layer, &thrift);
+  for (const std::size_t b : order) coder->brick(writer, b);
 }
 
 void codeVoxels(Reader& side, std::span<const std::size_t> order, const VoxelModel& model,
                 VoxelLayer& layer) {
-  code(side, order, model, layer);
+  Reader local = side;
+  code(local, order, model, layer);
+  side = local;
 }
 
 }  // namespace esvr::codec

@@ -22,6 +22,16 @@ struct Halo {
     return (local.x + 1) * kStepX + (local.y + 1) * kStepY + local.z + 1;
   }
 
+  /// Calls visit(cell) for the cells of the voxels before the brick.
+  template <class Visit>
+  static void forEachBefore(const Visit& visit) {
+    for (int cell = 0; cell < kStepX; ++cell) visit(std::size_t(cell));
+    for (int x = 1; x < kSide; ++x) {
+      for (int z = 0; z < kSide; ++z) visit(std::size_t(x * kStepX + z));
+      for (int y = 1; y < kSide; ++y) visit(std::size_t(x * kStepX + y * kStepY));
+    }
+  }
+
   /// Copies the voxels that lie before brick b. The voxels of the brick itself are not set here,
   /// because the coder sets each of them before it is read.
   /// \param vacantCode  code for voxels that no brick has
@@ -41,6 +51,16 @@ struct Halo {
                            kStepY + kStepZ, kStepX + kStepY + kStepZ})
       bits = bits << 1 | std::size_t(active[std::size_t(cell - back)]);
     return bits;
+  }
+
+  /// The same for a voxel whose neighbour before it along z has been coded last.
+  /// \param before   the activities around that neighbour
+  /// \param current  whether that neighbour is active
+  [[nodiscard]] std::size_t activityAfter(std::size_t before, bool current, int cell) const {
+    const auto bit = [&](int back) { return std::size_t(active[std::size_t(cell - back)]); };
+    const std::size_t kept = (before >> 4 & 4u) | (before >> 4 & 2u) | (before >> 3 & 1u);
+    return bit(kStepX) << 6 | bit(kStepY) << 5 | std::size_t(current) << 4 |
+           bit(kStepX + kStepY) << 3 | kept;
   }
 
  private:

@@ -1,5 +1,7 @@
 #include "esvr/voxel_layer.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -15,7 +17,7 @@ using Limits = std::numeric_limits<std::int32_t>;
 constexpr std::size_t kLargestPalette = 4096;
 constexpr double kMargin = 1.0 - 1e-6;  // factor of a bound, which leaves room for rounding
 constexpr double kLargestCode = 0x1p30;
-constexpr int kHalfMantissa = 10, kHalfLowest = -14, kHalfHighest = 15;
+constexpr int kFloatMantissa = 23, kHalfMantissa = 10, kHalfLowest = -14, kHalfHighest = 15;
 constexpr std::int32_t kHalfOne = 1 << kHalfMantissa, kHalfSign = 0x8000, kHalfBits = 0x7fff;
 
 bool sameBits(float a, float b) {
@@ -37,14 +39,12 @@ std::int32_t orderOfFloat(float v) {
 
 bool inOrder(float a, float b) { return orderOfFloat(a) < orderOfFloat(b); }
 
+/// The bits of a half, moved to those of a float, are the half times 2^-112, which is the difference
+/// of the exponents' offsets. The product is exact, also for subnormal halves.
 float halfAt(std::int32_t n) {
   const std::int32_t bits = (n < 0 ? -1 - n : n) & kHalfBits;
-  const int exponent = bits >> kHalfMantissa;
-  const int mantissa = bits & (kHalfOne - 1);
-  const double magnitude =
-      exponent == 0 ? std::ldexp(mantissa, kHalfLowest - kHalfMantissa)
-                    : std::ldexp(mantissa + kHalfOne, exponent - kHalfHighest - kHalfMantissa);
-  return std::copysign(float(magnitude), n < 0 ? -1.0f : 1.0f);
+  const auto moved = std::bit_cast<float>(std::uint32_t(bits) << (kFloatMantissa - kHalfMantissa));
+  return std::copysign(moved * 0x1p112f, n < 0 ? -1.0f : 1.0f);
 }
 /// The number of the half that is nearest to v among those of no larger magnitude. v is a half if
 /// halfAt() of the result equals v.
@@ -182,11 +182,22 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
   volume.bricks = layer.bricks;
   volume.active = layer.active;
   volume.values.resize(layer.codes.size());
-  for (std::size_t i = 0; i < layer.codes.size(); ++i)
-    volume.values[i] = layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels))
-                           ? layer.background
-                           : valueAt(layer, layer.codes[i]);
+  tbb::parallel_for(std::size_t{0}, layer.bricks.size(), [&](std::size_t b) {
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+      const std::size_t i = b * kBrickVoxels + v;
+      volume.values[i] =
+          layer.vacant[b].test(int(v)) ? layer.background : valueAt(layer, layer.codes[i]);
+    }
+  });
   return volume;
+}
+
+bool allFinite(const VoxelLayer& layer) {
+  for (std::size_t i = 0; i < layer.codes.size(); ++i)
+    if (!std::isfinite(valueAt(layer, layer.codes[i])) &&
+        !layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels)))
+      return false;
+  return true;
 }
 
 namespace {

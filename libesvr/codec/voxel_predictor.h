@@ -38,8 +38,7 @@ class VoxelPredictor {
     spread_ = std::abs(a - ab) + std::abs(b - bc) + std::abs(c - ac) + std::abs(a - ac) +
               std::abs(b - ab) + std::abs(c - bc);
     first_ = image ? kImage : kImage + 1;
-    const auto best = std::min_element(errors_.begin() + first_, errors_.end());
-    best_ = std::size_t(best - errors_.begin());
+    best_ = leastError();
   }
 
   [[nodiscard]] std::int64_t guess() const { return guesses_[best_]; }
@@ -48,7 +47,7 @@ class VoxelPredictor {
   /// recent errors; otherwise it is the magnitude, in half octaves, of the differences between the
   /// surrounding voxels plus recent errors.
   [[nodiscard]] std::size_t context() const {
-    const auto late = std::uint64_t(errors_[best_]);
+    const std::uint64_t late = errors_[best_];
     if (best_ == kImage)
       return kAroundContexts +
              std::min<std::size_t>(std::size_t(std::bit_width(late / 4)), kImageContexts - 1);
@@ -59,20 +58,34 @@ class VoxelPredictor {
   }
 
   void learn(std::int64_t code) {
-    for (std::size_t k = std::size_t(first_); k < kGuesses; ++k)
-      errors_[k] +=
-          kUnit * std::min(std::abs(code - guesses_[k]), kMaxError) - errors_[k] / kMemory;
+    for (std::size_t k = first_; k < kGuesses; ++k)
+      errors_[k] += kUnit * std::min(std::uint64_t(std::abs(code - guesses_[k])), kMaxError) -
+                    errors_[k] / kMemory;
   }
 
  private:
   static constexpr std::size_t kGuesses = 7, kImage = 0;
-  static constexpr std::int64_t kUnit = 16;    // errors are counted in units of 1/16
-  static constexpr std::int64_t kMemory = 16;  // recent errors decay by 1/16 for each voxel
-  static constexpr std::int64_t kMaxError = std::int64_t{1} << 34;
+  static constexpr int kGuessBits = 3;
+  static constexpr std::uint64_t kUnit = 16;    // errors are counted in units of 1/16
+  static constexpr std::uint64_t kMemory = 16;  // recent errors decay by 1/16 for each voxel
+  static constexpr std::uint64_t kMaxError = std::uint64_t{1} << 34;
 
-  std::array<std::int64_t, kGuesses> guesses_{}, errors_{};
+  /// The existing prediction with the least error, the first one among equals. The index is in the
+  /// lowest bits of what is compared, so that no branch depends on the errors, which no processor
+  /// could foresee. An error stays below 2^43.
+  [[nodiscard]] std::size_t leastError() const {
+    std::uint64_t least = ~std::uint64_t{0};
+    for (std::size_t k = 0; k < kGuesses; ++k) {
+      const std::uint64_t now = errors_[k] << kGuessBits | k;
+      least = k >= first_ && now < least ? now : least;
+    }
+    return least & ((std::size_t{1} << kGuessBits) - 1);
+  }
+
+  std::array<std::int64_t, kGuesses> guesses_{};
+  std::array<std::uint64_t, kGuesses> errors_{};
   std::int64_t spread_ = 0;
-  std::ptrdiff_t first_ = 0;  ///< index of the first prediction that exists
+  std::size_t first_ = 0;  ///< index of the first prediction that exists
   std::size_t best_ = 0;
 };
 

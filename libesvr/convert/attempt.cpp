@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/add_seconds.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -127,13 +128,16 @@ Attempt withBetterSigns(const ConvertInput& input, Attempt own, ConvertOptions& 
   const FitOptions& fit = options.fit;
   if (own.cancelled() || fit.bothSigns || fit.narrowBand || !saturates(input.source)) return own;
   std::optional<Attempt> found;
+  double seconds = 0.0;
   try {
+    const AddSeconds clock(seconds);
     found = betterSigned(job, double(own.asked), own);
   } catch (const Cancelled&) {
     // The search continues with `own`, which the token marks as cancelled below.
   }
   options.fit.bothSigns = found.has_value();
   Attempt& best = found ? *found : own;
+  best.bothSigns = {.tried = true, .used = found.has_value(), .seconds = seconds};
   if (fit.cancel && fit.cancel->cancelled()) best.fit.end = FitEnd::kCancelled;
   return std::move(best);
 }

@@ -5,6 +5,7 @@
 
 #include "compact/measure_layers.h"
 #include "convert/size_search.h"
+#include "core/add_seconds.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -49,12 +50,25 @@ struct Smallest {
   Conversion conversion;
   ChoiceRecord choice;
   bool insists = false;  ///< ellipsoids are taken even if voxels are smaller
+  Decision residual{};
 
   void take(Conversion now) {
     const std::uint64_t bytes = bytesAdded(now.grid);
     if (choice.ellipsoids && bytes >= choice.ellipsoids->bytes) return;
     choice.ellipsoids = Candidate{bytes};
     if (insists || bytes < choice.voxels->bytes) conversion = std::move(now);
+  }
+
+  /// Writes the figures into the conversion.
+  void record() {
+    residual.used = conversion.grid.residual.has_value();
+    residual.bytesWithout = choice.voxels->bytes;
+    if (choice.ellipsoids) {
+      residual.bytesWith = choice.ellipsoids->bytes;
+      choice.ellipsoids->seconds = residual.seconds;
+    }
+    conversion.choice = choice;
+    conversion.decisions.residual = residual;
   }
 };
 
@@ -71,6 +85,12 @@ void tryEllipsoids(const Job& job, double bound, Smallest& best) {
     best.take(std::move(*now));
     if (!promising) return;
   }
+}
+
+void tryTimed(const Job& job, double bound, Smallest& best) {
+  const AddSeconds clock(best.residual.seconds.emplace(0.0));
+  best.residual.tried = true;
+  tryEllipsoids(job, bound, best);
 }
 
 }  // namespace
@@ -98,11 +118,11 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   if (isNarrowBand(job.input.descriptor, source) && !insists) return voxels;
   Smallest best{std::move(voxels), {}, insists};
   best.choice.voxels = Candidate{bytesAdded(best.conversion.grid)};
-  if (job.options.representation != Representation::kVoxels) tryEllipsoids(job, bound, best);
+  if (job.options.representation != Representation::kVoxels) tryTimed(job, bound, best);
   if (insists && !best.choice.ellipsoids)
     throw UsageError("grid '" + job.input.descriptor.name +
                      "' has no ellipsoids with a residual that keep the bound");
-  best.conversion.choice = best.choice;
+  best.record();
   return std::move(best.conversion);
 }
 

@@ -9,6 +9,7 @@
 #include "convert/psnr_search.h"
 #include "convert/size_search.h"
 #include "convert/voxel_search.h"
+#include "core/add_seconds.h"
 #include "esvr/error.h"
 
 namespace esvr::convert {
@@ -26,10 +27,12 @@ Representation representationOf(const Job& job) {
   return wanted;
 }
 
-Candidate record(const VoxelCandidate& voxels) { return {voxels.bytes, voxels.psnr}; }
+Candidate record(const VoxelCandidate& voxels) {
+  return {voxels.bytes, voxels.psnr, false, voxels.seconds};
+}
 
-Candidate record(const Job& job, const Conversion& ellipsoids) {
-  return {bytesAdded(ellipsoids.grid), psnrOf(job, ellipsoids.grid)};
+Candidate record(const Job& job, const Conversion& ellipsoids, double seconds) {
+  return {bytesAdded(ellipsoids.grid), psnrOf(job, ellipsoids.grid), false, seconds};
 }
 
 Conversion asConversion(VoxelCandidate voxels, const ChoiceRecord& choice, FitEnd end) {
@@ -37,7 +40,15 @@ Conversion asConversion(VoxelCandidate voxels, const ChoiceRecord& choice, FitEn
   conversion.grid = std::move(voxels.grid);
   conversion.fit.end = end;
   conversion.choice = choice;
+  conversion.decisions.plateau = voxels.plateau;
   return conversion;
+}
+
+/// Records that ellipsoids were taken instead of these voxels.
+void recordRejected(const VoxelCandidate& voxels, const ChoiceRecord& choice, Conversion& taken) {
+  taken.choice = choice;
+  taken.decisions.plateau = voxels.plateau;
+  taken.decisions.plateau.used = false;
 }
 
 UsageError tooSmall(const Job& job, std::uint64_t bytes, const std::string& needs) {
@@ -64,16 +75,25 @@ auto unlessCancelled(const Search& search) -> decltype(search()) try {
   return {};
 }
 
+/// The result of a search, and the seconds that it took.
+template <class Search>
+auto measured(double& seconds, const Search& search) {
+  const AddSeconds clock(seconds);
+  return search();
+}
+
 /// The smaller of `voxels` and ellipsoids, which must reach the PSNR.
 Conversion smallerOf(const Job& job, const PsnrTarget& target, VoxelCandidate voxels) {
   const double psnr = target.psnr;
   const auto below = std::uint64_t(target.worthwhileShare * double(voxels.bytes));
-  auto [ellipsoids, expected] = unlessCancelled([&] { return searchPsnr(job, psnr, below); });
+  double seconds = 0.0;
+  auto [ellipsoids, expected] = measured(
+      seconds, [&] { return unlessCancelled([&] { return searchPsnr(job, psnr, below); }); });
   ChoiceRecord choice{record(voxels), {}};
-  if (expected > 0) choice.ellipsoids = Candidate{expected, psnr, true};
+  if (expected > 0) choice.ellipsoids = Candidate{expected, psnr, true, seconds};
   if (ellipsoids) {
-    choice.ellipsoids = record(job, *ellipsoids);
-    ellipsoids->choice = choice;
+    choice.ellipsoids = record(job, *ellipsoids, seconds);
+    recordRejected(voxels, choice, *ellipsoids);
     if (choice.ellipsoids->psnr >= psnr && choice.ellipsoids->bytes < voxels.bytes)
       return std::move(*ellipsoids);
   }
@@ -82,12 +102,15 @@ Conversion smallerOf(const Job& job, const PsnrTarget& target, VoxelCandidate vo
 
 /// The better of `voxels` and ellipsoids of a size.
 Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) {
-  auto result = unlessCancelled([&] { return searchSize(job, bytes, voxels.psnr); });
+  double seconds = 0.0;
+  auto result = measured(seconds, [&] {
+    return unlessCancelled([&] { return searchSize(job, bytes, voxels.psnr); });
+  });
   ChoiceRecord choice{record(voxels), {}};
-  if (result.expected > 0.0) choice.ellipsoids = Candidate{bytes, result.expected, true};
+  if (result.expected > 0.0) choice.ellipsoids = Candidate{bytes, result.expected, true, seconds};
   if (result.conversion) {
-    choice.ellipsoids = record(job, *result.conversion);
-    result.conversion->choice = choice;
+    choice.ellipsoids = record(job, *result.conversion, seconds);
+    recordRejected(voxels, choice, *result.conversion);
     if (choice.ellipsoids->psnr > voxels.psnr) return std::move(*result.conversion);
   }
   return asConversion(std::move(voxels), choice, FitEnd::kScheduleDone);
@@ -132,14 +155,16 @@ Conversion unlessExactIsSmaller(const Job& job, const std::function<Conversion()
   std::future<VoxelCandidate> coder = std::async(
       atOnce ? std::launch::async : std::launch::deferred, [&] { return exactVoxels(job); });
   std::optional<Conversion> fitted;
-  if (atOnce) fitted = fit();
+  double seconds = 0.0;
+  if (atOnce) fitted = measured(seconds, fit);
   VoxelCandidate exact = coder.get();
   ChoiceRecord choice{record(exact),
                       Candidate{std::uint64_t(kBytesPerEllipsoid * count), {}, true}};
   if (!fitted && double(exact.bytes) <= kMinBytesPerEllipsoid * count)
     return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);
-  if (!fitted) fitted = fit();
+  if (!fitted) fitted = measured(seconds, fit);
   choice.ellipsoids = Candidate{bytesAdded(fitted->grid)};  // its PSNR would take a decoding
+  choice.ellipsoids->seconds = seconds;
   fitted->choice = choice;
   if (choice.ellipsoids->bytes < exact.bytes) return std::move(*fitted);
   return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);

@@ -43,6 +43,7 @@ class PsnrSearch {
 
   PsnrResult run() {
     Attempt draft = nearDraft();
+    bothSigns_ = draft.bothSigns;
     std::uint64_t expected = 0;
     if (below_ && !draft.cancelled()) {
       const double price = priceOf(draft, compacted(job_, draft, {})) / kShortFitPrice;
@@ -190,10 +191,16 @@ class PsnrSearch {
     });
   }
 
-  [[nodiscard]] Conversion stored(Attempt attempt) const {
+  [[nodiscard]] Conversion packed(Attempt attempt) const {
     if (!compact_) return conversionOf(std::move(attempt));
     CompactResult compact = compacted(job_, attempt, {.psnr = psnr_});
     return conversionOf(std::move(attempt.fit), std::move(compact));
+  }
+
+  [[nodiscard]] Conversion stored(Attempt attempt) const {
+    Conversion conversion = packed(std::move(attempt));
+    conversion.decisions.bothSigns = bothSigns_;
+    return conversion;
   }
 
   [[nodiscard]] Conversion marked(Attempt attempt, FitEnd end) const {
@@ -231,6 +238,7 @@ class PsnrSearch {
   Margin margin_;
   std::uint64_t maxCount_;
   double slope_ = kDbPerDoubling;
+  Decision bothSigns_;
   std::vector<Attempt> attempts_;
 };
 

@@ -32,6 +32,7 @@ class SizeSearch {
   SizeResult run() {
     Attempt last = attempt(job_, double(bytes_) / kBytesPerEllipsoid, FitLength::kShort);
     last = withBetterSigns(job_.input, std::move(last), options_);
+    bothSigns_ = last.bothSigns;
     const double expected = last.psnr + kShortFitBehind - kUsualLoss;
     if (above_ && !last.cancelled() && expected + kUncertainty < *above_)
       return {std::nullopt, 0, expected};
@@ -44,15 +45,21 @@ class SizeSearch {
       if (besides_ >= bytes_) return refused();
       const bool fits = now.bytes <= left_;
       if (fits && (now.loss <= kMaxUsefulLoss || repairs + 1 >= kMaxRepairs))
-        return {conversionOf(std::move(last.fit), std::move(now)), 0, expected};
+        return {stored(std::move(last.fit), std::move(now)), 0, expected};
       if (!fits && last.asked == 1) return {std::nullopt, besides_ + now.bytes, expected};
       each = std::max(priceOf(last, compacted(job_, last, {})), kRepairFactor * each);
     }
     CompactResult compact = compactFor(last);
-    return {conversionOf(std::move(last.fit), std::move(compact)), 0, expected};
+    return {stored(std::move(last.fit), std::move(compact)), 0, expected};
   }
 
  private:
+  [[nodiscard]] Conversion stored(FitResult fit, CompactResult compact) const {
+    Conversion conversion = conversionOf(std::move(fit), std::move(compact));
+    conversion.decisions.bothSigns = bothSigns_;
+    return conversion;
+  }
+
   /// Reserves bytes for the grid's other sections. \return false if no bytes remain
   bool reserve(std::uint64_t besides) {
     besides_ = besides;
@@ -81,6 +88,7 @@ class SizeSearch {
   Job job_;
   std::uint64_t bytes_, besides_ = 0, left_ = 0;
   std::optional<double> above_;
+  Decision bothSigns_;
 };
 
 }  // namespace

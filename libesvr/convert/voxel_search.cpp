@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "convert/octave_search.h"
+#include "core/add_seconds.h"
 #include "esvr/grid_coding.h"
 #include "esvr/voxel_layer.h"
 
@@ -49,9 +50,9 @@ VoxelCandidate candidate(const Job& job, VoxelLayer layer, double psnr) {
 }
 
 /// The most frequent value of the active voxels besides 0 and the background, which are exact
-/// anyway, and the share of voxels that have it.
+/// anyway, the share of voxels that have it, and the seconds that counting them took.
 struct Plateau {
-  double value = 0.0, share = 0.0;
+  double value = 0.0, share = 0.0, seconds = 0.0;
 };
 
 Plateau plateauOf(const SparseVolume& volume) {
@@ -71,6 +72,40 @@ Plateau plateauOf(const SparseVolume& volume) {
   return plateau;
 }
 
+/// The result of `make`, whose member `seconds` says how long making it took.
+template <class Make>
+auto timed(const Make& make) {
+  double seconds = 0.0;
+  const auto run = [&] {
+    const AddSeconds clock(seconds);
+    return make();
+  };
+  auto made = run();
+  made.seconds = seconds;
+  return made;
+}
+
+bool isSmaller(const VoxelCandidate& a, const VoxelCandidate& b) { return a.bytes < b.bytes; }
+bool isCloser(const VoxelCandidate& a, const VoxelCandidate& b) { return a.psnr > b.psnr; }
+
+/// Voxels on a lattice without and with the plateau, and the seconds that the latter took.
+struct PlateauTrial {
+  std::optional<VoxelCandidate> without, with{};
+  double seconds = 0.0;
+
+  /// The better ones, with a record of the decision.
+  template <class Better>
+  std::optional<VoxelCandidate> decide(const Better& better) && {
+    Decision decision{.tried = true, .seconds = seconds};
+    if (without) decision.bytesWithout = without->bytes;
+    if (with) decision.bytesWith = with->bytes;
+    decision.used = with && (!without || better(*with, *without));
+    auto& best = decision.used ? with : without;
+    if (best) best->plateau = decision;
+    return std::move(best);
+  }
+};
+
 /// A layer, its bound and its PSNR.
 struct Trial {
   double bound, psnr;
@@ -79,7 +114,8 @@ struct Trial {
 
 class VoxelSearch {
  public:
-  explicit VoxelSearch(const Job& job) : job_(job), plateau_(plateauOf(job.input.source)) {
+  explicit VoxelSearch(const Job& job)
+      : job_(job), plateau_(timed([&] { return plateauOf(job.input.source); })) {
     const ValueRange range = activeRange(job.input.source);
     const double background = job.input.source.background;
     range_ = std::max(double(range.max), background) - std::min(double(range.min), background);
@@ -90,39 +126,33 @@ class VoxelSearch {
     if (!(range_ > 0.0)) return exactVoxels(job_);
     auto plain = coarsestFor(psnr, psnr / kDbPerOctave - 1.0, 0.0, kMaxTrials);
     if (!plain) return exactVoxels(job_);
-    const double bound = plain->bound, octave = octaveOf(bound) + kThriftOctaves;
+    const double bound = plain->bound;
     VoxelCandidate best;
-    std::optional<VoxelCandidate> simple, thrifty, plateau;
-    const auto takeSmallest = [&] {
-      for (auto* now : {&simple, &thrifty, &plateau})
-        if (*now && (*now)->bytes < best.bytes) best = std::move(**now);
-    };
     tbb::task_arena arena(trialsAtOnce());
     arena.execute([&] {
-      tbb::parallel_invoke([&] { best = exactVoxels(job_); },
-                           [&] { simple = candidateOf(std::move(plain)); });
-      takeSmallest();
-      if (best.bytes < target.smallEnough) return;
-      tbb::parallel_invoke(
-          [&] { thrifty = candidateOf(coarsestFor(psnr, octave, kPrice, kMaxThriftyTrials)); },
-          [&] {
-            if (plateau_.share >= kPlateauShare) plateau = withPlateau(psnr, bound);
-          });
-      takeSmallest();
+      best = exactUnless(std::move(*plain));
+      if (best.bytes >= target.smallEnough) best = furtherTrials(psnr, bound, std::move(best));
     });
+    if (!best.plateau.tried) best.plateau.seconds = plateau_.seconds;
     return best;
   }
 
   /// The best quantised voxels of a size.
   std::optional<VoxelCandidate> forSize(std::uint64_t bytes) const {
     if (!(range_ > 0.0)) return std::nullopt;
-    auto best = fullest(bytes, false);
-    if (plateau_.share < kPlateauShare) return best;
-    auto other = fullest(bytes, true);
-    return other && (!best || other->psnr > best->psnr) ? other : best;
+    PlateauTrial trial{.without = fullest(bytes, false), .seconds = plateau_.seconds};
+    if (trial.without) trial.without->plateau.seconds = trial.seconds;
+    if (!isPlateau()) return std::move(trial.without);
+    const auto fill = [&] {
+      const AddSeconds clock(trial.seconds);
+      trial.with = fullest(bytes, true);
+    };
+    fill();
+    return std::move(trial).decide(isCloser);
   }
 
  private:
+  [[nodiscard]] bool isPlateau() const { return plateau_.share >= kPlateauShare; }
   [[nodiscard]] double boundAt(double octave) const { return range_ * std::exp2(-octave); }
   [[nodiscard]] double octaveOf(double bound) const { return std::log2(range_ / bound); }
 
@@ -161,6 +191,31 @@ class VoxelSearch {
       if (best && best->psnr < psnr + kPsnrTolerance) break;
     }
     return best;
+  }
+
+  /// Exact voxels, unless the trial is smaller.
+  [[nodiscard]] VoxelCandidate exactUnless(Trial trial) const {
+    VoxelCandidate exact, rounded;
+    tbb::parallel_invoke([&] { exact = exactVoxels(job_); },
+                         [&] { rounded = candidate(job_, std::move(trial.layer), trial.psnr); });
+    return isSmaller(rounded, exact) ? std::move(rounded) : std::move(exact);
+  }
+
+  /// The smallest of `best`, thrifty voxels of about the same bound, and voxels with the plateau.
+  [[nodiscard]] VoxelCandidate furtherTrials(double psnr, double bound, VoxelCandidate best) const {
+    std::optional<VoxelCandidate> thrifty;
+    PlateauTrial trial{.without{}, .seconds = plateau_.seconds};
+    const double octave = octaveOf(bound) + kThriftOctaves;
+    tbb::parallel_invoke(
+        [&] { thrifty = candidateOf(coarsestFor(psnr, octave, kPrice, kMaxThriftyTrials)); },
+        [&] {
+          const AddSeconds clock(trial.seconds);
+          if (isPlateau()) trial.with = withPlateau(psnr, bound);
+        });
+    if (thrifty && isSmaller(*thrifty, best)) best = std::move(*thrifty);
+    if (!isPlateau()) return best;
+    trial.without = std::move(best);
+    return *std::move(trial).decide(isSmaller);
   }
 
   /// The smallest number of levels in [to, from] that reaches a PSNR; 0 if there is none.
@@ -228,17 +283,26 @@ class VoxelSearch {
 }  // namespace
 
 VoxelCandidate exactVoxels(const Job& job) {
-  return candidate(job, exactLayer(job.input.source), std::numeric_limits<double>::infinity());
+  return timed([&] {
+    return candidate(job, exactLayer(job.input.source), std::numeric_limits<double>::infinity());
+  });
 }
 
 VoxelCandidate voxelsForPsnr(const Job& job, const PsnrTarget& target) {
-  return VoxelSearch(job).forPsnr(target);
+  return timed([&] { return VoxelSearch(job).forPsnr(target); });
 }
 
 std::optional<VoxelCandidate> voxelsForSize(const Job& job, std::uint64_t bytes) {
-  auto exact = exactVoxels(job);
-  if (exact.bytes <= bytes) return exact;
-  return VoxelSearch(job).forSize(bytes);
+  double seconds = 0.0;
+  const auto search = [&]() -> std::optional<VoxelCandidate> {
+    const AddSeconds clock(seconds);
+    auto exact = exactVoxels(job);
+    if (exact.bytes <= bytes) return exact;
+    return VoxelSearch(job).forSize(bytes);
+  };
+  auto found = search();
+  if (found) found->seconds = seconds;
+  return found;
 }
 
 }  // namespace esvr::convert

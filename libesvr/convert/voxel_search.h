@@ -14,6 +14,8 @@ struct VoxelCandidate {
   StoredGrid grid;
   std::uint64_t bytes = 0;  ///< bytesAdded
   double psnr = 0.0;        ///< dB over the box; +inf if the voxels are exact
+  double seconds = 0.0;     ///< wall-clock seconds of the whole search
+  Decision plateau;         ///< whether the lattice contains the most frequent value
 };
 
 /// Exact voxels. Doubles are exact as they were read, rounded to float32.

@@ -146,10 +146,7 @@ void decodeStream(ByteReader& in, const BrickCount& count, const codec::VoxelMod
 
 void checkValues(const VoxelLayer& layer, const ByteReader& in) {
   checkCodes(layer, in);
-  const SparseVolume volume = volumeOf(layer);
-  if (!std::all_of(volume.values.begin(), volume.values.end(),
-                   [](float v) { return std::isfinite(v); }))
-    in.fail("a voxel is not finite");
+  if (!allFinite(layer)) in.fail("a voxel is not finite");
 }
 
 }  // namespace

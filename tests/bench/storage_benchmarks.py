@@ -6,11 +6,14 @@
     storage_benchmarks.py targets  --bin BUILD --data DIR --out OUT   files of a given size or PSNR
     storage_benchmarks.py lossless --bin BUILD --data DIR --out OUT   voxels stored exactly
     storage_benchmarks.py bounds   --bin BUILD --data DIR --out OUT   voxels or a residual within a bound
+    storage_benchmarks.py decode   --bin BUILD --data DIR --out OUT   the speed of decoding voxels
 
 Each command prints the rows of a Markdown table. Fits run on two threads of the CPU, or on --device.
 """
 import argparse
+import json
 import pathlib
+import subprocess
 
 from fit_benchmarks import THREADS, WHOLE_ANEURISM, convert
 
@@ -30,6 +33,10 @@ LOSSLESS = ["aneurism", "smoke1", "wdas_cloud_sixteenth", "hydrogen_atom", "neur
 BOUNDS = [("smoke1", "0.5%"), ("smoke1", "1%"), ("smoke1", "2%"), ("smoke1", "5%"),
           ("hydrogen_atom", "1%"), ("hydrogen_atom", "5%"), ("wdas_cloud_sixteenth", "2%"),
           ("aneurism", "1%")]
+# The forms of voxels whose decoding is timed, and the volume that esvr-sample makes for it.
+DECODED = [("lossless", ["--lossless"]), ("1 %", ["--max-error", "1%"])]
+LARGE = ("plume", "800")
+DECODINGS = "5"
 STREAMS = ["positions", "scales", "rotations", "intensities"]
 
 
@@ -100,11 +107,43 @@ def bounds(arguments):
               f"{report['process']['seconds']:.0f} |", flush=True)
 
 
+def large_volume(arguments):
+    """A volume of tens of millions of active voxels."""
+    kind, resolution = LARGE
+    source = arguments.out / f"{kind}_{resolution}.vdb"
+    if not source.exists():
+        subprocess.run([arguments.bin / "samples/esvr-sample", kind, source, "--resolution",
+                        resolution, "--quiet"], check=True)
+    return source
+
+
+def decode_seconds(arguments, file):
+    command = [arguments.bin / "tests/bench/bench_decode", DECODINGS, file]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def decode_row(arguments, source, form, options):
+    file = arguments.out / "decode.esvr"
+    convert(arguments.bin, source, file, options, representation="voxels")
+    found = decode_seconds(arguments, file)
+    seconds = found["read"] + found["values"]
+    print(f"| {source.stem} | {form} | {found['active'] / 1e6:.2f} | {found['voxels'] / 1e6:.2f} | "
+          f"{found['read']:.3f} | {found['values']:.3f} | {found['voxels'] / seconds / 1e6:.1f} | "
+          f"{found['active'] / seconds / 1e6:.1f} |", flush=True)
+
+
+def decode(arguments):
+    sources = [arguments.data / f"{name}.vdb" for name in LOSSLESS] + [large_volume(arguments)]
+    for source in sources:
+        for form, options in DECODED:
+            decode_row(arguments, source, form, options)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     jobs = {"compact": compact, "layers": layers, "targets": targets, "lossless": lossless,
-            "bounds": bounds}
+            "bounds": bounds, "decode": decode}
     parser.add_argument("what", choices=jobs)
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
     parser.add_argument("--data", type=pathlib.Path, required=True)

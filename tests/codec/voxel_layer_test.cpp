@@ -1,5 +1,5 @@
 // Plan: exact layers give back every bit in the smallest form that can hold it. Bounded layers keep
-// their bound for values of any scale.
+// their bound for values of any scale. All halves have the values that IEEE 754 defines.
 
 #include "esvr/voxel_layer.h"
 
@@ -49,6 +49,45 @@ TEST(ExactLayer, HoldsHalvesAsHalves) {
                 return float(std::ldexp(std::floor(r * 1024), int(std::lround(r * 1e6)) % 15 - 9));
               }),
               VoxelForm::kHalf);
+}
+
+/// A layer of one brick whose voxels have the codes from `first` on, all active.
+VoxelLayer layerFrom(VoxelForm form, std::int32_t first) {
+  VoxelLayer layer;
+  layer.form = form;
+  layer.bricks = {{}};
+  layer.active.resize(1);
+  layer.vacant.resize(1);
+  layer.active[0].setAll();
+  for (int v = 0; v < kBrickVoxels; ++v) layer.codes.push_back(first + v);
+  return layer;
+}
+
+/// The half with the bits n, by the definition in IEEE 754; the largest exponent counts as others.
+double halfByDefinition(std::int32_t n) {
+  const int exponent = n >> 10, mantissa = n & 1023;
+  return exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(1024 + mantissa, exponent - 25);
+}
+
+TEST(HalfLayer, HasTheValueOfEveryHalf) {
+  for (std::int32_t first = 0; first < 0x8000; first += kBrickVoxels) {
+    const SparseVolume volume = volumeOf(layerFrom(VoxelForm::kHalf, first));
+    for (int v = 0; v < kBrickVoxels; ++v)
+      ASSERT_EQ(double(volume.values[std::size_t(v)]), halfByDefinition(first + v)) << first + v;
+  }
+  const SparseVolume negative = volumeOf(layerFrom(VoxelForm::kHalf, -kBrickVoxels));
+  for (int v = 0; v < kBrickVoxels; ++v)
+    ASSERT_EQ(double(negative.values[std::size_t(v)]), -halfByDefinition(kBrickVoxels - 1 - v));
+}
+
+TEST(AllFinite, LooksAtVoxelsThatAreNotVacant) {
+  const auto infinity =
+      std::int32_t(std::bit_cast<std::uint32_t>(std::numeric_limits<float>::infinity()));
+  EXPECT_TRUE(allFinite(layerFrom(VoxelForm::kFloat, infinity - kBrickVoxels)));
+  VoxelLayer layer = layerFrom(VoxelForm::kFloat, infinity - kBrickVoxels + 1);
+  EXPECT_FALSE(allFinite(layer));
+  layer.vacant[0].set(kBrickVoxels - 1);
+  EXPECT_TRUE(allFinite(layer));
 }
 
 TEST(ExactLayer, HoldsAnyFloat) {

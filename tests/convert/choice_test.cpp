@@ -41,6 +41,8 @@ TEST(ChoiceForAPsnr, TakesVoxelsOfNoise) {
   ASSERT_TRUE(conversion.choice && conversion.choice->ellipsoids);
   EXPECT_TRUE(conversion.choice->ellipsoids->estimated)
       << "a short fit shows that voxels are right";
+  EXPECT_GT(conversion.choice->ellipsoids->seconds, 0.0);
+  EXPECT_GT(conversion.choice->voxels->seconds, 0.0);
   EXPECT_GT(conversion.choice->ellipsoids->bytes, bytesAdded(conversion.grid));
 }
 
@@ -243,6 +245,17 @@ TEST_F(VoxelSearch, PutsAPlateauOnTheLattice) {
     if (volume_.values[i] != 0.731f) continue;
     ASSERT_NEAR(back.values[i], 0.731f, 1e-5f);
   }
+  EXPECT_TRUE(found.plateau.tried && found.plateau.used);
+  EXPECT_EQ(found.plateau.bytesWith, found.bytes);
+  EXPECT_GT(found.plateau.bytesWithout, found.bytes);
+}
+
+TEST_F(VoxelSearch, RecordsThatThereIsNoPlateau) {
+  const auto found = convert::voxelsForPsnr(job_, {40.0});
+  EXPECT_FALSE(found.plateau.tried || found.plateau.used);
+  EXPECT_FALSE(found.plateau.bytesWith);
+  EXPECT_TRUE(found.plateau.seconds) << "the voxels were counted";
+  EXPECT_GE(found.seconds, *found.plateau.seconds);
 }
 
 TEST_F(VoxelSearch, StoresOneValueInFewBytes) {

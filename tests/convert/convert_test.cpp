@@ -141,6 +141,10 @@ TEST(ConvertWithin, TakesVoxelsOfNoise) {
   ASSERT_TRUE(conversion.choice);
   EXPECT_TRUE(conversion.grid.voxels);
   EXPECT_EQ(bytesAdded(conversion.grid), conversion.choice->voxels->bytes);
+  const Decision& residual = conversion.decisions.residual;
+  EXPECT_TRUE(residual.tried);
+  EXPECT_FALSE(residual.used);
+  EXPECT_EQ(residual.bytesWithout, bytesAdded(conversion.grid));
   EXPECT_LE(largestDifference(volume, decodeGrid(conversion.grid)), bound);
 }
 
@@ -149,6 +153,7 @@ TEST(ConvertWithin, TriesNoEllipsoidsWhereVoxelsAloneAreAskedFor) {
   const Conversion conversion = converted(volume, BoundGoal{0.1}, Representation::kVoxels);
   EXPECT_TRUE(conversion.grid.voxels);
   EXPECT_FALSE(conversion.choice->ellipsoids);
+  EXPECT_FALSE(conversion.decisions.residual.tried);
 }
 
 TEST(ConvertWithin, TakesAShareOfTheRange) {

@@ -76,12 +76,15 @@ TEST(Signs, AreChosenAfterAShortFit) {
   const auto first = withBetterSigns(gyroidVolume(), 800, options);
   EXPECT_TRUE(options.fit.bothSigns.value_or(false));
   EXPECT_TRUE(first.fit.signedIntensities);
+  EXPECT_TRUE(first.bothSigns.tried && first.bothSigns.used);
+  EXPECT_GT(first.bothSigns.seconds, 0.0);
 }
 
 TEST(Signs, AreThoseOfTheValuesWhereFewAreExtreme) {
   ConvertOptions options = searching(SizeGoal{6000});
-  (void)withBetterSigns(test::smoothVolume(), 50, options);
+  const auto first = withBetterSigns(test::smoothVolume(), 50, options);
   EXPECT_FALSE(options.fit.bothSigns);
+  EXPECT_FALSE(first.bothSigns.tried);
 }
 
 TEST(Signs, OfAnOptionAreKept) {

@@ -65,6 +65,10 @@ enum class Activity {
 
 [[nodiscard]] SparseVolume volumeOf(const VoxelLayer& layer);
 
+/// True if all values that volumeOf() would return are finite, besides the background. Nothing is
+/// allocated. The codes must have values.
+[[nodiscard]] bool allFinite(const VoxelLayer& layer);
+
 /// Largest absolute difference of two volumes' voxels over the bricks of both, active or not.
 [[nodiscard]] double largestDifference(const SparseVolume& a, const SparseVolume& b);
 
