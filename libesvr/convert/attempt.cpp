@@ -28,6 +28,17 @@ FitOptions optionsFor(const Job& job, double count, FitLength length) {
   return length == FitLength::kWhole ? options : shortened(std::move(options));
 }
 
+Attempt attempted(const Job& job, const FitOptions& options) {
+  const SparseVolume& source = job.input.source;
+  Attempt result;
+  result.asked = *options.count;
+  result.fit = fit(source, options);
+  result.grid = makeStoredGrid(job.input.descriptor, source, std::move(result.fit.field),
+                               job.options.storage.activity);
+  result.psnr = psnrOf(job, result.grid);
+  return result;
+}
+
 /// Share of the active voxels with the largest or the smallest value of the volume, other than the
 /// background, from which on it saturates.
 constexpr double kSaturatedShare = 0.05;
@@ -96,21 +107,6 @@ FitOptions shortened(FitOptions options) {
     options.preset = Preset::kDraft;
   return options;
 }
-
-namespace {
-
-Attempt attempted(const Job& job, const FitOptions& options) {
-  const SparseVolume& source = job.input.source;
-  Attempt result;
-  result.asked = *options.count;
-  result.fit = fit(source, options);
-  result.grid = makeStoredGrid(job.input.descriptor, source, std::move(result.fit.field),
-                               job.options.storage.activity);
-  result.psnr = psnrOf(job, result.grid);
-  return result;
-}
-
-}  // namespace
 
 Attempt attempt(const Job& job, double count, FitLength length) {
   return attempted(job, optionsFor(job, count, length));
