@@ -61,10 +61,12 @@ constexpr double kSignsGain = 0.25;
 /// Iterations of a short fit for each of a probe. Probes tell where a second short fit is useless.
 constexpr std::uint32_t kProbeDivisor = 4;
 
-/// The PSNR after a very short fit.
+/// The PSNR of the sum after a very short fit, as the device of the fit measures it. It suffices to
+/// compare two fits, and no grid has to be decoded.
 double psnrOfProbe(const ConvertInput& input, ConvertOptions options, double count) {
   options.fit.iterations = std::max(plannedIterations(shortened(options.fit)) / kProbeDivisor, 1u);
-  return attempt({input, options}, count, FitLength::kWhole).psnr;
+  const FitResult probe = fit(input.source, optionsFor({input, options}, count, FitLength::kWhole));
+  return probe.curve.back().psnrBox;
 }
 
 /// The PSNR of an attempt if it is quantised to as many bytes as others. Terms that cancel each

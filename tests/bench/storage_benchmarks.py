@@ -85,7 +85,9 @@ def targets(arguments):
         report = fitted(arguments, name, option, goal, representation="auto")
         grid = report["grids"][0]
         choice = grid["representation"]
+        psnr = grid["metrics"]["psnr_box"]
         print(f"| {name} | `{option} {goal}` | {choice['stored']} | {report['output']['bytes']:,} | "
+              f"{'exact' if psnr is None else f'{psnr:.2f}'} | "
               f"{candidate(choice['ellipsoids'])} | {candidate(choice['voxels'])} | "
               f"{report['process']['seconds']:.1f} |", flush=True)
 
