@@ -43,7 +43,7 @@ struct Attempt {
   StoredGrid grid;        ///< grid in float32
   double psnr = 0.0;      ///< dB over the box
   std::size_t asked = 0;  ///< wanted number of ellipsoids; the grid may have fewer
-  Decision bothSigns;     ///< the decision of firstAttempt()
+  Decision bothSigns;     ///< the decision of withBetterSigns()
 
   [[nodiscard]] std::size_t count() const { return grid.field.ellipsoidCount(); }
   [[nodiscard]] bool cancelled() const { return fit.end == FitEnd::kCancelled; }
