@@ -39,8 +39,8 @@ std::int32_t orderOfFloat(float v) {
 
 bool inOrder(float a, float b) { return orderOfFloat(a) < orderOfFloat(b); }
 
-/// The bits of a half, moved to those of a float, are the half times 2^-112, which is the difference
-/// of the exponents' offsets. The product is exact, also for subnormal halves.
+/// The bits of a half, moved to those of a float, are the half times 2^-112, which is the
+/// difference of the exponents' offsets. The product is exact, also for subnormal halves.
 float halfAt(std::int32_t n) {
   const std::int32_t bits = (n < 0 ? -1 - n : n) & kHalfBits;
   const auto moved = std::bit_cast<float>(std::uint32_t(bits) << (kFloatMantissa - kHalfMantissa));

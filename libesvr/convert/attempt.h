@@ -61,7 +61,7 @@ struct Attempt {
 /// Decides whether intensities have both signs (FitOptions::bothSigns in `options`), unless this is
 /// already set: where many voxels have an extreme value and the volume is no narrow band, a second
 /// short fit with both signs is compared, if two very short fits show that it could be better.
-/// \param own  a short fit with the signs of the values, with about as many ellipsoids as are wanted
+/// \param own  a short fit of about the wanted number of ellipsoids, with the signs of the values
 /// \return the better of the short fits
 [[nodiscard]] Attempt withBetterSigns(const ConvertInput& input, Attempt own,
                                       ConvertOptions& options);

@@ -1,5 +1,5 @@
-// Plan: the options of esvr-compare whose effect no other test shows. Each is tested by the change in
-// the output.
+// Plan: the options of esvr-compare whose effect no other test shows. Each is tested by the change
+// in the output.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Plan: the options of esvr2vdb whose effect no other test shows. Each is tested by the change in the
-// output.
+// Plan: the options of esvr2vdb whose effect no other test shows. Each is tested by the change in
+// the output.
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,6 @@
-// Plan: a blob is drawn from an .esvr and from a .vdb file by a separate process. Pictures that must
-// be equal or alike are compared with each other, and so are pictures that an option must change.
+// Plan: a blob is drawn from an .esvr and from a .vdb file by a separate process. Pictures that
+// must be equal or alike are compared with each other, and so are pictures that an option must
+// change.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Plan: the searches for a size and for a PSNR allow both signs of intensities where this is better,
-// and only there. A gyroid with a plateau is such a volume; smooth blobs are not.
+// Plan: the searches for a size and for a PSNR allow both signs of intensities where this is
+// better, and only there. A gyroid with a plateau is such a volume; smooth blobs are not.
 
 #include <gtest/gtest.h>
 

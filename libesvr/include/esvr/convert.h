@@ -86,8 +86,8 @@ struct StorageOptions {
 struct ConvertOptions {
   Goal goal;
   Representation representation = Representation::kAuto;
-  /// narrowBand is set by the conversion. A narrow band is always fitted for its voxels, because its
-  /// sum cannot be drawn: it means nothing outside the stored bricks.
+  /// narrowBand is set by the conversion. A narrow band is always fitted for its voxels, because
+  /// its sum cannot be drawn: it means nothing outside the stored bricks.
   FitOptions fit;
   StorageOptions storage;
 };
@@ -100,8 +100,8 @@ struct ConvertInput {
 
 /// A hash of all that a conversion depends on besides its options: the volume bit for bit, whether
 /// the grid is a level set, and whether its values were doubles. Inputs with the same key are
-/// converted to grids that differ in their descriptors only, except that a SizeGoal counts the bytes
-/// of the descriptor.
+/// converted to grids that differ in their descriptors only, except that a SizeGoal counts the
+/// bytes of the descriptor.
 struct InputKey {
   std::uint64_t low = 0, high = 0;
   friend auto operator<=>(const InputKey&, const InputKey&) = default;

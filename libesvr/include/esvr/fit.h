@@ -48,22 +48,22 @@ struct FitOptions : CommonFitOptions {
   Preset preset = Preset::kStandard;
   FitFor fitFor = FitFor::kVoxels;
   /// For FitFor::kDrawing: share of the iterations, 0 to 1, that compare at the voxels; the others
-  /// compare between them. A larger share lowers the error at the voxels, and raises it between them
-  /// (docs/benchmarks.md, "Fits for drawing").
+  /// compare between them. A larger share lowers the error at the voxels, and raises it between
+  /// them (docs/benchmarks.md, "Fits for drawing").
   double voxelShare = 0.25;
   std::optional<float> kappa;  ///< edge of the kernel; default: it is fitted with the ellipsoids
   /// The volume is a level set: voxels outside its bricks do not count.
   bool narrowBand = false;
-  /// Intensities may have both signs, also if all values have one. A sum can then end sharply at the
-  /// border of a plateau, which it exceeds inside. This gains up to 4 dB on some volumes and loses up
-  /// to 2 dB on others, and a fit takes about twice as long (docs/lab-notes.md, "Signs"). Default:
-  /// fit() allows the signs of the values. The searches of convertVolume() for a size or a PSNR, which
-  /// all goals but FitGoal and LosslessGoal use, choose by short fits if many voxels have an extreme
-  /// value.
+  /// Intensities may have both signs, also if all values have one. A sum can then end sharply at
+  /// the border of a plateau, which it exceeds inside. This gains up to 4 dB on some volumes and
+  /// loses up to 2 dB on others, and a fit takes about twice as long (docs/lab-notes.md, "Signs").
+  /// Default: fit() allows the signs of the values. The searches of convertVolume() for a size or a
+  /// PSNR, which all goals but FitGoal and LosslessGoal use, choose by short fits if many voxels
+  /// have an extreme value.
   std::optional<bool> bothSigns;
-  /// A field that was fitted to the same volume. The fit continues from its ellipsoids and its edge,
-  /// and adds ellipsoids until there are `count`. The field must outlive the call. Null: the fit
-  /// begins with seeds.
+  /// A field that was fitted to the same volume. The fit continues from its ellipsoids and its
+  /// edge, and adds ellipsoids until there are `count`. The field must outlive the call. Null: the
+  /// fit begins with seeds.
   const Field* start = nullptr;
 };
 

@@ -16,8 +16,8 @@ namespace esvr {
 struct FrameStats {
   double listMs = 0.0;  ///< CUDA: time to project the ellipsoids and list them by tile
   double drawMs = 0.0;  ///< CUDA: time to sum and composite the samples; CPU: whole time
-  /// Entries of all lists. A tile of pixels has a list for each bin of 32 samples, with an entry for
-  /// each ellipsoid that may reach these samples. 0 unless a field is drawn with CUDA.
+  /// Entries of all lists. A tile of pixels has a list for each bin of 32 samples, with an entry
+  /// for each ellipsoid that may reach these samples. 0 unless a field is drawn with CUDA.
   std::uint64_t listEntries = 0;
   double occupancy = 0.0;  ///< share of the tiles that have a list; for a field with CUDA
   int depthParts = 1;      ///< parts of a tile's depth that are drawn in parallel
