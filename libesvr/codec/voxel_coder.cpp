@@ -113,10 +113,12 @@ class VoxelCoder {
     if (active) layer_.active[b].set(v);
     const bool vacant = !active && codeVacant(side, image, layer_.vacant[b].test(v));
     if (vacant) layer_.vacant[b].set(v);
-    if (vacant)
-      code = model_.vacantCode, class_[cell] = vacantClass_;
-    else
+    if (vacant) {
+      code = model_.vacantCode;
+      class_[cell] = vacantClass_;
+    } else {
       code = codeValue(side, int(cell), image, code);
+    }
     halo_.code[cell] = code;
     halo_.active[cell] = active;
     return active;

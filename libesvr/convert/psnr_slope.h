@@ -1,5 +1,5 @@
 #pragma once
-/// How the PSNR of a fit grows with its number of ellipsoids.
+/// Estimates how the PSNR of a fit grows with its number of ellipsoids.
 
 #include <algorithm>
 #include <cmath>
@@ -17,8 +17,8 @@ struct CountPoint {
 /// the noise of fits, a few tenths of a dB.
 inline constexpr double kMinSlopeRatio = 1.15;
 
-/// Limits of a slope, so that noise does not lead a search astray. Short fits had 4.8 (smoke1), 5.1
-/// (dragon) and 6.7 (aneurism).
+/// Limits of a slope, so that noise does not lead a search astray. Short fits gained 4.8 dB (smoke1),
+/// 5.1 dB (dragon) and 6.7 dB (aneurism).
 inline constexpr double kMinDbPerDoubling = kDbPerDoubling / 2.0;
 inline constexpr double kMaxDbPerDoubling = kDbPerDoubling * 3.0;
 

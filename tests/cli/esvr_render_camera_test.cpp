@@ -1,5 +1,5 @@
-// Plan: a blob is drawn from given places and on a turntable by a separate process. The tests look
-// for the blob in the pictures and compare cameras that are given in two ways.
+// Plan: a separate process draws a blob from given places and on a turntable. The tests find the
+// blob in the pictures, and they compare pictures of one camera that is given in two ways.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

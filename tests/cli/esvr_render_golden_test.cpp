@@ -1,5 +1,5 @@
-// Plan: a blob is drawn in each way by a separate process, and the pictures are compared with those
-// in golden/.
+// Plan: a separate process draws a blob by each method. The folder golden/ has the expected
+// pictures, with which the tests compare the results.
 
 #include <gtest/gtest.h>
 

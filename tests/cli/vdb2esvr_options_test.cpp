@@ -1,5 +1,5 @@
-// Plan: the options of vdb2esvr whose effect no other test shows. Each is tested by the change in
-// the output.
+// Plan: these tests cover the options of vdb2esvr whose effect no other test shows. Each test
+// compares the output with and without an option.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

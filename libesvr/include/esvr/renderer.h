@@ -16,8 +16,9 @@ namespace esvr {
 struct FrameStats {
   double listMs = 0.0;  ///< CUDA: time to project the ellipsoids and list them by tile
   double drawMs = 0.0;  ///< CUDA: time to sum and composite the samples; CPU: whole time
-  /// Entries of all lists. A tile of pixels has a list for each bin of 32 samples, with an entry
-  /// for each ellipsoid that may reach these samples. 0 unless a field is drawn with CUDA.
+  /// Number of entries of all lists. A tile of pixels has a list for each bin of 32 samples, with
+  /// an entry for each ellipsoid that may reach these samples. The number is 0 unless a field is
+  /// drawn with CUDA.
   std::uint64_t listEntries = 0;
   double occupancy = 0.0;  ///< share of the tiles that have a list; for a field with CUDA
   int depthParts = 1;      ///< parts of a tile's depth that are drawn in parallel
@@ -30,8 +31,8 @@ struct RendererLimits {
 
   /// Parts of a tile's depth that a CUDA device draws in parallel, at most kMaxDepthParts. More
   /// parts use the device better if few tiles have most of the work, but in opaque volumes samples
-  /// behind the end of a ray are then computed without effect. 0: the number follows from the lists
-  /// of the first picture.
+  /// behind the end of a ray are then computed without effect. If the number is 0, the renderer
+  /// chooses it by the lists of the first picture.
   int depthParts = 0;
   /// Limit on device memory; 0: no limit. If necessary, pictures are drawn in bands.
   std::uint64_t maxBytes = 0;
