@@ -54,7 +54,7 @@ class Rate:
         self.volume, self.part, self.size = volume.name, part, size
         report = json.loads(volume.report(part).read_text())
         self.bytes, self.ours, self.ellipsoids = None, None, None  # if the size is too small
-        if 'refused' not in report:
+        if report['error'] is None:
             grid = report['grids'][0]
             self.bytes, self.ellipsoids = report['output']['bytes'], grid['ellipsoids']
             self.ours = psnr(grid['metrics'])
