@@ -23,13 +23,19 @@ class OctaveSearch {
 
   /// Takes the figure at next().
   void learn(double figure) {
-    (figure < aim_ ? low_ : high_) = {next_, figure};
+    const bool isLow = figure < aim_;
+    repeats_ = isLow == wasLow_ ? repeats_ + 1 : 0;
+    wasLow_ = isLow;
+    (isLow ? low_ : high_) = {next_, figure};
     const double width = high_.octave - low_.octave;
     double share = 0.5;
     if (low_.known() && high_.known())
       share = (aim_ - low_.figure) / (high_.figure - low_.figure);
     else if (std::isfinite(figure))
       share = (next_ + kOvershoot * (aim_ - figure) / slope_ - low_.octave) / width;
+    // Where the figure jumps, interpolation would approach the jump from one side for a long time.
+    if (repeats_ >= kMaxRepeats && low_.known() && high_.known())
+      share = isLow ? 0.5 * (1.0 + share) : 0.5 * share;
     next_ = low_.octave + width * std::clamp(share, kInside, 1.0 - kInside);
   }
 
@@ -41,7 +47,11 @@ class OctaveSearch {
   static constexpr double kOvershoot = 1.1;  // so that the aim comes to lie between two trials
   static constexpr double kInside = 0.02;    // distance from both sides, relative to the interval
 
+  static constexpr int kMaxRepeats = 2;
+
   double aim_, slope_, next_;
+  bool wasLow_ = false;
+  int repeats_ = 0;
   Side low_{kCoarsest - kNarrowest}, high_{kFinest + kNarrowest};
 };
 

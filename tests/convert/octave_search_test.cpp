@@ -39,6 +39,11 @@ TEST(OctaveSearch, FindsTheRiseOfAStep) {
   EXPECT_NEAR(found(50.0, 3.0, 40, step), 7.3, 2.0 * kNarrowest);
 }
 
+TEST(OctaveSearch, FindsTheRiseOfAStepThatEndsNearTheAim) {
+  const auto step = [](double octave) { return octave < 7.3 ? 20.0 : 52.0; };
+  EXPECT_NEAR(found(50.0, 3.0, 12, step), 7.3, 0.05);
+}
+
 TEST(OctaveSearch, TakesAnInfiniteFigure) {
   const auto exact = [](double octave) {
     return octave > 4.0 ? std::numeric_limits<double>::infinity() : 6.0 * octave;
