@@ -181,6 +181,7 @@ INTRODUCTION = """\
     tests/bench/unseen.py            --bin BUILD --data DATA --out UNSEEN --section UNSEEN/section.md PROGRAMS
     tests/bench/comparison.py page   --bin BUILD --data DATA --out OUT --device cuda --page docs/comparison.md \\
                                      --unseen UNSEEN/section.md
+    PROGRAMS: --sperr 0.8.5=sperr3d --sz3 3.3.2=sz3
 
 [compare.md](compare.md) has the rules that every row follows. The sizes of a volume are the size of its pruned
 grid as a half-float Blosc VDB file, divided by 200, 50, 25, 10 and 4. Every row is the best file of its form that
@@ -210,6 +211,8 @@ FULL_TABLES = """\
   NanoVDB files are drawn from grids of their quantised type.
 - Each ESVR file has two rows: one is drawn from the ellipsoids, the other from the decoded voxels
   (`esvr-render --method bricks`). Files for which `vdb2esvr` chose voxels are drawn from voxels in both.
+- Rows of `esvr-compare` are the best files that are not larger than the ESVR file; external compressors may use the
+  whole size.
 - The times of external compressors were measured on another machine and cannot be compared with the others. Their
   pictures were not measured.
 """

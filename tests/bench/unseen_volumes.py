@@ -1,7 +1,6 @@
 """Makes the volumes of the section "Unseen volumes" of docs/comparison.md.
 
-No setting of ESVR was chosen with these volumes, and nobody looked at them before they were measured. Each is
-one grid in a file of its own. Needs numpy and pyopenvdb (Debian: python3-numpy, python3-openvdb).
+Each is one grid in a file of its own. Needs numpy and pyopenvdb (Debian: python3-numpy, python3-openvdb).
 """
 import numpy as np
 import pyopenvdb
@@ -94,7 +93,6 @@ VOLUMES = {
     'fire_temperature': ('the grid `temperature` of `fluid_data_0071`',
                          grid_of('fire', 'fluid_data_0071', 'temperature')),
     'scan': ('a synthetic scan with noise, 80 voxels long, 8 bits', scan),
-    'sample_surface': ('`esvr-sample levelset --resolution 152 --seed 77`', sample('levelset', 152, 77)),
     'sphere': ('the level set of a sphere with a radius of 50 voxels', sphere),
     'torus': ('the level set of a torus with radii of 40 and 14 voxels', surface(torus, 116)),
     'gyroid': ('the level set of gyroid walls in a ball', surface(gyroid_ball, 100)),
