@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include "convert/unless_cancelled.h"
 #include "core/add_seconds.h"
-#include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 
@@ -125,14 +125,11 @@ Attempt withBetterSigns(const ConvertInput& input, Attempt own, ConvertOptions& 
   const Job job{input, options};
   const FitOptions& fit = options.fit;
   if (own.cancelled() || fit.bothSigns || fit.narrowBand || !saturates(input.source)) return own;
-  std::optional<Attempt> found;
   double seconds = 0.0;
-  try {
-    const AddSeconds clock(seconds);
-    found = betterSigned(job, double(own.asked), own);
-  } catch (const Cancelled&) {
-    // The search continues with `own`, which the token marks as cancelled below.
-  }
+  // Where it is cancelled, the search continues with `own`, which is marked below.
+  auto found = addSeconds(seconds, [&] {
+    return unlessCancelled([&] { return betterSigned(job, double(own.asked), own); });
+  });
   options.fit.bothSigns = found.has_value();
   Attempt& best = found ? *found : own;
   best.bothSigns = {.tried = true, .used = found.has_value(), .seconds = seconds};

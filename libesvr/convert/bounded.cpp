@@ -88,9 +88,8 @@ void tryEllipsoids(const Job& job, double bound, Smallest& best) {
 }
 
 void tryTimed(const Job& job, double bound, Smallest& best) {
-  const AddSeconds clock(best.residual.seconds.emplace(0.0));
   best.residual.tried = true;
-  tryEllipsoids(job, bound, best);
+  best.residual.seconds = secondsOf([&] { tryEllipsoids(job, bound, best); });
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "convert/psnr_search.h"
 #include "convert/size_search.h"
+#include "convert/unless_cancelled.h"
 #include "convert/voxel_search.h"
 #include "core/add_seconds.h"
 #include "esvr/error.h"
@@ -66,28 +67,12 @@ Conversion ellipsoidsToSize(const Job& job, std::uint64_t bytes) {
   return std::move(*result.conversion);
 }
 
-/// The result of a search for ellipsoids; an empty one if the search was cancelled before it had a
-/// fit, so that voxels are the best result so far.
-template <class Search>
-auto unlessCancelled(const Search& search) -> decltype(search()) try {
-  return search();
-} catch (const Cancelled&) {
-  return {};
-}
-
-/// The result of a search, and the seconds that it took.
-template <class Search>
-auto measured(double& seconds, const Search& search) {
-  const AddSeconds clock(seconds);
-  return search();
-}
-
 /// The smaller of `voxels` and ellipsoids, which must reach the PSNR.
 Conversion smallerOf(const Job& job, const PsnrTarget& target, VoxelCandidate voxels) {
   const double psnr = target.psnr;
   const auto below = std::uint64_t(target.worthwhileShare * double(voxels.bytes));
   double seconds = 0.0;
-  auto [ellipsoids, expected] = measured(
+  auto [ellipsoids, expected] = addSeconds(
       seconds, [&] { return unlessCancelled([&] { return searchPsnr(job, psnr, below); }); });
   ChoiceRecord choice{record(voxels), {}};
   if (expected > 0) choice.ellipsoids = Candidate{expected, psnr, true, seconds};
@@ -103,7 +88,7 @@ Conversion smallerOf(const Job& job, const PsnrTarget& target, VoxelCandidate vo
 /// The better of `voxels` and ellipsoids of a size.
 Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) {
   double seconds = 0.0;
-  auto result = measured(seconds, [&] {
+  auto result = addSeconds(seconds, [&] {
     return unlessCancelled([&] { return searchSize(job, bytes, voxels.psnr); });
   });
   ChoiceRecord choice{record(voxels), {}};
@@ -156,13 +141,13 @@ Conversion unlessExactIsSmaller(const Job& job, const std::function<Conversion()
       atOnce ? std::launch::async : std::launch::deferred, [&] { return exactVoxels(job); });
   std::optional<Conversion> fitted;
   double seconds = 0.0;
-  if (atOnce) fitted = measured(seconds, fit);
+  if (atOnce) fitted = addSeconds(seconds, fit);
   VoxelCandidate exact = coder.get();
   ChoiceRecord choice{record(exact),
                       Candidate{std::uint64_t(kBytesPerEllipsoid * count), {}, true}};
   if (!fitted && double(exact.bytes) <= kMinBytesPerEllipsoid * count)
     return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);
-  if (!fitted) fitted = measured(seconds, fit);
+  if (!fitted) fitted = addSeconds(seconds, fit);
   choice.ellipsoids = Candidate{bytesAdded(fitted->grid)};  // its PSNR would take a decoding
   choice.ellipsoids->seconds = seconds;
   fitted->choice = choice;

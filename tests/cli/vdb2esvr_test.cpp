@@ -28,7 +28,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 TEST_F(Vdb2Esvr, printsATableAndWritesTheFile) {
-  const auto run = quickFit(in(), out());
+  const auto run = fitQuickly();
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.out, AllOf(HasSubstr("PSNR box"), HasSubstr("density"), HasSubstr("bytes, 1 :")));
   EXPECT_THAT(run.err, IsEmpty());
@@ -43,7 +43,7 @@ TEST_F(Vdb2Esvr, listsTheKeysOfThePapersMethod) {
 }
 
 TEST_F(Vdb2Esvr, endsWithCodeFourWhereThePsnrIsMissedAndWritesTheFile) {
-  const auto run = quickFit(in(), out(), {"--psnr", "200"});
+  const auto run = fitQuickly({"--psnr", "200"});
   EXPECT_EQ(run.exitCode, 4);
   EXPECT_THAT(run.err, AllOf(HasSubstr("instead of 200.00 dB"), HasSubstr("was written")));
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
@@ -77,7 +77,7 @@ TEST_F(Vdb2Esvr, keepsEveryVoxelWithinTheBound) {
 }
 
 TEST_F(Vdb2Esvr, storesTheMaskWhereAsked) {
-  ASSERT_EQ(quickFit(in(), out(), {"--topology", "exact"}).exitCode, 0);
+  ASSERT_EQ(fitQuickly({"--topology", "exact"}).exitCode, 0);
   const SparseVolume source = readGrid(in(), "density").volume;
   const StoredGrid grid = readEsvr(out()).grids[0];
   EXPECT_GT(grid.field.ellipsoidCount(), 0u);
@@ -88,7 +88,7 @@ TEST_F(Vdb2Esvr, storesTheMaskWhereAsked) {
 
 TEST_F(Vdb2Esvr, givesTheSameBytesInEveryRunOnAnyNumberOfThreads) {
   const std::string other = folder_ / "other.esvr";
-  ASSERT_EQ(quickFit(in(), out(), {"--threads", "1"}).exitCode, 0);
+  ASSERT_EQ(fitQuickly({"--threads", "1"}).exitCode, 0);
   for (const char* threads : {"1", "3"}) {
     ASSERT_EQ(quickFit(in(), other, {"--threads", threads, "--force"}).exitCode, 0);
     EXPECT_EQ(test::readText(other), test::readText(out())) << threads << " threads";
