@@ -84,7 +84,7 @@ void addGoalOptions(cli::po::options_description& options) {
     ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
     ("max-error", value<std::string>()->value_name("E"),
      "keep the error of every voxel within E, or within E% of the range of values; if ellipsoids "
-     "are stored, they have a residual")
+     "are stored, they have a residual; a sample of the grid shows whether they may be smaller")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
      "ellipsoids, voxels, or auto (whichever are better or smaller)")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),

@@ -39,22 +39,6 @@ Attempt attempted(const Job& job, const FitOptions& options) {
   return result;
 }
 
-/// Share of the active voxels with the largest or the smallest value of the volume, other than the
-/// background, from which on it saturates.
-constexpr double kSaturatedShare = 0.05;
-
-bool saturates(const SparseVolume& volume) {
-  const ValueRange range = activeRange(volume);
-  const auto isExtreme = [&](float v) {
-    return (v == range.max && v > volume.background) || (v == range.min && v < volume.background);
-  };
-  std::uint64_t extreme = 0;
-  for (std::size_t i = 0; i < volume.values.size(); ++i)
-    extreme +=
-        isExtreme(volume.values[i]) && volume.active[i / kBrickVoxels].test(int(i % kBrickVoxels));
-  return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
-}
-
 // Whether both signs are better (docs/lab-notes.md, "Signs").
 /// dB by which a fit with both signs must be better than one with the signs of the values.
 constexpr double kSignsGain = 0.25;
@@ -88,7 +72,23 @@ std::optional<Attempt> betterSigned(const Job& job, double count, const Attempt&
   return found;
 }
 
+/// Share of the active voxels with the largest or the smallest value of the volume, other than the
+/// background, from which on it saturates.
+constexpr double kSaturatedShare = 0.05;
+
 }  // namespace
+
+bool saturates(const SparseVolume& volume) {
+  const ValueRange range = activeRange(volume);
+  const auto isExtreme = [&](float v) {
+    return (v == range.max && v > volume.background) || (v == range.min && v < volume.background);
+  };
+  std::uint64_t extreme = 0;
+  for (std::size_t i = 0; i < volume.values.size(); ++i)
+    extreme +=
+        isExtreme(volume.values[i]) && volume.active[i / kBrickVoxels].test(int(i % kBrickVoxels));
+  return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
+}
 
 Activity voxelActivity(const Job& job) {
   const bool levelSet = job.input.descriptor.gridClass == GridClass::kLevelSet;

@@ -58,6 +58,10 @@ struct Attempt {
 /// \param count  at least the number of the earlier attempt's ellipsoids
 [[nodiscard]] Attempt continued(const Job& job, const Attempt& from, double count);
 
+/// True if many active voxels have an extreme value of the volume, so that both signs of
+/// intensities may be better.
+[[nodiscard]] bool saturates(const SparseVolume& volume);
+
 /// Decides whether intensities have both signs (FitOptions::bothSigns in `options`), unless this is
 /// already set: where many voxels have an extreme value and the volume is no narrow band, a second
 /// short fit with both signs is compared, if two very short fits show that it could be better.

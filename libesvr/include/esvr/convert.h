@@ -119,7 +119,7 @@ struct Candidate {
   std::uint64_t bytes = 0;  ///< bytesAdded
   /// PSNR over the box, dB; +inf for exact voxels. Nothing for a BoundGoal.
   std::optional<double> psnr{};
-  bool estimated = false;  ///< the figures were extrapolated from a short fit
+  bool estimated = false;  ///< the figures were extrapolated from a short fit or from a sample
   /// Wall-clock seconds that all trials for this candidate took; nothing if none was made.
   std::optional<double> seconds{};
 };
