@@ -84,6 +84,9 @@ LeftOut chosen(const ChoiceRecord& choice, bool voxels) {
 LeftOut representationNote(const Conversion& conversion) {
   const ChoiceRecord choice = conversion.choice.value_or(ChoiceRecord{});
   if (choice.voxels && choice.ellipsoids) return chosen(choice, conversion.grid.voxels.has_value());
+  if (conversion.smallerExactBytes)
+    return note("representation", "an option determines it; exact voxels would take fewer bytes",
+                {});
   const char* why = choice.voxels || choice.ellipsoids
                         ? "the other representation was not tried or cannot reach the goal"
                         : "the goal, an option or the size of the volume determines it";

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "compact/measure_layers.h"
+#include "convert/exact_voxels.h"
 #include "convert/residual_trial.h"
 #include "convert/size_search.h"
 #include "convert/unless_cancelled.h"
@@ -76,15 +77,11 @@ struct Smaller {
   }
 };
 
-/// The bytes that remain for ellipsoids after the other sections of a grid.
-double ellipsoidBytes(const Job& job, std::uint64_t bytes) {
-  return double(bytes) - double(bytesAdded(asVoxels(job, {}).grid));
-}
-
 /// True if a sample promises that ellipsoids of `bytes` are smaller than the voxels. Otherwise the
 /// estimate of their bytes is recorded.
 bool isPromising(const Job& job, double bound, std::uint64_t bytes, Smaller& best) {
-  const double own = ellipsoidBytes(job, bytes), voxels = double(best.choice.voxels->bytes);
+  const double own = double(bytes) - double(bytesBesideVoxels(job.input));
+  const double voxels = double(best.choice.voxels->bytes);
   if (own < kMinBytesPerEllipsoid) return false;
   const double ratio = residualRatio(job, bound, own / voxels);
   if (ratio <= kPromisingRatio) return true;

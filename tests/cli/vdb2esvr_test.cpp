@@ -26,6 +26,7 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 TEST_F(Vdb2Esvr, printsATableAndWritesTheFile) {
   const auto run = fitQuickly();
@@ -34,6 +35,14 @@ TEST_F(Vdb2Esvr, printsATableAndWritesTheFile) {
   EXPECT_THAT(run.err, IsEmpty());
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
   EXPECT_THAT(folder_.names(), ElementsAre("in.vdb", "out.esvr"));
+}
+
+TEST_F(Vdb2Esvr, saysWhereExactVoxelsWouldTakeFewerBytes) {
+  EXPECT_THAT(fitQuickly().out, Not(HasSubstr("exact voxels")));
+  test::writeInput(in(), {{.voxels = test::cloud(8)}});
+  const auto many = vdb2esvr(
+      {in(), out(), "--force", "--iterations", "5", "--count", "5000", "--storage", "float32"});
+  EXPECT_THAT(many.out, HasSubstr("exact voxels would take fewer bytes, about "));
 }
 
 TEST_F(Vdb2Esvr, listsTheKeysOfThePapersMethod) {
