@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "convert/psnr_slope.h"
-#include "esvr/error.h"
+#include "convert/unless_cancelled.h"
 
 namespace esvr::convert {
 namespace {
@@ -52,7 +52,7 @@ class PsnrSearch {
         return {std::nullopt, expected};
     }
     if (!draft.cancelled()) fitUntilReached(scaledCount(draft, aim() - kShortFitBehind));
-    if (attempts_.empty()) return {marked(std::move(draft), FitEnd::kCancelled), expected};
+    if (attempts_.empty()) return {stored(cancelled(std::move(draft))), expected};
     return {anyReached() ? smallest() : best(), expected};
   }
 
@@ -61,14 +61,6 @@ class PsnrSearch {
     double guess = double(activeVoxelCount(job_.input.source)) / kVoxelsPerEllipsoid;
     if (below_) guess = std::min(guess, double(*below_) / kBytesPerEllipsoid);
     return capped(guess);
-  }
-
-  /// The result of a fit, or nothing if it was cancelled before it had an ellipsoid.
-  template <class Fit>
-  [[nodiscard]] static std::optional<Attempt> unlessCancelled(const Fit& fit) try {
-    return fit();
-  } catch (const Cancelled&) {
-    return std::nullopt;
   }
 
   /// The attempt with the most ellipsoids from which a fit can continue; null if there is none.
@@ -99,7 +91,7 @@ class PsnrSearch {
   /// True if the number of ellipsoids may suffice, even if the PSNR grows steeply.
   [[nodiscard]] bool canReach(const Attempt& draft) const {
     const double psnr = aim() - kShortFitBehind - kUncertainty;
-    return convert::neededCount(pointOf(draft), psnr, kMaxDbPerDoubling) <= double(maxCount_);
+    return countFor(pointOf(draft), psnr, kMaxDbPerDoubling) <= double(maxCount_);
   }
 
   /// A short fit whose number of ellipsoids is near the one that the PSNR needs, with the better
@@ -110,7 +102,8 @@ class PsnrSearch {
     const double ratio = count / pointOf(draft).count;
     const bool isFar = std::max(ratio, 1.0 / ratio) > kNear;
     if (!draft.cancelled() && isFar && canReach(draft)) {
-      auto nearer = unlessCancelled([&] { return attempt(job_, count, FitLength::kShort); });
+      auto nearer = unlessCancelled(
+          [&]() -> std::optional<Attempt> { return attempt(job_, count, FitLength::kShort); });
       if (!nearer) return cancelled(std::move(draft));
       slope_ = dbPerDoubling(pointOf(draft), pointOf(*nearer));
       draft = std::move(*nearer);
@@ -120,7 +113,7 @@ class PsnrSearch {
 
   void fitUntilReached(double count) {
     do {
-      auto found = unlessCancelled([&] { return next(capped(count)); });
+      auto found = unlessCancelled([&]() -> std::optional<Attempt> { return next(capped(count)); });
       if (!found) return markCancelled();
       attempts_.push_back(std::move(*found));
       if (attempts_.back().cancelled() || goodEnough(attempts_.back())) break;
@@ -153,7 +146,7 @@ class PsnrSearch {
 
   /// The number of ellipsoids that should reach a PSNR, extrapolated from an attempt.
   [[nodiscard]] double neededCount(const Attempt& from, double psnr) const {
-    return convert::neededCount(pointOf(from), psnr, slope_);
+    return countFor(pointOf(from), psnr, slope_);
   }
 
   /// The number of ellipsoids of the next fit: neededCount(), but not too far from the attempt's.
