@@ -120,6 +120,21 @@ void fill(const SparseVolume& volume, VoxelLayer& layer) {
   }
 }
 
+/// The largest error that rounding the values of a quantisation lattice to float32 adds.
+double roundingError(const SparseVolume& volume, double bound) {
+  double largest = 0.0;
+  for (const float v : volume.values) largest = std::max(largest, std::abs(double(v)));
+  return (largest + bound) * 0x1p-24;
+}
+
+VoxelLayer quantised(const SparseVolume& volume, double halfStep) {
+  VoxelLayer layer;
+  layer.form = VoxelForm::kQuantised;
+  layer.divisor = 0.5 / halfStep;
+  fill(volume, layer);
+  return layer;
+}
+
 /// Removes the bricks without an active voxel.
 void dropInactive(VoxelLayer& layer) {
   std::size_t kept = 0;
@@ -167,12 +182,15 @@ VoxelLayer exactLayer(const SparseVolume& volume) {
 VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity) {
   if (!(std::isfinite(bound) && bound > 0.0))
     throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
-  VoxelLayer layer;
-  layer.form = VoxelForm::kQuantised;
-  layer.divisor = 0.5 / (bound * kMargin);
-  fill(volume, layer);
-  if (activity == Activity::kByValue) activateByValue(volume, bound * kMargin, layer);
-  return largestError(volume, layer) <= bound ? layer : exactLayer(volume);
+  // The second lattice leaves room for rounding. The first one has the multiples of the bound.
+  const double halfStep = bound * kMargin;
+  for (const double h : {halfStep, halfStep - roundingError(volume, bound)}) {
+    if (!(h > 0.0)) break;
+    VoxelLayer layer = quantised(volume, h);
+    if (activity == Activity::kByValue) activateByValue(volume, halfStep, layer);
+    if (largestError(volume, layer) <= bound) return layer;
+  }
+  return exactLayer(volume);
 }
 
 SparseVolume volumeOf(const VoxelLayer& layer) {

@@ -15,6 +15,9 @@ struct BrickPair {
   const float* candidate = nullptr;  ///< null where only the reference has one
   const BrickMask* referenceActive = nullptr;
   const BrickMask* candidateActive = nullptr;
+  /// The values of the volumes where they have no brick: the background or, inside the surface of a
+  /// narrow band, the negated background.
+  float referenceEmpty = 0.0f, candidateEmpty = 0.0f;
 };
 
 /// The union of both volumes' bricks in increasing order of Coord. The pairs point into the
@@ -22,22 +25,21 @@ struct BrickPair {
 [[nodiscard]] std::vector<BrickPair> pairBricks(const SparseVolume& reference,
                                                 const SparseVolume& candidate);
 
-/// The values of the two volumes outside their bricks.
+/// The values of the two volumes at places that no pair covers.
 struct Backgrounds {
   double reference = 0.0, candidate = 0.0;
 };
 
-/// The voxels of a pair. A volume that does not have the brick has its background there.
+/// The voxels of a pair.
 class PairValues {
  public:
-  PairValues(const BrickPair& pair, const Backgrounds& backgrounds)
-      : pair_(pair), backgrounds_(backgrounds) {}
+  explicit PairValues(const BrickPair& pair) : pair_(pair) {}
 
   [[nodiscard]] double reference(int offset) const {
-    return pair_.reference ? pair_.reference[offset] : backgrounds_.reference;
+    return pair_.reference ? pair_.reference[offset] : pair_.referenceEmpty;
   }
   [[nodiscard]] double candidate(int offset) const {
-    return pair_.candidate ? pair_.candidate[offset] : backgrounds_.candidate;
+    return pair_.candidate ? pair_.candidate[offset] : pair_.candidateEmpty;
   }
   [[nodiscard]] double error(int offset) const { return reference(offset) - candidate(offset); }
   [[nodiscard]] bool referenceActive(int offset) const {
@@ -52,7 +54,6 @@ class PairValues {
 
  private:
   const BrickPair& pair_;
-  const Backgrounds& backgrounds_;
 };
 
 /// The voxels of a brick that lie in a box, in local coordinates; empty if there are none.

@@ -119,8 +119,7 @@ VolumeMetrics compareVolumes(const SparseVolume& reference, const SparseVolume& 
   addEmptySpace(sums, pairs, domain);
 
   VolumeMetrics m = metricsOf(sums, peak, domain.box.volume());
-  m.p999Error = metrics::errorOfRank(pairs, domain.backgrounds,
-                                     metrics::nearestRank(sums.activeUnion, kP999Permille));
+  m.p999Error = metrics::errorOfRank(pairs, metrics::nearestRank(sums.activeUnion, kP999Permille));
   if (options.ssim) m.ssim = ssim3d(reference, candidate, domain.box, peak);
   return m;
 }

@@ -28,7 +28,7 @@ void addVoxel(ErrorSums& sums, const PairValues& values, const Backgrounds& back
 
 void addBox(ErrorSums& sums, const BrickPair& pair, const ErrorDomain& domain) {
   const Box local = localBox(pair.brick, domain.box);
-  const PairValues values(pair, domain.backgrounds);
+  const PairValues values(pair);
   sums.voxels += local.volume();
   for (int x = local.min.x; x <= local.max.x; ++x)
     for (int y = local.min.y; y <= local.max.y; ++y)
@@ -36,9 +36,9 @@ void addBox(ErrorSums& sums, const BrickPair& pair, const ErrorDomain& domain) {
         addVoxel(sums, values, domain.backgrounds, voxelOffset({x, y, z}));
 }
 
-void addActive(ErrorSums& sums, const BrickPair& pair, const ErrorDomain& domain) {
+void addActive(ErrorSums& sums, const BrickPair& pair) {
   if (!pair.referenceActive) return;
-  const PairValues values(pair, domain.backgrounds);
+  const PairValues values(pair);
   for (int offset = 0; offset < kBrickVoxels; ++offset) {
     if (!values.referenceActive(offset)) continue;
     const double error = values.error(offset);
@@ -57,8 +57,8 @@ void countTopology(ErrorSums& sums, const BrickPair& pair) {
   }
 }
 
-void findNonFinite(ErrorSums& sums, const BrickPair& pair, const ErrorDomain& domain) {
-  const PairValues values(pair, domain.backgrounds);
+void findNonFinite(ErrorSums& sums, const BrickPair& pair) {
+  const PairValues values(pair);
   for (int offset = 0; offset < kBrickVoxels && !sums.nonFinite; ++offset)
     if (!std::isfinite(values.error(offset))) sums.nonFinite = values.voxel(offset);
 }
@@ -66,9 +66,9 @@ void findNonFinite(ErrorSums& sums, const BrickPair& pair, const ErrorDomain& do
 ErrorSums ofPair(const BrickPair& pair, const ErrorDomain& domain) {
   ErrorSums sums;
   addBox(sums, pair, domain);
-  addActive(sums, pair, domain);
+  addActive(sums, pair);
   countTopology(sums, pair);
-  findNonFinite(sums, pair, domain);
+  findNonFinite(sums, pair);
   return sums;
 }
 

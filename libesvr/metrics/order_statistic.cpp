@@ -22,8 +22,8 @@ std::uint64_t keyOf(double value) { return std::bit_cast<std::uint64_t>(value); 
 
 /// Calls visit(|error|) at every voxel that is active in either volume.
 template <class Visit>
-void visitErrors(const BrickPair& pair, const Backgrounds& backgrounds, Visit visit) {
-  const PairValues values(pair, backgrounds);
+void visitErrors(const BrickPair& pair, Visit visit) {
+  const PairValues values(pair);
   for (int offset = 0; offset < kBrickVoxels; ++offset)
     if (values.referenceActive(offset) || values.candidateActive(offset))
       visit(std::abs(values.error(offset)));
@@ -51,14 +51,13 @@ Histogram added(Histogram a, const Histogram& b) {
   return a;
 }
 
-Histogram countDigits(std::span<const BrickPair> pairs, const Backgrounds& backgrounds,
-                      const Prefix& prefix) {
+Histogram countDigits(std::span<const BrickPair> pairs, const Prefix& prefix) {
   using Range = tbb::blocked_range<std::size_t>;
   return tbb::parallel_reduce(
       Range(0, pairs.size(), kPairsPerCountingTask), Histogram(kDigits),
       [&](const Range& range, Histogram counts) {
         for (std::size_t i = range.begin(); i != range.end(); ++i)
-          visitErrors(pairs[i], backgrounds, [&](double error) {
+          visitErrors(pairs[i], [&](double error) {
             const std::uint64_t key = keyOf(error);
             if (prefix.matches(key)) ++counts[prefix.nextDigit(key)];
           });
@@ -69,11 +68,10 @@ Histogram countDigits(std::span<const BrickPair> pairs, const Backgrounds& backg
 
 }  // namespace
 
-double errorOfRank(std::span<const BrickPair> pairs, const Backgrounds& backgrounds,
-                   std::uint64_t rank) {
+double errorOfRank(std::span<const BrickPair> pairs, std::uint64_t rank) {
   Prefix prefix;
   while (prefix.unknown > 0) {
-    const Histogram counts = countDigits(pairs, backgrounds, prefix);
+    const Histogram counts = countDigits(pairs, prefix);
     std::size_t digit = 0;
     while (counts[digit] < rank) rank -= counts[digit++];
     prefix.append(digit);

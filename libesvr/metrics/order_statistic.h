@@ -11,8 +11,7 @@ namespace esvr::metrics {
 /// The rank-th smallest |error| (from 1) over the union of active voxels. The digits of its bit
 /// pattern are determined one after the other by counting. The memory does not depend on the number
 /// of voxels, and the counts do not depend on the order of threads.
-[[nodiscard]] double errorOfRank(std::span<const BrickPair> pairs, const Backgrounds& backgrounds,
-                                 std::uint64_t rank);
+[[nodiscard]] double errorOfRank(std::span<const BrickPair> pairs, std::uint64_t rank);
 
 /// Rank of a percentile by the nearest-rank definition: the rank of the smallest value that at
 /// least `permille` thousandths of `count` values do not exceed.

@@ -87,7 +87,7 @@ class SsimBrick {
 };
 
 void SsimBrick::gatherFrom(const BrickPair& pair, Coord brick) {
-  const metrics::PairValues values(pair, scene_.backgrounds);
+  const metrics::PairValues values(pair);
   const Coord shift =
       (pair.brick - brick) * kBrickSide + Coord{kSsimRadius, kSsimRadius, kSsimRadius};
   Box local = metrics::localBox(pair.brick, scene_.box);

@@ -1,105 +1,25 @@
 #!/usr/bin/env python3
-"""Makes docs/comparison.md, which compares ESVR with other formats on eight volumes at two sizes.
+"""Makes docs/comparison.md, which compares ESVR with other formats at five sizes.
 
-    comparison.py sizes --bin BUILD --data DATA
-    comparison.py fit   --bin BUILD --data DATA --out OUT [--device cuda]
-    comparison.py page  --bin BUILD --data DATA --out OUT --page docs/comparison.md [--device cuda]
+    comparison.py sizes  --bin BUILD --data DATA
+    comparison.py fit    --bin BUILD --data DATA --out OUT [--device cuda]
+    comparison.py rivals --bin BUILD --data DATA --out OUT
+    comparison.py page   --bin BUILD --data DATA --out OUT --page docs/comparison.md [--device cuda]
+                         [--unseen SECTION.md]
 
-`sizes` prints the two sizes of every volume: the size of its half-float Blosc VDB divided by 50 and by
-10. `fit` makes the .esvr files and their reports. `page` measures every row with esvr-compare and writes
-the page; it does not repeat measurements that OUT already holds.
+`sizes` prints the sizes of every volume: the size of its half-float Blosc VDB divided by 200, 50, 25, 10 and
+4. `fit` makes the .esvr files and their reports. `rivals` measures the other rows at these sizes. `page`
+measures the rows of the full tables, with pictures, and writes the page; SECTION.md comes from unseen.py. No job
+repeats what OUT already holds.
 
 Rows of compressors that esvr-compare does not run come from external_points.csv (external_points.md).
 """
 import argparse
-import csv
-import json
 import pathlib
 
-from run_program import run
-
-BOXES = {'aneurism': '0,0,0,255,255,255', 'hydrogen_atom': '0,0,0,127,127,127'}
-FILES = {'aneurism': 'aneurism', 'smoke1': 'smoke1', 'wdas': 'wdas_cloud_sixteenth',
-         'hydrogen_atom': 'hydrogen_atom', 'dragon': 'dragon_with_xform',
-         'cube_levelset': 'cube_levelset', 'neuron_rp140212': 'neuron_rp140212',
-         'neuron_m207': 'neuron_m207'}
-PARTS = (50, 10)
-LOW, HIGH = PARTS
-IMAGES = ['--images', '4', '--image-size', '400']
-MEASURE = ['--rows', 'matched,zfp', '--runs', '3', '--max-dense', '1GB']
-HERE = pathlib.Path(__file__).parent
-
-
-class Volume:
-    def __init__(self, name, options):
-        self.name, self.options = name, options
-        self.path = options.data / f'{FILES[name]}.vdb'
-        self.box = ['--box', BOXES[name]] if name in BOXES else []
-        self.compare = options.bin / 'compare/esvr-compare'
-
-    def half_blosc(self):
-        text = run([self.compare, 'table', self.path, *self.box, '--rows', 'none', '--runs', 1,
-                    '--report', '-'])
-        return json.loads(text)['half_blosc_bytes']
-
-    def esvr(self, part):
-        return self.options.out / f'{self.name}-{part}.esvr'
-
-    def report(self, part):
-        return self.esvr(part).with_suffix('.report.json')
-
-    def fit(self, part, size):
-        run([self.options.bin / 'vdb2esvr/vdb2esvr', self.path, self.esvr(part), *self.box,
-             '--size', size, '--device', self.options.device, '--report', self.report(part), '-f'])
-
-    def time_of(self, part):
-        """The seconds and the device of the fit."""
-        report = json.loads(self.report(part).read_text())
-        grid = report['grids'][0]
-        return {'seconds': report['seconds']['total'], 'device': grid['fit']['device'],
-                'ellipsoids': grid['ellipsoids']}
-
-    def table(self):
-        """All rows of the volume. They are kept in OUT and read from there the next time."""
-        kept = self.options.out / f'{self.name}.table.json'
-        if not kept.exists():
-            words = [self.compare, 'table', self.path, *[self.esvr(p) for p in PARTS], *self.box,
-                     *MEASURE, *IMAGES, '--device', self.options.device, '--report', kept, '-q']
-            run(words)
-        return json.loads(kept.read_text())
-
-
-def psnr(row, key='psnr_box'):
-    """The PSNR of a row. A report has null if there is no error at all, and no key without figures."""
-    if key not in row:
-        return None
-    return float('inf') if row[key] is None else row[key]
-
-
-def text(value, digits=2):
-    if value is None:
-        return '-'
-    return 'exact' if value == float('inf') else f'{value:.{digits}f}'
-
-
-def external_points(name, budget, peak):
-    """The row of each external compressor with the highest PSNR that takes at most `budget` bytes."""
-    best = {}
-    with open(HERE / 'external_points.csv', newline='') as stream:
-        for row in csv.DictReader(stream):
-            if row['dataset'] != FILES[name] or int(row['bytes']) > budget:
-                continue
-            family = row['method'].split('-')[0]
-            point = {'name': row['method'], 'bytes': int(row['bytes']), 'external': True,
-                     'psnr_box': float(row['psnr_box_db']),
-                     'psnr_active': float(row['psnr_nonzero_db']),
-                     'max_error': float(row['max_error_rel']) * peak,
-                     'encode_s': float(row['enc_s']),
-                     'decode_s': float(row['dec_s']), 'setting': row['parameter']}
-            if family not in best or point['psnr_box'] > best[family]['psnr_box']:
-                best[family] = point
-    return list(best.values())
-
+import rates
+from rates import external_rows, psnr, text
+from volumes import FILES, HIGH, LOW, Volume
 
 class Size:
     """The rows of one volume within one budget of bytes."""
@@ -109,11 +29,11 @@ class Size:
         self.ours = next(r for r in table['rows'] if r['name'] == volume.esvr(part).name)
         self.bricks = next(r for r in table['rows']
                            if r['name'] == volume.esvr(part).name + ', bricks')
-        self.budget = self.ours['bytes']
-        matched = [r for r in table['rows'] if r['group'] == f'at {self.budget} bytes']
+        self.budget = volume.sizes[part]
+        matched = [r for r in table['rows'] if r['group'] == f"at {self.ours['bytes']} bytes"]
         self.rows = [r for r in matched if 'psnr_box' in r]
         self.missing = [r for r in matched if 'psnr_box' not in r]
-        self.externals = external_points(volume.name, self.budget, table['peak'])
+        self.externals = external_rows(volume.points(), self.budget, table['peak'])
         self.time = volume.time_of(part)
 
     def all_others(self):
@@ -256,12 +176,30 @@ INTRODUCTION = """\
 
 `tests/bench/comparison.py` makes this page from real volumes:
 
-    tests/bench/comparison.py fit  --bin BUILD --data DATA --out OUT --device cuda
-    tests/bench/comparison.py page --bin BUILD --data DATA --out OUT --device cuda --page docs/comparison.md
+    tests/bench/comparison.py fit    --bin BUILD --data DATA --out OUT --device cuda
+    tests/bench/comparison.py rivals --bin BUILD --data DATA --out OUT
+    tests/bench/unseen.py            --bin BUILD --data DATA --out UNSEEN --section UNSEEN/section.md PROGRAMS
+    tests/bench/comparison.py page   --bin BUILD --data DATA --out OUT --device cuda --page docs/comparison.md \\
+                                     --unseen UNSEEN/section.md
 
-[compare.md](compare.md) has the rules that every row follows. The two sizes of a volume are the size of its
-pruned grid as a half-float Blosc VDB file, divided by 50 and by 10. Every row is the best file of its form that
-is not larger.
+[compare.md](compare.md) has the rules that every row follows. The sizes of a volume are the size of its pruned
+grid as a half-float Blosc VDB file, divided by 200, 50, 25, 10 and 4. Every row is the best file of its form that
+is not larger. The external compressors are SPERR, SZ3, TTHRESH, quantise+xz, xz-lossless and zstd-lossless. They
+were measured separately ([external_points.md](../tests/bench/external_points.md)), and not on `neuron_m207`, whose
+box has 810 million voxels.
+"""
+
+RATES = """\
+## Five rates
+
+Each cell has the PSNR over the box of ESVR and of the best rival, which is named. `v` marks files for which
+`vdb2esvr --size` chose voxels; the others hold ellipsoids. A rival is any other row of `esvr-compare table`
+(`--rows matched,zfp`) and any external compressor. Cells where a rival is better, or where both are exact and the
+rival is smaller, are bold.
+"""
+
+FULL_TABLES = """\
+## Full tables at 1/50 and 1/10
 
 - *encode s* of an ESVR row is the run time of the whole command `vdb2esvr --size` on the device that the row
   names. The other forms are encoded, and all forms are decoded, on the CPU of the same machine; these times are
@@ -272,10 +210,8 @@ is not larger.
   NanoVDB files are drawn from grids of their quantised type.
 - Each ESVR file has two rows: one is drawn from the ellipsoids, the other from the decoded voxels
   (`esvr-render --method bricks`). Files for which `vdb2esvr` chose voxels are drawn from voxels in both.
-- SZ3, TTHRESH, quantise+xz, xz-lossless and zstd-lossless are *external compressors*. They were measured
-  separately, on another machine, and for four of the volumes only
-  ([external_points.md](../tests/bench/external_points.md)). Their times cannot be compared with the others, and
-  their pictures were not measured.
+- The times of external compressors were measured on another machine and cannot be compared with the others. Their
+  pictures were not measured.
 """
 
 
@@ -298,29 +234,51 @@ def reference_cost(table):
             f"({pictures['device']}).")
 
 
-def page(options):
-    volumes = {name: Volume(name, options) for name in options.only}
+def full_tables(volumes):
+    """The tables with pictures."""
     tables = {name: volume.table() for name, volume in volumes.items()}
     sizes = {part: {name: Size(volumes[name], tables[name], part) for name in volumes}
-             for part in PARTS}
-    lines = introduction(tables) + verdict(sizes[LOW], sizes[HIGH])
+             for part in (LOW, HIGH)}
+    table = next(iter(tables.values()))
+    lines = [FULL_TABLES, '    ' + '\n    '.join(version_lines(table['versions'])), '']
+    lines += verdict(sizes[LOW], sizes[HIGH])
     for name in volumes:
         lines += [f'## {name}', '', f"{tables[name]['active_voxels']} active voxels; half-float "
                   f"Blosc VDB {tables[name]['half_blosc_bytes']} bytes. "
                   + reference_cost(tables[name]), '']
-        for part in PARTS:
+        for part in (LOW, HIGH):
             lines += section(sizes[part][name])
+    return lines
+
+
+def page(options):
+    volumes = {name: Volume(name, options) for name in options.only}
+    lines = [INTRODUCTION, RATES] + rates.table(volumes.values())
+    if options.unseen:
+        lines += [options.unseen.read_text()]
+    lines += full_tables(volumes)
     options.page.write_text('\n'.join(lines).rstrip() + '\n')
+
+
+def job_of_volume(options, volume):
+    if options.job == 'rivals':
+        print(volume.name, len(volume.rivals['rows']), 'rows', flush=True)
+        return
+    for part, size in volume.sizes.items():
+        print(volume.name, part, size, flush=True)
+        if options.job == 'fit':
+            volume.fit(part)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('job', choices=('sizes', 'fit', 'page'))
+    parser.add_argument('job', choices=('sizes', 'fit', 'rivals', 'page'))
     parser.add_argument('--bin', type=pathlib.Path, required=True, help='the build folder')
     parser.add_argument('--data', type=pathlib.Path, required=True)
     parser.add_argument('--out', type=pathlib.Path)
     parser.add_argument('--page', type=pathlib.Path)
+    parser.add_argument('--unseen', type=pathlib.Path, metavar='SECTION.md')
     parser.add_argument('--device', default='auto')
     parser.add_argument('--only', nargs='+', default=list(FILES), choices=list(FILES))
     options = parser.parse_args()
@@ -329,12 +287,7 @@ def main():
     if options.job == 'page':
         return page(options)
     for name in options.only:
-        volume = Volume(name, options)
-        half = volume.half_blosc()
-        for part in PARTS:
-            print(name, part, half // part, flush=True)
-            if options.job == 'fit' and not volume.esvr(part).exists():
-                volume.fit(part, half // part)
+        job_of_volume(options, Volume(name, options))
     return None
 
 

@@ -124,6 +124,15 @@ TEST(BoundedLayer, KeepsItsBoundAtAnyScale) {
       }
 }
 
+TEST(BoundedLayer, IsQuantisedWhereFloat32IsFinerThanTheBound) {
+  const SparseVolume volume = made([](double r) { return float(r); });
+  for (const double bound : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
+    const VoxelLayer layer = boundedLayer(volume, bound, Activity::kExact);
+    EXPECT_EQ(layer.form, VoxelForm::kQuantised) << bound;
+    EXPECT_LE(largestError(volume, layer), bound);
+  }
+}
+
 TEST(BoundedLayer, ByValueMakesTheBackgroundInactive) {
   const SparseVolume volume = test::tubeVolume();
   const VoxelLayer layer = boundedLayer(volume, 0.2, Activity::kByValue);

@@ -12,6 +12,8 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "esvr/error.h"
 #include "esvr/metrics.h"
@@ -113,6 +115,34 @@ TEST(CompareVolumes, theDefaultBoxIsTheReferencesActiveBox) {
   EXPECT_EQ(m.boxVoxels, 10.0 * 8.0 * 8.0);
   EXPECT_EQ(m.maxError, 3.0) << "voxels outside the box do not count";
   EXPECT_EQ(m.p999Error, 50.0) << "but the percentile is over all active voxels";
+}
+
+/// The level set of a sphere. Voxels whose distance is `band` or more are inactive.
+SparseVolume sphere(float band) {
+  constexpr float kBackground = 3.0f;
+  constexpr int kReach = 4;  // bricks
+  std::vector<BrickInput> bricks;
+  for (int n = 0; n < 8 * kReach * kReach * kReach; ++n) {
+    const Coord place{n % (2 * kReach), n / (2 * kReach) % (2 * kReach), n / (4 * kReach * kReach)};
+    BrickInput brick{(place - Coord{kReach, kReach, kReach}) * kBrickSide, {}, {}};
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Coord at = brick.corner + voxelLocal(v);
+      const auto distance = float(std::hypot(at.x, at.y, at.z)) - 26.0f;
+      const bool active = std::abs(distance) < band;
+      brick.values[std::size_t(v)] = active ? distance : std::copysign(kBackground, distance);
+      if (active) brick.active.set(v);
+    }
+    bricks.push_back(brick);
+  }
+  return makeVolume(std::move(bricks), kBackground);
+}
+
+TEST(CompareVolumes, theInsideOfALevelSetNeedsNoBricks) {
+  const SparseVolume wide = sphere(3.0f), narrow = sphere(2.0f);
+  ASSERT_LT(narrow.brickCount(), wide.brickCount());
+  const Box box{{-32, -32, -32}, {31, 31, 31}};
+  EXPECT_LE(compareVolumes(wide, narrow, {.box = box}).maxError, 1.0);
+  EXPECT_LE(compareVolumes(narrow, wide, {.box = box}).maxError, 1.0);
 }
 
 TEST(CompareVolumes, differentBackgroundsCountInEmptySpace) {

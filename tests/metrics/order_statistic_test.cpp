@@ -35,16 +35,16 @@ TEST(ErrorOfRank, isTheSortedErrorForEveryRank) {
   for (float& e : errors) e = std::abs(e);
   std::sort(errors.begin(), errors.end());
   for (std::size_t rank = 1; rank <= errors.size(); ++rank)
-    ASSERT_EQ(errorOfRank(pairs, {}, rank), errors[rank - 1]) << "rank " << rank;
+    ASSERT_EQ(errorOfRank(pairs, rank), errors[rank - 1]) << "rank " << rank;
 }
 
 TEST(ErrorOfRank, countsEachVoxelOfTheUnionOnce) {
   const auto a = test::volumeOf({{{0, 0, 0}, 1.0f}, {{1, 0, 0}, 2.0f}});
   const auto b = test::volumeOf({{{1, 0, 0}, 5.0f}, {{9, 0, 0}, 7.0f}});
   const auto pairs = pairBricks(a, b);
-  EXPECT_EQ(errorOfRank(pairs, {}, 1), 1.0);
-  EXPECT_EQ(errorOfRank(pairs, {}, 2), 3.0);
-  EXPECT_EQ(errorOfRank(pairs, {}, 3), 7.0);
+  EXPECT_EQ(errorOfRank(pairs, 1), 1.0);
+  EXPECT_EQ(errorOfRank(pairs, 2), 3.0);
+  EXPECT_EQ(errorOfRank(pairs, 3), 7.0);
 }
 
 TEST(NearestRank, isTheCeilingOfTheShare) {

@@ -46,8 +46,8 @@ enum class Activity {
   kByValue  ///< a voxel is active if its value differs from the background by more than the bound
 };
 
-/// Makes a layer whose voxels are within `bound` of the volume's. If rounding to float32 would
-/// break the bound, the layer is exactLayer().
+/// Makes a layer whose voxels are within `bound` of the volume's. If float32 is too coarse for the
+/// bound, the layer is exactLayer().
 /// \throws UsageError  the bound is not positive and finite
 [[nodiscard]] VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity);
 
