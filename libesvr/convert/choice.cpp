@@ -67,13 +67,20 @@ Conversion ellipsoidsToSize(const Job& job, std::uint64_t bytes) {
   return std::move(*result.conversion);
 }
 
-/// The smaller of `voxels` and ellipsoids, which must reach the PSNR.
-Conversion smallerOf(const Job& job, const PsnrTarget& target, VoxelCandidate voxels) {
+/// Voxels that reach a PSNR, and the search for ellipsoids that do.
+struct PsnrCandidates {
+  VoxelCandidate voxels;
+  RestOfSearch search;
+  double seconds = 0.0;  ///< those of the search so far
+};
+
+/// The smaller of voxels and ellipsoids, which must reach the PSNR.
+Conversion smallerOf(const Job& job, const PsnrTarget& target, PsnrCandidates candidates) {
+  auto& [voxels, search, seconds] = candidates;
   const double psnr = target.psnr;
   const auto below = std::uint64_t(target.worthwhileShare * double(voxels.bytes));
-  double seconds = 0.0;
-  auto [ellipsoids, expected] = addSeconds(
-      seconds, [&] { return unlessCancelled([&] { return searchPsnr(job, psnr, below); }); });
+  auto [ellipsoids, expected] =
+      addSeconds(seconds, [&] { return unlessCancelled([&] { return search(below); }); });
   ChoiceRecord choice{record(voxels), {}};
   if (expected > 0) choice.ellipsoids = Candidate{expected, psnr, true, seconds};
   if (ellipsoids) {
@@ -129,11 +136,33 @@ Conversion exactOrEllipsoids(const Job& job, std::uint64_t bytes) {
   return ellipsoidsToSize(job, bytes);
 }
 
+bool usesGpu(const Job& job) { return job.options.fit.device.kind == DeviceKind::kCuda; }
+
 /// True if a fit for a number of ellipsoids, which is usually small, should not wait for the voxel
 /// coder, which has one thread.
 bool fitsBesideTheCoder(const Job& job) {
-  const FitOptions& options = job.options.fit;
-  return options.count && options.device.kind == DeviceKind::kCuda && !isLarge(job);
+  return job.options.fit.count && usesGpu(job) && !isLarge(job);
+}
+
+/// The short fits of a GPU need not wait for the coder either. Those of volumes with fewer active
+/// voxels would often not be needed, and their voxels are soon coded.
+constexpr std::uint64_t kMinDraftedVoxels = std::uint64_t{1} << 16;
+
+PsnrCandidates psnrCandidates(const Job& job, const PsnrTarget& target) {
+  PsnrCandidates made;
+  const auto code = [&] { return voxelsForPsnr(job, target); };
+  if (!usesGpu(job) || activeVoxelCount(job.input.source) < kMinDraftedVoxels) {
+    made.search = [&](auto below) { return searchPsnr(job, target.psnr, below); };
+    made.voxels = code();
+    return made;
+  }
+  auto coder = std::async(std::launch::async, code);
+  made.search = addSeconds(made.seconds, [&] {
+    return unlessCancelled([&] { return startPsnrSearch(job, target.psnr); });
+  });
+  made.voxels = coder.get();
+  if (!made.search) made.search = [](auto) { return PsnrResult{}; };
+  return made;
 }
 
 }  // namespace
@@ -143,11 +172,12 @@ Conversion convertToPsnr(const Job& job, const PsnrTarget& target) {
   if (wanted == Representation::kEllipsoids)
     return std::move(*searchPsnr(job, target.psnr).conversion);
   if (wanted == Representation::kAuto && isLarge(job)) return smallerOfExactAnd(job, target.psnr);
-  auto voxels = voxelsForPsnr(job, target);
-  if (wanted == Representation::kAuto && voxels.bytes >= target.smallEnough)
-    return smallerOf(job, target, std::move(voxels));
-  const ChoiceRecord choice{record(voxels), {}};
-  return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
+  auto found = wanted == Representation::kAuto ? psnrCandidates(job, target)
+                                               : PsnrCandidates{voxelsForPsnr(job, target), {}};
+  if (found.search && found.voxels.bytes >= target.smallEnough)
+    return smallerOf(job, target, std::move(found));
+  const ChoiceRecord choice{record(found.voxels), {}};
+  return asConversion(std::move(found.voxels), choice, FitEnd::kPsnrReached);
 }
 
 Conversion convertToSize(const Job& job, std::uint64_t bytes) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -29,20 +30,23 @@ constexpr Margin kFloat32Margin{0.3, 0.0, 0.9};
 
 class PsnrSearch {
  public:
-  PsnrSearch(const Job& job, double psnr, std::optional<std::uint64_t> below)
+  PsnrSearch(const Job& job, double psnr)
       : options_(job.options),
         job_{job.input, options_},
         psnr_(psnr),
-        below_(below),
         compact_(job.options.storage.form == Storage::kCompact),
         margin_(compact_ ? kCompactMargin : kFloat32Margin),
-        maxCount_(job.options.fit.count.value_or(activeVoxelCount(job.input.source))) {
-    if (below_)
-      maxCount_ = std::min(maxCount_, std::uint64_t(double(*below_) / kMinBytesPerEllipsoid) + 1);
+        maxCount_(job.options.fit.count.value_or(activeVoxelCount(job.input.source))) {}
+
+  void stayBelow(std::uint64_t bytes) {
+    below_ = bytes;
+    maxCount_ = std::min(maxCount_, std::uint64_t(double(bytes) / kMinBytesPerEllipsoid) + 1);
   }
 
+  void makeDraft() { draft_ = nearDraft(); }
+
   PsnrResult run() {
-    Attempt draft = nearDraft();
+    Attempt& draft = *draft_;
     bothSigns_ = draft.bothSigns;
     std::uint64_t expected = 0;
     if (below_ && !draft.cancelled()) {
@@ -232,13 +236,26 @@ class PsnrSearch {
   std::uint64_t maxCount_;
   double slope_ = kDbPerDoubling;
   Decision bothSigns_;
+  std::optional<Attempt> draft_;
   std::vector<Attempt> attempts_;
 };
 
 }  // namespace
 
 PsnrResult searchPsnr(const Job& job, double psnr, std::optional<std::uint64_t> below) {
-  return PsnrSearch(job, psnr, below).run();
+  PsnrSearch search(job, psnr);
+  if (below) search.stayBelow(*below);
+  search.makeDraft();
+  return search.run();
+}
+
+RestOfSearch startPsnrSearch(const Job& job, double psnr) {
+  const auto search = std::make_shared<PsnrSearch>(job, psnr);
+  search->makeDraft();
+  return [search](std::optional<std::uint64_t> below) {
+    if (below) search->stayBelow(*below);
+    return search->run();
+  };
 }
 
 }  // namespace esvr::convert
