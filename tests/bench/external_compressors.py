@@ -274,15 +274,15 @@ class Search:
 
 def searched(method, compress, values, sizes):
     """The best point of a method for each size that it reaches, without repetitions. A program that
-    takes longer than LONGEST ends the search; the sizes before it keep their points."""
+    fails or takes longer than LONGEST ends the search; the sizes before it keep their points."""
     search, best = Search(method, compress, values, sizes), {}
     try:
         for size in sizes:
             point = search.best(size)
             if point:
                 best[point['parameter']] = point
-    except subprocess.TimeoutExpired:
-        print(f'{method}: one setting takes longer than {LONGEST:.0f} s', flush=True)
+    except subprocess.SubprocessError as failure:
+        print(f'{method}: {failure}', flush=True)
     return list(best.values())
 
 

@@ -40,10 +40,10 @@ def stored_rows():
 
 
 def again(options, compressors):
-    volumes = {}
+    volumes, wanted = {}, [FILES[name] for name in options.volumes]
     for old in stored_rows():
         name, method = old['dataset'], old['method']
-        if method not in compressors:
+        if method not in compressors or name not in wanted:
             continue
         if name not in volumes:
             volumes = {name: dense(options.data, name)}

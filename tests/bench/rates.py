@@ -54,7 +54,7 @@ class Rate:
         self.volume, self.part, self.size = volume.name, part, size
         report = json.loads(volume.report(part).read_text())
         self.bytes, self.ours, self.ellipsoids = None, None, None  # if the size is too small
-        if 'refused' not in report:
+        if report['error'] is None:
             grid = report['grids'][0]
             self.bytes, self.ellipsoids = report['output']['bytes'], grid['ellipsoids']
             self.ours = psnr(grid['metrics'])
@@ -76,11 +76,21 @@ class Rate:
         rival = f"{text(psnr(self.best))} {family(self.best['name'])}" if self.best else '-'
         return f'**{ours} / {rival}**' if self.is_lost() else f'{ours} / {rival}'
 
-    def exception(self, causes):
+    def comparison(self):
         ours = f'ESVR has {text(self.ours)} in {self.bytes} bytes' if self.bytes else 'ESVR has no file'
-        both = f"{ours}, {self.best['name']} {text(psnr(self.best))} in {self.best['bytes']}"
-        cause = causes.get((self.volume, str(self.part)), 'not known')
-        return f'- {self.volume} at 1/{self.part}: {both}. Cause: {cause}.'
+        return f"{ours}, {self.best['name']} {text(psnr(self.best))} in {self.best['bytes']}"
+
+
+def exceptions(lost):
+    """A line for each comparison that is lost, with all rates at which it is the same, and its cause."""
+    known, parts = causes(), {}
+    for rate in lost:
+        parts.setdefault((rate.volume, rate.comparison()), []).append(str(rate.part))
+    lines = []
+    for (volume, comparison), at in parts.items():
+        cause = known.get((volume, at[0]), 'not known')
+        lines.append(f"- {volume} at {', '.join('1/' + part for part in at)}: {comparison}. Cause: {cause}.")
+    return lines or ['- none']
 
 
 def causes():
@@ -90,7 +100,6 @@ def causes():
 
 def table(volumes):
     """The table of these volumes and the list of exceptions."""
-    known = causes()
     lines = ['| volume | ' + ' | '.join(f'1/{part}' for part in PARTS) + ' |',
              '|---|' + '---|' * len(PARTS)]
     rates = []
@@ -103,4 +112,4 @@ def table(volumes):
     compared = [rate for rate in rates if rate.best]
     lines += ['', f'ESVR is better than every rival in {len(compared) - len(lost)} of the '
               f'{len(compared)} cases that have a rival. The exceptions are:', '']
-    return lines + ([rate.exception(known) for rate in lost] or ['- none']) + ['']
+    return lines + exceptions(lost) + ['']

@@ -41,11 +41,12 @@ class Unseen(Volume):
         return self.rivals
 
     def fit_or_refuse(self, part):
-        """A size may be too small for the grid. The report then holds the message instead of figures."""
+        """A size may be too small for the grid. The report of vdb2esvr then holds the error."""
         try:
             self.fit(part)
-        except SystemExit as refusal:
-            self.report(part).write_text(json.dumps({'refused': str(refusal)}))
+        except SystemExit:
+            if not self.report(part).exists():
+                raise
 
     @property
     def points_file(self):

@@ -91,7 +91,6 @@ VOLUMES = {
     'hemibrain': ('`swc2vdb hemibrain_754538881.swc --resolution 300`',
                   skeleton('hemibrain_754538881', 300)),
     'gas_density': ('the grid `density` of `gas_0006`', grid_of('sequence', 'gas_0006', 'density')),
-    'gas_shadow': ('the grid `shadow` of `gas_0006`', grid_of('sequence', 'gas_0006', 'shadow')),
     'fire_temperature': ('the grid `temperature` of `fluid_data_0071`',
                          grid_of('fire', 'fluid_data_0071', 'temperature')),
     'scan': ('a synthetic scan with noise, 80 voxels long, 8 bits', scan),
