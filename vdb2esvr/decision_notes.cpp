@@ -48,10 +48,18 @@ const char* whyPlateau(const Conversion& conversion) {
   return "no lattice of voxels was chosen for the goal";
 }
 
+/// True if the bytes of ellipsoids were estimated and not measured.
+bool isEstimated(const Conversion& conversion) {
+  const auto& choice = conversion.choice;
+  return choice && choice->ellipsoids && choice->ellipsoids->estimated;
+}
+
 const char* whyResidual(const Conversion& conversion) {
   const Decision& residual = conversion.decisions.residual;
   if (residual.used) return "it corrects the ellipsoids to within the bound";
   if (residual.bytesWith) return "voxels take fewer bytes than ellipsoids with a residual";
+  if (residual.tried && isEstimated(conversion))
+    return "a sample of bricks shows that voxels take fewer bytes than ellipsoids with a residual";
   if (residual.tried) return "no ellipsoids with a residual were found that keep the bound";
   return "ellipsoids within a bound were not considered";
 }
@@ -76,6 +84,9 @@ LeftOut chosen(const ChoiceRecord& choice, bool voxels) {
 LeftOut representationNote(const Conversion& conversion) {
   const ChoiceRecord choice = conversion.choice.value_or(ChoiceRecord{});
   if (choice.voxels && choice.ellipsoids) return chosen(choice, conversion.grid.voxels.has_value());
+  if (conversion.smallerExactBytes)
+    return note("representation", "an option determines it; exact voxels would take fewer bytes",
+                {});
   const char* why = choice.voxels || choice.ellipsoids
                         ? "the other representation was not tried or cannot reach the goal"
                         : "the goal, an option or the size of the volume determines it";

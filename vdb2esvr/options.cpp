@@ -44,7 +44,8 @@ cli::ProgramText programText() {
           "grids share the bytes in proportion to their active voxels. --psnr searches for the\n"
           "smallest file that reaches the PSNR; --count then limits the number of ellipsoids.\n"
           "In all these cases, the program chooses for each grid between ellipsoids and quantised\n"
-          "voxels. It makes only a short fit if that shows that voxels are better.\n"
+          "voxels. It makes only a short fit if that shows that voxels are better. Grids of more\n"
+          "than 33 million voxels are stored as ellipsoids or exact voxels.\n"
           "--representation prescribes one of them.\n"
           "With --count, --seconds, --iterations or --storage-loss there is a single fit. Its\n"
           "ellipsoids are stored unless exact voxels take no more bytes. With --psnr and\n"
@@ -84,7 +85,7 @@ void addGoalOptions(cli::po::options_description& options) {
     ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
     ("max-error", value<std::string>()->value_name("E"),
      "keep the error of every voxel within E, or within E% of the range of values; if ellipsoids "
-     "are stored, they have a residual")
+     "are stored, they have a residual; a sample of the grid shows whether they may be smaller")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
      "ellipsoids, voxels, or auto (whichever are better or smaller)")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),

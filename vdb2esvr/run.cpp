@@ -1,6 +1,7 @@
 #include "vdb2esvr/run.h"
 
 #include <algorithm>
+#include <future>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -38,12 +39,10 @@ void checkFiles(const Options& options) {
 
 constexpr const char* kAuto = "auto";
 
-Device chooseDevice(const Options& options, const cli::Log& log) {
-  const Device device = selectDevice(options.device);
+void tellDevice(const Device& device, const Options& options, const cli::Log& log) {
   log.detail("fitting on " + deviceName(device) + ", with " +
              (options.threads > 0 ? std::to_string(options.threads) : "all available") +
              " threads");
-  return device;
 }
 
 void tellSkipped(const std::vector<GridSummary>& skipped, const cli::Log& log) {
@@ -69,10 +68,13 @@ void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
 /// same voxels are converted once.
 class FileConversion {
  public:
-  FileConversion(const Options& options, const CancelToken& cancel, const cli::Log& log)
-      : options_(options), log_(log) {
+  FileConversion(const Options& options, const Device& device, const CancelToken& cancel,
+                 const cli::Log& log)
+      : options_(options),
+        log_(log),
+        started_(std::async(std::launch::async, [device] { startDevice(device); })) {
     options_.convert.fit.cancel = &cancel;
-    options_.convert.fit.device = chooseDevice(options, log);
+    options_.convert.fit.device = device;
   }
 
   void run(const std::vector<GridSummary>& grids, RunRecord& record) {
@@ -135,6 +137,7 @@ class FileConversion {
 
   Options options_;
   const cli::Log& log_;
+  std::future<void> started_;  ///< the device starts while the first grid is read
 };
 
 void write(const Options& options, RunRecord& record) {
@@ -173,11 +176,14 @@ RunRecord convertFile(const Options& options, const cli::Interrupts& interrupts,
                       const cli::Log& log) {
   cli::Stopwatch watch;
   RunRecord record;
+  auto device = std::async(std::launch::async, [&] { return selectDevice(options.device); });
   record.input = inspectVdb(options.input);
   GridChoice choice = chooseGrids(options.input, record.input, options.grids);
   tellSkipped(choice.skipped, log);
   record.skipped = std::move(choice.skipped);
-  FileConversion(options, interrupts.token(), log).run(choice.fitted, record);
+  const Device selected = device.get();
+  tellDevice(selected, options, log);
+  FileConversion(options, selected, interrupts.token(), log).run(choice.fitted, record);
   for (const auto& grid : record.grids) tellGrid(grid, log);
   write(options, record);
   record.secondsTotal = watch.lap();

@@ -33,6 +33,13 @@ void printChoice(const ConvertedGrid& grid, std::ostream& out) {
   out << '\n';
 }
 
+/// Says that ellipsoids, on which the user insisted, take more bytes than exact voxels.
+void printRemark(const ConvertedGrid& grid, std::ostream& out) {
+  if (const auto bytes = grid.conversion.smallerExactBytes)
+    out << cli::printable(grid.uniqueName) << ": exact voxels would take fewer bytes, about "
+        << *bytes << '\n';
+}
+
 /// Says how the data of a grid were made.
 void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& out) {
   const bool forDrawing = options.convert.fit.fitFor == FitFor::kDrawing;
@@ -43,7 +50,10 @@ void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& 
   if (grid.psnrBetween)
     out << cli::printable(grid.uniqueName) << ": the sum between voxels has "
         << cli::decibels(*grid.psnrBetween) << " dB\n";
-  if (!grid.sameAs) return printChoice(grid, out);
+  if (!grid.sameAs) {
+    printRemark(grid, out);
+    return printChoice(grid, out);
+  }
   out << cli::printable(grid.uniqueName) << ": stored once with " << cli::printable(*grid.sameAs)
       << ", which has the same voxels\n";
 }

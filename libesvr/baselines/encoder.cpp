@@ -59,12 +59,9 @@ struct BaselineEncoder::State {
   }
   double encodeZfp(const ZfpSetting& setting) {
     if (!dense) dense = baselines::densify(source.grid.volume, source.box, source.maxDenseBytes);
-    double seconds = 0.0;
-    {
-      const AddSeconds clock(seconds);
+    return secondsOf([&] {
       writeBytes(file(), baselines::compressZfp(*dense, setting, source.grid.descriptor.name));
-    }
-    return seconds;
+    });
   }
   void decodeZfp(DenseBox& into) const {
     baselines::decompressZfp(readBytes(file()), file(), into);
@@ -98,12 +95,7 @@ double BaselineEncoder::secondsToDecode() const {
   if (const auto* packing = std::get_if<VoxelPacking>(&state_->last.how))
     return secondsToRead(state_->file(), packing->form);
   DenseBox dense{state_->dense->box, std::vector<float>(state_->dense->values.size())};
-  double seconds = 0.0;
-  {
-    const AddSeconds clock(seconds);
-    state_->decodeZfp(dense);
-  }
-  return seconds;
+  return secondsOf([&] { state_->decodeZfp(dense); });
 }
 
 SparseVolume BaselineEncoder::decode() const {

@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include "convert/unless_cancelled.h"
 #include "core/add_seconds.h"
-#include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 
@@ -37,22 +37,6 @@ Attempt attempted(const Job& job, const FitOptions& options) {
                                job.options.storage.activity);
   result.psnr = psnrOf(job, result.grid);
   return result;
-}
-
-/// Share of the active voxels with the largest or the smallest value of the volume, other than the
-/// background, from which on it saturates.
-constexpr double kSaturatedShare = 0.05;
-
-bool saturates(const SparseVolume& volume) {
-  const ValueRange range = activeRange(volume);
-  const auto isExtreme = [&](float v) {
-    return (v == range.max && v > volume.background) || (v == range.min && v < volume.background);
-  };
-  std::uint64_t extreme = 0;
-  for (std::size_t i = 0; i < volume.values.size(); ++i)
-    extreme +=
-        isExtreme(volume.values[i]) && volume.active[i / kBrickVoxels].test(int(i % kBrickVoxels));
-  return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
 }
 
 // Whether both signs are better (docs/lab-notes.md, "Signs").
@@ -88,7 +72,23 @@ std::optional<Attempt> betterSigned(const Job& job, double count, const Attempt&
   return found;
 }
 
+/// Share of the active voxels with the largest or the smallest value of the volume, other than the
+/// background, from which on it saturates.
+constexpr double kSaturatedShare = 0.05;
+
 }  // namespace
+
+bool saturates(const SparseVolume& volume) {
+  const ValueRange range = activeRange(volume);
+  const auto isExtreme = [&](float v) {
+    return (v == range.max && v > volume.background) || (v == range.min && v < volume.background);
+  };
+  std::uint64_t extreme = 0;
+  for (std::size_t i = 0; i < volume.values.size(); ++i)
+    extreme +=
+        isExtreme(volume.values[i]) && volume.active[i / kBrickVoxels].test(int(i % kBrickVoxels));
+  return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
+}
 
 Activity voxelActivity(const Job& job) {
   const bool levelSet = job.input.descriptor.gridClass == GridClass::kLevelSet;
@@ -125,14 +125,11 @@ Attempt withBetterSigns(const ConvertInput& input, Attempt own, ConvertOptions& 
   const Job job{input, options};
   const FitOptions& fit = options.fit;
   if (own.cancelled() || fit.bothSigns || fit.narrowBand || !saturates(input.source)) return own;
-  std::optional<Attempt> found;
   double seconds = 0.0;
-  try {
-    const AddSeconds clock(seconds);
-    found = betterSigned(job, double(own.asked), own);
-  } catch (const Cancelled&) {
-    // The search continues with `own`, which the token marks as cancelled below.
-  }
+  // Where it is cancelled, the search continues with `own`, which is marked below.
+  auto found = addSeconds(seconds, [&] {
+    return unlessCancelled([&] { return betterSigned(job, double(own.asked), own); });
+  });
   options.fit.bothSigns = found.has_value();
   Attempt& best = found ? *found : own;
   best.bothSigns = {.tried = true, .used = found.has_value(), .seconds = seconds};

@@ -5,15 +5,26 @@
 #include <cstdint>
 #include <optional>
 
+#include "convert/sample.h"
 #include "esvr/compact.h"
 #include "esvr/convert.h"
 
 namespace esvr::convert {
 
+/// What bounds the time that voxels take where they are an alternative to ellipsoids.
+struct VoxelLimits {
+  /// Largest number of voxels in bricks for which voxels are coded without need. One core codes and
+  /// decodes 3 to 15 million of them per second.
+  std::size_t maxVoxels = std::size_t{1} << 25;
+  /// The sample from which the bytes of the exact voxels of a larger volume are estimated.
+  SampleSize sample{.bricks = 2048, .runs = 128};
+};
+
 /// The input and the options of a search. A job does not own them.
 struct Job {
   const ConvertInput& input;
   const ConvertOptions& options;
+  VoxelLimits limits{};
 };
 
 /// PSNR of a volume or of a decoded grid over the box, dB.
@@ -57,6 +68,10 @@ struct Attempt {
 /// times as long (docs/lab-notes.md, "Continued fits").
 /// \param count  at least the number of the earlier attempt's ellipsoids
 [[nodiscard]] Attempt continued(const Job& job, const Attempt& from, double count);
+
+/// True if many active voxels have an extreme value of the volume, so that both signs of
+/// intensities may be better.
+[[nodiscard]] bool saturates(const SparseVolume& volume);
 
 /// Decides whether intensities have both signs (FitOptions::bothSigns in `options`), unless this is
 /// already set: where many voxels have an extreme value and the volume is no narrow band, a second

@@ -4,7 +4,10 @@
 #include <utility>
 
 #include "compact/measure_layers.h"
+#include "convert/exact_voxels.h"
+#include "convert/residual_trial.h"
 #include "convert/size_search.h"
+#include "convert/unless_cancelled.h"
 #include "core/add_seconds.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
@@ -17,8 +20,9 @@ namespace {
 // docs/benchmarks.md, "Voxels or a residual within an error bound", has the sizes that follow.
 /// The ellipsoids of a grid with a residual get this fraction (1/4) of the voxels' bytes.
 constexpr std::uint64_t kEllipsoidBytesDivisor = 4;
-/// Largest size of a short fit's grid, relative to the voxels', at which a full fit is tried.
-constexpr double kMaxPromisingRatio = 1.15;
+/// Largest residualRatio() at which ellipsoids are fitted. The ratio of the whole volume is larger by
+/// up to 0.09 (docs/lab-notes.md, "Deciding on a residual").
+constexpr double kPromisingRatio = 0.9;
 
 double absoluteBound(const BoundGoal& goal, const SparseVolume& source) {
   if (!goal.relative) return goal.bound;
@@ -45,16 +49,19 @@ std::optional<Conversion> withEllipsoids(const Job& job, double bound, std::uint
   return conversion;
 }
 
-/// The smallest conversion so far, and the sizes that were compared.
-struct Smallest {
+/// The smaller conversion so far, and the sizes that were compared.
+struct Smaller {
   Conversion conversion;
   ChoiceRecord choice;
   bool insists = false;  ///< ellipsoids are taken even if voxels are smaller
   Decision residual{};
 
+  [[nodiscard]] bool hasEllipsoids() const {
+    return choice.ellipsoids && !choice.ellipsoids->estimated;
+  }
+
   void take(Conversion now) {
     const std::uint64_t bytes = bytesAdded(now.grid);
-    if (choice.ellipsoids && bytes >= choice.ellipsoids->bytes) return;
     choice.ellipsoids = Candidate{bytes};
     if (insists || bytes < choice.voxels->bytes) conversion = std::move(now);
   }
@@ -63,34 +70,39 @@ struct Smallest {
   void record() {
     residual.used = conversion.grid.residual.has_value();
     residual.bytesWithout = choice.voxels->bytes;
-    if (choice.ellipsoids) {
-      residual.bytesWith = choice.ellipsoids->bytes;
-      choice.ellipsoids->seconds = residual.seconds;
-    }
+    if (hasEllipsoids()) residual.bytesWith = choice.ellipsoids->bytes;
+    if (choice.ellipsoids) choice.ellipsoids->seconds = residual.seconds;
     conversion.choice = choice;
     conversion.decisions.residual = residual;
   }
 };
 
-/// Tries a short fit, and a full one if the size of the short fit's grid is near the voxels'.
-void tryEllipsoids(const Job& job, double bound, Smallest& best) {
-  ConvertOptions shortFit = job.options;
-  shortFit.fit = shortened(shortFit.fit);
-  for (const ConvertOptions* options : {&std::as_const(shortFit), &job.options}) {
-    auto now = withEllipsoids({job.input, *options}, bound,
-                              best.choice.voxels->bytes / kEllipsoidBytesDivisor);
-    if (!now) return;
-    const bool promising =
-        double(bytesAdded(now->grid)) <= kMaxPromisingRatio * double(best.choice.voxels->bytes);
-    best.take(std::move(*now));
-    if (!promising) return;
-  }
+/// True if a sample promises that ellipsoids of `bytes` are smaller than the voxels. Otherwise the
+/// estimate of their bytes is recorded.
+bool isPromising(const Job& job, double bound, std::uint64_t bytes, Smaller& best) {
+  const double own = double(bytes) - double(bytesBesideVoxels(job.input));
+  const double voxels = double(best.choice.voxels->bytes);
+  if (own < kMinBytesPerEllipsoid) return false;
+  const double ratio = residualRatio(job, bound, own / voxels);
+  if (ratio <= kPromisingRatio) return true;
+  best.choice.ellipsoids = Candidate{std::uint64_t(ratio * voxels), {}, true};
+  return false;
 }
 
-void tryTimed(const Job& job, double bound, Smallest& best) {
-  const AddSeconds clock(best.residual.seconds.emplace(0.0));
+/// Takes ellipsoids if they are smaller than the voxels.
+void tryEllipsoids(const Job& job, double bound, Smaller& best) {
+  const std::uint64_t bytes = best.choice.voxels->bytes / kEllipsoidBytesDivisor;
+  const auto fitted = [&]() -> std::optional<Conversion> {
+    if (!best.insists && !isPromising(job, bound, bytes, best)) return std::nullopt;
+    return withEllipsoids(job, bound, bytes);
+  };
+  auto found = best.insists ? fitted() : unlessCancelled(fitted);
+  if (found) best.take(std::move(*found));
+}
+
+void tryTimed(const Job& job, double bound, Smaller& best) {
   best.residual.tried = true;
-  tryEllipsoids(job, bound, best);
+  best.residual.seconds = secondsOf([&] { tryEllipsoids(job, bound, best); });
 }
 
 }  // namespace
@@ -116,10 +128,10 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   Conversion voxels = asVoxels(job, boundedLayer(source, bound, voxelActivity(job)));
   const bool insists = job.options.representation == Representation::kEllipsoids;
   if (isNarrowBand(job.input.descriptor, source) && !insists) return voxels;
-  Smallest best{std::move(voxels), {}, insists};
+  Smaller best{std::move(voxels), {}, insists};
   best.choice.voxels = Candidate{bytesAdded(best.conversion.grid)};
   if (job.options.representation != Representation::kVoxels) tryTimed(job, bound, best);
-  if (insists && !best.choice.ellipsoids)
+  if (insists && !best.hasEllipsoids())
     throw UsageError("grid '" + job.input.descriptor.name +
                      "' has no ellipsoids with a residual that keep the bound");
   best.record();

@@ -6,25 +6,20 @@
 #include <string>
 #include <utility>
 
+#include "convert/exact_voxels.h"
 #include "convert/psnr_search.h"
 #include "convert/size_search.h"
-#include "convert/voxel_search.h"
+#include "convert/unless_cancelled.h"
 #include "core/add_seconds.h"
 #include "esvr/error.h"
 
 namespace esvr::convert {
 namespace {
 
-/// Largest number of voxels in bricks for which voxels are tried as an alternative.
-constexpr std::size_t kMaxVoxels = std::size_t{1} << 25;
-
 /// The representation of a job. Float32 storage is a form of ellipsoids.
 Representation representationOf(const Job& job) {
   if (job.options.storage.form == Storage::kFloat32) return Representation::kEllipsoids;
-  const Representation wanted = job.options.representation;
-  if (wanted == Representation::kAuto && isTooLargeForVoxels(job))
-    return Representation::kEllipsoids;
-  return wanted;
+  return job.options.representation;
 }
 
 Candidate record(const VoxelCandidate& voxels) {
@@ -42,6 +37,12 @@ Conversion asConversion(VoxelCandidate voxels, const ChoiceRecord& choice, FitEn
   conversion.choice = choice;
   conversion.decisions.plateau = voxels.plateau;
   return conversion;
+}
+
+/// The same where the figures of ellipsoids are known.
+Conversion asConversion(VoxelCandidate voxels, const Candidate& ellipsoids, FitEnd end) {
+  const ChoiceRecord choice{record(voxels), ellipsoids};
+  return asConversion(std::move(voxels), choice, end);
 }
 
 /// Records that ellipsoids were taken instead of these voxels.
@@ -66,29 +67,20 @@ Conversion ellipsoidsToSize(const Job& job, std::uint64_t bytes) {
   return std::move(*result.conversion);
 }
 
-/// The result of a search for ellipsoids; an empty one if the search was cancelled before it had a
-/// fit, so that voxels are the best result so far.
-template <class Search>
-auto unlessCancelled(const Search& search) -> decltype(search()) try {
-  return search();
-} catch (const Cancelled&) {
-  return {};
-}
+/// Voxels that reach a PSNR, and the search for ellipsoids that do.
+struct PsnrCandidates {
+  VoxelCandidate voxels;
+  RestOfSearch search;
+  double seconds = 0.0;  ///< those of the search so far
+};
 
-/// The result of a search, and the seconds that it took.
-template <class Search>
-auto measured(double& seconds, const Search& search) {
-  const AddSeconds clock(seconds);
-  return search();
-}
-
-/// The smaller of `voxels` and ellipsoids, which must reach the PSNR.
-Conversion smallerOf(const Job& job, const PsnrTarget& target, VoxelCandidate voxels) {
+/// The smaller of voxels and ellipsoids, which must reach the PSNR.
+Conversion smallerOf(const Job& job, const PsnrTarget& target, PsnrCandidates candidates) {
+  auto& [voxels, search, seconds] = candidates;
   const double psnr = target.psnr;
   const auto below = std::uint64_t(target.worthwhileShare * double(voxels.bytes));
-  double seconds = 0.0;
-  auto [ellipsoids, expected] = measured(
-      seconds, [&] { return unlessCancelled([&] { return searchPsnr(job, psnr, below); }); });
+  auto [ellipsoids, expected] =
+      addSeconds(seconds, [&] { return unlessCancelled([&] { return search(below); }); });
   ChoiceRecord choice{record(voxels), {}};
   if (expected > 0) choice.ellipsoids = Candidate{expected, psnr, true, seconds};
   if (ellipsoids) {
@@ -100,10 +92,29 @@ Conversion smallerOf(const Job& job, const PsnrTarget& target, VoxelCandidate vo
   return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
 }
 
+/// The smaller of exact voxels and ellipsoids that reach the PSNR. If ellipsoids were cancelled, they
+/// are taken, because coding the voxels of a large volume takes long.
+Conversion smallerOfExactAnd(const Job& job, double psnr) {
+  ExactVoxels exact(job);
+  double seconds = 0.0;
+  auto [ellipsoids, expected] =
+      addSeconds(seconds, [&] { return searchPsnr(job, psnr, exact.figures().bytes); });
+  Candidate other{expected, psnr, true, seconds};
+  if (ellipsoids) {
+    other = record(job, *ellipsoids, seconds);
+    const bool ended = other.psnr >= psnr || ellipsoids->fit.end == FitEnd::kCancelled;
+    if (ended && !exact.takeAtMost(double(other.bytes))) {
+      ellipsoids->choice = ChoiceRecord{exact.figures(), other};
+      return std::move(*ellipsoids);
+    }
+  }
+  return asConversion(std::move(exact).take(), other, FitEnd::kPsnrReached);
+}
+
 /// The better of `voxels` and ellipsoids of a size.
 Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) {
   double seconds = 0.0;
-  auto result = measured(seconds, [&] {
+  auto result = addSeconds(seconds, [&] {
     return unlessCancelled([&] { return searchSize(job, bytes, voxels.psnr); });
   });
   ChoiceRecord choice{record(voxels), {}};
@@ -116,24 +127,63 @@ Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) 
   return asConversion(std::move(voxels), choice, FitEnd::kScheduleDone);
 }
 
-}  // namespace
+/// Exact voxels if they keep to a size, otherwise ellipsoids.
+Conversion exactOrEllipsoids(const Job& job, std::uint64_t bytes) {
+  ExactVoxels exact(job);
+  const bool fits = exact.takeAtMost(double(bytes));
+  const ChoiceRecord choice{exact.figures(), {}};
+  if (fits) return asConversion(std::move(exact).take(), choice, FitEnd::kScheduleDone);
+  return ellipsoidsToSize(job, bytes);
+}
 
-bool isTooLargeForVoxels(const Job& job) { return job.input.source.values.size() > kMaxVoxels; }
+bool usesGpu(const Job& job) { return job.options.fit.device.kind == DeviceKind::kCuda; }
+
+/// True if a fit for a number of ellipsoids, which is usually small, should not wait for the voxel
+/// coder, which has one thread.
+bool fitsBesideTheCoder(const Job& job) {
+  return job.options.fit.count && usesGpu(job) && !isLarge(job);
+}
+
+/// The short fits of a GPU need not wait for the coder either. Those of volumes with fewer active
+/// voxels would often not be needed, and their voxels are soon coded.
+constexpr std::uint64_t kMinDraftedVoxels = std::uint64_t{1} << 16;
+
+PsnrCandidates psnrCandidates(const Job& job, const PsnrTarget& target) {
+  PsnrCandidates made;
+  const auto code = [&] { return voxelsForPsnr(job, target); };
+  if (!usesGpu(job) || activeVoxelCount(job.input.source) < kMinDraftedVoxels) {
+    made.search = [&](auto below) { return searchPsnr(job, target.psnr, below); };
+    made.voxels = code();
+    return made;
+  }
+  auto coder = std::async(std::launch::async, code);
+  made.search = addSeconds(made.seconds, [&] {
+    return unlessCancelled([&] { return startPsnrSearch(job, target.psnr); });
+  });
+  made.voxels = coder.get();
+  if (!made.search) made.search = [](auto) { return PsnrResult{}; };
+  return made;
+}
+
+}  // namespace
 
 Conversion convertToPsnr(const Job& job, const PsnrTarget& target) {
   const Representation wanted = representationOf(job);
   if (wanted == Representation::kEllipsoids)
     return std::move(*searchPsnr(job, target.psnr).conversion);
-  auto voxels = voxelsForPsnr(job, target);
-  if (wanted == Representation::kAuto && voxels.bytes >= target.smallEnough)
-    return smallerOf(job, target, std::move(voxels));
-  const ChoiceRecord choice{record(voxels), {}};
-  return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
+  if (wanted == Representation::kAuto && isLarge(job)) return smallerOfExactAnd(job, target.psnr);
+  auto found = wanted == Representation::kAuto ? psnrCandidates(job, target)
+                                               : PsnrCandidates{voxelsForPsnr(job, target), {}};
+  if (found.search && found.voxels.bytes >= target.smallEnough)
+    return smallerOf(job, target, std::move(found));
+  const ChoiceRecord choice{record(found.voxels), {}};
+  return asConversion(std::move(found.voxels), choice, FitEnd::kPsnrReached);
 }
 
 Conversion convertToSize(const Job& job, std::uint64_t bytes) {
   const Representation wanted = representationOf(job);
   if (wanted == Representation::kEllipsoids) return ellipsoidsToSize(job, bytes);
+  if (wanted == Representation::kAuto && isLarge(job)) return exactOrEllipsoids(job, bytes);
   auto voxels = voxelsForSize(job, bytes);
   if (!voxels && wanted == Representation::kVoxels)
     throw tooSmall(job, bytes, "has no voxels of that size");
@@ -147,27 +197,26 @@ Conversion convertToSize(const Job& job, std::uint64_t bytes) {
 
 Conversion unlessExactIsSmaller(const Job& job, const std::function<Conversion()>& fit) {
   if (representationOf(job) != Representation::kAuto) return fit();
-  const FitOptions& options = job.options.fit;
-  const double count = double(plannedCount(options, activeVoxelCount(job.input.source)));
-  // The voxel coder has one thread. A GPU does not wait for it where a number of ellipsoids is
-  // wanted, which is usually small.
-  const bool atOnce = options.count && options.device.kind == DeviceKind::kCuda;
-  std::future<VoxelCandidate> coder = std::async(
-      atOnce ? std::launch::async : std::launch::deferred, [&] { return exactVoxels(job); });
+  const double count = double(plannedCount(job.options.fit, activeVoxelCount(job.input.source)));
+  ExactVoxels exact(job);
   std::optional<Conversion> fitted;
   double seconds = 0.0;
-  if (atOnce) fitted = measured(seconds, fit);
-  VoxelCandidate exact = coder.get();
-  ChoiceRecord choice{record(exact),
-                      Candidate{std::uint64_t(kBytesPerEllipsoid * count), {}, true}};
-  if (!fitted && double(exact.bytes) <= kMinBytesPerEllipsoid * count)
-    return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);
-  if (!fitted) fitted = measured(seconds, fit);
-  choice.ellipsoids = Candidate{bytesAdded(fitted->grid)};  // its PSNR would take a decoding
-  choice.ellipsoids->seconds = seconds;
-  fitted->choice = choice;
-  if (choice.ellipsoids->bytes < exact.bytes) return std::move(*fitted);
-  return asConversion(std::move(exact), choice, FitEnd::kScheduleDone);
+  if (fitsBesideTheCoder(job)) {
+    auto coder = std::async(std::launch::async, [&] { return exactVoxels(job); });
+    fitted = addSeconds(seconds, fit);
+    exact.set(coder.get());
+  }
+  Candidate ellipsoids{std::uint64_t(kBytesPerEllipsoid * count), {}, true};
+  if (fitted || !exact.takeAtMost(kMinBytesPerEllipsoid * count)) {
+    if (!fitted) fitted = addSeconds(seconds, fit);
+    // Their PSNR would take a decoding.
+    ellipsoids = {bytesAdded(fitted->grid), {}, false, seconds};
+    if (!exact.takeAtMost(double(ellipsoids.bytes))) {
+      fitted->choice = ChoiceRecord{exact.figures(), ellipsoids};
+      return std::move(*fitted);
+    }
+  }
+  return asConversion(std::move(exact).take(), ellipsoids, FitEnd::kScheduleDone);
 }
 
 }  // namespace esvr::convert

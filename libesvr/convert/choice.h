@@ -9,16 +9,13 @@ namespace esvr::convert {
 
 /// The smaller of two grids that reach a PSNR: voxels or ellipsoids. Voxels are made first, because
 /// they take the time of a few passes over the volume. A short fit then shows whether ellipsoids
-/// can be smaller; full fits are made only if they can.
+/// can be smaller; full fits are made only if they can. Voxels of a large volume (isLarge) are
+/// either exact or not tried, because each trial would take long.
 [[nodiscard]] Conversion convertToPsnr(const Job& job, const PsnrTarget& target);
 
 /// The better of two grids of a size: voxels or ellipsoids, which are compared in the same way.
 /// \throws UsageError  neither can be that small
 [[nodiscard]] Conversion convertToSize(const Job& job, std::uint64_t bytes);
-
-/// True for volumes whose voxels are not tried as an alternative to ellipsoids. They would keep a
-/// fit waiting, because coding them takes long.
-[[nodiscard]] bool isTooLargeForVoxels(const Job& job);
 
 /// The result of `fit`, or exact voxels if they take no more bytes. `fit` is not called if its
 /// number of ellipsoids shows that it cannot be smaller.

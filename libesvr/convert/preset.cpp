@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "convert/choice.h"
+#include "convert/exact_voxels.h"
 
 namespace esvr::convert {
 namespace {
@@ -54,12 +55,11 @@ FitOptions bounded(FitOptions options, std::uint64_t activeVoxels) {
 }  // namespace
 
 Conversion convertToPreset(const Job& job, const std::function<Conversion()>& fit) {
-  if (isTooLargeForVoxels(job) && job.options.representation != Representation::kVoxels)
-    return fit();
+  if (isLarge(job) && job.options.representation != Representation::kVoxels) return fit();
   ConvertOptions options = job.options;
   options.fit = bounded(job.options.fit, activeVoxelCount(job.input.source));
   const double psnr = psnrOverBox(job, presetPsnr(job.options.fit.preset));
-  return convertToPsnr({job.input, options}, {psnr, kSmallEnough, kWorthwhileShare});
+  return convertToPsnr({job.input, options, job.limits}, {psnr, kSmallEnough, kWorthwhileShare});
 }
 
 }  // namespace esvr::convert

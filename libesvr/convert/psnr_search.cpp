@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "convert/psnr_slope.h"
-#include "esvr/error.h"
+#include "convert/unless_cancelled.h"
 
 namespace esvr::convert {
 namespace {
@@ -29,20 +30,23 @@ constexpr Margin kFloat32Margin{0.3, 0.0, 0.9};
 
 class PsnrSearch {
  public:
-  PsnrSearch(const Job& job, double psnr, std::optional<std::uint64_t> below)
+  PsnrSearch(const Job& job, double psnr)
       : options_(job.options),
         job_{job.input, options_},
         psnr_(psnr),
-        below_(below),
         compact_(job.options.storage.form == Storage::kCompact),
         margin_(compact_ ? kCompactMargin : kFloat32Margin),
-        maxCount_(job.options.fit.count.value_or(activeVoxelCount(job.input.source))) {
-    if (below_)
-      maxCount_ = std::min(maxCount_, std::uint64_t(double(*below_) / kMinBytesPerEllipsoid) + 1);
+        maxCount_(job.options.fit.count.value_or(activeVoxelCount(job.input.source))) {}
+
+  void stayBelow(std::uint64_t bytes) {
+    below_ = bytes;
+    maxCount_ = std::min(maxCount_, std::uint64_t(double(bytes) / kMinBytesPerEllipsoid) + 1);
   }
 
+  void makeDraft() { draft_ = nearDraft(); }
+
   PsnrResult run() {
-    Attempt draft = nearDraft();
+    Attempt& draft = *draft_;
     bothSigns_ = draft.bothSigns;
     std::uint64_t expected = 0;
     if (below_ && !draft.cancelled()) {
@@ -52,7 +56,7 @@ class PsnrSearch {
         return {std::nullopt, expected};
     }
     if (!draft.cancelled()) fitUntilReached(scaledCount(draft, aim() - kShortFitBehind));
-    if (attempts_.empty()) return {marked(std::move(draft), FitEnd::kCancelled), expected};
+    if (attempts_.empty()) return {stored(cancelled(std::move(draft))), expected};
     return {anyReached() ? smallest() : best(), expected};
   }
 
@@ -61,14 +65,6 @@ class PsnrSearch {
     double guess = double(activeVoxelCount(job_.input.source)) / kVoxelsPerEllipsoid;
     if (below_) guess = std::min(guess, double(*below_) / kBytesPerEllipsoid);
     return capped(guess);
-  }
-
-  /// The result of a fit, or nothing if it was cancelled before it had an ellipsoid.
-  template <class Fit>
-  [[nodiscard]] static std::optional<Attempt> unlessCancelled(const Fit& fit) try {
-    return fit();
-  } catch (const Cancelled&) {
-    return std::nullopt;
   }
 
   /// The attempt with the most ellipsoids from which a fit can continue; null if there is none.
@@ -99,7 +95,7 @@ class PsnrSearch {
   /// True if the number of ellipsoids may suffice, even if the PSNR grows steeply.
   [[nodiscard]] bool canReach(const Attempt& draft) const {
     const double psnr = aim() - kShortFitBehind - kUncertainty;
-    return convert::neededCount(pointOf(draft), psnr, kMaxDbPerDoubling) <= double(maxCount_);
+    return countFor(pointOf(draft), psnr, kMaxDbPerDoubling) <= double(maxCount_);
   }
 
   /// A short fit whose number of ellipsoids is near the one that the PSNR needs, with the better
@@ -110,7 +106,8 @@ class PsnrSearch {
     const double ratio = count / pointOf(draft).count;
     const bool isFar = std::max(ratio, 1.0 / ratio) > kNear;
     if (!draft.cancelled() && isFar && canReach(draft)) {
-      auto nearer = unlessCancelled([&] { return attempt(job_, count, FitLength::kShort); });
+      auto nearer = unlessCancelled(
+          [&]() -> std::optional<Attempt> { return attempt(job_, count, FitLength::kShort); });
       if (!nearer) return cancelled(std::move(draft));
       slope_ = dbPerDoubling(pointOf(draft), pointOf(*nearer));
       draft = std::move(*nearer);
@@ -120,7 +117,7 @@ class PsnrSearch {
 
   void fitUntilReached(double count) {
     do {
-      auto found = unlessCancelled([&] { return next(capped(count)); });
+      auto found = unlessCancelled([&]() -> std::optional<Attempt> { return next(capped(count)); });
       if (!found) return markCancelled();
       attempts_.push_back(std::move(*found));
       if (attempts_.back().cancelled() || goodEnough(attempts_.back())) break;
@@ -153,7 +150,7 @@ class PsnrSearch {
 
   /// The number of ellipsoids that should reach a PSNR, extrapolated from an attempt.
   [[nodiscard]] double neededCount(const Attempt& from, double psnr) const {
-    return convert::neededCount(pointOf(from), psnr, slope_);
+    return countFor(pointOf(from), psnr, slope_);
   }
 
   /// The number of ellipsoids of the next fit: neededCount(), but not too far from the attempt's.
@@ -239,13 +236,26 @@ class PsnrSearch {
   std::uint64_t maxCount_;
   double slope_ = kDbPerDoubling;
   Decision bothSigns_;
+  std::optional<Attempt> draft_;
   std::vector<Attempt> attempts_;
 };
 
 }  // namespace
 
 PsnrResult searchPsnr(const Job& job, double psnr, std::optional<std::uint64_t> below) {
-  return PsnrSearch(job, psnr, below).run();
+  PsnrSearch search(job, psnr);
+  if (below) search.stayBelow(*below);
+  search.makeDraft();
+  return search.run();
+}
+
+RestOfSearch startPsnrSearch(const Job& job, double psnr) {
+  const auto search = std::make_shared<PsnrSearch>(job, psnr);
+  search->makeDraft();
+  return [search](std::optional<std::uint64_t> below) {
+    if (below) search->stayBelow(*below);
+    return search->run();
+  };
 }
 
 }  // namespace esvr::convert

@@ -2,6 +2,7 @@
 /// The search for the smallest grid that reaches a PSNR.
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 
 #include "convert/attempt.h"
@@ -21,5 +22,12 @@ struct PsnrResult {
 ///               that it would not
 [[nodiscard]] PsnrResult searchPsnr(const Job& job, double psnr,
                                     std::optional<std::uint64_t> below = {});
+
+/// The rest of a search whose short fits are done. \param below  see searchPsnr()
+using RestOfSearch = std::function<PsnrResult(std::optional<std::uint64_t> below)>;
+
+/// Makes the short fits of a search before `below` is known.
+/// \return the rest, which may be called once while the job exists
+[[nodiscard]] RestOfSearch startPsnrSearch(const Job& job, double psnr);
 
 }  // namespace esvr::convert

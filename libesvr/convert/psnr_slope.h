@@ -31,7 +31,7 @@ inline constexpr double kMaxDbPerDoubling = kDbPerDoubling * 3.0;
 }
 
 /// The number of ellipsoids that reaches a PSNR if it grows from a fit's with this slope.
-[[nodiscard]] inline double neededCount(const CountPoint& from, double psnr, double slope) {
+[[nodiscard]] inline double countFor(const CountPoint& from, double psnr, double slope) {
   return from.count * std::exp2((psnr - from.psnr) / slope);
 }
 

@@ -76,11 +76,7 @@ Plateau plateauOf(const SparseVolume& volume) {
 template <class Make>
 auto timed(const Make& make) {
   double seconds = 0.0;
-  const auto run = [&] {
-    const AddSeconds clock(seconds);
-    return make();
-  };
-  auto made = run();
+  auto made = addSeconds(seconds, make);
   made.seconds = seconds;
   return made;
 }
@@ -143,11 +139,7 @@ class VoxelSearch {
     PlateauTrial trial{.without = fullest(bytes, false), .seconds = plateau_.seconds};
     if (trial.without) trial.without->plateau.seconds = trial.seconds;
     if (!isPlateau()) return std::move(trial.without);
-    const auto fill = [&] {
-      const AddSeconds clock(trial.seconds);
-      trial.with = fullest(bytes, true);
-    };
-    fill();
+    trial.with = addSeconds(trial.seconds, [&] { return fullest(bytes, true); });
     return std::move(trial).decide(isCloser);
   }
 
@@ -209,8 +201,8 @@ class VoxelSearch {
     tbb::parallel_invoke(
         [&] { thrifty = candidateOf(coarsestFor(psnr, octave, kPrice, kMaxThriftyTrials)); },
         [&] {
-          const AddSeconds clock(trial.seconds);
-          if (isPlateau()) trial.with = withPlateau(psnr, bound);
+          if (!isPlateau()) return;
+          trial.with = addSeconds(trial.seconds, [&] { return withPlateau(psnr, bound); });
         });
     if (thrifty && isSmaller(*thrifty, best)) best = std::move(*thrifty);
     if (!isPlateau()) return best;
@@ -294,13 +286,11 @@ VoxelCandidate voxelsForPsnr(const Job& job, const PsnrTarget& target) {
 
 std::optional<VoxelCandidate> voxelsForSize(const Job& job, std::uint64_t bytes) {
   double seconds = 0.0;
-  const auto search = [&]() -> std::optional<VoxelCandidate> {
-    const AddSeconds clock(seconds);
+  auto found = addSeconds(seconds, [&]() -> std::optional<VoxelCandidate> {
     auto exact = exactVoxels(job);
     if (exact.bytes <= bytes) return exact;
     return VoxelSearch(job).forSize(bytes);
-  };
-  auto found = search();
+  });
   if (found) found->seconds = seconds;
   return found;
 }

@@ -19,4 +19,19 @@ class AddSeconds {
   Clock::time_point start_ = Clock::now();
 };
 
+/// The result of `work`, whose seconds are added to a sum. The sum must not be a part of the result.
+template <class Work>
+decltype(auto) addSeconds(double& sum, const Work& work) {
+  const AddSeconds clock(sum);
+  return work();
+}
+
+/// The seconds that `work` takes.
+template <class Work>
+[[nodiscard]] double secondsOf(const Work& work) {
+  double seconds = 0.0;
+  addSeconds(seconds, work);
+  return seconds;
+}
+
 }  // namespace esvr

@@ -5,6 +5,8 @@ namespace esvr {
 
 bool builtWithCuda() noexcept { return false; }
 
+void startDevice(const Device&) noexcept {}
+
 CudaProbe probeCuda() {
   return {.versions = "no CUDA", .devices = {}, .whyNoDevices = "this build has no CUDA"};
 }

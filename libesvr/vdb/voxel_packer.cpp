@@ -47,17 +47,6 @@ void checkPacking(const VoxelPacking& packing, const GridDescriptor& descriptor)
     throw UsageError("NanoVDB holds affine transforms only, not a " + descriptor.transform.mapType);
 }
 
-/// Runs body() and returns the seconds that it takes.
-template <class Body>
-double timed(const Body& body) {
-  double seconds = 0.0;
-  {
-    const AddSeconds clock(seconds);
-    body();
-  }
-  return seconds;
-}
-
 constexpr float kLargestHalf = 65504.0f;
 
 bool fitsHalf(const SparseVolume& volume) {
@@ -124,7 +113,7 @@ double VoxelPacker::write(const std::filesystem::path& path, const VoxelPacking&
   if (packing.form == PackedForm::kOpenVdbHalf && !source_->fitsHalf)
     throw UsageError("has values beyond 65504, the largest that half precision holds");
   return vdb::whileWriting(path, [&] {
-    return timed([&] {
+    return secondsOf([&] {
       std::ofstream stream(path, std::ios::binary);
       stream.exceptions(std::ios::badbit | std::ios::failbit);
       if (isNanoVdb(packing.form))
@@ -139,7 +128,7 @@ double VoxelPacker::write(const std::filesystem::path& path, const VoxelPacking&
 double secondsToRead(const std::filesystem::path& path, PackedForm form) {
   vdb::initializeOpenVdb();
   return vdb::whileReading(path, [&] {
-    return timed([&] {
+    return secondsOf([&] {
       if (isNanoVdb(form)) {
         (void)nanovdb::io::readGrid(path.string());
         return;

@@ -30,9 +30,11 @@ TARGETS = [("aneurism", "--size", "13141"), ("aneurism", "--size", "50KB"),
            ("neuron_m207", "--size", "40KB"), ("neuron_m207", "--size", "200KB"),
            ("dragon_with_xform", "--psnr", "48.3"), ("cube_levelset", "--psnr", "50")]
 LOSSLESS = ["aneurism", "smoke1", "wdas_cloud_sixteenth", "hydrogen_atom", "neuron_m207"]
-BOUNDS = [("smoke1", "0.5%"), ("smoke1", "1%"), ("smoke1", "2%"), ("smoke1", "5%"),
-          ("hydrogen_atom", "1%"), ("hydrogen_atom", "5%"), ("wdas_cloud_sixteenth", "2%"),
-          ("aneurism", "1%")]
+BOUNDS = [("smoke1", "0.1%"), ("smoke1", "1%"), ("smoke1", "2%"), ("hydrogen_atom", "5%"),
+          ("hydrogen_atom", "10%"), ("dragon_with_xform", "1%"), ("dragon_with_xform", "2%"),
+          ("wdas_cloud_sixteenth", "2%"), ("wdas_cloud_sixteenth", "10%"), ("aneurism", "1%"),
+          ("aneurism", "10%"), ("neuron_rp140212", "2%"), ("neuron_rp140212", "5%"),
+          ("neuron_m207", "5%")]
 # The forms of voxels whose decoding is timed, and the volume that esvr-sample makes for it.
 DECODED = [("lossless", ["--lossless"]), ("1 %", ["--max-error", "1%"])]
 LARGE = ("plume", "800")
@@ -71,11 +73,20 @@ def layers(arguments):
                   f"{layer['psnr_box']:.2f} |", flush=True)
 
 
+def about_if_estimated(found):
+    return "about " if found["estimated"] else ""
+
+
+def candidate_bytes(found):
+    """The bytes of a representation that was considered."""
+    return f"{about_if_estimated(found)}{found['bytes']:,}" if found else "-"
+
+
 def candidate(found):
     """The bytes and the PSNR of a representation that was considered for a goal."""
     if not found:
         return "- | -"
-    about = "about " if found["estimated"] else ""
+    about = about_if_estimated(found)
     psnr = "exact" if found["psnr_box"] is None else f"{found['psnr_box']:.2f}"
     return f"{about}{found['bytes']:,} | {about}{psnr}"
 
@@ -104,7 +115,7 @@ def bounds(arguments):
     for name, bound in BOUNDS:
         report = fitted(arguments, name, "--max-error", bound, representation="auto")
         found = report["grids"][0]["representation"]
-        tried = f"{found['ellipsoids']['bytes']:,}" if found["ellipsoids"] else "-"
+        tried = candidate_bytes(found["ellipsoids"])
         print(f"| {name} | {bound} | {found['voxels']['bytes']:,} | {tried} | {found['stored']} | "
               f"{report['process']['seconds']:.0f} |", flush=True)
 

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "cli/converters.h"
 #include "cli/vdb_inputs.h"
@@ -17,6 +18,9 @@ class Vdb2Esvr : public testing::Test {
   void SetUp() override { writeInput(in(), {{.voxels = softBall({})}}); }
   [[nodiscard]] std::string in() const { return folder_ / "in.vdb"; }
   [[nodiscard]] std::string out() const { return folder_ / "out.esvr"; }
+  [[nodiscard]] ProgramRun fitQuickly(const std::vector<std::string>& more = {}) const {
+    return quickFit(in(), out(), more);
+  }
   [[nodiscard]] bool outIsThere() const { return std::filesystem::exists(out()); }
 
   TemporaryFolder folder_;

@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_F(Vdb2Esvr, listsTheGridsWhereTheOneAskedForIsNotThere) {
   test::writeInput(in(), {{.name = "a", .voxels = softBall({})}, {.name = "b"}});
-  const auto run = quickFit(in(), out(), {"-g", "c"});
+  const auto run = fitQuickly({"-g", "c"});
   EXPECT_EQ(run.exitCode, 3);
   EXPECT_THAT(run.err, AllOf(HasSubstr("no grid \"c\""), HasSubstr("\"a\""), HasSubstr("\"b\"")));
   EXPECT_FALSE(outIsThere());
@@ -88,7 +88,7 @@ TEST_F(Vdb2Esvr, listsTheGridsWhereTheOneAskedForIsNotThere) {
 
 TEST_F(Vdb2Esvr, listsGridsOfOtherTypesAsSkippedAndGoesOn) {
   test::writeMixedInput(in(), {{.voxels = softBall({})}});
-  const auto run = quickFit(in(), out());
+  const auto run = fitQuickly();
   EXPECT_EQ(run.exitCode, 0);
   for (const char* type : {"bool", "int32", "vec3s", "ptdataidx32"})
     EXPECT_THAT(run.err, HasSubstr(type));
@@ -97,7 +97,7 @@ TEST_F(Vdb2Esvr, listsGridsOfOtherTypesAsSkippedAndGoesOn) {
 
 TEST_F(Vdb2Esvr, refusesAGridOfAnotherTypeThatIsAskedFor) {
   test::writeMixedInput(in(), {{.voxels = softBall({})}});
-  const auto run = quickFit(in(), out(), {"-g", "vec3s"});
+  const auto run = fitQuickly({"-g", "vec3s"});
   EXPECT_EQ(run.exitCode, 3);
   EXPECT_THAT(run.err, HasSubstr("vec3s"));
   EXPECT_FALSE(outIsThere());
@@ -105,7 +105,7 @@ TEST_F(Vdb2Esvr, refusesAGridOfAnotherTypeThatIsAskedFor) {
 
 TEST_F(Vdb2Esvr, takesNonFiniteVoxelsAsZeroWhereAskedAndSaysHowMany) {
   test::writeInput(in(), {withNonFinite()});
-  const auto run = quickFit(in(), out(), {"--nonfinite", "zero"});
+  const auto run = fitQuickly({"--nonfinite", "zero"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.err, HasSubstr("2 NaN or infinite voxels were replaced by 0"));
   EXPECT_TRUE(outIsThere());
@@ -115,7 +115,7 @@ TEST_F(Vdb2Esvr, fitsTheGridsThatAreNamedOnly) {
   test::writeInput(in(), {{.voxels = softBall({})},
                           {.voxels = softBall({30, 0, 0})},
                           {.name = "heat", .voxels = softBall({})}});
-  ASSERT_EQ(quickFit(in(), out(), {"-g", "heat", "-g", "density[1]"}).exitCode, 0);
+  ASSERT_EQ(fitQuickly({"-g", "heat", "-g", "density[1]"}).exitCode, 0);
   const EsvrFile file = readEsvr(out());
   ASSERT_EQ(file.grids.size(), 2u);
   EXPECT_EQ(file.grids[0].activeBox.min.x, 26);
@@ -123,7 +123,7 @@ TEST_F(Vdb2Esvr, fitsTheGridsThatAreNamedOnly) {
 }
 
 TEST_F(Vdb2Esvr, refusesWhatTakesMoreMemoryThanAllowed) {
-  const auto run = quickFit(in(), out(), {"--max-memory", "1KB"});
+  const auto run = fitQuickly({"--max-memory", "1KB"});
   EXPECT_EQ(run.exitCode, 5);
   EXPECT_THAT(run.err, HasSubstr("density"));
   EXPECT_FALSE(outIsThere());

@@ -22,11 +22,11 @@ using testing::IsEmpty;
 
 TEST_F(Vdb2Esvr, keepsAnExistingFileUnlessForced) {
   test::writeText(out(), "precious");
-  const auto refused = quickFit(in(), out());
+  const auto refused = fitQuickly();
   EXPECT_EQ(refused.exitCode, 1);
   EXPECT_THAT(refused.err, HasSubstr("--force"));
   EXPECT_EQ(test::readText(out()), "precious");
-  EXPECT_EQ(quickFit(in(), out(), {"--force"}).exitCode, 0);
+  EXPECT_EQ(fitQuickly({"--force"}).exitCode, 0);
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
 }
 
@@ -46,7 +46,7 @@ TEST_F(Vdb2Esvr, refusesOutputsThatCannotBeWrittenBeforeAnyWork) {
 
 TEST_F(Vdb2Esvr, refusesToWriteOverItsInput) {
   std::filesystem::create_hard_link(in(), out());
-  const auto run = quickFit(in(), out(), {"--force"});
+  const auto run = fitQuickly({"--force"});
   EXPECT_EQ(run.exitCode, 2);
   EXPECT_THAT(run.err, HasSubstr("one file"));
 }

@@ -16,14 +16,13 @@ namespace esvr {
 namespace {
 
 using Json = nlohmann::json;
-using test::quickFit;
 using test::softBall;
 using test::Vdb2Esvr;
 using test::vdb2esvr;
 using testing::HasSubstr;
 
 TEST_F(Vdb2Esvr, reportsWhatTheFileHolds) {
-  const auto run = quickFit(in(), out(), {"--report", "-"});
+  const auto run = fitQuickly({"--report", "-"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const Json report = Json::parse(run.out);
   EXPECT_TRUE(report["error"].is_null());
@@ -63,7 +62,7 @@ TEST_F(Vdb2Esvr, dividesByTheGridsThatWereConverted) {
   test::writeInput(in(), {{.name = "density", .voxels = softBall({})},
                           {.name = "heat", .voxels = softBall({40, 0, 0})}});
   const std::string path = folder_ / "r.json";
-  const auto run = quickFit(in(), out(), {"-g", "heat", "--report", path});
+  const auto run = fitQuickly({"-g", "heat", "--report", path});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("1 of 2 grids"));
   const Json report = Json::parse(test::readText(path));
@@ -87,13 +86,13 @@ TEST_F(Vdb2Esvr, reportsAFailureToo) {
 TEST_F(Vdb2Esvr, reportsNullForAPsnrWithoutError) {
   test::writeInput(in(), {{.voxels = softBall({}, 0.0f)}});
   const std::string report = folder_ / "r.json";
-  ASSERT_EQ(quickFit(in(), out(), {"--report", report}).exitCode, 0);
+  ASSERT_EQ(fitQuickly({"--report", report}).exitCode, 0);
   const Json json = Json::parse(test::readText(report));
   EXPECT_TRUE(json["grids"][0]["metrics"]["psnr_box"].is_null());
 }
 
 TEST_F(Vdb2Esvr, reportsTheErrorOfTheVoxelsThatComeBack) {
-  const auto run = quickFit(in(), out(), {"--report", "-"});
+  const auto run = fitQuickly({"--report", "-"});
   const Json metrics = Json::parse(run.out)["grids"][0]["metrics"];
   const std::string back = folder_ / "back.vdb";
   ASSERT_EQ(test::esvr2vdb({out(), back}).exitCode, 0);

@@ -26,14 +26,23 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 TEST_F(Vdb2Esvr, printsATableAndWritesTheFile) {
-  const auto run = quickFit(in(), out());
+  const auto run = fitQuickly();
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.out, AllOf(HasSubstr("PSNR box"), HasSubstr("density"), HasSubstr("bytes, 1 :")));
   EXPECT_THAT(run.err, IsEmpty());
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
   EXPECT_THAT(folder_.names(), ElementsAre("in.vdb", "out.esvr"));
+}
+
+TEST_F(Vdb2Esvr, saysWhereExactVoxelsWouldTakeFewerBytes) {
+  EXPECT_THAT(fitQuickly().out, Not(HasSubstr("exact voxels")));
+  test::writeInput(in(), {{.voxels = test::cloud(8)}});
+  const auto many = vdb2esvr(
+      {in(), out(), "--force", "--iterations", "5", "--count", "5000", "--storage", "float32"});
+  EXPECT_THAT(many.out, HasSubstr("exact voxels would take fewer bytes, about "));
 }
 
 TEST_F(Vdb2Esvr, listsTheKeysOfThePapersMethod) {
@@ -43,7 +52,7 @@ TEST_F(Vdb2Esvr, listsTheKeysOfThePapersMethod) {
 }
 
 TEST_F(Vdb2Esvr, endsWithCodeFourWhereThePsnrIsMissedAndWritesTheFile) {
-  const auto run = quickFit(in(), out(), {"--psnr", "200"});
+  const auto run = fitQuickly({"--psnr", "200"});
   EXPECT_EQ(run.exitCode, 4);
   EXPECT_THAT(run.err, AllOf(HasSubstr("instead of 200.00 dB"), HasSubstr("was written")));
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
@@ -77,7 +86,7 @@ TEST_F(Vdb2Esvr, keepsEveryVoxelWithinTheBound) {
 }
 
 TEST_F(Vdb2Esvr, storesTheMaskWhereAsked) {
-  ASSERT_EQ(quickFit(in(), out(), {"--topology", "exact"}).exitCode, 0);
+  ASSERT_EQ(fitQuickly({"--topology", "exact"}).exitCode, 0);
   const SparseVolume source = readGrid(in(), "density").volume;
   const StoredGrid grid = readEsvr(out()).grids[0];
   EXPECT_GT(grid.field.ellipsoidCount(), 0u);
@@ -88,7 +97,7 @@ TEST_F(Vdb2Esvr, storesTheMaskWhereAsked) {
 
 TEST_F(Vdb2Esvr, givesTheSameBytesInEveryRunOnAnyNumberOfThreads) {
   const std::string other = folder_ / "other.esvr";
-  ASSERT_EQ(quickFit(in(), out(), {"--threads", "1"}).exitCode, 0);
+  ASSERT_EQ(fitQuickly({"--threads", "1"}).exitCode, 0);
   for (const char* threads : {"1", "3"}) {
     ASSERT_EQ(quickFit(in(), other, {"--threads", threads, "--force"}).exitCode, 0);
     EXPECT_EQ(test::readText(other), test::readText(out())) << threads << " threads";

@@ -145,6 +145,8 @@ TEST(ConvertWithin, TakesVoxelsOfNoise) {
   EXPECT_TRUE(residual.tried);
   EXPECT_FALSE(residual.used);
   EXPECT_EQ(residual.bytesWithout, bytesAdded(conversion.grid));
+  EXPECT_TRUE(conversion.choice->ellipsoids->estimated) << "a sample shows that voxels are right";
+  EXPECT_FALSE(residual.bytesWith);
   EXPECT_LE(largestDifference(volume, decodeGrid(conversion.grid)), bound);
 }
 

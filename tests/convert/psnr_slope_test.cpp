@@ -25,8 +25,8 @@ TEST(PsnrSlope, IsLimited) {
 }
 
 TEST(PsnrSlope, GivesTheNumberThatReachesAPsnr) {
-  EXPECT_DOUBLE_EQ(neededCount({1000, 40}, 46, 6.0), 2000.0);
-  EXPECT_DOUBLE_EQ(neededCount({1000, 40}, 34, 6.0), 500.0);
+  EXPECT_DOUBLE_EQ(countFor({1000, 40}, 46, 6.0), 2000.0);
+  EXPECT_DOUBLE_EQ(countFor({1000, 40}, 34, 6.0), 500.0);
 }
 
 }  // namespace

@@ -30,11 +30,15 @@ class OptimiserOn : public test::OnDevice {
     return makeOptimiser(target_, options_, tuning);
   }
   [[nodiscard]] Field fitAt(Coord shift) const {
+    return fit(test::tubeVolume(shift), fitOptions(60, 120)).field;
+  }
+
+  [[nodiscard]] FitOptions fitOptions(std::size_t count, std::uint32_t iterations) const {
     FitOptions options;
-    options.count = 60;
-    options.iterations = 120;
+    options.count = count;
+    options.iterations = iterations;
     options.device = options_.device;
-    return fit(test::tubeVolume(shift), options).field;
+    return options;
   }
 
   /// PSNR of a fit's last state over the box, dB.
@@ -83,10 +87,7 @@ TEST_P(OptimiserOn, LargeStepsSeeTheWholeOfEveryEllipsoid) {
 // The tube has soft walls of one voxel. A fit for voxels follows them with small ellipsoids, whose
 // sum between voxels is far from the interpolated voxels.
 TEST_P(OptimiserOn, AFitForDrawingIsCloserBetweenVoxels) {
-  FitOptions options;
-  options.count = 300;
-  options.iterations = 200;
-  options.device = options_.device;
+  FitOptions options = fitOptions(300, 200);
   const FitResult forVoxels = fit(volume_, options);
   options.fitFor = FitFor::kDrawing;
   const FitResult forDrawing = fit(volume_, options);
@@ -115,10 +116,7 @@ TEST_P(OptimiserOn, SignsOfIntensitiesAreThoseThatAreAllowed) {
 }
 
 TEST_P(OptimiserOn, AContinuedFitIsBetterThanItsStartAndThanOneFromSeeds) {
-  FitOptions options;
-  options.device = options_.device;
-  options.count = 150;
-  options.iterations = 400;
+  FitOptions options = fitOptions(150, 400);
   const FitResult start = fit(volume_, options);
   options.count = 200;
   options.iterations = 100;
@@ -131,10 +129,7 @@ TEST_P(OptimiserOn, AContinuedFitIsBetterThanItsStartAndThanOneFromSeeds) {
 }
 
 TEST_P(OptimiserOn, AFitDoesNotContinueFromMoreEllipsoidsThanWanted) {
-  FitOptions options;
-  options.count = 20;
-  options.iterations = 60;
-  options.device = options_.device;
+  FitOptions options = fitOptions(20, 60);
   const FitResult first = fit(volume_, options);
   options.start = &first.field;
   options.count = 10;

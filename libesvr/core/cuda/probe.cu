@@ -68,6 +68,13 @@ std::string versions() {
 
 bool builtWithCuda() noexcept { return true; }
 
+void startDevice(const Device& device) noexcept {
+  if (device.kind != DeviceKind::kCuda) return;
+  cudaSetDevice(device.index);
+  cudaFree(nullptr);   // creates the context
+  cudaGetLastError();  // an error of this thread must not remain
+}
+
 CudaProbe probeCuda() {
   CudaProbe probe{.versions = versions(), .devices = {}, .whyNoDevices = {}};
   int count = 0;

@@ -29,6 +29,12 @@ struct ResidualOutput {
 constexpr int kMomentSlots = 16;  // kMoments, rounded up to a power of two
 static_assert(kMomentSlots % kGroup == 0, "each lane ends with some of the moments");
 
+/// 1 / (B + e^(m - s)), with the fast exponential of the device. The kernel that follows from it
+/// differs from kernelPhi by about 1e-6 at most.
+__device__ inline float fastQuotient(const KernelConstants<float>& k, float m) {
+  return __fdividef(1.0f, k.plateau + __expf(m - k.shift));
+}
+
 /// Adds the lane's share of a pair's voxels to the sums.
 template <class Sum>
 __device__ void addPair(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
@@ -36,9 +42,11 @@ __device__ void addPair(const PairForm& p, const KernelConstants<float>& kernel,
   const float height = p.form.intensity * units;
   visitLines(p, corner, kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
     float t = line.t;
-    for (int y = line.yBegin; y < line.yEnd; ++y, t += 1.0f) {
-      const float phi = fastPhi(kernel, squaredAt(p.form, line.closest, t));
-      addUnits(sums[line.offset + y * kBrickSide], height * phi);
+    Sum* sum = sums + line.offset;
+    for (int n = line.count; n > 0; --n, t += 1.0f, sum += kBrickSide) {
+      const float m = squaredAt(p.form, line.closest, t);
+      if (m < kernel.cutoff)
+        addUnits(*sum, height * (kernel.numerator * fastQuotient(kernel, m) - kernel.base));
     }
   });
 }
@@ -95,14 +103,15 @@ __device__ void sumBrick(const PassScene& scene, const Kernels& kernels, const P
 template <class Sum>
 __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
                            const Sum* byValue, float (&s)[kMomentSlots]) {
-  const float slopeBase = kernel.slope * kernel.base - 1.0f;
   visitLines(p, corner, kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
     float w0 = 0.0f, w1 = 0.0f, t = line.t;
-    for (int y = line.yBegin; y < line.yEnd; ++y, t += 1.0f) {
-      const float phi = fastPhi(kernel, squaredAt(p.form, line.closest, t));
-      const float g = valueIn(byValue[line.offset + y * kBrickSide]);
-      const float gq = phi > 0.0f ? g * (phi + kernel.base) : 0.0f;
-      const float w = gq * (phi * kernel.slope + slopeBase);  // g phi'
+    const Sum* derivative = byValue + line.offset;
+    for (int n = line.count; n > 0; --n, t += 1.0f, derivative += kBrickSide) {
+      const float m = squaredAt(p.form, line.closest, t);
+      if (!(m < kernel.cutoff)) continue;
+      const float q = kernel.numerator * fastQuotient(kernel, m), phi = q - kernel.base;
+      const float g = valueIn(*derivative), gq = g * q;
+      const float w = gq * (q * kernel.slope - 1.0f);  // g phi'
       const float wt = w * t;
       w0 += w;
       w1 += wt;

@@ -19,8 +19,8 @@ __device__ void visitVoxels(const IntensityPassArguments& a, std::uint32_t ellip
   const PairForm p = a.scene.forms[ellipsoid];
   visitLines(p, corner, a.kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
     float t = line.t;
-    for (int y = line.yBegin; y < line.yEnd; ++y, t += 1.0f)
-      visit(line.offset + y * kBrickSide, kernelPhi(a.kernel, squaredAt(p.form, line.closest, t)));
+    for (int n = line.count, at = line.offset; n > 0; --n, at += kBrickSide, t += 1.0f)
+      visit(at, kernelPhi(a.kernel, squaredAt(p.form, line.closest, t)));
   });
 }
 

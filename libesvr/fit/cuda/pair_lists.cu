@@ -94,11 +94,23 @@ __global__ void gatherOwners(const std::uint32_t* pair, const std::uint32_t* own
   if (k < entries) ellipsoid[k] = owner[pair[k]];
 }
 
-__global__ void countBrickPairs(const std::uint32_t* begin, std::uint32_t bricks,
-                                std::uint32_t* pairs, std::uint32_t* brick) {
+constexpr int kRankBits = 8;
+
+/// The rank of a brick with n pairs, below 2^kRankBits. Numbers within an eighth of a power of two
+/// share a rank.
+__device__ std::uint32_t pairsRank(std::uint32_t n) {
+  constexpr int kEighths = 3;
+  if (n == 0) return 0;
+  const int exponent = 31 - __clz(int(n));  // the highest bit that is set
+  const std::uint64_t eighths = (std::uint64_t{n} << kEighths) >> exponent;  // 8 to 15
+  return std::uint32_t(exponent) << kEighths | std::uint32_t(eighths & 7u);
+}
+
+__global__ void rankBricks(const std::uint32_t* begin, std::uint32_t bricks, std::uint32_t* rank,
+                           std::uint32_t* brick) {
   const std::size_t b = threadNumber();
   if (b >= bricks) return;
-  pairs[b] = begin[b + 1] - begin[b];
+  rank[b] = pairsRank(begin[b + 1] - begin[b]);
   brick[b] = std::uint32_t(b);
 }
 
@@ -118,8 +130,8 @@ PairLists::PairLists(cudaStream_t stream)
       owner_(stream),
       ellipsoid_(stream),
       brickBegin_(stream),
-      brickPairs_(stream),
-      brickPairsSorted_(stream),
+      brickRank_(stream),
+      brickRankSorted_(stream),
       bricks_(stream),
       brickOrder_(stream),
       total_(stream),
@@ -197,20 +209,21 @@ void PairLists::sortByBrick(std::size_t bricks) {
   check(cudaGetLastError(), "listing the ellipsoids of bricks");
 }
 
-/// Orders the bricks by their number of pairs, the largest first. Blocks start in this order, so
-/// that no long brick begins when all others are done.
+/// Orders the bricks by the rank of their number of pairs, the largest first. Blocks start in this
+/// order, so that no long brick begins when all others are done. Bricks of one rank keep their
+/// order in space, so that blocks that run at the same time read the same ellipsoids.
 void PairLists::orderBricks(std::size_t bricks) {
   if (bricks == 0) return;
-  std::uint32_t* const pairs = brickPairs_.reserve(bricks);
-  std::uint32_t* const sorted = brickPairsSorted_.reserve(bricks);
+  std::uint32_t* const rank = brickRank_.reserve(bricks);
+  std::uint32_t* const sorted = brickRankSorted_.reserve(bricks);
   std::uint32_t* const brick = bricks_.reserve(bricks);
   std::uint32_t* const order = brickOrder_.reserve(bricks);
-  countBrickPairs<<<blocksFor(bricks, kBlock), kBlock, 0, stream_>>>(
-      brickBegin_.data(), std::uint32_t(bricks), pairs, brick);
-  check(cudaGetLastError(), "counting the pairs of bricks");
+  rankBricks<<<blocksFor(bricks, kBlock), kBlock, 0, stream_>>>(brickBegin_.data(),
+                                                                std::uint32_t(bricks), rank, brick);
+  check(cudaGetLastError(), "ranking bricks");
   withTemporary(temporary_, "ordering bricks", [&](void* memory, std::size_t& bytes) {
-    return cub::DeviceRadixSort::SortPairsDescending(memory, bytes, pairs, sorted, brick, order,
-                                                     bricks, 0, 32, stream_);
+    return cub::DeviceRadixSort::SortPairsDescending(memory, bytes, rank, sorted, brick, order,
+                                                     bricks, 0, kRankBits, stream_);
   });
 }
 

@@ -14,7 +14,9 @@ namespace esvr::cuda {
 struct PairListsView {
   static constexpr std::uint32_t kChunk = 256;  ///< pairs in a chunk
 
-  const std::uint32_t* brickOrder;      ///< bricks in decreasing order of their number of pairs
+  /// Bricks in roughly decreasing order of their number of pairs. Those with a power of two or more
+  /// come before those with fewer.
+  const std::uint32_t* brickOrder;
   const std::uint32_t* brickBegin;      ///< by brick: its entries are [b] to [b + 1] - 1
   const std::uint32_t* ellipsoid;       ///< by entry: its ellipsoid; in a brick by decreasing lines
   const std::uint32_t* pair;            ///< by entry: number of its pair
@@ -45,7 +47,7 @@ class PairLists {
   std::size_t pairCount_ = 0, chunkCount_ = 0;
   GrowingBuffer<std::uint32_t> counts_, chunkCounts_, ellipsoidBegin_, chunkBegin_, chunkOwner_;
   GrowingBuffer<std::uint32_t> key_, keySorted_, pair_, pairSorted_, owner_, ellipsoid_;
-  GrowingBuffer<std::uint32_t> brickBegin_, brickPairs_, brickPairsSorted_, bricks_, brickOrder_;
+  GrowingBuffer<std::uint32_t> brickBegin_, brickRank_, brickRankSorted_, bricks_, brickOrder_;
   GrowingBuffer<std::uint64_t> total_;
   GrowingBuffer<char> temporary_;
 };

@@ -2,6 +2,7 @@
 /// The data that every pass over the bricks reads: bricks, ellipsoids and pair lists.
 
 #include <algorithm>
+#include <bit>
 
 #include "fit/cuda/pair_form.h"
 #include "fit/cuda/pair_lists.h"
@@ -33,11 +34,12 @@ struct PassScene {
 /// units of 2^-22.
 inline constexpr std::uint32_t kMaxNarrowEntries = 4096;
 
-/// \return an upper bound for the number of bricks with longer lists, which come first in
-///         PairListsView::brickOrder
+/// \return an upper bound for the number of bricks with lists of kMaxNarrowEntries or more, which
+///         come first in PairListsView::brickOrder; 0 if no list can be longer
 [[nodiscard]] inline std::uint32_t maxWideBricks(const PassScene& scene) {
+  static_assert(std::has_single_bit(kMaxNarrowEntries), "as PairListsView::brickOrder says");
   if (scene.ellipsoidCount <= kMaxNarrowEntries) return 0;
-  return std::min(scene.brickCount, scene.pairCount / (kMaxNarrowEntries + 1));
+  return std::min(scene.brickCount, scene.pairCount / kMaxNarrowEntries);
 }
 
 }  // namespace esvr::cuda

@@ -62,8 +62,9 @@ using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, BoundGoal, Lo
 enum class Representation {
   /// Ellipsoids or voxels: those with the higher PSNR for a SizeGoal, and those that take fewer
   /// bytes for a PsnrGoal or a BoundGoal. A FitGoal stores ellipsoids unless exact voxels take no
-  /// more bytes. For goals other than a BoundGoal, voxels are not tried if the bricks of the volume
-  /// have more than 2^25 voxels, because encoding them takes long.
+  /// more bytes. If the bricks of the volume have more than 2^25 voxels, goals other than a
+  /// BoundGoal store either exact voxels or ellipsoids. Coding voxels takes long then, so that it
+  /// is done only if an estimate from a sample says that they may be small enough.
   kAuto,
   /// Ellipsoids. For a BoundGoal they have a residual, which a narrow band cannot have.
   kEllipsoids,
@@ -119,7 +120,7 @@ struct Candidate {
   std::uint64_t bytes = 0;  ///< bytesAdded
   /// PSNR over the box, dB; +inf for exact voxels. Nothing for a BoundGoal.
   std::optional<double> psnr{};
-  bool estimated = false;  ///< the figures were extrapolated from a short fit
+  bool estimated = false;  ///< the figures were extrapolated from a short fit or from a sample
   /// Wall-clock seconds that all trials for this candidate took; nothing if none was made.
   std::optional<double> seconds{};
 };
@@ -157,6 +158,9 @@ struct Conversion {
   std::optional<CompactRecord> compact;  ///< set if ellipsoids are stored as kCompact
   std::optional<ChoiceRecord> choice;    ///< set if voxels were considered for the goal
   DecisionRecord decisions;
+  /// Bytes of exact voxels, estimated from a sample, if they are fewer than those of the ellipsoids
+  /// on which the representation or the storage insisted.
+  std::optional<std::uint64_t> smallerExactBytes;
 };
 
 /// Converts a volume. The result is as deterministic as that of fit(). If a PSNR is out of reach,

@@ -21,6 +21,10 @@ struct Device {
 /// \throws DeviceError  the CUDA device cannot be used (the text says why)
 [[nodiscard]] Device selectDevice(const std::string& text);
 
+/// Starts a device, which takes some tenths of a second for a GPU, so that its first use need not
+/// wait. It may be called on another thread. It reports no error, because the first use does.
+void startDevice(const Device& device) noexcept;
+
 /// The name of a device: "CPU", or the GPU's name and number, "NVIDIA H200 (cuda:0)".
 [[nodiscard]] std::string deviceName(const Device& device);
 

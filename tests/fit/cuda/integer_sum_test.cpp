@@ -50,9 +50,9 @@ TEST(WideBricks, AreAtMostAsManyAsThePairsAllow) {
   cuda::PassScene scene{};
   scene.brickCount = 100;
   scene.ellipsoidCount = 1'000'000;
-  scene.pairCount = cuda::kMaxNarrowEntries;
+  scene.pairCount = cuda::kMaxNarrowEntries - 1;
   EXPECT_EQ(cuda::maxWideBricks(scene), 0u);
-  scene.pairCount = 3 * (cuda::kMaxNarrowEntries + 1) + 5;
+  scene.pairCount = 3 * cuda::kMaxNarrowEntries + 5;
   EXPECT_EQ(cuda::maxWideBricks(scene), 3u);
   scene.pairCount = 4'000'000'000u;
   EXPECT_EQ(cuda::maxWideBricks(scene), 100u);

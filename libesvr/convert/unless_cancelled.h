@@ -1,0 +1,16 @@
+#pragma once
+/// Ends a search with its result so far where a fit is cancelled.
+
+#include "esvr/error.h"
+
+namespace esvr::convert {
+
+/// The result of `work`; an empty one if a fit in it was cancelled before it had an ellipsoid.
+template <class Work>
+[[nodiscard]] auto unlessCancelled(const Work& work) -> decltype(work()) try {
+  return work();
+} catch (const Cancelled&) {
+  return {};
+}
+
+}  // namespace esvr::convert
