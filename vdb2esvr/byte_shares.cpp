@@ -24,8 +24,8 @@ StoredGrid withDescriptor(StoredGrid grid, const GridDescriptor& descriptor) {
   return grid;
 }
 
-/// The bytes that a twin usually adds: its record, and rows for the ellipsoids of one chunk, for the
-/// bricks or the mask, and for the errors of layers. Voxels have fewer rows.
+/// The bytes that a twin usually adds: its record, and rows for the ellipsoids of one chunk, for
+/// the bricks or the mask, and for the errors of layers. Voxels have fewer rows.
 std::uint64_t usualBytes(const GridDescriptor& twin) {
   constexpr std::uint64_t kRows = 3;
   StoredGrid grid;

@@ -92,8 +92,8 @@ Conversion smallerOf(const Job& job, const PsnrTarget& target, PsnrCandidates ca
   return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
 }
 
-/// The smaller of exact voxels and ellipsoids that reach the PSNR. If ellipsoids were cancelled, they
-/// are taken, because coding the voxels of a large volume takes long.
+/// The smaller of exact voxels and ellipsoids that reach the PSNR. If ellipsoids were cancelled,
+/// they are taken, because coding the voxels of a large volume takes long.
 Conversion smallerOfExactAnd(const Job& job, double psnr) {
   ExactVoxels exact(job);
   double seconds = 0.0;

@@ -17,8 +17,8 @@ struct CountPoint {
 /// the noise of fits, a few tenths of a dB.
 inline constexpr double kMinSlopeRatio = 1.15;
 
-/// Limits of a slope, so that noise does not lead a search astray. Short fits gained 4.8 dB (smoke1),
-/// 5.1 dB (dragon) and 6.7 dB (aneurism).
+/// Limits of a slope, so that noise does not lead a search astray. Short fits gained 4.8 dB
+/// (smoke1), 5.1 dB (dragon) and 6.7 dB (aneurism).
 inline constexpr double kMinDbPerDoubling = kDbPerDoubling / 2.0;
 inline constexpr double kMaxDbPerDoubling = kDbPerDoubling * 3.0;
 

@@ -19,7 +19,8 @@ class AddSeconds {
   Clock::time_point start_ = Clock::now();
 };
 
-/// The result of `work`, whose seconds are added to a sum. The sum must not be a part of the result.
+/// The result of `work`, whose seconds are added to a sum. The sum must not be a part of the
+/// result.
 template <class Work>
 decltype(auto) addSeconds(double& sum, const Work& work) {
   const AddSeconds clock(sum);

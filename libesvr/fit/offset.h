@@ -63,8 +63,8 @@ struct OffsetPlace {
   return {p != nearest, p & last, nearest};
 }
 
-/// The bricks that an interpolation reads are numbered 4 x + 2 y + z, where x, y and z are 0 for the
-/// brick itself and 1 for the next one along the axis.
+/// The bricks that an interpolation reads are numbered 4 x + 2 y + z, where x, y and z are 0 for
+/// the brick itself and 1 for the next one along the axis.
 inline constexpr int kInterpolatedBricks = 8;
 /// \return brick `n` of those that an interpolation in `brick` reads
 [[nodiscard]] ESVR_HD inline Coord interpolatedBrick(Coord brick, const OffsetAxis* axes, int n) {

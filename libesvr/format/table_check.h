@@ -9,7 +9,8 @@
 namespace esvr::format {
 
 /// Refuses sections that reach beyond the file, sections that overlap but are not stored alike, two
-/// sections with the same id, unknown kinds that are required, unknown codecs, and impossible sizes.
+/// sections with the same id, unknown kinds that are required, unknown codecs, and impossible
+/// sizes.
 /// \throws BadInput
 void checkTable(const std::string& file, const SectionTable& table);
 

@@ -1,5 +1,5 @@
-// Plan: the search for a PSNR continues a fit that has too few ellipsoids, instead of beginning again
-// with seeds. A search that is cancelled during its first fit keeps this fit.
+// Plan: the search for a PSNR continues a fit that has too few ellipsoids, instead of beginning
+// again with seeds. A search that is cancelled during its first fit keeps this fit.
 
 #include "convert/psnr_search.h"
 

@@ -42,8 +42,8 @@ double valueAt(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<d
 }
 
 /// 1/2 sum r^2 in float64 over a box that contains every support. If the target saturates, the loss
-/// of a sum beyond the range grows from that of the range's end in proportion to `slopeBeyond` times
-/// its slope there.
+/// of a sum beyond the range grows from that of the range's end in proportion to `slopeBeyond`
+/// times its slope there.
 double referenceLoss(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<double>& k,
                      const SparseVolume& volume, const FitTarget& target, int margin,
                      double slopeBeyond = 1.0) {

@@ -59,8 +59,8 @@ struct StoredGrid {
   std::vector<QuantisedEllipsoids> quantised;
   std::vector<LayerError> layerErrors;  ///< empty, or layerCount() rows
   /// Correction that is added to the sum, voxel by voxel, before the active voxels are determined.
-  /// Its form is VoxelForm::kQuantised with all voxels active; it is 0 in other bricks. A grid cannot
-  /// have both `residual` and `voxels`.
+  /// Its form is VoxelForm::kQuantised with all voxels active; it is 0 in other bricks. A grid
+  /// cannot have both `residual` and `voxels`.
   std::optional<VoxelLayer> residual;
   /// The voxels themselves, exact or within a bound. If present, decodeGrid() returns them.
   std::optional<VoxelLayer> voxels;
@@ -150,8 +150,8 @@ struct PartOfFile {
 [[nodiscard]] std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata);
 
 /// Encodes a file in memory. The same content gives the same bytes. Sections of the same kind and
-/// content are stored once. The ellipsoids of a chunk are stored in Morton order of their centers; a
-/// reader gets them in that order, bit for bit.
+/// content are stored once. The ellipsoids of a chunk are stored in Morton order of their centers;
+/// a reader gets them in that order, bit for bit.
 /// \throws RuntimeFailure  the content is invalid: a number is not finite, a quaternion has no unit
 ///                         length, or the bricks' corners are not increasing
 [[nodiscard]] std::vector<std::byte> encodeEsvr(const EsvrFile& file);

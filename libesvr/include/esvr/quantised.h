@@ -3,11 +3,11 @@
 ///
 /// Ellipsoids need different precisions, since the effect of an error grows with the ellipsoid's
 /// weight w = |I| sqrt(sum phi^2). Each ellipsoid therefore has a precision e, the octave of its
-/// weight. The number of bits of a parameter follows from e and from the parameters that are decoded
-/// earlier: rotations depend on the ratios of the scales, positions on the scales and the rotation,
-/// intensities on the ellipsoid's volume. The numbers of bits are computed from integers only. The
-/// values are computed with +, -, *, / and sqrt in float64 and rounded once to float32, so they are
-/// bit-identical on every machine (docs/format.md, "The quantisation lattice").
+/// weight. The number of bits of a parameter follows from e and from the parameters that are
+/// decoded earlier: rotations depend on the ratios of the scales, positions on the scales and the
+/// rotation, intensities on the ellipsoid's volume. The numbers of bits are computed from integers
+/// only. The values are computed with +, -, *, / and sqrt in float64 and rounded once to float32,
+/// so they are bit-identical on every machine (docs/format.md, "The quantisation lattice").
 
 #include <array>
 #include <cstddef>
