@@ -10,53 +10,66 @@
 
 namespace esvr::codec {
 
+/// All bits set if a condition holds, none otherwise.
+inline std::uint32_t allBits(bool condition) { return 0u - std::uint32_t(condition); }
+
 /// Learns the probability of a zero. Decision number n, counted from 0, moves it towards 0 or 1 by
 /// 1/(n + 1.5) of the distance. From n = kMemory - 1 on, that share stays the same.
 class BitModel {
  public:
-  static constexpr int kBits = 16;
+  /// Steps end when the probability of an error is below (kMemory + 1)/kOne, because they are
+  /// rounded down. A decision that is always the same then costs 0.000035 bits.
+  static constexpr int kBits = 22;
   static constexpr std::uint32_t kOne = 1u << kBits;
 
   /// The probability of a zero in units of 1/kOne. It is neither 0 nor 1.
-  [[nodiscard]] std::uint32_t zero() const { return zero_; }
+  [[nodiscard]] std::uint32_t zero() const { return state_ >> kCountBits; }
 
-  /// No branch depends on the bit, because processors can hardly foresee it.
-  void learn(bool bit) {
-    const std::uint32_t all = allBits(bit), zero = zero_;
-    const std::uint32_t distance = ((zero - kMinZero) & all) | ((kOne - kMinZero - zero) & ~all);
-    const std::uint32_t step = (distance * kShares[count_]) >> kBits;
-    zero_ = std::uint16_t(zero + ((step ^ all) - all));
-    count_ = std::uint8_t(count_ + (count_ + 1u < kShares.size() ? 1 : 0));
+  /// The part of a range that stands for a zero.
+  [[nodiscard]] std::uint32_t part(std::uint32_t range) const {
+    return std::uint32_t((std::uint64_t(range) * zero()) >> kBits);
   }
 
-  /// All bits set for a one, none for a zero.
-  static std::uint32_t allBits(bool bit) { return 0u - std::uint32_t(bit); }
+  /// No branch depends on the decision, because processors can hardly foresee it. The distance of
+  /// the probability from 0 is the probability itself. The distance from the largest one, kOne - 1,
+  /// has its bits inverted. It never becomes 0, since a step is rounded down.
+  /// \param isZero  allBits() of whether the decision is a zero
+  void learn(std::uint32_t isZero) {
+    const std::uint32_t count = state_ & kCountMask, inverted = isZero >> kCountBits;
+    const std::uint32_t distance = zero() ^ inverted;
+    const auto step = std::uint32_t((std::uint64_t(distance) * kShares[count]) >> kShareBits);
+    state_ = ((distance - step) ^ inverted) << kCountBits | (count + (count < kMemory - 1 ? 1 : 0));
+  }
 
  private:
-  static constexpr std::uint32_t kMinZero = 32;
-  static constexpr std::size_t kMemory = 160;  ///< decisions until the share stays the same
+  static constexpr int kCountBits = 32 - kBits, kShareBits = 16;
+  static constexpr std::uint32_t kCountMask = (1u << kCountBits) - 1;
+  /// Decisions until the share stays the same. A smaller number is better for regular volumes, a
+  /// larger one for noise (docs/lab-notes.md, "Voxel coding").
+  static constexpr std::uint32_t kMemory = 100;
   static constexpr std::array<std::uint16_t, kMemory> kShares = [] {
     std::array<std::uint16_t, kMemory> shares{};
-    for (std::uint32_t n = 0; n < kMemory; ++n) shares[n] = std::uint16_t(2 * kOne / (2 * n + 3));
+    for (std::uint32_t n = 0; n < kMemory; ++n)
+      shares[n] = std::uint16_t((2u << kShareBits) / (2 * n + 3));
     return shares;
   }();
 
-  // 4 bytes, so that the models of a coder of voxels stay in the cache.
-  std::uint16_t zero_ = kOne / 2;
-  std::uint8_t count_ = 0;
+  /// The probability and, in the lowest bits, the number of decisions so far. 4 bytes, so that the
+  /// models of a coder of voxels stay in the cache.
+  std::uint32_t state_ = 1u << 31;
 };
 
 class RangeEncoder {
  public:
   void bit(BitModel& model, bool value) {
-    const std::uint32_t bound = (range_ >> BitModel::kBits) * model.zero();
+    const std::uint32_t bound = model.part(range_);
     if (value) {
       low_ += bound;
       range_ -= bound;
     } else {
       range_ = bound;
     }
-    model.learn(value);
+    model.learn(allBits(!value));
     normalise();
   }
 
@@ -113,14 +126,13 @@ class RangeDecoder {
   }
 
   [[nodiscard]] bool bit(BitModel& model) {
-    const std::uint32_t bound = (range_ >> BitModel::kBits) * model.zero();
-    const bool value = code_ >= bound;
-    const std::uint32_t all = BitModel::allBits(value);
-    code_ -= bound & all;
-    range_ = ((range_ - bound) & all) | (bound & ~all);
-    model.learn(value);
+    const std::uint32_t bound = model.part(range_), rest = range_ - bound;
+    const std::uint32_t zero = allBits(code_ < bound);
+    code_ -= bound & ~zero;
+    range_ = rest ^ ((rest ^ bound) & zero);
+    model.learn(zero);
     normalise();
-    return value;
+    return zero == 0;
   }
 
   [[nodiscard]] std::uint32_t raw(int bits) {

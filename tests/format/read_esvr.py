@@ -137,8 +137,8 @@ class Decoder:
             self.code = (self.code << 8 | self.next()) & 0xFFFFFFFF
 
     def decision(self, *model):
-        p, n = self.models.get(model, (1 << 15, 0))
-        bound = (self.range >> 16) * p
+        p, n = self.models.get(model, (1 << 21, 0))
+        bound = self.range * p >> 22
         one = self.code >= bound
         if one:
             self.code -= bound
@@ -146,8 +146,8 @@ class Decoder:
         else:
             self.range = bound
         share = (1 << 17) // (2 * n + 3)
-        p += -((p - 32) * share >> 16) if one else (65536 - 32 - p) * share >> 16
-        self.models[model] = p, min(n + 1, 159)
+        p += -(p * share >> 16) if one else ((1 << 22) - 1 - p) * share >> 16
+        self.models[model] = p, min(n + 1, 99)
         self.fill()
         return int(one)
 
