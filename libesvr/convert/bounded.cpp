@@ -18,7 +18,7 @@ namespace esvr::convert {
 namespace {
 
 // docs/benchmarks.md, "Voxels or a residual within an error bound", has the sizes that follow.
-/// The ellipsoids of a grid with a residual get this fraction (1/4) of the voxels' bytes.
+/// The ellipsoids of a grid with a residual get this fraction (1/4) of the bytes of its voxels.
 constexpr std::uint64_t kEllipsoidBytesDivisor = 4;
 /// Largest residualRatio() at which ellipsoids are fitted. The ratio of the whole volume is larger
 /// by up to 0.09 (docs/lab-notes.md, "Deciding on a residual").
@@ -77,13 +77,12 @@ struct Smaller {
   }
 };
 
-/// True if a sample promises that ellipsoids of `bytes` are smaller than the voxels. Otherwise the
-/// estimate of their bytes is recorded.
+/// True if a sample promises that ellipsoids of `bytes` and a residual are smaller than the voxels.
+/// Otherwise the estimate of their bytes is recorded.
 bool isPromising(const Job& job, double bound, std::uint64_t bytes, Smaller& best) {
-  const double own = double(bytes) - double(bytesBesideVoxels(job.input));
   const double voxels = double(best.choice.voxels->bytes);
-  if (own < kMinBytesPerEllipsoid) return false;
-  const double ratio = residualRatio(job, bound, own / voxels);
+  if (double(bytes) < kMinBytesPerEllipsoid) return false;
+  const double ratio = residualRatio(job, bound, double(bytes) / voxels);
   if (ratio <= kPromisingRatio) return true;
   best.choice.ellipsoids = Candidate{std::uint64_t(ratio * voxels), {}, true};
   return false;
@@ -91,10 +90,11 @@ bool isPromising(const Job& job, double bound, std::uint64_t bytes, Smaller& bes
 
 /// Takes ellipsoids if they are smaller than the voxels.
 void tryEllipsoids(const Job& job, double bound, Smaller& best) {
-  const std::uint64_t bytes = best.choice.voxels->bytes / kEllipsoidBytesDivisor;
+  const std::uint64_t beside = bytesBesideVoxels(job.input);
+  const std::uint64_t bytes = (best.choice.voxels->bytes - beside) / kEllipsoidBytesDivisor;
   const auto fitted = [&]() -> std::optional<Conversion> {
     if (!best.insists && !isPromising(job, bound, bytes, best)) return std::nullopt;
-    return withEllipsoids(job, bound, bytes);
+    return withEllipsoids(job, bound, beside + bytes);
   };
   auto found = best.insists ? fitted() : unlessCancelled(fitted);
   if (found) best.take(std::move(*found));
