@@ -6,62 +6,19 @@
 #include <optional>
 #include <type_traits>
 
-#include "codec/voxel_model.h"
+#include "codec/brick_copies.h"
+#include "codec/voxel_mirrors.h"
 #include "codec/voxel_predictor.h"
-#include "core/axes.h"
 #include "esvr/error.h"
 
 namespace esvr::codec {
 namespace {
 
-/// The mirror image of a voxel, if it was coded before the voxel.
-struct Image {
-  std::int32_t code = 0;
-  bool active = false;
-};
-
-/// Finds the image of a voxel, along the first axis on which an image lies before it.
-class Mirrors {
- public:
-  Mirrors(const VoxelModel& model, const VoxelLayer& layer, const BrickIndex& index)
-      : model_(model), layer_(layer), index_(index), any_(hasMirror(model)) {}
-
-  [[nodiscard]] std::optional<Image> imageOf(Coord voxel) {
-    if (!any_) return std::nullopt;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::int32_t place = model_.mirror[a] - voxel.*kAxes[a];
-      if (model_.mirror[a] == VoxelModel::kNoMirror || place >= voxel.*kAxes[a]) continue;
-      voxel.*kAxes[a] = place;
-      return at(voxel);
-    }
-    return std::nullopt;
-  }
-
- private:
-  Image at(Coord voxel) {
-    const Coord brick = brickOf(voxel);
-    if (brick != lastBrick_) {
-      lastBrick_ = brick;
-      last_ = index_.find(brick);
-    }
-    if (last_ == BrickIndex::kNone) return {model_.vacantCode, false};
-    const int v = voxelOffset(localOf(voxel));
-    return {layer_.codes[last_ * std::size_t(kBrickVoxels) + std::size_t(v)],
-            layer_.active[last_].test(v)};
-  }
-
-  const VoxelModel& model_;
-  const VoxelLayer& layer_;
-  const BrickIndex& index_;
-  Coord lastBrick_{Box::kMin, 0, 0};
-  std::uint32_t last_ = BrickIndex::kNone;
-  bool any_;
-};
-
 // Numbers of contexts. The image of a voxel is missing, inactive or active. For vacancy it is
 // missing, or has one of four combinations of activity and code.
 constexpr std::size_t kActivities = 128, kImages = 3;
 constexpr std::size_t kVacancies = 5;
+constexpr std::size_t kCopyStates = 8;  // whether the bricks before along x, y and z are copies
 constexpr int kClassBits = 4;
 constexpr std::size_t kClasses = std::size_t{1} << kClassBits;
 
@@ -74,18 +31,41 @@ class VoxelCoder {
         layer_(layer),
         index_(layer.bricks),
         mirrors_(model, layer, index_),
+        copies_(model, layer, index_, mirrors_),
+        copied_(layer.bricks.size()),
         vacantClass_(std::uint8_t(classOf(model.vacantCode))),
         thrift_(thrift) {}
 
   /// The side is an argument and not a member, so that the compiler can keep the state of a range
   /// decoder in registers.
   void brick(Side& side, std::size_t b) {
+    if (codeCopy(side, b)) return;
     halo_.fill(layer_, index_, b, model_.vacantCode);
     fillClasses();
     for (int first = 0; first < kBrickVoxels; first += kBrickSide) line(side, b, first);
   }
 
  private:
+  /// Codes whether all voxels of a brick equal voxels before it, and which ones.
+  bool codeCopy(Side& side, std::size_t b) {
+    const auto wanted = kReads ? std::nullopt : copies_.sourceOf(b);
+    copied_[b] = side.bit(copy_[copiesBefore(b)], wanted.has_value());
+    if (!copied_[b]) return false;
+    lastSource_ = sources_[lastSource_].code(side, wanted.value_or(0));
+    if (kReads) copies_.copy(b, lastSource_);
+    return true;
+  }
+
+  /// For each axis a bit: whether the brick before brick b is a copy.
+  [[nodiscard]] std::size_t copiesBefore(std::size_t b) const {
+    std::size_t bits = 0;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      const std::uint32_t before = copies_.before(b, axis);
+      bits = bits << 1 | std::size_t(before != BrickIndex::kNone && copied_[before]);
+    }
+    return bits;
+  }
+
   /// Codes the voxels of a line along z.
   void line(Side& side, std::size_t b, int first) {
     const int cell = Halo::cell(voxelLocal(first));
@@ -229,6 +209,9 @@ class VoxelCoder {
   VoxelLayer& layer_;
   BrickIndex index_;
   Mirrors mirrors_;
+  BrickCopies copies_;
+  std::vector<bool> copied_;      ///< for each brick, whether it is a copy
+  std::uint32_t lastSource_ = 0;  ///< of the last copy
   Halo halo_{};
   /// The numbers of the codes in the halo (classOf), if there are common codes.
   std::array<std::uint8_t, Halo::kCells> class_{};
@@ -237,6 +220,9 @@ class VoxelCoder {
   const Thrift* thrift_;
   std::size_t at_ = 0;  ///< index of the voxel in the layer's codes
   bool lastNegative_ = false;
+  std::array<BitModel, kCopyStates> copy_;
+  std::array<TreeModel<BrickCopies::kSourceBits>, std::size_t{1} << BrickCopies::kSourceBits>
+      sources_;
   std::array<std::array<BitModel, kImages>, kActivities> active_;
   std::array<BitModel, kVacancies> vacant_;
   std::array<TreeModel<kClassBits>, kClasses * kClasses * kClasses> classes_;

@@ -50,7 +50,7 @@ VoxelLayer asFloats(VoxelLayer layer) {
   return layer;
 }
 
-/// 16 x 8 x 8 floats that are equal under a mirror along x, many of them 0.5.
+/// 16 x 8 x 8 floats that are equal under a mirror along x but for one voxel, many of them 0.5.
 StoredGrid mirroredValues() {
   std::vector<BrickInput> bricks(2);
   for (std::size_t b = 0; b < bricks.size(); ++b) {
@@ -60,7 +60,7 @@ StoredGrid mirroredValues() {
       const std::int32_t x = std::min(at.x, 15 - at.x);
       const std::int32_t n = (x * 64 + (at.y + 8) * 8 + at.z - 8) * 37 % 512;
       bricks[b].values[std::size_t(v)] =
-          at.z % 3 == 0 ? 0.5f : 1.0f + float(n) * float(n) / 65536.0f;
+          at.z % 3 == 0 || at == Coord{9, -6, 10} ? 0.5f : 1.0f + float(n) * float(n) / 65536.0f;
       if (x > 1 || n % 5 != 0) bricks[b].active.set(v);
     }
   }
@@ -68,7 +68,23 @@ StoredGrid mirroredValues() {
   return makeStoredVoxels({}, volume, asFloats(exactLayer(volume)));
 }
 
-/// An ellipsoid with the mask of the voxels above.
+/// 32 x 8 x 16 floats that repeat along z after a brick and are equal under a mirror along x.
+StoredGrid copiedValues() {
+  std::vector<BrickInput> bricks(8);
+  for (std::size_t b = 0; b < bricks.size(); ++b) {
+    bricks[b].corner = Coord{std::int32_t(b / 2), 2, std::int32_t(b % 2)} * kBrickSide;
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Coord at = bricks[b].corner + voxelLocal(v);
+      const std::int32_t n = std::min(at.x, 31 - at.x) * 64 + (at.y & 7) * 8 + (at.z & 7);
+      bricks[b].values[std::size_t(v)] = float(n * n % 11);
+      if (n % 5 != 0) bricks[b].active.set(v);
+    }
+  }
+  const SparseVolume volume = makeVolume(bricks, 0.0f);
+  return makeStoredVoxels({}, volume, asFloats(exactLayer(volume)));
+}
+
+/// An ellipsoid with the mask of the few values.
 StoredGrid masked() {
   StoredGrid grid = oneEllipsoid();
   const SparseVolume volume = volumeOf(*fewValues().voxels);
@@ -116,6 +132,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"layered", fileOf(layeredGrid(20))},
       {"voxels", fileOf(fewValues())},
       {"mirrored_voxels", fileOf(mirroredValues())},
+      {"copied_voxels", fileOf(copiedValues())},
       {"mask", fileOf(masked())},
       {"twins", twins()},
       {"residual", fileOf(corrected())},

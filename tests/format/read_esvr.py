@@ -383,6 +383,7 @@ class Voxels:
     def __init__(self, head, stream, mirrors, common):
         self.head, self.stream, self.mirrors, self.common = head, stream, mirrors, common
         self.codes, self.active, self.held = {}, set(), {}
+        self.kept, self.copies, self.source = set(), {}, 0
 
     def code(self, p):
         return self.codes.get(p, self.head["vacant"])
@@ -394,19 +395,44 @@ class Voxels:
                 return tuple(mirror - c if a == axis else c for a, c in enumerate(p))
         return None
 
-    def each(self):
-        """Yields every voxel in order, with its neighbours that come before it."""
+    def bricks(self):
+        """Yields the voxels of every brick in order."""
         for key in keys(self.head["bricks"], 3 * self.head["bits"], self.stream):
-            corner = [8 * sum((key >> (3 * b + a) & 1) << b for b in range(self.head["bits"]))
-                      for a in range(3)]
-            for offset in range(512):
-                x, y, z = (corner[0] + (offset >> 6), corner[1] + (offset >> 3 & 7),
-                           corner[2] + (offset & 7))
+            x, y, z = (8 * sum((key >> (3 * b + a) & 1) << b for b in range(self.head["bits"]))
+                       for a in range(3))
+            yield [(x + (v >> 6), y + (v >> 3 & 7), z + (v & 7)) for v in range(512)]
+
+    def copied(self, voxels_):
+        """Copies a brick, if it is a copy."""
+        first = voxels_[0]
+        before = [tuple(c - 8 * (a == axis) for a, c in enumerate(first)) for axis in range(3)]
+        if not self.stream.decision("copy", *(self.copies.get(q, 0) for q in before)):
+            return False
+        self.copies[first] = 1
+        self.source = self.stream.tree(2, "source", self.source)
+        for p in voxels_:
+            q = (self.image(p) if self.source == 3 else
+                 tuple(c - 8 * (a == self.source) for a, c in enumerate(p)))
+            if q not in self.kept:
+                self.codes[p] = self.head["vacant"]
+                continue
+            if q in self.active:
+                self.active.add(p)
+            self.put(p, self.codes[q])
+        return True
+
+    def each(self):
+        """Yields every voxel that is not copied, with its neighbours that come before it."""
+        for voxels_ in self.bricks():
+            if self.copied(voxels_):
+                continue
+            for x, y, z in voxels_:
                 yield (x, y, z), [(x - 1, y, z), (x, y - 1, z), (x, y, z - 1), (x - 1, y - 1, z),
                                   (x - 1, y, z - 1), (x, y - 1, z - 1), (x - 1, y - 1, z - 1)]
 
     def put(self, p, code):
         self.codes[p] = code
+        self.kept.add(p)
         self.held[tuple(o + c for o, c in zip(self.head["origin"], p))] = code, p in self.active
 
 
@@ -621,12 +647,26 @@ def check_mirrored(sections):
             for z in range(8, 16):
                 half = min(x, 15 - x)
                 n = (half * 64 + (y + 8) * 8 + z - 8) * 37 % 512
-                wanted = 0.5 if z % 3 == 0 else 1.0 + n * n / 65536.0
+                half_one = z % 3 == 0 or (x, y, z) == (9, -6, 10)
+                wanted = 0.5 if half_one else 1.0 + n * n / 65536.0
                 code, now = held[x, y, z]
                 value = struct.unpack("<f", struct.pack("<i", code))[0]
                 assert (value, now) == (wanted, half > 1 or n % 5 != 0), (x, y, z)
                 active += now
     assert 512 < active < len(held) == 1024
+
+
+def check_copied(sections):
+    head, held = sections["voxels", 0, NONE]
+    assert (head["form"], head["origin"], head["bricks"]) == (2, (0, 16, 0), 8)
+    for x in range(32):
+        for y in range(16, 24):
+            for z in range(16):
+                n = min(x, 31 - x) * 64 + (y & 7) * 8 + (z & 7)
+                code, now = held.get((x, y, z), (0, False))
+                value = struct.unpack("<f", struct.pack("<i", code))[0]
+                assert (value, now) == (n * n % 11, n % 5 != 0), (x, y, z)
+    assert 3200 < len(held) < 4096
 
 
 def check_voxels(sections):
@@ -667,7 +707,8 @@ def check_twins(sections):
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
           "voxels": check_voxels, "mask": check_mask, "residual": check_residual,
-          "mirrored_voxels": check_mirrored, "two_grids": check_two_grids, "twins": check_twins,
+          "mirrored_voxels": check_mirrored, "copied_voxels": check_copied,
+          "two_grids": check_two_grids, "twins": check_twins,
           "kappas_and_chunks": check_kappas_and_chunks}
 
 

@@ -79,6 +79,35 @@ TEST(VoxelSection, FindsMirrors) {
   EXPECT_EQ(voxelsOf(putVoxels(exactLayer(mirrored)), "v"), exactLayer(mirrored));
 }
 
+/// Noise of two bricks that are repeated along y and z and mirrored along x is stored once.
+TEST(VoxelSection, CopiesBricks) {
+  test::Random random(12);
+  std::array<float, 512> noise{};
+  for (float& v : noise) v = float(random(0.0, 1.0));
+  const auto value = [&](Coord v) {
+    const Coord first{std::min(v.x, 31 - v.x) & 7, v.y & 7, v.z & 7};
+    return noise[std::size_t(voxelOffset(first))] + (v.x > 7 && v.x < 24 ? 1.0f : 0.0f);
+  };
+  const SparseVolume volume = test::volumeOf({}, 4, -1.0f, value);
+  // 1024 of the 32,768 voxels have a float in the palette and a code of 10 bits each.
+  EXPECT_LT(double(bytesOf(volume)) * 8.0, 1024 * (32.0 + 12.0));
+  EXPECT_EQ(voxelsOf(putVoxels(exactLayer(volume)), "v"), exactLayer(volume));
+  const VoxelLayer bounded = boundedLayer(volume, 0.01, Activity::kExact);
+  EXPECT_LT(double(putVoxels(bounded).size()) * 8.0, 1024 * 9.0);
+  EXPECT_EQ(voxelsOf(putVoxels(bounded), "v"), bounded);
+}
+
+/// A brick without active voxels at the border of the grid equals the vacant voxels before it.
+TEST(VoxelSection, CopiesVacantPlaces) {
+  VoxelLayer layer = boundedLayer(test::tubeVolume(), 0.01, Activity::kExact);
+  for (const std::size_t b : {std::size_t{0}, layer.bricks.size() - 1}) {
+    layer.active[b] = {};
+    layer.vacant[b].setAll();
+    std::fill_n(layer.codes.begin() + std::ptrdiff_t(b * kBrickVoxels), kBrickVoxels, 0);
+  }
+  EXPECT_EQ(voxelsOf(putVoxels(layer), "v"), layer);
+}
+
 /// Most floats have one common value. The values between them must not spoil the predictions.
 TEST(VoxelSection, KnowsCommonValues) {
   test::Random random(10);
