@@ -76,11 +76,12 @@ struct PsnrCandidates {
 
 /// The smaller of voxels and ellipsoids, which must reach the PSNR.
 Conversion smallerOf(const Job& job, const PsnrTarget& target, PsnrCandidates candidates) {
-  auto& [voxels, search, seconds] = candidates;
+  VoxelCandidate& voxels = candidates.voxels;
+  double& seconds = candidates.seconds;
   const double psnr = target.psnr;
   const auto below = std::uint64_t(target.worthwhileShare * double(voxels.bytes));
-  auto [ellipsoids, expected] =
-      addSeconds(seconds, [&] { return unlessCancelled([&] { return search(below); }); });
+  auto [ellipsoids, expected] = addSeconds(
+      seconds, [&] { return unlessCancelled([&] { return candidates.search(below); }); });
   ChoiceRecord choice{record(voxels), {}};
   if (expected > 0) choice.ellipsoids = Candidate{expected, psnr, true, seconds};
   if (ellipsoids) {
