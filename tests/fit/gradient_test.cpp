@@ -18,6 +18,7 @@
 #include "gradient_cases.h"
 #include "interpolate.h"
 #include "random_ellipsoids.h"
+#include "reference_sum.h"
 
 namespace esvr {
 namespace {
@@ -25,25 +26,11 @@ namespace {
 using test::denseVolume;
 using test::kSide;
 using test::randomEllipsoids;
+using test::sumAt;
 
-double valueAt(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<double>& k,
-               Coord v) {
-  double value = 0.0;
-  for (const Ellipsoid& p : ellipsoids) {
-    const double d[3] = {v.x - p.center[0], v.y - p.center[1], v.z - p.center[2]};
-    double m = 0.0;
-    for (int r = 0; r < 3; ++r) {
-      const double u = p.L[3 * r] * d[0] + p.L[3 * r + 1] * d[1] + p.L[3 * r + 2] * d[2];
-      m += u * u;
-    }
-    value += p.intensity * kernelPhi(k, m);
-  }
-  return value;
-}
-
-/// 1/2 sum r^2 in float64 over a box that contains every support. If the target saturates, the loss
-/// of a sum beyond the range grows from that of the range's end in proportion to `slopeBeyond`
-/// times its slope there.
+/// 1/2 sum r^2 in float64 over a box that contains every support. If the target saturates, sums are
+/// clamped to its range. Beyond an end of the range, the loss goes on as a line, whose slope is
+/// `slopeBeyond` times the slope at the end.
 double referenceLoss(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<double>& k,
                      const SparseVolume& volume, const FitTarget& target, int margin,
                      double slopeBeyond = 1.0) {
@@ -52,7 +39,7 @@ double referenceLoss(const std::vector<Ellipsoid>& ellipsoids, const KernelConst
     for (int y = -margin; y < kSide + margin; ++y)
       for (int z = -margin; z < kSide + margin; ++z) {
         const double t = double(esvr::valueAt(volume, {x, y, z})) * target.scale;
-        const double sum = valueAt(ellipsoids, k, {x, y, z});
+        const double sum = sumAt(ellipsoids, k, {x, y, z});
         const double clamped =
             target.saturates ? std::clamp(sum, target.lowest, target.highest) : sum;
         const double r = clamped - t;

@@ -29,24 +29,46 @@ struct ResidualOutput {
 constexpr int kMomentSlots = 16;  // kMoments, rounded up to a power of two
 static_assert(kMomentSlots % kGroup == 0, "each lane ends with some of the moments");
 
-/// 1 / (B + e^(m - s)), with the fast exponential of the device. The kernel that follows from it
-/// differs from kernelPhi by about 1e-6 at most.
-__device__ inline float fastQuotient(const KernelConstants<float>& k, float m) {
-  return __fdividef(1.0f, k.plateau + __expf(m - k.shift));
-}
+/// The kernel as a function of the exponent x = (m - s) log2(e), since the device computes a power
+/// of two with one instruction. Along a line, m = closest + a t^2, and therefore
+/// x = exponentOf(closest) + factorOf(a) t^2. The values differ from kernelPhi by about 1e-6.
+class FastKernel {
+ public:
+  __device__ explicit FastKernel(const KernelConstants<float>& k) : k_(k) {}
+
+  [[nodiscard]] __device__ float exponentOf(float m) const {
+    return kLog2E * m - kLog2E * k_.shift;
+  }
+  [[nodiscard]] __device__ static float factorOf(float a) { return kLog2E * a; }
+
+  [[nodiscard]] __device__ bool isInside(float exponent) const {
+    return exponent < exponentOf(k_.cutoff);
+  }
+  /// phi + base, also outside the support.
+  [[nodiscard]] __device__ float quotient(float exponent) const {
+    return k_.numerator * __fdividef(1.0f, k_.plateau + exp2f(exponent));
+  }
+
+ private:
+  static constexpr float kLog2E = 1.44269504f;
+  const KernelConstants<float>& k_;
+};
 
 /// Adds the lane's share of a pair's voxels to the sums.
 template <class Sum>
 __device__ void addPair(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
                         float units, Sum* sums) {
-  const float height = p.form.intensity * units;
+  const FastKernel fast(kernel);
+  const float height = p.form.intensity * units, a = fast.factorOf(p.form.a);
   visitLines(p, corner, kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
+    const float closest = fast.exponentOf(line.closest);
     float t = line.t;
     Sum* sum = sums + line.offset;
+#pragma unroll 1  // an unrolled loop ends with different remainders on the lanes of a warp
     for (int n = line.count; n > 0; --n, t += 1.0f, sum += kBrickSide) {
-      const float m = squaredAt(p.form, line.closest, t);
-      if (m < kernel.cutoff)
-        addUnits(*sum, height * (kernel.numerator * fastQuotient(kernel, m) - kernel.base));
+      const float exponent = closest + a * t * t;
+      const float phi = fast.quotient(exponent) - kernel.base;
+      addUnits(*sum, fast.isInside(exponent) ? height * phi : 0.0f);
     }
   });
 }
@@ -103,14 +125,18 @@ __device__ void sumBrick(const PassScene& scene, const Kernels& kernels, const P
 template <class Sum>
 __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kernel, Coord corner,
                            const Sum* byValue, float (&s)[kMomentSlots]) {
+  const FastKernel fast(kernel);
+  const float a = fast.factorOf(p.form.a);
   visitLines(p, corner, kernel.cutoff, int(threadIdx.x % kGroup), [&](const PairLine& line) {
+    const float closest = fast.exponentOf(line.closest);
     float w0 = 0.0f, w1 = 0.0f, t = line.t;
     const Sum* derivative = byValue + line.offset;
+#pragma unroll 1  // as in addPair
     for (int n = line.count; n > 0; --n, t += 1.0f, derivative += kBrickSide) {
-      const float m = squaredAt(p.form, line.closest, t);
-      if (!(m < kernel.cutoff)) continue;
-      const float q = kernel.numerator * fastQuotient(kernel, m), phi = q - kernel.base;
-      const float g = valueIn(*derivative), gq = g * q;
+      const float exponent = closest + a * t * t;
+      const bool inside = fast.isInside(exponent);
+      const float q = fast.quotient(exponent), phi = inside ? q - kernel.base : 0.0f;
+      const float g = inside ? valueIn(*derivative) : 0.0f, gq = g * q;
       const float w = gq * (q * kernel.slope - 1.0f);  // g phi'
       const float wt = w * t;
       w0 += w;

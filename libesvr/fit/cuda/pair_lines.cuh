@@ -99,12 +99,13 @@ __device__ inline void visitLines(const PairForm& p, Coord corner, float cutoff,
   const Interval xs = voxelsWithin(cx, f.halfX), zs = voxelsWithin(cz, p.halfZ);
   if (xs.count <= 0 || zs.count <= 0) return;
   LinePlaces place(xs, zs, cx, cz, lane);
+  const float inverseA = __fdividef(1.0f, f.a);
   for (int n = xs.count * zs.count - lane; n > 0; n -= kGroup, place.advance()) {
     const float pzDz[3] = {f.pz[0] * place.dz, f.pz[1] * place.dz, f.pz[2] * place.dz};
     const float closest = closestSquared(f, place.dx, pzDz);
     if (!(closest < cutoff)) continue;
     const float middle = -distanceAlong(f, 0.0f, cy, place.dx, place.dz);
-    const Interval ys = voxelsWithin(middle, sqrtf(__fdividef(cutoff - closest, f.a)));
+    const Interval ys = voxelsWithin(middle, sqrtf((cutoff - closest) * inverseA));
     visit(PairLine{place.offset + ys.first * kBrickSide, ys.count, place.dx, place.dz, closest,
                    ys.begin - middle});
   }

@@ -3,9 +3,13 @@
 // ellipsoids that cover everything, narrow bands, bricks that only supports reach, and many
 // ellipsoids in one brick.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "../random_ellipsoids.h"
+#include "../reference_sum.h"
 #include "../volumes.h"
 #include "fit/cpu/cpu_pass.h"
 #include "fit/cuda/cuda_optimiser.h"
@@ -28,10 +32,56 @@ double distance(const ParameterVector& a, const ParameterVector& b) {
   return std::sqrt(sum);
 }
 
+/// A box that contains the support of an ellipsoid.
+Box supportBox(const Ellipsoid& p, const KernelConstants<double>& k) {
+  const Matrix3 F = inverse(p.L);
+  std::array<int, 3> low, high;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double half = supportRadius(k) * std::hypot(F[3 * a], F[3 * a + 1], F[3 * a + 2]);
+    low[a] = int(std::floor(p.center[a] - half)), high[a] = int(std::ceil(p.center[a] + half));
+  }
+  return {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
+}
+
+/// The volume, the kernel and the ellipsoids of a case.
+struct Scene {
+  const SparseVolume& volume;
+  FitTarget target;
+  Kernel kernel;
+  std::vector<Ellipsoid> ellipsoids;
+
+  [[nodiscard]] KernelConstants<double> constants() const {
+    return kernelConstants<double>(kernel);
+  }
+  [[nodiscard]] double residual(Coord v) const {
+    const double value = double(valueAt(volume, v)) - volume.background;
+    return test::sumAt(ellipsoids, constants(), v) - value * target.scale;
+  }
+};
+
+/// The change of an ellipsoid's gradient if all voxels at the end of its support count as outside.
+/// Rounding decides on which side of the end they are, so that devices may differ. There phi is 0,
+/// but its slope is not.
+double gradientAtTheEnd(const Scene& scene, const Ellipsoid& p) {
+  constexpr double kRounding = 3e-5;  // relative to m; needles lose the most digits of it
+  const auto k = scene.constants();
+  const double m = k.cutoff;
+  const double slope = k.base * (1.0 - k.base * k.slope);
+  const double byParameters = 2.0 * std::sqrt(m) + 2.0 * std::sqrt(2.0) * m;  // a bound of |dm|
+  const Box box = supportBox(p, k);
+  double change = 0.0;
+  for (int x = box.min.x; x <= box.max.x; ++x)
+    for (int y = box.min.y; y <= box.max.y; ++y)
+      for (int z = box.min.z; z <= box.max.z; ++z)
+        if (std::abs(test::mAt(p, {x, y, z}) - m) < kRounding * m)
+          change += std::abs(scene.residual({x, y, z})) * slope * byParameters;
+  return change;
+}
+
 /// Compares all gradients. The tolerance is relative to the largest one, because residuals nearly
 /// cancel in some.
-void expectAgreement(const FitTarget& target, const Kernel& kernel,
-                     const std::vector<Ellipsoid>& ellipsoids, double tolerance) {
+void expectAgreement(const Scene& scene, double tolerance) {
+  const auto& [volume, target, kernel, ellipsoids] = scene;
   CpuPass engine(target, kernelConstants<double>(kernel));
   engine.rebuild(ellipsoids, 0.5);
   std::vector<EllipsoidGradient> expected(ellipsoids.size());
@@ -50,23 +100,32 @@ void expectAgreement(const FitTarget& target, const Kernel& kernel,
     largestByKappa = std::max(largestByKappa, std::abs(g.byKappa));
   }
   for (std::size_t i = 0; i < found.size(); ++i) {
-    EXPECT_LT(distance(found[i].byParameter, expected[i].byParameter), tolerance * largest) << i;
+    const double off = distance(found[i].byParameter, expected[i].byParameter);
+    const double atTheEnd =
+        off < tolerance * largest ? 0.0 : gradientAtTheEnd(scene, ellipsoids[i]);
+    EXPECT_LT(off, tolerance * largest + atTheEnd) << i;
+    EXPECT_NEAR(found[i].byParameter[9], expected[i].byParameter[9], tolerance * largest) << i;
     EXPECT_NEAR(found[i].phi2, expected[i].phi2, tolerance * largestPhi2) << i;
     // byKappa is the difference of two sums of the size of the other gradients.
-    EXPECT_NEAR(found[i].byKappa, expected[i].byKappa, tolerance * (largestByKappa + largest)) << i;
+    EXPECT_NEAR(found[i].byKappa, expected[i].byKappa,
+                tolerance * (largestByKappa + largest) + atTheEnd)
+        << i;
   }
   EXPECT_NEAR(onGpu.measure().squaredSum, loss, 1e-5 * loss);
 }
 
 class GradientOnGpu : public test::CudaTest, public testing::WithParamInterface<Case> {};
 
-// Both sides are float32 sums over a few thousand voxels, with exponentials precise to 1e-6.
+// Both sides are float32 sums over a few thousand voxels, with exponentials precise to 1e-6, whose
+// errors cancel in part.
 TEST_P(GradientOnGpu, AgreesWithTheCpu) {
   const Case& c = GetParam();
   const SparseVolume volume = test::denseVolume();
-  const FitTarget target = makeTarget(volume, std::nullopt);
-  expectAgreement(target, {.kappa = c.kappa}, test::randomEllipsoids(c.count, c.smallest, c.aspect),
-                  1e-4);
+  expectAgreement({volume,
+                   makeTarget(volume, std::nullopt),
+                   {.kappa = c.kappa},
+                   test::randomEllipsoids(c.count, c.smallest, c.aspect)},
+                  5e-6);
 }
 INSTANTIATE_TEST_SUITE_P(
     Cases, GradientOnGpu,
@@ -84,7 +143,7 @@ TEST_P(SaturationOnGpu, IsThatOfTheCpu) {
   FitTarget target = makeTarget(volume, std::nullopt);
   target.saturates = true;
   target.narrowBand = GetParam();
-  expectAgreement(target, {.kappa = 2.0f}, test::randomEllipsoids(100, 1.0, 3.0), 1e-4);
+  expectAgreement({volume, target, {.kappa = 2.0f}, test::randomEllipsoids(100, 1.0, 3.0)}, 1e-4);
 }
 INSTANTIATE_TEST_SUITE_P(Bricks, SaturationOnGpu, testing::Bool(), [](const auto& narrowBand) {
   return narrowBand.param ? "OfANarrowBand" : "ThatSupportsReach";
