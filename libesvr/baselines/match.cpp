@@ -41,9 +41,8 @@ class Search {
   /// Measures the PSNR of the last setting.
   double measure() {
     const BaselineSource& source = encoder_.source();
-    const auto metrics = compareVolumes(source.grid.volume, encoder_.decode(),
-                                        {.box = source.box, .peak = source.peak});
-    return match_.steps.back().psnr = metrics.psnrBox;
+    return match_.steps.back().psnr = psnrOverBox(source.grid.volume, encoder_.decode(),
+                                                  {.box = source.box, .peak = source.peak});
   }
   const MatchStep& last() const { return match_.steps.back(); }
 

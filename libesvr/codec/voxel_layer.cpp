@@ -1,11 +1,15 @@
 #include "esvr/voxel_layer.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <unordered_set>
 
 #include "esvr/error.h"
 
@@ -92,10 +96,17 @@ std::int32_t codeOf(const VoxelLayer& layer, float v) {
 
 /// The distinct values of a volume in increasing order; empty if there are too many for a palette.
 std::vector<float> paletteOf(const SparseVolume& volume) {
-  std::vector<float> values = volume.values;
+  std::unordered_set<std::int32_t> orders;
+  std::optional<std::int32_t> last;
+  for (const float v : volume.values) {
+    const std::int32_t order = orderOfFloat(v);
+    if (last == order) continue;
+    orders.insert(*(last = order));
+    if (orders.size() > kLargestPalette) return {};
+  }
+  std::vector<float> values;
+  for (const std::int32_t order : orders) values.push_back(floatAt(order));
   std::sort(values.begin(), values.end(), inOrder);
-  values.erase(std::unique(values.begin(), values.end(), sameBits), values.end());
-  if (values.size() > kLargestPalette) values.clear();
   return values;
 }
 
@@ -111,13 +122,14 @@ void fill(const SparseVolume& volume, VoxelLayer& layer) {
   layer.active = volume.active;
   layer.vacant.resize(volume.brickCount());
   layer.codes.resize(volume.values.size());
-  for (std::size_t i = 0; i < volume.values.size(); ++i) {
-    const std::size_t b = i / kBrickVoxels;
-    const int v = int(i % kBrickVoxels);
-    if (!volume.active[b].test(v) && sameBits(volume.values[i], volume.background))
-      layer.vacant[b].set(v);
-    layer.codes[i] = codeOf(layer, volume.values[i]);
-  }
+  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      if (!volume.active[b].test(v) && sameBits(values[v], volume.background))
+        layer.vacant[b].set(v);
+      layer.codes[b * kBrickVoxels + std::size_t(v)] = codeOf(layer, values[v]);
+    }
+  });
 }
 
 /// The largest error that rounding the values of a quantisation lattice to float32 adds.
@@ -155,15 +167,18 @@ void dropInactive(VoxelLayer& layer) {
 
 void activateByValue(const SparseVolume& volume, double bound, VoxelLayer& layer) {
   const std::int32_t background = codeOf(layer, volume.background);
-  for (std::size_t i = 0; i < volume.values.size(); ++i) {
-    const std::size_t b = i / kBrickVoxels;
-    const int v = int(i % kBrickVoxels);
-    layer.active[b].set(v);
-    if (std::abs(double(volume.values[i]) - volume.background) > bound) continue;
-    layer.active[b].words[std::size_t(v) >> 6] &= ~(std::uint64_t{1} << (v & 63));
-    layer.vacant[b].set(v);
-    layer.codes[i] = background;
-  }
+  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    layer.active[b] = {};
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      if (std::abs(double(values[v]) - volume.background) > bound) {
+        layer.active[b].set(v);
+        continue;
+      }
+      layer.vacant[b].set(v);
+      layer.codes[b * kBrickVoxels + std::size_t(v)] = background;
+    }
+  });
   dropInactive(layer);
 }
 
@@ -220,17 +235,29 @@ bool allFinite(const VoxelLayer& layer) {
 
 namespace {
 
-/// The largest difference over the bricks of `a`.
-double largestOver(const SparseVolume& a, const SparseVolume& b) {
+/// The largest difference over brick i of `a`.
+double largestOver(const SparseVolume& a, std::size_t i, const SparseVolume& b) {
+  const auto at = findBrick(b, brickOf(a.brickCorner(i)) - brickOf(b.origin));
   double largest = 0.0;
-  for (std::size_t i = 0; i < a.brickCount(); ++i) {
-    const auto at = findBrick(b, brickOf(a.brickCorner(i)) - brickOf(b.origin));
-    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
-      const float other = at ? b.brickValues(*at)[v] : b.background;
-      largest = std::max(largest, std::abs(double(a.brickValues(i)[v]) - double(other)));
-    }
+  for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+    const float other = at ? b.brickValues(*at)[v] : b.background;
+    largest = std::max(largest, std::abs(double(a.brickValues(i)[v]) - double(other)));
   }
   return largest;
+}
+
+/// The largest difference over the bricks of `a`.
+double largestOver(const SparseVolume& a, const SparseVolume& b) {
+  using Range = tbb::blocked_range<std::size_t>;
+  const auto largest = [](double x, double y) { return std::max(x, y); };
+  return tbb::parallel_reduce(
+      Range(0, a.brickCount()), 0.0,
+      [&](const Range& bricks, double found) {
+        for (std::size_t i = bricks.begin(); i != bricks.end(); ++i)
+          found = largest(found, largestOver(a, i, b));
+        return found;
+      },
+      largest);
 }
 
 }  // namespace

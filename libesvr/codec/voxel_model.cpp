@@ -1,5 +1,7 @@
 #include "codec/voxel_model.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <span>
@@ -66,15 +68,13 @@ class MirrorSearch {
   [[nodiscard]] std::int32_t along(std::int32_t Coord::*axis) const {
     const std::int32_t extent = last_.*axis + 1;
     if (samples_.empty() || extent > kMaxExtent) return VoxelModel::kNoMirror;
-    std::int32_t best = VoxelModel::kNoMirror;
-    double largest = kAlike * double(samples_.size());
-    for (std::int32_t mirror = extent / 2; mirror < extent + extent / 2; ++mirror) {
-      const double now = double(alike(axis, mirror));
-      if (now <= largest) continue;
-      largest = now;
-      best = mirror;
-    }
-    return best;
+    const std::int32_t first = extent / 2;
+    std::vector<std::size_t> counts(static_cast<std::size_t>(extent));
+    tbb::parallel_for(std::size_t{0}, counts.size(),
+                      [&](std::size_t n) { counts[n] = alike(axis, first + std::int32_t(n)); });
+    const auto most = std::max_element(counts.begin(), counts.end());
+    if (double(*most) <= kAlike * double(samples_.size())) return VoxelModel::kNoMirror;
+    return first + std::int32_t(most - counts.begin());
   }
 
  private:

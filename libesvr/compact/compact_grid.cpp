@@ -35,9 +35,7 @@ bool missedByReader(const StoredGrid& grid, const SparseVolume& source,
                     const CompactOptions& options) {
   if (!options.psnr || *options.psnr < kMaxPsnrOfMargin || options.device.kind == DeviceKind::kCpu)
     return false;
-  const auto metrics =
-      compareVolumes(source, decodeGrid(grid), {.box = options.box, .peak = {}, .ssim = false});
-  return metrics.psnrBox < *options.psnr;
+  return psnrOverBox(source, decodeGrid(grid), {.box = options.box}) < *options.psnr;
 }
 
 void requireOneKappa(const StoredGrid& grid) {

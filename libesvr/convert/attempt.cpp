@@ -96,8 +96,7 @@ Activity voxelActivity(const Job& job) {
 }
 
 double psnrOf(const Job& job, const SparseVolume& volume) {
-  const CompareOptions options{.box = job.options.fit.box, .peak = {}, .ssim = false};
-  return compareVolumes(job.input.source, volume, options).psnrBox;
+  return psnrOverBox(job.input.source, volume, {.box = job.options.fit.box});
 }
 
 double psnrOf(const Job& job, const StoredGrid& grid) { return psnrOf(job, decodeGrid(grid)); }

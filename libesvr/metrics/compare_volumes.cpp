@@ -3,6 +3,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "esvr/error.h"
 #include "esvr/metrics.h"
@@ -76,17 +77,43 @@ void refuseNonFinite(const ErrorSums& sums, const Backgrounds& backgrounds) {
     throw BadInput("the background is not finite");
 }
 
-VolumeMetrics metricsOf(const ErrorSums& sums, double peak, double boxVoxels) {
+/// Two volumes that are being compared.
+struct Comparison {
+  double peak = 0.0;
+  metrics::ErrorDomain domain;
+  std::vector<BrickPair> pairs;
+  ErrorSums sums;
+
+  [[nodiscard]] double mseBox() const { return sums.squaredError / domain.box.volume(); }
+};
+
+Comparison compared(const SparseVolume& reference, const SparseVolume& candidate,
+                    const CompareOptions& options) {
+  if (activeVoxelCount(reference) == 0) throw BadInput("the reference has no active voxel");
+  Comparison c;
+  c.peak = choosePeak(reference, options);
+  c.domain = {chooseBox(reference, options), {reference.background, candidate.background}};
+  c.pairs = metrics::pairBricks(reference, candidate);
+  c.sums = metrics::sumErrors(c.pairs, c.domain);
+  refuseNonFinite(c.sums, c.domain.backgrounds);
+  addEmptySpace(c.sums, c.pairs, c.domain);
+  return c;
+}
+
+VolumeMetrics metricsOf(const Comparison& c) {
+  const ErrorSums& sums = c.sums;
   VolumeMetrics m;
-  m.peak = peak;
-  m.boxVoxels = boxVoxels;
+  m.peak = c.peak;
+  m.boxVoxels = c.domain.box.volume();
   m.activeVoxels = sums.activeReference;
-  m.mseBox = sums.squaredError / boxVoxels;
+  m.mseBox = c.mseBox();
   m.mseActive = sums.squaredErrorActive / double(sums.activeReference);
-  m.psnrBox = psnr(m.mseBox, peak);
-  m.psnrActive = psnr(m.mseActive, peak);
+  m.psnrBox = psnr(m.mseBox, m.peak);
+  m.psnrActive = psnr(m.mseActive, m.peak);
   m.maxError = sums.maxError;
   m.maxErrorAt = sums.maxErrorAt;
+  m.p999Error =
+      metrics::errorOfRank(c.pairs, metrics::nearestRank(sums.activeUnion, kP999Permille));
   m.iou = double(sums.activeIntersection) / double(sums.activeUnion);
   m.massReference = sums.massReference;
   m.massCandidate = sums.massCandidate;
@@ -108,20 +135,16 @@ double psnr(double mse, double peak) {
 
 VolumeMetrics compareVolumes(const SparseVolume& reference, const SparseVolume& candidate,
                              const CompareOptions& options) {
-  if (activeVoxelCount(reference) == 0) throw BadInput("the reference has no active voxel");
-  const double peak = choosePeak(reference, options);
-  const metrics::ErrorDomain domain{chooseBox(reference, options),
-                                    {reference.background, candidate.background}};
-
-  const auto pairs = metrics::pairBricks(reference, candidate);
-  ErrorSums sums = metrics::sumErrors(pairs, domain);
-  refuseNonFinite(sums, domain.backgrounds);
-  addEmptySpace(sums, pairs, domain);
-
-  VolumeMetrics m = metricsOf(sums, peak, domain.box.volume());
-  m.p999Error = metrics::errorOfRank(pairs, metrics::nearestRank(sums.activeUnion, kP999Permille));
-  if (options.ssim) m.ssim = ssim3d(reference, candidate, domain.box, peak);
+  const Comparison c = compared(reference, candidate, options);
+  VolumeMetrics m = metricsOf(c);
+  if (options.ssim) m.ssim = ssim3d(reference, candidate, c.domain.box, c.peak);
   return m;
+}
+
+double psnrOverBox(const SparseVolume& reference, const SparseVolume& candidate,
+                   const CompareOptions& options) {
+  const Comparison c = compared(reference, candidate, options);
+  return psnr(c.mseBox(), c.peak);
 }
 
 }  // namespace esvr

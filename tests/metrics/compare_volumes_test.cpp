@@ -59,6 +59,7 @@ TEST_P(AgainstDense, everyMetricAgreesWithThePlainLoops) {
   EXPECT_NEAR(got.mseActive, want.mseActive, kSumTolerance * want.mseActive);
   EXPECT_NEAR(got.psnrBox, want.psnrBox, 1e-9);  // kSumTolerance * 10 / ln 10, and rounding
   EXPECT_NEAR(got.psnrActive, want.psnrActive, 1e-9);
+  EXPECT_EQ(got.psnrBox, psnrOverBox(a, b, {.box = kBox, .peak = peak}));
   EXPECT_NEAR(got.massReference, want.massReference, kSumTolerance * want.boxVoxels);
   EXPECT_NEAR(got.massCandidate, want.massCandidate, kSumTolerance * want.boxVoxels);
 
