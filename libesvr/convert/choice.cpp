@@ -157,9 +157,14 @@ PsnrCandidates psnrCandidates(const Job& job, const PsnrTarget& target) {
     made.voxels = code();
     return made;
   }
-  auto coder = std::async(std::launch::async, code);
+  CancelToken notNeeded(job.options.fit.cancel);
+  auto coder = std::async(std::launch::async, [&] {
+    VoxelCandidate voxels = code();
+    if (voxels.bytes < target.smallEnough) notNeeded.cancel();
+    return voxels;
+  });
   made.search = addSeconds(made.seconds, [&] {
-    return unlessCancelled([&] { return startPsnrSearch(job, target.psnr); });
+    return unlessCancelled([&] { return startPsnrSearch(job, target.psnr, notNeeded); });
   });
   made.voxels = coder.get();
   if (!made.search) made.search = [](auto) { return PsnrResult{}; };

@@ -44,6 +44,11 @@ class PsnrSearch {
   }
 
   void makeDraft() { draft_ = nearDraft(); }
+  void makeDraft(const CancelToken& cancel) {
+    const CancelToken* own = std::exchange(options_.fit.cancel, &cancel);
+    makeDraft();
+    options_.fit.cancel = own;
+  }
 
   PsnrResult run() {
     Attempt& draft = *draft_;
@@ -249,9 +254,9 @@ PsnrResult searchPsnr(const Job& job, double psnr, std::optional<std::uint64_t> 
   return search.run();
 }
 
-RestOfSearch startPsnrSearch(const Job& job, double psnr) {
+RestOfSearch startPsnrSearch(const Job& job, double psnr, const CancelToken& cancel) {
   const auto search = std::make_shared<PsnrSearch>(job, psnr);
-  search->makeDraft();
+  search->makeDraft(cancel);
   return [search](std::optional<std::uint64_t> below) {
     if (below) search->stayBelow(*below);
     return search->run();

@@ -27,7 +27,9 @@ struct PsnrResult {
 using RestOfSearch = std::function<PsnrResult(std::optional<std::uint64_t> below)>;
 
 /// Makes the short fits of a search before `below` is known.
+/// \param cancel  cancels these short fits, instead of the job's token
 /// \return the rest, which may be called once while the job exists
-[[nodiscard]] RestOfSearch startPsnrSearch(const Job& job, double psnr);
+/// \throws Cancelled  a short fit was cancelled before it had a result
+[[nodiscard]] RestOfSearch startPsnrSearch(const Job& job, double psnr, const CancelToken& cancel);
 
 }  // namespace esvr::convert

@@ -1,11 +1,14 @@
 // Plan: the search for a PSNR continues a fit that has too few ellipsoids, instead of beginning
-// again with seeds. A search that is cancelled during its first fit keeps this fit.
+// again with seeds. A search that is cancelled during its first fit keeps this fit. A search whose
+// short fits were made before finds the same; a token of their own cancels them only.
 
 #include "convert/psnr_search.h"
 
 #include <gtest/gtest.h>
 
 #include "convert/volumes.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
 
 namespace esvr {
 namespace {
@@ -50,6 +53,42 @@ TEST(PsnrSearch, KeepsItsFirstFitWhereItIsCancelled) {
   ASSERT_TRUE(found.conversion);
   EXPECT_EQ(found.conversion->fit.end, FitEnd::kCancelled);
   EXPECT_GT(found.conversion->grid.field.ellipsoidCount(), 0u);
+}
+
+ConvertOptions shortOptions() {
+  ConvertOptions options;
+  options.fit.iterations = 80;
+  options.fit.kappa = 2.0f;
+  return options;
+}
+
+TEST(StartPsnrSearch, FindsWhatTheWholeSearchFinds) {
+  constexpr double kPsnr = 30.0;
+  const GridDescriptor descriptor;
+  const SparseVolume volume = test::tubeVolume();
+  const ConvertInput input{descriptor, volume};
+  const ConvertOptions options = shortOptions();
+  convert::RestOfSearch rest;
+  {
+    const CancelToken cancel;  // ends with the short fits
+    rest = convert::startPsnrSearch({input, options}, kPsnr, cancel);
+  }
+  const auto found = rest({});
+  const auto whole = search(kPsnr, options);
+  ASSERT_TRUE(found.conversion && whole.conversion);
+  EXPECT_EQ(found.conversion->grid.field.ellipsoidCount(),
+            whole.conversion->grid.field.ellipsoidCount());
+  EXPECT_EQ(bytesAdded(found.conversion->grid), bytesAdded(whole.conversion->grid));
+}
+
+TEST(StartPsnrSearch, EndsWhereItsShortFitsAreCancelled) {
+  const GridDescriptor descriptor;
+  const SparseVolume volume = test::tubeVolume();
+  const ConvertOptions options = shortOptions();
+  CancelToken cancel;
+  cancel.cancel();
+  EXPECT_THROW((void)convert::startPsnrSearch({{descriptor, volume}, options}, 30.0, cancel),
+               Cancelled);
 }
 
 }  // namespace
