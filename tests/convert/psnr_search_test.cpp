@@ -1,5 +1,7 @@
 // Plan: the search for a PSNR continues a fit that has too few ellipsoids, instead of beginning
-// again with seeds. A search that is cancelled during its first fit keeps this fit.
+// again with seeds. A search that is cancelled during its first fit keeps this fit. A search whose
+// short fits are made before the number of bytes is known finds the same ellipsoids, and none if
+// too few bytes are left.
 
 #include "convert/psnr_search.h"
 
@@ -50,6 +52,23 @@ TEST(PsnrSearch, KeepsItsFirstFitWhereItIsCancelled) {
   ASSERT_TRUE(found.conversion);
   EXPECT_EQ(found.conversion->fit.end, FitEnd::kCancelled);
   EXPECT_GT(found.conversion->grid.field.ellipsoidCount(), 0u);
+}
+
+TEST(PsnrSearch, FindsTheSameWhereItsShortFitsAreMadeBefore) {
+  const GridDescriptor descriptor;
+  const SparseVolume volume = test::tubeVolume();
+  const ConvertInput input{descriptor, volume};
+  ConvertOptions options;
+  options.fit.iterations = 60;
+  constexpr double kPsnr = 28.0;
+  const auto rest = [&] { return convert::startPsnrSearch({input, options}, kPsnr); };
+  const auto whole = convert::searchPsnr({input, options}, kPsnr).conversion;
+  const auto parted = rest()({}).conversion;
+  ASSERT_TRUE(whole && parted);
+  EXPECT_EQ(parted->grid.quantised, whole->grid.quantised);
+  const auto limited = rest()(100);
+  EXPECT_FALSE(limited.conversion);
+  EXPECT_GT(limited.expected, 100u);
 }
 
 }  // namespace

@@ -41,9 +41,9 @@ double valueAt(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<d
   return value;
 }
 
-/// 1/2 sum r^2 in float64 over a box that contains every support. If the target saturates, the loss
-/// of a sum beyond the range grows from that of the range's end in proportion to `slopeBeyond`
-/// times its slope there.
+/// 1/2 sum r^2 in float64 over a box that contains every support. If the target saturates, a sum
+/// beyond the range has the loss of the range's end, plus its distance from that end times the
+/// slope of the loss there times `slopeBeyond`.
 double referenceLoss(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<double>& k,
                      const SparseVolume& volume, const FitTarget& target, int margin,
                      double slopeBeyond = 1.0) {
