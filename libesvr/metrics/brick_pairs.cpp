@@ -38,8 +38,9 @@ class BrickCursor {
   void advance() { ++at_; }
 
   /// The value at a place without a brick between the brick before and this one. In a narrow band,
-  /// the facing slice of the nearest brick along z gives the sign. Without such a brick, the place
-  /// is outside, because a line along z that is inside somewhere crosses the surface.
+  /// the next brick along -z, or else along z, gives the sign with the slice that faces the place.
+  /// Without such bricks the place is outside, because a line along z that is inside somewhere
+  /// crosses the surface.
   [[nodiscard]] float emptyValue(Coord place) const {
     const bool before = at_ > 0 && isInColumn(at_ - 1, place);
     const bool after = !done() && isInColumn(at_, place);
