@@ -22,13 +22,13 @@ class BrickCopies {
   static constexpr int kSourceBits = 2;
 
   BrickCopies(const VoxelModel& model, VoxelLayer& layer, const BrickIndex& index, Mirrors& mirrors)
-      : model_(model), layer_(layer), index_(index), mirrors_(mirrors), images_(hasMirror(model)) {}
+      : model_(model), layer_(layer), index_(index), mirrors_(mirrors) {}
 
   /// The first source whose voxels equal those of brick b; nothing if there is none.
   [[nodiscard]] std::optional<std::uint32_t> sourceOf(std::size_t b) {
     for (std::uint32_t axis = 0; axis < kImageSource; ++axis)
       if (equals(b, before(b, axis))) return axis;
-    return images_ && equalsImages(b) ? std::optional(kImageSource) : std::nullopt;
+    return mirrors_.any() && equalsImages(b) ? std::optional(kImageSource) : std::nullopt;
   }
 
   /// Sets the voxels of brick b, which must have no active and no vacant voxel yet.
@@ -95,7 +95,6 @@ class BrickCopies {
   VoxelLayer& layer_;
   const BrickIndex& index_;
   Mirrors& mirrors_;
-  bool images_;
 };
 
 }  // namespace esvr::codec

@@ -131,10 +131,9 @@ Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) 
 /// Exact voxels if they keep to a size, otherwise ellipsoids.
 Conversion exactOrEllipsoids(const Job& job, std::uint64_t bytes) {
   ExactVoxels exact(job);
-  const bool fits = exact.takeAtMost(double(bytes));
+  if (!exact.takeAtMost(double(bytes))) return ellipsoidsToSize(job, bytes);
   const ChoiceRecord choice{exact.figures(), {}};
-  if (fits) return asConversion(std::move(exact).take(), choice, FitEnd::kScheduleDone);
-  return ellipsoidsToSize(job, bytes);
+  return asConversion(std::move(exact).take(), choice, FitEnd::kScheduleDone);
 }
 
 bool usesGpu(const Job& job) { return job.options.fit.device.kind == DeviceKind::kCuda; }
