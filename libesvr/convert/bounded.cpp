@@ -20,8 +20,8 @@ namespace {
 // docs/benchmarks.md, "Voxels or a residual within an error bound", has the sizes that follow.
 /// The ellipsoids of a grid with a residual get this fraction (1/4) of the bytes of its voxels.
 constexpr std::uint64_t kEllipsoidBytesDivisor = 4;
-/// Largest residualRatio() at which ellipsoids are fitted. The ratio of the whole volume is larger
-/// by up to 0.09 (docs/lab-notes.md, "Deciding on a residual").
+/// Largest residualRatio() at which ellipsoids are fitted. The ratio of a whole volume without
+/// symmetry is larger by up to 0.09 (docs/lab-notes.md, "Deciding on a residual").
 constexpr double kPromisingRatio = 0.9;
 
 double absoluteBound(const BoundGoal& goal, const SparseVolume& source) {
