@@ -1,6 +1,7 @@
 #pragma once
-/// Bricks whose voxels all equal other voxels that are coded before them: those of the neighbouring
-/// brick before them along an axis, or their mirror images. A place without a voxel is vacant.
+/// Finds and makes copies. A brick is a copy if all its voxels equal voxels that are coded before
+/// them: those of the neighbouring brick along an axis, or their mirror images. Voxels of a brick
+/// that does not exist, and images that do not exist, count as vacant.
 
 #include <algorithm>
 #include <cstddef>
@@ -15,20 +16,22 @@ namespace esvr::codec {
 
 class BrickCopies {
  public:
-  static constexpr std::uint32_t kImageSource =
-      3;  ///< sources 0 to 2 are the neighbours along x, y, z
+  /// The source of a copy is a number: 0, 1 and 2 are the neighbours along x, y and z, and this one
+  /// stands for the mirror images.
+  static constexpr std::uint32_t kImageSource = 3;
   static constexpr int kSourceBits = 2;
 
   BrickCopies(const VoxelModel& model, VoxelLayer& layer, const BrickIndex& index, Mirrors& mirrors)
-      : model_(model), layer_(layer), index_(index), mirrors_(mirrors), images_(hasMirror(model)) {}
+      : model_(model), layer_(layer), index_(index), mirrors_(mirrors) {}
 
-  /// The first source that a brick equals.
+  /// The first source whose voxels equal those of brick b; nothing if there is none.
   [[nodiscard]] std::optional<std::uint32_t> sourceOf(std::size_t b) {
     for (std::uint32_t axis = 0; axis < kImageSource; ++axis)
       if (equals(b, before(b, axis))) return axis;
-    return images_ && equalsImages(b) ? std::optional(kImageSource) : std::nullopt;
+    return mirrors_.any() && equalsImages(b) ? std::optional(kImageSource) : std::nullopt;
   }
 
+  /// Sets the voxels of brick b, which must have no active and no vacant voxel yet.
   void copy(std::size_t b, std::uint32_t source) {
     if (source == kImageSource) return copyImages(b);
     copyBrick(b, before(b, source));
@@ -92,7 +95,6 @@ class BrickCopies {
   VoxelLayer& layer_;
   const BrickIndex& index_;
   Mirrors& mirrors_;
-  bool images_;
 };
 
 }  // namespace esvr::codec

@@ -17,8 +17,8 @@ inline std::uint32_t allBits(bool condition) { return 0u - std::uint32_t(conditi
 /// 1/(n + 1.5) of the distance. From n = kMemory - 1 on, that share stays the same.
 class BitModel {
  public:
-  /// Steps end when the probability of an error is below (kMemory + 1)/kOne, because they are
-  /// rounded down. A decision that is always the same then costs 0.000035 bits.
+  /// Steps are rounded down, so that the probability of the rarer decision does not fall below about
+  /// kMemory/kOne. A decision that is always the same then costs 0.000035 bits.
   static constexpr int kBits = 22;
   static constexpr std::uint32_t kOne = 1u << kBits;
 
@@ -30,9 +30,10 @@ class BitModel {
     return std::uint32_t((std::uint64_t(range) * zero()) >> kBits);
   }
 
-  /// No branch depends on the decision, because processors can hardly foresee it. The distance of
-  /// the probability from 0 is the probability itself. The distance from the largest one, kOne - 1,
-  /// has its bits inverted. It never becomes 0, since a step is rounded down.
+  /// No branch depends on the decision, because processors can hardly foresee it. The probability
+  /// moves by a share of its distance from 0 or from kOne - 1. The distance from 0 is the
+  /// probability itself, and the distance from kOne - 1 is the probability with inverted bits. A
+  /// step is shorter than the distance, so the probability becomes neither 0 nor 1.
   /// \param isZero  allBits() of whether the decision is a zero
   void learn(std::uint32_t isZero) {
     const std::uint32_t count = state_ & kCountMask, inverted = isZero >> kCountBits;

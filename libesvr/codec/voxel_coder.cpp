@@ -18,7 +18,7 @@ namespace {
 // missing, or has one of four combinations of activity and code.
 constexpr std::size_t kActivities = 128, kImages = 3;
 constexpr std::size_t kVacancies = 5;
-constexpr std::size_t kCopyStates = 8;  // whether the bricks before along x, y and z are copies
+constexpr std::size_t kCopyStates = 8;  // each of the three bricks before is a copy or not
 constexpr int kClassBits = 4;
 constexpr std::size_t kClasses = std::size_t{1} << kClassBits;
 
@@ -32,7 +32,7 @@ class VoxelCoder {
         index_(layer.bricks),
         mirrors_(model, layer, index_),
         copies_(model, layer, index_, mirrors_),
-        copied_(layer.bricks.size()),
+        isCopy_(layer.bricks.size()),
         vacantClass_(std::uint8_t(classOf(model.vacantCode))),
         thrift_(thrift) {}
 
@@ -46,22 +46,23 @@ class VoxelCoder {
   }
 
  private:
-  /// Codes whether all voxels of a brick equal voxels before it, and which ones.
+  /// Codes whether a brick is a copy and, if it is, the source. \return whether it is a copy
   bool codeCopy(Side& side, std::size_t b) {
     const auto wanted = kReads ? std::nullopt : copies_.sourceOf(b);
-    copied_[b] = side.bit(copy_[copiesBefore(b)], wanted.has_value());
-    if (!copied_[b]) return false;
+    isCopy_[b] = side.bit(copy_[copiesBefore(b)], wanted.has_value());
+    if (!isCopy_[b]) return false;
     lastSource_ = sources_[lastSource_].code(side, wanted.value_or(0));
     if (kReads) copies_.copy(b, lastSource_);
     return true;
   }
 
-  /// For each axis a bit: whether the brick before brick b is a copy.
+  /// Three bits, from the highest to the lowest: whether the bricks before brick b along x, y and z
+  /// are copies.
   [[nodiscard]] std::size_t copiesBefore(std::size_t b) const {
     std::size_t bits = 0;
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       const std::uint32_t before = copies_.before(b, axis);
-      bits = bits << 1 | std::size_t(before != BrickIndex::kNone && copied_[before]);
+      bits = bits << 1 | std::size_t(before != BrickIndex::kNone && isCopy_[before]);
     }
     return bits;
   }
@@ -210,8 +211,8 @@ class VoxelCoder {
   BrickIndex index_;
   Mirrors mirrors_;
   BrickCopies copies_;
-  std::vector<bool> copied_;      ///< for each brick, whether it is a copy
-  std::uint32_t lastSource_ = 0;  ///< of the last copy
+  std::vector<bool> isCopy_;      ///< by brick
+  std::uint32_t lastSource_ = 0;  ///< source of the latest brick that was a copy
   Halo halo_{};
   /// The numbers of the codes in the halo (classOf), if there are common codes.
   std::array<std::uint8_t, Halo::kCells> class_{};

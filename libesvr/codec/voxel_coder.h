@@ -1,7 +1,7 @@
 #pragma once
-/// Codes the voxels of a layer's bricks with a range coder. A brick may be a copy of voxels before it
-/// (brick_copies.h). In all others, each voxel is predicted from the voxels before it and from its
-/// mirror image; the contexts depend on the errors of recent predictions.
+/// Codes the voxels of a layer's bricks with a range coder. A brick may be a copy of voxels before
+/// it (brick_copies.h). In all other bricks, each voxel is predicted from the voxels before it and
+/// from its mirror image; the contexts depend on the errors of recent predictions.
 
 #include <array>
 #include <cstdint>

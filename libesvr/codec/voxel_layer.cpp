@@ -139,6 +139,7 @@ double roundingError(const SparseVolume& volume, double bound) {
   return (largest + bound) * 0x1p-24;
 }
 
+/// The voxels of a volume, rounded to multiples of two half steps.
 VoxelLayer quantised(const SparseVolume& volume, double halfStep) {
   VoxelLayer layer;
   layer.form = VoxelForm::kQuantised;
@@ -197,7 +198,8 @@ VoxelLayer exactLayer(const SparseVolume& volume) {
 VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity) {
   if (!(std::isfinite(bound) && bound > 0.0))
     throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
-  // The second lattice leaves room for rounding. The first one has the multiples of the bound.
+  // Multiples of twice the bound are nearly exact on the first lattice. Its values may miss the
+  // bound where they are rounded to float32; the second lattice is finer and leaves room for that.
   const double halfStep = bound * kMargin;
   for (const double h : {halfStep, halfStep - roundingError(volume, bound)}) {
     if (!(h > 0.0)) break;

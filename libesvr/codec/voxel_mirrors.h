@@ -24,6 +24,9 @@ class Mirrors {
   Mirrors(const VoxelModel& model, const VoxelLayer& layer, const BrickIndex& index)
       : model_(model), layer_(layer), index_(index), any_(hasMirror(model)) {}
 
+  /// True if the model has a mirror.
+  [[nodiscard]] bool any() const { return any_; }
+
   [[nodiscard]] std::optional<Image> imageOf(Coord voxel) {
     if (!any_) return std::nullopt;
     for (std::size_t a = 0; a < 3; ++a) {

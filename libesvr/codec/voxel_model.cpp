@@ -14,9 +14,9 @@
 namespace esvr::codec {
 namespace {
 
-constexpr std::size_t kCommonShare = 512;     // a code is common if 1 of 512 voxels has it
-constexpr std::size_t kSamples = 2048;        // voxels that are compared with their images
-constexpr double kAlike = 0.4;                // share of equal samples above which a mirror is used
+constexpr std::size_t kCommonShare = 512;  // a code is common if 1 of 512 voxels has it
+constexpr std::size_t kSamples = 2048;     // voxels that are compared with their images
+constexpr double kAlike = 0.4;             // share of equal samples above which a mirror is tried
 constexpr std::int32_t kMaxExtent = 1 << 14;  // voxels; the search is skipped for larger grids
 
 bool vacantAt(const VoxelLayer& layer, std::size_t i) {

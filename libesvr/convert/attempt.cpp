@@ -125,7 +125,7 @@ Attempt withBetterSigns(const ConvertInput& input, Attempt own, ConvertOptions& 
   const FitOptions& fit = options.fit;
   if (own.cancelled() || fit.bothSigns || fit.narrowBand || !saturates(input.source)) return own;
   double seconds = 0.0;
-  // Where it is cancelled, the search continues with `own`, which is marked below.
+  // If these fits are cancelled, the search continues with `own` and marks it as cancelled.
   auto found = addSeconds(seconds, [&] {
     return unlessCancelled([&] { return betterSigned(job, double(own.asked), own); });
   });

@@ -20,8 +20,8 @@ namespace {
 // docs/benchmarks.md, "Voxels or a residual within an error bound", has the sizes that follow.
 /// The ellipsoids of a grid with a residual get this fraction (1/4) of the bytes of its voxels.
 constexpr std::uint64_t kEllipsoidBytesDivisor = 4;
-/// Largest residualRatio() at which ellipsoids are fitted. The ratio of the whole volume is larger
-/// by up to 0.09 (docs/lab-notes.md, "Deciding on a residual").
+/// Largest residualRatio() at which ellipsoids are fitted. The ratio of a whole volume without
+/// symmetry is larger by up to 0.09 (docs/lab-notes.md, "Deciding on a residual").
 constexpr double kPromisingRatio = 0.9;
 
 double absoluteBound(const BoundGoal& goal, const SparseVolume& source) {
@@ -78,7 +78,7 @@ struct Smaller {
 };
 
 /// True if a sample promises that ellipsoids of `bytes` and a residual are smaller than the voxels.
-/// Otherwise the estimate of their bytes is recorded.
+/// Otherwise the estimate of their bytes is recorded, unless `bytes` hold not even one ellipsoid.
 bool isPromising(const Job& job, double bound, std::uint64_t bytes, Smaller& best) {
   const double voxels = double(best.choice.voxels->bytes);
   if (double(bytes) < kMinBytesPerEllipsoid) return false;
@@ -88,7 +88,8 @@ bool isPromising(const Job& job, double bound, std::uint64_t bytes, Smaller& bes
   return false;
 }
 
-/// Takes ellipsoids if they are smaller than the voxels.
+/// Takes ellipsoids if they are smaller than the voxels or an option insists on them. A cancelled
+/// fit counts as one that found none, unless the option leaves no voxels to take instead.
 void tryEllipsoids(const Job& job, double bound, Smaller& best) {
   const std::uint64_t beside = bytesBesideVoxels(job.input);
   const std::uint64_t bytes = (best.choice.voxels->bytes - beside) / kEllipsoidBytesDivisor;

@@ -39,7 +39,7 @@ Conversion asConversion(VoxelCandidate voxels, const ChoiceRecord& choice, FitEn
   return conversion;
 }
 
-/// The same where the figures of ellipsoids are known.
+/// A conversion to voxels that were chosen instead of ellipsoids with these figures.
 Conversion asConversion(VoxelCandidate voxels, const Candidate& ellipsoids, FitEnd end) {
   const ChoiceRecord choice{record(voxels), ellipsoids};
   return asConversion(std::move(voxels), choice, end);
@@ -71,7 +71,7 @@ Conversion ellipsoidsToSize(const Job& job, std::uint64_t bytes) {
 struct PsnrCandidates {
   VoxelCandidate voxels;
   RestOfSearch search;
-  double seconds = 0.0;  ///< those of the search so far
+  double seconds = 0.0;  ///< wall-clock seconds that `search` took before the voxels were known
 };
 
 /// The smaller of voxels and ellipsoids, which must reach the PSNR.
@@ -93,8 +93,8 @@ Conversion smallerOf(const Job& job, const PsnrTarget& target, PsnrCandidates ca
   return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
 }
 
-/// The smaller of exact voxels and ellipsoids that reach the PSNR. If ellipsoids were cancelled,
-/// they are taken, because coding the voxels of a large volume takes long.
+/// The smaller of exact voxels and ellipsoids that reach the PSNR. If the search was cancelled, its
+/// ellipsoids need not reach the PSNR.
 Conversion smallerOfExactAnd(const Job& job, double psnr) {
   ExactVoxels exact(job);
   double seconds = 0.0;
@@ -131,10 +131,9 @@ Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) 
 /// Exact voxels if they keep to a size, otherwise ellipsoids.
 Conversion exactOrEllipsoids(const Job& job, std::uint64_t bytes) {
   ExactVoxels exact(job);
-  const bool fits = exact.takeAtMost(double(bytes));
+  if (!exact.takeAtMost(double(bytes))) return ellipsoidsToSize(job, bytes);
   const ChoiceRecord choice{exact.figures(), {}};
-  if (fits) return asConversion(std::move(exact).take(), choice, FitEnd::kScheduleDone);
-  return ellipsoidsToSize(job, bytes);
+  return asConversion(std::move(exact).take(), choice, FitEnd::kScheduleDone);
 }
 
 bool usesGpu(const Job& job) { return job.options.fit.device.kind == DeviceKind::kCuda; }
@@ -145,10 +144,13 @@ bool fitsBesideTheCoder(const Job& job) {
   return job.options.fit.count && usesGpu(job) && !isLarge(job);
 }
 
-/// The short fits of a GPU need not wait for the coder either. Those of volumes with fewer active
-/// voxels would often not be needed, and their voxels are soon coded.
+/// Smallest number of active voxels from which on a GPU makes the short fits of a PSNR search while
+/// the CPU codes voxels. The voxels of smaller volumes are soon coded, and often show that no fit
+/// is needed.
 constexpr std::uint64_t kMinDraftedVoxels = std::uint64_t{1} << 16;
 
+/// Makes the voxels, and on a GPU the short fits beside them. A search that was cancelled before it
+/// had a fit finds nothing.
 PsnrCandidates psnrCandidates(const Job& job, const PsnrTarget& target) {
   PsnrCandidates made;
   const auto code = [&] { return voxelsForPsnr(job, target); };

@@ -93,10 +93,10 @@ void requirePossible(const ConvertOptions& options) {
     throw UsageError("ellipsoids are not lossless");
 }
 
-/// The sample for a remark on exact voxels. Coding it takes less than a tenth of a second.
+/// The sample for a remark on exact voxels. Coding it takes at most 0.2 s.
 constexpr convert::SampleSize kRemarkSample{.bricks = 512, .runs = 32};
 
-/// The bytes of exact voxels, where ellipsoids were insisted on and take more.
+/// The estimated bytes of exact voxels, if an option insisted on ellipsoids and these take more.
 std::optional<std::uint64_t> smallerExactBytes(const Job& job, const StoredGrid& grid) {
   const bool insists = job.options.representation == Representation::kEllipsoids ||
                        job.options.storage.form == Storage::kFloat32;

@@ -16,7 +16,8 @@ namespace esvr::convert {
 
 /// Estimates the bytes of a grid of exact voxels from a sample. If the runs have 16 bricks, the
 /// estimates of docs/lab-notes.md, "Estimating the bytes of exact voxels", are 0.94 to 1.08 times
-/// the true bytes. Mirror images are not seen: with them, the true bytes may be a sixth.
+/// the true bytes of volumes without symmetry. A sample hardly contains mirror images and copies of
+/// bricks; with them, the estimate may be nine times the true bytes.
 [[nodiscard]] Candidate estimateExactVoxels(const ConvertInput& input, const SampleSize& size);
 
 /// The exact voxels of a job. Those of a large volume are coded only if an estimate says that they
@@ -32,10 +33,11 @@ class ExactVoxels {
   /// larger.
   [[nodiscard]] bool takeAtMost(double bytes);
 
-  /// Bytes, PSNR and seconds: those of the estimate until the voxels are coded.
+  /// Bytes, PSNR and seconds of the coded voxels, or of the estimate if none were coded. Those of a
+  /// volume that is not large are known after takeAtMost() only.
   [[nodiscard]] Candidate figures() const;
 
-  /// The voxels, coded if they were not before.
+  /// The voxels, which are coded if they were not before.
   [[nodiscard]] VoxelCandidate take() &&;
 
  private:

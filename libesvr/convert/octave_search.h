@@ -46,11 +46,11 @@ class OctaveSearch {
   };
   static constexpr double kOvershoot = 1.1;  // so that the aim comes to lie between two trials
   static constexpr double kInside = 0.02;    // distance from both sides, relative to the interval
-  static constexpr int kMaxRepeats = 2;      // further trials on one side before steps are longer
+  static constexpr int kMaxRepeats = 2;      // repeated trials on a side, then steps are longer
 
   double aim_, slope_, next_;
   bool wasLow_ = false;  ///< whether the last trial was below the aim
-  int repeats_ = 0;      ///< trials before it that were on the same side
+  int repeats_ = 0;      ///< number of trials directly before the last one on its side of the aim
   Side low_{kCoarsest - kNarrowest}, high_{kFinest + kNarrowest};
 };
 

@@ -23,7 +23,8 @@ struct PsnrResult {
 [[nodiscard]] PsnrResult searchPsnr(const Job& job, double psnr,
                                     std::optional<std::uint64_t> below = {});
 
-/// The rest of a search whose short fits are done. \param below  see searchPsnr()
+/// The rest of a search whose short fits are done.
+/// \param below  as for searchPsnr()
 using RestOfSearch = std::function<PsnrResult(std::optional<std::uint64_t> below)>;
 
 /// Makes the short fits of a search before `below` is known.

@@ -17,7 +17,7 @@ constexpr std::uint32_t kShortIterations = 200;
 constexpr double kHopelessRatio = 1.15;
 constexpr std::size_t kMinBricks = 32, kMaxBricks = 96;
 constexpr std::size_t kBricksPerRun = 4;
-constexpr std::size_t kSampledFraction = 8;  // a smaller sample of a small volume: one of 8 bricks
+constexpr std::size_t kSampledFraction = 8;  // one of 8 bricks, between these limits
 
 SampleSize trialSize(std::size_t bricks) {
   const std::size_t wanted = std::clamp(bricks / kSampledFraction, kMinBricks, kMaxBricks);
@@ -42,7 +42,7 @@ double bytesWithin(const SparseVolume& volume, double bound, Activity activity) 
   return double(format::putVoxels(boundedLayer(volume, bound, activity)).size());
 }
 
-/// The fits of one sample.
+/// The fits of one sample of a volume, which take the same number of ellipsoids.
 class ResidualTrial {
  public:
   ResidualTrial(const Job& job, double bound, double share)

@@ -1,5 +1,5 @@
 #pragma once
-/// Ends a search with its result so far where a fit is cancelled.
+/// Lets a search end with what it has found before a fit was cancelled.
 
 #include "esvr/error.h"
 

@@ -7,8 +7,8 @@
 namespace esvr::metrics {
 namespace {
 
-/// True if an inactive voxel has the negated background, which distinguishes inside from outside.
-bool isNarrowBand(const SparseVolume& volume) {
+/// True if an inactive voxel has the negated background, as inside the surface of a narrow band.
+bool hasNegatedBackground(const SparseVolume& volume) {
   if (!(volume.background > 0.0f)) return false;
   for (std::size_t i = 0; i < volume.values.size(); ++i)
     if (volume.values[i] == -volume.background &&
@@ -28,7 +28,9 @@ bool isSliceNegative(std::span<const float> values, int z) {
 class BrickCursor {
  public:
   explicit BrickCursor(const SparseVolume& volume)
-      : volume_(volume), origin_(brickOf(volume.origin)), narrowBand_(isNarrowBand(volume)) {}
+      : volume_(volume),
+        origin_(brickOf(volume.origin)),
+        narrowBand_(hasNegatedBackground(volume)) {}
 
   [[nodiscard]] bool done() const { return at_ == volume_.brickCount(); }
   [[nodiscard]] Coord brick() const { return origin_ + volume_.bricks[at_]; }
@@ -38,8 +40,9 @@ class BrickCursor {
   void advance() { ++at_; }
 
   /// The value at a place without a brick between the brick before and this one. In a narrow band,
-  /// the facing slice of the nearest brick along z gives the sign. Without such a brick, the place
-  /// is outside, because a line along z that is inside somewhere crosses the surface.
+  /// the next brick along -z, or else along z, gives the sign with the slice that faces the place.
+  /// Without such bricks the place is outside, because a line along z that is inside somewhere
+  /// crosses the surface.
   [[nodiscard]] float emptyValue(Coord place) const {
     const bool before = at_ > 0 && isInColumn(at_ - 1, place);
     const bool after = !done() && isInColumn(at_, place);

@@ -21,6 +21,7 @@ import rates
 from rates import external_rows, psnr, text
 from volumes import FILES, HIGH, LOW, Volume
 
+
 class Size:
     """The rows of one volume within one budget of bytes."""
 
@@ -222,11 +223,6 @@ def version_lines(versions):
     lines = [f"esvr-compare {versions['esvr']}", f".esvr format {versions['format']}",
              versions['vdb'], versions['cuda']]
     return lines + ([versions['zfp']] if versions['zfp'] else [])
-
-
-def introduction(tables):
-    table = next(iter(tables.values()))
-    return [INTRODUCTION, '    ' + '\n    '.join(version_lines(table['versions'])), '']
 
 
 def reference_cost(table):

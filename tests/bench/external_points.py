@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Measures the rows of external_points.csv, with the compressors' own programs.
 
-    external_points.py again  --data DATA [options]              measures the rows of external_points.csv again
-    external_points.py search --data DATA --bin BUILD [options]  searches new rows for five sizes
+    external_points.py again  --data DATA --out NEW.csv PROGRAMS
+    external_points.py search --data DATA --out NEW.csv PROGRAMS --bin BUILD
 
 Each row of external_points.csv names a volume, a method and its parameter. `again` compresses and decompresses
 the dense array of the volume with that parameter, and prints the bytes and the PSNR of the row beside its own.

@@ -130,7 +130,7 @@ bool storesEllipsoidsWithinABound(const std::string& in, const std::string& out,
   return grid.residual.has_value();
 }
 
-/// The voxels of the cloud take about 2200 bytes, and ellipsoids about 650 bytes after a full fit.
+/// The voxels of the cloud take about 1570 bytes, and ellipsoids with a residual about 780 bytes.
 TEST_F(Vdb2Esvr, SlowTakesEllipsoidsForABoundWhereTheyAreSmaller) {
   EXPECT_TRUE(storesEllipsoidsWithinABound(in(), out(), test::cloud(40), "1000"));
 }

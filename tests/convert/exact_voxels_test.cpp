@@ -1,7 +1,7 @@
-// Plan: the estimate of a sample is near the bytes of exact voxels. With a limit that makes every
-// volume a large one, exact voxels are coded only where they may be small enough: for a fit, a PSNR
-// and a size, one volume has few exact bytes and one has many. A file that takes more bytes than
-// exact voxels because an option insists on ellipsoids is noticed.
+// Plan: the estimate from a sample is near the bytes of exact voxels. A limit of one voxel makes
+// every volume a large one. For a fit, for a PSNR and for a size, one conversion must give exact
+// voxels and one must give ellipsoids. If an option insists on ellipsoids that take more bytes than
+// exact voxels, the conversion must say so.
 
 #include "convert/exact_voxels.h"
 
@@ -22,7 +22,7 @@ using convert::Job;
 
 class LargeVolume : public testing::Test {
  protected:
-  void SetUp() override { options_.fit.iterations = 200; }
+  void SetUp() override { options_.fit.iterations = 20; }
 
   [[nodiscard]] Job job() const { return {input_, options_, kLimits}; }
   [[nodiscard]] bool isExact(const Conversion& conversion) const {
@@ -79,6 +79,7 @@ TEST_F(LargeVolume, ThatCannotHaveAPsnrWithFewerBytesIsExact) {
 
 TEST_F(LargeVolume, SlowHasEllipsoidsWhereTheseAreSmaller) {
   volume_ = test::smoothVolume();
+  options_.fit.iterations = 200;
   const Conversion conversion = convert::convertToPsnr(job(), {35.0});
   EXPECT_GT(conversion.grid.field.ellipsoidCount(), 0u);
   EXPECT_TRUE(conversion.choice->voxels->estimated);

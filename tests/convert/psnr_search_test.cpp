@@ -1,6 +1,7 @@
 // Plan: the search for a PSNR continues a fit that has too few ellipsoids, instead of beginning
 // again with seeds. A search that is cancelled during its first fit keeps this fit. A search whose
-// short fits were made before finds the same; a token of their own cancels them only.
+// short fits are made before the number of bytes is known finds the same ellipsoids, and none if
+// too few bytes are left. A token of their own cancels these short fits.
 
 #include "convert/psnr_search.h"
 
@@ -8,7 +9,6 @@
 
 #include "convert/volumes.h"
 #include "esvr/error.h"
-#include "esvr/grid_coding.h"
 
 namespace esvr {
 namespace {
@@ -57,28 +57,27 @@ TEST(PsnrSearch, KeepsItsFirstFitWhereItIsCancelled) {
 
 ConvertOptions shortOptions() {
   ConvertOptions options;
-  options.fit.iterations = 80;
-  options.fit.kappa = 2.0f;
+  options.fit.iterations = 60;
   return options;
 }
 
 TEST(StartPsnrSearch, FindsWhatTheWholeSearchFinds) {
-  constexpr double kPsnr = 30.0;
+  constexpr double kPsnr = 28.0;
   const GridDescriptor descriptor;
   const SparseVolume volume = test::tubeVolume();
   const ConvertInput input{descriptor, volume};
   const ConvertOptions options = shortOptions();
-  convert::RestOfSearch rest;
-  {
+  const auto rest = [&] {
     const CancelToken cancel;  // ends with the short fits
-    rest = convert::startPsnrSearch({input, options}, kPsnr, cancel);
-  }
-  const auto found = rest({});
-  const auto whole = search(kPsnr, options);
-  ASSERT_TRUE(found.conversion && whole.conversion);
-  EXPECT_EQ(found.conversion->grid.field.ellipsoidCount(),
-            whole.conversion->grid.field.ellipsoidCount());
-  EXPECT_EQ(bytesAdded(found.conversion->grid), bytesAdded(whole.conversion->grid));
+    return convert::startPsnrSearch({input, options}, kPsnr, cancel);
+  };
+  const auto whole = convert::searchPsnr({input, options}, kPsnr).conversion;
+  const auto parted = rest()({}).conversion;
+  ASSERT_TRUE(whole && parted);
+  EXPECT_EQ(parted->grid.quantised, whole->grid.quantised);
+  const auto limited = rest()(100);
+  EXPECT_FALSE(limited.conversion);
+  EXPECT_GT(limited.expected, 100u);
 }
 
 TEST(StartPsnrSearch, EndsWhereItsShortFitsAreCancelled) {
@@ -87,7 +86,7 @@ TEST(StartPsnrSearch, EndsWhereItsShortFitsAreCancelled) {
   const ConvertOptions options = shortOptions();
   CancelToken cancel;
   cancel.cancel();
-  EXPECT_THROW((void)convert::startPsnrSearch({{descriptor, volume}, options}, 30.0, cancel),
+  EXPECT_THROW((void)convert::startPsnrSearch({{descriptor, volume}, options}, 28.0, cancel),
                Cancelled);
 }
 

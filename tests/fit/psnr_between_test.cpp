@@ -1,5 +1,5 @@
-// Plan: the error between voxels agrees with a float64 evaluation at the same positions, for sums
-// that are clamped, for a background that is not 0, and for a narrow band.
+// Plan: the PSNR between voxels is compared with a float64 evaluation at the same positions. The
+// tests use sums that are clamped, a background that is not 0, and a narrow band.
 
 #include "esvr/psnr_between.h"
 
@@ -17,8 +17,8 @@
 namespace esvr {
 namespace {
 
-/// A field of wide ellipsoids that is moved by an offset, in float64 as far as float32 centers
-/// allow.
+/// A field that is moved by an offset. Its ellipsoids must be wide, since its centers are rounded to
+/// float32.
 Field moved(Field field, const Offset& offset) {
   for (std::size_t a = 0; a < 3; ++a)
     for (float& c : field.chunks[0].ellipsoids.center[a]) c = float(double(c) - offset[a]);

@@ -1,6 +1,8 @@
 #pragma once
 /// Errors of a volume against a reference. Sums are formed in float64 over the bricks of either
-/// volume. Empty space within the box counts as voxels but takes no computing time.
+/// volume. Empty space within the box counts as voxels but takes no computing time. Where only one
+/// volume has a brick, the other one has its background or, inside the surface of a narrow band, the
+/// negated background.
 
 #include <cstdint>
 #include <optional>
