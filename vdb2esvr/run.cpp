@@ -64,6 +64,12 @@ void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
              cli::shortNumber(grid.metrics.iou));
 }
 
+/// False if the options exclude ellipsoids, so that no device is needed.
+bool mayFit(const Options& options) {
+  return !std::holds_alternative<LosslessGoal>(options.convert.goal) &&
+         options.convert.representation != Representation::kVoxels;
+}
+
 /// Converts one grid after the other until all are done or the run is interrupted. Grids with the
 /// same voxels are converted once.
 class FileConversion {
@@ -72,7 +78,8 @@ class FileConversion {
                  const cli::Log& log)
       : options_(options),
         log_(log),
-        started_(std::async(std::launch::async, [device] { startDevice(device); })) {
+        started_(mayFit(options) ? std::async(std::launch::async, [device] { startDevice(device); })
+                                 : std::future<void>()) {
     options_.convert.fit.cancel = &cancel;
     options_.convert.fit.device = device;
   }
@@ -137,7 +144,7 @@ class FileConversion {
 
   Options options_;
   const cli::Log& log_;
-  std::future<void> started_;  ///< the device starts while the first grid is read
+  std::future<void> started_;  ///< the device starts while the first grid is read; may be empty
 };
 
 void write(const Options& options, RunRecord& record) {

@@ -35,7 +35,7 @@ std::uint64_t activeVoxelsIn(const SparseVolume& volume, const Box& box) {
 }
 
 /// The PSNR over the box at which the same sum of squares has a PSNR over the active voxels.
-double psnrOverBox(const Job& job, double psnrActive) {
+double boxPsnrFor(const Job& job, double psnrActive) {
   const SparseVolume& source = job.input.source;
   const Box box = job.options.fit.box.value_or(activeBox(source));
   const auto active = std::max<std::uint64_t>(activeVoxelsIn(source, box), 1);
@@ -58,7 +58,7 @@ Conversion convertToPreset(const Job& job, const std::function<Conversion()>& fi
   if (isLarge(job) && job.options.representation != Representation::kVoxels) return fit();
   ConvertOptions options = job.options;
   options.fit = bounded(job.options.fit, activeVoxelCount(job.input.source));
-  const double psnr = psnrOverBox(job, presetPsnr(job.options.fit.preset));
+  const double psnr = boxPsnrFor(job, presetPsnr(job.options.fit.preset));
   return convertToPsnr({job.input, options, job.limits}, {psnr, kSmallEnough, kWorthwhileShare});
 }
 

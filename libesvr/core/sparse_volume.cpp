@@ -1,7 +1,10 @@
 #include "esvr/sparse_volume.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
-#include <limits>
+#include <bit>
 #include <stdexcept>
 
 #include "esvr/error.h"
@@ -28,12 +31,44 @@ void refuseTooFarApart(Coord low, const std::vector<BrickInput>& bricks) {
   }
 }
 
-/// The box of a brick's active voxels, in local coordinates.
-Box localActiveBox(const BrickMask& mask) {
-  Box box;
-  for (int offset = 0; offset < kBrickVoxels; ++offset)
-    if (mask.test(offset)) box.expand(voxelLocal(offset));
-  return box;
+/// Adds the active voxels of a brick to a box.
+void addActive(const BrickMask& mask, Coord corner, Box& box) {
+  std::uint64_t any = 0;  // over all x
+  int first = kBrickSide, last = 0;
+  for (int x = 0; x < kBrickSide; ++x) {
+    any |= mask.words[x];
+    if (mask.words[x] == 0) continue;
+    first = std::min(first, x);
+    last = x;
+  }
+  if (any == 0) return;
+  std::uint64_t line = 0;  // bits of z over all y
+  for (int y = 0; y < kBrickSide; ++y) line |= any >> (kBrickSide * y) & 0xff;
+  const auto low = [](std::uint64_t bits) { return std::countr_zero(bits); };
+  const auto high = [](std::uint64_t bits) { return 63 - std::countl_zero(bits); };
+  box.expand(Box{corner + Coord{first, low(any) / kBrickSide, low(line)},
+                 corner + Coord{last, high(any) / kBrickSide, high(line)}});
+}
+
+/// Expands `none` by all bricks: add(b, result) for each brick.
+template <class Result, class Add>
+Result overBricks(const SparseVolume& volume, const Result& none, Add add) {
+  using Range = tbb::blocked_range<std::size_t>;
+  return tbb::parallel_reduce(
+      Range(0, volume.brickCount()), none,
+      [&](const Range& bricks, Result result) {
+        for (std::size_t b = bricks.begin(); b != bricks.end(); ++b) add(b, result);
+        return result;
+      },
+      [](Result a, const Result& b) {
+        a.expand(b);
+        return a;
+      });
+}
+
+void addActive(std::span<const float> values, const BrickMask& active, ValueRange& range) {
+  for (int i = 0; i < kBrickVoxels; ++i)
+    if (active.test(i)) range.expand(values[i]);
 }
 
 }  // namespace
@@ -57,26 +92,15 @@ std::uint64_t activeVoxelCount(const SparseVolume& volume) {
 }
 
 Box activeBox(const SparseVolume& volume) {
-  Box box;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    const Box local = localActiveBox(volume.active[b]);
-    if (local.empty()) continue;
-    const Coord corner = volume.brickCorner(b);
-    box.expand(Box{corner + local.min, corner + local.max});
-  }
-  return box;
+  return overBricks(volume, Box{}, [&](std::size_t b, Box& box) {
+    addActive(volume.active[b], volume.brickCorner(b), box);
+  });
 }
 
 ValueRange activeRange(const SparseVolume& volume) {
-  ValueRange range{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    const auto values = volume.brickValues(b);
-    for (int i = 0; i < kBrickVoxels; ++i) {
-      if (!volume.active[b].test(i)) continue;
-      range.min = std::min(range.min, values[i]);
-      range.max = std::max(range.max, values[i]);
-    }
-  }
+  const ValueRange range = overBricks(
+      volume, ValueRange::none(),
+      [&](std::size_t b, ValueRange& r) { addActive(volume.brickValues(b), volume.active[b], r); });
   if (range.min > range.max) throw BadInput("the grid has no active voxel");
   return range;
 }

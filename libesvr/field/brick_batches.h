@@ -7,16 +7,26 @@
 
 #include "esvr/coord.h"
 #include "esvr/ellipsoids.h"
+#include "esvr/sparse_volume.h"
 
 namespace esvr {
 
 /// Number of bricks that are evaluated at once. Their values take 32 MB.
 inline constexpr std::size_t kBatchBricks = 16384;
 
-/// A function of a brick's index corner and its kBrickVoxels values, which it may change.
-using BrickVisitor = std::function<void(Coord, std::span<float>)>;
+/// Some bricks and their values.
+struct BrickBatch {
+  std::span<const Coord> corners;  ///< index corners
+  std::span<float> all;  ///< kBrickVoxels values for each brick; a visitor may change them
 
-/// Calls `visit` for every brick, in order, from the calling thread.
-void forEachBrick(const Field& field, std::span<const Coord> corners, const BrickVisitor& visit);
+  [[nodiscard]] std::size_t size() const { return corners.size(); }
+  [[nodiscard]] std::span<float> values(std::size_t b) const {
+    return all.subspan(b * kBrickVoxels, kBrickVoxels);
+  }
+};
+using BatchVisitor = std::function<void(const BrickBatch&)>;
+
+/// Calls `visit` for all bricks, in order and kBatchBricks at a time, from the calling thread.
+void forEachBatch(const Field& field, std::span<const Coord> corners, const BatchVisitor& visit);
 
 }  // namespace esvr

@@ -1,5 +1,8 @@
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "esvr/error.h"
 #include "esvr/field.h"
@@ -58,12 +61,18 @@ SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
   if (corners.empty()) return volume;
   volume.origin = smallest(corners);
   refuseTooFarApart(volume.origin, corners);
-  forEachBrick(field, corners, [&](Coord corner, std::span<float> values) {
-    const BrickMask mask = settle(rule, values);
-    if (mask.count() == 0) return;
-    volume.bricks.push_back(brickOf(corner - volume.origin));
-    volume.active.push_back(mask);
-    volume.values.insert(volume.values.end(), values.begin(), values.end());
+  std::vector<BrickMask> masks(std::min(kBatchBricks, corners.size()));
+  volume.values.reserve(corners.size() * kBrickVoxels);
+  forEachBatch(field, corners, [&](const BrickBatch& batch) {
+    tbb::parallel_for(std::size_t{0}, batch.size(),
+                      [&](std::size_t b) { masks[b] = settle(rule, batch.values(b)); });
+    for (std::size_t b = 0; b < batch.size(); ++b) {
+      if (masks[b].count() == 0) continue;
+      const auto values = batch.values(b);
+      volume.bricks.push_back(brickOf(batch.corners[b] - volume.origin));
+      volume.active.push_back(masks[b]);
+      volume.values.insert(volume.values.end(), values.begin(), values.end());
+    }
   });
   tightenOrigin(volume);
   return volume;

@@ -1,5 +1,7 @@
 #include "esvr/psnr_between.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -58,8 +60,12 @@ class BetweenError {
     const Field moved = movedBack(field, offset);
     const auto corners = cornersFor(moved);
     double squares = 0.0;
-    forEachBrick(moved, corners, [&](Coord corner, std::span<const float> sums) {
-      squares += squaresOf(corner, sums, offset);
+    std::vector<double> ofBricks(std::min(kBatchBricks, corners.size()));
+    forEachBatch(moved, corners, [&](const BrickBatch& batch) {
+      tbb::parallel_for(std::size_t{0}, batch.size(), [&](std::size_t b) {
+        ofBricks[b] = squaresOf(batch.corners[b], batch.values(b), offset);
+      });
+      for (std::size_t b = 0; b < batch.size(); ++b) squares += ofBricks[b];
     });
     return squares;
   }

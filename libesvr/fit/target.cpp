@@ -1,19 +1,32 @@
 #include "fit/target.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "esvr/metrics.h"
 
 namespace esvr {
 namespace {
 
-double largestMagnitude(const SparseVolume& volume) {
-  double largest = 0.0;
-  for (const float v : volume.values)
-    largest = std::max(largest, std::abs(double(v) - double(volume.background)));
-  return largest;
+/// The range of all values, active or not.
+ValueRange rangeOfAll(std::span<const float> values) {
+  using Range = tbb::blocked_range<std::size_t>;
+  return tbb::parallel_reduce(
+      Range(0, values.size(), kBrickVoxels), ValueRange::none(),
+      [&](const Range& part, ValueRange range) {
+        for (std::size_t i = part.begin(); i != part.end(); ++i) range.expand(values[i]);
+        return range;
+      },
+      [](ValueRange a, const ValueRange& b) {
+        a.expand(b);
+        return a;
+      });
 }
 
 /// The power of two that scales `largest` to [0.5, 1).
@@ -31,18 +44,22 @@ FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box) 
   target.bricks = volume.bricks;
   target.active = &volume.active;
   target.activeVoxels = activeVoxelCount(volume);
-  target.scale = powerOfTwoScale(largestMagnitude(volume));
+  const ValueRange range = rangeOfAll(volume.values);
+  const double background = volume.background;
+  target.scale = powerOfTwoScale(std::max(range.max - background, background - range.min));
   target.peak = peakOf(volume) * target.scale;
   const Box b = box.value_or(activeBox(volume));
   target.boxVoxels = b.volume();
   target.box = {b.min - volume.origin, b.max - volume.origin};
+  const auto scaled = [&](float v) { return float((double(v) - background) * target.scale); };
+  target.lowest = std::min(0.0, double(scaled(range.min)));
+  target.highest = std::max(0.0, double(scaled(range.max)));
   target.values.resize(volume.values.size());
-  std::transform(volume.values.begin(), volume.values.end(), target.values.begin(), [&](float v) {
-    return float((double(v) - double(volume.background)) * target.scale);
+  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t n) {
+    const auto values = volume.brickValues(n);
+    std::transform(values.begin(), values.end(),
+                   target.values.begin() + std::ptrdiff_t(n * kBrickVoxels), scaled);
   });
-  const auto [low, high] = std::minmax_element(target.values.begin(), target.values.end());
-  target.lowest = std::min(0.0, double(*low));
-  target.highest = std::max(0.0, double(*high));
   return target;
 }
 

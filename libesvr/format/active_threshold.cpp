@@ -1,5 +1,8 @@
 #include "format/active_threshold.h"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <limits>
@@ -46,6 +49,15 @@ class Histogram {
     bin.cost += dropped * dropped - kept * kept;
   }
 
+  void add(const Histogram& other) {
+    error_ += other.error_;
+    for (std::size_t k = 0; k < bins_.size(); ++k) {
+      bins_[k].active += other.bins_[k].active;
+      bins_[k].inactive += other.bins_[k].inactive;
+      bins_[k].cost += other.bins_[k].cost;
+    }
+  }
+
   [[nodiscard]] ThresholdChoice best(std::uint64_t sourceActive) const {
     Tally kept = total();
     const double allowed = kAllowedShare * error_;
@@ -80,19 +92,35 @@ class Histogram {
   std::vector<Tally> bins_ = std::vector<Tally>(kBins);
 };
 
+void addBrick(const SparseVolume& source, const VoxelRule& rule, Coord corner,
+              std::span<const float> values, Histogram& histogram) {
+  const auto b = findBrick(source, brickOf(corner - source.origin));
+  for (int v = 0; v < kBrickVoxels; ++v) {
+    const float wanted = b ? source.brickValues(*b)[v] : source.background;
+    histogram.add(rule, values[v], wanted, b && source.active[*b].test(v));
+  }
+}
+
+/// Bricks of a batch that are counted by one thread. A histogram takes 0.8 MB.
+constexpr std::size_t kBricksOfPart = 1024;
+
 }  // namespace
 
 ThresholdChoice chooseThreshold(const SparseVolume& source, const Field& field,
                                 const VoxelRule& rule, std::span<const Coord> bricks) {
-  Histogram histogram;
-  forEachBrick(field, bricks, [&](Coord corner, std::span<float> values) {
-    const auto b = findBrick(source, brickOf(corner - source.origin));
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const float wanted = b ? source.brickValues(*b)[v] : source.background;
-      histogram.add(rule, values[v], wanted, b && source.active[*b].test(v));
-    }
+  // The bricks of a part do not depend on the number of threads, so that sums are the same for any.
+  const std::size_t batch = std::min(kBatchBricks, bricks.size());
+  std::vector<Histogram> parts((batch + kBricksOfPart - 1) / kBricksOfPart);
+  forEachBatch(field, bricks, [&](const BrickBatch& sums) {
+    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
+      const std::size_t end = std::min((p + 1) * kBricksOfPart, sums.size());
+      for (std::size_t b = p * kBricksOfPart; b < end; ++b)
+        addBrick(source, rule, sums.corners[b], sums.values(b), parts[p]);
+    });
   });
-  return histogram.best(activeVoxelCount(source));
+  Histogram whole;
+  for (const Histogram& part : parts) whole.add(part);
+  return whole.best(activeVoxelCount(source));
 }
 
 }  // namespace esvr::format

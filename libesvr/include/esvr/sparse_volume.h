@@ -3,10 +3,12 @@
 /// elsewhere. It is the library's only container for voxels; vdb_io.h converts OpenVDB and NanoVDB
 /// grids to it and back. Its size depends on the number of bricks and not on the bounding box.
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -83,6 +85,17 @@ struct SparseVolume {
 
 struct ValueRange {
   float min = 0.0f, max = 0.0f;
+
+  /// The range of no value, from which a range is expanded.
+  [[nodiscard]] static constexpr ValueRange none() {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    return {kInfinity, -kInfinity};
+  }
+  void expand(float v) { expand({v, v}); }
+  void expand(const ValueRange& r) {
+    min = std::min(min, r.min);
+    max = std::max(max, r.max);
+  }
 };
 /// Smallest and largest value of the active voxels.
 /// \throws BadInput  there is no active voxel
