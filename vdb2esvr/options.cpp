@@ -127,8 +127,13 @@ void addFitOptions(cli::po::options_description& options) {
      "fit by the paper's method, for comparison; --help paper lists the keys");
   // clang-format on
   cli::addDevice(options);
-  options.add_options()("max-vram", value<double>()->value_name("GB"),
-                        "GPU memory to use (default: all free memory)");
+  // clang-format off
+  options.add_options()
+    ("max-vram", value<double>()->value_name("GB"),
+     "GPU memory to use (default: all free memory); a volume that does not fit is fitted in chunks")
+    ("chunk-voxels", value<std::int64_t>()->value_name("N"),
+     "fit the volume in chunks of at most N active voxels (default: one chunk if it fits)");
+  // clang-format on
 }
 
 void addFileOptions(cli::po::options_description& options) {
@@ -184,6 +189,8 @@ FitOptions fitOptions(const Arguments& a) {
     throw UsageError("--voxel-share needs --fit-for drawing");
   if (const auto gigabytes = bounded<double>(a, "max-vram", kMinVram, kMaxVram))
     fit.maxDeviceBytes = std::size_t(*gigabytes * 1e9);
+  fit.chunkVoxels = bounded<std::uint64_t>(a, "chunk-voxels", std::int64_t{1},
+                                           std::numeric_limits<std::int64_t>::max());
   fit.kappa = bounded<float>(a, "kappa", -kLargestKappa, kLargestKappa);
   if (const auto box = a.find<std::string>("box")) fit.box = cli::parseBox(*box);
   fit.seed =
@@ -264,7 +271,7 @@ void readSize(const Arguments& a, Options& options) {
 void readPaper(const Arguments& a, Options& options) {
   const auto given = a.find<std::vector<std::string>>("paper");
   if (!given) return;
-  refuseWith(a, "paper", {"kappa", "iterations", "preset", "fit-for"});
+  refuseWith(a, "paper", {"kappa", "iterations", "preset", "fit-for", "chunk-voxels"});
   options.paper = readPaperMethod(*given);
   options.paper->countHits = a.get<bool>("hits");
   StorageOptions& storage = options.convert.storage;

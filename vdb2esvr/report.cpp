@@ -103,7 +103,8 @@ Json asked(const Options& options) {
           {"seed", fit.seed},
           {"threads", options.threads > 0 ? Json(options.threads) : Json(nullptr)},
           {"device", options.device},
-          {"max_vram", orNull(fit.maxDeviceBytes)}};
+          {"max_vram", orNull(fit.maxDeviceBytes)},
+          {"chunk_voxels", orNull(fit.chunkVoxels)}};
 }
 
 Json sourceOf(const ConvertedGrid& grid) {
@@ -136,6 +137,7 @@ Json fitOf(const ConvertedGrid& grid) {
           {"device", grid.device},
           {"device_bytes", fit.deviceBytes},
           {"device_full", fit.deviceFull},
+          {"chunks", fit.chunks},
           {"kappa_learned", fit.kappaLearned},
           {"pairs", fit.pairs},
           {"hits", orNull(grid.hits)},

@@ -7,8 +7,8 @@
 
 namespace esvr {
 
-[[nodiscard]] inline bool isEmpty(const FitTarget& target) {
-  return target.lowest == 0.0 && target.highest == 0.0;
+[[nodiscard]] inline bool isEmpty(const TargetScale& scale) {
+  return scale.lowest == 0.0 && scale.highest == 0.0;
 }
 
 [[nodiscard]] inline FitResult emptyFit(const SparseVolume& volume, float kappa) {

@@ -1,58 +1,28 @@
 #include "esvr/fit.h"
 
-#include <algorithm>
-#include <cmath>
+#include <string>
 
 #include "esvr/error.h"
+#include "fit/chunks/chunks_for.h"
+#include "fit/chunks/fit_in_chunks.h"
 #include "fit/empty_fit.h"
 #include "fit/export_field.h"
+#include "fit/fit_plan.h"
 #include "fit/import_field.h"
 #include "fit/run.h"
 
 namespace esvr {
 namespace {
 
-struct PresetValues {
-  double voxelsPerEllipsoid;  ///< active voxels per ellipsoid
-  std::uint32_t iterations;   ///< iterations on the CPU
-};
-PresetValues valuesOf(Preset preset) {
-  switch (preset) {
-    case Preset::kDraft:
-      return {100.0, 400};
-    case Preset::kHigh:
-      return {12.0, 5000};
-    case Preset::kStandard:
-      break;
-  }
-  return {35.0, 1500};
-}
-
-void check(const FitOptions& options) {
-  if (options.count && *options.count == 0) throw UsageError("count must be at least 1");
-  if (options.iterations && *options.iterations == 0)
-    throw UsageError("iterations must be at least 1");
-  if (options.seconds && !(*options.seconds > 0.0)) throw UsageError("seconds must be positive");
-  if (options.psnr && !std::isfinite(*options.psnr)) throw UsageError("psnr must be finite");
-  if (options.kappa && !std::isfinite(*options.kappa)) throw UsageError("kappa must be finite");
-  if (!(options.voxelShare >= 0.0 && options.voxelShare <= 1.0))
-    throw UsageError("the share of iterations at voxels must be between 0 and 1");
-  if (options.box && options.box->empty()) throw UsageError("the box is empty");
-}
-
-std::vector<Ellipsoid> startOf(const FitOptions& options, Coord origin, double scale) {
-  if (!options.start) return {};
-  return importField(*options.start, origin, scale);
-}
-
-float firstKappa(const FitOptions& options, const Tuning& tuning) {
-  if (options.kappa) return *options.kappa;
-  return options.start ? options.start->kernel.kappa : tuning.firstKappa;
-}
-
-RunPlan planFor(const FitTarget& target, const FitOptions& options) {
+RunPlan planFor(const FitTarget& target, const FitOptions& options, const Tuning& tuning,
+                Coord origin) {
   RunPlan plan;
   plan.count = plannedCount(options, target.activeVoxels);
+  plan.firstCount = firstSeeds(plan.count, tuning);
+  if (options.start) {
+    plan.start = stateOf(importField(*options.start, origin, target.scale));
+    plan.firstCount = plan.start.ellipsoids.size();
+  }
   plan.iterations = plannedIterations(options);
   plan.psnr = options.psnr;
   plan.seconds = options.seconds;
@@ -60,51 +30,14 @@ RunPlan planFor(const FitTarget& target, const FitOptions& options) {
   return plan;
 }
 
-ValueRange rangeOf(float background, const FitTarget& target) {
-  return {float(background + target.lowest / target.scale),
-          float(background + target.highest / target.scale)};
-}
-
-bool anyNegative(const Field& field) {
-  return std::any_of(field.chunks.begin(), field.chunks.end(), [](const Chunk& chunk) {
-    const auto& i = chunk.ellipsoids.intensity;
-    return std::any_of(i.begin(), i.end(), [](float v) { return v < 0.0f; });
-  });
-}
-
-}  // namespace
-
-std::size_t plannedCount(const FitOptions& options, std::uint64_t activeVoxels) {
-  const double each = valuesOf(options.preset).voxelsPerEllipsoid;
-  const auto byPreset = std::size_t(double(activeVoxels) / each);
-  return std::clamp<std::size_t>(options.count.value_or(byPreset), 1,
-                                 std::max<std::size_t>(activeVoxels, 1));
-}
-
-std::uint32_t plannedIterations(const FitOptions& options) {
-  const std::uint32_t onCpu = valuesOf(options.preset).iterations;
-  // A GPU makes a third more, because they take little time there.
-  const bool onGpu = options.device.kind == DeviceKind::kCuda;
-  return options.iterations.value_or(onGpu ? onCpu * 4 / 3 : onCpu);
-}
-
-FitResult fit(const SparseVolume& volume, const FitOptions& options) {
-  check(options);
+/// Fits all bricks together.
+FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
+                   const TargetScale& scale) {
   const Tuning tuning;
-  FitTarget target = makeTarget(volume, options.box);
-  target.saturates = true;
-  target.narrowBand = options.narrowBand;
-  target.bothSigns = options.bothSigns.value_or(false);
-  if (options.fitFor == FitFor::kDrawing) target.voxelShare = options.voxelShare;
-  if (isEmpty(target)) return emptyFit(volume, options.kappa.value_or(Kernel{}.kappa));
-
+  FitTarget target = makeTarget(volume, boxOf(volume, options.box), scale);
+  applyOptions(options, target);
   Recorder recorder(target, options);
-  const auto start = startOf(options, volume.origin, target.scale);
-  RunPlan plan = planFor(target, options);
-  plan.start = start;
-  if (start.size() > plan.count)
-    throw UsageError("a fit of " + std::to_string(plan.count) +
-                     " ellipsoids cannot continue from " + std::to_string(start.size()));
+  const RunPlan plan = planFor(target, options, tuning, volume.origin);
   OptimiserOptions optimiserOptions{{}, options.seed, options.device, options.maxDeviceBytes};
   optimiserOptions.kernel.kappa = firstKappa(options, tuning);
 
@@ -115,7 +48,8 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   recorder.record(*optimiser, end.iterations);
 
   FitResult result;
-  result.field = exportField(optimiser->ellipsoids(),
+  const auto ellipsoids = optimiser->ellipsoids();
+  result.field = exportField(ellipsoids,
                              {volume.origin, target.scale, volume.background, optimiser->kernel()});
   result.field.fitFor = options.fitFor;
   result.range = rangeOf(volume.background, target);
@@ -123,13 +57,29 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   result.end = end.end;
   result.curve = recorder.curve();
   result.wanted = plan.count;
+  result.chunks = 1;
   result.deviceBytes = optimiser->deviceBytes();
   result.deviceFull = optimiser->deviceFull();
   result.pairs = optimiser->pairCount();
-  result.signedIntensities = anyNegative(result.field);
+  result.signedIntensities = anyNegative(ellipsoids);
   result.secondsSeed = optimiser->secondsSeeding();
   result.secondsOptimise = recorder.seconds() - result.secondsSeed;
   return result;
+}
+
+}  // namespace
+
+FitResult fit(const SparseVolume& volume, const FitOptions& options) {
+  checkOptions(options);
+  const TargetScale scale = scaleOf(volume);
+  if (isEmpty(scale)) return emptyFit(volume, options.kappa.value_or(Kernel{}.kappa));
+  const std::size_t count = plannedCount(options, activeVoxelCount(volume));
+  if (options.start && options.start->ellipsoidCount() > count)
+    throw UsageError("a fit of " + std::to_string(count) + " ellipsoids cannot continue from " +
+                     std::to_string(options.start->ellipsoidCount()));
+  const auto chunks = chunksFor(volume, options);
+  return chunks.size() > 1 ? fitInChunks(volume, options, chunks)
+                           : fitWhole(volume, options, scale);
 }
 
 }  // namespace esvr

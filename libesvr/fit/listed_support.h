@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "field/line_form.h"
+#include "fit/ellipsoid.h"
 
 namespace esvr {
 
@@ -17,6 +18,11 @@ struct ListedSupport {
   double reach;  ///< radius in the unit frame, including the slack
   bool refused;  ///< true if a step was refused since the lists were built
 };
+
+/// The support of an ellipsoid that no list has held, which gets the largest slack.
+[[nodiscard]] inline ListedSupport unlisted(const Ellipsoid& p) {
+  return {p.center, p.L, 0.0, true};
+}
 
 /// The rule that chooses the slack and ends the lists. docs/lab-notes.md has the measurements
 /// ("When pair lists are built again").

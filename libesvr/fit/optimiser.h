@@ -5,10 +5,12 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "esvr/device.h"
 #include "esvr/fit.h"
+#include "fit/adam.h"
 #include "fit/ellipsoid.h"
 #include "fit/target.h"
 #include "fit/tuning.h"
@@ -38,9 +40,25 @@ struct FitErrors {
   }
 };
 
+/// The ellipsoids of a fit and the moments of their gradients, with which it can continue.
+struct FitState {
+  std::vector<Ellipsoid> ellipsoids;
+  std::vector<AdamState> adam;  ///< one for each ellipsoid
+};
+
+/// The state of ellipsoids that have taken no step.
+[[nodiscard]] inline FitState stateOf(std::vector<Ellipsoid> ellipsoids) {
+  std::vector<AdamState> adam(ellipsoids.size());
+  return {std::move(ellipsoids), std::move(adam)};
+}
+
 class Optimiser {
  public:
   virtual ~Optimiser() = default;
+
+  /// Continues from a state.
+  virtual void setState(const FitState& state) = 0;
+  [[nodiscard]] virtual FitState state() const = 0;
 
   /// Replaces the ellipsoids. The new ones have taken no step yet.
   virtual void setEllipsoids(std::span<const Ellipsoid> ellipsoids) = 0;

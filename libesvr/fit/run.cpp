@@ -12,12 +12,6 @@ namespace {
 constexpr std::uint32_t kCurvePoints = 32;
 constexpr double kReachedMargin = 1e-3;  // dB, more than the rounding to float32 can cost
 
-std::size_t firstCount(const RunPlan& plan, const Tuning& tuning) {
-  if (!plan.start.empty()) return plan.start.size();
-  const auto share = std::size_t(std::llround(tuning.firstShare * double(plan.count)));
-  return std::clamp<std::size_t>(share, 1, plan.count);
-}
-
 class FitRun {
  public:
   FitRun(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,
@@ -26,11 +20,14 @@ class FitRun {
         target_(target),
         recorder_(recorder),
         plan_(plan),
-        schedule_{firstCount(plan, tuning), plan.count, plan.iterations, tuning},
-        kappa_(tuning.kappaStep) {}
+        schedule_{plan.firstCount, plan.count, plan.iterations, tuning},
+        kappa_(tuning.kappaStep),
+        first_(iterationAt(plan.from)),
+        last_(iterationAt(plan.to)),
+        done_(first_) {}
 
   RunEnd run() {
-    if (!plan_.start.empty()) optimiser_.setEllipsoids(plan_.start);
+    if (!plan_.start.ellipsoids.empty()) optimiser_.setState(plan_.start);
     return {iterateToEnd(), done_};
   }
 
@@ -56,10 +53,14 @@ class FitRun {
   /// The fraction of the run that is done after `ahead` more iterations.
   [[nodiscard]] double fractionDone(std::uint32_t ahead = 0) const {
     if (!plan_.seconds) return double(done_ + ahead) / schedule_.iterations;
-    return std::min(1.0, recorder_.seconds() / *plan_.seconds);
+    const double share = std::min(1.0, recorder_.seconds() / *plan_.seconds);
+    return plan_.from + share * (plan_.to - plan_.from);
   }
   [[nodiscard]] bool finished() const {
-    return plan_.seconds ? fractionDone() >= 1.0 : done_ >= schedule_.iterations;
+    return plan_.seconds ? fractionDone() >= plan_.to : done_ >= last_;
+  }
+  [[nodiscard]] std::uint32_t iterationAt(double fraction) const {
+    return std::uint32_t(std::lround(fraction * schedule_.iterations));
   }
   [[nodiscard]] std::uint32_t recordInterval() const {
     return std::max(schedule_.eventInterval(), schedule_.iterations / kCurvePoints);
@@ -70,7 +71,7 @@ class FitRun {
     const auto until = [&](std::uint32_t interval) { return interval - done_ % interval; };
     std::uint32_t count = std::min(
         {optimiser_.batchSize(), until(schedule_.eventInterval()), until(recordInterval())});
-    if (!plan_.seconds) count = std::min(count, schedule_.iterations - done_);
+    if (!plan_.seconds) count = std::min(count, last_ - done_);
     std::vector<double> factors;
     for (std::uint32_t k = 0; k < count; ++k)
       factors.push_back(schedule_.stepAt(fractionDone(k), done_ + k));
@@ -86,8 +87,8 @@ class FitRun {
 
   void events() {
     const double fraction = fractionDone();
-    if (plan_.learnKappa && done_ > 0) descendKappa(schedule_.stepAt(fraction, done_));
-    if (done_ > 0)
+    if (plan_.learnKappa && done_ > first_) descendKappa(schedule_.stepAt(fraction, done_));
+    if (done_ > first_)  // there are no gradients before
       optimiser_.relocate(schedule_.relocationsAt(fraction, optimiser_.ellipsoidCount()));
     optimiser_.growTo(schedule_.countAt(fraction));
   }
@@ -112,10 +113,16 @@ class FitRun {
   const RunPlan& plan_;
   Schedule schedule_;
   KappaDescent kappa_;
-  std::uint32_t done_ = 0;
+  std::uint32_t first_, last_;  ///< iterations at the ends of the part
+  std::uint32_t done_;
 };
 
 }  // namespace
+
+std::size_t firstSeeds(std::size_t count, const Tuning& tuning) {
+  const auto share = std::size_t(std::llround(tuning.firstShare * double(count)));
+  return std::clamp<std::size_t>(share, 1, count);
+}
 
 RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,
            const Tuning& tuning) {

@@ -12,13 +12,18 @@ namespace esvr {
 
 /// The parameters of a run, with all defaults resolved.
 struct RunPlan {
+  std::size_t firstCount = 0;     ///< ellipsoids at the start of growth
   std::size_t count = 0;          ///< ellipsoids at the end of growth
   std::uint32_t iterations = 0;   ///< length of the schedule
   std::optional<double> psnr;     ///< dB over the box; the run ends as soon as it is reached
   std::optional<double> seconds;  ///< time limit; replaces `iterations` as length of the schedule
-  std::span<const Ellipsoid> start{};  ///< ellipsoids to begin with; empty: seeds
-  bool learnKappa = false;             ///< whether kappa is fitted or stays the same
+  FitState start{};               ///< ellipsoids to begin with; empty: seeds
+  bool learnKappa = false;        ///< whether kappa is fitted or stays the same
+  double from = 0.0, to = 1.0;    ///< the part of the schedule that is run
 };
+
+/// The number of seeds with which a fit of `count` ellipsoids begins.
+[[nodiscard]] std::size_t firstSeeds(std::size_t count, const Tuning& tuning);
 
 struct RunEnd {
   FitEnd end;

@@ -37,30 +37,50 @@ double powerOfTwoScale(double largest) {
   return std::ldexp(1.0, -exponent);
 }
 
+float scaled(float value, double background, double scale) {
+  return float((double(value) - background) * scale);
+}
+
 }  // namespace
 
-FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box) {
-  FitTarget target;
-  target.bricks = volume.bricks;
-  target.active = &volume.active;
-  target.activeVoxels = activeVoxelCount(volume);
+TargetScale scaleOf(const SparseVolume& volume) {
   const ValueRange range = rangeOfAll(volume.values);
   const double background = volume.background;
-  target.scale = powerOfTwoScale(std::max(range.max - background, background - range.min));
-  target.peak = peakOf(volume) * target.scale;
+  TargetScale scale;
+  scale.scale = powerOfTwoScale(std::max(range.max - background, background - range.min));
+  scale.peak = peakOf(volume) * scale.scale;
+  scale.lowest = std::min(0.0, double(scaled(range.min, background, scale.scale)));
+  scale.highest = std::max(0.0, double(scaled(range.max, background, scale.scale)));
+  return scale;
+}
+
+Box boxOf(const SparseVolume& volume, const std::optional<Box>& box) {
   const Box b = box.value_or(activeBox(volume));
-  target.boxVoxels = b.volume();
-  target.box = {b.min - volume.origin, b.max - volume.origin};
-  const auto scaled = [&](float v) { return float((double(v) - background) * target.scale); };
-  target.lowest = std::min(0.0, double(scaled(range.min)));
-  target.highest = std::max(0.0, double(scaled(range.max)));
-  target.values.resize(volume.values.size());
-  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t n) {
-    const auto values = volume.brickValues(n);
+  return {b.min - volume.origin, b.max - volume.origin};
+}
+
+FitTarget makeTarget(const SparseVolume& part, const Box& box, const TargetScale& scale) {
+  FitTarget target;
+  static_cast<TargetScale&>(target) = scale;
+  target.bricks = part.bricks;
+  target.seedBricks = part.brickCount();
+  target.active = &part.active;
+  target.activeVoxels = activeVoxelCount(part);
+  target.boxVoxels = box.volume();
+  target.box = box;
+  target.values.resize(part.values.size());
+  const double background = part.background;
+  tbb::parallel_for(std::size_t{0}, part.brickCount(), [&](std::size_t b) {
+    const auto values = part.brickValues(b);
     std::transform(values.begin(), values.end(),
-                   target.values.begin() + std::ptrdiff_t(n * kBrickVoxels), scaled);
+                   target.values.begin() + std::ptrdiff_t(b * kBrickVoxels),
+                   [&](float v) { return scaled(v, background, scale.scale); });
   });
   return target;
+}
+
+FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box) {
+  return makeTarget(volume, boxOf(volume, box), scaleOf(volume));
 }
 
 }  // namespace esvr

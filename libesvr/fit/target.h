@@ -1,6 +1,7 @@
 #pragma once
 /// The target of a fit: the volume less its background, scaled by a power of two.
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -9,18 +10,26 @@
 
 namespace esvr {
 
-struct FitTarget {
-  std::vector<Coord> bricks;  ///< see SparseVolume::bricks
+/// The units of a target and its range.
+struct TargetScale {
+  double scale = 1.0;                  ///< a power of two, so that scaling is exact
+  double peak = 1.0;                   ///< scaled peakOf(volume)
+  double lowest = 0.0, highest = 0.0;  ///< range of the scaled values and 0
+};
+
+struct FitTarget : TargetScale {
+  std::vector<Coord> bricks;   ///< relative to the volume's origin, in bricks
+  std::size_t seedBricks = 0;  ///< number of bricks, the first ones, in which seeds are placed
   std::vector<float> values;  ///< (value - background) * scale, at most 1 in magnitude
-  double scale = 1.0;         ///< a power of two, so that scaling is exact
-  Box box;                    ///< box of the PSNR, relative to the volume's origin
+  /// Sums of ellipsoids that are not fitted, at the same voxels as `values`. They are added to the
+  /// sum of the fitted ones. Empty: there are none.
+  std::vector<float> constants;
+  Box box;  ///< box of the PSNR, relative to the volume's origin
   double boxVoxels = 0.0;
   std::uint64_t activeVoxels = 0;
-  double peak = 1.0;                   ///< scaled peakOf(volume)
-  double lowest = 0.0, highest = 0.0;  ///< range of `values` and 0
-  bool saturates = false;              ///< sums are clamped to this range
-  bool narrowBand = false;             ///< see FitOptions
-  bool bothSigns = false;              ///< see FitOptions
+  bool saturates = false;   ///< sums are clamped to this range
+  bool narrowBand = false;  ///< see FitOptions
+  bool bothSigns = false;   ///< see FitOptions
   /// Share of the iterations that compare at the voxels; the others compare between them.
   double voxelShare = 1.0;
   const std::vector<BrickMask>* active = nullptr;  ///< active masks of the volume's bricks
@@ -30,8 +39,19 @@ struct FitTarget {
   [[nodiscard]] bool betweenVoxels() const { return voxelShare < 1.0; }
 };
 
+/// \throws BadInput  the volume has no active voxel
+[[nodiscard]] TargetScale scaleOf(const SparseVolume& volume);
+
+/// The given box or else the box of all active voxels, relative to the volume's origin.
+[[nodiscard]] Box boxOf(const SparseVolume& volume, const std::optional<Box>& box);
+
 /// Makes the target of a volume, which must outlive it.
 /// \throws BadInput  the volume has no active voxel
 [[nodiscard]] FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box);
+
+/// Makes the target of a part of a volume, with the units of the whole.
+/// \param box  box of the PSNR, relative to the volume's origin
+[[nodiscard]] FitTarget makeTarget(const SparseVolume& part, const Box& box,
+                                   const TargetScale& scale);
 
 }  // namespace esvr

@@ -37,6 +37,7 @@ Table withCommon(Table tests) {
 
 Table vdb2esvrTests() {
   return {{"--box", "Vdb2EsvrOption.boxIsWherePsnrIsTaken"},
+          {"--chunk-voxels", "Vdb2EsvrOption.chunkVoxelsDivideTheFit"},
           {"--count", "Vdb2EsvrOption.countIsTheNumberOfEllipsoids"},
           {"--device", "Vdb2EsvrOption.devicesAreTakenAsNamed"},
           {"--fit-for", "Vdb2EsvrOption.fitForDrawingIsStoredInTheFile"},

@@ -103,6 +103,14 @@ TEST_F(Vdb2EsvrOption, secondsEndTheFit) {
   EXPECT_EQ(grid["fit"]["end"], "time up");
 }
 
+TEST_F(Vdb2EsvrOption, chunkVoxelsDivideTheFit) {
+  const Json one = quick({"--count", "40"}),
+             several = quick({"--count", "40", "--chunk-voxels", "600"});
+  EXPECT_EQ(one["fit"]["chunks"], 1);
+  EXPECT_GT(several["fit"]["chunks"], 1);
+  EXPECT_GT(several["metrics"]["psnr_box"], one["metrics"]["psnr_box"].get<double>() - 3.0);
+}
+
 TEST_F(Vdb2EsvrOption, presetsTakeMoreAndMoreIterations) {
   const auto last = [&](const char* preset) {
     const Json report =

@@ -74,7 +74,7 @@ std::vector<Ellipsoid> CpuOptimiser::newSeeds(std::size_t count) {
   pass_.residuals(ellipsoids_, residuals_);
   stale_ = true;  // the caller adds or moves ellipsoids
   SeedOptions options;
-  options.draw = {count, target_.bricks.size(), signsOf(target_),
+  options.draw = {count, target_.seedBricks, signsOf(target_),
                   options_.seed ^ (++samplings_ << 32)};
   options.window = seedWindow(target_, std::max(count, ellipsoids_.size()), tuning_);
   options.unitVariance = unitVariance_;
@@ -87,6 +87,13 @@ void CpuOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
   states_.assign(ellipsoids_.size(), {});
   gradients_.assign(ellipsoids_.size(), {});
   stale_ = true;
+}
+
+void CpuOptimiser::setState(const FitState& state) {
+  setEllipsoids(state.ellipsoids);
+  states_ = state.adam;
+  listed_.clear();
+  for (const Ellipsoid& p : ellipsoids_) listed_.push_back(unlisted(p));
 }
 
 void CpuOptimiser::growTo(std::size_t count) {

@@ -18,6 +18,8 @@ class CpuOptimiser final : public Optimiser {
   /// The target must outlive the optimiser.
   CpuOptimiser(const FitTarget& target, const OptimiserOptions& options, const Tuning& tuning);
 
+  void setState(const FitState& state) override;
+  [[nodiscard]] FitState state() const override { return {ellipsoids_, states_}; }
   void setEllipsoids(std::span<const Ellipsoid> ellipsoids) override;
   void growTo(std::size_t count) override;
   void relocate(std::size_t count) override;

@@ -27,7 +27,7 @@ double CpuPass::gradients(std::span<const Ellipsoid> ellipsoids, std::span<Ellip
     PairTapes& scratch = tapes_.local();
     alignas(64) float r[kBrickVoxels], t[kBrickVoxels];
     readTarget(b, t);
-    startFrom(t, r);
+    startFrom(b, t, r);
     forwardBrick(b, scratch, r);
     if (target().saturates) saturate(t, r);
     brickLoss_[b] = sumOfSquares(r);

@@ -70,7 +70,7 @@ class PairPass {
     forEachBrick([&](std::size_t b) {
       alignas(64) float r[kBrickVoxels], t[kBrickVoxels];
       readTarget(b, t);
-      startFrom(t, r);
+      startFrom(b, t, r);
       const Coord corner = index_.bricks()[b] * kBrickSide;
       for (auto pair = pairs_.brickBegin[b]; pair != pairs_.brickBegin[b + 1]; ++pair) {
         const auto i = pairs_.ellipsoid[pair];
@@ -119,19 +119,15 @@ class PairPass {
   }
 
   /// Reads the target's values of a brick at the current offset.
-  void readTarget(std::size_t brick, float* t) const {
-    if (offset_ != kAtVoxels) {
-      const Missing missing = target_.narrowBand ? Missing::kNearest : Missing::kZero;
-      interpolateBrick(around(brick), offset_, missing, {t, std::size_t(kBrickVoxels)});
-    } else if (const float* const values = valuesOf(brick)) {
-      std::copy_n(values, kBrickVoxels, t);
-    } else {
-      std::fill_n(t, kBrickVoxels, 0.0f);
-    }
-  }
+  void readTarget(std::size_t brick, float* t) const { read(target_.values, brick, t); }
 
-  static void startFrom(const float* t, float* r) {
+  /// Starts a sum: r = constants - t.
+  void startFrom(std::size_t brick, const float* t, float* r) const {
     for (int v = 0; v < kBrickVoxels; ++v) r[v] = -t[v];
+    if (target_.constants.empty()) return;
+    alignas(64) float constants[kBrickVoxels];
+    read(target_.constants, brick, constants);
+    for (int v = 0; v < kBrickVoxels; ++v) r[v] += constants[v];
   }
 
   /// Replaces r = V - t by clamp(V, lowest, highest) - t.
@@ -191,19 +187,31 @@ class PairPass {
     moments_.resize(pairs_.pairCount());
   }
 
+  /// Reads values of a brick, `all` being those of the target's bricks, at the current offset.
+  void read(std::span<const float> all, std::size_t brick, float* out) const {
+    if (offset_ != kAtVoxels) {
+      const Missing missing = target_.narrowBand ? Missing::kNearest : Missing::kZero;
+      interpolateBrick(around(all, brick), offset_, missing, {out, std::size_t(kBrickVoxels)});
+    } else if (const float* const values = valuesOf(all, brick)) {
+      std::copy_n(values, kBrickVoxels, out);
+    } else {
+      std::fill_n(out, kBrickVoxels, 0.0f);
+    }
+  }
+
   /// The values of a brick by its number; null if it is not one of the target's.
-  [[nodiscard]] const float* valuesOf(std::size_t brick) const {
+  [[nodiscard]] const float* valuesOf(std::span<const float> all, std::size_t brick) const {
     if (brick >= target_.bricks.size()) return nullptr;
-    return target_.values.data() + brick * kBrickVoxels;
+    return all.data() + brick * kBrickVoxels;
   }
 
   /// The bricks that an interpolation at the current offset reads.
-  [[nodiscard]] InterpolatedBricks around(std::size_t brick) const {
+  [[nodiscard]] InterpolatedBricks around(std::span<const float> all, std::size_t brick) const {
     const Coord at = index_.bricks()[brick];
     const auto axes = offsetAxes(offset_);
     InterpolatedBricks bricks;
     for (int n = 0; n < kInterpolatedBricks; ++n)
-      bricks[std::size_t(n)] = valuesOf(index_.find(interpolatedBrick(at, axes.data(), n)));
+      bricks[std::size_t(n)] = valuesOf(all, index_.find(interpolatedBrick(at, axes.data(), n)));
     return bricks;
   }
 

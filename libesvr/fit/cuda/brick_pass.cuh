@@ -77,7 +77,8 @@ __device__ void addPair(const PairForm& p, const KernelConstants<float>& kernel,
 __device__ inline float residualOf(const PassTarget& target, bool hasValues, std::size_t v,
                                    float sum) {
   const float t = hasValues ? target.values[v] : 0.0f;
-  const float r = sum - t;
+  const float constant = hasValues && target.constants != nullptr ? target.constants[v] : 0.0f;
+  const float r = sum + constant - t;
   return target.saturates ? fminf(fmaxf(r, target.lowest - t), target.highest - t) : r;
 }
 

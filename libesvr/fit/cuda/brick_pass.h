@@ -9,10 +9,11 @@ namespace esvr::cuda {
 
 /// The values that the sum is compared with.
 struct PassTarget {
-  const float* values;    ///< kBrickVoxels values for each of the first `bricks` bricks
-  std::uint32_t bricks;   ///< bricks that have values; the values of all others are 0
-  bool saturates;         ///< the sum is clamped to [lowest, highest] before it is compared
-  float lowest, highest;  ///< range of the target
+  const float* values;     ///< kBrickVoxels values for each of the first `bricks` bricks
+  const float* constants;  ///< values that are added to the sums of these bricks; null: none
+  std::uint32_t bricks;    ///< bricks that have values; the values of all others are 0
+  bool saturates;          ///< the sum is clamped to [lowest, highest] before it is compared
+  float lowest, highest;   ///< range of the target
 };
 
 /// All pointers are to device memory that the caller owns.

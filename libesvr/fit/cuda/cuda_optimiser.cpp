@@ -38,6 +38,7 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       bricks_(target.bricks, stream_.get()),
       lists_(stream_.get()),
       targetValues_(target.values, stream_.get()),
+      constants_(target.constants, stream_.get()),
       active_(*target.active, stream_.get()),
       ellipsoids_(stream_.get()),
       adam_(stream_.get()),
@@ -47,6 +48,7 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       moments_(stream_.get()),
       residual_(stream_.get()),
       offsetTarget_(stream_.get()),
+      offsetConstants_(stream_.get()),
       brickLoss_(stream_.get()),
       chunkSums_(stream_.get()),
       slope_(stream_.get()),
@@ -69,6 +71,7 @@ BrickPassArguments CudaOptimiser::passArguments() {
   return {.scene = passScene(bricks_, lists_, count_, forms_.data()),
           .kernel = narrowed(kernel_),
           .target = {.values = targetValues_.data(),
+                     .constants = target_.constants.empty() ? nullptr : constants_.data(),
                      .bricks = std::uint32_t(bricks_.targetCount()),
                      .saturates = target_.saturates,
                      .lowest = float(target_.lowest),
@@ -135,25 +138,32 @@ Offset CudaOptimiser::offsetAfter(std::size_t n) const {
 /// Makes a pass compare between voxels.
 void CudaOptimiser::compareBetween(const Offset& offset, BrickPassArguments& pass) {
   if (offset == kAtVoxels) return;
-  launchOffsetTarget({.bricks = bricks_.view(),
-                      .brickCount = pass.scene.brickCount,
-                      .values = targetValues_.data(),
-                      .nearest = target_.narrowBand,
-                      .offset = offset,
-                      .out = offsetTarget_.data(),
-                      .halted = pass.halted},
-                     stream_.get());
-  pass.target.values = offsetTarget_.data();
+  const auto moved = [&](const float* values, GrowingBuffer<float>& out) {
+    launchOffsetTarget({.bricks = bricks_.view(),
+                        .brickCount = pass.scene.brickCount,
+                        .values = values,
+                        .nearest = target_.narrowBand,
+                        .offset = offset,
+                        .out = out.data(),
+                        .halted = pass.halted},
+                       stream_.get());
+    return out.data();
+  };
+  pass.target.values = moved(pass.target.values, offsetTarget_);
+  if (pass.target.constants) pass.target.constants = moved(pass.target.constants, offsetConstants_);
   pass.target.bricks = pass.scene.brickCount;
 }
 
 void CudaOptimiser::buildLists(const SupportSource& supports) {
-  if (!target_.narrowBand) bricks_.findReached(supports);
+  if (!target_.narrowBand)
+    bricks_.findReached(supports, target_.within.value_or(bricksOf(Box::whole())));
   lists_.rebuild(supports, bricks_);
   moments_.reserve(lists_.pairCount() * kMoments);
   chunkSums_.reserve(lists_.chunkCount() * kMoments);
   brickLoss_.reserve(bricks_.size());
-  if (target_.betweenVoxels()) offsetTarget_.reserve(bricks_.size() * kBrickVoxels);
+  const std::size_t values = target_.betweenVoxels() ? bricks_.size() * kBrickVoxels : 0;
+  offsetTarget_.reserve(values);
+  if (!target_.constants.empty()) offsetConstants_.reserve(values);
 }
 
 /// Builds the lists for the following steps, and clears their halt flags.
@@ -208,7 +218,7 @@ void CudaOptimiser::releaseScratch() {
   sampling_ = VoxelSampling(stream_.get());
   ranking_ = EllipsoidRanking(stream_.get());
   errorSums_ = ErrorSums(stream_.get());
-  for (auto* buffer : {&moments_, &residual_, &offsetTarget_}) buffer->release();
+  for (auto* buffer : {&moments_, &residual_, &offsetTarget_, &offsetConstants_}) buffer->release();
   for (auto* buffer : {&brickLoss_, &chunkSums_}) buffer->release();
   trimMemoryPool();
 }
@@ -284,7 +294,7 @@ std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t ellipsoids,
   const double loss = downloadValue(&status_.data()->loss, stream_.get());
   const DeviceSampling drawn = sampling_.draw(
       residual_.data(), loss, bricks_.view().bricks,
-      {count, bricks_.targetCount(), signsOf(target_), options_.seed ^ (++samplings_ << 32)});
+      {count, target_.seedBricks, signsOf(target_), options_.seed ^ (++samplings_ << 32)});
   launchPlaceSeeds({.voxels = drawn.voxels,
                     .count = drawn.count,
                     .bricks = bricks_.view(),
@@ -431,6 +441,20 @@ void CudaOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
   stale_ = true;
 }
 
+void CudaOptimiser::setState(const FitState& state) {
+  setEllipsoids(state.ellipsoids);
+  uploadTo(adam_.data(), std::span<const AdamState>(state.adam), stream_.get());
+  std::vector<ListedSupport> listed;
+  for (const Ellipsoid& p : state.ellipsoids) listed.push_back(unlisted(p));
+  uploadTo(listed_.data(), std::span<const ListedSupport>(listed), stream_.get());
+}
+
+FitState CudaOptimiser::state() const {
+  FitState state{ellipsoids(), std::vector<AdamState>(count_)};
+  downloadTo(std::span(state.adam), adam_.data(), stream_.get());
+  return state;
+}
+
 std::vector<EllipsoidGradient> CudaOptimiser::gradients(int threads) {
   rebuildLists();
   useForms(kAtVoxels);
@@ -465,6 +489,12 @@ std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget& target,
   cuda::forgetPeakMemory();
   cuda::requireMemory(target, 1, options.maxDeviceBytes);
   return std::make_unique<cuda::CudaOptimiser>(target, options, tuning);
+}
+
+bool fitsOnGpu(const FitSize& size, std::size_t ellipsoids, const Device& device,
+               std::optional<std::size_t> maxBytes) {
+  cuda::useDevice(device);
+  return cuda::fitsInMemory(size, ellipsoids, maxBytes);
 }
 
 }  // namespace esvr

@@ -27,6 +27,8 @@ class CudaOptimiser final : public Optimiser {
   /// The device of the options must be the current one.
   CudaOptimiser(const FitTarget& target, const OptimiserOptions& options, const Tuning& tuning);
 
+  void setState(const FitState& state) override;
+  [[nodiscard]] FitState state() const override;
   void setEllipsoids(std::span<const Ellipsoid> ellipsoids) override;
   void growTo(std::size_t count) override;
   void relocate(std::size_t count) override;
@@ -91,7 +93,7 @@ class CudaOptimiser final : public Optimiser {
   BrickTable bricks_;
   PairLists lists_;
   ThreadsPerBrick threads_;
-  DeviceBuffer<float> targetValues_;
+  DeviceBuffer<float> targetValues_, constants_;
   DeviceBuffer<BrickMask> active_;
   GrowingBuffer<Ellipsoid> ellipsoids_;
   GrowingBuffer<AdamState> adam_;
@@ -99,7 +101,7 @@ class CudaOptimiser final : public Optimiser {
   GrowingBuffer<Usefulness> usefulness_;
   GrowingBuffer<ListedSupport> listed_;
   GrowingBuffer<float> moments_, residual_;
-  GrowingBuffer<float> offsetTarget_;  ///< values of all bricks between voxels
+  GrowingBuffer<float> offsetTarget_, offsetConstants_;  ///< values of all bricks between voxels
   GrowingBuffer<double> brickLoss_, chunkSums_, slope_;
   std::size_t stepped_ = 0;  ///< number of ellipsoids that took part in the last step
   DeviceBuffer<StepStatus> status_;

@@ -1,8 +1,11 @@
 #pragma once
 /// Makes the optimiser on a GPU. This header does not include those of CUDA.
 
+#include <cstddef>
 #include <memory>
+#include <optional>
 
+#include "fit/fit_size.h"
 #include "fit/optimiser.h"
 
 namespace esvr {
@@ -12,5 +15,11 @@ namespace esvr {
 [[nodiscard]] std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget& target,
                                                            const OptimiserOptions& options,
                                                            const Tuning& tuning);
+
+/// True if a fit with this number of ellipsoids, at least 1, stays within `maxBytes`, or else within
+/// the free memory of the device.
+/// \throws DeviceError  the device does not exist, or the build has no CUDA
+[[nodiscard]] bool fitsOnGpu(const FitSize& size, std::size_t ellipsoids, const Device& device,
+                             std::optional<std::size_t> maxBytes);
 
 }  // namespace esvr

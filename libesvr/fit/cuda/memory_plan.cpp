@@ -32,18 +32,23 @@ constexpr double kBytesPerEllipsoid =
            sizeof(ListedSupport)) +
     double(kMoments * sizeof(double)) + 9.0 * sizeof(std::uint32_t) + sizeof(Coord) * 2;
 
-double pairsOf(const FitTarget& target, double ellipsoids) {
-  const double distance = std::cbrt(double(target.activeVoxels) / ellipsoids);
+double pairsOf(const FitSize& size, double ellipsoids) {
+  const double distance = std::cbrt(double(size.activeVoxels) / ellipsoids);
   return ellipsoids * std::pow(1.0 + kReach * distance / kBrickSide, 3.0);
 }
 
-double bytesOf(const FitTarget& target, double ellipsoids) {
-  const auto targets = double(target.bricks.size());
-  const double reached = target.narrowBand ? 0.0 : kReachedShare * targets;
-  const double between = target.betweenVoxels() ? (targets + reached) * kBytesOfValues : 0.0;
-  return targets * kBytesPerTarget +
+double bytesOf(const FitSize& size, double ellipsoids) {
+  const auto targets = double(size.bricks);
+  const double reached = size.narrowBand ? 0.0 : kReachedShare * targets;
+  const double arrays = size.constants ? 2.0 : 1.0;  // the values, and the constants like them
+  const double between = size.between ? arrays * (targets + reached) * kBytesOfValues : 0.0;
+  return targets * (kBytesPerTarget + (arrays - 1.0) * kBytesOfValues) +
          kSpare * (between + (targets + reached) * kBytesPerBrick + reached * kBytesPerReached +
-                   ellipsoids * kBytesPerEllipsoid + pairsOf(target, ellipsoids) * kBytesPerPair);
+                   ellipsoids * kBytesPerEllipsoid + pairsOf(size, ellipsoids) * kBytesPerPair);
+}
+
+double bytesOf(const FitTarget& target, double ellipsoids) {
+  return bytesOf(sizeOf(target), ellipsoids);
 }
 
 /// The largest number of ellipsoids whose fit takes at most `bound` bytes; 0 if the bricks alone
@@ -89,6 +94,11 @@ std::size_t affordableEllipsoids(const FitTarget& target, std::size_t wanted,
 bool fitsInMemory(const FitTarget& target, std::optional<std::size_t> maxBytes) {
   return 2.0 * double(predictedBytes(target, 1)) <=
          double(maxBytes ? *maxBytes : availableMemory());
+}
+
+bool fitsInMemory(const FitSize& size, std::size_t ellipsoids,
+                  std::optional<std::size_t> maxBytes) {
+  return bytesOf(size, double(ellipsoids)) <= double(maxBytes ? *maxBytes : availableMemory());
 }
 
 }  // namespace esvr::cuda

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "fit/fit_size.h"
 #include "fit/target.h"
 
 namespace esvr::cuda {
@@ -25,5 +26,9 @@ void requireMemory(const FitTarget& target, std::size_t ellipsoids,
 
 /// True if a fit of the target with few ellipsoids leaves half of the memory free.
 [[nodiscard]] bool fitsInMemory(const FitTarget& target, std::optional<std::size_t> maxBytes);
+
+/// True if a fit of this size with this number of ellipsoids, at least 1, stays within the memory.
+[[nodiscard]] bool fitsInMemory(const FitSize& size, std::size_t ellipsoids,
+                                std::optional<std::size_t> maxBytes);
 
 }  // namespace esvr::cuda

@@ -9,6 +9,10 @@ std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget&, const OptimiserOp
   refuseCuda("fitting", options.device);
 }
 
+bool fitsOnGpu(const FitSize&, std::size_t, const Device& device, std::optional<std::size_t>) {
+  refuseCuda("fitting", device);
+}
+
 std::unique_ptr<IntensityPasses> makeCudaIntensityPasses(const IntensityTarget&,
                                                          const Device& device) {
   refuseCuda("fitting", device);

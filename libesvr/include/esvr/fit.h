@@ -61,6 +61,9 @@ struct FitOptions : CommonFitOptions {
   /// PSNR, which all goals but FitGoal and LosslessGoal use, choose by short fits if many voxels
   /// have an extreme value.
   std::optional<bool> bothSigns;
+  /// The volume is fitted in chunks of at most this many active voxels (docs/scale.md). Default: in
+  /// one chunk, or in the largest chunks that fit into the memory of the GPU.
+  std::optional<std::uint64_t> chunkVoxels;
   /// A field that was fitted to the same volume. The fit continues from its ellipsoids and its
   /// edge, and adds ellipsoids until there are `count`. The field must outlive the call. Null: the
   /// fit begins with seeds.
@@ -80,6 +83,7 @@ struct FitResult {
   double secondsSeed = 0.0, secondsOptimise = 0.0;
   std::size_t wanted = 0;          ///< ellipsoids that fit() aimed at; 0 for fitByPaper()
   std::size_t deviceBytes = 0;     ///< largest GPU memory held; 0 on the CPU
+  std::size_t chunks = 0;          ///< number of chunks of the fit; 0 for fitByPaper()
   bool deviceFull = false;         ///< true if GPU memory ran out: fewer ellipsoids than `wanted`
   std::uint64_t pairs = 0;         ///< (ellipsoid, brick) pairs that the final field evaluates
   bool signedIntensities = false;  ///< true if an intensity is negative

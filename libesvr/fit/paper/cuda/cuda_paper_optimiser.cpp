@@ -77,6 +77,7 @@ PaperPassArguments CudaPaperOptimiser::passArguments(const Part& part) {
           .kernel = narrowed(constants_),
           .kernels = ellipsoids().kernels,
           .target = {.values = values_,
+                     .constants = nullptr,
                      .bricks = std::uint32_t(part.bricks.targetCount()),
                      .saturates = false,
                      .lowest = float(target_.lowest),

@@ -1,0 +1,92 @@
+#include "fit/chunks/chunk_target.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstddef>
+
+#include "core/axes.h"
+#include "core/brick_index.h"
+#include "esvr/field.h"
+#include "fit/export_field.h"
+
+namespace esvr {
+namespace {
+
+/// The voxels of a box of bricks, as far as coordinates reach.
+Box voxelsOf(const Box& bricks) {
+  const auto bounded = [](std::int64_t coordinate) {
+    return std::int32_t(std::clamp<std::int64_t>(coordinate, Box::kMin, Box::kMax));
+  };
+  Box box;
+  for (const auto axis : kAxes) {
+    box.min.*axis = bounded(std::int64_t{bricks.min.*axis} * kBrickSide);
+    box.max.*axis = bounded((std::int64_t{bricks.max.*axis} + 1) * kBrickSide - 1);
+  }
+  return box;
+}
+
+/// The sums of ellipsoids in the bricks of a target; empty if they reach none.
+std::vector<float> sumsIn(const FitTarget& target, const Ghosts& ghosts) {
+  const Field field = exportField(ghosts.ellipsoids, {{}, 1.0, 0.0f, ghosts.kernel});
+  const BrickIndex index(target.bricks);
+  std::vector<Coord> corners;
+  for (const Coord corner : reachedBricks(field, voxelsOf(index.bounds())))
+    if (index.find(brickOf(corner)) != BrickIndex::kNone) corners.push_back(corner);
+  if (corners.empty()) return {};
+  std::vector<float> values(corners.size() * kBrickVoxels);
+  evaluateBricks(field, corners, values);
+  std::vector<float> sums(target.values.size());
+  tbb::parallel_for(std::size_t{0}, corners.size(), [&](std::size_t n) {
+    const auto from = values.begin() + std::ptrdiff_t(n * kBrickVoxels);
+    const std::size_t b = index.find(brickOf(corners[n]));
+    std::copy_n(from, kBrickVoxels, sums.begin() + std::ptrdiff_t(b * kBrickVoxels));
+  });
+  return sums;
+}
+
+/// The bricks of a volume with these numbers. The origin stays the same.
+SparseVolume partOf(const SparseVolume& volume, std::span<const std::uint32_t> bricks) {
+  SparseVolume part;
+  part.origin = volume.origin;
+  part.background = volume.background;
+  part.values.resize(bricks.size() * kBrickVoxels);
+  for (const std::uint32_t b : bricks) {
+    part.bricks.push_back(volume.bricks[b]);
+    part.active.push_back(volume.active[b]);
+  }
+  tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t n) {
+    std::ranges::copy(volume.brickValues(bricks[n]), part.brickValues(n).begin());
+  });
+  return part;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> bricksAround(const SparseVolume& volume, const BrickChunk& chunk) {
+  const Box around = dilated(chunk.bounds, kHaloBricks);
+  std::vector<std::uint32_t> bricks;
+  for (std::uint32_t b = 0; b < volume.brickCount(); ++b)
+    if (around.contains(volume.bricks[b])) bricks.push_back(b);
+  return bricks;
+}
+
+void makeChunkTarget(const ChunkScene& scene, const BrickChunk& chunk, const Ghosts& ghosts,
+                     const std::function<bool(Coord)>& isOpen, ChunkTarget& out) {
+  std::vector<std::uint32_t> bricks = bricksAround(scene.volume, chunk);
+  const auto others = std::stable_partition(bricks.begin(), bricks.end(), [&](std::uint32_t b) {
+    const Coord brick = scene.volume.bricks[b];
+    return chunk.box.contains(brick) || isOpen(brick);
+  });
+  const SparseVolume part = partOf(scene.volume, bricks);
+  out.target = makeTarget(part, common(scene.box, voxelsOf(chunk.box)), scene.scale);
+  out.active = out.counted = part.active;
+  for (std::size_t b = 0; b < out.counted.size(); ++b)
+    if (!chunk.box.contains(part.bricks[b])) out.counted[b] = {};
+  out.target.active = &out.counted;
+  out.target.seedBricks = std::size_t(others - bricks.begin());
+  out.target.within = dilated(chunk.bounds, kHaloBricks);
+  out.target.constants = sumsIn(out.target, ghosts);
+}
+
+}  // namespace esvr

@@ -1,0 +1,54 @@
+#pragma once
+/// The target of one chunk's fit.
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "esvr/kernel.h"
+#include "fit/chunks/divide_bricks.h"
+#include "fit/ellipsoid.h"
+#include "fit/target.h"
+
+namespace esvr {
+
+/// Bricks around a chunk that its fit sees. The largest support reaches 42 voxels
+/// (Tuning::largestScale), but few reach beyond 16.
+inline constexpr int kHaloBricks = 2;
+
+/// A volume that is fitted in chunks.
+struct ChunkScene {
+  const SparseVolume& volume;
+  TargetScale scale;  ///< of the whole volume, so that all chunks have the same units
+  Box box;            ///< box of the PSNR, relative to the volume's origin
+};
+
+/// The bricks of a chunk and of its halo, and the target that consists of them. It is pinned,
+/// because the target points to its other members.
+struct ChunkTarget {
+  ChunkTarget() = default;
+  ChunkTarget(const ChunkTarget&) = delete;
+  ChunkTarget& operator=(const ChunkTarget&) = delete;
+
+  std::vector<BrickMask> active;   ///< active voxels of each brick
+  std::vector<BrickMask> counted;  ///< the same for the chunk's own bricks; none for the others
+  FitTarget target;
+};
+
+/// Numbers of the bricks of the chunk and of its halo, increasing.
+[[nodiscard]] std::vector<std::uint32_t> bricksAround(const SparseVolume& volume,
+                                                      const BrickChunk& chunk);
+
+/// Ellipsoids that are not fitted but take part in the sum.
+struct Ghosts {
+  std::span<const Ellipsoid> ellipsoids;  ///< relative to the volume's origin, in its scaled units
+  Kernel kernel;
+};
+
+/// Makes the target of a chunk. Its PSNR counts the chunk's own part of the box. Seeds are placed in
+/// the chunk's bricks and in those of the halo for which `isOpen` is true.
+void makeChunkTarget(const ChunkScene& scene, const BrickChunk& chunk, const Ghosts& ghosts,
+                     const std::function<bool(Coord)>& isOpen, ChunkTarget& out);
+
+}  // namespace esvr

@@ -1,0 +1,248 @@
+// Plan: every brick belongs to one chunk, the chunks' boxes fill space, and the chunks of a group are
+// apart. Constants of a target act like ellipsoids that are not fitted. A fit in chunks is nearly as
+// good as a fit in one chunk, also at the seams, gives the same bits again and on any number of
+// threads, continues from a field, and ends when it is cancelled. A volume that fits into one chunk
+// is fitted as usual.
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "esvr/error.h"
+#include "esvr/field.h"
+#include "esvr/fit.h"
+#include "esvr/metrics.h"
+#include "fit/chunks/chunk_target.h"
+#include "fit/chunks/divide_bricks.h"
+#include "fit/cpu/cpu_pass.h"
+#include "random_ellipsoids.h"
+#include "volumes.h"
+
+namespace esvr {
+namespace {
+
+constexpr std::uint64_t kChunkVoxels = 5000;
+
+TEST(DivideBricks, GivesEveryBrickToTheChunkWhoseBoxContainsIt) {
+  const SparseVolume volume = test::tubeVolume();
+  const auto chunks = divideBricks(volume, 500);
+  ASSERT_GT(chunks.size(), 4u);
+  std::set<std::uint32_t> seen;
+  for (const BrickChunk& chunk : chunks) {
+    EXPECT_LE(chunk.activeVoxels, 500u);
+    std::uint64_t active = 0;
+    for (const std::uint32_t b : chunk.bricks) {
+      EXPECT_TRUE(seen.insert(b).second);
+      EXPECT_TRUE(chunk.bounds.contains(volume.bricks[b]));
+      active += std::uint64_t(volume.active[b].count());
+    }
+    EXPECT_EQ(active, chunk.activeVoxels);
+  }
+  EXPECT_EQ(seen.size(), volume.brickCount());
+}
+
+TEST(DivideBricks, MakesBoxesThatFillSpaceWithoutOverlap) {
+  const auto chunks = divideBricks(test::tubeVolume(), 500);
+  for (const Coord place : {Coord{0, 0, 0}, Coord{2, 3, 1}, Coord{-100, 2, 5},
+                            Coord{Box::kMax, Box::kMin, 0}, Coord{Box::kMin, 0, Box::kMax}})
+    EXPECT_EQ(std::count_if(chunks.begin(), chunks.end(),
+                            [&](const BrickChunk& c) { return c.box.contains(place); }),
+              1);
+}
+
+TEST(DivideBricks, KeepsABrickThatIsDenserThanAChunk) {
+  const SparseVolume volume = test::volumeOf({}, 1, 0.0f, [](Coord) { return 1.0f; });
+  const auto chunks = divideBricks(volume, 1);
+  ASSERT_EQ(chunks.size(), 1u);
+  EXPECT_EQ(chunks[0].activeVoxels, 512u);
+}
+
+TEST(DivideBricks, DividesABrickColumnOfUnequalBricks) {
+  SparseVolume volume = test::volumeOf({}, 1, 0.0f, [](Coord) { return 1.0f; });
+  for (int n = 1; n < 4; ++n) {
+    volume.bricks.push_back({n, 0, 0});
+    volume.values.resize(volume.values.size() + kBrickVoxels);
+    volume.active.push_back({});
+    volume.active.back().set(n);
+  }
+  const auto chunks = divideBricks(volume, 2);
+  EXPECT_EQ(chunks.size(), 3u);  // the dense brick, one of the others, and two together
+}
+
+TEST(GroupChunks, KeepsTheChunksOfAGroupApart) {
+  const auto chunks = divideBricks(test::tubeVolume(), 500);
+  const auto groups = groupChunks(chunks, 1);
+  std::set<std::size_t> seen;
+  for (const auto& group : groups)
+    for (const std::size_t a : group) {
+      EXPECT_TRUE(seen.insert(a).second);
+      for (const std::size_t b : group)
+        EXPECT_TRUE(a == b || common(dilated(chunks[a].bounds, 1), chunks[b].bounds).empty());
+    }
+  EXPECT_EQ(seen.size(), chunks.size());
+}
+
+TEST(Dilated, EndsWhereCoordinatesEnd) {
+  const Box all = dilated(Box::whole(), 3);
+  EXPECT_EQ(all, Box::whole());
+  EXPECT_EQ(dilated({{1, 2, 3}, {4, 5, 6}}, 2), (Box{{-1, 0, 1}, {6, 7, 8}}));
+}
+
+std::vector<float> residualsOf(const FitTarget& target, const Kernel& kernel,
+                               const std::vector<Ellipsoid>& ellipsoids, const Offset& offset) {
+  CpuPass pass(target, kernelConstants<double>(kernel));
+  pass.rebuild(ellipsoids, 1.0);
+  pass.setOffset(offset);
+  std::vector<float> residuals;
+  pass.residuals(ellipsoids, residuals);
+  residuals.resize(target.values.size());
+  return residuals;
+}
+
+class Constants : public testing::TestWithParam<bool> {};
+
+// Both sides are float32 sums of 60 ellipsoids with intensities of at most 1.
+TEST_P(Constants, ActLikeEllipsoidsThatAreNotFitted) {
+  const SparseVolume volume = test::denseVolume();
+  const Kernel kernel{.kappa = 2.0f};
+  const auto all = test::randomEllipsoids(60, 1.0, 3.0);
+  const std::vector<Ellipsoid> fitted(all.begin(), all.begin() + 30),
+      ghosts(all.begin() + 30, all.end());
+  const ChunkScene scene{volume, scaleOf(volume), boxOf(volume, std::nullopt)};
+  const auto chunks = divideBricks(volume, std::numeric_limits<std::uint64_t>::max());
+  ChunkTarget part;
+  makeChunkTarget(
+      scene, chunks.front(), {ghosts, kernel}, [](Coord) { return false; }, part);
+  ASSERT_FALSE(part.target.constants.empty());
+  part.target.saturates = GetParam();
+  FitTarget whole = makeTarget(volume, std::nullopt);
+  whole.saturates = GetParam();
+  const auto found = residualsOf(part.target, kernel, fitted, kAtVoxels);
+  const auto expected = residualsOf(whole, kernel, all, kAtVoxels);
+  for (std::size_t v = 0; v < expected.size(); ++v) ASSERT_NEAR(found[v], expected[v], 1e-5) << v;
+}
+INSTANTIATE_TEST_SUITE_P(Sums, Constants, testing::Bool(), [](const auto& saturates) {
+  return saturates.param ? "Clamped" : "NotClamped";
+});
+
+TEST(ChunkTarget, CountsItsOwnVoxelsOnly) {
+  const SparseVolume volume = test::tubeVolume();
+  const ChunkScene scene{volume, scaleOf(volume), boxOf(volume, std::nullopt)};
+  std::uint64_t counted = 0;
+  double boxVoxels = 0.0;
+  for (const BrickChunk& chunk : divideBricks(volume, 500)) {
+    ChunkTarget part;
+    makeChunkTarget(
+        scene, chunk, {}, [](Coord) { return false; }, part);
+    for (const BrickMask& mask : part.counted) counted += std::uint64_t(mask.count());
+    boxVoxels += part.target.boxVoxels;
+  }
+  EXPECT_EQ(counted, activeVoxelCount(volume));
+  EXPECT_EQ(boxVoxels, scene.box.volume());
+}
+
+/// A long tube that winds through several chunks.
+SparseVolume longTube() {
+  return test::volumeOf({-8, 16, 0}, 12, 0.0f, [](Coord v) {
+    const double axis = 60.0 + 20.0 * std::sin(v.x * 0.1);
+    const double r = std::hypot(v.y - axis, v.z - 44.0 - 15.0 * std::cos(v.x * 0.07));
+    return r < 7.0 ? float(std::min(1.0, (7.0 - r) / 3.0)) : 0.0f;
+  });
+}
+
+FitOptions shortFit(std::optional<std::uint64_t> chunkVoxels) {
+  FitOptions options;
+  options.count = 300;
+  options.iterations = 150;
+  options.chunkVoxels = chunkVoxels;
+  return options;
+}
+
+SparseVolume decoded(const FitResult& result) {
+  return revoxelise(result.field, {.threshold = 0.01f, .range = result.range});
+}
+
+// Chunks of 5000 voxels are extreme: their halo has more bricks than they have themselves.
+TEST(FitInChunks, SlowIsNearlyAsGoodAsOneChunk) {
+  const SparseVolume volume = longTube();
+  const FitResult one = fit(volume, shortFit(std::nullopt));
+  const FitResult several = fit(volume, shortFit(kChunkVoxels));
+  EXPECT_GT(psnrOverBox(volume, decoded(several)), psnrOverBox(volume, decoded(one)) - 1.0);
+  EXPECT_NEAR(double(several.field.ellipsoidCount()), double(one.field.ellipsoidCount()), 15.0);
+  EXPECT_NEAR(several.curve.back().psnrBox, psnrOverBox(volume, decoded(several)), 0.3);
+}
+
+TEST(FitInChunks, GivesTheSameBitsOnAnyNumberOfThreads) {
+  const SparseVolume volume = longTube();
+  FitOptions options = shortFit(kChunkVoxels);
+  options.iterations = 20;
+  const FitResult usual = fit(volume, options);
+  const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_TRUE(test::sameBits(fit(volume, options).field, usual.field));
+}
+
+TEST(FitInChunks, IsTheUsualFitInOneChunk) {
+  const SparseVolume volume = test::tubeVolume();
+  FitOptions options = shortFit(activeVoxelCount(volume));
+  options.iterations = 20;
+  const FitResult chunked = fit(volume, options);
+  options.chunkVoxels.reset();
+  EXPECT_TRUE(test::sameBits(fit(volume, options).field, chunked.field));
+}
+
+TEST(FitInChunks, SlowContinuesFromAField) {
+  const SparseVolume volume = longTube();
+  FitOptions options = shortFit(kChunkVoxels);
+  const FitResult first = fit(volume, options);
+  options.start = &first.field;
+  options.count = 450;
+  const FitResult more = fit(volume, options);
+  EXPECT_GT(more.field.ellipsoidCount(), 400u);
+  EXPECT_GT(psnrOverBox(volume, decoded(more)), psnrOverBox(volume, decoded(first)) + 1.0);
+}
+
+TEST(FitInChunks, ReportsProgressOfTheWholeFit) {
+  FitOptions options = shortFit(kChunkVoxels);
+  double last = 0.0;
+  bool grows = true;
+  options.progress = [&](const FitProgress& p) {
+    grows = grows && p.fraction >= last;
+    last = p.fraction;
+  };
+  (void)fit(longTube(), options);
+  EXPECT_TRUE(grows);
+  EXPECT_LE(last, 1.0);
+}
+
+TEST(FitInChunks, KeepsTheChunksThatWereFittedBeforeItWasCancelled) {
+  CancelToken cancel;
+  FitOptions options = shortFit(kChunkVoxels);
+  options.cancel = &cancel;
+  options.progress = [&](const FitProgress& p) {
+    if (p.fraction > 0.3) cancel.cancel();
+  };
+  const FitResult result = fit(longTube(), options);
+  EXPECT_EQ(result.end, FitEnd::kCancelled);
+  EXPECT_GT(result.field.ellipsoidCount(), 0u);
+  EXPECT_LT(result.field.ellipsoidCount(), 250u);
+}
+
+TEST(FitInChunks, LeavesOutAChunkWithoutData) {
+  SparseVolume volume = longTube();
+  const std::size_t half = volume.brickCount() / 2;
+  std::fill(volume.values.begin() + std::ptrdiff_t(half * kBrickVoxels), volume.values.end(), 0.0f);
+  FitOptions options = shortFit(kChunkVoxels);
+  options.iterations = 20;
+  EXPECT_GT(fit(volume, options).field.ellipsoidCount(), 0u);
+}
+
+TEST(FitInChunks, RefusesChunksWithoutVoxels) {
+  EXPECT_THROW((void)fit(test::tubeVolume(), shortFit(0)), UsageError);
+}
+
+}  // namespace
+}  // namespace esvr
