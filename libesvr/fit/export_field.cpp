@@ -1,16 +1,19 @@
 #include "fit/export_field.h"
 
+#include <tbb/parallel_for.h>
+
 #include <cmath>
 #include <map>
+#include <vector>
 
 #include "fit/frame.h"
 
 namespace esvr {
 namespace {
 
-void append(Ellipsoids& e, const Ellipsoid& p, Coord frame, double scale) {
+void append(Ellipsoids& e, const Ellipsoid& p, const PrincipalAxes& axes, Coord frame,
+            double scale) {
   const auto center = inFrame(p.center, frame);
-  const PrincipalAxes axes = principalAxes(p.L);
   for (std::size_t a = 0; a < 3; ++a) {
     e.center[a].push_back(float(center[a]));
     e.logScale[a].push_back(float(std::log(axes.scale[a])));
@@ -22,11 +25,14 @@ void append(Ellipsoids& e, const Ellipsoid& p, Coord frame, double scale) {
 }  // namespace
 
 Field exportField(std::span<const Ellipsoid> ellipsoids, const ExportFrame& frame) {
+  std::vector<PrincipalAxes> axes(ellipsoids.size());
+  tbb::parallel_for(std::size_t{0}, axes.size(),
+                    [&](std::size_t i) { axes[i] = principalAxes(ellipsoids[i].L); });
   std::map<Coord, Ellipsoids> byChunk;
   for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
     const Coord chunk = frameOf(ellipsoids[i].center);
     Ellipsoids& stored = byChunk[chunk];
-    append(stored, ellipsoids[i], chunk, frame.scale);
+    append(stored, ellipsoids[i], axes[i], chunk, frame.scale);
     if (!frame.kappas.empty()) stored.kappa.push_back(float(frame.kappas[i]));
   }
   Field field;

@@ -26,8 +26,8 @@ namespace esvr {
   const double range = target.highest - target.lowest;
   const double lowest = target.bothSigns ? -range : target.lowest;
   const double highest = target.bothSigns ? range : target.highest;
-  return {tuning.smallestScale, tuning.largestScale, tuning.intensityHeadroom * lowest,
-          tuning.intensityHeadroom * highest};
+  return {tuning.smallestScale, std::min(tuning.largestScale, target.largestScale),
+          tuning.intensityHeadroom * lowest, tuning.intensityHeadroom * highest};
 }
 
 /// Half width of a seed's window: Tuning::seedWindow times the distance that the ellipsoids would

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -20,7 +21,7 @@ struct TargetScale {
 struct FitTarget : TargetScale {
   std::vector<Coord> bricks;   ///< relative to the volume's origin, in bricks
   std::size_t seedBricks = 0;  ///< number of bricks, the first ones, in which seeds are placed
-  std::vector<float> values;  ///< (value - background) * scale, at most 1 in magnitude
+  std::vector<float> values;   ///< (value - background) * scale, at most 1 in magnitude
   /// Sums of ellipsoids that are not fitted, at the same voxels as `values`. They are added to the
   /// sum of the fitted ones. Empty: there are none.
   std::vector<float> constants;
@@ -33,6 +34,8 @@ struct FitTarget : TargetScale {
   /// Share of the iterations that compare at the voxels; the others compare between them.
   double voxelShare = 1.0;
   const std::vector<BrickMask>* active = nullptr;  ///< active masks of the volume's bricks
+  /// Largest scale, voxels, where it is less than Tuning::largestScale.
+  double largestScale = std::numeric_limits<double>::infinity();
   std::optional<Box> within{};  ///< box of bricks outside which errors do not count; default: none
 
   /// \return whether some iterations compare between voxels

@@ -16,16 +16,18 @@
 #include "esvr/field.h"
 #include "esvr/fit.h"
 #include "esvr/metrics.h"
+#include "esvr/psnr_between.h"
 #include "fit/chunks/chunk_target.h"
 #include "fit/chunks/divide_bricks.h"
 #include "fit/cpu/cpu_pass.h"
 #include "random_ellipsoids.h"
+#include "support/on_device.h"
 #include "volumes.h"
 
 namespace esvr {
 namespace {
 
-constexpr std::uint64_t kChunkVoxels = 5000;
+constexpr std::uint64_t kChunkVoxels = 2000;
 
 TEST(DivideBricks, GivesEveryBrickToTheChunkWhoseBoxContainsIt) {
   const SparseVolume volume = test::tubeVolume();
@@ -166,14 +168,70 @@ SparseVolume decoded(const FitResult& result) {
   return revoxelise(result.field, {.threshold = 0.01f, .range = result.range});
 }
 
-// Chunks of 5000 voxels are extreme: their halo has more bricks than they have themselves.
-TEST(FitInChunks, SlowIsNearlyAsGoodAsOneChunk) {
+class ChunksOn : public test::OnDevice {
+ protected:
+  [[nodiscard]] FitResult fitted(std::optional<std::uint64_t> chunkVoxels,
+                                 FitFor fitFor = FitFor::kVoxels) const {
+    FitOptions options = shortFit(chunkVoxels);
+    options.device = device_;
+    options.fitFor = fitFor;
+    return fit(volume_, options);
+  }
+  SparseVolume volume_ = longTube();
+};
+
+// Chunks of 2000 voxels are extreme: their halo has more bricks than they have themselves.
+// The fit loses 1.4 dB in them, and 1.5 dB between voxels.
+TEST_P(ChunksOn, SlowAreNearlyAsGoodAsOneChunk) {
+  const FitResult one = fitted(std::nullopt), several = fitted(kChunkVoxels);
+  EXPECT_GT(several.chunks, 4u);
+  EXPECT_GT(psnrOverBox(volume_, decoded(several)), psnrOverBox(volume_, decoded(one)) - 2.5);
+  EXPECT_LE(several.field.ellipsoidCount(), 300u);
+  EXPECT_GT(several.field.ellipsoidCount(), 290u);
+  EXPECT_NEAR(several.curve.back().psnrBox, psnrOverBox(volume_, decoded(several)), 0.3);
+}
+
+TEST_P(ChunksOn, SlowAreNearlyAsGoodBetweenVoxels) {
+  const auto between = [&](const FitResult& result) {
+    return psnrBetween(volume_, result.field, {.range = result.range});
+  };
+  const FitResult one = fitted(std::nullopt, FitFor::kDrawing);
+  const FitResult several = fitted(kChunkVoxels, FitFor::kDrawing);
+  EXPECT_GT(between(several), between(one) - 2.5);
+}
+
+TEST_P(ChunksOn, GiveTheSameBitsAgain) {
+  EXPECT_TRUE(test::sameBits(fitted(kChunkVoxels).field, fitted(kChunkVoxels).field));
+}
+ESVR_ON_DEVICES(ChunksOn);
+
+/// Squared error per voxel, in the bricks that border on another chunk or in the others.
+double errorIn(const SparseVolume& volume, const SparseVolume& found, bool atSeams) {
+  const auto chunks = divideBricks(volume, kChunkVoxels);
+  double squares = 0.0, voxels = 0.0;
+  for (const BrickChunk& chunk : chunks)
+    for (const std::uint32_t b : chunk.bricks) {
+      const Box near = dilated({volume.bricks[b], volume.bricks[b]}, 1);
+      const bool isAtSeam = common(near, chunk.box) != near;
+      if (isAtSeam != atSeams) continue;
+      for (int v = 0; v < kBrickVoxels; ++v) {
+        if (!volume.active[b].test(v)) continue;
+        const Coord at = volume.brickCorner(b) + voxelLocal(v);
+        squares += std::pow(double(valueAt(volume, at)) - double(valueAt(found, at)), 2);
+        voxels += 1.0;
+      }
+    }
+  EXPECT_GT(voxels, 1000.0);
+  return squares / voxels;
+}
+
+// The error at the seams of these small chunks is 1.4 times that of a fit in one chunk.
+TEST(FitInChunks, SlowIsNearlyAsGoodAtTheSeams) {
   const SparseVolume volume = longTube();
-  const FitResult one = fit(volume, shortFit(std::nullopt));
-  const FitResult several = fit(volume, shortFit(kChunkVoxels));
-  EXPECT_GT(psnrOverBox(volume, decoded(several)), psnrOverBox(volume, decoded(one)) - 1.0);
-  EXPECT_NEAR(double(several.field.ellipsoidCount()), double(one.field.ellipsoidCount()), 15.0);
-  EXPECT_NEAR(several.curve.back().psnrBox, psnrOverBox(volume, decoded(several)), 0.3);
+  const SparseVolume one = decoded(fit(volume, shortFit(std::nullopt)));
+  const SparseVolume several = decoded(fit(volume, shortFit(kChunkVoxels)));
+  EXPECT_LT(errorIn(volume, several, true), 1.7 * errorIn(volume, one, true));
+  EXPECT_LT(errorIn(volume, several, false), 1.2 * errorIn(volume, one, false));
 }
 
 TEST(FitInChunks, GivesTheSameBitsOnAnyNumberOfThreads) {

@@ -2,7 +2,7 @@
 // seeds where the error is large. Relocation moves the least useful ellipsoids only. Ellipsoids
 // that reach no voxel are dropped, and without an error there are no seeds. A fit for drawing is
 // closer to the volume between voxels. A whole fit has the same bits in three runs and at a distant
-// position. Without a GPU, its tests skip.
+// position. An optimiser continues from the state of another. Without a GPU, its tests skip.
 
 #include "fit/optimiser.h"
 
@@ -68,6 +68,24 @@ TEST_P(OptimiserOn, ManyIterationsInACallAreThoseOfManyCalls) {
     for (int i = 0; i < 25; ++i) inMany->iterate(std::array{0.5});
     EXPECT_EQ(inOne->measure().squaredSum, inMany->measure().squaredSum) << voxelShare;
   }
+}
+
+// The lists are built anew, so that the steps are not quite the same.
+TEST_P(OptimiserOn, ContinuesFromItsState) {
+  const std::vector<double> factors(20, 1.0), half(10, 1.0);
+  const auto whole = make();
+  whole->growTo(40);
+  whole->iterate(factors);
+  const auto first = make();
+  first->growTo(40);
+  first->iterate(half);
+  const auto second = make();
+  second->setState(first->state());
+  second->iterate(half);
+  EXPECT_EQ(second->ellipsoidCount(), whole->ellipsoidCount());
+  EXPECT_NEAR(second->measure().squaredSum, whole->measure().squaredSum,
+              0.02 * whole->measure().squaredSum);
+  EXPECT_EQ(second->state().adam.front().steps, 20u);
 }
 
 // If lists were used for too long, they would miss the parts by which supports have grown. The loss

@@ -85,6 +85,8 @@ void makeChunkTarget(const ChunkScene& scene, const BrickChunk& chunk, const Gho
     if (!chunk.box.contains(part.bricks[b])) out.counted[b] = {};
   out.target.active = &out.counted;
   out.target.seedBricks = std::size_t(others - bricks.begin());
+  out.target.largestScale =
+      kHaloBricks * kBrickSide / supportRadius(kernelConstants<double>(ghosts.kernel));
   out.target.within = dilated(chunk.bounds, kHaloBricks);
   out.target.constants = sumsIn(out.target, ghosts);
 }

@@ -13,8 +13,8 @@
 
 namespace esvr {
 
-/// Bricks around a chunk that its fit sees. The largest support reaches 42 voxels
-/// (Tuning::largestScale), but few reach beyond 16.
+/// Bricks around a chunk that its fit sees. Supports are limited to this reach: a fit would not see
+/// the error that an ellipsoid makes beyond them.
 inline constexpr int kHaloBricks = 2;
 
 /// A volume that is fitted in chunks.

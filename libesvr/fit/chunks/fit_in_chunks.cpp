@@ -1,10 +1,13 @@
 #include "fit/chunks/fit_in_chunks.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -24,13 +27,13 @@ namespace {
 /// Rounds of the fit. In each, all chunks are fitted for a part of the iterations.
 constexpr int kRounds = 4;
 
-/// The fit of one chunk so far. Ellipsoids may lie outside its box, but not in that of a chunk that
-/// is fitted after it.
+/// The fit of one chunk so far. During a round, ellipsoids may move out of its box.
 struct ChunkState {
   FitState fit;
   std::size_t firstCount = 0;  ///< ellipsoids at the start of growth
   std::size_t count = 0;       ///< ellipsoids at the end of growth
-  double error = 0.0;          ///< sum of squares over its active voxels
+  FitErrors errors;            ///< errors of its part of the box when it was last fitted
+  std::uint64_t pairs = 0;     ///< pairs of its ellipsoids and bricks
   bool begun = false;          ///< whether the chunk was fitted, or had ellipsoids at the start
 
   [[nodiscard]] const std::vector<Ellipsoid>& ellipsoids() const { return fit.ellipsoids; }
@@ -42,7 +45,6 @@ struct Totals {
   std::uint32_t iterations = 0;
   std::size_t deviceBytes = 0;
   bool deviceFull = false;
-  std::uint64_t pairs = 0;
   double secondsSeed = 0.0;
   double fraction = 0.0;  ///< share of the fit that is done
 };
@@ -53,11 +55,11 @@ Coord brickWith(const Ellipsoid& p) {
   return {brick(p.center[0]), brick(p.center[1]), brick(p.center[2])};
 }
 
-/// A number of bricks, rounded up, beyond which a support does not reach from its center's brick.
+int bricksIn(double voxels) { return int(std::ceil(voxels / kBrickSide)); }
+
+/// A number of bricks beyond which a support does not reach from its center's brick.
 int reachOf(const Ellipsoid& p, double radius) {
-  constexpr double kMost = 1e6;
-  const double voxels = radius * std::sqrt(ellipsoid_math::norm2(inverse(p.L)));
-  return int(std::min(std::ceil(voxels / kBrickSide), kMost));
+  return bricksIn(radius * std::sqrt(ellipsoid_math::norm2(inverse(p.L))));
 }
 
 bool isZero(const FitTarget& target) {
@@ -75,7 +77,8 @@ class ChunkedFit {
         activeVoxels_(activeVoxelCount(volume)),
         states_(chunks.size()) {
     kernel_.kappa = firstKappa(options, tuning_);
-    for (std::size_t c = 0; c < chunks.size(); ++c) states_[c].error = energyOf(chunks[c]);
+    for (std::size_t c = 0; c < chunks.size(); ++c)
+      states_[c].errors.squaredSumActive = energyOf(chunks[c]);
     if (options.start) takeStart();
   }
 
@@ -84,6 +87,7 @@ class ChunkedFit {
     for (int n = 0; n < kRounds && !isCancelled(); ++n) {
       divideCount();
       for (const auto& group : groups) fitGroup(group, n);
+      reassign();
     }
     return result();
   }
@@ -122,7 +126,7 @@ class ChunkedFit {
     for (std::size_t c = 0; c < states_.size(); ++c) {
       const ChunkState& state = states_[c];
       const std::uint64_t voxels = chunks_[c].activeVoxels;
-      needs.push_back({.error = state.error,
+      needs.push_back({.error = state.errors.squaredSumActive,
                        .count = state.begun ? double(state.ellipsoids().size()) : double(voxels),
                        .least = std::max(state.ellipsoids().size(), state.firstCount),
                        .most = voxels});
@@ -133,6 +137,18 @@ class ChunkedFit {
       if (!states_[c].begun && counts[c] > 0)
         states_[c].firstCount = firstSeeds(counts[c], tuning_);
     }
+  }
+
+  /// Gives every ellipsoid to the chunk that contains its center now and sees all around it.
+  void reassign() {
+    std::vector<FitState> moved(states_.size());
+    for (const ChunkState& state : states_)
+      for (std::size_t i = 0; i < state.ellipsoids().size(); ++i) {
+        FitState& owner = moved[ownerOf(brickWith(state.ellipsoids()[i]))];
+        owner.ellipsoids.push_back(state.ellipsoids()[i]);
+        owner.adam.push_back(state.fit.adam[i]);
+      }
+    for (std::size_t c = 0; c < states_.size(); ++c) states_[c].fit = std::move(moved[c]);
   }
 
   void takeStart() {
@@ -159,13 +175,17 @@ class ChunkedFit {
 
   /// The ellipsoids of other chunks whose supports may reach a chunk or its halo.
   [[nodiscard]] std::vector<Ellipsoid> ghostsOf(std::size_t c) const {
-    const Box around = dilated(chunks_[c].bounds, kHaloBricks);
     const double radius = supportRadius(kernelConstants<double>(kernel_));
+    const Box around = dilated(chunks_[c].bounds, kHaloBricks);
+    const Box possible = dilated(around, bricksIn(radius * tuning_.largestScale));
     std::vector<Ellipsoid> ghosts;
     for (std::size_t other = 0; other < states_.size(); ++other) {
       if (other == c) continue;
-      for (const Ellipsoid& p : states_[other].ellipsoids())
-        if (dilated(around, reachOf(p, radius)).contains(brickWith(p))) ghosts.push_back(p);
+      for (const Ellipsoid& p : states_[other].ellipsoids()) {
+        const Coord brick = brickWith(p);
+        if (possible.contains(brick) && dilated(around, reachOf(p, radius)).contains(brick))
+          ghosts.push_back(p);
+      }
     }
     return ghosts;
   }
@@ -230,17 +250,21 @@ class ChunkedFit {
     applyOptions(options_, part.target);
   }
 
-  /// The sum of squares over the active voxels of a chunk if nothing is fitted.
-  [[nodiscard]] double energyOf(const BrickChunk& chunk) const {
+  /// The sum of squares over the active voxels of a brick if nothing is fitted.
+  [[nodiscard]] double energyOf(std::uint32_t brick) const {
+    const auto values = volume_.brickValues(brick);
     double energy = 0.0;
-    for (const std::uint32_t b : chunk.bricks) {
-      const auto values = volume_.brickValues(b);
-      for (int v = 0; v < kBrickVoxels; ++v) {
-        const double value = (double(values[v]) - volume_.background) * scene_.scale.scale;
-        if (volume_.active[b].test(v)) energy += value * value;
-      }
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const double value = (double(values[v]) - volume_.background) * scene_.scale.scale;
+      if (volume_.active[brick].test(v)) energy += value * value;
     }
     return energy;
+  }
+  [[nodiscard]] double energyOf(const BrickChunk& chunk) const {
+    std::vector<double> energy(chunk.bricks.size());
+    tbb::parallel_for(std::size_t{0}, energy.size(),
+                      [&](std::size_t n) { energy[n] = energyOf(chunk.bricks[n]); });
+    return std::accumulate(energy.begin(), energy.end(), 0.0);
   }
 
   [[nodiscard]] ChunkState fitChunk(std::size_t c, int round) {
@@ -258,7 +282,8 @@ class ChunkedFit {
         (plan.to - plan.from) * double(chunks_[c].activeVoxels) / double(activeVoxels_);
     if (round + 1 == kRounds) optimiser->dropUnseen();
     takeKernel(optimiser->kernel());
-    made.error = optimiser->measure().squaredSumActive;
+    made.errors = optimiser->measure();
+    made.pairs = optimiser->pairCount();
     made.fit = withoutOpen(c, optimiser->state());
     return made;
   }
@@ -292,22 +317,10 @@ class ChunkedFit {
     totals_.secondsSeed += optimiser.secondsSeeding();
   }
 
-  /// The errors of the whole sum, chunk by chunk.
-  [[nodiscard]] FitErrors measure() {
+  /// The last point of the curve.
+  [[nodiscard]] TimedCurvePoint lastPoint(std::size_t ellipsoids) const {
     FitErrors errors;
-    for (std::size_t c = 0; c < chunks_.size(); ++c) {
-      ChunkTarget part;
-      makeTargetOf(c, part);
-      const auto optimiser = optimiserOf(c, part.target);
-      optimiser->setEllipsoids(states_[c].ellipsoids());
-      errors.add(optimiser->measure());
-      totals_.pairs += optimiser->pairCount();
-    }
-    return errors;
-  }
-
-  [[nodiscard]] TimedCurvePoint lastPoint(std::size_t ellipsoids) {
-    const FitErrors errors = measure();
+    for (const ChunkState& state : states_) errors.add(state.errors);
     TimedCurvePoint point;
     point.seconds = seconds();
     point.iteration = totals_.iterations;
@@ -337,7 +350,7 @@ class ChunkedFit {
     result.chunks = chunks_.size();
     result.deviceBytes = totals_.deviceBytes;
     result.deviceFull = totals_.deviceFull;
-    result.pairs = totals_.pairs;
+    for (const ChunkState& state : states_) result.pairs += state.pairs;
     result.signedIntensities = anyNegative(all);
     return result;
   }

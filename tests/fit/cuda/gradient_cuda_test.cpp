@@ -149,5 +149,17 @@ INSTANTIATE_TEST_SUITE_P(Bricks, SaturationOnGpu, testing::Bool(), [](const auto
   return narrowBand.param ? "OfANarrowBand" : "ThatSupportsReach";
 });
 
+// The constants may move a sum beyond the range of the target.
+TEST_P(SaturationOnGpu, IsThatOfTheCpuWithConstants) {
+  const SparseVolume volume = test::levelSetVolume();
+  FitTarget target = makeTarget(volume, std::nullopt);
+  target.saturates = true;
+  target.narrowBand = GetParam();
+  test::Random random(13);
+  target.constants.resize(target.values.size());
+  for (float& v : target.constants) v = float(random(-0.5, 0.5));
+  expectAgreement({volume, target, {.kappa = 2.0f}, test::randomEllipsoids(100, 1.0, 3.0)}, 1e-4);
+}
+
 }  // namespace
 }  // namespace esvr
