@@ -143,7 +143,11 @@ CompactResult compacted(const Job& job, const Attempt& attempt, const StorageTar
                       .psnr = target.psnr,
                       .bytes = target.bytes,
                       .box = fit.box,
-                      .device = fit.device});
+                      .device = rateControlDevice(attempt.fit, fit.device)});
+}
+
+Device rateControlDevice(const FitResult& fit, const Device& device) {
+  return fit.chunks > 1 ? Device{} : device;
 }
 
 double priceOf(const Attempt& attempt, const CompactResult& compact) {

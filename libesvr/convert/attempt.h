@@ -106,6 +106,10 @@ struct StorageTarget {
   std::optional<double> psnr{};          ///< dB over the box
   std::optional<std::uint64_t> bytes{};  ///< bytes of the ellipsoids' sections
 };
+/// The device on which rate control passes over the whole volume: that of the fit, or the CPU if the
+/// fit was divided into chunks, because the volume may not fit into the memory of the GPU.
+[[nodiscard]] Device rateControlDevice(const FitResult& fit, const Device& device);
+
 [[nodiscard]] CompactResult compacted(const Job& job, const Attempt& attempt,
                                       const StorageTarget& target);
 

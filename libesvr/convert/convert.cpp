@@ -29,11 +29,12 @@ Conversion stored(const ConvertInput& input, FitResult fit, const CommonFitOptio
     conversion.grid = std::move(grid);
     return conversion;
   }
-  return convert::conversionOf(std::move(fit), compactGrid(grid, input.source,
-                                                           {.loss = storage.loss,
-                                                            .psnr = options.psnr,
-                                                            .box = options.box,
-                                                            .device = options.device}));
+  CompactResult compact = compactGrid(grid, input.source,
+                                      {.loss = storage.loss,
+                                       .psnr = options.psnr,
+                                       .box = options.box,
+                                       .device = convert::rateControlDevice(fit, options.device)});
+  return convert::conversionOf(std::move(fit), std::move(compact));
 }
 
 /// Calls the conversion that belongs to a goal.

@@ -289,6 +289,16 @@ TEST(FitInChunks, KeepsTheChunksThatWereFittedBeforeItWasCancelled) {
   EXPECT_LT(result.field.ellipsoidCount(), 250u);
 }
 
+TEST(FitInChunks, SaysWhetherItReachedAPsnr) {
+  FitOptions options = shortFit(kChunkVoxels);
+  options.psnr = 35.0;
+  const FitResult reached = fit(longTube(), options);
+  EXPECT_EQ(reached.end, FitEnd::kPsnrReached);
+  EXPECT_GT(reached.curve.back().psnrBox, 35.0);
+  options.psnr = 80.0;
+  EXPECT_EQ(fit(longTube(), options).end, FitEnd::kPsnrMissed);
+}
+
 TEST(FitInChunks, LeavesOutAChunkWithoutData) {
   SparseVolume volume = longTube();
   const std::size_t half = volume.brickCount() / 2;

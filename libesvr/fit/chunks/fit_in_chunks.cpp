@@ -331,6 +331,12 @@ class ChunkedFit {
     return point;
   }
 
+  [[nodiscard]] FitEnd endAt(double psnr) const {
+    if (!options_.psnr || isCancelled()) return totals_.end;
+    if (psnr > *options_.psnr) return FitEnd::kPsnrReached;
+    return options_.seconds ? FitEnd::kTimeUp : FitEnd::kPsnrMissed;
+  }
+
   [[nodiscard]] FitResult result() {
     std::vector<Ellipsoid> all;
     for (const ChunkState& state : states_)
@@ -345,7 +351,7 @@ class ChunkedFit {
     result.field.fitFor = options_.fitFor;
     result.range = rangeOf(volume_.background, scene_.scale);
     result.kappaLearned = !options_.kappa;
-    result.end = totals_.end;
+    result.end = endAt(result.curve.back().psnrBox);
     result.wanted = plannedCount(options_, activeVoxels_);
     result.chunks = chunks_.size();
     result.deviceBytes = totals_.deviceBytes;
