@@ -13,11 +13,10 @@ namespace {
 /// fewer bytes.
 constexpr double kMinVoxelsPerEllipsoid = 8.0;
 
-/// Active voxels up to which a fit on the CPU has all iterations of its preset; larger volumes have
-/// fewer in proportion. An iteration takes 24 to 43 ns of one core for each of them
-/// (docs/benchmarks.md, "Scaling with the number of voxels"), so that a fit takes about 20 seconds
-/// of two cores at most.
-constexpr double kVoxelsOfWholeFit = 700'000.0;
+/// Bricks up to which a fit on the CPU has all iterations of its preset; larger volumes have fewer in
+/// proportion. An iteration takes about 10 us of two cores for each brick of smoke1, aneurism and
+/// neuron_m207, so that a fit takes about 20 seconds at most.
+constexpr double kBricksOfWholeFit = 2100.0;
 
 /// Bytes of a grid at which nothing is tried to save some of them. A fit would take seconds.
 constexpr std::uint64_t kSmallEnough = 8192;
@@ -42,12 +41,12 @@ double boxPsnrFor(const Job& job, double psnrActive) {
   return psnrActive + 10.0 * std::log10(std::max(box.volume() / double(active), 1.0));
 }
 
-FitOptions bounded(FitOptions options, std::uint64_t activeVoxels) {
-  options.count =
-      std::max<std::size_t>(std::size_t(double(activeVoxels) / kMinVoxelsPerEllipsoid), 1);
+FitOptions bounded(FitOptions options, const SparseVolume& volume) {
+  const auto activeVoxels = double(activeVoxelCount(volume));
+  options.count = std::max<std::size_t>(std::size_t(activeVoxels / kMinVoxelsPerEllipsoid), 1);
   if (options.device.kind == DeviceKind::kCuda) return options;
   const double share =
-      std::min(1.0, kVoxelsOfWholeFit / double(std::max<std::uint64_t>(activeVoxels, 1)));
+      std::min(1.0, kBricksOfWholeFit / double(std::max<std::size_t>(volume.brickCount(), 1)));
   options.iterations = std::uint32_t(std::ceil(share * plannedIterations(options)));
   return options;
 }
@@ -57,7 +56,7 @@ FitOptions bounded(FitOptions options, std::uint64_t activeVoxels) {
 Conversion convertToPreset(const Job& job, const std::function<Conversion()>& fit) {
   if (isLarge(job) && job.options.representation != Representation::kVoxels) return fit();
   ConvertOptions options = job.options;
-  options.fit = bounded(job.options.fit, activeVoxelCount(job.input.source));
+  options.fit = bounded(job.options.fit, job.input.source);
   const double psnr = boxPsnrFor(job, presetPsnr(job.options.fit.preset));
   return convertToPsnr({job.input, options, job.limits}, {psnr, kSmallEnough, kWorthwhileShare});
 }
