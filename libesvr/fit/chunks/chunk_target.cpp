@@ -3,12 +3,14 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 #include "core/axes.h"
 #include "core/brick_index.h"
 #include "esvr/field.h"
 #include "fit/export_field.h"
+#include "fit/tuning.h"
 
 namespace esvr {
 namespace {
@@ -63,8 +65,18 @@ SparseVolume partOf(const SparseVolume& volume, std::span<const std::uint32_t> b
 
 }  // namespace
 
-std::vector<std::uint32_t> bricksAround(const SparseVolume& volume, const BrickChunk& chunk) {
-  const Box around = dilated(chunk.bounds, kHaloBricks);
+int haloBricks(std::uint64_t activeVoxels, std::size_t count) {
+  constexpr double kScales = 2.0;  // largest scale, relative to the distance of ellipsoids
+  constexpr int kFewest = 2;
+  const double distance = std::cbrt(double(activeVoxels) / double(std::max<std::size_t>(count, 1)));
+  const double scale = std::min(kScales * distance, Tuning{}.largestScale);
+  const double radius = supportRadius(kernelConstants<double>(Kernel{}));
+  return std::max(int(std::ceil(scale * radius / kBrickSide)), kFewest);
+}
+
+std::vector<std::uint32_t> bricksAround(const SparseVolume& volume, const BrickChunk& chunk,
+                                        int halo) {
+  const Box around = dilated(chunk.bounds, halo);
   std::vector<std::uint32_t> bricks;
   for (std::uint32_t b = 0; b < volume.brickCount(); ++b)
     if (around.contains(volume.bricks[b])) bricks.push_back(b);
@@ -73,7 +85,7 @@ std::vector<std::uint32_t> bricksAround(const SparseVolume& volume, const BrickC
 
 void makeChunkTarget(const ChunkScene& scene, const BrickChunk& chunk, const Ghosts& ghosts,
                      const std::function<bool(Coord)>& isOpen, ChunkTarget& out) {
-  std::vector<std::uint32_t> bricks = bricksAround(scene.volume, chunk);
+  std::vector<std::uint32_t> bricks = bricksAround(scene.volume, chunk, scene.halo);
   const auto others = std::stable_partition(bricks.begin(), bricks.end(), [&](std::uint32_t b) {
     const Coord brick = scene.volume.bricks[b];
     return chunk.box.contains(brick) || isOpen(brick);
@@ -86,8 +98,8 @@ void makeChunkTarget(const ChunkScene& scene, const BrickChunk& chunk, const Gho
   out.target.active = &out.counted;
   out.target.seedBricks = std::size_t(others - bricks.begin());
   out.target.largestScale =
-      kHaloBricks * kBrickSide / supportRadius(kernelConstants<double>(ghosts.kernel));
-  out.target.within = dilated(chunk.bounds, kHaloBricks);
+      scene.halo * kBrickSide / supportRadius(kernelConstants<double>(ghosts.kernel));
+  out.target.within = dilated(chunk.bounds, scene.halo);
   out.target.constants = sumsIn(out.target, ghosts);
 }
 

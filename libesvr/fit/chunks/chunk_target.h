@@ -1,6 +1,8 @@
 #pragma once
 /// The target of one chunk's fit.
 
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -13,15 +15,18 @@
 
 namespace esvr {
 
-/// Bricks around a chunk that its fit sees. Supports are limited to this reach: a fit would not see
-/// the error that an ellipsoid makes beyond them.
-inline constexpr int kHaloBricks = 2;
+/// The bricks around a chunk that its fit sees, wide enough for ellipsoids of twice the distance that
+/// `count` of them have if they are spread evenly over the active voxels. Supports are limited to
+/// this reach, because a fit would not see the error that an ellipsoid makes beyond it.
+/// \return a number of bricks on each side
+[[nodiscard]] int haloBricks(std::uint64_t activeVoxels, std::size_t count);
 
 /// A volume that is fitted in chunks.
 struct ChunkScene {
   const SparseVolume& volume;
   TargetScale scale;  ///< of the whole volume, so that all chunks have the same units
   Box box;            ///< box of the PSNR, relative to the volume's origin
+  int halo = 2;       ///< see haloBricks()
 };
 
 /// The bricks of a chunk and of its halo, and the target that consists of them. It is pinned,
@@ -38,7 +43,7 @@ struct ChunkTarget {
 
 /// Numbers of the bricks of the chunk and of its halo, increasing.
 [[nodiscard]] std::vector<std::uint32_t> bricksAround(const SparseVolume& volume,
-                                                      const BrickChunk& chunk);
+                                                      const BrickChunk& chunk, int halo);
 
 /// Ellipsoids that are not fitted but take part in the sum.
 struct Ghosts {

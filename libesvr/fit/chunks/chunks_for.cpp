@@ -16,17 +16,18 @@ constexpr std::uint64_t kMinVoxels = std::uint64_t{1} << 16;
 
 /// True if the fit of a chunk stays within the memory of the GPU.
 bool fits(const SparseVolume& volume, const FitOptions& options, const BrickChunk& chunk) {
+  const std::uint64_t all = activeVoxelCount(volume);
+  const std::size_t whole = plannedCount(options, all);
   FitSize size;
-  for (const std::uint32_t b : bricksAround(volume, chunk)) {
+  for (const std::uint32_t b : bricksAround(volume, chunk, haloBricks(all, whole))) {
     ++size.bricks;
     size.activeVoxels += std::uint64_t(volume.active[b].count());
   }
   size.narrowBand = options.narrowBand;
   size.between = options.fitFor == FitFor::kDrawing;
   size.constants = chunk.bricks.size() < volume.brickCount();
-  const std::uint64_t all = activeVoxelCount(volume);
   const double share = double(size.activeVoxels) / double(all);
-  const auto count = std::size_t(share * double(plannedCount(options, all))) + 1;
+  const auto count = std::size_t(share * double(whole)) + 1;
   return fitsOnGpu(size, count, options.device, options.maxDeviceBytes);
 }
 

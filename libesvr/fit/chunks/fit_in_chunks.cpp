@@ -73,8 +73,9 @@ class ChunkedFit {
       : volume_(volume),
         options_(options),
         chunks_(chunks),
-        scene_{volume, scaleOf(volume), boxOf(volume, options.box)},
         activeVoxels_(activeVoxelCount(volume)),
+        scene_{volume, scaleOf(volume), boxOf(volume, options.box),
+               haloBricks(activeVoxels_, plannedCount(options, activeVoxels_))},
         states_(chunks.size()) {
     kernel_.kappa = firstKappa(options, tuning_);
     for (std::size_t c = 0; c < chunks.size(); ++c)
@@ -100,7 +101,7 @@ class ChunkedFit {
 
   /// The groups of chunks. The first chunk is fitted before all others if it has to find kappa.
   [[nodiscard]] std::vector<std::vector<std::size_t>> groupsOf() const {
-    auto groups = groupChunks(chunks_, 2 * kHaloBricks);
+    auto groups = groupChunks(chunks_, 2 * scene_.halo);
     if (options_.kappa || groups.front().size() == 1) return groups;
     auto& first = groups.front();
     const std::vector<std::size_t> alone{first.front()};
@@ -176,7 +177,7 @@ class ChunkedFit {
   /// The ellipsoids of other chunks whose supports may reach a chunk or its halo.
   [[nodiscard]] std::vector<Ellipsoid> ghostsOf(std::size_t c) const {
     const double radius = supportRadius(kernelConstants<double>(kernel_));
-    const Box around = dilated(chunks_[c].bounds, kHaloBricks);
+    const Box around = dilated(chunks_[c].bounds, scene_.halo);
     const Box possible = dilated(around, bricksIn(radius * tuning_.largestScale));
     std::vector<Ellipsoid> ghosts;
     for (std::size_t other = 0; other < states_.size(); ++other) {
@@ -365,8 +366,8 @@ class ChunkedFit {
   const FitOptions& options_;
   Tuning tuning_;
   std::span<const BrickChunk> chunks_;
-  ChunkScene scene_;
   std::uint64_t activeVoxels_;
+  ChunkScene scene_;
   std::vector<ChunkState> states_;
   Kernel kernel_;
   Totals totals_;
