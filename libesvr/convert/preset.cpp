@@ -14,8 +14,8 @@ namespace {
 constexpr double kMinVoxelsPerEllipsoid = 8.0;
 
 /// Bricks up to which a fit on the CPU has all iterations of its preset; larger volumes have fewer in
-/// proportion. An iteration takes about 10 us of two cores for each brick of smoke1, aneurism and
-/// neuron_m207, so that a fit takes about 20 seconds at most.
+/// proportion. An iteration takes 5 to 13 us of two cores for each brick of smoke1, aneurism and
+/// neuron_m207, so that a fit takes 15 to 40 seconds at most.
 constexpr double kBricksOfWholeFit = 2100.0;
 
 /// Bytes of a grid at which nothing is tried to save some of them. A fit would take seconds.
