@@ -250,11 +250,11 @@ double largestOver(const SparseVolume& a, std::size_t i, const SparseVolume& b) 
 
 /// The largest difference over the bricks of `a`.
 double largestOver(const SparseVolume& a, const SparseVolume& b) {
-  using Range = tbb::blocked_range<std::size_t>;
+  using BrickRange = tbb::blocked_range<std::size_t>;
   const auto largest = [](double x, double y) { return std::max(x, y); };
   return tbb::parallel_reduce(
-      Range(0, a.brickCount()), 0.0,
-      [&](const Range& bricks, double found) {
+      BrickRange(0, a.brickCount()), 0.0,
+      [&](const BrickRange& bricks, double found) {
         for (std::size_t i = bricks.begin(); i != bricks.end(); ++i)
           found = largest(found, largestOver(a, i, b));
         return found;

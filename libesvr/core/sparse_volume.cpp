@@ -53,10 +53,10 @@ void addActive(const BrickMask& mask, Coord corner, Box& box) {
 /// Expands `none` by all bricks: add(b, result) for each brick.
 template <class Result, class Add>
 Result overBricks(const SparseVolume& volume, const Result& none, Add add) {
-  using Range = tbb::blocked_range<std::size_t>;
+  using BrickRange = tbb::blocked_range<std::size_t>;
   return tbb::parallel_reduce(
-      Range(0, volume.brickCount()), none,
-      [&](const Range& bricks, Result result) {
+      BrickRange(0, volume.brickCount()), none,
+      [&](const BrickRange& bricks, Result result) {
         for (std::size_t b = bricks.begin(); b != bricks.end(); ++b) add(b, result);
         return result;
       },

@@ -16,10 +16,10 @@ namespace {
 
 /// The range of all values, active or not.
 ValueRange rangeOfAll(std::span<const float> values) {
-  using Range = tbb::blocked_range<std::size_t>;
+  using ValueSpan = tbb::blocked_range<std::size_t>;
   return tbb::parallel_reduce(
-      Range(0, values.size(), kBrickVoxels), ValueRange::none(),
-      [&](const Range& part, ValueRange range) {
+      ValueSpan(0, values.size(), kBrickVoxels), ValueRange::none(),
+      [&](const ValueSpan& part, ValueRange range) {
         for (std::size_t i = part.begin(); i != part.end(); ++i) range.expand(values[i]);
         return range;
       },
