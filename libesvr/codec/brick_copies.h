@@ -1,7 +1,7 @@
 #pragma once
 /// Finds and makes copies. A brick is a copy if all its voxels equal voxels that are coded before
-/// them: those of the neighbouring brick along an axis, or their mirror images. Voxels of a brick
-/// that does not exist, and images that do not exist, count as vacant.
+/// them: those of the neighbouring brick along an axis, or their mirror images. If the neighbouring
+/// brick or a mirror image does not exist, vacant voxels take its place.
 
 #include <algorithm>
 #include <cstddef>

@@ -89,8 +89,6 @@ inline constexpr double kUsualLoss = 0.9;
 // PSNR and the bytes of every stored grid are measured.
 /// PSNR of a full fit less that of a short fit of as many ellipsoids, dB.
 inline constexpr double kShortFitBehind = 2.5;
-/// Gain of PSNR by twice the ellipsoids, dB.
-inline constexpr double kDbPerDoubling = 4.5;
 /// Bytes that an ellipsoid takes in a grid that lost kUsualLoss by quantising.
 inline constexpr double kBytesPerEllipsoid = 7.5;
 /// Bytes that an ellipsoid takes at least.

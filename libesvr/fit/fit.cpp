@@ -78,7 +78,7 @@ FitResult fit(const SparseVolume& volume, const FitOptions& options) {
     throw UsageError("a fit of " + std::to_string(count) + " ellipsoids cannot continue from " +
                      std::to_string(options.start->ellipsoidCount()));
   const auto chunks = chunksFor(volume, options);
-  return chunks.size() > 1 ? fitInChunks(volume, options, chunks)
+  return chunks.size() > 1 ? fitInChunks(volume, options, scale, chunks)
                            : fitWhole(volume, options, scale);
 }
 

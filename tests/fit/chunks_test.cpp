@@ -114,7 +114,7 @@ TEST_P(Constants, ActLikeEllipsoidsThatAreNotFitted) {
   const auto all = test::randomEllipsoids(60, 1.0, 3.0);
   const std::vector<Ellipsoid> fitted(all.begin(), all.begin() + 30),
       ghosts(all.begin() + 30, all.end());
-  const ChunkScene scene{volume, scaleOf(volume), boxOf(volume, std::nullopt)};
+  const ChunkScene scene{volume, scaleOf(volume), boxOf(volume, std::nullopt), 2};
   const auto chunks = divideBricks(volume, std::numeric_limits<std::uint64_t>::max());
   ChunkTarget part;
   makeChunkTarget(
@@ -133,7 +133,7 @@ INSTANTIATE_TEST_SUITE_P(Sums, Constants, testing::Bool(), [](const auto& satura
 
 TEST(ChunkTarget, CountsItsOwnVoxelsOnly) {
   const SparseVolume volume = test::tubeVolume();
-  const ChunkScene scene{volume, scaleOf(volume), boxOf(volume, std::nullopt)};
+  const ChunkScene scene{volume, scaleOf(volume), boxOf(volume, std::nullopt), 2};
   std::uint64_t counted = 0;
   double boxVoxels = 0.0;
   for (const BrickChunk& chunk : divideBricks(volume, 500)) {

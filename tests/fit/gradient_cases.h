@@ -16,6 +16,7 @@
 #include "fit/ellipsoid.h"
 #include "fit/ellipsoid_math.h"
 #include "fit/target.h"
+#include "reference_sum.h"
 
 namespace esvr::test {
 
@@ -83,16 +84,6 @@ class SmallTarget {
 inline double phiByDefinition(double kappa, double m) {
   const double E = std::exp(kappa), eps = double(Kernel::kDefaultEpsilon);
   return std::max(0.0, ((1.0 + E) / (E + std::exp(m)) - eps) / (1.0 - eps));
-}
-
-inline double squaredDistance(const Ellipsoid& p, Coord v) {
-  const double d[3] = {v.x - p.center[0], v.y - p.center[1], v.z - p.center[2]};
-  double m = 0.0;
-  for (int r = 0; r < 3; ++r) {
-    const double u = p.L[3 * r] * d[0] + p.L[3 * r + 1] * d[1] + p.L[3 * r + 2] * d[2];
-    m += u * u;
-  }
-  return m;
 }
 
 inline double contribution(const Ellipsoid& p, double kappa, Coord v) {

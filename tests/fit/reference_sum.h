@@ -10,7 +10,7 @@
 namespace esvr::test {
 
 /// m of an ellipsoid at a voxel: |L (v - mu)|^2.
-inline double mAt(const Ellipsoid& p, Coord v) {
+inline double squaredDistance(const Ellipsoid& p, Coord v) {
   const double d[3] = {v.x - p.center[0], v.y - p.center[1], v.z - p.center[2]};
   double m = 0.0;
   for (int r = 0; r < 3; ++r) {
@@ -23,7 +23,7 @@ inline double mAt(const Ellipsoid& p, Coord v) {
 inline double sumAt(const std::vector<Ellipsoid>& ellipsoids, const KernelConstants<double>& k,
                     Coord v) {
   double sum = 0.0;
-  for (const Ellipsoid& p : ellipsoids) sum += p.intensity * kernelPhi(k, mAt(p, v));
+  for (const Ellipsoid& p : ellipsoids) sum += p.intensity * kernelPhi(k, squaredDistance(p, v));
   return sum;
 }
 

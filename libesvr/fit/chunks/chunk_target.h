@@ -24,9 +24,9 @@ namespace esvr {
 /// A volume that is fitted in chunks.
 struct ChunkScene {
   const SparseVolume& volume;
-  TargetScale scale;  ///< of the whole volume, so that all chunks have the same units
+  TargetScale scale;  ///< the units and the range of the whole volume, which all chunks share
   Box box;            ///< box of the PSNR, relative to the volume's origin
-  int halo = 2;       ///< see haloBricks()
+  int halo;           ///< see haloBricks()
 };
 
 /// The bricks of a chunk and of its halo, and the target that consists of them. It is pinned,

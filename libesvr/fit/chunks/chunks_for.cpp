@@ -34,9 +34,11 @@ bool fits(const SparseVolume& volume, const FitOptions& options, const BrickChun
 }  // namespace
 
 std::vector<BrickChunk> chunksFor(const SparseVolume& volume, const FitOptions& options) {
+  const bool onCpu = options.device.kind == DeviceKind::kCpu;
+  if (onCpu && !options.chunkVoxels) return {};
   std::uint64_t most = options.chunkVoxels.value_or(std::numeric_limits<std::uint64_t>::max());
   auto chunks = divideBricks(volume, most);
-  if (options.chunkVoxels || options.device.kind == DeviceKind::kCpu) return chunks;
+  if (options.chunkVoxels) return chunks;
   const auto fitting = [&](const BrickChunk& chunk) { return fits(volume, options, chunk); };
   most = activeVoxelCount(volume);
   while (most > kMinVoxels && !std::all_of(chunks.begin(), chunks.end(), fitting)) {

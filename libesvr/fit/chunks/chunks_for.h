@@ -9,7 +9,8 @@
 namespace esvr {
 
 /// The chunks in which a volume is fitted: those of options.chunkVoxels, or the largest ones whose
-/// fits stay within the memory of the GPU. A volume that needs no division is one chunk.
+/// fits stay within the memory of the GPU.
+/// \return no or one chunk if the volume needs no division
 [[nodiscard]] std::vector<BrickChunk> chunksFor(const SparseVolume& volume,
                                                 const FitOptions& options);
 

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "esvr/fit.h"
+
 namespace esvr {
 namespace {
 
-/// The error falls as n^-p, with 4.5 dB per doubling.
-constexpr double kPower = 0.45 / 0.30103;
+/// The error falls as n^-p.
+const double kPower = 0.1 * kDbPerDoubling / std::log10(2.0);
 
 /// A number to which the best number of ellipsoids is proportional. With E = a n^-p, dE/dn is the
 /// same for all chunks if n is proportional to a^(1 / (p + 1)).

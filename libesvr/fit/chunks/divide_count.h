@@ -16,8 +16,8 @@ struct ChunkNeed {
 };
 
 /// Divides `count` so that a further ellipsoid lowers the error of every chunk by the same amount,
-/// within each chunk's limits. The error of a chunk is taken to fall by 4.5 dB where the number of
-/// its ellipsoids doubles.
+/// within each chunk's limits. The error of a chunk is taken to fall by kDbPerDoubling where the
+/// number of its ellipsoids doubles.
 /// \return a number for each chunk; together `count`, if the limits allow it
 [[nodiscard]] std::vector<std::size_t> dividedCount(std::size_t count,
                                                     std::span<const ChunkNeed> needs);

@@ -68,13 +68,13 @@ bool isZero(const FitTarget& target) {
 
 class ChunkedFit {
  public:
-  ChunkedFit(const SparseVolume& volume, const FitOptions& options,
+  ChunkedFit(const SparseVolume& volume, const FitOptions& options, const TargetScale& scale,
              std::span<const BrickChunk> chunks)
       : volume_(volume),
         options_(options),
         chunks_(chunks),
         activeVoxels_(activeVoxelCount(volume)),
-        scene_{volume, scaleOf(volume), boxOf(volume, options.box),
+        scene_{volume, scale, boxOf(volume, options.box),
                haloBricks(activeVoxels_, plannedCount(options, activeVoxels_))},
         states_(chunks.size()) {
     kernel_.kappa = firstKappa(options, tuning_);
@@ -377,8 +377,8 @@ class ChunkedFit {
 }  // namespace
 
 FitResult fitInChunks(const SparseVolume& volume, const FitOptions& options,
-                      std::span<const BrickChunk> chunks) {
-  return ChunkedFit(volume, options, chunks).run();
+                      const TargetScale& scale, std::span<const BrickChunk> chunks) {
+  return ChunkedFit(volume, options, scale, chunks).run();
 }
 
 }  // namespace esvr

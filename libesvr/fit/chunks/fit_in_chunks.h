@@ -5,14 +5,15 @@
 
 #include "esvr/fit.h"
 #include "fit/chunks/divide_bricks.h"
+#include "fit/target.h"
 
 namespace esvr {
 
-/// Fits each chunk with the ellipsoids of the chunks before it as constants, and then all of them
-/// again for a part of the iterations, with those of all other chunks as constants. The result does
-/// not depend on the order in which the chunks of a group (groupChunks) are fitted.
+/// Fits all chunks in rounds, in which the ellipsoids of the other chunks are constants. The result
+/// does not depend on the order in which the chunks of a group (groupChunks) are fitted.
+/// \param scale   scaleOf(volume)
 /// \param chunks  at least two
 [[nodiscard]] FitResult fitInChunks(const SparseVolume& volume, const FitOptions& options,
-                                    std::span<const BrickChunk> chunks);
+                                    const TargetScale& scale, std::span<const BrickChunk> chunks);
 
 }  // namespace esvr

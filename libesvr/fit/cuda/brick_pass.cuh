@@ -29,8 +29,8 @@ struct ResidualOutput {
 constexpr int kMomentSlots = 16;  // kMoments, rounded up to a power of two
 static_assert(kMomentSlots % kGroup == 0, "each lane ends with some of the moments");
 
-/// The kernel as a function of the exponent x = (m - s) log2(e), since the device computes a power
-/// of two with one instruction. Along a line, m = closest + a t^2, and therefore
+/// Computes the kernel from the exponent x = (m - s) log2(e), because a power of two takes the device
+/// one instruction. Along a line, m = closest + a t^2, and therefore
 /// x = exponentOf(closest) + factorOf(a) t^2. The values differ from kernelPhi by about 1e-6.
 class FastKernel {
  public:
@@ -132,7 +132,7 @@ __device__ void sumMoments(const PairForm& p, const KernelConstants<float>& kern
     const float closest = fast.exponentOf(line.closest);
     float w0 = 0.0f, w1 = 0.0f, t = line.t;
     const Sum* derivative = byValue + line.offset;
-#pragma unroll 1  // as in addPair
+#pragma unroll 1  // remainders of an unrolled loop would differ here too, as in addPair
     for (int n = line.count; n > 0; --n, t += 1.0f, derivative += kBrickSide) {
       const float exponent = closest + a * t * t;
       const bool inside = fast.isInside(exponent);

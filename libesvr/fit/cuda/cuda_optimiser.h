@@ -1,6 +1,7 @@
 #pragma once
 /// The optimiser on a GPU. It decides the order of the operations; their kernels are in the other
-/// files of this folder.
+/// files of this folder. Its parts: iterations (cuda_optimiser.cpp), growth and what happens when
+/// memory runs out (cuda_optimiser_memory.cpp), and its state (cuda_optimiser_state.cpp).
 
 #include <optional>
 #include <span>
@@ -119,5 +120,31 @@ class CudaOptimiser final : public Optimiser {
   std::size_t ahead_ = 8;  ///< steps to start before the next look()
   bool full_ = false;      ///< memory ran out, so no more ellipsoids are added
 };
+
+/// Does work that allocates memory. If memory runs out, the scratch memory is freed and the work is
+/// done again.
+template <class Work>
+auto CudaOptimiser::withRoom(const Work& work) {
+  try {
+    return work();
+  } catch (const DeviceMemoryError&) {
+    releaseScratch();
+  }
+  return work();
+}
+
+/// Does the same, and drops ellipsoids until the memory suffices.
+/// \throws DeviceMemoryError  the memory does not suffice for one ellipsoid
+template <class Work>
+auto CudaOptimiser::withFewer(const Work& work) {
+  for (;;) {
+    try {
+      return withRoom(work);
+    } catch (const DeviceMemoryError&) {
+      if (count_ < 2) throw;
+      dropLeastUseful();
+    }
+  }
+}
 
 }  // namespace esvr::cuda

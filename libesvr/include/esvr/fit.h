@@ -21,6 +21,9 @@ namespace esvr {
 /// given, and the quality of a PresetGoal (convert.h).
 enum class Preset { kDraft, kStandard, kHigh };
 
+/// Usual gain of PSNR by twice the ellipsoids, dB. It serves estimates only.
+inline constexpr double kDbPerDoubling = 4.5;
+
 /// The state of a running fit. It is reported about four times a second.
 struct FitProgress {
   TimedCurvePoint point;

@@ -73,7 +73,7 @@ double gradientAtTheEnd(const Scene& scene, const Ellipsoid& p) {
   for (int x = box.min.x; x <= box.max.x; ++x)
     for (int y = box.min.y; y <= box.max.y; ++y)
       for (int z = box.min.z; z <= box.max.z; ++z)
-        if (std::abs(test::mAt(p, {x, y, z}) - m) < kRounding * m)
+        if (std::abs(test::squaredDistance(p, {x, y, z}) - m) < kRounding * m)
           change += std::abs(scene.residual({x, y, z})) * slope * byParameters;
   return change;
 }
