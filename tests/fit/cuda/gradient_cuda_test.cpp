@@ -44,7 +44,7 @@ Box supportBox(const Ellipsoid& p, const KernelConstants<double>& k) {
 }
 
 /// The volume, the kernel and the ellipsoids of a case.
-struct Scene {
+struct GradientScene {
   const SparseVolume& volume;
   FitTarget target;
   Kernel kernel;
@@ -62,7 +62,7 @@ struct Scene {
 /// The change of an ellipsoid's gradient if all voxels at the end of its support count as outside.
 /// Rounding decides on which side of the end they are, so that devices may differ. There phi is 0,
 /// but its slope is not.
-double gradientAtTheEnd(const Scene& scene, const Ellipsoid& p) {
+double gradientAtTheEnd(const GradientScene& scene, const Ellipsoid& p) {
   constexpr double kRounding = 3e-5;  // relative to m; needles lose the most digits of it
   const auto k = scene.constants();
   const double m = k.cutoff;
@@ -80,7 +80,7 @@ double gradientAtTheEnd(const Scene& scene, const Ellipsoid& p) {
 
 /// Compares all gradients. The tolerance is relative to the largest one, because residuals nearly
 /// cancel in some.
-void expectAgreement(const Scene& scene, double tolerance) {
+void expectAgreement(const GradientScene& scene, double tolerance) {
   const auto& [volume, target, kernel, ellipsoids] = scene;
   CpuPass engine(target, kernelConstants<double>(kernel));
   engine.rebuild(ellipsoids, 0.5);
