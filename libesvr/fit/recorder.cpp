@@ -34,8 +34,16 @@ void Recorder::report(const TimedCurvePoint& now, double fraction) {
   constexpr double kInterval = 0.25;  // seconds
   if (!options_.progress || now.seconds - lastReport_ < kInterval) return;
   lastReport_ = now.seconds;
-  const double left = fraction > 0.0 ? now.seconds * (1.0 - fraction) / fraction : 0.0;
-  options_.progress({now, fraction, left});
+  FitProgress progress{.point = now, .fraction = fraction};
+  addRates(progress, target_.activeVoxels);
+  options_.progress(progress);
+}
+
+void addRates(FitProgress& progress, std::uint64_t activeVoxels) {
+  const double seconds = progress.point.seconds, fraction = progress.fraction;
+  if (seconds <= 0.0 || fraction <= 0.0) return;
+  progress.secondsLeft = seconds * (1.0 - fraction) / fraction;
+  progress.voxelsPerSecond = double(activeVoxels) * fraction / seconds;
 }
 
 }  // namespace esvr

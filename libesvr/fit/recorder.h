@@ -14,6 +14,9 @@ namespace esvr {
 [[nodiscard]] double psnrOf(double squaredSum, double voxels, double peak);
 inline constexpr double kPerfectPsnr = 999.0;
 
+/// Sets the members that follow from the time and the fraction.
+void addRates(FitProgress& progress, std::uint64_t activeVoxels);
+
 class Recorder {
  public:
   Recorder(const FitTarget& target, const CommonFitOptions& options)

@@ -1,8 +1,7 @@
-// Plan: every brick belongs to one chunk, the chunks' boxes fill space, and the chunks of a group are
-// apart. Constants of a target act like ellipsoids that are not fitted. A fit in chunks is nearly as
-// good as a fit in one chunk, also at the seams, gives the same bits again and on any number of
-// threads, continues from a field, and ends when it is cancelled. A volume that fits into one chunk
-// is fitted as usual.
+// Plan: every brick belongs to one chunk, and the chunks' boxes fill space. Constants of a target act
+// like ellipsoids that are not fitted. A fit in chunks is nearly as good as a fit in one chunk, also
+// at the seams, gives the same bits again and on any number of threads, continues from a field, and
+// ends when it is cancelled. A volume that fits into one chunk is fitted as usual.
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -75,19 +74,6 @@ TEST(DivideBricks, DividesABrickColumnOfUnequalBricks) {
   EXPECT_EQ(chunks.size(), 3u);  // the dense brick, one of the others, and two together
 }
 
-TEST(GroupChunks, KeepsTheChunksOfAGroupApart) {
-  const auto chunks = divideBricks(test::tubeVolume(), 500);
-  const auto groups = groupChunks(chunks, 1);
-  std::set<std::size_t> seen;
-  for (const auto& group : groups)
-    for (const std::size_t a : group) {
-      EXPECT_TRUE(seen.insert(a).second);
-      for (const std::size_t b : group)
-        EXPECT_TRUE(a == b || common(dilated(chunks[a].bounds, 1), chunks[b].bounds).empty());
-    }
-  EXPECT_EQ(seen.size(), chunks.size());
-}
-
 TEST(Dilated, EndsWhereCoordinatesEnd) {
   const Box all = dilated(Box::whole(), 3);
   EXPECT_EQ(all, Box::whole());
@@ -114,11 +100,10 @@ TEST_P(Constants, ActLikeEllipsoidsThatAreNotFitted) {
   const auto all = test::randomEllipsoids(60, 1.0, 3.0);
   const std::vector<Ellipsoid> fitted(all.begin(), all.begin() + 30),
       ghosts(all.begin() + 30, all.end());
-  const ChunkScene scene{volume, scaleOf(volume), boxOf(volume, std::nullopt), 2};
   const auto chunks = divideBricks(volume, std::numeric_limits<std::uint64_t>::max());
+  const ChunkScene scene{volume, chunks, scaleOf(volume), boxOf(volume, std::nullopt), 2};
   ChunkTarget part;
-  makeChunkTarget(
-      scene, chunks.front(), {ghosts, kernel}, [](Coord) { return false; }, part);
+  makeChunkTarget(scene, chunks.front(), {ghosts, kernel}, part);
   ASSERT_FALSE(part.target.constants.empty());
   part.target.saturates = GetParam();
   FitTarget whole = makeTarget(volume, std::nullopt);
@@ -133,13 +118,13 @@ INSTANTIATE_TEST_SUITE_P(Sums, Constants, testing::Bool(), [](const auto& satura
 
 TEST(ChunkTarget, CountsItsOwnVoxelsOnly) {
   const SparseVolume volume = test::tubeVolume();
-  const ChunkScene scene{volume, scaleOf(volume), boxOf(volume, std::nullopt), 2};
+  const auto chunks = divideBricks(volume, 500);
+  const ChunkScene scene{volume, chunks, scaleOf(volume), boxOf(volume, std::nullopt), 2};
   std::uint64_t counted = 0;
   double boxVoxels = 0.0;
-  for (const BrickChunk& chunk : divideBricks(volume, 500)) {
+  for (const BrickChunk& chunk : chunks) {
     ChunkTarget part;
-    makeChunkTarget(
-        scene, chunk, {}, [](Coord) { return false; }, part);
+    makeChunkTarget(scene, chunk, {}, part);
     for (const BrickMask& mask : part.counted) counted += std::uint64_t(mask.count());
     boxVoxels += part.target.boxVoxels;
   }
@@ -181,11 +166,11 @@ class ChunksOn : public test::OnDevice {
 };
 
 // Chunks of 2000 voxels are extreme: their halo has more bricks than they have themselves.
-// The fit loses 1.4 dB in them, and 1.5 dB between voxels.
+// The fit loses 1.0 dB in them, and 0.5 dB between voxels.
 TEST_P(ChunksOn, SlowAreNearlyAsGoodAsOneChunk) {
   const FitResult one = fitted(std::nullopt), several = fitted(kChunkVoxels);
   EXPECT_GT(several.chunks, 4u);
-  EXPECT_GT(psnrOverBox(volume_, decoded(several)), psnrOverBox(volume_, decoded(one)) - 2.5);
+  EXPECT_GT(psnrOverBox(volume_, decoded(several)), psnrOverBox(volume_, decoded(one)) - 1.5);
   EXPECT_LE(several.field.ellipsoidCount(), 300u);
   EXPECT_GT(several.field.ellipsoidCount(), 290u);
   EXPECT_NEAR(several.curve.back().psnrBox, psnrOverBox(volume_, decoded(several)), 0.3);
@@ -197,7 +182,7 @@ TEST_P(ChunksOn, SlowAreNearlyAsGoodBetweenVoxels) {
   };
   const FitResult one = fitted(std::nullopt, FitFor::kDrawing);
   const FitResult several = fitted(kChunkVoxels, FitFor::kDrawing);
-  EXPECT_GT(between(several), between(one) - 2.5);
+  EXPECT_GT(between(several), between(one) - 1.5);
 }
 
 TEST_P(ChunksOn, GiveTheSameBitsAgain) {
@@ -225,13 +210,15 @@ double errorIn(const SparseVolume& volume, const SparseVolume& found, bool atSea
   return squares / voxels;
 }
 
-// The error at the seams of these small chunks is 1.4 times that of a fit in one chunk.
+// Both errors are 1.3 times those of a fit in one chunk.
 TEST(FitInChunks, SlowIsNearlyAsGoodAtTheSeams) {
   const SparseVolume volume = longTube();
   const SparseVolume one = decoded(fit(volume, shortFit(std::nullopt)));
   const SparseVolume several = decoded(fit(volume, shortFit(kChunkVoxels)));
-  EXPECT_LT(errorIn(volume, several, true), 1.7 * errorIn(volume, one, true));
-  EXPECT_LT(errorIn(volume, several, false), 1.2 * errorIn(volume, one, false));
+  const double atSeams = errorIn(volume, several, true) / errorIn(volume, one, true);
+  const double inside = errorIn(volume, several, false) / errorIn(volume, one, false);
+  EXPECT_LT(inside, 1.5);
+  EXPECT_LT(atSeams, 1.15 * inside);
 }
 
 TEST(FitInChunks, GivesTheSameBitsOnAnyNumberOfThreads) {

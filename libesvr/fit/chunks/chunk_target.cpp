@@ -74,29 +74,33 @@ int haloBricks(std::uint64_t activeVoxels, std::size_t count) {
   return std::max(int(std::ceil(scale * radius / kBrickSide)), kFewest);
 }
 
-std::vector<std::uint32_t> bricksAround(const SparseVolume& volume, const BrickChunk& chunk,
+std::vector<std::uint32_t> bricksAround(const SparseVolume& volume,
+                                        std::span<const BrickChunk> chunks, const BrickChunk& chunk,
                                         int halo) {
   const Box around = dilated(chunk.bounds, halo);
   std::vector<std::uint32_t> bricks;
-  for (std::uint32_t b = 0; b < volume.brickCount(); ++b)
-    if (around.contains(volume.bricks[b])) bricks.push_back(b);
+  for (const BrickChunk& other : chunks) {
+    if (common(around, other.bounds).empty()) continue;
+    for (const std::uint32_t b : other.bricks)
+      if (around.contains(volume.bricks[b])) bricks.push_back(b);
+  }
+  std::ranges::sort(bricks);
   return bricks;
 }
 
+Box boxOf(const ChunkScene& scene, const BrickChunk& chunk) {
+  return common(scene.box, voxelsOf(chunk.box));
+}
+
 void makeChunkTarget(const ChunkScene& scene, const BrickChunk& chunk, const Ghosts& ghosts,
-                     const std::function<bool(Coord)>& isOpen, ChunkTarget& out) {
-  std::vector<std::uint32_t> bricks = bricksAround(scene.volume, chunk, scene.halo);
-  const auto others = std::stable_partition(bricks.begin(), bricks.end(), [&](std::uint32_t b) {
-    const Coord brick = scene.volume.bricks[b];
-    return chunk.box.contains(brick) || isOpen(brick);
-  });
+                     ChunkTarget& out) {
+  const auto bricks = bricksAround(scene.volume, scene.chunks, chunk, scene.halo);
   const SparseVolume part = partOf(scene.volume, bricks);
-  out.target = makeTarget(part, common(scene.box, voxelsOf(chunk.box)), scene.scale);
+  out.target = makeTarget(part, boxOf(scene, chunk), scene.scale);
   out.active = out.counted = part.active;
   for (std::size_t b = 0; b < out.counted.size(); ++b)
     if (!chunk.box.contains(part.bricks[b])) out.counted[b] = {};
   out.target.active = &out.counted;
-  out.target.seedBricks = std::size_t(others - bricks.begin());
   out.target.largestScale =
       scene.halo * kBrickSide / supportRadius(kernelConstants<double>(ghosts.kernel));
   out.target.within = dilated(chunk.bounds, scene.halo);

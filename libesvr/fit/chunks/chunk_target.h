@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -24,6 +23,7 @@ namespace esvr {
 /// A volume that is fitted in chunks.
 struct ChunkScene {
   const SparseVolume& volume;
+  std::span<const BrickChunk> chunks;
   TargetScale scale;  ///< the units and the range of the whole volume, which all chunks share
   Box box;            ///< box of the PSNR, relative to the volume's origin
   int halo;           ///< see haloBricks()
@@ -41,8 +41,10 @@ struct ChunkTarget {
   FitTarget target;
 };
 
-/// Numbers of the bricks of the chunk and of its halo, increasing.
+/// Numbers of the bricks of a chunk and of its halo, increasing.
+/// \param chunks  all chunks of the volume
 [[nodiscard]] std::vector<std::uint32_t> bricksAround(const SparseVolume& volume,
+                                                      std::span<const BrickChunk> chunks,
                                                       const BrickChunk& chunk, int halo);
 
 /// Ellipsoids that are not fitted but take part in the sum.
@@ -51,9 +53,11 @@ struct Ghosts {
   Kernel kernel;
 };
 
-/// Makes the target of a chunk. Its PSNR counts the chunk's own part of the box. Seeds are placed in
-/// the chunk's bricks and in those of the halo for which `isOpen` is true.
+/// The chunk's part of the box of the PSNR.
+[[nodiscard]] Box boxOf(const ChunkScene& scene, const BrickChunk& chunk);
+
+/// Makes the target of a chunk. Its PSNR counts the chunk's own part of the box.
 void makeChunkTarget(const ChunkScene& scene, const BrickChunk& chunk, const Ghosts& ghosts,
-                     const std::function<bool(Coord)>& isOpen, ChunkTarget& out);
+                     ChunkTarget& out);
 
 }  // namespace esvr

@@ -15,11 +15,12 @@ namespace {
 constexpr std::uint64_t kMinVoxels = std::uint64_t{1} << 16;
 
 /// True if the fit of a chunk stays within the memory of the GPU.
-bool fits(const SparseVolume& volume, const FitOptions& options, const BrickChunk& chunk) {
+bool fits(const SparseVolume& volume, const FitOptions& options, std::span<const BrickChunk> chunks,
+          const BrickChunk& chunk) {
   const std::uint64_t all = activeVoxelCount(volume);
   const std::size_t whole = plannedCount(options, all);
   FitSize size;
-  for (const std::uint32_t b : bricksAround(volume, chunk, haloBricks(all, whole))) {
+  for (const std::uint32_t b : bricksAround(volume, chunks, chunk, haloBricks(all, whole))) {
     ++size.bricks;
     size.activeVoxels += std::uint64_t(volume.active[b].count());
   }
@@ -39,7 +40,9 @@ std::vector<BrickChunk> chunksFor(const SparseVolume& volume, const FitOptions& 
   std::uint64_t most = options.chunkVoxels.value_or(std::numeric_limits<std::uint64_t>::max());
   auto chunks = divideBricks(volume, most);
   if (options.chunkVoxels) return chunks;
-  const auto fitting = [&](const BrickChunk& chunk) { return fits(volume, options, chunk); };
+  const auto fitting = [&](const BrickChunk& chunk) {
+    return fits(volume, options, chunks, chunk);
+  };
   most = activeVoxelCount(volume);
   while (most > kMinVoxels && !std::all_of(chunks.begin(), chunks.end(), fitting)) {
     most /= 2;

@@ -99,23 +99,4 @@ Box dilated(const Box& box, int bricks) {
   return result;
 }
 
-std::vector<std::vector<std::size_t>> groupChunks(std::span<const BrickChunk> chunks,
-                                                  int distance) {
-  std::vector<std::vector<std::size_t>> groups;
-  const auto isApart = [&](std::size_t a, std::size_t b) {
-    return common(dilated(chunks[a].bounds, distance), chunks[b].bounds).empty();
-  };
-  for (std::size_t c = 0; c < chunks.size(); ++c) {
-    const auto free = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
-      return std::all_of(group.begin(), group.end(),
-                         [&](std::size_t other) { return isApart(c, other); });
-    });
-    if (free == groups.end())
-      groups.push_back({c});
-    else
-      free->push_back(c);
-  }
-  return groups;
-}
-
 }  // namespace esvr

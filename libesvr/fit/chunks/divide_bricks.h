@@ -24,12 +24,6 @@ struct BrickChunk {
 [[nodiscard]] std::vector<BrickChunk> divideBricks(const SparseVolume& volume,
                                                    std::uint64_t maxVoxels);
 
-/// Groups of chunks that can be fitted at the same time: the chunks of a group are more than
-/// `distance` bricks apart. The groups follow from the order of the chunks alone.
-/// \return for each group, the numbers of its chunks
-[[nodiscard]] std::vector<std::vector<std::size_t>> groupChunks(std::span<const BrickChunk> chunks,
-                                                                int distance);
-
 /// A box that is larger by a number of bricks on all sides, as far as coordinates reach.
 [[nodiscard]] Box dilated(const Box& box, int bricks);
 

@@ -10,7 +10,7 @@
 namespace esvr {
 
 /// Fits all chunks in rounds, in which the ellipsoids of the other chunks are constants. The result
-/// does not depend on the order in which the chunks of a group (groupChunks) are fitted.
+/// does not depend on where and in which order options.parts runs the parts of a round.
 /// \param scale   scaleOf(volume)
 /// \param chunks  at least two
 [[nodiscard]] FitResult fitInChunks(const SparseVolume& volume, const FitOptions& options,

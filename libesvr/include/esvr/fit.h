@@ -12,6 +12,7 @@
 #include "esvr/device.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/fit_record.h"
+#include "esvr/part_runner.h"
 #include "esvr/progress.h"
 #include "esvr/sparse_volume.h"
 
@@ -27,8 +28,11 @@ inline constexpr double kDbPerDoubling = 4.5;
 /// The state of a running fit. It is reported about four times a second.
 struct FitProgress {
   TimedCurvePoint point;
-  double fraction = 0.0;     ///< share of the run that is done, 0 to 1
-  double secondsLeft = 0.0;  ///< estimated time to the end of the run
+  double fraction = 0.0;         ///< share of the run that is done, 0 to 1
+  double secondsLeft = 0.0;      ///< estimated time to the end of the run
+  double voxelsPerSecond = 0.0;  ///< active voxels times `fraction`, in a second
+  /// Parts of a fit in chunks (part_runner.h); 1 part of a fit in one chunk.
+  std::size_t partsDone = 0, parts = 1;
 };
 
 /// The options that fit() and fitByPaper() (paper_method.h) have in common.
@@ -67,6 +71,9 @@ struct FitOptions : CommonFitOptions {
   /// The volume is fitted in chunks of at most this many active voxels (docs/scale.md). Default: in
   /// one chunk, or in the largest chunks that fit into the memory of the GPU.
   std::optional<std::uint64_t> chunkVoxels;
+  /// Runs the parts of a fit in chunks. It must outlive the call. Null: they run on `device`, one
+  /// after the other.
+  PartRunner* parts = nullptr;
   /// A field that was fitted to the same volume. The fit continues from its ellipsoids and its
   /// edge, and adds ellipsoids until there are `count`. The field must outlive the call. Null: the
   /// fit begins with seeds.
