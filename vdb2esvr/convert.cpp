@@ -1,6 +1,7 @@
 #include "vdb2esvr/convert.h"
 
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "cli/stopwatch.h"
@@ -24,6 +25,9 @@ void convert(const Options& options, const VolumeGrid& source, std::optional<std
   if (options.paper) return convertByPaper(options, source, grid);
   ConvertOptions wanted = options.convert;
   if (bytes) wanted.goal = SizeGoal{*bytes};
+  // The parts of a single fit do not depend on the storage, and compact storage takes time.
+  if (options.job == Job::kPart && std::holds_alternative<FitGoal>(wanted.goal))
+    wanted.storage.form = Storage::kFloat32;
   grid.conversion = convertVolume({source.descriptor, source.volume}, wanted);
 }
 
@@ -61,6 +65,7 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
   grid.seconds.seed = grid.conversion.fit.secondsSeed;
   grid.seconds.optimise = grid.conversion.fit.secondsOptimise;
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
+  if (options.job == Job::kPart) return grid;
 
   grid.metrics = compareVolumes(source.volume, decodeGrid(grid.stored()), {.box = fit.box});
   grid.psnrBetween = errorBetween(source.volume, grid.stored(), fit.box);

@@ -35,7 +35,7 @@ struct ConvertedGrid {
   [[nodiscard]] const StoredGrid& stored() const { return conversion.grid; }
 };
 
-/// Reads, converts and measures a grid.
+/// Reads, converts and measures a grid. A run with Job::kPart does not measure it.
 /// \param bytes  bytes that the grid may add to the file, if a size is wanted
 [[nodiscard]] ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
                                         std::optional<std::uint64_t> bytes);

@@ -9,6 +9,7 @@
 #include "cli/device_option.h"
 #include "cli/error_bound.h"
 #include "cli/memory_limit.h"
+#include "cli/number.h"
 #include "cli/table.h"
 #include "vdb2esvr/paper_options.h"
 
@@ -126,13 +127,26 @@ void addFitOptions(cli::po::options_description& options) {
     ("paper", value<std::vector<std::string>>()->value_name("KEY=VALUE,...")->composing(),
      "fit by the paper's method, for comparison; --help paper lists the keys");
   // clang-format on
-  cli::addDevice(options);
+  cli::addDevice(options, {}, "; cuda:0,1 or cuda:all fit the chunks of a volume on several GPUs");
   // clang-format off
   options.add_options()
     ("max-vram", value<double>()->value_name("GB"),
      "GPU memory to use (default: all free memory); a volume that does not fit is fitted in chunks")
     ("chunk-voxels", value<std::int64_t>()->value_name("N"),
      "fit the volume in chunks of at most N active voxels (default: one chunk if it fits)");
+  // clang-format on
+}
+
+void addPartOptions(cli::po::options_description& options) {
+  // clang-format off
+  options.add_options()
+    ("resume", bool_switch(),
+     "keep the finished parts of a fit in chunks in the folder OUT.esvr.parts until OUT.esvr is "
+     "written, and continue from those that are there")
+    ("part", value<std::string>()->value_name("K/N"),
+     "fit the K-th of N shares of the parts and write them to OUT.esvr.parts, for job arrays; "
+     "--merge then writes OUT.esvr")
+    ("merge", bool_switch(), "write OUT.esvr from the parts in OUT.esvr.parts");
   // clang-format on
 }
 
@@ -147,6 +161,8 @@ void addFileOptions(cli::po::options_description& options) {
      "keep or discard the best result so far if the run is interrupted")
     ("report", value<std::string>()->value_name("FILE"),
      "write a JSON report to FILE, whose name ends in .json; '-' is stdout")
+    ("progress", value<std::string>()->value_name("P")->default_value("text"),
+     "text: a bar on a terminal, and lines in a log with --verbose; json: lines of JSON on stderr")
     ("hits", bool_switch(), "report the average number of ellipsoids that reach a voxel")
     ("force,f", bool_switch(), "replace OUT.esvr and the report if they exist");
   // clang-format on
@@ -159,6 +175,7 @@ cli::CommandLine commandLine() {
   addFileOptions(line.options());
   addGoalOptions(line.options());
   addFitOptions(line.options());
+  addPartOptions(line.options());
   cli::addMaxMemory(line);
   line.helpTopic("paper", paperHelp());
   return line;
@@ -307,6 +324,36 @@ NonFinite nonFinite(const Arguments& a) {
                                 {{"refuse", NonFinite::kRefuse}, {"zero", NonFinite::kZero}});
 }
 
+/// K/N with 1 <= K <= N.
+PartShare partShare(const std::string& text) {
+  const auto slash = text.find('/');
+  const auto number = cli::parseWhole(text.substr(0, slash));
+  const auto count = slash == text.npos ? std::nullopt : cli::parseWhole(text.substr(slash + 1));
+  constexpr std::int64_t kMostParts = 1'000'000;
+  if (!number || !count || *number < 1 || *number > *count || *count > kMostParts)
+    throw UsageError("--part must be K/N with K from 1 to N, not '" + text + "'");
+  return {int(*number), int(*count)};
+}
+
+void readParts(const Arguments& a, Options& options) {
+  options.resume = a.get<bool>("resume");
+  if (a.get<bool>("merge")) options.job = Job::kMerge;
+  if (const auto part = a.find<std::string>("part")) {
+    refuseWith(a, "part", {"merge", "report"});
+    options.job = Job::kPart;
+    options.share = partShare(*part);
+  }
+  const bool isStored = options.resume || options.job != Job::kWhole;
+  if (isStored && options.paper) throw UsageError("fits by --paper have no parts");
+  // An interrupted run is continued later.
+  if (isStored && a.values["on-cancel"].defaulted()) options.onCancel = OnCancel::kDiscard;
+}
+
+ProgressForm progressForm(const Arguments& a) {
+  return cli::choose<ProgressForm>("progress", a.get<std::string>("progress"),
+                                   {{"text", ProgressForm::kText}, {"json", ProgressForm::kJson}});
+}
+
 OnCancel onCancel(const Arguments& a) {
   return cli::choose<OnCancel>("on-cancel", a.get<std::string>("on-cancel"),
                                {{"keep", OnCancel::kKeep}, {"discard", OnCancel::kDiscard}});
@@ -335,7 +382,9 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.read.maxBytes = cli::maxMemoryOf(a);
   options.device = cli::deviceOf(a);
   options.onCancel = onCancel(a);
+  readParts(a, options);
   options.report = a.find<std::string>("report").value_or("");
+  options.progress = progressForm(a);
   options.countHits = a.get<bool>("hits");
   options.overwrite = a.get<bool>("force");
   options.threads = a.threads;

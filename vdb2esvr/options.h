@@ -8,11 +8,17 @@
 
 #include "cli/log.h"
 #include "esvr/convert.h"
+#include "esvr/part_store.h"
 #include "esvr/vdb_io.h"
+#include "vdb2esvr/progress_bar.h"
 
 namespace esvr::vdb2esvr {
 
 inline constexpr const char* kProgram = "vdb2esvr";
+
+/// What a run does of a conversion: all of it; the share of one process in the fits; or all but the
+/// fits, from the parts that other processes have fitted.
+enum class Job { kWhole, kPart, kMerge };
 
 /// Whether an interrupted run writes its best state.
 enum class OnCancel { kKeep, kDiscard };
@@ -27,10 +33,14 @@ struct Options {
   std::optional<PaperMethod> paper;   ///< the paper's method, if it replaces ours
   ReadOptions read;
   std::string device = "auto";
+  Job job = Job::kWhole;
+  bool resume = false;  ///< parts are kept in a folder until the file is written
+  PartShare share;      ///< for Job::kPart
   OnCancel onCancel = OnCancel::kKeep;
   std::string report;      ///< file name, or cli::kStandardOutput; empty: no report
   bool countHits = false;  ///< whether the report has the average ellipsoid hits
   bool overwrite = false;
+  ProgressForm progress = ProgressForm::kText;
   int threads = 0;  ///< number of threads; 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "cli/printable.h"
 
@@ -16,7 +17,7 @@ namespace {
 constexpr const char* kBackAndClear = "\r\x1b[K";
 constexpr std::size_t kBarCells = 20;
 constexpr std::size_t kLogWidth = 200;
-constexpr std::chrono::seconds kLineInterval{5};
+constexpr std::chrono::seconds kLineInterval{5}, kJsonInterval{1};
 
 std::size_t terminalWidth() {
   constexpr std::size_t kUnknown = 80;
@@ -45,14 +46,36 @@ std::string progressLine(const std::string& grid, const FitProgress& progress, s
   char numbers[96];
   std::snprintf(numbers, sizeof numbers, "  %.2f dB  %llu ellipsoids  ", progress.point.psnrBox,
                 static_cast<unsigned long long>(progress.point.ellipsoids));
+  std::string parts;
+  if (progress.parts > 1)
+    parts = "part " + std::to_string(progress.partsDone) + " of " + std::to_string(progress.parts) +
+            "  ";
   std::string line = cli::printable(grid) + "  " + std::to_string(std::lround(100.0 * fraction)) +
-                     " % " + bar(fraction) + numbers + clock(progress.secondsLeft) + " left";
+                     " % " + bar(fraction) + numbers + parts + clock(progress.secondsLeft) +
+                     " left";
   line.resize(std::min(line.size(), width));
   return line;
 }
 
-ProgressBar::ProgressBar(std::string grid, cli::Verbosity verbosity)
+std::string progressJson(const std::string& grid, const FitProgress& progress) {
+  const nlohmann::ordered_json json{{"grid", grid},
+                                    {"fraction", progress.fraction},
+                                    {"seconds", progress.point.seconds},
+                                    {"seconds_left", progress.secondsLeft},
+                                    {"psnr_box", progress.point.psnrBox},
+                                    {"ellipsoids", progress.point.ellipsoids},
+                                    {"parts_done", progress.partsDone},
+                                    {"parts", progress.parts},
+                                    {"voxels_per_second", progress.voxelsPerSecond}};
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+ProgressBar::ProgressBar(std::string grid, ProgressForm form, cli::Verbosity verbosity)
     : grid_(std::move(grid)), form_(Form::kNone) {
+  if (form == ProgressForm::kJson) {
+    form_ = Form::kJson;
+    return;
+  }
   if (verbosity == cli::Verbosity::kQuiet) return;
   if (isatty(STDERR_FILENO) == 1)
     form_ = Form::kBar;
@@ -76,9 +99,18 @@ void ProgressBar::printLine(const FitProgress& progress) {
   std::cerr << progressLine(grid_, progress, kLogWidth) << std::endl;
 }
 
+void ProgressBar::printJson(const FitProgress& progress) {
+  const auto now = Clock::now();
+  if (now - lastLine_ < kJsonInterval && progress.partsDone == lastParts_) return;
+  lastLine_ = now;
+  lastParts_ = progress.partsDone;
+  std::cerr << progressJson(grid_, progress) << std::endl;
+}
+
 void ProgressBar::show(const FitProgress& progress) {
   if (form_ == Form::kBar) redraw(progress);
   if (form_ == Form::kLines) printLine(progress);
+  if (form_ == Form::kJson) printJson(progress);
 }
 
 }  // namespace esvr::vdb2esvr

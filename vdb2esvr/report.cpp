@@ -78,7 +78,9 @@ bool isShare(const Goal& goal) {
   return within && within->relative;
 }
 
-Json asked(const Options& options) {
+}  // namespace
+
+Json askedJson(const Options& options) {
   const FitOptions& fit = options.convert.fit;
   const StorageOptions& storage = options.convert.storage;
   return {{"count", orNull(fit.count)},
@@ -106,6 +108,8 @@ Json asked(const Options& options) {
           {"max_vram", orNull(fit.maxDeviceBytes)},
           {"chunk_voxels", orNull(fit.chunkVoxels)}};
 }
+
+namespace {
 
 Json sourceOf(const ConvertedGrid& grid) {
   const StoredGrid& stored = grid.stored();
@@ -320,7 +324,7 @@ Json head(const Options& options) {
           {"program", kProgram},
           {"command_line", options.commandLine},
           {"versions", cli::versionJson()},
-          {"asked", asked(options)}};
+          {"asked", askedJson(options)}};
 }
 
 }  // namespace

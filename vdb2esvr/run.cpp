@@ -16,6 +16,7 @@
 #include "esvr/error.h"
 #include "vdb2esvr/byte_shares.h"
 #include "vdb2esvr/choose_grids.h"
+#include "vdb2esvr/parts.h"
 #include "vdb2esvr/progress_bar.h"
 #include "vdb2esvr/report.h"
 #include "vdb2esvr/run_record.h"
@@ -33,14 +34,17 @@ void checkFiles(const Options& options) {
   std::vector<std::filesystem::path> files{options.input, options.output};
   if (reportIsFile(options)) files.emplace_back(options.report);
   cli::requireDistinct(files);
-  cli::checkOutput(options.output, {".esvr"}, options.overwrite);
+  const bool mayExist = options.overwrite || options.job == Job::kPart;  // it is not written
+  cli::checkOutput(options.output, {".esvr"}, mayExist);
   if (reportIsFile(options)) cli::checkOutput(options.report, {".json"}, options.overwrite);
 }
 
 constexpr const char* kAuto = "auto";
 
-void tellDevice(const Device& device, const Options& options, const cli::Log& log) {
-  log.detail("fitting on " + deviceName(device) + ", with " +
+void tellDevices(const std::vector<Device>& devices, const Options& options, const cli::Log& log) {
+  std::string names;
+  for (const Device& device : devices) names += (names.empty() ? "" : ", ") + deviceName(device);
+  log.detail("fitting on " + names + ", with " +
              (options.threads > 0 ? std::to_string(options.threads) : "all available") +
              " threads");
 }
@@ -74,14 +78,18 @@ bool mayFit(const Options& options) {
 /// same voxels are converted once.
 class FileConversion {
  public:
-  FileConversion(const Options& options, const Device& device, const CancelToken& cancel,
-                 const cli::Log& log)
+  FileConversion(const Options& options, const std::vector<Device>& devices,
+                 const CancelToken& cancel, Parts& parts, const cli::Log& log)
       : options_(options),
+        parts_(parts),
         log_(log),
-        started_(mayFit(options) ? std::async(std::launch::async, [device] { startDevice(device); })
+        started_(mayFit(options) ? std::async(std::launch::async,
+                                              [devices] {
+                                                for (const auto& d : devices) startDevice(d);
+                                              })
                                  : std::future<void>()) {
     options_.convert.fit.cancel = &cancel;
-    options_.convert.fit.device = device;
+    runOn(devices);
   }
 
   void run(const std::vector<GridSummary>& grids, RunRecord& record) {
@@ -98,15 +106,27 @@ class FileConversion {
     }
     record.interrupted = cancelled();
     if (record.interrupted && (options_.onCancel == OnCancel::kDiscard || record.grids.empty()))
-      throw RuntimeFailure("interrupted; nothing was written");
+      throw RuntimeFailure("interrupted; " + whatIsLeft());
   }
 
  private:
   [[nodiscard]] bool cancelled() const { return options_.convert.fit.cancel->cancelled(); }
 
+  /// What an interrupted run leaves.
+  [[nodiscard]] std::string whatIsLeft() const {
+    const auto folder = partsFolder(options_);
+    if (!std::filesystem::exists(folder)) return "nothing was written";
+    return "the finished parts are in " + folder.string() + ", and the same command continues";
+  }
+
+  void runOn(const std::vector<Device>& devices) {
+    options_.convert.fit.device = devices.front();
+    options_.convert.fit.parts = parts_.runOn(devices);
+  }
+
   /// \return false if the run was interrupted before the fit had a result
   bool convert(std::size_t g, const std::string& name, ByteShares& shares, RunRecord& record) try {
-    ProgressBar bar(name, options_.verbosity);
+    ProgressBar bar(name, options_.progress, options_.verbosity);
     options_.convert.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
     record.grids.push_back(convertToShare(g, name, shares));
     return true;
@@ -137,12 +157,13 @@ class FileConversion {
       return convertGrid(options_, name, bytes);
     } catch (const DeviceError& error) {
       log_.warning(std::string(error.what()) + "; continuing on the CPU");
-      options_.convert.fit.device = {};
+      runOn({Device{}});
       return convertGrid(options_, name, bytes);
     }
   }
 
   Options options_;
+  Parts& parts_;
   const cli::Log& log_;
   std::future<void> started_;  ///< the device starts while the first grid is read; may be empty
 };
@@ -179,20 +200,39 @@ void throwWhatIsAmiss(const Options& options, const RunRecord& record) {
                        " was written");
 }
 
+/// Ends a run that fits a share of the parts.
+void tellPart(const Options& options, const RunRecord& record, const cli::Log& log) {
+  const bool none = std::ranges::none_of(
+      record.grids, [](const ConvertedGrid& grid) { return grid.conversion.fit.chunks > 1; });
+  if (none)
+    log.warning(
+        "no grid was fitted in chunks, so that there are no parts; --chunk-voxels divides "
+        "a grid");
+  else
+    log.info("the parts are in " + partsFolder(options).string() + "; --merge writes " +
+             options.output.string());
+}
+
 RunRecord convertFile(const Options& options, const cli::Interrupts& interrupts,
                       const cli::Log& log) {
   cli::Stopwatch watch;
   RunRecord record;
-  auto device = std::async(std::launch::async, [&] { return selectDevice(options.device); });
+  auto devices = std::async(std::launch::async, [&] { return selectDevices(options.device); });
   record.input = inspectVdb(options.input);
   GridChoice choice = chooseGrids(options.input, record.input, options.grids);
   tellSkipped(choice.skipped, log);
   record.skipped = std::move(choice.skipped);
-  const Device selected = device.get();
-  tellDevice(selected, options, log);
-  FileConversion(options, selected, interrupts.token(), log).run(choice.fitted, record);
+  const std::vector<Device> selected = devices.get();
+  tellDevices(selected, options, log);
+  Parts parts(options, interrupts.token());
+  FileConversion(options, selected, interrupts.token(), parts, log).run(choice.fitted, record);
   for (const auto& grid : record.grids) tellGrid(grid, log);
+  if (options.job == Job::kPart) {
+    tellPart(options, record, log);
+    return record;
+  }
   write(options, record);
+  parts.remove();
   record.secondsTotal = watch.lap();
   return record;
 }
@@ -215,6 +255,7 @@ int run(const Options& options) {
   const cli::Interrupts interrupts;
   checkFiles(options);
   const RunRecord record = convertOrReport(options, interrupts, log);
+  if (options.job == Job::kPart) return 0;
   tellResult(options, record);
   throwWhatIsAmiss(options, record);
   return 0;

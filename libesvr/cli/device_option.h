@@ -7,10 +7,11 @@
 
 namespace esvr::cli {
 
-/// Adds the option. Its help text begins with `purpose`.
-void addDevice(po::options_description& options, const std::string& purpose = {});
+/// Adds the option. Its help text begins with `purpose` and ends with `more`.
+void addDevice(po::options_description& options, const std::string& purpose = {},
+               const std::string& more = {});
 
-/// The value of the option, as selectDevice() takes it.
+/// The value of the option, as selectDevice() or selectDevices() take it.
 [[nodiscard]] std::string deviceOf(const Arguments& arguments);
 
 }  // namespace esvr::cli

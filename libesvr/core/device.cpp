@@ -12,12 +12,11 @@
 namespace esvr {
 namespace {
 
-constexpr std::string_view kCudaPrefix = "cuda:";
+constexpr std::string_view kCudaPrefix = "cuda:", kAllDevices = "cuda:all";
 
-/// The N of "cuda:N"; nothing for any other text.
-std::optional<int> cudaIndex(std::string_view text) {
-  if (!text.starts_with(kCudaPrefix)) return std::nullopt;
-  const auto index = parseWhole(text.substr(kCudaPrefix.size()));
+/// The number of a device; nothing for any other text.
+std::optional<int> indexOf(std::string_view text) {
+  const auto index = parseWhole(text);
   if (!index || *index < 0 || *index > std::numeric_limits<int>::max()) return std::nullopt;
   return int(*index);
 }
@@ -50,19 +49,52 @@ Device requireIndex(const CudaProbe& probe, int index) {
                     " CUDA devices, counted from 0");
 }
 
+std::vector<Device> allUsable(const CudaProbe& probe) {
+  std::vector<Device> devices{requireUsable(probe)};
+  for (const auto& device : probe.devices)
+    if (device.whyNotUsable.empty() && device.index != devices.front().index)
+      devices.push_back({DeviceKind::kCuda, device.index});
+  return devices;
+}
+
+/// The numbers of "cuda:N,M,..."; none if the text is another one.
+std::vector<int> cudaIndices(const std::string& text) {
+  std::vector<int> indices;
+  if (!text.starts_with(kCudaPrefix)) return indices;
+  for (const auto& number : splitText(text.substr(kCudaPrefix.size()), ',')) {
+    const auto index = indexOf(number);
+    if (!index) return {};
+    indices.push_back(*index);
+  }
+  return indices;
+}
+
+/// The devices of this machine. With "cpu" the driver is not initialised.
+CudaProbe probeFor(const std::string& text) { return text == "cpu" ? CudaProbe{} : probeCuda(); }
+
 }  // namespace
 
 Device chooseDevice(const std::string& text, const CudaProbe& probe) {
   if (text == "cpu") return {};
   if (text == "cuda") return requireUsable(probe);
   if (text == "auto") return firstUsable(probe) ? requireUsable(probe) : Device{};
-  if (const auto index = cudaIndex(text)) return requireIndex(probe, *index);
+  if (const auto indices = cudaIndices(text); indices.size() == 1)
+    return requireIndex(probe, indices.front());
   throw UsageError("device '" + text + "' is none of auto, cpu, cuda, cuda:N");
 }
 
-Device selectDevice(const std::string& text) {
-  // With "cpu" the driver is not initialised.
-  return chooseDevice(text, text == "cpu" ? CudaProbe{} : probeCuda());
+std::vector<Device> chooseDevices(const std::string& text, const CudaProbe& probe) {
+  if (text == kAllDevices) return allUsable(probe);
+  std::vector<Device> devices;
+  for (const int index : cudaIndices(text)) devices.push_back(requireIndex(probe, index));
+  if (devices.empty()) devices.push_back(chooseDevice(text, probe));
+  return devices;
+}
+
+Device selectDevice(const std::string& text) { return chooseDevice(text, probeFor(text)); }
+
+std::vector<Device> selectDevices(const std::string& text) {
+  return chooseDevices(text, probeFor(text));
 }
 
 std::string deviceName(const Device& device) {

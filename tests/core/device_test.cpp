@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "core/device_choice.h"
 #include "esvr/error.h"
@@ -12,6 +13,7 @@ namespace esvr {
 namespace {
 
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
 using testing::ThrowsMessage;
@@ -61,6 +63,29 @@ TEST(ChooseDevice, CudaWithANumberTakesThatDeviceOrNone) {
               ThrowsMessage<DeviceError>(HasSubstr("there are 3")));
   EXPECT_THAT([] { (void)chooseDevice("cuda:0", noGpu()); },
               ThrowsMessage<DeviceError>(HasSubstr("no driver")));
+}
+
+std::vector<int> indicesOf(const std::string& text) {
+  std::vector<int> indices;
+  for (const Device& device : chooseDevices(text, threeGpus())) indices.push_back(device.index);
+  return indices;
+}
+
+TEST(ChooseDevices, TakesTheDevicesOfAList) {
+  EXPECT_THAT(indicesOf("cuda:2,1,2"), ElementsAre(2, 1, 2));
+  EXPECT_THAT(indicesOf("cuda:all"), ElementsAre(1, 2));
+  EXPECT_THAT(indicesOf("cuda:2"), ElementsAre(2));
+  EXPECT_THAT(indicesOf("cuda"), ElementsAre(1));
+  EXPECT_EQ(chooseDevices("cpu", threeGpus()).size(), 1u);
+}
+
+TEST(ChooseDevices, SaysWhichDeviceOfAListIsMissing) {
+  EXPECT_THAT([] { (void)chooseDevices("cuda:1,3", threeGpus()); },
+              ThrowsMessage<DeviceError>(HasSubstr("no cuda:3")));
+  EXPECT_THAT([] { (void)chooseDevices("cuda:all", noGpu()); },
+              ThrowsMessage<DeviceError>(HasSubstr("no driver")));
+  for (const char* text : {"cuda:1,", "cuda:,1", "cuda:1;2", "cuda:all,1"})
+    EXPECT_THROW((void)chooseDevices(text, threeGpus()), UsageError) << text;
 }
 
 class MeaninglessDevice : public testing::TestWithParam<const char*> {};

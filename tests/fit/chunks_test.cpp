@@ -11,6 +11,7 @@
 #include <limits>
 #include <set>
 
+#include "esvr/device_workers.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/fit.h"
@@ -228,6 +229,18 @@ TEST(FitInChunks, GivesTheSameBitsOnAnyNumberOfThreads) {
   const FitResult usual = fit(volume, options);
   const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
   EXPECT_TRUE(test::sameBits(fit(volume, options).field, usual.field));
+}
+
+TEST(FitInChunks, GivesTheSameBitsOnSeveralWorkers) {
+  const SparseVolume volume = longTube();
+  FitOptions options = shortFit(kChunkVoxels);
+  options.iterations = 40;
+  const FitResult usual = fit(volume, options);
+  for (const std::size_t count : {2, 4}) {
+    DeviceWorkers workers{std::vector<Device>(count)};
+    options.parts = &workers;
+    EXPECT_TRUE(test::sameBits(fit(volume, options).field, usual.field)) << count;
+  }
 }
 
 TEST(FitInChunks, IsTheUsualFitInOneChunk) {

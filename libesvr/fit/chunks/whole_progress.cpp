@@ -41,6 +41,7 @@ void WholeProgress::end(std::size_t chunk, const PartEnd& part, double fraction)
   chunks_[chunk].fraction = fraction;
   chunks_[chunk].ellipsoids = part.fit.ellipsoids.size();
   ++partsDone_;
+  if (report_) report_(whole());
 }
 
 FitProgress WholeProgress::whole() const {
@@ -51,6 +52,7 @@ FitProgress WholeProgress::whole() const {
     now.point.ellipsoids += chunk.ellipsoids;
     squares += chunk.squares;
   }
+  now.fraction = std::min(1.0, now.fraction);  // the shares are rounded
   now.point.seconds = seconds();
   now.point.psnrBox = psnrOf(squares, boxVoxels_, 1.0);
   now.parts = chunks_.size() * kRounds;

@@ -20,7 +20,7 @@ class WholeProgress {
   /// A function for the reports of a chunk's part; empty if nobody asks for reports.
   [[nodiscard]] std::function<void(const FitProgress&)> of(std::size_t chunk);
 
-  /// A part has ended. \param fraction  share of the schedule at its end
+  /// A part has ended, which is reported. \param fraction  share of the schedule at its end
   void end(std::size_t chunk, const PartEnd& part, double fraction);
 
   /// A chunk's share of the active voxels.

@@ -2,6 +2,7 @@
 /// Selects the device that computes.
 
 #include <string>
+#include <vector>
 
 namespace esvr {
 
@@ -20,6 +21,12 @@ struct Device {
 /// \throws UsageError   the text is none of these names
 /// \throws DeviceError  the CUDA device cannot be used (the text says why)
 [[nodiscard]] Device selectDevice(const std::string& text);
+
+/// Selects one or more devices: "cuda:0,1,3" (each number may be repeated), "cuda:all" (all usable
+/// CUDA devices), or a name that selectDevice() takes.
+/// \return at least one device
+/// \throws UsageError, DeviceError  see selectDevice()
+[[nodiscard]] std::vector<Device> selectDevices(const std::string& text);
 
 /// Starts a device, which takes some tenths of a second for a GPU, so that its first use need not
 /// wait. It may be called on another thread. It reports no error, because the first use does.

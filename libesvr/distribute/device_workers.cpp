@@ -1,0 +1,23 @@
+#include "esvr/device_workers.h"
+
+#include <atomic>
+#include <utility>
+
+#include "distribute/on_devices.h"
+
+namespace esvr {
+
+DeviceWorkers::DeviceWorkers(std::vector<Device> devices) : devices_(std::move(devices)) {}
+
+std::vector<std::vector<std::byte>> DeviceWorkers::run(const RoundParts& parts) {
+  std::vector<std::vector<std::byte>> results(parts.count());
+  std::atomic<std::size_t> next{0};
+  const auto work = [&](const Device& device) {
+    for (std::size_t p = next++; p < parts.count(); p = next++)
+      results[p] = parts.fit(p, device).bytes;
+  };
+  onDevices(devices_, work, [&] { next = parts.count(); });
+  return results;
+}
+
+}  // namespace esvr

@@ -1,0 +1,154 @@
+#include "esvr/part_store.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+#include <utility>
+
+#include "core/atomic_file.h"
+#include "esvr/error.h"
+
+namespace esvr {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kLock = "lock";
+constexpr const char* kOrigin = "origin";
+constexpr const char* kResult = ".part";
+constexpr const char* kClaim = ".claim";
+constexpr mode_t kMode = 0666;  // reduced by the process's umask
+
+/// The start of a file with a result.
+struct ResultHead {
+  static constexpr std::uint64_t kMagic = 0x31545250'52565345;  // "ESVRPRT1"
+  std::uint64_t magic = kMagic, bytes = 0, hash = 0;
+};
+
+[[noreturn]] void fail(const fs::path& path, int error) {
+  throw RuntimeFailure("cannot use " + path.string() + ": " +
+                       std::system_category().message(error));
+}
+
+/// Locks a file, which is created if it is missing. \return nothing if another process has the lock
+std::optional<PartStore::Lock> tryLock(const fs::path& path, int operation) {
+  const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kMode);
+  if (fd < 0) fail(path, errno);
+  PartStore::Lock lock(fd);
+  if (::flock(fd, operation | LOCK_NB) == 0) return lock;
+  if (errno != EWOULDBLOCK) fail(path, errno);
+  return std::nullopt;
+}
+
+PartStore::Lock lockFolder(const fs::path& folder, PartStore::Access access) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) fail(folder, error.value());
+  auto lock = tryLock(folder / kLock, access == PartStore::Access::kAlone ? LOCK_EX : LOCK_SH);
+  if (!lock) throw RuntimeFailure("another process uses " + folder.string());
+  return std::move(*lock);
+}
+
+std::string textOf(const std::vector<PartOrigin>& origin) {
+  std::string text;
+  for (const auto& [name, value] : origin) text += name + ' ' + value + '\n';
+  return text;
+}
+
+std::vector<std::string> linesOf(const fs::path& path) {
+  std::ifstream in(path);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+}  // namespace
+
+PartStore::Lock::Lock(Lock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+
+PartStore::Lock::~Lock() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+PartStore::PartStore(fs::path folder, const std::vector<PartOrigin>& origin, Access access)
+    : folder_(std::move(folder)), lock_(lockFolder(folder_, access)) {
+  if (!fs::exists(folder_ / kOrigin)) {
+    const std::string text = textOf(origin);
+    AtomicFile file(folder_ / kOrigin, true);
+    file.write(std::as_bytes(std::span(text)));
+    file.commit();
+  }
+  checkOrigin(origin);
+}
+
+void PartStore::checkOrigin(const std::vector<PartOrigin>& origin) const {
+  const auto lines = linesOf(folder_ / kOrigin);
+  for (std::size_t n = 0; n < origin.size(); ++n) {
+    const auto& [name, value] = origin[n];
+    const std::string found = n < lines.size() ? lines[n] : "";
+    if (found == name + ' ' + value) continue;
+    const bool isNamed = found.starts_with(name + ' ');
+    throw BadInput(folder_.string() + " belongs to another run: its " + name + " is " +
+                   (isNamed ? found.substr(name.size() + 1) : "unknown") + ", not " + value);
+  }
+}
+
+fs::path PartStore::fileOf(const PartKey& key, const char* extension) const {
+  std::array<char, 33> digits{};
+  std::snprintf(digits.data(), digits.size(), "%016llx%016llx",
+                static_cast<unsigned long long>(key[1]), static_cast<unsigned long long>(key[0]));
+  return folder_ / (std::string(digits.data()) + extension);
+}
+
+bool PartStore::contains(const PartKey& key) const { return fs::exists(fileOf(key, kResult)); }
+
+std::optional<std::vector<std::byte>> PartStore::find(const PartKey& key) const {
+  const fs::path path = fileOf(key, kResult);
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return std::nullopt;
+  ResultHead head;
+  in.read(reinterpret_cast<char*>(&head), sizeof head);
+  const std::vector<char> text{std::istreambuf_iterator<char>(in), {}};
+  const bool isWhole = head.magic == ResultHead::kMagic && head.bytes == text.size() &&
+                       head.hash == XXH3_64bits(text.data(), text.size());
+  if (!isWhole)
+    throw BadInput(path.string() + " is damaged; remove it, and the part will be fitted again");
+  const auto bytes = std::as_bytes(std::span(text));
+  return std::vector<std::byte>(bytes.begin(), bytes.end());
+}
+
+void PartStore::put(const PartKey& key, std::span<const std::byte> result) {
+  const ResultHead head{.bytes = result.size(), .hash = XXH3_64bits(result.data(), result.size())};
+  AtomicFile file(fileOf(key, kResult), true);
+  file.write(std::as_bytes(std::span(&head, 1)));
+  file.write(result);
+  file.commit();
+}
+
+std::optional<PartStore::Claim> PartStore::claim(const PartKey& key) {
+  const fs::path path = fileOf(key, kClaim);
+  auto lock = tryLock(path, LOCK_EX);
+  if (!lock) return std::nullopt;
+  return std::optional<Claim>(std::in_place, path, std::move(*lock));
+}
+
+PartStore::Claim::~Claim() {
+  if (!path_.empty()) ::unlink(path_.c_str());  // while it is locked
+}
+
+void PartStore::remove() {
+  std::error_code ignored;  // what cannot be removed stays; the result of the run is complete
+  fs::remove_all(folder_, ignored);
+}
+
+}  // namespace esvr

@@ -1,0 +1,24 @@
+#pragma once
+/// Runs the parts of a fit in chunks on several devices of this process.
+
+#include <vector>
+
+#include "esvr/device.h"
+#include "esvr/part_runner.h"
+
+namespace esvr {
+
+/// A thread for each device takes one part after the other.
+class DeviceWorkers : public PartRunner {
+ public:
+  /// \param devices  at least one; a device that is listed twice runs two parts at the same time
+  explicit DeviceWorkers(std::vector<Device> devices);
+
+  /// \throws Error  what a part threw; the other devices end their current parts first
+  std::vector<std::vector<std::byte>> run(const RoundParts& parts) override;
+
+ private:
+  std::vector<Device> devices_;
+};
+
+}  // namespace esvr

@@ -1,0 +1,168 @@
+// Plan: a fit in chunks gives the same bytes in one run, in a run that was interrupted or killed and
+// continued, and by several processes and a merge. A folder of another run, of damaged or missing
+// parts, or of a running process is refused.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "cli/converters.h"
+#include "cli/folder_test.h"
+#include "cli/vdb_inputs.h"
+#include "esvr/part_store.h"
+
+namespace esvr {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+
+class Parts : public test::FolderTest {
+ protected:
+  void SetUp() override { test::writeInput(at("in.vdb"), {{.voxels = test::cloud(8)}}); }
+
+  [[nodiscard]] std::vector<std::string> argumentsFor(const std::string& name,
+                                                      const std::vector<std::string>& more) const {
+    std::vector<std::string> all{at("in.vdb"),       at(name),     "--count",        "40",
+                                 "--iterations",     "60",         "--chunk-voxels", "600",
+                                 "--representation", "ellipsoids", "--device",       "cpu"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  [[nodiscard]] test::ProgramRun run(const std::string& name,
+                                     const std::vector<std::string>& more = {}) const {
+    return test::vdb2esvr(argumentsFor(name, more));
+  }
+  void expectSameBytes(const std::string& name) const {
+    EXPECT_EQ(run("one.esvr").exitCode, 0);
+    EXPECT_EQ(test::readText(at(name)), test::readText(at("one.esvr")));
+    EXPECT_FALSE(fs::exists(at(name) + ".parts"));
+  }
+  /// A result in the folder of finished parts.
+  [[nodiscard]] fs::path anyPart() const {
+    for (const auto& entry : fs::directory_iterator(at("out.esvr.parts")))
+      if (entry.path().extension() == ".part") return entry.path();
+    return {};
+  }
+};
+
+TEST_F(Parts, andAMergeGiveTheBytesOfOneRun) {
+  for (const char* part : {"1/3", "2/3", "3/3"}) {
+    const auto made = run("out.esvr", {"--part", part});
+    EXPECT_EQ(made.exitCode, 0) << made.err;
+    EXPECT_THAT(made.err, HasSubstr("--merge writes"));
+  }
+  EXPECT_FALSE(fs::exists(at("out.esvr")));
+  const auto merged = run("out.esvr", {"--merge"});
+  EXPECT_EQ(merged.exitCode, 0) << merged.err;
+  expectSameBytes("out.esvr");
+}
+
+TEST_F(Parts, ofAnInterruptedRunAreUsedAgain) {
+  const auto stopped = test::runInterrupted(
+      VDB2ESVR, argumentsFor("out.esvr", {"--resume", "--progress", "json"}), "\"parts_done\":3,");
+  EXPECT_EQ(stopped.exitCode, 1);
+  EXPECT_THAT(stopped.err, HasSubstr("the same command continues"));
+  EXPECT_FALSE(anyPart().empty());
+  EXPECT_FALSE(fs::exists(at("out.esvr")));
+  const auto resumed = run("out.esvr", {"--resume"});
+  EXPECT_EQ(resumed.exitCode, 0) << resumed.err;
+  expectSameBytes("out.esvr");
+}
+
+TEST_F(Parts, areReportedAsJson) {
+  std::istringstream lines(run("out.esvr", {"--progress", "json"}).err);
+  int count = 0;
+  double fraction = 0.0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    const auto json = nlohmann::json::parse(line);
+    EXPECT_EQ(json["grid"], "density");
+    EXPECT_GE(json["fraction"], fraction);
+    EXPECT_LE(json["parts_done"], json["parts"]);
+    fraction = json["fraction"];
+  }
+  EXPECT_GT(count, 10);
+  EXPECT_NEAR(fraction, 1.0, 1e-9);
+}
+
+TEST_F(Parts, areMergedOnlyIfAllAreThere) {
+  const auto none = run("out.esvr", {"--merge"});
+  EXPECT_EQ(none.exitCode, 3);
+  EXPECT_THAT(none.err, HasSubstr("there is no"));
+  EXPECT_EQ(run("out.esvr", {"--part", "1/1"}).exitCode, 0);
+  fs::remove(anyPart());
+  const auto merged = run("out.esvr", {"--merge"});
+  EXPECT_EQ(merged.exitCode, 3);
+  EXPECT_THAT(merged.err, AllOf(HasSubstr("out.esvr.parts is not complete"), HasSubstr("missing")));
+  EXPECT_FALSE(fs::exists(at("out.esvr")));
+  EXPECT_EQ(run("out.esvr", {"--part", "1/1"}).exitCode, 0);
+  EXPECT_EQ(run("out.esvr", {"--merge"}).exitCode, 0);
+  expectSameBytes("out.esvr");
+}
+
+TEST_F(Parts, thatAreDamagedAreRefused) {
+  EXPECT_EQ(run("out.esvr", {"--part", "1/1"}).exitCode, 0);
+  fs::resize_file(anyPart(), 100);
+  const auto merged = run("out.esvr", {"--merge"});
+  EXPECT_EQ(merged.exitCode, 3);
+  EXPECT_THAT(merged.err, HasSubstr("is damaged; remove it"));
+}
+
+TEST_F(Parts, ofAnotherRunAreRefusedWithBothNames) {
+  EXPECT_EQ(run("out.esvr", {"--part", "1/2"}).exitCode, 0);
+  const auto otherOption = run("out.esvr", {"--part", "2/2", "--seed", "5"});
+  EXPECT_EQ(otherOption.exitCode, 3);
+  EXPECT_THAT(otherOption.err, HasSubstr("its seed is 1, not 5"));
+  fs::copy_file(at("in.vdb"), at("other.vdb"));
+  auto arguments = argumentsFor("out.esvr", {"--merge"});
+  arguments[0] = at("other.vdb");
+  const auto otherInput = test::vdb2esvr(arguments);
+  EXPECT_EQ(otherInput.exitCode, 3);
+  EXPECT_THAT(otherInput.err, AllOf(HasSubstr("in.vdb, not "), HasSubstr("other.vdb")));
+}
+
+TEST_F(Parts, areNotUsedByTwoRunsThatDoNotShareThem) {
+  const PartStore store(at("out.esvr.parts"), {}, PartStore::Access::kAlone);
+  for (const auto& job :
+       std::vector<std::vector<std::string>>{{"--resume"}, {"--part", "1/2"}, {"--merge"}}) {
+    const auto second = run("out.esvr", job);
+    EXPECT_EQ(second.exitCode, 1);
+    EXPECT_THAT(second.err, HasSubstr("another process uses"));
+  }
+}
+
+TEST_F(Parts, cannotBeKeptOnAFullDisk) {
+  std::string command = VDB2ESVR;
+  for (const auto& argument : argumentsFor("out.esvr", {"--resume"})) command += ' ' + argument;
+  const auto full = test::runOnFullDisk(command);
+  EXPECT_EQ(full.exitCode, 1);
+  EXPECT_THAT(full.err, AllOf(HasSubstr("out.esvr.parts/"), HasSubstr("File too large")));
+  EXPECT_EQ(run("out.esvr", {"--resume"}).exitCode, 0);
+  expectSameBytes("out.esvr");
+}
+
+TEST_F(Parts, ofAFitInOneChunkAreNone) {
+  const auto made = run("out.esvr", {"--chunk-voxels", "1000000", "--part", "1/2"});
+  EXPECT_EQ(made.exitCode, 2);  // the option was given twice
+  auto arguments = argumentsFor("out.esvr", {"--part", "1/2"});
+  arguments[7] = "1000000";
+  const auto whole = test::vdb2esvr(arguments);
+  EXPECT_EQ(whole.exitCode, 0) << whole.err;
+  EXPECT_THAT(whole.err, HasSubstr("there are no parts"));
+}
+
+TEST_F(Parts, haveNumbersFromOneToTheirCount) {
+  for (const char* part : {"0/2", "3/2", "1", "a/b", "1/", "/2", "1/2/3", "-1/2"}) {
+    const auto made = run("out.esvr", {"--part", part});
+    EXPECT_EQ(made.exitCode, 2) << part;
+    EXPECT_THAT(made.err, HasSubstr("--part must be K/N"));
+  }
+  EXPECT_EQ(run("out.esvr", {"--part", "1/2", "--merge"}).exitCode, 2);
+}
+
+}  // namespace
+}  // namespace esvr

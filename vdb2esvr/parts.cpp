@@ -1,0 +1,72 @@
+#include "vdb2esvr/parts.h"
+
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "cli/version_text.h"
+#include "esvr/device_workers.h"
+#include "esvr/error.h"
+#include "vdb2esvr/report.h"
+
+namespace esvr::vdb2esvr {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The properties of the input file that change with its content.
+void addInput(const fs::path& input, std::vector<PartOrigin>& origin) {
+  std::error_code error;
+  const fs::path path = fs::canonical(input, error);
+  if (error) throw BadInput("cannot read " + input.string() + ": " + error.message());
+  const auto changed = fs::last_write_time(path).time_since_epoch().count();
+  origin.push_back({"input", path.string()});
+  origin.push_back({"input's size", std::to_string(fs::file_size(path))});
+  origin.push_back({"input's time of change", std::to_string(changed)});
+}
+
+std::vector<PartOrigin> originOf(const Options& options) {
+  std::vector<PartOrigin> origin{{"version", cli::programVersion()}};
+  addInput(options.input, origin);
+  const auto asked = askedJson(options);
+  for (const auto& [name, value] : asked.items())
+    if (name != "threads" && name != "device") origin.push_back({name, value.dump()});
+  std::string grids;
+  for (const auto& grid : options.grids) grids += '"' + grid + '"';
+  origin.push_back({"grids", grids});
+  return origin;
+}
+
+PartStore::Access accessOf(Job job) {
+  return job == Job::kPart ? PartStore::Access::kShared : PartStore::Access::kAlone;
+}
+
+}  // namespace
+
+fs::path partsFolder(const Options& options) { return options.output.string() + ".parts"; }
+
+Parts::Parts(const Options& options, const CancelToken& cancel)
+    : options_(options), cancel_(cancel) {
+  if (options.job == Job::kWhole && !options.resume) return;
+  const fs::path folder = partsFolder(options);
+  if (options.job == Job::kMerge && !fs::exists(folder))
+    throw BadInput("cannot merge: there is no " + folder.string());
+  store_.emplace(folder, originOf(options), accessOf(options.job));
+}
+
+PartRunner* Parts::runOn(const std::vector<Device>& devices) {
+  if (!store_)
+    runner_ = std::make_unique<DeviceWorkers>(devices);
+  else
+    runner_ = std::make_unique<StoredParts>(
+        *store_, StoredPartsOptions{.devices = devices,
+                                    .share = options_.share,
+                                    .mergeOnly = options_.job == Job::kMerge,
+                                    .cancel = &cancel_});
+  return runner_.get();
+}
+
+void Parts::remove() {
+  if (store_) store_->remove();
+}
+
+}  // namespace esvr::vdb2esvr

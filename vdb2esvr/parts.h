@@ -1,0 +1,38 @@
+#pragma once
+/// Decides where the parts of fits in chunks run (docs/scale.md).
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "esvr/device.h"
+#include "esvr/part_store.h"
+#include "vdb2esvr/options.h"
+
+namespace esvr::vdb2esvr {
+
+/// The folder of a run's finished parts: that of OUT.esvr is OUT.esvr.parts.
+[[nodiscard]] std::filesystem::path partsFolder(const Options& options);
+
+class Parts {
+ public:
+  /// Opens the folder of finished parts if the options want one.
+  /// \throws BadInput  the folder belongs to another input or to other options; or --merge is wanted
+  ///                   and there is no folder
+  Parts(const Options& options, const CancelToken& cancel);
+
+  /// \param devices  the devices that fit parts; the runner is valid until the next call
+  [[nodiscard]] PartRunner* runOn(const std::vector<Device>& devices);
+
+  /// Removes the folder.
+  void remove();
+
+ private:
+  const Options& options_;
+  const CancelToken& cancel_;
+  std::optional<PartStore> store_;
+  std::unique_ptr<PartRunner> runner_;
+};
+
+}  // namespace esvr::vdb2esvr
