@@ -52,6 +52,9 @@ install(
   DESTINATION ${packageDir}
   COMPONENT library)
 
+if(TARGET esvr_mpi)
+  install(TARGETS esvr_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT programs)
+endif()
 foreach(program vdb2esvr esvr2vdb esvr-render esvr-compare esvr-sample swc2vdb raw2vdb)
   if(TARGET ${program})
     install(TARGETS ${program} COMPONENT programs)

@@ -6,6 +6,7 @@
 #include "cli/version_text.h"
 #include "esvr/device_workers.h"
 #include "esvr/error.h"
+#include "esvr/rank_workers.h"
 #include "vdb2esvr/report.h"
 
 namespace esvr::vdb2esvr {
@@ -36,25 +37,28 @@ std::vector<PartOrigin> originOf(const Options& options) {
   return origin;
 }
 
-PartStore::Access accessOf(Job job) {
-  return job == Job::kPart ? PartStore::Access::kShared : PartStore::Access::kAlone;
+PartStore::Access accessOf(Job job, const Ranks* ranks) {
+  return job == Job::kPart || ranks ? PartStore::Access::kShared : PartStore::Access::kAlone;
 }
 
 }  // namespace
 
 fs::path partsFolder(const Options& options) { return options.output.string() + ".parts"; }
 
-Parts::Parts(const Options& options, const CancelToken& cancel)
-    : options_(options), cancel_(cancel) {
-  if (options.job == Job::kWhole && !options.resume) return;
+Parts::Parts(const Options& options, const CancelToken& cancel, Ranks* ranks)
+    : options_(options), cancel_(cancel), ranks_(ranks) {
+  const bool isShared = !ranks && options.job != Job::kWhole;
+  if (!isShared && !options.resume) return;
   const fs::path folder = partsFolder(options);
   if (options.job == Job::kMerge && !fs::exists(folder))
     throw BadInput("cannot merge: there is no " + folder.string());
-  store_.emplace(folder, originOf(options), accessOf(options.job));
+  store_.emplace(folder, originOf(options), accessOf(options.job, ranks));
 }
 
 PartRunner* Parts::runOn(const std::vector<Device>& devices) {
-  if (!store_)
+  if (ranks_)
+    runner_ = std::make_unique<RankWorkers>(*ranks_, devices, store_ ? &*store_ : nullptr);
+  else if (!store_)
     runner_ = std::make_unique<DeviceWorkers>(devices);
   else
     runner_ = std::make_unique<StoredParts>(

@@ -8,6 +8,7 @@
 
 #include "esvr/device.h"
 #include "esvr/part_store.h"
+#include "esvr/ranks.h"
 #include "vdb2esvr/options.h"
 
 namespace esvr::vdb2esvr {
@@ -18,9 +19,10 @@ namespace esvr::vdb2esvr {
 class Parts {
  public:
   /// Opens the folder of finished parts if the options want one.
+  /// \param ranks  the processes that share the parts; may be null
   /// \throws BadInput  the folder belongs to another input or to other options; or --merge is wanted
   ///                   and there is no folder
-  Parts(const Options& options, const CancelToken& cancel);
+  Parts(const Options& options, const CancelToken& cancel, Ranks* ranks);
 
   /// \param devices  the devices that fit parts; the runner is valid until the next call
   [[nodiscard]] PartRunner* runOn(const std::vector<Device>& devices);
@@ -31,6 +33,7 @@ class Parts {
  private:
   const Options& options_;
   const CancelToken& cancel_;
+  Ranks* ranks_;
   std::optional<PartStore> store_;
   std::unique_ptr<PartRunner> runner_;
 };

@@ -213,22 +213,31 @@ void tellPart(const Options& options, const RunRecord& record, const cli::Log& l
              options.output.string());
 }
 
-RunRecord convertFile(const Options& options, const cli::Interrupts& interrupts,
+/// The devices of this process. The ranks of a host take its GPUs in turn.
+std::vector<Device> devicesFor(const Options& options, const Ranks* ranks) {
+  if (!ranks) return selectDevices(options.device);
+  const bool isAny = options.device == kAuto || options.device == "cuda";
+  std::vector<Device> devices = selectDevices(options.device);
+  if (isAny && devices.front().kind == DeviceKind::kCuda) devices = selectDevices("cuda:all");
+  return {devices[std::size_t(ranks->rankOnHost()) % devices.size()]};
+}
+
+RunRecord convertFile(const Options& options, Ranks* ranks, const cli::Interrupts& interrupts,
                       const cli::Log& log) {
   cli::Stopwatch watch;
   RunRecord record;
-  auto devices = std::async(std::launch::async, [&] { return selectDevices(options.device); });
+  auto devices = std::async(std::launch::async, [&] { return devicesFor(options, ranks); });
   record.input = inspectVdb(options.input);
   GridChoice choice = chooseGrids(options.input, record.input, options.grids);
   tellSkipped(choice.skipped, log);
   record.skipped = std::move(choice.skipped);
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
-  Parts parts(options, interrupts.token());
+  Parts parts(options, interrupts.token(), ranks);
   FileConversion(options, selected, interrupts.token(), parts, log).run(choice.fitted, record);
   for (const auto& grid : record.grids) tellGrid(grid, log);
   if (options.job == Job::kPart) {
-    tellPart(options, record, log);
+    if (!ranks) tellPart(options, record, log);
     return record;
   }
   write(options, record);
@@ -238,27 +247,44 @@ RunRecord convertFile(const Options& options, const cli::Interrupts& interrupts,
 }
 
 /// Converts the file; if that fails, writes a report of the failure.
-RunRecord convertOrReport(const Options& options, const cli::Interrupts& interrupts,
+RunRecord convertOrReport(const Options& options, Ranks* ranks, const cli::Interrupts& interrupts,
                           const cli::Log& log) try {
-  return convertFile(options, interrupts, log);
+  return convertFile(options, ranks, interrupts, log);
 } catch (const Error& error) {
   if (!options.report.empty())
     cli::writeJson({options.report, options.overwrite}, makeFailureReport(options, error));
   throw;
 }
 
-}  // namespace
+/// The options of a rank. Rank 0 writes the file; the others only fit parts.
+Options optionsOf(const Options& options, const Ranks* ranks) {
+  if (!ranks) return options;
+  if (options.job != Job::kWhole)
+    throw UsageError("the ranks of MPI need no --part and no --merge");
+  if (options.paper) throw UsageError("fits by --paper have no parts for the ranks of MPI");
+  Options own = options;
+  if (ranks->rank() == 0) return own;
+  own.job = Job::kPart;
+  own.report.clear();
+  own.progress = ProgressForm::kText;
+  own.verbosity = cli::Verbosity::kQuiet;
+  return own;
+}
 
-int run(const Options& options) {
+int runAs(const Options& options, Ranks* ranks) {
   const cli::Log log(kProgram, options.verbosity);
   const cli::ThreadLimit threads(options.threads);
   const cli::Interrupts interrupts;
   checkFiles(options);
-  const RunRecord record = convertOrReport(options, interrupts, log);
+  const RunRecord record = convertOrReport(options, ranks, interrupts, log);
   if (options.job == Job::kPart) return 0;
   tellResult(options, record);
   throwWhatIsAmiss(options, record);
   return 0;
 }
+
+}  // namespace
+
+int run(const Options& options, Ranks* ranks) { return runAs(optionsOf(options, ranks), ranks); }
 
 }  // namespace esvr::vdb2esvr

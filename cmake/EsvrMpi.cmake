@@ -1,0 +1,15 @@
+# Looks for MPI according to ESVR_MPI, and sets ESVR_WITH_MPI.
+set(ESVR_WITH_MPI OFF)
+if(NOT ESVR_MPI)
+  return()
+endif()
+set(MPI_CXX_SKIP_MPICXX ON) # only the C functions are used
+find_package(MPI QUIET COMPONENTS CXX)
+if(MPI_CXX_FOUND)
+  set(ESVR_WITH_MPI ON)
+  message(STATUS "MPI: ${MPI_CXX_VERSION}")
+elseif(ESVR_MPI STREQUAL "AUTO")
+  message(STATUS "MPI: not found, a fit runs on one host")
+else()
+  message(FATAL_ERROR "ESVR_MPI is ${ESVR_MPI} but there is no MPI")
+endif()

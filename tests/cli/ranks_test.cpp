@@ -1,0 +1,100 @@
+// Plan: the ranks of MPI write the bytes of one process. If a rank is killed, the others end, and a
+// later run continues from the finished parts. Ranks that do not agree, and options that ranks do not
+// need, end all of them with a message.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "cli/converters.h"
+#include "cli/folder_test.h"
+#include "cli/vdb_inputs.h"
+
+namespace esvr {
+namespace {
+
+using testing::HasSubstr;
+
+class RanksTest : public test::FolderTest {
+ protected:
+  void SetUp() override {
+    // More ranks than cores, also for root, as in a container; the names are those of Open MPI.
+    for (const char* name : {"OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM",
+                             "OMPI_MCA_rmaps_base_oversubscribe"})
+      ::setenv(name, "1", 1);
+    test::writeInput(at("in.vdb"), {{.voxels = test::cloud(8)}});
+  }
+  [[nodiscard]] std::vector<std::string> conversion(const std::string& name,
+                                                    const std::vector<std::string>& more) const {
+    std::vector<std::string> all{VDB2ESVR,     at("in.vdb"),   at(name), "--count",
+                                 "40",         "--iterations", "60",     "--representation",
+                                 "ellipsoids", "--device",     "cpu"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  /// Runs a command on several ranks.
+  static test::ProgramRun onRanks(const std::string& count, std::vector<std::string> command) {
+    // Ranks that wait for each other would never end.
+    command.insert(command.begin(), {"60", ESVR_MPIEXEC, "-n", count});
+    return test::runProgram("/usr/bin/timeout", command);
+  }
+  /// Runs a conversion on two ranks. A shell of rank 1 runs `script` in place of it, where "$@" is
+  /// the command.
+  static test::ProgramRun withRankOne(const std::string& script, std::vector<std::string> command) {
+    const std::string both = "if [ $OMPI_COMM_WORLD_RANK = 0 ]; then exec \"$@\"; fi; " + script;
+    command.insert(command.begin(), {"/bin/sh", "-c", both, "sh"});
+    return onRanks("2", command);
+  }
+  void expectSameBytes(const std::string& name) const {
+    auto alone = conversion("one.esvr", {"--chunk-voxels", "600"});
+    EXPECT_EQ(test::runProgram(alone[0], {alone.begin() + 1, alone.end()}).exitCode, 0);
+    EXPECT_EQ(test::readText(at(name)), test::readText(at("one.esvr")));
+  }
+};
+
+TEST_F(RanksTest, WriteTheBytesOfOneProcess) {
+  for (const char* count : {"2", "3"}) {
+    const auto run = onRanks(count, conversion("out.esvr", {"--chunk-voxels", "600", "--force"}));
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_THAT(run.out, HasSubstr("density"));
+    expectSameBytes("out.esvr");
+    std::filesystem::remove(at("one.esvr"));
+  }
+}
+
+TEST_F(RanksTest, EndWhereOneIsKilledAndContinueLater) {
+  const auto command = conversion("out.esvr", {"--chunk-voxels", "600", "--resume"});
+  const auto killed = withRankOne("\"$@\" & until ls " + at("out.esvr.parts") +
+                                      "/*.part >/dev/null 2>&1; do sleep 0.01; done; "
+                                      "kill -9 $!; wait $!",
+                                  command);
+  EXPECT_NE(killed.exitCode, 0);
+  EXPECT_FALSE(std::filesystem::exists(at("out.esvr")));
+  EXPECT_EQ(onRanks("2", command).exitCode, 0);
+  expectSameBytes("out.esvr");
+  EXPECT_FALSE(std::filesystem::exists(at("out.esvr.parts")));
+}
+
+TEST_F(RanksTest, SayThatTheyDivideTheVolumeDifferently) {
+  const auto run = withRankOne("exec \"$@\" --chunk-voxels 300", conversion("out.esvr", {}));
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("divided the volume differently"));
+}
+
+TEST_F(RanksTest, NeedNoParts) {
+  const auto run = onRanks("2", conversion("out.esvr", {"--part", "1/2"}));
+  EXPECT_EQ(run.exitCode, 2);
+  EXPECT_THAT(run.err, HasSubstr("need no --part"));
+}
+
+TEST_F(RanksTest, KeepTheExitCodeOfAMissedTarget) {
+  const auto run = onRanks(
+      "2", conversion("out.esvr", {"--chunk-voxels", "600", "--psnr", "200", "--seconds", "1"}));
+  EXPECT_EQ(run.exitCode, 4) << run.err;
+  EXPECT_TRUE(std::filesystem::exists(at("out.esvr")));
+}
+
+}  // namespace
+}  // namespace esvr
