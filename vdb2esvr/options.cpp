@@ -58,7 +58,11 @@ cli::ProgramText programText() {
           "\n"
           "Ctrl-C ends the fit, and the exit code is 1. --on-cancel chooses whether the best\n"
           "result so far is written. A second Ctrl-C ends the program at once. OUT.esvr is never\n"
-          "incomplete.\n"
+          "incomplete. With --resume, the same command continues a run that was interrupted.\n"
+          "\n"
+          "mpirun -n N vdb2esvr ... fits the chunks of a volume on N processes, if the program "
+          "was\n"
+          "built with MPI. All devices and processes together write the bytes that one writes.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted, 2 wrong options, 3 unusable input,\n"
           "4 --psnr not reached (the file is written), 5 no such device or not enough memory\n"
@@ -69,6 +73,7 @@ cli::ProgramText programText() {
           "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             the smallest file with 45 dB\n"
           "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report fit.json\n"
           "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            every voxel within the bound\n"
+          "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4 --resume\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255"};
 }
 
@@ -133,7 +138,7 @@ void addFitOptions(cli::po::options_description& options) {
     ("max-vram", value<double>()->value_name("GB"),
      "GPU memory to use (default: all free memory); a volume that does not fit is fitted in chunks")
     ("chunk-voxels", value<std::int64_t>()->value_name("N"),
-     "fit the volume in chunks of at most N active voxels (default: one chunk if it fits)");
+     "fit the volume in chunks of about N active voxels (default: one chunk if it fits)");
   // clang-format on
 }
 
@@ -158,7 +163,8 @@ void addFileOptions(cli::po::options_description& options) {
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
      "refuse: fail on NaN or infinite voxels; zero: replace them by 0")
     ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
-     "keep or discard the best result so far if the run is interrupted")
+     "keep or discard the best result so far if the run is interrupted (with --resume: discard, "
+     "because the finished parts are kept)")
     ("report", value<std::string>()->value_name("FILE"),
      "write a JSON report to FILE, whose name ends in .json; '-' is stdout")
     ("progress", value<std::string>()->value_name("P")->default_value("text"),

@@ -29,9 +29,9 @@ using namespace esvr;
 
 constexpr std::int64_t kNear = 4;  // voxels
 
-/// The chunks of a fit on a GPU, whose voxels are halved until there are enough chunks.
+/// The chunks of a fit on a GPU, whose bricks are halved until there are enough chunks.
 std::vector<BrickChunk> divided(const SparseVolume& volume, std::size_t count) {
-  std::uint64_t most = activeVoxelCount(volume);
+  std::size_t most = volume.brickCount();
   auto chunks = divideBricks(volume, most);
   while (chunks.size() < count && most > 1) chunks = divideBricks(volume, most /= 2);
   if (chunks.size() != count) throw std::runtime_error("the volume has no such division");

@@ -3,12 +3,12 @@
 // at the seams, gives the same bits again and on any number of threads, continues from a field, and
 // ends when it is cancelled. A volume that fits into one chunk is fitted as usual.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 
 #include "esvr/device_workers.h"
@@ -18,6 +18,7 @@
 #include "esvr/metrics.h"
 #include "esvr/psnr_between.h"
 #include "fit/chunks/chunk_target.h"
+#include "fit/chunks/chunks_for.h"
 #include "fit/chunks/divide_bricks.h"
 #include "fit/cpu/cpu_pass.h"
 #include "random_ellipsoids.h"
@@ -29,13 +30,20 @@ namespace {
 
 constexpr std::uint64_t kChunkVoxels = 2000;
 
+/// The chunks of a fit with kChunkVoxels.
+std::vector<BrickChunk> chunksOf(const SparseVolume& volume) {
+  FitOptions options;
+  options.chunkVoxels = kChunkVoxels;
+  return chunksFor(volume, options);
+}
+
 TEST(DivideBricks, GivesEveryBrickToTheChunkWhoseBoxContainsIt) {
   const SparseVolume volume = test::tubeVolume();
-  const auto chunks = divideBricks(volume, 500);
+  const auto chunks = divideBricks(volume, 5);
   ASSERT_GT(chunks.size(), 4u);
   std::set<std::uint32_t> seen;
   for (const BrickChunk& chunk : chunks) {
-    EXPECT_LE(chunk.activeVoxels, 500u);
+    EXPECT_LE(chunk.bricks.size(), 5u);
     std::uint64_t active = 0;
     for (const std::uint32_t b : chunk.bricks) {
       EXPECT_TRUE(seen.insert(b).second);
@@ -48,7 +56,7 @@ TEST(DivideBricks, GivesEveryBrickToTheChunkWhoseBoxContainsIt) {
 }
 
 TEST(DivideBricks, MakesBoxesThatFillSpaceWithoutOverlap) {
-  const auto chunks = divideBricks(test::tubeVolume(), 500);
+  const auto chunks = divideBricks(test::tubeVolume(), 10);
   for (const Coord place : {Coord{0, 0, 0}, Coord{2, 3, 1}, Coord{-100, 2, 5},
                             Coord{Box::kMax, Box::kMin, 0}, Coord{Box::kMin, 0, Box::kMax}})
     EXPECT_EQ(std::count_if(chunks.begin(), chunks.end(),
@@ -56,23 +64,46 @@ TEST(DivideBricks, MakesBoxesThatFillSpaceWithoutOverlap) {
               1);
 }
 
-TEST(DivideBricks, KeepsABrickThatIsDenserThanAChunk) {
-  const SparseVolume volume = test::volumeOf({}, 1, 0.0f, [](Coord) { return 1.0f; });
-  const auto chunks = divideBricks(volume, 1);
-  ASSERT_EQ(chunks.size(), 1u);
-  EXPECT_EQ(chunks[0].activeVoxels, 512u);
+TEST(DivideBricks, EndsAtSingleBricks) {
+  const SparseVolume volume = test::volumeOf({}, 2, 0.0f, [](Coord) { return 1.0f; });
+  for (const std::size_t most : {0, 1}) {
+    const auto chunks = divideBricks(volume, most);
+    ASSERT_EQ(chunks.size(), 8u);
+    for (const BrickChunk& chunk : chunks) EXPECT_EQ(chunk.activeVoxels, 512u);
+  }
 }
 
-TEST(DivideBricks, DividesABrickColumnOfUnequalBricks) {
-  SparseVolume volume = test::volumeOf({}, 1, 0.0f, [](Coord) { return 1.0f; });
-  for (int n = 1; n < 4; ++n) {
-    volume.bricks.push_back({n, 0, 0});
-    volume.values.resize(volume.values.size() + kBrickVoxels);
-    volume.active.push_back({});
-    volume.active.back().set(n);
-  }
-  const auto chunks = divideBricks(volume, 2);
-  EXPECT_EQ(chunks.size(), 3u);  // the dense brick, one of the others, and two together
+/// A volume whose bricks are at these places on the x axis.
+SparseVolume columnOf(const std::vector<int>& places) {
+  SparseVolume volume;
+  for (const int x : places) volume.bricks.push_back({x, 0, 0});
+  volume.values.resize(places.size() * kBrickVoxels);
+  volume.active.resize(places.size());
+  return volume;
+}
+
+std::vector<std::size_t> sizesOf(const std::vector<BrickChunk>& chunks) {
+  std::vector<std::size_t> sizes;
+  for (const BrickChunk& chunk : chunks) sizes.push_back(chunk.bricks.size());
+  return sizes;
+}
+
+TEST(DivideBricks, HalvesTheBricks) {
+  using testing::ElementsAre;
+  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1, 2, 3, 4, 5, 6, 7}), 4)), ElementsAre(4, 4));
+  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1, 2}), 2)), ElementsAre(1, 2));
+  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1'000'000}), 1)), ElementsAre(1, 1));
+  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1, 2, 100'000'000}), 2)), ElementsAre(2, 2));
+}
+
+TEST(DivideBricks, PutsThePlaneWhereBothSidesAreNearlyEqual) {
+  SparseVolume volume;  // six bricks at 0, one at 1 and one at 2
+  for (int y = 0; y < 6; ++y) volume.bricks.push_back({0, y % 2, y / 2});
+  volume.bricks.push_back({1, 0, 0});
+  volume.bricks.push_back({9, 0, 0});
+  volume.values.resize(8 * kBrickVoxels);
+  volume.active.resize(8);
+  EXPECT_THAT(sizesOf(divideBricks(volume, 7)), testing::ElementsAre(6, 2));
 }
 
 TEST(Dilated, EndsWhereCoordinatesEnd) {
@@ -101,7 +132,7 @@ TEST_P(Constants, ActLikeEllipsoidsThatAreNotFitted) {
   const auto all = test::randomEllipsoids(60, 1.0, 3.0);
   const std::vector<Ellipsoid> fitted(all.begin(), all.begin() + 30),
       ghosts(all.begin() + 30, all.end());
-  const auto chunks = divideBricks(volume, std::numeric_limits<std::uint64_t>::max());
+  const auto chunks = divideBricks(volume, volume.brickCount());
   const ChunkScene scene{volume, chunks, scaleOf(volume), boxOf(volume, std::nullopt), 2};
   ChunkTarget part;
   makeChunkTarget(scene, chunks.front(), {ghosts, kernel}, part);
@@ -119,7 +150,7 @@ INSTANTIATE_TEST_SUITE_P(Sums, Constants, testing::Bool(), [](const auto& satura
 
 TEST(ChunkTarget, CountsItsOwnVoxelsOnly) {
   const SparseVolume volume = test::tubeVolume();
-  const auto chunks = divideBricks(volume, 500);
+  const auto chunks = divideBricks(volume, 10);
   const ChunkScene scene{volume, chunks, scaleOf(volume), boxOf(volume, std::nullopt), 2};
   std::uint64_t counted = 0;
   double boxVoxels = 0.0;
@@ -193,7 +224,7 @@ ESVR_ON_DEVICES(ChunksOn);
 
 /// Squared error per voxel, in the bricks that border on another chunk or in the others.
 double errorIn(const SparseVolume& volume, const SparseVolume& found, bool atSeams) {
-  const auto chunks = divideBricks(volume, kChunkVoxels);
+  const auto chunks = chunksOf(volume);
   double squares = 0.0, voxels = 0.0;
   for (const BrickChunk& chunk : chunks)
     for (const std::uint32_t b : chunk.bricks) {
@@ -297,6 +328,57 @@ TEST(FitInChunks, SaysWhetherItReachedAPsnr) {
   EXPECT_GT(reached.curve.back().psnrBox, 35.0);
   options.psnr = 80.0;
   EXPECT_EQ(fit(longTube(), options).end, FitEnd::kPsnrMissed);
+}
+
+TEST(FitInChunks, DoesNotDependOnWhereTheVolumeIs) {
+  SparseVolume volume = longTube();
+  FitOptions options = shortFit(kChunkVoxels);
+  options.iterations = 20;
+  const FitResult here = fit(volume, options);
+  for (const int shift : {10'000'000, -10'000'000}) {
+    volume.origin = volume.origin + Coord{shift, -shift, shift};
+    const FitResult there = fit(volume, options);
+    EXPECT_EQ(there.curve.back().psnrBox, here.curve.back().psnrBox) << shift;
+    EXPECT_EQ(there.field.ellipsoidCount(), here.field.ellipsoidCount()) << shift;
+  }
+}
+
+TEST(FitInChunks, FitsPartsThatAreFarFromEachOther) {
+  const SparseVolume volume = test::volumeOf({}, 2, 0.0f, [](Coord v) {
+    return float(std::exp(-0.05 * (std::pow(v.x - 8, 2) + std::pow(v.y - 8, 2))));
+  });
+  SparseVolume both = volume;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    both.bricks.push_back(volume.bricks[b] + Coord{2'500'000, 0, 0});
+  both.values.insert(both.values.end(), volume.values.begin(), volume.values.end());
+  both.active.insert(both.active.end(), volume.active.begin(), volume.active.end());
+  FitOptions options = shortFit(kChunkVoxels);
+  options.count = 40;
+  const FitResult result = fit(both, options);
+  EXPECT_GT(result.chunks, 1u);
+  EXPECT_GT(result.curve.back().psnrActive, 30.0);
+}
+
+/// A field with one ellipsoid, with its longest scale along x.
+Field longEllipsoid(float scale) {
+  Field field;
+  field.chunks.resize(1);
+  Ellipsoids& e = field.chunks[0].ellipsoids;
+  e.resize(1);
+  e.center[0] = {40.0f}, e.center[1] = {60.0f}, e.center[2] = {44.0f};
+  e.logScale[0] = {std::log(scale)}, e.logScale[1] = e.logScale[2] = {1.0f};
+  e.rotation[0] = {1.0f};
+  e.intensity = {0.5f};
+  return field;
+}
+
+TEST(FitInChunks, TakesAnEllipsoidThatReachesAcrossFiveChunks) {
+  const Field field = longEllipsoid(20.0f);
+  FitOptions options = shortFit(1000);
+  options.start = &field;
+  const FitResult result = fit(longTube(), options);
+  EXPECT_GT(result.chunks, 8u);
+  EXPECT_GT(result.curve.back().psnrBox, 40.0);
 }
 
 TEST(FitInChunks, LeavesOutAChunkWithoutData) {

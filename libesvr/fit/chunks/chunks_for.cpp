@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
+#include <span>
 
 #include "fit/chunks/chunk_target.h"
 #include "fit/cuda/make_cuda_optimiser.h"
@@ -10,42 +10,77 @@
 namespace esvr {
 namespace {
 
-/// Chunks are not made smaller than this number of active voxels; most of a smaller chunk's bricks
-/// would be its halo.
-constexpr std::uint64_t kMinVoxels = std::uint64_t{1} << 16;
+/// Chunks for the memory of a GPU have at least this number of bricks; most bricks around a smaller
+/// chunk would be its halo.
+constexpr std::size_t kMinBricks = 512;
 
-/// True if the fit of a chunk stays within the memory of the GPU.
-bool fits(const SparseVolume& volume, const FitOptions& options, std::span<const BrickChunk> chunks,
-          const BrickChunk& chunk) {
-  const std::uint64_t all = activeVoxelCount(volume);
-  const std::size_t whole = plannedCount(options, all);
-  FitSize size;
-  for (const std::uint32_t b : bricksAround(volume, chunks, chunk, haloBricks(all, whole))) {
-    ++size.bricks;
-    size.activeVoxels += std::uint64_t(volume.active[b].count());
+/// Room for the ellipsoids of chunks that get more than others, because their error is larger.
+constexpr double kSpare = 1.5;
+
+class MemoryCheck {
+ public:
+  MemoryCheck(const SparseVolume& volume, const FitOptions& options)
+      : volume_(volume),
+        options_(options),
+        active_(activeVoxelCount(volume)),
+        count_(plannedCount(options, active_)) {}
+
+  /// True if the fit of every chunk stays within the memory of the GPU.
+  [[nodiscard]] bool allFit(std::span<const BrickChunk> chunks) const {
+    const double spare = chunks.size() > 1 ? kSpare : 1.0;
+    return std::ranges::all_of(chunks, [&](const BrickChunk& chunk) {
+      const FitSize size = sizeOf(chunks, chunk);
+      const double share = double(size.activeVoxels) / double(active_);
+      return fits(size, std::size_t(spare * share * double(count_)) + 1);
+    });
   }
-  size.narrowBand = options.narrowBand;
-  size.between = options.fitFor == FitFor::kDrawing;
-  size.constants = chunk.bricks.size() < volume.brickCount();
-  const double share = double(size.activeVoxels) / double(all);
-  const auto count = std::size_t(share * double(whole)) + 1;
-  return fitsOnGpu(size, count, options.device, options.maxDeviceBytes);
+
+  /// True if the volume fits as one chunk with few ellipsoids.
+  [[nodiscard]] bool bricksFit(std::span<const BrickChunk> whole) const {
+    return fits(sizeOf(whole, whole.front()), 1);
+  }
+
+ private:
+  [[nodiscard]] FitSize sizeOf(std::span<const BrickChunk> chunks, const BrickChunk& chunk) const {
+    FitSize size;
+    for (const std::uint32_t b :
+         bricksAround(volume_, chunks, chunk, haloBricks(active_, count_))) {
+      ++size.bricks;
+      size.activeVoxels += std::uint64_t(volume_.active[b].count());
+    }
+    size.narrowBand = options_.narrowBand;
+    size.between = options_.fitFor == FitFor::kDrawing;
+    size.constants = chunks.size() > 1;
+    return size;
+  }
+  [[nodiscard]] bool fits(const FitSize& size, std::size_t ellipsoids) const {
+    return fitsOnGpu(size, ellipsoids, options_.device, options_.maxDeviceBytes);
+  }
+
+  const SparseVolume& volume_;
+  const FitOptions& options_;
+  std::uint64_t active_;
+  std::size_t count_;
+};
+
+/// The bricks that have this number of active voxels on average.
+std::size_t bricksWith(std::uint64_t voxels, const SparseVolume& volume) {
+  const double each = double(activeVoxelCount(volume)) / double(volume.brickCount());
+  return std::size_t(std::min(double(voxels) / each, double(volume.brickCount())));
 }
 
 }  // namespace
 
 std::vector<BrickChunk> chunksFor(const SparseVolume& volume, const FitOptions& options) {
-  const bool onCpu = options.device.kind == DeviceKind::kCpu;
-  if (onCpu && !options.chunkVoxels) return {};
-  std::uint64_t most = options.chunkVoxels.value_or(std::numeric_limits<std::uint64_t>::max());
-  auto chunks = divideBricks(volume, most);
-  if (options.chunkVoxels) return chunks;
-  const auto fitting = [&](const BrickChunk& chunk) {
-    return fits(volume, options, chunks, chunk);
-  };
-  most = activeVoxelCount(volume);
-  while (most > kMinVoxels && !std::all_of(chunks.begin(), chunks.end(), fitting)) {
+  if (options.chunkVoxels) return divideBricks(volume, bricksWith(*options.chunkVoxels, volume));
+  if (options.device.kind == DeviceKind::kCpu) return {};
+  const MemoryCheck memory(volume, options);
+  const auto whole = divideBricks(volume, volume.brickCount());
+  auto chunks = whole;
+  for (std::size_t most = volume.brickCount(); !memory.allFit(chunks);) {
     most /= 2;
+    // Where even small chunks do not fit, a fit in one chunk with fewer ellipsoids is better.
+    if (most < kMinBricks) return memory.bricksFit(whole) ? whole : chunks;
     chunks = divideBricks(volume, most);
   }
   return chunks;

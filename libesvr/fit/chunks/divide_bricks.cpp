@@ -23,14 +23,15 @@ struct DividingPlane {
 
 class Division {
  public:
-  Division(const SparseVolume& volume, std::uint64_t maxVoxels)
-      : volume_(volume), maxVoxels_(maxVoxels) {}
+  Division(const SparseVolume& volume, std::size_t maxBricks)
+      : volume_(volume), maxBricks_(maxBricks) {}
 
   void divide(const Box& box, std::vector<std::uint32_t> bricks) {
     BrickChunk chunk{box, boundsOf(volume_, bricks), {}, 0};
-    for (const std::uint32_t b : bricks) chunk.activeVoxels += activeIn(b);
-    if (chunk.activeVoxels > maxVoxels_ && bricks.size() > 1)
-      return divideAt(planeFor(chunk, bricks), box, bricks);
+    if (bricks.size() > std::max<std::size_t>(maxBricks_, 1))
+      return divideAt(planeFor(chunk.bounds, bricks), box, bricks);
+    for (const std::uint32_t b : bricks)
+      chunk.activeVoxels += std::uint64_t(volume_.active[b].count());
     chunk.bricks = std::move(bricks);
     chunks_.push_back(std::move(chunk));
   }
@@ -38,27 +39,28 @@ class Division {
   std::vector<BrickChunk> take() { return std::move(chunks_); }
 
  private:
-  [[nodiscard]] std::uint64_t activeIn(std::uint32_t b) const {
-    return std::uint64_t(volume_.active[b].count());
-  }
-
-  /// The plane that halves the active voxels across the longest side, with bricks on both sides.
-  [[nodiscard]] DividingPlane planeFor(const BrickChunk& chunk,
+  /// The plane that halves two or more bricks across the longest side of their bounds.
+  [[nodiscard]] DividingPlane planeFor(const Box& bounds,
                                        std::span<const std::uint32_t> bricks) const {
-    const Box& bounds = chunk.bounds;
     DividingPlane plane;
     for (const auto axis : kAxes)
-      if (bounds.max.*axis - bounds.min.*axis > bounds.max.*plane.axis - bounds.min.*plane.axis)
-        plane.axis = axis;
-    std::vector<std::uint64_t> active(std::size_t(bounds.max.*plane.axis - bounds.min.*plane.axis) +
-                                      1);
-    for (const std::uint32_t b : bricks)
-      active[std::size_t(volume_.bricks[b].*plane.axis - bounds.min.*plane.axis)] += activeIn(b);
-    std::uint64_t below = 0;
-    plane.position = bounds.min.*plane.axis;
-    do below += active[std::size_t(plane.position++ - bounds.min.*plane.axis)];
-    while (2 * below < chunk.activeVoxels && plane.position < bounds.max.*plane.axis);
+      if (lengthOf(bounds, axis) > lengthOf(bounds, plane.axis)) plane.axis = axis;
+    std::vector<std::int32_t> places;
+    for (const std::uint32_t b : bricks) places.push_back(volume_.bricks[b].*plane.axis);
+    const auto middle = places.begin() + std::ptrdiff_t(places.size() / 2);
+    std::nth_element(places.begin(), middle, places.end());
+    const std::int32_t median = *middle;
+    const auto below = std::ranges::count_if(places, [&](auto place) { return place < median; });
+    const auto upTo = std::ranges::count_if(places, [&](auto place) { return place <= median; });
+    // Bricks at the median lie on the side that makes both sides more equal.
+    const auto all = std::ptrdiff_t(places.size());
+    const bool isFirstAbove = below > 0 && (all - 2 * below <= 2 * upTo - all || upTo == all);
+    plane.position = isFirstAbove ? median : median + 1;
     return plane;
+  }
+
+  static std::int64_t lengthOf(const Box& bounds, std::int32_t Coord::*axis) {
+    return std::int64_t{bounds.max.*axis} - bounds.min.*axis;
   }
 
   void divideAt(const DividingPlane& plane, const Box& box, std::span<const std::uint32_t> bricks) {
@@ -73,16 +75,16 @@ class Division {
   }
 
   const SparseVolume& volume_;
-  std::uint64_t maxVoxels_;
+  std::size_t maxBricks_;
   std::vector<BrickChunk> chunks_;
 };
 
 }  // namespace
 
-std::vector<BrickChunk> divideBricks(const SparseVolume& volume, std::uint64_t maxVoxels) {
+std::vector<BrickChunk> divideBricks(const SparseVolume& volume, std::size_t maxBricks) {
   std::vector<std::uint32_t> all(volume.brickCount());
   std::iota(all.begin(), all.end(), 0u);
-  Division division(volume, maxVoxels);
+  Division division(volume, maxBricks);
   division.divide(Box::whole(), std::move(all));
   return division.take();
 }

@@ -19,10 +19,11 @@ struct BrickChunk {
   std::uint64_t activeVoxels = 0;
 };
 
-/// Divides bricks by planes until no chunk has more than `maxVoxels` active voxels or it is a single
-/// brick. Each plane halves the active voxels across the longest side of a chunk's bounds.
+/// Divides bricks by planes until no chunk has more than `maxBricks`, at least 1. Each plane halves
+/// the bricks across the longest side of a chunk's bounds. Time and memory of a fit are proportional
+/// to the bricks, so that chunks of as many bricks cost alike.
 [[nodiscard]] std::vector<BrickChunk> divideBricks(const SparseVolume& volume,
-                                                   std::uint64_t maxVoxels);
+                                                   std::size_t maxBricks);
 
 /// A box that is larger by a number of bricks on all sides, as far as coordinates reach.
 [[nodiscard]] Box dilated(const Box& box, int bricks);

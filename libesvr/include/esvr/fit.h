@@ -68,8 +68,9 @@ struct FitOptions : CommonFitOptions {
   /// PSNR, which all goals but FitGoal and LosslessGoal use, choose by short fits if many voxels
   /// have an extreme value.
   std::optional<bool> bothSigns;
-  /// The volume is fitted in chunks of at most this many active voxels (docs/scale.md). Default: in
-  /// one chunk, or in the largest chunks that fit into the memory of the GPU.
+  /// The volume is fitted in chunks of about this many active voxels (docs/scale.md): the chunks have
+  /// at most as many bricks as have these voxels on average. Default: in one chunk, or in the
+  /// largest chunks that fit into the memory of the GPU.
   std::optional<std::uint64_t> chunkVoxels;
   /// Runs the parts of a fit in chunks. It must outlive the call. Null: they run on `device`, one
   /// after the other.
