@@ -100,43 +100,38 @@ class ChunkedFit {
     }
   }
 
-  /// The chunk that fits kappa.
-  [[nodiscard]] std::size_t largestChunk() const {
-    const auto hasMore = [](const BrickChunk& a, const BrickChunk& b) {
-      return a.activeVoxels < b.activeVoxels;
-    };
-    const auto largest = std::max_element(scene_.chunks.begin(), scene_.chunks.end(), hasMore);
-    return std::size_t(largest - scene_.chunks.begin());
-  }
-
   void runRound(int number) {
-    const std::size_t kappaChunk = options_.kappa ? kNoChunk : largestChunk();
-    const RoundPlan plan{number, kernel_, kappaChunk};
-    const Round round(scene_, plan, states_, progress_);
+    const Round round(scene_, {number, kernel_}, states_, progress_);
     InOrder inOrder(options_.device);
     PartRunner& runner = options_.parts ? *options_.parts : inOrder;
     const auto outputs = runner.run(round);
-    Kernel found = kernel_;
+    std::vector<Kernel> kernels;
     for (std::size_t c = 0; c < states_.size(); ++c) {
       PartEnd part = partOf(outputs[c]);
       addUp(part);
-      if (c == kappaChunk) found = part.kernel;
+      kernels.push_back(part.kernel);
       states_[c].errors = part.errors;
       states_[c].pairs = part.pairs;
       states_[c].fit = std::move(part.fit);
     }
-    takeKernel(found, kappaChunk);
+    takeMeanKappa(kernels);
   }
 
-  /// Takes the kappa that a chunk has found. The ellipsoids of the others keep their half widths.
-  void takeKernel(const Kernel& found, std::size_t by) {
-    const auto widthOf = [](const Kernel& k) { return kernelWidth(kernelConstants<double>(k)).m; };
-    const double factor = std::sqrt(widthOf(found) / widthOf(kernel_));
+  /// Takes the mean of the kappas that the chunks have found, weighted by their ellipsoids. All
+  /// ellipsoids keep their half widths.
+  void takeMeanKappa(std::span<const Kernel> kernels) {
+    double sum = 0.0, weight = 0.0;
     for (std::size_t c = 0; c < states_.size(); ++c) {
-      if (c == by || found == kernel_) continue;
+      sum += double(states_[c].count()) * double(kernels[c].kappa);
+      weight += double(states_[c].count());
+    }
+    if (weight > 0.0) kernel_.kappa = float(sum / weight);
+    const auto widthOf = [](const Kernel& k) { return kernelWidth(kernelConstants<double>(k)).m; };
+    for (std::size_t c = 0; c < states_.size(); ++c) {
+      if (kernels[c] == kernel_) continue;
+      const double factor = std::sqrt(widthOf(kernel_) / widthOf(kernels[c]));
       for (Ellipsoid& p : states_[c].fit.ellipsoids) shrinkBy(p, factor);
     }
-    kernel_ = found;
   }
 
   void takeStart() {

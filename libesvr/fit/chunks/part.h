@@ -19,6 +19,9 @@ namespace esvr {
 /// A fit in chunks has rounds. Each fits all chunks for a part of the schedule, from a fraction to
 /// the next one.
 inline constexpr std::array kRoundEnds{0.0, 0.1, 0.25, 0.5, 0.7, 0.85, 0.95, 1.0};
+/// Kappa is fitted in the rounds that begin before this fraction. Every chunk finds a kappa of its own
+/// in such a round; in later rounds, all chunks have the same one.
+inline constexpr double kKappaUntil = 0.7;
 inline constexpr int kRounds = int(kRoundEnds.size()) - 1;
 
 /// The brick that contains the center of an ellipsoid.

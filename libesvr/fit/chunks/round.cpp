@@ -54,9 +54,9 @@ RunPlan Round::runPlanOf(std::size_t chunk) const {
   plan.iterations = plannedIterations(options);
   plan.start = state.fit;
   plan.psnr = options.psnr;
-  plan.learnKappa = chunk == plan_.kappaChunk;
   plan.from = kRoundEnds[plan_.number];
   plan.to = kRoundEnds[plan_.number + 1];
+  plan.learnKappa = !options.kappa && plan.from < kKappaUntil;
   if (options.seconds)
     plan.seconds = *options.seconds * (plan.to - plan.from) * progress_.shareOf(chunk);
   return plan;

@@ -3,7 +3,6 @@
 /// parts begin with the ellipsoids of the round before and do not see each other.
 
 #include <cstddef>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -14,12 +13,9 @@
 
 namespace esvr {
 
-inline constexpr std::size_t kNoChunk = std::numeric_limits<std::size_t>::max();
-
 struct RoundPlan {
   int number = 0;
   Kernel kernel;
-  std::size_t kappaChunk = kNoChunk;  ///< the chunk that fits kappa
 };
 
 class Round : public RoundParts {
