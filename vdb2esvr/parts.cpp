@@ -25,7 +25,7 @@ void addInput(const fs::path& input, std::vector<PartOrigin>& origin) {
   origin.push_back({"input's time of change", std::to_string(changed)});
 }
 
-std::vector<PartOrigin> originOf(const Options& options) {
+std::vector<PartOrigin> originOf(const Options& options, const Device& device) {
   std::vector<PartOrigin> origin{{"version", cli::programVersion()}};
   addInput(options.input, origin);
   const auto asked = askedJson(options);
@@ -34,6 +34,7 @@ std::vector<PartOrigin> originOf(const Options& options) {
   std::string grids;
   for (const auto& grid : options.grids) grids += '"' + grid + '"';
   origin.push_back({"grids", grids});
+  origin.push_back({"kind of device", device.kind == DeviceKind::kCpu ? "CPU" : "GPU"});
   return origin;
 }
 
@@ -45,14 +46,14 @@ PartStore::Access accessOf(Job job, const Ranks* ranks) {
 
 fs::path partsFolder(const Options& options) { return options.output.string() + ".parts"; }
 
-Parts::Parts(const Options& options, const CancelToken& cancel, Ranks* ranks)
+Parts::Parts(const Options& options, const Device& device, const CancelToken& cancel, Ranks* ranks)
     : options_(options), cancel_(cancel), ranks_(ranks) {
   const bool isShared = !ranks && options.job != Job::kWhole;
   if (!isShared && !options.resume) return;
   const fs::path folder = partsFolder(options);
   if (options.job == Job::kMerge && !fs::exists(folder))
     throw BadInput("cannot merge: there is no " + folder.string());
-  store_.emplace(folder, originOf(options), accessOf(options.job, ranks));
+  store_.emplace(folder, originOf(options, device), accessOf(options.job, ranks));
 }
 
 PartRunner* Parts::runOn(const std::vector<Device>& devices) {

@@ -19,10 +19,11 @@ namespace esvr::vdb2esvr {
 class Parts {
  public:
   /// Opens the folder of finished parts if the options want one.
-  /// \param ranks  the processes that share the parts; may be null
-  /// \throws BadInput  the folder belongs to another input or to other options; or --merge is wanted
-  ///                   and there is no folder
-  Parts(const Options& options, const CancelToken& cancel, Ranks* ranks);
+  /// \param device  the device that fits parts
+  /// \param ranks   the processes that share the parts; may be null
+  /// \throws BadInput  the folder belongs to another input, to other options or to fits on another
+  ///                   kind of device; or --merge is wanted and there is no folder
+  Parts(const Options& options, const Device& device, const CancelToken& cancel, Ranks* ranks);
 
   /// \param devices  the devices that fit parts; the runner is valid until the next call
   [[nodiscard]] PartRunner* runOn(const std::vector<Device>& devices);

@@ -233,7 +233,7 @@ RunRecord convertFile(const Options& options, Ranks* ranks, const cli::Interrupt
   record.skipped = std::move(choice.skipped);
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
-  Parts parts(options, interrupts.token(), ranks);
+  Parts parts(options, selected.front(), interrupts.token(), ranks);
   FileConversion(options, selected, interrupts.token(), parts, log).run(choice.fitted, record);
   for (const auto& grid : record.grids) tellGrid(grid, log);
   if (options.job == Job::kPart) {
