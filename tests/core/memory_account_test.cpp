@@ -61,6 +61,20 @@ TEST(MemoryAccount, LimitsEndWithTheirOwner) {
   memoryAccount().give(11);
 }
 
+TEST(MemoryAccount, LimitsOneDevice) {
+  const LimitMemory limit(10);
+  std::thread other([] {
+    accountedDevice() = 1;
+    EXPECT_NO_THROW(memoryAccount().take(11));
+    memoryAccount().give(11);
+    const LimitMemory own(5);
+    EXPECT_THROW(memoryAccount().take(6), DeviceMemoryError);
+  });
+  other.join();
+  EXPECT_NO_THROW(memoryAccount().take(10));
+  memoryAccount().give(10);
+}
+
 TEST(Count32, RefusesByNameWhatKernelsCannotNumber) {
   EXPECT_EQ(count32(4'000'000'000u, "pairs"), 4'000'000'000u);
   EXPECT_EQ(count32(kMaxCount32, "pairs"), kMaxCount32);

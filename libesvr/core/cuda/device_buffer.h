@@ -36,7 +36,7 @@ class DeviceBuffer {
   ~DeviceBuffer() {
     if (data_ == nullptr) return;
     cudaFreeAsync(data_, stream_);
-    memoryAccount().give(bytes());
+    account_->give(bytes());
   }
 
   [[nodiscard]] T* data() noexcept { return data_; }
@@ -72,11 +72,13 @@ class DeviceBuffer {
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
     std::swap(stream_, other.stream_);
+    std::swap(account_, other.account_);
   }
 
   T* data_ = nullptr;
   std::size_t size_ = 0;
   cudaStream_t stream_ = nullptr;
+  MemoryAccount* account_ = &memoryAccount();
 };
 
 }  // namespace esvr::cuda

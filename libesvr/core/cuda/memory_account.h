@@ -1,6 +1,7 @@
 #pragma once
 /// The device memory that all buffers take, and its limit.
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <limits>
@@ -15,7 +16,7 @@ struct DeviceMemoryError : DeviceError {
   using DeviceError::DeviceError;
 };
 
-/// Counts the bytes of all buffers of the process.
+/// Counts the bytes of all buffers of a device.
 class MemoryAccount {
  public:
   static constexpr std::size_t kNoLimit = std::numeric_limits<std::size_t>::max();
@@ -41,22 +42,31 @@ class MemoryAccount {
   std::atomic<std::size_t> held_{0}, limit_{kNoLimit};
 };
 
-/// The account of the process.
-inline MemoryAccount& memoryAccount() {
-  static MemoryAccount account;
-  return account;
+/// The number of the calling thread's device; useDevice() sets it.
+inline int& accountedDevice() {
+  thread_local int device = 0;
+  return device;
 }
 
-/// As long as it lives, limits the memory that buffers take in addition to what they take now.
+/// The account of the calling thread's device.
+inline MemoryAccount& memoryAccount() {
+  constexpr std::size_t kAccounts = 64;  // more devices than a host has
+  static std::array<MemoryAccount, kAccounts> accounts;
+  return accounts[std::size_t(accountedDevice()) % kAccounts];
+}
+
+/// As long as it lives, limits the memory that buffers of the thread's device take in addition to
+/// what they take now. Only one may live for a device at a time, or they must end in reverse order.
 class LimitMemory {
  public:
   explicit LimitMemory(std::size_t bytes)
-      : before_(memoryAccount().setLimit(memoryAccount().held() + bytes)) {}
+      : account_(memoryAccount()), before_(account_.setLimit(account_.held() + bytes)) {}
   LimitMemory(const LimitMemory&) = delete;
   LimitMemory& operator=(const LimitMemory&) = delete;
-  ~LimitMemory() { memoryAccount().setLimit(before_); }
+  ~LimitMemory() { account_.setLimit(before_); }
 
  private:
+  MemoryAccount& account_;
   std::size_t before_;
 };
 

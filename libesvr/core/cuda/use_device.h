@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "core/cuda/memory_account.h"
 #include "core/cuda/stream.h"
 #include "esvr/device.h"
 
@@ -14,6 +15,7 @@ namespace esvr::cuda {
 inline void useDevice(const Device& device) {
   if (device.kind != DeviceKind::kCuda) throw DeviceError("CUDA was asked to use the CPU");
   check(cudaSetDevice(device.index), "using cuda:" + std::to_string(device.index));
+  accountedDevice() = device.index;
 }
 
 /// Uses the device and makes a stream of it.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "fit/cuda/make_cuda_optimiser.h"
 #include "fit/ellipsoid_math.h"
 #include "fit/fit_plan.h"
 
@@ -17,6 +18,13 @@ int reachOf(const Ellipsoid& p, double radius) {
 
 }  // namespace
 
+void DeviceMemory::keep(const Device& device) {
+  if (device.kind == DeviceKind::kCpu) return;
+  const std::lock_guard lock(mutex_);
+  auto& kept = kept_[device.index];
+  if (!kept) kept = keepFreedMemory(device);
+}
+
 bool Round::cancelled() const {
   return scene_.options.cancel && scene_.options.cancel->cancelled();
 }
@@ -25,13 +33,20 @@ PartKey Round::keyOf(std::size_t part) const { return esvr::keyOf(scene_, startO
 
 PartOutput Round::fit(std::size_t part, const Device& device) const {
   const PartStart start = startOf(part);
-  PartEnd end = unchanged(scene_, start);
-  if (cancelled())
-    end.end = FitEnd::kCancelled;
-  else
-    end = fitPart(scene_, start, device, progress_.of(part));
+  const PartEnd end = cancelled() ? notFitted(start) : fitted(start, device);
   progress_.end(part, end, start.plan.to);
   return {bytesOf(end), end.end != FitEnd::kCancelled};
+}
+
+PartEnd Round::notFitted(const PartStart& start) const {
+  PartEnd end = unchanged(scene_, start);
+  end.end = FitEnd::kCancelled;
+  return end;
+}
+
+PartEnd Round::fitted(const PartStart& start, const Device& device) const {
+  memory_.keep(device);
+  return fitPart(scene_, start, device, progress_.of(start.chunk));
 }
 
 PartStart Round::startOf(std::size_t chunk) const {

@@ -3,6 +3,9 @@
 /// parts begin with the ellipsoids of the round before and do not see each other.
 
 #include <cstddef>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -18,12 +21,22 @@ struct RoundPlan {
   Kernel kernel;
 };
 
+/// Keeps the memory of GPUs between parts. Any thread may use it.
+class DeviceMemory {
+ public:
+  void keep(const Device& device);
+
+ private:
+  std::mutex mutex_;
+  std::map<int, std::shared_ptr<void>> kept_;  ///< by the number of the GPU
+};
+
 class Round : public RoundParts {
  public:
   /// All arguments must outlive the round.
   Round(const FitScene& scene, const RoundPlan& plan, std::span<const ChunkState> states,
-        WholeProgress& progress)
-      : scene_(scene), plan_(plan), states_(states), progress_(progress) {}
+        WholeProgress& progress, DeviceMemory& memory)
+      : scene_(scene), plan_(plan), states_(states), progress_(progress), memory_(memory) {}
 
   [[nodiscard]] int round() const override { return plan_.number; }
   [[nodiscard]] std::size_t count() const override { return states_.size(); }
@@ -33,6 +46,8 @@ class Round : public RoundParts {
  private:
   [[nodiscard]] bool cancelled() const;
   [[nodiscard]] PartStart startOf(std::size_t chunk) const;
+  [[nodiscard]] PartEnd notFitted(const PartStart& start) const;
+  [[nodiscard]] PartEnd fitted(const PartStart& start, const Device& device) const;
   [[nodiscard]] RunPlan runPlanOf(std::size_t chunk) const;
   void takeAround(std::size_t chunk, PartStart& start) const;
   struct Halo {
@@ -46,6 +61,7 @@ class Round : public RoundParts {
   RoundPlan plan_;
   std::span<const ChunkState> states_;
   WholeProgress& progress_;
+  DeviceMemory& memory_;
 };
 
 }  // namespace esvr

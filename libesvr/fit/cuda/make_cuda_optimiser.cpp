@@ -1,5 +1,6 @@
 #include "fit/cuda/make_cuda_optimiser.h"
 
+#include "core/cuda/memory_pool.h"
 #include "core/cuda/use_device.h"
 #include "fit/cuda/cuda_optimiser.h"
 #include "fit/cuda/memory_plan.h"
@@ -13,6 +14,11 @@ std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget& target,
   cuda::forgetPeakMemory();
   cuda::requireMemory(target, 1, options.maxDeviceBytes);
   return std::make_unique<cuda::CudaOptimiser>(target, options, tuning);
+}
+
+std::shared_ptr<void> keepFreedMemory(const Device& device) {
+  cuda::useDevice(device);
+  return std::make_shared<cuda::KeepFreedMemory>();
 }
 
 bool fitsOnGpu(const FitSize& size, std::size_t ellipsoids, const Device& device,

@@ -16,6 +16,11 @@ namespace esvr {
                                                            const OptimiserOptions& options,
                                                            const Tuning& tuning);
 
+/// While the result lives, memory that is freed on a GPU stays with the process, so that the next
+/// optimiser gets it quickly.
+/// \throws DeviceError  the device does not exist, or the build has no CUDA
+[[nodiscard]] std::shared_ptr<void> keepFreedMemory(const Device& device);
+
 /// True if a fit with this number of ellipsoids, at least 1, stays within `maxBytes`, or else within
 /// the free memory of the device.
 /// \throws DeviceError  the device does not exist, or the build has no CUDA

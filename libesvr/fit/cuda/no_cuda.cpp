@@ -9,6 +9,8 @@ std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget&, const OptimiserOp
   refuseCuda("fitting", options.device);
 }
 
+std::shared_ptr<void> keepFreedMemory(const Device& device) { refuseCuda("fitting", device); }
+
 bool fitsOnGpu(const FitSize&, std::size_t, const Device& device, std::optional<std::size_t>) {
   refuseCuda("fitting", device);
 }
