@@ -48,7 +48,7 @@ std::vector<float> sumsIn(const FitTarget& target, const Ghosts& ghosts) {
 }
 
 /// The bricks of a volume with these numbers. The origin stays the same.
-SparseVolume partOf(const SparseVolume& volume, std::span<const std::uint32_t> bricks) {
+SparseVolume withBricks(const SparseVolume& volume, std::span<const std::uint32_t> bricks) {
   SparseVolume part;
   part.origin = volume.origin;
   part.background = volume.background;
@@ -95,7 +95,7 @@ Box boxOf(const ChunkScene& scene, const BrickChunk& chunk) {
 void makeChunkTarget(const ChunkScene& scene, const BrickChunk& chunk, const Ghosts& ghosts,
                      ChunkTarget& out) {
   const auto bricks = bricksAround(scene.volume, scene.chunks, chunk, scene.halo);
-  const SparseVolume part = partOf(scene.volume, bricks);
+  const SparseVolume part = withBricks(scene.volume, bricks);
   out.target = makeTarget(part, boxOf(scene, chunk), scene.scale);
   out.active = out.counted = part.active;
   for (std::size_t b = 0; b < out.counted.size(); ++b)
