@@ -28,6 +28,9 @@ class Parts {
   /// \param devices  the devices that fit parts; the runner is valid until the next call
   [[nodiscard]] PartRunner* runOn(const std::vector<Device>& devices);
 
+  /// True if the parts are shared with the ranks of MPI, which must all do the same.
+  [[nodiscard]] bool haveRanks() const { return ranks_ != nullptr; }
+
   /// Removes the folder.
   void remove();
 

@@ -151,7 +151,8 @@ class FileConversion {
   /// Converts a grid. If the GPU that "auto" selected fails, for example because its memory is too
   /// small, the CPU converts this grid and all later ones.
   ConvertedGrid convertWhereItFits(const std::string& name, std::optional<std::uint64_t> bytes) {
-    if (options_.device != kAuto || options_.convert.fit.device.kind == DeviceKind::kCpu)
+    const bool onGpu = options_.convert.fit.device.kind == DeviceKind::kCuda;
+    if (options_.device != kAuto || !onGpu || parts_.haveRanks())
       return convertGrid(options_, name, bytes);
     try {
       return convertGrid(options_, name, bytes);
