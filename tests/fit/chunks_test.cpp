@@ -20,6 +20,7 @@
 #include "fit/chunks/chunk_target.h"
 #include "fit/chunks/chunks_for.h"
 #include "fit/chunks/divide_bricks.h"
+#include "fit/chunks/whole_progress.h"
 #include "fit/cpu/cpu_pass.h"
 #include "random_ellipsoids.h"
 #include "support/on_device.h"
@@ -217,7 +218,7 @@ TEST_P(ChunksOn, SlowAreNearlyAsGoodBetweenVoxels) {
   EXPECT_GT(between(several), between(one) - 1.5);
 }
 
-TEST_P(ChunksOn, GiveTheSameBitsAgain) {
+TEST_P(ChunksOn, SlowGiveTheSameBitsAgain) {
   EXPECT_TRUE(test::sameBits(fitted(kChunkVoxels).field, fitted(kChunkVoxels).field));
 }
 ESVR_ON_DEVICES(ChunksOn);
@@ -296,6 +297,7 @@ TEST(FitInChunks, SlowContinuesFromAField) {
 
 TEST(FitInChunks, ReportsProgressOfTheWholeFit) {
   FitOptions options = shortFit(kChunkVoxels);
+  options.iterations = 30;  // rounds then end between iterations
   double last = 0.0;
   bool grows = true;
   options.progress = [&](const FitProgress& p) {
@@ -305,6 +307,22 @@ TEST(FitInChunks, ReportsProgressOfTheWholeFit) {
   (void)fit(longTube(), options);
   EXPECT_TRUE(grows);
   EXPECT_LE(last, 1.0);
+}
+
+TEST(WholeProgress, DoesNotGoBackWhereAPartEnds) {
+  const SparseVolume volume = test::tubeVolume();
+  const auto chunks = divideBricks(volume, 10);
+  const FitOptions options;
+  const FitScene scene{{volume, chunks, scaleOf(volume), boxOf(volume, std::nullopt), 2}, options};
+  std::vector<double> fractions;
+  WholeProgress progress(scene, [&](const FitProgress& p) { fractions.push_back(p.fraction); });
+  FitProgress now;
+  now.fraction = 0.26;  // the part has ended at a whole iteration
+  progress.of(0)(now);
+  progress.end(0, {}, 0.25);
+  ASSERT_EQ(fractions.size(), 2u);
+  EXPECT_GT(fractions[0], 0.0);
+  EXPECT_EQ(fractions[1], fractions[0]);
 }
 
 TEST(FitInChunks, KeepsTheChunksThatWereFittedBeforeItWasCancelled) {
@@ -320,7 +338,7 @@ TEST(FitInChunks, KeepsTheChunksThatWereFittedBeforeItWasCancelled) {
   EXPECT_LT(result.field.ellipsoidCount(), 250u);
 }
 
-TEST(FitInChunks, SaysWhetherItReachedAPsnr) {
+TEST(FitInChunks, SlowSaysWhetherItReachedAPsnr) {
   FitOptions options = shortFit(kChunkVoxels);
   options.psnr = 35.0;
   const FitResult reached = fit(longTube(), options);
@@ -372,7 +390,7 @@ Field longEllipsoid(float scale) {
   return field;
 }
 
-TEST(FitInChunks, TakesAnEllipsoidThatReachesAcrossFiveChunks) {
+TEST(FitInChunks, SlowTakesAnEllipsoidThatReachesAcrossFiveChunks) {
   const Field field = longEllipsoid(20.0f);
   FitOptions options = shortFit(1000);
   options.start = &field;

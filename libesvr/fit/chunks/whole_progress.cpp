@@ -31,14 +31,15 @@ std::function<void(const FitProgress&)> WholeProgress::of(std::size_t chunk) {
 
 void WholeProgress::take(std::size_t chunk, const FitProgress& now) {
   Chunk& state = chunks_[chunk];
-  state.fraction = now.fraction;
+  state.fraction = std::max(state.fraction, now.fraction);
   state.squares = state.boxVoxels * std::pow(10.0, -0.1 * now.point.psnrBox);
   state.ellipsoids = now.point.ellipsoids;
 }
 
 void WholeProgress::end(std::size_t chunk, const PartEnd& part, double fraction) {
   const std::lock_guard lock(mutex_);
-  chunks_[chunk].fraction = fraction;
+  // A part ends at a whole iteration, which may be a little later.
+  chunks_[chunk].fraction = std::max(chunks_[chunk].fraction, fraction);
   chunks_[chunk].ellipsoids = part.fit.ellipsoids.size();
   ++partsDone_;
   if (report_) report_(whole());
