@@ -330,7 +330,7 @@ NonFinite nonFinite(const Arguments& a) {
                                 {{"refuse", NonFinite::kRefuse}, {"zero", NonFinite::kZero}});
 }
 
-/// K/N with 1 <= K <= N.
+/// The share that a text K/N with 1 <= K <= N names.
 PartShare partShare(const std::string& text) {
   const auto slash = text.find('/');
   const auto number = cli::parseWhole(text.substr(0, slash));
@@ -351,8 +351,9 @@ void readParts(const Arguments& a, Options& options) {
   }
   const bool isStored = options.resume || options.job != Job::kWhole;
   if (isStored && options.paper) throw UsageError("fits by --paper have no parts");
-  // An interrupted run is continued later.
-  if (isStored && a.values["on-cancel"].defaulted()) options.onCancel = OnCancel::kDiscard;
+  // An interrupted run is continued later. A share of the parts has no result to keep.
+  if (options.job == Job::kPart || (isStored && a.values["on-cancel"].defaulted()))
+    options.onCancel = OnCancel::kDiscard;
 }
 
 ProgressForm progressForm(const Arguments& a) {

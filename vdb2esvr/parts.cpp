@@ -46,6 +46,8 @@ PartStore::Access accessOf(Job job, const Ranks* ranks) {
 
 fs::path partsFolder(const Options& options) { return options.output.string() + ".parts"; }
 
+bool keepsParts(const Options& options) { return options.resume || options.job != Job::kWhole; }
+
 Parts::Parts(const Options& options, const Device& device, const CancelToken& cancel, Ranks* ranks)
     : options_(options), cancel_(cancel), ranks_(ranks) {
   const bool isShared = !ranks && options.job != Job::kWhole;

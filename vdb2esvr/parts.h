@@ -16,6 +16,9 @@ namespace esvr::vdb2esvr {
 /// The folder of a run's finished parts: that of OUT.esvr is OUT.esvr.parts.
 [[nodiscard]] std::filesystem::path partsFolder(const Options& options);
 
+/// True if a run keeps its finished parts in the folder.
+[[nodiscard]] bool keepsParts(const Options& options);
+
 class Parts {
  public:
   /// Opens the folder of finished parts if the options want one.

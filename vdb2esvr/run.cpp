@@ -114,9 +114,9 @@ class FileConversion {
 
   /// What an interrupted run leaves.
   [[nodiscard]] std::string whatIsLeft() const {
-    const auto folder = partsFolder(options_);
-    if (!std::filesystem::exists(folder)) return "nothing was written";
-    return "the finished parts are in " + folder.string() + ", and the same command continues";
+    if (!keepsParts(options_)) return "nothing was written";
+    return "the finished parts are in " + partsFolder(options_).string() +
+           ", and the same command continues";
   }
 
   void runOn(const std::vector<Device>& devices) {
@@ -252,7 +252,7 @@ RunRecord convertFile(const Options& options, Ranks* ranks, const cli::Interrupt
     return record;
   }
   write(options, record);
-  parts.remove();
+  if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();
   return record;
 }

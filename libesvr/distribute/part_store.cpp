@@ -147,7 +147,7 @@ PartStore::Claim::~Claim() {
 }
 
 void PartStore::remove() {
-  std::error_code ignored;  // what cannot be removed stays; the result of the run is complete
+  std::error_code ignored;  // files that cannot be removed do no harm: OUT.esvr is complete
   fs::remove_all(folder_, ignored);
 }
 

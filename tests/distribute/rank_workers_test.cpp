@@ -101,7 +101,7 @@ class StartedBy : public testing::Test {
 
 TEST_F(StartedBy, AShellThereAreNoRanks) {
   EXPECT_EQ(joinRanks(), nullptr);
-  ::setenv("SLURM_STEP_NUM_TASKS", "8", 1);  // in a job, but not started by srun with MPI
+  ::setenv("SLURM_STEP_NUM_TASKS", "8", 1);  // a job of Slurm without MPI sets this
   EXPECT_EQ(joinRanks(), nullptr);
 }
 

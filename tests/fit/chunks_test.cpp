@@ -1,15 +1,13 @@
-// Plan: every brick belongs to one chunk, and the chunks' boxes fill space. Constants of a target act
-// like ellipsoids that are not fitted. A fit in chunks is nearly as good as a fit in one chunk, also
-// at the seams, gives the same bits again and on any number of threads, continues from a field, and
-// ends when it is cancelled. A volume that fits into one chunk is fitted as usual.
+// Plan: constants of a target act like ellipsoids that are not fitted. A fit in chunks is nearly as
+// good as a fit in one chunk, also at the seams, gives the same bits again, on any number of threads
+// and of workers, continues from a field, and ends when it is cancelled. A volume that fits into one
+// chunk is fitted as usual.
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "esvr/device_workers.h"
 #include "esvr/error.h"
@@ -36,81 +34,6 @@ std::vector<BrickChunk> chunksOf(const SparseVolume& volume) {
   FitOptions options;
   options.chunkVoxels = kChunkVoxels;
   return chunksFor(volume, options);
-}
-
-TEST(DivideBricks, GivesEveryBrickToTheChunkWhoseBoxContainsIt) {
-  const SparseVolume volume = test::tubeVolume();
-  const auto chunks = divideBricks(volume, 5);
-  ASSERT_GT(chunks.size(), 4u);
-  std::set<std::uint32_t> seen;
-  for (const BrickChunk& chunk : chunks) {
-    EXPECT_LE(chunk.bricks.size(), 5u);
-    std::uint64_t active = 0;
-    for (const std::uint32_t b : chunk.bricks) {
-      EXPECT_TRUE(seen.insert(b).second);
-      EXPECT_TRUE(chunk.bounds.contains(volume.bricks[b]));
-      active += std::uint64_t(volume.active[b].count());
-    }
-    EXPECT_EQ(active, chunk.activeVoxels);
-  }
-  EXPECT_EQ(seen.size(), volume.brickCount());
-}
-
-TEST(DivideBricks, MakesBoxesThatFillSpaceWithoutOverlap) {
-  const auto chunks = divideBricks(test::tubeVolume(), 10);
-  for (const Coord place : {Coord{0, 0, 0}, Coord{2, 3, 1}, Coord{-100, 2, 5},
-                            Coord{Box::kMax, Box::kMin, 0}, Coord{Box::kMin, 0, Box::kMax}})
-    EXPECT_EQ(std::count_if(chunks.begin(), chunks.end(),
-                            [&](const BrickChunk& c) { return c.box.contains(place); }),
-              1);
-}
-
-TEST(DivideBricks, EndsAtSingleBricks) {
-  const SparseVolume volume = test::volumeOf({}, 2, 0.0f, [](Coord) { return 1.0f; });
-  for (const std::size_t most : {0, 1}) {
-    const auto chunks = divideBricks(volume, most);
-    ASSERT_EQ(chunks.size(), 8u);
-    for (const BrickChunk& chunk : chunks) EXPECT_EQ(chunk.activeVoxels, 512u);
-  }
-}
-
-/// A volume whose bricks are at these places on the x axis.
-SparseVolume columnOf(const std::vector<int>& places) {
-  SparseVolume volume;
-  for (const int x : places) volume.bricks.push_back({x, 0, 0});
-  volume.values.resize(places.size() * kBrickVoxels);
-  volume.active.resize(places.size());
-  return volume;
-}
-
-std::vector<std::size_t> sizesOf(const std::vector<BrickChunk>& chunks) {
-  std::vector<std::size_t> sizes;
-  for (const BrickChunk& chunk : chunks) sizes.push_back(chunk.bricks.size());
-  return sizes;
-}
-
-TEST(DivideBricks, HalvesTheBricks) {
-  using testing::ElementsAre;
-  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1, 2, 3, 4, 5, 6, 7}), 4)), ElementsAre(4, 4));
-  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1, 2}), 2)), ElementsAre(1, 2));
-  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1'000'000}), 1)), ElementsAre(1, 1));
-  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1, 2, 100'000'000}), 2)), ElementsAre(2, 2));
-}
-
-TEST(DivideBricks, PutsThePlaneWhereBothSidesAreNearlyEqual) {
-  SparseVolume volume;  // six bricks at 0, one at 1 and one at 2
-  for (int y = 0; y < 6; ++y) volume.bricks.push_back({0, y % 2, y / 2});
-  volume.bricks.push_back({1, 0, 0});
-  volume.bricks.push_back({9, 0, 0});
-  volume.values.resize(8 * kBrickVoxels);
-  volume.active.resize(8);
-  EXPECT_THAT(sizesOf(divideBricks(volume, 7)), testing::ElementsAre(6, 2));
-}
-
-TEST(Dilated, EndsWhereCoordinatesEnd) {
-  const Box all = dilated(Box::whole(), 3);
-  EXPECT_EQ(all, Box::whole());
-  EXPECT_EQ(dilated({{1, 2, 3}, {4, 5, 6}}, 2), (Box{{-1, 0, 1}, {6, 7, 8}}));
 }
 
 std::vector<float> residualsOf(const FitTarget& target, const Kernel& kernel,

@@ -56,7 +56,8 @@ inline MemoryAccount& memoryAccount() {
 }
 
 /// As long as it lives, limits the memory that buffers of the thread's device take in addition to
-/// what they take now. Only one may live for a device at a time, or they must end in reverse order.
+/// what they take now. If several limits of a device exist at the same time, the one that was made
+/// last must end first.
 class LimitMemory {
  public:
   explicit LimitMemory(std::size_t bytes)

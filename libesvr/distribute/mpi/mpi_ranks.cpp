@@ -18,7 +18,7 @@ namespace {
 constexpr std::chrono::milliseconds kPause{1};
 constexpr int kAsk = 1, kAnswer = 2;  // tags of messages
 constexpr std::int64_t kNoneLeft = -1;
-constexpr std::uint64_t kEnd = 0x454E4420'4F464649;  // for agree() at the end
+constexpr std::uint64_t kEnd = 0x454E4420'4F464649;  // number on which ranks that end agree
 
 /// Waits without using the processor, unlike the calls of MPI that block.
 void waitFor(MPI_Request request) {

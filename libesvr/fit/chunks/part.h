@@ -19,8 +19,8 @@ namespace esvr {
 /// A fit in chunks has rounds. Each fits all chunks for a part of the schedule, from a fraction to
 /// the next one.
 inline constexpr std::array kRoundEnds{0.0, 0.1, 0.25, 0.5, 0.7, 0.85, 0.95, 1.0};
-/// Kappa is fitted in the rounds that begin before this fraction. Every chunk finds a kappa of its own
-/// in such a round; in later rounds, all chunks have the same one.
+/// Kappa is fitted in the rounds that begin before this fraction of the schedule. In these rounds,
+/// every chunk finds its own kappa. In later rounds, kappa is the same for all chunks and constant.
 inline constexpr double kKappaUntil = 0.7;
 inline constexpr int kRounds = int(kRoundEnds.size()) - 1;
 
@@ -42,7 +42,7 @@ struct PartEnd {
   FitState fit;             ///< the ellipsoids in the chunk
   Kernel kernel;            ///< with the kappa that the part has found
   FitErrors errors;         ///< errors of the chunk's part of the box
-  std::uint64_t pairs = 0;  ///< pairs of its ellipsoids and bricks
+  std::uint64_t pairs = 0;  ///< pairs of ellipsoids and bricks, those in the halo included
   FitEnd end = FitEnd::kScheduleDone;
   std::uint32_t iterations = 0;  ///< iterations of the schedule up to the end of the part
   std::uint64_t deviceBytes = 0;

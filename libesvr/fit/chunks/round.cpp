@@ -78,8 +78,9 @@ RunPlan Round::runPlanOf(std::size_t chunk) const {
 }
 
 /// Takes the ellipsoids of the other chunks. Those in the halo are fitted too and dropped at the end
-/// of the part. The neighbours of the chunk thus change as they do in their own parts, and the
-/// ellipsoids on both sides of a plane adapt to each other, although the parts run apart.
+/// of the part. During the part they change as they do in the parts of their own chunks, because the
+/// voxels and the first state are the same. The ellipsoids on both sides of a plane can therefore
+/// adapt to each other although the parts do not communicate.
 void Round::takeAround(std::size_t chunk, PartStart& start) const {
   const double radius = supportRadius(kernelConstants<double>(plan_.kernel));
   const Box halo = dilated(scene_.chunks[chunk].bounds, scene_.halo);

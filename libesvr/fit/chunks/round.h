@@ -52,7 +52,7 @@ class Round : public RoundParts {
   void takeAround(std::size_t chunk, PartStart& start) const;
   struct Halo {
     Box box;        ///< box of bricks
-    double radius;  ///< of a support, in scales
+    double radius;  ///< radius of a support, relative to its scales
   };
   [[nodiscard]] double takeFrom(std::size_t other, const Halo& halo, PartStart& start) const;
   [[nodiscard]] double shareWithin(const Box& box, const BrickChunk& chunk) const;

@@ -92,11 +92,13 @@ struct FitResult {
   /// Wall-clock times. secondsSeed covers the seeding at the start, growth and relocation, and is
   /// not part of secondsOptimise.
   double secondsSeed = 0.0, secondsOptimise = 0.0;
-  std::size_t wanted = 0;          ///< ellipsoids that fit() aimed at; 0 for fitByPaper()
-  std::size_t deviceBytes = 0;     ///< largest GPU memory held; 0 on the CPU
-  std::size_t chunks = 0;          ///< number of chunks of the fit; 0 for fitByPaper()
-  bool deviceFull = false;         ///< true if GPU memory ran out: fewer ellipsoids than `wanted`
-  std::uint64_t pairs = 0;         ///< (ellipsoid, brick) pairs that the final field evaluates
+  std::size_t wanted = 0;       ///< ellipsoids that fit() aimed at; 0 for fitByPaper()
+  std::size_t deviceBytes = 0;  ///< largest GPU memory held; 0 on the CPU
+  std::size_t chunks = 0;       ///< number of chunks of the fit; 0 for fitByPaper()
+  bool deviceFull = false;      ///< true if GPU memory ran out: fewer ellipsoids than `wanted`
+  /// (ellipsoid, brick) pairs that the final field evaluates. In a fit in chunks, an ellipsoid counts
+  /// again in every chunk whose halo it is in.
+  std::uint64_t pairs = 0;
   bool signedIntensities = false;  ///< true if an intensity is negative
 };
 
