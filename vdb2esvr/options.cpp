@@ -9,9 +9,10 @@
 #include "cli/device_option.h"
 #include "cli/error_bound.h"
 #include "cli/memory_limit.h"
-#include "cli/number.h"
 #include "cli/table.h"
 #include "vdb2esvr/paper_options.h"
+#include "vdb2esvr/part_options.h"
+#include "vdb2esvr/refuse_with.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -142,19 +143,6 @@ void addFitOptions(cli::po::options_description& options) {
   // clang-format on
 }
 
-void addPartOptions(cli::po::options_description& options) {
-  // clang-format off
-  options.add_options()
-    ("resume", bool_switch(),
-     "keep the finished parts of a fit in chunks in the folder OUT.esvr.parts until OUT.esvr is "
-     "written, and continue from those that are there")
-    ("part", value<std::string>()->value_name("K/N"),
-     "fit the K-th of N shares of the parts and write them to OUT.esvr.parts, for job arrays; "
-     "--merge then writes OUT.esvr")
-    ("merge", bool_switch(), "write OUT.esvr from the parts in OUT.esvr.parts");
-  // clang-format on
-}
-
 void addFileOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
@@ -244,14 +232,6 @@ Representation representation(const Arguments& a) {
                                       {"voxels", Representation::kVoxels}});
 }
 
-/// \throws UsageError  one of the options was given, which `given` excludes
-void refuseWith(const Arguments& a, const std::string& given,
-                std::initializer_list<const char*> options) {
-  for (const char* option : options)
-    if (a.has(option) && !a.values[option].defaulted())
-      throw UsageError("--" + given + " cannot be combined with --" + option);
-}
-
 Goal losslessGoal(const Arguments& a) {
   refuseWith(a, "lossless", {"max-error", "count", "psnr", "seconds", "size", "ratio", "paper"});
   return LosslessGoal{};
@@ -328,32 +308,6 @@ void requireRepresentation(const Arguments& a, const Options& options) {
 NonFinite nonFinite(const Arguments& a) {
   return cli::choose<NonFinite>("nonfinite", a.get<std::string>("nonfinite"),
                                 {{"refuse", NonFinite::kRefuse}, {"zero", NonFinite::kZero}});
-}
-
-/// The share that a text K/N with 1 <= K <= N names.
-PartShare partShare(const std::string& text) {
-  const auto slash = text.find('/');
-  const auto number = cli::parseWhole(text.substr(0, slash));
-  const auto count = slash == text.npos ? std::nullopt : cli::parseWhole(text.substr(slash + 1));
-  constexpr std::int64_t kMostParts = 1'000'000;
-  if (!number || !count || *number < 1 || *number > *count || *count > kMostParts)
-    throw UsageError("--part must be K/N with K from 1 to N, not '" + text + "'");
-  return {int(*number), int(*count)};
-}
-
-void readParts(const Arguments& a, Options& options) {
-  options.resume = a.get<bool>("resume");
-  if (a.get<bool>("merge")) options.job = Job::kMerge;
-  if (const auto part = a.find<std::string>("part")) {
-    refuseWith(a, "part", {"merge", "report"});
-    options.job = Job::kPart;
-    options.share = partShare(*part);
-  }
-  const bool isStored = options.resume || options.job != Job::kWhole;
-  if (isStored && options.paper) throw UsageError("fits by --paper have no parts");
-  // An interrupted run is continued later. A share of the parts has no result to keep.
-  if (options.job == Job::kPart || (isStored && a.values["on-cancel"].defaulted()))
-    options.onCancel = OnCancel::kDiscard;
 }
 
 ProgressForm progressForm(const Arguments& a) {
