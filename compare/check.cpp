@@ -183,8 +183,8 @@ void check(const CheckOptions& options) {
   const cli::ThreadLimit threads(options.threads);
   const cli::Interrupts interrupts;
   checkFiles(options);
-  const GridFile reference(options.reference, options.maxMemory),
-      candidate(options.candidate, options.maxMemory);
+  const GridFile reference(options.reference, options.memory),
+      candidate(options.candidate, options.memory);
 
   CheckRecord record;
   record.candidateBytes = candidate.bytes();

@@ -3,7 +3,7 @@
 #include "cli/byte_size.h"
 #include "cli/choice.h"
 #include "cli/command_line.h"
-#include "cli/memory_limit.h"
+#include "cli/host_memory.h"
 #include "cli/number.h"
 #include "compare/measure_options.h"
 #include "compare/program.h"
@@ -71,7 +71,7 @@ cli::CommandLine makeCommandLine() {
   addMeasureOptions(options);
   addJsonReport(options);
   options.add_options()("force,f", bool_switch(), "replace the report if it exists");
-  cli::addMaxMemory(line);
+  cli::addHostMemory(line);
   return line;
 }
 
@@ -132,7 +132,7 @@ std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv)
   options.ssim = a.get<bool>("ssim");
   options.report = a.find<std::string>("report").value_or("");
   options.overwrite = a.get<bool>("force");
-  options.maxMemory = cli::maxMemoryOf(a);
+  options.memory = cli::hostMemoryOf(a);
   options.threads = a.threads;
   options.verbosity = a.verbosity;
   options.commandLine = commandLine(argc, argv);

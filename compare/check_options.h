@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/error_bound.h"
+#include "cli/host_memory.h"
 #include "cli/log.h"
 #include "compare/differences.h"
 #include "compare/figures.h"
@@ -30,7 +31,7 @@ struct CheckOptions {
   bool ssim = false;   ///< whether SSIM is measured without a limit on it
   std::string report;  ///< file name or "-"; empty: no report
   bool overwrite = false;
-  std::uint64_t maxMemory = 0;  ///< bytes that input may take
+  cli::HostMemory memory;  ///< memory that input may take
   int threads = 0;
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;

@@ -172,7 +172,7 @@ class RawReader {
 };
 
 SparseVolume readVdb(const External& external, const ExternalPlace& place) {
-  const GridFile file(external.file, place.maxMemory);
+  const GridFile file(external.file, place.memory);
   return file.read(file.grids().size() == 1 ? 0 : file.find(place.grid)).volume;
 }
 

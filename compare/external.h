@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/host_memory.h"
 #include "esvr/coord.h"
 #include "esvr/memory_limit.h"
 #include "esvr/sparse_volume.h"
@@ -33,7 +34,7 @@ struct ExternalPlace {
   std::string grid;  ///< grid of a VDB file; a file's only grid may have another name
   Box box;           ///< box of the voxels of a raw file
   float background = 0.0f;
-  std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes that reading may take
+  cli::HostMemory memory;  ///< memory that input may take
 };
 
 /// Reads the voxels. In a raw file, voxels that differ from the background are active.

@@ -18,8 +18,8 @@ std::vector<std::string> storedNames(const std::vector<ListedGrid>& grids) {
 
 }  // namespace
 
-GridFile::GridFile(std::filesystem::path path, std::uint64_t maxMemory)
-    : path_(std::move(path)), maxMemory_(maxMemory) {
+GridFile::GridFile(std::filesystem::path path, cli::HostMemory memory)
+    : path_(std::move(path)), memory_(std::move(memory)) {
   if (path_.extension() == ".esvr")
     listEsvr();
   else
@@ -27,7 +27,7 @@ GridFile::GridFile(std::filesystem::path path, std::uint64_t maxMemory)
 }
 
 void GridFile::listEsvr() {
-  esvr_ = std::make_unique<EsvrFile>(readEsvr(path_, {maxMemory_}));
+  esvr_ = std::make_unique<EsvrFile>(readEsvr(path_, {memory_.maxBytes, memory_.voxels}));
   bytes_ = inspectEsvr(path_).fileBytes;
   metadata_ = esvr_->metadata;
   for (const auto& grid : esvr_->grids)
@@ -59,10 +59,12 @@ std::size_t GridFile::firstWithVoxels() const {
 
 VolumeGrid GridFile::read(std::size_t g) const {
   if (!esvr_)
-    return readGrid(path_, grids_[g].uniqueName, {.allowEmpty = true, .maxBytes = maxMemory_});
+    return readGrid(path_, grids_[g].uniqueName,
+                    {.allowEmpty = true, .maxBytes = memory_.maxBytes, .memory = memory_.voxels});
   VolumeGrid grid;
   grid.descriptor = esvr_->grids[g].descriptor;
-  grid.volume = decodeGrid(esvr_->grids[g], {.maxBytes = maxMemory_});
+  grid.volume =
+      decodeGrid(esvr_->grids[g], {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});
   return grid;
 }
 

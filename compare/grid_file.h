@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/host_memory.h"
 #include "esvr/container.h"
 #include "esvr/vdb_io.h"
 
@@ -25,8 +26,8 @@ struct ListedGrid {
 class GridFile {
  public:
   /// \throws BadInput, MemoryExceeded  as readEsvr and inspectVdb
-  /// \param maxMemory  bytes that reading it may take
-  GridFile(std::filesystem::path path, std::uint64_t maxMemory);
+  /// \param memory  memory that reading it may take
+  GridFile(std::filesystem::path path, cli::HostMemory memory);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
@@ -48,7 +49,7 @@ class GridFile {
   void listVdb();
 
   std::filesystem::path path_;
-  std::uint64_t maxMemory_;
+  cli::HostMemory memory_;
   std::uint64_t bytes_ = 0;
   std::vector<ListedGrid> grids_;
   std::vector<MetaItem> metadata_;

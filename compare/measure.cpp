@@ -209,29 +209,30 @@ TableRow RowMaker::external(const External& external) {
   if (external.encodeSeconds) row.encode = once(*external.encodeSeconds);
   if (external.decodeSeconds) row.decode = once(*external.decodeSeconds);
   row.note = "times as given";
-  measureVoxels(
-      readExternal(external, {scene_.gridName, scene_.box, scene_.reference.volume.background,
-                              scene_.options.maxMemory}),
-      NanoValues::kFloat, row);
+  measureVoxels(readExternal(external, {scene_.gridName, scene_.box,
+                                        scene_.reference.volume.background, scene_.options.memory}),
+                NanoValues::kFloat, row);
   if (external.fps) row.fps = external.fps;
   return row;
 }
 
 void RowMaker::measureEsvr(const std::filesystem::path& path, Drawing drawing, TableRow& row) {
-  const std::uint64_t maxMemory = scene_.options.maxMemory;
+  const cli::HostMemory& memory = scene_.options.memory;
   SparseVolume volume;
   const cli::MemoryMeter decoding;
   row.decode = timed(scene_.options.runs, [&] {
     cli::Stopwatch watch;
-    volume = decodeGrid(gridOf(readEsvr(path, {maxMemory}), path, scene_.gridName),
-                        {.maxBytes = maxMemory});
+    volume =
+        decodeGrid(gridOf(readEsvr(path, {memory.maxBytes, memory.voxels}), path, scene_.gridName),
+                   {.maxBytes = memory.maxBytes, .memory = memory.voxels});
     return watch.lap();
   });
   row.memory = decoding.peakRise();
   requireOverlap(path, activeBox(scene_.reference.volume), activeBox(volume));
   row.metrics = compare(volume);
   if (scene_.gallery)
-    drawEsvr(gridOf(readEsvr(path, {maxMemory}), path, scene_.gridName), volume, drawing, row);
+    drawEsvr(gridOf(readEsvr(path, {memory.maxBytes, memory.voxels}), path, scene_.gridName),
+             volume, drawing, row);
 }
 
 void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Drawing drawing,
@@ -246,7 +247,7 @@ void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Draw
 TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing) {
   const std::string how = drawing == Drawing::kBricks ? ", bricks" : "";
   TableRow row{.name = path.filename().string() + how, .group = "ESVR"};
-  const GridFile file(path, scene_.options.maxMemory);
+  const GridFile file(path, scene_.options.memory);
   if (!file.esvr())
     throw BadInput(path.string() +
                    ": candidates must be .esvr files; --external takes other results");

@@ -27,7 +27,7 @@ double choosePeak(const TableOptions& options, const VolumeGrid& reference) {
 SceneFiles::SceneFiles(const TableOptions& options, const CancelToken& cancel)
     : options_(options),
       cancel_(cancel),
-      file_(options.reference, options.maxMemory),
+      file_(options.reference, options.memory),
       place_(options.grid ? file_.find(*options.grid) : file_.firstWithVoxels()),
       reference_(readReference(file_, place_)),
       box_(options.box.value_or(activeBox(reference_.volume))),

@@ -2,7 +2,7 @@
 
 #include "cli/byte_size.h"
 #include "cli/device_option.h"
-#include "cli/memory_limit.h"
+#include "cli/host_memory.h"
 #include "compare/measure_options.h"
 
 namespace esvr::compare {
@@ -22,7 +22,7 @@ void addSceneOptions(cli::CommandLine& line) {
      "leave ZFP out if the box as an array of floats takes more than this");
   // clang-format on
   cli::addDevice(line.options(), "device for fits and pictures: ");
-  cli::addMaxMemory(line);
+  cli::addHostMemory(line);
 }
 
 void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
@@ -35,7 +35,7 @@ void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
   options.peak = peakOption(a);
   options.maxDense = cli::parseByteSize("max-dense", a.get<std::string>("max-dense"));
   options.device = cli::deviceOf(a);
-  options.maxMemory = cli::maxMemoryOf(a);
+  options.memory = cli::hostMemoryOf(a);
   options.threads = a.threads;
   options.verbosity = a.verbosity;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/host_memory.h"
 #include "cli/log.h"
 #include "compare/external.h"
 #include "compare/gallery.h"
@@ -34,7 +35,7 @@ struct TableOptions {
   std::string device;
   GalleryOptions images;
   ReportFiles files;
-  std::uint64_t maxMemory = 0;  ///< bytes that input may take
+  cli::HostMemory memory;  ///< memory that input may take
   int threads = 0;
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;

@@ -8,7 +8,7 @@ namespace esvr::esvr2vdb {
 
 void check(const Options& options) {
   const std::string name = cli::printable(options.input.string());
-  const auto notes = checkEsvr(options.input, {options.maxMemory});
+  const auto notes = checkEsvr(options.input, {options.memory.maxBytes, options.memory.voxels});
   if (options.verbosity == cli::Verbosity::kQuiet) return;
   for (const auto& note : notes) std::cout << name << ": note: " << cli::printable(note) << '\n';
   std::cout << name << ": OK\n";

@@ -25,7 +25,7 @@ void checkFiles(const Options& options) {
 }
 
 EsvrFile read(const Options& options, const cli::Log& log) {
-  const ReadLimits limits{options.maxMemory};
+  const ReadLimits limits{options.memory.maxBytes, options.memory.voxels};
   if (readsAll(options)) return readEsvr(options.input, limits);
   ReadPart wanted = options.part;
   wanted.limits = limits;
@@ -43,8 +43,11 @@ VolumeGrid decoded(const StoredGrid& grid, const Options& options, const DecodeO
   return result;
 }
 
+/// Bytes of a volume in memory.
 std::uint64_t bytesOf(const SparseVolume& volume) {
-  return volume.brickCount() * (kBrickVoxels * sizeof(float) + sizeof(BrickMask) + sizeof(Coord));
+  const std::uint64_t values = volume.values.size() * sizeof(float);
+  return volume.brickCount() * (sizeof(BrickMask) + sizeof(Coord)) +
+         (memoryOf(volume).isInFile(values) ? 0 : values);
 }
 
 void tellEmpty(const VolumeGrid& grid, const cli::Log& log) {
@@ -56,7 +59,8 @@ std::vector<VolumeGrid> decodeAll(const EsvrFile& file, const std::vector<std::s
                                   const Options& options, const cli::Log& log) {
   std::vector<VolumeGrid> grids;
   DecodeOptions decode = options.decode;
-  decode.maxBytes = options.maxMemory;
+  decode.maxBytes = options.memory.maxBytes;
+  decode.memory = options.memory.voxels;
   for (const std::size_t g : chosen) {
     grids.push_back(decoded(file.grids[g], options, decode));
     tellEmpty(grids.back(), log);

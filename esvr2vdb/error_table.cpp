@@ -12,12 +12,16 @@ namespace {
 SparseVolume readWritten(const Options& options, const std::string& name) {
   for (const auto& grid : inspectVdb(options.output).grids)
     if (grid.uniqueName == name && grid.activeVoxels == 0) return {};
-  return readGrid(options.output, name, {.maxBytes = options.maxMemory}).volume;
+  return readGrid(options.output, name,
+                  {.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels})
+      .volume;
 }
 
 VolumeMetrics compare(const Options& options, const ComparedGrid& grid) {
   const SparseVolume reference =
-      readGrid(*options.reference, grid.name, {.maxBytes = options.maxMemory}).volume;
+      readGrid(*options.reference, grid.name,
+               {.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels})
+          .volume;
   return compareVolumes(reference, readWritten(options, grid.writtenName),
                         {.box = options.box, .ssim = true});
 }

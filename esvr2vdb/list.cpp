@@ -122,7 +122,9 @@ void printDetails(const Listing& listing) {
 void list(const Options& options) {
   const auto extension = options.input.extension();
   if (extension == ".vdb" || extension == ".nvdb") return listVdb(options);
-  Listing listing{readEsvr(options.input, {options.maxMemory}), inspectEsvr(options.input), {}};
+  Listing listing{readEsvr(options.input, {options.memory.maxBytes, options.memory.voxels}),
+                  inspectEsvr(options.input),
+                  {}};
   listing.names = uniqueNames(listing.file);
   std::cout << cli::printable(options.input.string()) << ": .esvr format "
             << listing.summary.versionMajor << '.' << listing.summary.versionMinor << ", "

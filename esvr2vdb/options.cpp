@@ -5,7 +5,7 @@
 #include "cli/box_option.h"
 #include "cli/choice.h"
 #include "cli/command_line.h"
-#include "cli/memory_limit.h"
+#include "cli/host_memory.h"
 
 namespace esvr::esvr2vdb {
 namespace {
@@ -77,7 +77,7 @@ cli::CommandLine commandLine() {
      "the reference's active voxels)")
     ("force,f", bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
-  cli::addMaxMemory(line);
+  cli::addHostMemory(line);
   return line;
 }
 
@@ -148,7 +148,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.input = arguments->get<std::string>("input");
   options.threads = arguments->threads;
   options.verbosity = arguments->verbosity;
-  options.maxMemory = cli::maxMemoryOf(*arguments);
+  options.memory = cli::hostMemoryOf(*arguments);
   if (options.job == Job::kConvert) readConversion(*arguments, options);
   return options;
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/host_memory.h"
 #include "cli/log.h"
 #include "esvr/container.h"
 #include "esvr/coord.h"
@@ -27,9 +28,9 @@ struct Options {
   std::optional<std::size_t> maxEllipsoids;  ///< keep those of each grid with the largest weight
   WriteOptions write;
   std::optional<std::filesystem::path> reference;
-  std::optional<Box> box;       ///< box of the PSNR against the reference
-  std::uint64_t maxMemory = 0;  ///< limit on the memory that the input needs, bytes
-  int threads = 0;              ///< number of threads; 0: all
+  std::optional<Box> box;  ///< box of the PSNR against the reference
+  cli::HostMemory memory;  ///< memory that input may take
+  int threads = 0;         ///< number of threads; 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
 };
 

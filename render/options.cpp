@@ -1,7 +1,7 @@
 #include "render/options.h"
 
 #include "cli/command_line.h"
-#include "cli/memory_limit.h"
+#include "cli/host_memory.h"
 #include "render/option_groups.h"
 #include "render/program_text.h"
 
@@ -27,7 +27,7 @@ cli::CommandLine commandLine() {
   addDeviceOptions(line.options());
   addMeasuringOptions(line.options());
   line.options().add_options()("force,f", bool_switch(), "replace OUT.png if it exists");
-  cli::addMaxMemory(line);
+  cli::addHostMemory(line);
   return line;
 }
 
@@ -47,7 +47,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   readDeviceOptions(a, options);
   readMeasuringOptions(a, options);
   options.overwrite = a.get<bool>("force");
-  options.maxMemory = cli::maxMemoryOf(a);
+  options.memory = cli::hostMemoryOf(a);
   options.threads = a.threads;
   options.verbosity = a.verbosity;
   options.commandLine.assign(argv, argv + argc);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/host_memory.h"
 #include "cli/log.h"
 #include "esvr/renderer.h"
 #include "render/scene.h"
@@ -52,8 +53,8 @@ struct Options {
   bool bench = false;
   std::string report;  ///< empty: none
   bool overwrite = false;
-  std::uint64_t maxMemory = 0;  ///< bytes
-  int threads = 0;              ///< 0: all
+  cli::HostMemory memory;  ///< memory that input may take
+  int threads = 0;         ///< 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;  ///< the command as given, which pictures and reports hold
 };

@@ -98,7 +98,7 @@ void checkPictureSize(const Options& options) {
   const double pictures = options.reference.empty() ? 1.0 : (options.sheet.empty() ? 3.0 : 6.0);
   const Resolution r = options.resolution;
   requireWithinMemory(
-      pictures * kBytesPerPixel * r.width * r.height, options.maxMemory,
+      pictures * kBytesPerPixel * r.width * r.height, options.memory.maxBytes,
       "a picture of " + std::to_string(r.width) + " x " + std::to_string(r.height) + " pixels");
 }
 
@@ -145,7 +145,7 @@ std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings&
   if (options.reference.empty()) return nullptr;
   DrawSettings own = settings;
   if (options.input.extension() != ".esvr") own.values.reset();
-  return std::make_unique<Drawing>(readScene({options.reference, std::nullopt, options.maxMemory}),
+  return std::make_unique<Drawing>(readScene({options.reference, std::nullopt, options.memory}),
                                    own, sample);
 }
 
@@ -261,8 +261,8 @@ void run(const Options& options) {
   checkFiles(options, files);
   checkPictureSize(options);
   const DrawSettings settings{selectDevice(options.device), options.method, options.limits,
-                              options.values, options.maxMemory};
-  Scene scene = readScene({options.input, options.grid, options.maxMemory});
+                              options.values, options.memory};
+  Scene scene = readScene({options.input, options.grid, options.memory});
   RenderOptions r = renderOptions(options, scene);
   Drawing drawing(std::move(scene), settings, r);
   const auto reference = referenceOf(options, settings, r);

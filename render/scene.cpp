@@ -22,7 +22,7 @@ std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
 /// Reads a grid of an .esvr file. If the grid stores its voxels, they are drawn instead of the
 /// ellipsoids, because they are exact.
 Scene encoded(const SceneFile& from) {
-  EsvrFile file = readEsvr(from.path, {from.maxMemory});
+  EsvrFile file = readEsvr(from.path, {from.memory.maxBytes, from.memory.voxels});
   StoredGrid& grid = file.grids[placeOf(file, from.path, from.grid)];
   Scene scene;
   scene.grid = grid.descriptor.name;
@@ -30,7 +30,9 @@ Scene encoded(const SceneFile& from) {
   scene.data = {grid.valueMin, grid.valueMax};
   scene.background = float(grid.descriptor.background);
   if (grid.voxels)
-    scene.content = VolumeGrid{grid.descriptor, decodeGrid(grid, {.maxBytes = from.maxMemory}), 0};
+    scene.content = VolumeGrid{
+        grid.descriptor,
+        decodeGrid(grid, {.maxBytes = from.memory.maxBytes, .memory = from.memory.voxels}), 0};
   else
     scene.content = grid.field, scene.encoded = std::move(grid);
   return scene;
@@ -44,7 +46,7 @@ std::string firstDrawable(const std::filesystem::path& path) {
 
 Scene voxels(const SceneFile& from) {
   VolumeGrid grid = readGrid(from.path, from.grid ? *from.grid : firstDrawable(from.path),
-                             {.maxBytes = from.maxMemory});
+                             {.maxBytes = from.memory.maxBytes, .memory = from.memory.voxels});
   Scene scene;
   scene.grid = grid.descriptor.name;
   scene.box = activeBox(grid.volume);
@@ -99,7 +101,7 @@ void SceneRenderer::drawField(const Field& field, const Scene& scene, const Draw
   if (s.method != Method::kBricks)
     renderer_ = makeFieldRenderer(field, s.device, s.limits, voxelRule(*scene.encoded));
   if (s.method == Method::kEllipsoids) return;
-  decoded_ = decodeGrid(*scene.encoded, {.maxBytes = s.maxMemory});
+  decoded_ = decodeGrid(*scene.encoded, {.maxBytes = s.memory.maxBytes, .memory = s.memory.voxels});
   if (s.method == Method::kBricks) {
     renderer_ = makeVolumeRenderer(decoded_, s.device, s.limits);
     return;

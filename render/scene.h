@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "cli/host_memory.h"
 #include "esvr/grid_coding.h"
 #include "esvr/memory_limit.h"
 #include "esvr/renderer.h"
@@ -23,8 +24,8 @@ struct Scene {
 
 struct SceneFile {
   std::filesystem::path path;
-  std::optional<std::string> grid;           ///< default: the first grid that can be drawn
-  std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes
+  std::optional<std::string> grid;  ///< default: the first grid that can be drawn
+  cli::HostMemory memory;           ///< memory that input may take
 };
 
 /// \throws BadInput        the file cannot be read, or has no such grid or none that can be drawn
@@ -38,8 +39,8 @@ struct DrawSettings {
   Device device;
   Method method = Method::kEllipsoids;
   RendererLimits limits;
-  std::optional<NanoValues> values;          ///< draw voxels as a NanoVDB grid of this value type
-  std::uint64_t maxMemory = kNoMemoryLimit;  ///< bytes that decoding may take
+  std::optional<NanoValues> values;  ///< draw voxels as a NanoVDB grid of this value type
+  cli::HostMemory memory;            ///< memory that input may take
 };
 
 /// Draws a scene, which must outlive it.

@@ -67,7 +67,9 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
   if (options.job == Job::kPart) return grid;
 
-  grid.metrics = compareVolumes(source.volume, decodeGrid(grid.stored()), {.box = fit.box});
+  grid.metrics =
+      compareVolumes(source.volume, decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)}),
+                     {.box = fit.box});
   grid.psnrBetween = errorBetween(source.volume, grid.stored(), fit.box);
   grid.seconds.measure = watch.lap();
   if (options.countHits) countHits(source.volume, grid);

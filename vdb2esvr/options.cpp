@@ -8,7 +8,7 @@
 #include "cli/command_line.h"
 #include "cli/device_option.h"
 #include "cli/error_bound.h"
-#include "cli/memory_limit.h"
+#include "cli/host_memory.h"
 #include "cli/table.h"
 #include "vdb2esvr/paper_options.h"
 #include "vdb2esvr/part_options.h"
@@ -170,7 +170,7 @@ cli::CommandLine commandLine() {
   addGoalOptions(line.options());
   addFitOptions(line.options());
   addPartOptions(line.options());
-  cli::addMaxMemory(line);
+  cli::addHostMemory(line);
   line.helpTopic("paper", paperHelp());
   return line;
 }
@@ -320,6 +320,14 @@ OnCancel onCancel(const Arguments& a) {
                                {{"keep", OnCancel::kKeep}, {"discard", OnCancel::kDiscard}});
 }
 
+void readMemory(const Arguments& a, Options& options) {
+  constexpr std::uint64_t kFitsShare = 2;  // one of two; the rest is for the volume and its copy
+  const cli::HostMemory memory = cli::hostMemoryOf(a);
+  options.read.maxBytes = memory.maxBytes;
+  options.read.memory = memory.voxels;
+  options.convert.fit.maxHostBytes = memory.maxBytes / kFitsShare;
+}
+
 }  // namespace
 
 std::optional<Options> parseOptions(int argc, const char* const* argv) {
@@ -340,7 +348,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.convert.representation = representation(a);
   requireRepresentation(a, options);
   options.read.nonFinite = nonFinite(a);
-  options.read.maxBytes = cli::maxMemoryOf(a);
+  readMemory(a, options);
   options.device = cli::deviceOf(a);
   options.onCancel = onCancel(a);
   readParts(a, options);

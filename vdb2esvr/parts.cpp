@@ -1,5 +1,7 @@
 #include "vdb2esvr/parts.h"
 
+#include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
@@ -42,6 +44,14 @@ PartStore::Access accessOf(Job job, const Ranks* ranks) {
   return job == Job::kPart || ranks ? PartStore::Access::kShared : PartStore::Access::kAlone;
 }
 
+/// Each GPU twice: while it fits a part, the next one is prepared on the host.
+std::vector<Device> withPreparation(const std::vector<Device>& devices) {
+  std::vector<Device> workers = devices;
+  std::ranges::copy_if(devices, std::back_inserter(workers),
+                       [](const Device& device) { return device.kind == DeviceKind::kCuda; });
+  return workers;
+}
+
 }  // namespace
 
 fs::path partsFolder(const Options& options) { return options.output.string() + ".parts"; }
@@ -62,10 +72,10 @@ PartRunner* Parts::runOn(const std::vector<Device>& devices) {
   if (ranks_)
     runner_ = std::make_unique<RankWorkers>(*ranks_, devices, store_ ? &*store_ : nullptr);
   else if (!store_)
-    runner_ = std::make_unique<DeviceWorkers>(devices);
+    runner_ = std::make_unique<DeviceWorkers>(withPreparation(devices));
   else
     runner_ = std::make_unique<StoredParts>(
-        *store_, StoredPartsOptions{.devices = devices,
+        *store_, StoredPartsOptions{.devices = withPreparation(devices),
                                     .share = options_.share,
                                     .mergeOnly = options_.job == Job::kMerge,
                                     .cancel = &cancel_});

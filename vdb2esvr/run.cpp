@@ -214,15 +214,6 @@ void tellPart(const Options& options, const RunRecord& record, const cli::Log& l
              options.output.string());
 }
 
-/// \throws UsageError  --max-vram would limit two parts on one GPU
-void requireOneLimitEach(const Options& options, const std::vector<Device>& devices) {
-  if (!options.convert.fit.maxDeviceBytes) return;
-  for (std::size_t n = 0; n < devices.size(); ++n)
-    for (std::size_t m = 0; m < n; ++m)
-      if (devices[m].index == devices[n].index)
-        throw UsageError("--max-vram cannot be combined with a GPU that --device names twice");
-}
-
 /// The devices of this process. The ranks of a host take its GPUs in turn.
 std::vector<Device> devicesFor(const Options& options, const Ranks* ranks) {
   if (!ranks) return selectDevices(options.device);
@@ -242,7 +233,6 @@ RunRecord convertFile(const Options& options, Ranks* ranks, const cli::Interrupt
   tellSkipped(choice.skipped, log);
   record.skipped = std::move(choice.skipped);
   const std::vector<Device> selected = devices.get();
-  requireOneLimitEach(options, selected);
   tellDevices(selected, options, log);
   Parts parts(options, selected.front(), interrupts.token(), ranks);
   FileConversion(options, selected, interrupts.token(), parts, log).run(choice.fitted, record);

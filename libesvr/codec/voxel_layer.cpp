@@ -121,7 +121,7 @@ void fill(const SparseVolume& volume, VoxelLayer& layer) {
   layer.bricks = volume.bricks;
   layer.active = volume.active;
   layer.vacant.resize(volume.brickCount());
-  layer.codes.resize(volume.values.size());
+  layer.codes = VoxelArray<std::int32_t>(volume.values.size(), memoryOf(volume));
   tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
     const auto values = volume.brickValues(b);
     for (int v = 0; v < kBrickVoxels; ++v) {
@@ -216,7 +216,7 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
   volume.background = layer.background;
   volume.bricks = layer.bricks;
   volume.active = layer.active;
-  volume.values.resize(layer.codes.size());
+  volume.values = VoxelArray<float>(layer.codes.size(), layer.codes.get_allocator());
   tbb::parallel_for(std::size_t{0}, layer.bricks.size(), [&](std::size_t b) {
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
       const std::size_t i = b * kBrickVoxels + v;

@@ -35,7 +35,8 @@ bool missedByReader(const StoredGrid& grid, const SparseVolume& source,
                     const CompactOptions& options) {
   if (!options.psnr || *options.psnr < kMaxPsnrOfMargin || options.device.kind == DeviceKind::kCpu)
     return false;
-  return psnrOverBox(source, decodeGrid(grid), {.box = options.box}) < *options.psnr;
+  return psnrOverBox(source, decodeGrid(grid, {.memory = memoryOf(source)}), {.box = options.box}) <
+         *options.psnr;
 }
 
 void requireOneKappa(const StoredGrid& grid) {
@@ -47,9 +48,9 @@ void requireOneKappa(const StoredGrid& grid) {
 
 /// The voxels of a grid whose ellipsoids are meant to be drawn. Intensities that are solved for the
 /// voxels of the source instead would draw a worse picture between them.
-std::optional<SparseVolume> ownVoxels(const StoredGrid& grid) {
+std::optional<SparseVolume> ownVoxels(const StoredGrid& grid, const VoxelMemory& memory) {
   if (grid.field.fitFor == FitFor::kVoxels) return std::nullopt;
-  return decodeGrid(grid);
+  return decodeGrid(grid, {.memory = memory});
 }
 
 }  // namespace
@@ -60,7 +61,7 @@ CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
   CompactResult result{grid, {}, 0.0, 0};
   if (grid.field.ellipsoidCount() == 0) return result;
   const Box box = options.box.value_or(activeBox(source));
-  const auto own = ownVoxels(grid);
+  const auto own = ownVoxels(grid, memoryOf(source));
   TrialMaker maker(
       grid,
       {.source = source, .box = box, .device = options.device, .solvedFor = own ? &*own : nullptr});

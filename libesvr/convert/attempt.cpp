@@ -99,7 +99,9 @@ double psnrOf(const Job& job, const SparseVolume& volume) {
   return psnrOverBox(job.input.source, volume, {.box = job.options.fit.box});
 }
 
-double psnrOf(const Job& job, const StoredGrid& grid) { return psnrOf(job, decodeGrid(grid)); }
+double psnrOf(const Job& job, const StoredGrid& grid) {
+  return psnrOf(job, decodeGrid(grid, {.memory = memoryOf(job.input.source)}));
+}
 
 FitOptions shortened(FitOptions options) {
   if (options.iterations)

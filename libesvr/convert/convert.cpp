@@ -67,16 +67,17 @@ class Converter {
 };
 
 /// Encodes and decodes a grid, so that the caller gets the same grid as a reader of the file.
-StoredGrid throughTheFormat(StoredGrid grid) {
+StoredGrid throughTheFormat(StoredGrid grid, const VoxelMemory& memory) {
   EsvrFile file;
   file.grids.push_back(std::move(grid));
   const auto bytes = encodeEsvr(file);
-  return std::move(decodeEsvr(bytes, "the stored grid").grids.front());
+  return std::move(decodeEsvr(bytes, "the stored grid", {.memory = memory}).grids.front());
 }
 
 /// Checks the decoded grid against the bound.
 void requireBound(const ConvertInput& input, const StoredGrid& grid, double bound) {
-  const double error = largestDifference(input.source, decodeGrid(grid));
+  const double error =
+      largestDifference(input.source, decodeGrid(grid, {.memory = memoryOf(input.source)}));
   if (error > bound)
     throw RuntimeFailure("grid '" + input.descriptor.name + "': an error of " +
                          std::to_string(error) + " exceeds the bound of " + std::to_string(bound));
@@ -128,7 +129,7 @@ Conversion convertVolume(const ConvertInput& input, const ConvertOptions& option
   if (own.fit.fitFor == FitFor::kDrawing) own.representation = Representation::kEllipsoids;
   Conversion conversion = std::visit(Converter({input, own}), options.goal);
   conversion.smallerExactBytes = smallerExactBytes({input, own}, conversion.grid);
-  conversion.grid = throughTheFormat(std::move(conversion.grid));
+  conversion.grid = throughTheFormat(std::move(conversion.grid), memoryOf(input.source));
   if (const auto bound = convert::boundOf(options.goal, input.source))
     requireBound(input, conversion.grid, *bound);
   return conversion;
@@ -146,7 +147,7 @@ PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions&
         "that a narrow band does not fill");
   PaperFitResult made = fitByPaper(input.source, options);
   Conversion conversion = stored(input, std::move(made.fit), options, storage);
-  conversion.grid = throughTheFormat(std::move(conversion.grid));
+  conversion.grid = throughTheFormat(std::move(conversion.grid), memoryOf(input.source));
   return {std::move(conversion), std::move(made.record)};
 }
 

@@ -9,9 +9,9 @@
 namespace esvr {
 namespace {
 
-template <class T>
-void putHash(format::ByteWriter& out, const std::vector<T>& items) {
-  const XXH128_hash_t hash = XXH3_128bits(items.data(), items.size() * sizeof(T));
+template <class Items>
+void putHash(format::ByteWriter& out, const Items& items) {
+  const XXH128_hash_t hash = XXH3_128bits(items.data(), items.size() * sizeof(items.front()));
   for (const std::uint64_t word : {std::uint64_t(items.size()), hash.low64, hash.high64})
     out.put(word);
 }

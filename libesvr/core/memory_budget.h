@@ -3,14 +3,20 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 
 #include "esvr/memory_limit.h"
+#include "esvr/voxel_memory.h"
 
 namespace esvr {
 
 class MemoryBudget {
  public:
-  explicit MemoryBudget(std::uint64_t maxBytes) : max_(maxBytes) {}
+  /// \param voxels  holds voxels
+  explicit MemoryBudget(std::uint64_t maxBytes, VoxelMemory voxels = {})
+      : max_(maxBytes), voxels_(std::move(voxels)) {}
+
+  [[nodiscard]] const VoxelMemory& voxels() const { return voxels_; }
 
   /// Takes bytes from the budget, before they are allocated.
   /// \param what  start of the message
@@ -22,6 +28,7 @@ class MemoryBudget {
 
  private:
   std::uint64_t max_;
+  VoxelMemory voxels_;
   double taken_ = 0.0;
 };
 

@@ -66,6 +66,18 @@ Result overBricks(const SparseVolume& volume, const Result& none, Add add) {
       });
 }
 
+/// Moves the origin to the smallest corner of the bricks, as in makeVolume.
+void tightenOrigin(SparseVolume& volume) {
+  if (volume.bricks.empty()) {
+    volume.origin = {};
+    return;
+  }
+  Coord low = volume.bricks.front();
+  for (const Coord b : volume.bricks) low = minCoord(low, b);
+  for (Coord& b : volume.bricks) b = b - low;
+  volume.origin = volume.origin + low * kBrickSide;
+}
+
 void addActive(std::span<const float> values, const BrickMask& active, ValueRange& range) {
   for (int i = 0; i < kBrickVoxels; ++i)
     if (active.test(i)) range.expand(values[i]);
@@ -103,6 +115,23 @@ ValueRange activeRange(const SparseVolume& volume) {
       [&](std::size_t b, ValueRange& r) { addActive(volume.brickValues(b), volume.active[b], r); });
   if (range.min > range.max) throw BadInput("the grid has no active voxel");
   return range;
+}
+
+void dropInactiveBricks(SparseVolume& volume) {
+  std::size_t kept = 0;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    if (volume.active[b].count() == 0) continue;
+    if (kept != b) {
+      volume.bricks[kept] = volume.bricks[b];
+      volume.active[kept] = volume.active[b];
+      std::ranges::copy(volume.brickValues(b), volume.brickValues(kept).begin());
+    }
+    ++kept;
+  }
+  volume.bricks.resize(kept);
+  volume.active.resize(kept);
+  volume.values.resize(kept * kBrickVoxels);
+  tightenOrigin(volume);
 }
 
 void checkInvariants(const SparseVolume& volume) {

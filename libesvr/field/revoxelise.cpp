@@ -42,22 +42,12 @@ void refuseTooFarApart(Coord low, std::span<const Coord> corners) {
   }
 }
 
-/// Moves the origin to the smallest corner of the remaining bricks, as in makeVolume.
-void tightenOrigin(SparseVolume& volume) {
-  if (volume.bricks.empty()) {
-    volume.origin = {};
-    return;
-  }
-  const Coord low = smallest(volume.bricks);
-  for (Coord& b : volume.bricks) b = b - low;
-  volume.origin = volume.origin + low * kBrickSide;
-}
-
 SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
                            const RevoxeliseOptions& options) {
   const VoxelRule rule = makeVoxelRule(field.background, options);
   SparseVolume volume;
   volume.background = field.background;
+  volume.values = VoxelArray<float>(options.memory);
   if (corners.empty()) return volume;
   volume.origin = smallest(corners);
   refuseTooFarApart(volume.origin, corners);
@@ -74,7 +64,7 @@ SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
       volume.values.insert(volume.values.end(), values.begin(), values.end());
     }
   });
-  tightenOrigin(volume);
+  dropInactiveBricks(volume);
   return volume;
 }
 

@@ -16,7 +16,13 @@ namespace {
 constexpr double kEvaluationBytesPerEllipsoid = 512.0;  // parameters, support, prepared form
 constexpr double kBytesPerPair = 16.0;  // both lists of pairs, and intermediate lists
 constexpr double kBytesOfValues = kBrickVoxels * sizeof(float);
-constexpr double kEvaluationBytesPerBrick = 2.0 * (kBytesOfValues + sizeof(BrickMask)) + 96.0;
+constexpr double kBytesPerEntry = 2.0 * sizeof(BrickMask) + 96.0;  // of a brick without its values
+
+/// Bytes of an evaluated brick in memory.
+double bytesPerBrick(double bricks, const VoxelMemory& memory) {
+  const bool isInFile = memory.isInFile(std::uint64_t(std::min(bricks * kBytesOfValues, 0x1p63)));
+  return kBytesPerEntry + (isInFile ? 0.0 : 2.0 * kBytesOfValues);
+}
 
 /// An upper bound that counts a brick once for each ellipsoid that reaches it.
 WorkEstimate boundOf(std::span<const Support> supports, const Box& within, double maxOfAll) {
@@ -34,9 +40,9 @@ WorkEstimate boundOf(std::span<const Support> supports, const Box& within, doubl
 
 }  // namespace
 
-double WorkEstimate::bytes() const {
+double WorkEstimate::bytes(const VoxelMemory& memory) const {
   return ellipsoids * kEvaluationBytesPerEllipsoid + pairs * kBytesPerPair +
-         bricks * kEvaluationBytesPerBrick +
+         bricks * bytesPerBrick(bricks, memory) +
          std::min(bricks, double(kBatchBricks)) * kBytesOfValues;
 }
 
@@ -47,10 +53,10 @@ WorkEstimate estimateWork(const Field& field, const EstimateOptions& options) {
   WorkEstimate withoutBricks = estimate;
   withoutBricks.bricks = 0.0;
   const double left = options.enough - withoutBricks.bytes();
-  if (estimate.bytes() <= options.enough || !(left > 0.0)) return estimate;
-  const double counted = countBricks(reach, within, left / kEvaluationBytesPerBrick);
-  if (counted <= left / kEvaluationBytesPerBrick)
-    estimate.bricks = std::min(estimate.bricks, counted);
+  if (estimate.bytes(options.memory) <= options.enough || !(left > 0.0)) return estimate;
+  const double most = left / bytesPerBrick(estimate.bricks, options.memory);
+  const double counted = countBricks(reach, within, most);
+  if (counted <= most) estimate.bricks = std::min(estimate.bricks, counted);
   return estimate;
 }
 

@@ -120,7 +120,7 @@ class BetweenError {
   std::optional<ValueRange> range_;
   float background_;
   BrickIndex index_;
-  std::vector<float> relative_;  ///< values of the volume less its background
+  VoxelArray<float> relative_;  ///< values of the volume less its background
 };
 
 }  // namespace

@@ -35,14 +35,20 @@ class FitRun {
   FitEnd iterateToEnd() {
     while (!finished()) {
       if (recorder_.cancelled()) return FitEnd::kCancelled;
-      if (done_ % schedule_.eventInterval() == 0) events();
-      if (done_ % recordInterval() == 0) recorder_.record(optimiser_, done_);
+      if (isEvent() && !isDoneBefore()) events();
+      if (plan_.curve && done_ % recordInterval() == 0) recorder_.record(optimiser_, done_);
       const double psnr = psnrOf(iterate(), target_.boxVoxels, target_.peak);
       report(psnr);
       if (plan_.psnr && psnr > *plan_.psnr && reachedExactly()) return FitEnd::kPsnrReached;
     }
+    // There are gradients now, and none at the start of the next part.
+    if (plan_.to < 1.0 && isEvent()) events();
     return endOfSchedule();
   }
+
+  [[nodiscard]] bool isEvent() const { return done_ % schedule_.eventInterval() == 0; }
+  /// Whether the part before has ended with the event of this iteration.
+  [[nodiscard]] bool isDoneBefore() const { return done_ == first_ && plan_.from > 0.0; }
 
   FitEnd endOfSchedule() {
     if (plan_.seconds) return FitEnd::kTimeUp;

@@ -20,6 +20,7 @@ struct RunPlan {
   FitState start{};               ///< ellipsoids to begin with; empty: seeds
   bool learnKappa = false;        ///< whether kappa is fitted or stays the same
   double from = 0.0, to = 1.0;    ///< the part of the schedule that is run
+  bool curve = true;              ///< whether points of the curve are measured during the run
 };
 
 /// The number of seeds with which a fit of `count` ellipsoids begins.

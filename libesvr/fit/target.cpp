@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <span>
 
@@ -59,23 +60,34 @@ Box boxOf(const SparseVolume& volume, const std::optional<Box>& box) {
   return {b.min - volume.origin, b.max - volume.origin};
 }
 
-FitTarget makeTarget(const SparseVolume& part, const Box& box, const TargetScale& scale) {
+FitTarget makeTarget(const VolumePart& part, const Box& box, const TargetScale& scale) {
+  const SparseVolume& volume = part.volume;
   FitTarget target;
   static_cast<TargetScale&>(target) = scale;
-  target.bricks = part.bricks;
-  target.seedBricks = part.brickCount();
-  target.active = &part.active;
-  target.activeVoxels = activeVoxelCount(part);
+  target.seedBricks = part.bricks.size();
   target.boxVoxels = box.volume();
   target.box = box;
-  target.values.resize(part.values.size());
-  const double background = part.background;
-  tbb::parallel_for(std::size_t{0}, part.brickCount(), [&](std::size_t b) {
-    const auto values = part.brickValues(b);
+  target.bricks.reserve(part.bricks.size());
+  for (const std::uint32_t b : part.bricks) {
+    target.bricks.push_back(volume.bricks[b]);
+    target.activeVoxels += std::uint64_t(volume.active[b].count());
+  }
+  target.values.resize(part.bricks.size() * kBrickVoxels);
+  const double background = volume.background;
+  tbb::parallel_for(std::size_t{0}, part.bricks.size(), [&](std::size_t n) {
+    const auto values = volume.brickValues(part.bricks[n]);
     std::transform(values.begin(), values.end(),
-                   target.values.begin() + std::ptrdiff_t(b * kBrickVoxels),
+                   target.values.begin() + std::ptrdiff_t(n * kBrickVoxels),
                    [&](float v) { return scaled(v, background, scale.scale); });
   });
+  return target;
+}
+
+FitTarget makeTarget(const SparseVolume& volume, const Box& box, const TargetScale& scale) {
+  std::vector<std::uint32_t> all(volume.brickCount());
+  std::iota(all.begin(), all.end(), 0u);
+  FitTarget target = makeTarget({volume, all}, box, scale);
+  target.active = &volume.active;
   return target;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "esvr/sparse_volume.h"
@@ -52,9 +53,20 @@ struct FitTarget : TargetScale {
 /// \throws BadInput  the volume has no active voxel
 [[nodiscard]] FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box);
 
-/// Makes the target of a part of a volume, with the units of the whole.
+/// Makes the target of a volume, which must outlive it.
 /// \param box  box of the PSNR, relative to the volume's origin
-[[nodiscard]] FitTarget makeTarget(const SparseVolume& part, const Box& box,
+[[nodiscard]] FitTarget makeTarget(const SparseVolume& volume, const Box& box,
+                                   const TargetScale& scale);
+
+/// Bricks of a volume.
+struct VolumePart {
+  const SparseVolume& volume;
+  std::span<const std::uint32_t> bricks;  ///< numbers, increasing
+};
+
+/// Makes the target of a part of a volume, with the units of the whole. The caller sets `active`.
+/// \param box  box of the PSNR, relative to the volume's origin
+[[nodiscard]] FitTarget makeTarget(const VolumePart& part, const Box& box,
                                    const TargetScale& scale);
 
 }  // namespace esvr

@@ -301,21 +301,22 @@ EsvrFile decodeGrids(SectionReader& sections, const ReadPart* part) {
 }  // namespace
 
 EsvrFile decode(const ByteSource& source, const ReadLimits& limits) {
-  SectionReader sections(source, limits.maxBytes);
+  SectionReader sections(source, limits);
   EsvrFile file = decodeGrids(sections, nullptr);
   sections.finish();
   return file;
 }
 
 EsvrFile decodePart(const ByteSource& source, const ReadPart& part) {
-  SectionReader sections(source, part.limits.maxBytes);
+  SectionReader sections(source, part.limits);
   return decodeGrids(sections, &part);
 }
 
 }  // namespace format
 
-EsvrFile decodeEsvr(std::span<const std::byte> bytes, const std::string& nameForErrors) {
-  return format::decode(format::MemorySource(bytes, nameForErrors));
+EsvrFile decodeEsvr(std::span<const std::byte> bytes, const std::string& nameForErrors,
+                    const ReadLimits& limits) {
+  return format::decode(format::MemorySource(bytes, nameForErrors), limits);
 }
 
 }  // namespace esvr

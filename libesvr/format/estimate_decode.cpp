@@ -14,7 +14,8 @@ Box boxAround(const std::vector<Coord>& corners) {
 
 EstimateOptions optionsFor(const StoredGrid& grid, const DecodeOptions& options) {
   EstimateOptions estimate{.within = options.box.value_or(Box::whole()),
-                           .enough = double(options.maxBytes)};
+                           .enough = double(options.maxBytes),
+                           .memory = options.memory};
   if (grid.topology == TopologyKind::kThreshold) return estimate;
   estimate.within = common(estimate.within, boxAround(grid.bricks));
   estimate.maxBricks = double(grid.bricks.size());
@@ -27,8 +28,7 @@ WorkEstimate estimateDecode(const StoredGrid& grid, const DecodeOptions& options
   if (grid.voxels) return {.bricks = double(grid.voxels->bricks.size())};
   WorkEstimate work = estimateWork(grid.field, optionsFor(grid, options));
   if (grid.topology != TopologyKind::kThreshold) work.bricks = double(grid.bricks.size());
-  // Adding a residual copies the bricks.
-  if (grid.residual) work.bricks = 2.0 * (work.bricks + double(grid.residual->bricks.size()));
+  if (grid.residual) work.bricks += double(grid.residual->bricks.size());
   return work;
 }
 

@@ -169,19 +169,17 @@ void addResidual(const VoxelLayer& residual, SparseVolume& volume) {
 }
 
 /// Determines the active voxels of values that are not clamped again, by the rule of revoxelise().
-SparseVolume withActivity(const SparseVolume& volume, const VoxelRule& rule) {
-  std::vector<BrickInput> bricks;
+void activate(const VoxelRule& rule, SparseVolume& volume) {
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    BrickInput brick{volume.brickCorner(b), {}, {}};
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const float value = volume.brickValues(b)[v];
-      const bool active = rule.isActive(value);
-      brick.values[std::size_t(v)] = active ? value : rule.inactiveValue(value);
-      if (active) brick.active.set(v);
-    }
-    bricks.push_back(brick);
+    volume.active[b] = {};
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (rule.isActive(values[v]))
+        volume.active[b].set(v);
+      else
+        values[v] = rule.inactiveValue(values[v]);
   }
-  return makeVolume(std::move(bricks), volume.background);
+  dropInactiveBricks(volume);
 }
 
 SparseVolume evaluatedWithResidual(const StoredGrid& grid, const DecodeOptions& options) {
@@ -191,11 +189,13 @@ SparseVolume evaluatedWithResidual(const StoredGrid& grid, const DecodeOptions& 
   SparseVolume volume = revoxelise(grid.field, {.threshold = kAlwaysActive,
                                                 .range = voxelRule(grid).range,
                                                 .bricks = bricks,
-                                                .restrictToBricks = true});
+                                                .restrictToBricks = true,
+                                                .memory = options.memory});
   addResidual(*grid.residual, volume);
   VoxelRule rule = ruleOf(grid);
   rule.threshold = options.threshold.value_or(rule.threshold);
-  return withActivity(volume, rule);
+  activate(rule, volume);
+  return volume;
 }
 
 SparseVolume evaluated(const StoredGrid& grid, const DecodeOptions& options) {
@@ -205,6 +205,7 @@ SparseVolume evaluated(const StoredGrid& grid, const DecodeOptions& options) {
   const auto bricks = bricksWanted(grid, options);
   if (bricks) revoxel.bricks = *bricks;
   revoxel.restrictToBricks = bricks.has_value();
+  revoxel.memory = options.memory;
   return revoxelise(grid.field, revoxel);
 }
 
@@ -224,18 +225,17 @@ void applyMask(const StoredGrid& grid, SparseVolume& volume) {
 
 /// Makes voxels outside a box inactive and drops bricks without an active voxel.
 void clip(const Box& box, const VoxelRule& rule, SparseVolume& volume) {
-  std::vector<BrickInput> kept;
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    BrickInput brick{volume.brickCorner(b), {}, {}};
     const auto values = volume.brickValues(b);
+    BrickMask active;
     for (int v = 0; v < kBrickVoxels; ++v) {
-      const bool inside = box.contains(brick.corner + voxelLocal(v));
-      brick.values[std::size_t(v)] = inside ? values[v] : rule.inactiveValue(values[v]);
-      if (inside && volume.active[b].test(v)) brick.active.set(v);
+      const bool inside = box.contains(volume.brickCorner(b) + voxelLocal(v));
+      if (!inside) values[v] = rule.inactiveValue(values[v]);
+      if (inside && volume.active[b].test(v)) active.set(v);
     }
-    kept.push_back(brick);
+    volume.active[b] = active;
   }
-  volume = makeVolume(std::move(kept), volume.background);
+  dropInactiveBricks(volume);
 }
 
 }  // namespace
@@ -248,7 +248,7 @@ SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
                      "' says itself which voxels are active: it takes no threshold");
   if (options.box && options.box->empty()) throw UsageError("the box of voxels is empty");
   if (options.maxBytes != kNoMemoryLimit)
-    requireWithinMemory(estimateDecode(grid, options).bytes(), options.maxBytes,
+    requireWithinMemory(estimateDecode(grid, options).bytes(options.memory), options.maxBytes,
                         "grid '" + grid.descriptor.name + "'");
   SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
   if (!grid.voxels && grid.topology == TopologyKind::kMask) applyMask(grid, volume);

@@ -20,8 +20,8 @@ double expansionOf(SectionKind kind) {
 
 }  // namespace
 
-SectionReader::SectionReader(const ByteSource& source, std::uint64_t maxBytes)
-    : source_(source), table_(readTable(source)), budget_(maxBytes) {
+SectionReader::SectionReader(const ByteSource& source, const ReadLimits& limits)
+    : source_(source), table_(readTable(source)), budget_(limits.maxBytes, limits.memory) {
   for (std::size_t i = 0; i < table_.entries.size(); ++i) unread_[table_.entries[i].id] = i;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/memory_budget.h"
+#include "esvr/container.h"
 #include "format/byte_source.h"
 #include "format/section_table.h"
 
@@ -14,9 +15,9 @@ namespace esvr::format {
 
 class SectionReader {
  public:
-  /// \param maxBytes  limit on the memory of the content
+  /// \param limits  limits on the memory of the content
   /// \throws BadInput  the header or the section table is damaged
-  explicit SectionReader(const ByteSource& source, std::uint64_t maxBytes = kNoMemoryLimit);
+  explicit SectionReader(const ByteSource& source, const ReadLimits& limits = {});
 
   [[nodiscard]] const SectionTable& table() const { return table_; }
 

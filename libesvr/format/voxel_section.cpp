@@ -21,8 +21,14 @@ constexpr std::uint64_t kMaxBricksPerByte = 4;
 constexpr int kMaxBrickBits = 21;
 
 /// Bytes of memory that a brick takes while it is read: its codes, its masks, and its values.
-constexpr double kDecodedBytesPerBrick =
-    kBrickVoxels * (sizeof(std::int32_t) + sizeof(float)) + 3.0 * sizeof(BrickMask) + 64.0;
+constexpr std::uint64_t kCodeBytesPerBrick = kBrickVoxels * sizeof(std::int32_t);
+constexpr double kVoxelBytesPerBrick = double(kCodeBytesPerBrick) + kBrickVoxels * sizeof(float);
+constexpr double kEntryBytesPerBrick = 3.0 * sizeof(BrickMask) + 64.0;
+
+double decodedBytesPerBrick(std::uint64_t bricks, const VoxelMemory& memory) {
+  return kEntryBytesPerBrick +
+         (memory.isInFile(bricks * kCodeBytesPerBrick) ? 0.0 : kVoxelBytesPerBrick);
+}
 
 int bitsOf(const std::vector<Coord>& bricks) {
   std::uint32_t all = 0;
@@ -175,8 +181,9 @@ VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& wher
                      MemoryBudget& budget) {
   ByteReader in(content, where);
   VoxelLayer layer = getHeader(in);
+  layer.codes = VoxelArray<std::int32_t>(budget.voxels());
   const BrickCount count = getBrickCount(in, content.size());
-  budget.take(double(count.bricks) * kDecodedBytesPerBrick, where);
+  budget.take(double(count.bricks) * decodedBytesPerBrick(count.bricks, budget.voxels()), where);
   const codec::VoxelModel model = getModel(in);
   decodeStream(in, count, model, layer);
   checkValues(layer, in);

@@ -9,9 +9,9 @@
 namespace esvr::vdb {
 namespace {
 
-/// Bytes of a brick in the volume and of its entry in the list of sources.
-constexpr double kBrickBytes =
-    kBrickVoxels * sizeof(float) + sizeof(BrickMask) + 2.0 * sizeof(Coord) + 32.0;
+/// Bytes of a brick's voxels, and of its other entries in the volume and in the list of sources.
+constexpr double kValueBytes = kBrickVoxels * sizeof(float);
+constexpr double kEntryBytes = sizeof(BrickMask) + 2.0 * sizeof(Coord) + 32.0;
 
 void refuseTooFarApart(Coord low, Coord high) {
   constexpr std::int64_t kMaxExtent = std::numeric_limits<std::int32_t>::max() - kBrickSide;
@@ -32,8 +32,10 @@ float narrowBackground(double background) {
 }
 
 void refuseTooLarge(std::uint64_t bricks, std::uint64_t treeBytes, const ReadOptions& options) {
+  const bool isInFile = options.memory.isInFile(bricks * std::uint64_t(kValueBytes));
+  const double each = kEntryBytes + (isInFile ? 0.0 : kValueBytes);
   requireWithinMemory(
-      double(treeBytes) + double(bricks) * kBrickBytes, options.maxBytes,
+      double(treeBytes) + double(bricks) * each, options.maxBytes,
       "it has " + std::to_string(bricks) + " bricks of 8^3 voxels, active tiles included, and");
 }
 
@@ -47,7 +49,8 @@ void refuseEmpty(std::size_t bricks, const FillRules& rules) {
   if (bricks == 0 && !rules.allowEmpty) throw BadInput("it has no active voxel");
 }
 
-SparseVolume layOutBricks(const std::vector<Coord>& corners, float background) {
+SparseVolume layOutBricks(const std::vector<Coord>& corners, float background,
+                          const VoxelMemory& memory) {
   SparseVolume volume;
   volume.background = background;
   if (corners.empty()) return volume;
@@ -65,7 +68,7 @@ SparseVolume layOutBricks(const std::vector<Coord>& corners, float background) {
       throw BadInput("it has two bricks at " + toString(corner));
     volume.bricks.push_back(place);
   }
-  volume.values.assign(corners.size() * kBrickVoxels, background);
+  volume.values = VoxelArray<float>(corners.size() * kBrickVoxels, background, memory);
   volume.active.resize(corners.size());
   return volume;
 }

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "esvr/coord.h"
@@ -37,7 +38,8 @@ struct NonFiniteTally {
   Coord first;  ///< the first one in the order of bricks and of voxels in a brick
 
   void add(Coord voxel) {
-    if (count++ == 0) first = voxel;
+    if (count++ == 0 || std::pair(brickOf(voxel), voxel) < std::pair(brickOf(first), first))
+      first = voxel;
   }
 };
 /// \throws BadInput  there are such voxels, and they are not to be replaced
@@ -64,7 +66,8 @@ void appendTile(Coord corner, std::int32_t extent, double value,
 /// A volume with bricks at these corners (increasing), whose voxels are inactive and have the
 /// background.
 /// \throws BadInput  two corners are equal, or are 2^31 voxels apart
-SparseVolume layOutBricks(const std::vector<Coord>& corners, float background);
+SparseVolume layOutBricks(const std::vector<Coord>& corners, float background,
+                          const VoxelMemory& memory);
 
 /// \throws BadInput  there is no brick, and the rules do not allow this
 void refuseEmpty(std::size_t bricks, const FillRules& rules);
@@ -77,6 +80,7 @@ inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
   return 0.0f;
 }
 
+/// Fills a brick. Access::value(leaf, i) is a leaf's voxel in voxelOffset order.
 template <class Leaf, class Access>
 void fillFromLeaf(const Leaf& leaf, const FillRules& rules, Coord corner, std::span<float> out,
                   const BrickMask& active, NonFiniteTally& tally) {
@@ -89,13 +93,12 @@ void fillFromLeaf(const Leaf& leaf, const FillRules& rules, Coord corner, std::s
   }
 }
 
-/// Builds the volume. Access::value(leaf, i) is a leaf's voxel in voxelOffset order, and
-/// Access::mask(leaf) holds its active voxels.
-/// \throws BadInput  there is no active voxel, and the rules do not allow this; or voxels are not
-///                   finite
+/// Makes a volume with all bricks that have an active voxel. The masks are set, and the bricks of
+/// tiles have their values. Access::mask(leaf) holds the active voxels of a leaf.
+/// \throws BadInput  there is no active voxel, and the rules do not allow this
 template <class Leaf, class Access>
-SparseVolume buildVolume(std::vector<BrickSource<Leaf>> sources, const FillRules& rules,
-                         NonFiniteTally& tally) {
+SparseVolume volumeFor(std::vector<BrickSource<Leaf>>& sources, const FillRules& rules,
+                       const VoxelMemory& memory, NonFiniteTally& tally) {
   std::erase_if(sources,
                 [](const auto& s) { return s.leaf && Access::mask(*s.leaf).count() == 0; });
   std::sort(sources.begin(), sources.end(),
@@ -105,21 +108,18 @@ SparseVolume buildVolume(std::vector<BrickSource<Leaf>> sources, const FillRules
   for (const auto& source : sources) corners.push_back(source.corner);
 
   refuseEmpty(corners.size(), rules);
-  SparseVolume volume = layOutBricks(corners, rules.background);
+  SparseVolume volume = layOutBricks(corners, rules.background, memory);
   for (std::size_t b = 0; b < sources.size(); ++b) {
     const auto& source = sources[b];
-    BrickMask& active = volume.active[b];
-    const auto out = volume.brickValues(b);
     if (source.leaf) {
-      active = Access::mask(*source.leaf);
-      fillFromLeaf<Leaf, Access>(*source.leaf, rules, source.corner, out, active, tally);
-    } else {
-      active.setAll();
-      for (int i = 0; i < kBrickVoxels; ++i)
-        out[i] = narrowValue(source.tileValue, source.corner + voxelLocal(i), tally);
+      volume.active[b] = Access::mask(*source.leaf);
+      continue;
     }
+    volume.active[b].setAll();
+    const auto out = volume.brickValues(b);
+    for (int i = 0; i < kBrickVoxels; ++i)
+      out[i] = narrowValue(source.tileValue, source.corner + voxelLocal(i), tally);
   }
-  refuseNonFinite(tally, rules.nonFinite);
   return volume;
 }
 

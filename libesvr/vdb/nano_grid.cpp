@@ -170,7 +170,13 @@ void readVoxelsAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGr
                         grid.descriptor.gridClass == GridClass::kLevelSet, options.nonFinite,
                         options.allowEmpty};
   NonFiniteTally tally;
-  grid.volume = buildVolume<Leaf, NanoLeafAccess<Leaf>>(std::move(sources), rules, tally);
+  grid.volume = volumeFor<Leaf, NanoLeafAccess<Leaf>>(sources, rules, options.memory, tally);
+  for (std::size_t b = 0; b < sources.size(); ++b)
+    if (const Leaf* leaf = sources[b].leaf)
+      fillFromLeaf<Leaf, NanoLeafAccess<Leaf>>(*leaf, rules, sources[b].corner,
+                                               grid.volume.brickValues(b), grid.volume.active[b],
+                                               tally);
+  refuseNonFinite(tally, rules.nonFinite);
   grid.nonFiniteReplaced = tally.count;
 }
 

@@ -12,7 +12,7 @@
 namespace esvr::vdb {
 namespace {
 
-/// Access to the leaves of OpenVDB for buildVolume. Their voxels are in voxelOffset order.
+/// Access to the leaves of OpenVDB. Their voxels are in voxelOffset order.
 template <class Leaf>
 struct LeafAccess {
   static auto value(const Leaf& leaf, int i) { return leaf.buffer().data()[i]; }
@@ -43,16 +43,27 @@ LocatedTree locateTree(Archive& archive, const ArchiveEntry& entry) {
   return {owner, std::move(head), survey};
 }
 
-/// Reads a tree with its voxels. OpenVDB cannot map this stream into memory and load voxels later.
+/// Reads a tree without the voxels of its leaves, which follow it in the file.
 template <class Tree>
-Tree readTree(Archive& archive, const LocatedTree& located) {
+void readTopology(Archive& archive, const LocatedTree& located, Tree& tree) {
   InputFile& file = archive.file();
   file.seek(located.head.treeAt);
   openvdb::io::setDataCompression(file.stream(), located.head.compression);
-  Tree tree;
   tree.readTopology(file.stream(), located.owner.savedAsHalf);
-  tree.readBuffers(file.stream(), located.owner.savedAsHalf);
-  return tree;
+}
+
+/// Calls `use` for each leaf, in the file's order, while the leaf has its voxels.
+template <class Tree, class Use>
+void readLeaves(Archive& archive, const LocatedTree& located, Tree& tree, const Use& use) {
+  using Buffer = typename Tree::LeafNodeType::Buffer;
+  for (auto leaf = tree.beginLeaf(); leaf; ++leaf) {
+    const auto mask = leaf->valueMask();
+    leaf->readBuffers(archive.file().stream(), located.owner.savedAsHalf);
+    if (leaf->valueMask() != mask) throw BadInput("is damaged: a leaf has two different masks");
+    use(*leaf);
+    Buffer empty(openvdb::PartialCreate{}, tree.background());
+    leaf->swap(empty);
+  }
 }
 
 template <class Tree>
@@ -78,13 +89,25 @@ TreeVoxels readVoxelsAs(Archive& archive, const LocatedTree& located, GridClass 
   using Leaf = typename Tree::LeafNodeType;
   const std::uint64_t bricks = located.survey.leaves + located.survey.tileBricks;
   refuseTooLarge(bricks, located.survey.treeBytes, options);
-  const auto tree = readTree<Tree>(archive, located);
+  Tree tree;
+  readTopology(archive, located, tree);
   TreeVoxels result;
   result.background = double(tree.background());
   const FillRules rules{narrowBackground(result.background), gridClass == GridClass::kLevelSet,
                         options.nonFinite, options.allowEmpty};
   NonFiniteTally tally;
-  result.volume = buildVolume<Leaf, LeafAccess<Leaf>>(brickSources(tree, bricks), rules, tally);
+  {
+    auto sources = brickSources(tree, bricks);
+    result.volume = volumeFor<Leaf, LeafAccess<Leaf>>(sources, rules, options.memory, tally);
+  }
+  SparseVolume& volume = result.volume;
+  readLeaves(archive, located, tree, [&](const Leaf& leaf) {
+    const Coord corner = toCoord(leaf.origin());
+    if (const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin)))
+      fillFromLeaf<Leaf, LeafAccess<Leaf>>(leaf, rules, corner, volume.brickValues(*b),
+                                           volume.active[*b], tally);
+  });
+  refuseNonFinite(tally, rules.nonFinite);
   result.nonFiniteReplaced = tally.count;
   return result;
 }

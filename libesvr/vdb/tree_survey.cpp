@@ -112,7 +112,7 @@ class Surveyor {
   void leaf(Coord corner) {
     const auto mask = file_.read<LeafMask>();
     ++survey_.leaves;
-    survey_.treeBytes += kLeafOverhead + LeafMask::kCells * layout_.valueBytes;
+    survey_.treeBytes += kLeafBytes;
     survey_.activeVoxels += mask.count();
     mask.forEachSet([&](std::size_t n) { survey_.activeBox.expand(corner + voxelLocal(int(n))); });
   }
@@ -201,7 +201,7 @@ class Surveyor {
 
   static constexpr std::uint64_t kHalfBytes = 2;
   static constexpr std::uint64_t kRootTileBytes = 96;  ///< a std::map node of coordinates and tile
-  static constexpr std::uint64_t kLeafOverhead = 160;  ///< a leaf without its values
+  static constexpr std::uint64_t kLeafBytes = 160;     ///< a leaf without its values
 
   InputFile& file_;
   ValueLayout layout_;

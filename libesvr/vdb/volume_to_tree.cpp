@@ -8,6 +8,7 @@
 
 #include "esvr/error.h"
 #include "vdb/metadata.h"
+#include "vdb/streamed_grid.h"
 #include "vdb/transform.h"
 
 namespace esvr::vdb {
@@ -29,34 +30,28 @@ openvdb::GridClass openVdbClass(GridClass gridClass) {
   return openvdb::GRID_UNKNOWN;
 }
 
-template <class Leaf>
-Leaf* makeLeaf(const SparseVolume& volume, std::size_t b, typename Leaf::ValueType background) {
-  const Coord corner = volume.brickCorner(b);
-  auto leaf = std::make_unique<Leaf>(openvdb::Coord(corner.x, corner.y, corner.z), background);
-  const auto values = volume.brickValues(b);
-  const BrickMask& active = volume.active[b];
-  for (int i = 0; i < kBrickVoxels; ++i)
-    if (active.test(i)) leaf->setValueOn(openvdb::Index(i), values[i]);
-  return leaf.release();
-}
-
 template <class Tree>
 void addLeaves(const SparseVolume& volume, Tree& tree) {
   openvdb::tree::ValueAccessor<Tree> accessor(tree);
   for (std::size_t b = 0; b < volume.brickCount(); ++b)
     if (volume.active[b].count() > 0)
-      accessor.addLeaf(makeLeaf<typename Tree::LeafNodeType>(volume, b, tree.background()));
+      accessor.addLeaf(
+          makeLeaf<typename Tree::LeafNodeType>(volume, b, tree.background()).release());
 }
 
 template <class Tree>
-typename openvdb::Grid<Tree>::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options) {
+typename openvdb::Grid<Tree>::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options,
+                                           LeafVoxels voxels) {
   const auto background = typename Tree::ValueType(source.descriptor.background);
+  const bool levelSet = source.descriptor.gridClass == GridClass::kLevelSet;
+  // The flood fill of a level set needs the voxels of all leaves.
+  if (voxels == LeafVoxels::kWhenWritten && !levelSet)
+    return std::make_shared<StreamedGrid<Tree>>(source.volume, background, options.constantTiles);
   auto grid = openvdb::Grid<Tree>::create(background);
   Tree& tree = grid->tree();
   addLeaves(source.volume, tree);
   // The flood fill overwrites active tiles, so it runs before there are any.
-  if (source.descriptor.gridClass == GridClass::kLevelSet && background > 0)
-    openvdb::tools::signedFloodFill(tree);
+  if (levelSet && background > 0) openvdb::tools::signedFloodFill(tree);
   if (options.constantTiles) openvdb::tools::prune(tree);
   return grid;
 }
@@ -91,13 +86,14 @@ void restoreDescriptor(const GridDescriptor& descriptor, GridBase& grid) {
 
 }  // namespace
 
-GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& source, const WriteOptions& options) {
+GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& source, const WriteOptions& options,
+                              LeafVoxels voxels) {
   initializeOpenVdb();
   GridBase::Ptr grid;
   if (source.descriptor.valueType == ValueType::kDouble)
-    grid = makeGrid<openvdb::DoubleTree>(source, options);
+    grid = makeGrid<openvdb::DoubleTree>(source, options, voxels);
   else
-    grid = makeGrid<openvdb::FloatTree>(source, options);
+    grid = makeGrid<openvdb::FloatTree>(source, options, voxels);
   restoreDescriptor(source.descriptor, *grid);
   const bool half = wantsHalf(source.descriptor, *grid, options.half);
   if (half) refuseBeyondHalf(source);

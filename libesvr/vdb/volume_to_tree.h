@@ -8,10 +8,18 @@
 
 namespace esvr::vdb {
 
+/// When the leaves of a grid get their voxels.
+enum class LeafVoxels {
+  kInMemory,    ///< at once
+  kWhenWritten  ///< one leaf after the other, when the grid is written, except in a level set
+};
+
 /// A grid with the voxels of the volume and the properties of the descriptor: a DoubleGrid if the
 /// source was double, else a FloatGrid. Inactive voxels hold the background. In a level set whose
 /// background is positive, a flood fill gives inactive voxels and empty space their sign.
+/// \param grid  must outlive the result if leaves get their voxels when they are written
 /// \throws UsageError  the grid is to be saved as half, which cannot hold its values
-openvdb::GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& grid, const WriteOptions& options);
+openvdb::GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& grid, const WriteOptions& options,
+                                       LeafVoxels voxels = LeafVoxels::kInMemory);
 
 }  // namespace esvr::vdb

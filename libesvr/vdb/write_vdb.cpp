@@ -31,7 +31,8 @@ std::vector<MetaItem> withWriter(std::span<const MetaItem> fileMetadata) {
 void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                   std::span<const VolumeGrid> grids, const WriteOptions& options) {
   openvdb::GridPtrVec openVdbGrids;
-  for (const auto& grid : grids) openVdbGrids.push_back(makeOpenVdbGrid(grid, options));
+  for (const auto& grid : grids)
+    openVdbGrids.push_back(makeOpenVdbGrid(grid, options, LeafVoxels::kWhenWritten));
   openvdb::MetaMap metadata;
   insertItems(withWriter(fileMetadata), metadata);
 

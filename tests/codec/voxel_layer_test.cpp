@@ -15,7 +15,7 @@
 namespace esvr {
 namespace {
 
-bool sameBits(const std::vector<float>& a, const std::vector<float>& b) {
+bool sameBits(std::span<const float> a, std::span<const float> b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](float x, float y) {
     return std::bit_cast<std::uint32_t>(x) == std::bit_cast<std::uint32_t>(y);
   });

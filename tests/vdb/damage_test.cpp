@@ -23,7 +23,7 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 
 /// Damage may turn a bit into a large active tile, which is not worth building.
-constexpr ReadOptions kSmall{.maxBytes = std::uint64_t{8} << 20};
+const ReadOptions kSmall{.maxBytes = std::uint64_t{8} << 20};
 
 class Damage : public testing::Test {
  protected:

@@ -47,22 +47,6 @@ std::vector<float> sumsIn(const FitTarget& target, const Ghosts& ghosts) {
   return sums;
 }
 
-/// The bricks of a volume with these numbers. The origin stays the same.
-SparseVolume withBricks(const SparseVolume& volume, std::span<const std::uint32_t> bricks) {
-  SparseVolume part;
-  part.origin = volume.origin;
-  part.background = volume.background;
-  part.values.resize(bricks.size() * kBrickVoxels);
-  for (const std::uint32_t b : bricks) {
-    part.bricks.push_back(volume.bricks[b]);
-    part.active.push_back(volume.active[b]);
-  }
-  tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t n) {
-    std::ranges::copy(volume.brickValues(bricks[n]), part.brickValues(n).begin());
-  });
-  return part;
-}
-
 }  // namespace
 
 int haloBricks(std::uint64_t activeVoxels, std::size_t count) {
@@ -94,12 +78,11 @@ Box boxOf(const ChunkScene& scene, const BrickChunk& chunk) {
 
 void makeChunkTarget(const ChunkScene& scene, const BrickChunk& chunk, const Ghosts& ghosts,
                      ChunkTarget& out) {
-  const auto bricks = bricksAround(scene.volume, scene.chunks, chunk, scene.halo);
-  const SparseVolume part = withBricks(scene.volume, bricks);
-  out.target = makeTarget(part, boxOf(scene, chunk), scene.scale);
-  out.active = out.counted = part.active;
-  for (std::size_t b = 0; b < out.counted.size(); ++b)
-    if (!chunk.box.contains(part.bricks[b])) out.counted[b] = {};
+  const SparseVolume& volume = scene.volume;
+  const auto bricks = bricksAround(volume, scene.chunks, chunk, scene.halo);
+  out.target = makeTarget({volume, bricks}, boxOf(scene, chunk), scene.scale);
+  for (const std::uint32_t b : bricks)
+    out.counted.push_back(chunk.box.contains(volume.bricks[b]) ? volume.active[b] : BrickMask{});
   out.target.active = &out.counted;
   out.target.largestScale =
       scene.halo * kBrickSide / supportRadius(kernelConstants<double>(ghosts.kernel));

@@ -36,8 +36,7 @@ struct ChunkTarget {
   ChunkTarget(const ChunkTarget&) = delete;
   ChunkTarget& operator=(const ChunkTarget&) = delete;
 
-  std::vector<BrickMask> active;   ///< active voxels of each brick
-  std::vector<BrickMask> counted;  ///< the same for the chunk's own bricks; none for the others
+  std::vector<BrickMask> counted;  ///< active voxels of the chunk's bricks; none of the halo's
   FitTarget target;
 };
 

@@ -18,6 +18,21 @@ constexpr std::size_t kMinBricks = 512;
 /// 1.5, a fit of 549 million voxels filled the 4 GB that it was allowed (docs/scale.md).
 constexpr double kSpare = 2.0;
 
+// Memory of the host, measured with trees of 16 million voxels on a CPU: the target, the residual
+// and the constants of a brick with its masks and lists; an ellipsoid with its moments, its gradient
+// and its pairs.
+constexpr double kHostBytesPerBrick = 4.0 * kBrickVoxels * sizeof(float);
+constexpr double kHostBytesPerEllipsoid = 1024.0;
+
+/// False if the fit of one chunk would take too much memory of the host.
+bool fitsOnHost(const FitSize& size, std::size_t ellipsoids, const FitOptions& options) {
+  return !options.maxHostBytes ||
+         double(size.bricks) * kHostBytesPerBrick + double(ellipsoids) * kHostBytesPerEllipsoid <=
+             double(*options.maxHostBytes);
+}
+
+bool isOnCpu(const FitOptions& options) { return options.device.kind == DeviceKind::kCpu; }
+
 class MemoryCheck {
  public:
   MemoryCheck(const SparseVolume& volume, const FitOptions& options)
@@ -26,7 +41,7 @@ class MemoryCheck {
         active_(activeVoxelCount(volume)),
         count_(plannedCount(options, active_)) {}
 
-  /// True if the fit of every chunk stays within the memory of the GPU.
+  /// True if the fit of every chunk stays within the memory of the host and of the GPU.
   [[nodiscard]] bool allFit(std::span<const BrickChunk> chunks) const {
     const double spare = chunks.size() > 1 ? kSpare : 1.0;
     return std::ranges::all_of(chunks, [&](const BrickChunk& chunk) {
@@ -55,7 +70,9 @@ class MemoryCheck {
     return size;
   }
   [[nodiscard]] bool fits(const FitSize& size, std::size_t ellipsoids) const {
-    return fitsOnGpu(size, ellipsoids, options_.device, options_.maxDeviceBytes);
+    return fitsOnHost(size, ellipsoids, options_) &&
+           (isOnCpu(options_) ||
+            fitsOnGpu(size, ellipsoids, options_.device, options_.maxDeviceBytes));
   }
 
   const SparseVolume& volume_;
@@ -74,7 +91,7 @@ std::size_t bricksWith(std::uint64_t voxels, const SparseVolume& volume) {
 
 std::vector<BrickChunk> chunksFor(const SparseVolume& volume, const FitOptions& options) {
   if (options.chunkVoxels) return divideBricks(volume, bricksWith(*options.chunkVoxels, volume));
-  if (options.device.kind == DeviceKind::kCpu) return {};
+  if (isOnCpu(options) && !options.maxHostBytes) return {};
   const MemoryCheck memory(volume, options);
   const auto whole = divideBricks(volume, volume.brickCount());
   auto chunks = whole;

@@ -101,7 +101,7 @@ class ChunkedFit {
   }
 
   void runRound(int number) {
-    const Round round(scene_, {number, kernel_}, states_, progress_, memory_);
+    const Round round(scene_, {number, kernel_}, states_, progress_, turns_);
     InOrder inOrder(options_.device);
     PartRunner& runner = options_.parts ? *options_.parts : inOrder;
     const auto outputs = runner.run(round);
@@ -203,7 +203,7 @@ class ChunkedFit {
   FitScene scene_;
   std::vector<ChunkState> states_;
   WholeProgress progress_;
-  DeviceMemory memory_;
+  DeviceTurns turns_;
   Kernel kernel_;
   Totals totals_;
 };

@@ -54,19 +54,19 @@ Coord brickWith(const Ellipsoid& p) {
   return {brick(p.center[0]), brick(p.center[1]), brick(p.center[2])};
 }
 
-PartEnd fitPart(const FitScene& scene, const PartStart& start, const Device& device,
-                const std::function<void(const FitProgress&)>& progress) {
+PartEnd fitPart(const FitScene& scene, const PartStart& start, const PartPlace& place) {
   const BrickChunk& chunk = scene.chunks[start.chunk];
   ChunkTarget part;
   makeChunkTarget(scene, chunk, {start.ghosts, start.kernel}, part);
   if (isZero(part.target) || start.plan.count == 0) return unchanged(scene, start);
   applyOptions(scene.options, part.target);
   CommonFitOptions options = scene.options;
-  options.progress = progress;
+  options.progress = place.progress;
   const Tuning tuning;
+  const auto turn = place.turns.take(place.device);
   Recorder recorder(part.target, options);
   const auto optimiser =
-      makeOptimiser(part.target, optimiserOptions(scene.options, start, device), tuning);
+      makeOptimiser(part.target, optimiserOptions(scene.options, start, place.device), tuning);
   const RunEnd end = run(*optimiser, part.target, recorder, start.plan, tuning);
   return endOf(*optimiser, end, start, chunk.box);
 }

@@ -11,6 +11,7 @@
 #include "esvr/fit.h"
 #include "esvr/part_runner.h"
 #include "fit/chunks/chunk_target.h"
+#include "fit/chunks/device_turns.h"
 #include "fit/chunks/divide_bricks.h"
 #include "fit/run.h"
 
@@ -55,10 +56,17 @@ struct FitScene : ChunkScene {
   const FitOptions& options;
 };
 
+/// Where a part is fitted.
+struct PartPlace {
+  const Device& device;
+  DeviceTurns& turns;
+  std::function<void(const FitProgress&)>
+      progress{};  ///< gets the reports of the run; may be empty
+};
+
 /// Fits a part.
-/// \param progress  gets the reports of the part's run; may be empty
-[[nodiscard]] PartEnd fitPart(const FitScene& scene, const PartStart& start, const Device& device,
-                              const std::function<void(const FitProgress&)>& progress);
+[[nodiscard]] PartEnd fitPart(const FitScene& scene, const PartStart& start,
+                              const PartPlace& place);
 
 /// The end of a part that was not fitted.
 [[nodiscard]] PartEnd unchanged(const FitScene& scene, const PartStart& start);

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "fit/cuda/make_cuda_optimiser.h"
 #include "fit/ellipsoid_math.h"
 #include "fit/fit_plan.h"
 
@@ -17,13 +16,6 @@ int reachOf(const Ellipsoid& p, double radius) {
 }
 
 }  // namespace
-
-void DeviceMemory::keep(const Device& device) {
-  if (device.kind == DeviceKind::kCpu) return;
-  const std::lock_guard lock(mutex_);
-  auto& kept = kept_[device.index];
-  if (!kept) kept = keepFreedMemory(device);
-}
 
 bool Round::cancelled() const {
   return scene_.options.cancel && scene_.options.cancel->cancelled();
@@ -45,8 +37,7 @@ PartEnd Round::notFitted(const PartStart& start) const {
 }
 
 PartEnd Round::fitted(const PartStart& start, const Device& device) const {
-  memory_.keep(device);
-  return fitPart(scene_, start, device, progress_.of(start.chunk));
+  return fitPart(scene_, start, {device, turns_, progress_.of(start.chunk)});
 }
 
 PartStart Round::startOf(std::size_t chunk) const {
@@ -71,6 +62,7 @@ RunPlan Round::runPlanOf(std::size_t chunk) const {
   plan.psnr = options.psnr;
   plan.from = kRoundEnds[plan_.number];
   plan.to = kRoundEnds[plan_.number + 1];
+  plan.curve = false;
   plan.learnKappa = !options.kappa && plan.from < kKappaUntil;
   if (options.seconds)
     plan.seconds = *options.seconds * (plan.to - plan.from) * progress_.shareOf(chunk);
@@ -88,7 +80,7 @@ void Round::takeAround(std::size_t chunk, PartStart& start) const {
   double count = double(start.plan.count), firstCount = double(start.plan.firstCount);
   for (std::size_t other = 0; other < states_.size(); ++other) {
     if (other == chunk || common(possible, scene_.chunks[other].box).empty()) continue;
-    const double share = takeFrom(other, {halo, radius}, start);
+    const double share = takeFrom(other, {halo, possible, radius}, start);
     count += share * double(states_[other].wanted);
     firstCount += share * double(states_[other].firstCount);
   }
@@ -105,6 +97,7 @@ double Round::takeFrom(std::size_t other, const Halo& halo, PartStart& start) co
   for (std::size_t i = 0; i < fit.ellipsoids.size(); ++i) {
     const Ellipsoid& p = fit.ellipsoids[i];
     const Coord brick = brickWith(p);
+    if (!halo.possible.contains(brick)) continue;
     if (halo.box.contains(brick)) {
       start.plan.start.ellipsoids.push_back(p);
       start.plan.start.adam.push_back(fit.adam[i]);

@@ -3,14 +3,12 @@
 /// parts begin with the ellipsoids of the round before and do not see each other.
 
 #include <cstddef>
-#include <map>
-#include <memory>
-#include <mutex>
 #include <span>
 #include <vector>
 
 #include "esvr/part_runner.h"
 #include "fit/chunks/chunk_state.h"
+#include "fit/chunks/device_turns.h"
 #include "fit/chunks/part.h"
 #include "fit/chunks/whole_progress.h"
 
@@ -21,22 +19,12 @@ struct RoundPlan {
   Kernel kernel;
 };
 
-/// Keeps the memory of GPUs between parts. Any thread may use it.
-class DeviceMemory {
- public:
-  void keep(const Device& device);
-
- private:
-  std::mutex mutex_;
-  std::map<int, std::shared_ptr<void>> kept_;  ///< by the number of the GPU
-};
-
 class Round : public RoundParts {
  public:
   /// All arguments must outlive the round.
   Round(const FitScene& scene, const RoundPlan& plan, std::span<const ChunkState> states,
-        WholeProgress& progress, DeviceMemory& memory)
-      : scene_(scene), plan_(plan), states_(states), progress_(progress), memory_(memory) {}
+        WholeProgress& progress, DeviceTurns& turns)
+      : scene_(scene), plan_(plan), states_(states), progress_(progress), turns_(turns) {}
 
   [[nodiscard]] int round() const override { return plan_.number; }
   [[nodiscard]] std::size_t count() const override { return states_.size(); }
@@ -52,6 +40,7 @@ class Round : public RoundParts {
   void takeAround(std::size_t chunk, PartStart& start) const;
   struct Halo {
     Box box;        ///< box of bricks
+    Box possible;   ///< bricks from which ellipsoids may reach into it
     double radius;  ///< radius of a support, relative to its scales
   };
   [[nodiscard]] double takeFrom(std::size_t other, const Halo& halo, PartStart& start) const;
@@ -61,7 +50,7 @@ class Round : public RoundParts {
   RoundPlan plan_;
   std::span<const ChunkState> states_;
   WholeProgress& progress_;
-  DeviceMemory& memory_;
+  DeviceTurns& turns_;
 };
 
 }  // namespace esvr

@@ -106,6 +106,7 @@ std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
 /// several grids may share their bytes.
 struct ReadLimits {
   std::uint64_t maxBytes = kNoMemoryLimit;
+  VoxelMemory memory{};  ///< holds voxels; those in a file do not count towards maxBytes
 };
 
 /// Reads a whole file. Every size is checked before memory is allocated, every section is checked
@@ -159,7 +160,7 @@ struct PartOfFile {
 /// \param nameForErrors  name of the file in error texts
 /// \throws BadInput  as for readEsvr
 [[nodiscard]] EsvrFile decodeEsvr(std::span<const std::byte> bytes,
-                                  const std::string& nameForErrors);
+                                  const std::string& nameForErrors, const ReadLimits& limits = {});
 
 /// A row of a file's section table, for --list.
 struct SectionSummary {

@@ -53,6 +53,7 @@ struct RevoxeliseOptions {
   /// otherwise all bricks that ellipsoids reach.
   std::span<const Coord> bricks{};
   bool restrictToBricks = false;
+  VoxelMemory memory{};  ///< holds the voxels
 };
 
 /// Converts a field to voxels. Inactive voxels hold the background (with a sign if `narrowBand` is

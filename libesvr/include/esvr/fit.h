@@ -70,8 +70,10 @@ struct FitOptions : CommonFitOptions {
   std::optional<bool> bothSigns;
   /// The volume is fitted in chunks of about this many active voxels (docs/scale.md): the chunks have
   /// at most as many bricks as have these voxels on average. Default: in one chunk, or in the
-  /// largest chunks that fit into the memory of the GPU.
+  /// largest chunks that fit into the memory of the GPU and within maxHostBytes.
   std::optional<std::uint64_t> chunkVoxels;
+  /// Memory of the host that the fit may take beside the volume. Default: no limit.
+  std::optional<std::uint64_t> maxHostBytes{};
   /// Runs the parts of a fit in chunks. It must outlive the call. Null: they run on `device`, one
   /// after the other.
   PartRunner* parts = nullptr;

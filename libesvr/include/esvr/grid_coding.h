@@ -46,7 +46,9 @@ struct DecodeOptions {
   std::optional<float> threshold{};  ///< replaces the grid's own threshold; 0 or above
   /// Voxels outside the box come back inactive, and bricks outside are not evaluated.
   std::optional<Box> box{};
-  std::uint64_t maxBytes = kNoMemoryLimit;  ///< memory limit of the evaluation and its result
+  /// Limit on the memory of the evaluation and its result. Voxels in a file do not count.
+  std::uint64_t maxBytes = kNoMemoryLimit;
+  VoxelMemory memory{};  ///< holds the voxels
 };
 
 /// Estimates the work and memory that decodeGrid() takes at most. Nothing is evaluated.

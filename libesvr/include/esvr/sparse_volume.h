@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "esvr/coord.h"
+#include "esvr/voxel_memory.h"
 
 namespace esvr {
 
@@ -58,7 +59,7 @@ struct SparseVolume {
   Coord origin;               ///< index coordinates of brick (0,0,0)'s first voxel; multiples of 8
   float background = 0.0f;    ///< value outside the bricks
   std::vector<Coord> bricks;  ///< brick positions relative to `origin`, in bricks, each >= 0
-  std::vector<float> values;  ///< kBrickVoxels values for each brick, active or not
+  VoxelArray<float> values;   ///< kBrickVoxels values for each brick, active or not
   std::vector<BrickMask> active;  ///< active voxels of each brick
 
   [[nodiscard]] std::size_t brickCount() const { return bricks.size(); }
@@ -71,6 +72,11 @@ struct SparseVolume {
   /// Index coordinates of a brick's first voxel.
   [[nodiscard]] Coord brickCorner(std::size_t b) const { return origin + bricks[b] * kBrickSide; }
 };
+
+/// The memory that holds a volume's values.
+[[nodiscard]] inline VoxelMemory memoryOf(const SparseVolume& volume) {
+  return volume.values.get_allocator().memory();
+}
 
 /// Index in `bricks` of the brick at a position relative to the volume's origin, if it exists.
 [[nodiscard]] std::optional<std::size_t> findBrick(const SparseVolume& volume, Coord brick);
@@ -100,6 +106,9 @@ struct ValueRange {
 /// Smallest and largest value of the active voxels.
 /// \throws BadInput  there is no active voxel
 [[nodiscard]] ValueRange activeRange(const SparseVolume& volume);
+
+/// Drops bricks without an active voxel, and moves the origin to the smallest corner of the others.
+void dropInactiveBricks(SparseVolume& volume);
 
 /// \throws std::logic_error  the arrays differ in length, or the bricks are not in order
 void checkInvariants(const SparseVolume& volume);

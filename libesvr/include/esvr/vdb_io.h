@@ -52,6 +52,9 @@ struct ReadOptions {
   /// Limit on the memory of the file's tree and of the bricks that are made from it. Active tiles
   /// become bricks; one tile may become 2^27 bricks.
   std::uint64_t maxBytes = std::uint64_t{16} << 30;
+  /// Holds the voxels. Those in a file do not count towards maxBytes. Of the tree of a .vdb file,
+  /// only the leaf that is being read has its voxels in memory.
+  VoxelMemory memory{};
 };
 
 /// A grid with its voxels.

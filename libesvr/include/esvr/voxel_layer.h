@@ -23,12 +23,12 @@ enum class VoxelForm {
 
 struct VoxelLayer {
   VoxelForm form = VoxelForm::kFloat;
-  double divisor = 1.0;             ///< divisor of kQuantised
-  std::vector<float> palette;       ///< values of kPalette, in the order of kFloat
-  Coord origin;                     ///< see SparseVolume
-  float background = 0.0f;          ///< exact background
-  std::vector<Coord> bricks;        ///< see SparseVolume
-  std::vector<std::int32_t> codes;  ///< kBrickVoxels per brick; vacant voxels have the background's
+  double divisor = 1.0;            ///< divisor of kQuantised
+  std::vector<float> palette;      ///< values of kPalette, in the order of kFloat
+  Coord origin;                    ///< see SparseVolume
+  float background = 0.0f;         ///< exact background
+  std::vector<Coord> bricks;       ///< see SparseVolume
+  VoxelArray<std::int32_t> codes;  ///< kBrickVoxels per brick; vacant voxels have the background's
   std::vector<BrickMask> active;
   std::vector<BrickMask> vacant;  ///< inactive voxels that are exactly the background
 

@@ -7,6 +7,7 @@
 
 #include "esvr/coord.h"
 #include "esvr/ellipsoids.h"
+#include "esvr/voxel_memory.h"
 
 namespace esvr {
 
@@ -15,7 +16,8 @@ struct WorkEstimate {
   double ellipsoids = 0.0;
   double pairs = 0.0;   ///< pairs of an ellipsoid and a brick that its support reaches
   double bricks = 0.0;  ///< bricks that are evaluated and kept
-  [[nodiscard]] double bytes() const;
+  /// \param memory  holds the voxels; those in a file do not count
+  [[nodiscard]] double bytes(const VoxelMemory& memory = {}) const;
 };
 
 struct EstimateOptions {
@@ -26,6 +28,7 @@ struct EstimateOptions {
   /// If the estimate exceeds this number of bytes, a slower and tighter estimate is made, which
   /// counts a brick once even if several ellipsoids reach it.
   double enough = std::numeric_limits<double>::infinity();
+  VoxelMemory memory{};  ///< see WorkEstimate::bytes
 };
 
 /// Estimates the evaluation of a field on the bricks that its ellipsoids reach.
