@@ -9,9 +9,9 @@
 namespace esvr::vdb {
 namespace {
 
-/// Bytes of a brick's voxels, and of its other entries in the volume and in the list of sources.
+/// Bytes of a brick's voxels, and of its mask and its coordinates in the volume and in two lists.
 constexpr double kValueBytes = kBrickVoxels * sizeof(float);
-constexpr double kEntryBytes = sizeof(BrickMask) + 2.0 * sizeof(Coord) + 32.0;
+constexpr double kEntryBytes = sizeof(BrickMask) + 3.0 * sizeof(Coord);
 
 void refuseTooFarApart(Coord low, Coord high) {
   constexpr std::int64_t kMaxExtent = std::numeric_limits<std::int32_t>::max() - kBrickSide;
@@ -20,6 +20,10 @@ void refuseTooFarApart(Coord low, Coord high) {
   if (extent > kMaxExtent)
     throw BadInput("its active voxels reach from " + toString(low) + " to " + toString(high) +
                    ": 2^31 voxels or more");
+}
+
+void refuseEmpty(std::size_t bricks, const FillRules& rules) {
+  if (bricks == 0 && !rules.allowEmpty) throw BadInput("it has no active voxel");
 }
 
 }  // namespace
@@ -31,11 +35,11 @@ float narrowBackground(double background) {
   return narrow;
 }
 
-void refuseTooLarge(std::uint64_t bricks, std::uint64_t treeBytes, const ReadOptions& options) {
+void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options) {
   const bool isInFile = options.memory.isInFile(bricks * std::uint64_t(kValueBytes));
   const double each = kEntryBytes + (isInFile ? 0.0 : kValueBytes);
   requireWithinMemory(
-      double(treeBytes) + double(bricks) * each, options.maxBytes,
+      double(bricks) * each, options.maxBytes,
       "it has " + std::to_string(bricks) + " bricks of 8^3 voxels, active tiles included, and");
 }
 
@@ -45,15 +49,20 @@ void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite) {
                  " NaN, infinite or too large for float; the first is at " + toString(tally.first));
 }
 
-void refuseEmpty(std::size_t bricks, const FillRules& rules) {
-  if (bricks == 0 && !rules.allowEmpty) throw BadInput("it has no active voxel");
+void appendBricks(const TileSource& tile, std::vector<Coord>& corners) {
+  for (std::int32_t x = 0; x < tile.extent; x += kBrickSide)
+    for (std::int32_t y = 0; y < tile.extent; y += kBrickSide)
+      for (std::int32_t z = 0; z < tile.extent; z += kBrickSide)
+        corners.push_back(tile.corner + Coord{x, y, z});
 }
 
-SparseVolume layOutBricks(const std::vector<Coord>& corners, float background,
+SparseVolume layOutBricks(std::vector<Coord>& corners, const FillRules& rules,
                           const VoxelMemory& memory) {
+  refuseEmpty(corners.size(), rules);
   SparseVolume volume;
-  volume.background = background;
+  volume.background = rules.background;
   if (corners.empty()) return volume;
+  std::ranges::sort(corners);
   Coord low = corners.front(), high = low;
   for (const Coord corner : corners) {
     low = minCoord(low, corner);
@@ -68,9 +77,26 @@ SparseVolume layOutBricks(const std::vector<Coord>& corners, float background,
       throw BadInput("it has two bricks at " + toString(corner));
     volume.bricks.push_back(place);
   }
-  volume.values = VoxelArray<float>(corners.size() * kBrickVoxels, background, memory);
+  volume.values = VoxelArray<float>(corners.size() * kBrickVoxels, rules.background, memory);
   volume.active.resize(corners.size());
   return volume;
+}
+
+std::size_t brickAt(const SparseVolume& volume, Coord corner) {
+  if (const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin))) return *b;
+  throw BadInput("is damaged: a leaf without an active voxel has one after all");
+}
+
+void fillTile(const TileSource& tile, SparseVolume& volume, NonFiniteTally& tally) {
+  std::vector<Coord> corners;
+  appendBricks(tile, corners);
+  for (const Coord corner : corners) {
+    const std::size_t b = brickAt(volume, corner);
+    volume.active[b].setAll();
+    const auto out = volume.brickValues(b);
+    for (int i = 0; i < kBrickVoxels; ++i)
+      out[i] = narrowValue(tile.value, corner + voxelLocal(i), tally);
+  }
 }
 
 }  // namespace esvr::vdb

@@ -29,8 +29,8 @@ struct FillRules {
 /// The background as float. \throws BadInput  it is not finite as float
 float narrowBackground(double background);
 
-/// \throws MemoryExceeded  the bricks and the tree together take more than options.maxBytes
-void refuseTooLarge(std::uint64_t bricks, std::uint64_t treeBytes, const ReadOptions& options);
+/// \throws MemoryExceeded  the bricks take more than options.maxBytes
+void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options);
 
 /// Active voxels that float cannot hold: NaN, infinite values, and doubles out of range.
 struct NonFiniteTally {
@@ -45,32 +45,28 @@ struct NonFiniteTally {
 /// \throws BadInput  there are such voxels, and they are not to be replaced
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite);
 
-/// The leaf or tile from which a brick is filled.
-template <class Leaf>
-struct BrickSource {
+/// An active tile.
+struct TileSource {
   Coord corner;
-  const Leaf* leaf = nullptr;  ///< null: the source is an active tile
-  double tileValue = 0.0;
+  std::int32_t extent = 0;  ///< side, voxels
+  double value = 0.0;
 };
 
-/// Appends the bricks that a tile with a side of `extent` voxels covers.
-template <class Leaf>
-void appendTile(Coord corner, std::int32_t extent, double value,
-                std::vector<BrickSource<Leaf>>& sources) {
-  for (std::int32_t x = 0; x < extent; x += kBrickSide)
-    for (std::int32_t y = 0; y < extent; y += kBrickSide)
-      for (std::int32_t z = 0; z < extent; z += kBrickSide)
-        sources.push_back({corner + Coord{x, y, z}, nullptr, value});
-}
+/// Appends the corners of the bricks that a tile covers.
+void appendBricks(const TileSource& tile, std::vector<Coord>& corners);
 
-/// A volume with bricks at these corners (increasing), whose voxels are inactive and have the
-/// background.
-/// \throws BadInput  two corners are equal, or are 2^31 voxels apart
-SparseVolume layOutBricks(const std::vector<Coord>& corners, float background,
+/// Makes a volume with bricks at these corners, which are sorted. Its voxels are inactive and have
+/// the background.
+/// \throws BadInput  two corners are equal, or are 2^31 voxels apart; there is none, and the rules
+///                   do not allow this
+SparseVolume layOutBricks(std::vector<Coord>& corners, const FillRules& rules,
                           const VoxelMemory& memory);
 
-/// \throws BadInput  there is no brick, and the rules do not allow this
-void refuseEmpty(std::size_t bricks, const FillRules& rules);
+/// Number of the brick with this corner. \throws BadInput  the volume does not have it
+std::size_t brickAt(const SparseVolume& volume, Coord corner);
+
+/// Fills the bricks that a tile covers.
+void fillTile(const TileSource& tile, SparseVolume& volume, NonFiniteTally& tally);
 
 /// An active value as float. A value that float cannot hold is counted and becomes 0.
 inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
@@ -80,10 +76,13 @@ inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
   return 0.0f;
 }
 
-/// Fills a brick. Access::value(leaf, i) is a leaf's voxel in voxelOffset order.
+/// Fills brick b. Access::value(leaf, i) is a leaf's voxel in voxelOffset order, and Access::mask(leaf) holds its active voxels.
 template <class Leaf, class Access>
-void fillFromLeaf(const Leaf& leaf, const FillRules& rules, Coord corner, std::span<float> out,
-                  const BrickMask& active, NonFiniteTally& tally) {
+void fillFromLeaf(const Leaf& leaf, const FillRules& rules, std::size_t b, SparseVolume& volume,
+                  NonFiniteTally& tally) {
+  const Coord corner = volume.brickCorner(b);
+  const auto out = volume.brickValues(b);
+  const BrickMask active = volume.active[b] = Access::mask(leaf);
   for (int i = 0; i < kBrickVoxels; ++i) {
     const auto value = Access::value(leaf, i);
     if (active.test(i))
@@ -91,36 +90,6 @@ void fillFromLeaf(const Leaf& leaf, const FillRules& rules, Coord corner, std::s
     else if (rules.levelSet)
       out[i] = value < 0 ? -std::abs(rules.background) : std::abs(rules.background);
   }
-}
-
-/// Makes a volume with all bricks that have an active voxel. The masks are set, and the bricks of
-/// tiles have their values. Access::mask(leaf) holds the active voxels of a leaf.
-/// \throws BadInput  there is no active voxel, and the rules do not allow this
-template <class Leaf, class Access>
-SparseVolume volumeFor(std::vector<BrickSource<Leaf>>& sources, const FillRules& rules,
-                       const VoxelMemory& memory, NonFiniteTally& tally) {
-  std::erase_if(sources,
-                [](const auto& s) { return s.leaf && Access::mask(*s.leaf).count() == 0; });
-  std::sort(sources.begin(), sources.end(),
-            [](const auto& a, const auto& b) { return a.corner < b.corner; });
-  std::vector<Coord> corners;
-  corners.reserve(sources.size());
-  for (const auto& source : sources) corners.push_back(source.corner);
-
-  refuseEmpty(corners.size(), rules);
-  SparseVolume volume = layOutBricks(corners, rules.background, memory);
-  for (std::size_t b = 0; b < sources.size(); ++b) {
-    const auto& source = sources[b];
-    if (source.leaf) {
-      volume.active[b] = Access::mask(*source.leaf);
-      continue;
-    }
-    volume.active[b].setAll();
-    const auto out = volume.brickValues(b);
-    for (int i = 0; i < kBrickVoxels; ++i)
-      out[i] = narrowValue(source.tileValue, source.corner + voxelLocal(i), tally);
-  }
-  return volume;
 }
 
 }  // namespace esvr::vdb

@@ -28,7 +28,6 @@ class NanoTree {
   using Upper = nanovdb::NanoUpper<Build>;
   using Lower = nanovdb::NanoLower<Build>;
   using Leaf = nanovdb::NanoLeaf<Build>;
-  using Source = BrickSource<Leaf>;
 
   /// \throws BadInput  a header, a tree or a root reaches beyond the buffer
   explicit NanoTree(const NanoBuffer& buffer) : buffer_(buffer) {
@@ -145,7 +144,7 @@ std::uint64_t countBricks(const NanoTree<Build>& tree, const ReadOptions& option
   const auto add = [&](std::int32_t extent) {
     const auto side = std::uint64_t(extent / kBrickSide);
     bricks += side * side * side;
-    refuseTooLarge(bricks, 0, options);
+    refuseTooLarge(bricks, options);
   };
   tree.visit([&](Coord, const auto&) { add(kBrickSide); },
              [&](Coord, std::int32_t extent, double) { add(extent); });
@@ -153,29 +152,40 @@ std::uint64_t countBricks(const NanoTree<Build>& tree, const ReadOptions& option
 }
 
 template <class Build>
+std::vector<Coord> brickCorners(const NanoTree<Build>& tree, const ReadOptions& options) {
+  std::vector<Coord> corners;
+  corners.reserve(countBricks(tree, options));
+  tree.visit(
+      [&](Coord corner, const auto& leaf) {
+        using Leaf = std::decay_t<decltype(leaf)>;
+        if (NanoLeafAccess<Leaf>::mask(leaf).count() > 0) corners.push_back(corner);
+      },
+      [&](Coord corner, std::int32_t extent, double) {
+        appendBricks({corner, extent}, corners);
+      });
+  return corners;
+}
+
+template <class Build>
 void readVoxelsAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGrid& grid) {
   using Leaf = typename NanoTree<Build>::Leaf;
+  using Access = NanoLeafAccess<Leaf>;
   const NanoTree<Build> tree(buffer);
-  std::vector<BrickSource<Leaf>> sources;
-  sources.reserve(countBricks(tree, options));
-  tree.visit(
-      [&](Coord corner, const Leaf& leaf) {
-        sources.push_back({corner, &leaf});
-      },
-      [&](Coord corner, std::int32_t extent, double value) {
-        appendTile(corner, extent, value, sources);
-      });
   grid.descriptor.background = tree.background();
   const FillRules rules{narrowBackground(tree.background()),
                         grid.descriptor.gridClass == GridClass::kLevelSet, options.nonFinite,
                         options.allowEmpty};
+  auto corners = brickCorners(tree, options);
+  SparseVolume& volume = grid.volume = layOutBricks(corners, rules, options.memory);
   NonFiniteTally tally;
-  grid.volume = volumeFor<Leaf, NanoLeafAccess<Leaf>>(sources, rules, options.memory, tally);
-  for (std::size_t b = 0; b < sources.size(); ++b)
-    if (const Leaf* leaf = sources[b].leaf)
-      fillFromLeaf<Leaf, NanoLeafAccess<Leaf>>(*leaf, rules, sources[b].corner,
-                                               grid.volume.brickValues(b), grid.volume.active[b],
-                                               tally);
+  tree.visit(
+      [&](Coord corner, const Leaf& leaf) {
+        if (Access::mask(leaf).count() == 0) return;
+        fillFromLeaf<Leaf, Access>(leaf, rules, brickAt(volume, corner), volume, tally);
+      },
+      [&](Coord corner, std::int32_t extent, double value) {
+        fillTile({corner, extent, value}, volume, tally);
+      });
   refuseNonFinite(tally, rules.nonFinite);
   grid.nonFiniteReplaced = tally.count;
 }

@@ -4,10 +4,12 @@
 
 #include "vdb/scalar_trees.h"
 
-#include <stdexcept>
+#include <openvdb/io/Compression.h>
+#include <openvdb/io/io.h>
 
 #include "esvr/error.h"
 #include "vdb/brick_filler.h"
+#include "vdb/tree_walk.h"
 
 namespace esvr::vdb {
 namespace {
@@ -24,12 +26,11 @@ struct LeafAccess {
   }
 };
 
-Coord toCoord(const openvdb::Coord& c) { return {c.x(), c.y(), c.z()}; }
-
 /// The position and the head of an entry's tree.
 struct LocatedTree {
   const ArchiveEntry& owner;
   GridHead head;
+  ValueLayout layout;
   TreeSurvey survey;
 };
 
@@ -39,74 +40,119 @@ LocatedTree locateTree(Archive& archive, const ArchiveEntry& entry) {
     throw BadInput("is damaged: it shares the voxels of a grid of another type");
   GridHead head = archive.readHead(owner);
   const std::uint64_t valueBytes = entry.valueType() == "double" ? sizeof(double) : sizeof(float);
-  const auto survey = surveyTree(archive.file(), {valueBytes, owner.savedAsHalf, head.compression});
-  return {owner, std::move(head), survey};
+  const ValueLayout layout{valueBytes, owner.savedAsHalf, head.compression};
+  const TreeSurvey survey = surveyTree(archive.file(), layout);
+  return {owner, std::move(head), layout, survey};
 }
 
-/// Reads a tree without the voxels of its leaves, which follow it in the file.
-template <class Tree>
-void readTopology(Archive& archive, const LocatedTree& located, Tree& tree) {
-  InputFile& file = archive.file();
-  file.seek(located.head.treeAt);
-  openvdb::io::setDataCompression(file.stream(), located.head.compression);
-  tree.readTopology(file.stream(), located.owner.savedAsHalf);
-}
+openvdb::Coord toOpenVdb(Coord c) { return {c.x, c.y, c.z}; }
 
-/// Calls `use` for each leaf, in the file's order, while the leaf has its voxels.
-template <class Tree, class Use>
-void readLeaves(Archive& archive, const LocatedTree& located, Tree& tree, const Use& use) {
-  using Buffer = typename Tree::LeafNodeType::Buffer;
-  for (auto leaf = tree.beginLeaf(); leaf; ++leaf) {
-    const auto mask = leaf->valueMask();
-    leaf->readBuffers(archive.file().stream(), located.owner.savedAsHalf);
-    if (leaf->valueMask() != mask) throw BadInput("is damaged: a leaf has two different masks");
-    use(*leaf);
-    Buffer empty(openvdb::PartialCreate{}, tree.background());
-    leaf->swap(empty);
+/// Notes the leaves and the active tiles of a tree.
+template <class Value>
+class TopologyReader {
+ public:
+  TopologyReader(InputFile& file, bool savedAsHalf) : file_(file), savedAsHalf_(savedAsHalf) {}
+
+  void leaf(Coord corner, const LeafMask& mask) {
+    leaves.push_back(corner);
+    if (mask.count() > 0) bricks.push_back(corner);
   }
-}
 
-template <class Tree>
-auto brickSources(const Tree& tree, std::uint64_t bricks) {
-  std::vector<BrickSource<typename Tree::LeafNodeType>> sources;
-  sources.reserve(bricks);
-  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
-    sources.push_back({toCoord(leaf->origin()), leaf.getLeaf()});
-  auto tile = tree.cbeginValueOn();
-  tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    openvdb::CoordBBox box;
-    tile.getBoundingBox(box);
-    appendTile(toCoord(box.min()), box.dim().x(), double(*tile), sources);
+  void rootTile(Coord corner, std::uint64_t at) {
+    const std::uint64_t back = file_.position();
+    file_.seek(at);
+    tile({corner, kUpperExtent, double(file_.read<Value>())});
+    file_.seek(back);
   }
-  if (sources.size() != bricks) throw std::logic_error("a tree's survey and its reader disagree");
-  return sources;
-}
+
+  template <int kLog2>
+  void tiles(const NodeMask<kLog2>& mask, const TileValues& place, std::int32_t extent) {
+    using OpenVdbMask = openvdb::util::NodeMask<kLog2>;
+    OpenVdbMask active;
+    for (openvdb::Index w = 0; w < mask.words.size(); ++w)
+      active.template getWord<openvdb::Index64>(w) = mask.words[w];
+    std::vector<Value> values(OpenVdbMask::SIZE);
+    file_.seek(place.at);
+    openvdb::io::readCompressedValues(file_.stream(), values.data(), OpenVdbMask::SIZE, active,
+                                      savedAsHalf_);
+    file_.followStream();
+    mask.forEachSet([&](std::size_t n) {
+      tile({cellCorner<kLog2>(place.corner, n, extent), extent, double(values[n])});
+    });
+  }
+
+  std::vector<Coord> leaves;  ///< in the file's order
+  std::vector<Coord> bricks;  ///< corners of all bricks with an active voxel
+  std::vector<TileSource> activeTiles;
+
+ private:
+  void tile(const TileSource& tile) {
+    activeTiles.push_back(tile);
+    appendBricks(tile, bricks);
+  }
+
+  InputFile& file_;
+  bool savedAsHalf_;
+};
+
+/// Reads the voxels of a tree leaf by leaf. There is no tree of OpenVDB in memory.
+template <class Tree>
+class VoxelReader {
+ public:
+  VoxelReader(Archive& archive, const LocatedTree& located)
+      : file_(archive.file()), located_(located), topology_(file_, located.owner.savedAsHalf) {
+    openvdb::io::setDataCompression(file_.stream(), located.head.compression);
+    file_.seek(located.head.treeAt + sizeof(std::int32_t));
+    background_ = file_.read<Value>();
+    openvdb::io::setGridBackgroundValuePtr(file_.stream(), &background_);
+  }
+  ~VoxelReader() { openvdb::io::setGridBackgroundValuePtr(file_.stream(), nullptr); }
+  VoxelReader(const VoxelReader&) = delete;
+  VoxelReader& operator=(const VoxelReader&) = delete;
+
+  [[nodiscard]] double background() const { return double(background_); }
+
+  SparseVolume read(const FillRules& rules, const VoxelMemory& memory, NonFiniteTally& tally) {
+    file_.seek(located_.head.treeAt);
+    topology_.leaves.reserve(located_.survey.leaves);
+    topology_.bricks.reserve(located_.survey.leaves + located_.survey.tileBricks);
+    TreeWalk(file_, located_.layout, topology_).topology();
+    SparseVolume volume = layOutBricks(topology_.bricks, rules, memory);
+    topology_.bricks = {};
+    file_.seek(file_.position());  // OpenVDB reads on from there
+    for (const Coord corner : topology_.leaves) readLeaf(corner, rules, volume, tally);
+    for (const TileSource& tile : topology_.activeTiles) fillTile(tile, volume, tally);
+    return volume;
+  }
+
+ private:
+  using Leaf = typename Tree::LeafNodeType;
+  using Value = typename Tree::ValueType;
+
+  void readLeaf(Coord corner, const FillRules& rules, SparseVolume& volume, NonFiniteTally& tally) {
+    Leaf leaf(openvdb::PartialCreate{}, toOpenVdb(corner), background_);
+    leaf.readBuffers(file_.stream(), located_.owner.savedAsHalf);
+    if (leaf.valueMask().isOff()) return;
+    fillFromLeaf<Leaf, LeafAccess<Leaf>>(leaf, rules, brickAt(volume, corner), volume, tally);
+  }
+
+  InputFile& file_;
+  const LocatedTree& located_;
+  TopologyReader<Value> topology_;
+  Value background_{};
+};
 
 template <class Tree>
 TreeVoxels readVoxelsAs(Archive& archive, const LocatedTree& located, GridClass gridClass,
                         const ReadOptions& options) {
-  using Leaf = typename Tree::LeafNodeType;
-  const std::uint64_t bricks = located.survey.leaves + located.survey.tileBricks;
-  refuseTooLarge(bricks, located.survey.treeBytes, options);
-  Tree tree;
-  readTopology(archive, located, tree);
+  refuseTooLarge(located.survey.leaves + located.survey.tileBricks, options);
+  VoxelReader<Tree> reader(archive, located);
   TreeVoxels result;
-  result.background = double(tree.background());
+  result.background = reader.background();
   const FillRules rules{narrowBackground(result.background), gridClass == GridClass::kLevelSet,
                         options.nonFinite, options.allowEmpty};
   NonFiniteTally tally;
-  {
-    auto sources = brickSources(tree, bricks);
-    result.volume = volumeFor<Leaf, LeafAccess<Leaf>>(sources, rules, options.memory, tally);
-  }
-  SparseVolume& volume = result.volume;
-  readLeaves(archive, located, tree, [&](const Leaf& leaf) {
-    const Coord corner = toCoord(leaf.origin());
-    if (const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin)))
-      fillFromLeaf<Leaf, LeafAccess<Leaf>>(leaf, rules, corner, volume.brickValues(*b),
-                                           volume.active[*b], tally);
-  });
+  result.volume = reader.read(rules, options.memory, tally);
   refuseNonFinite(tally, rules.nonFinite);
   result.nonFiniteReplaced = tally.count;
   return result;

@@ -1,218 +1,48 @@
 #include "vdb/tree_survey.h"
 
-#include <blosc.h>
-
-#include "vdb/versions.h"
-
-#include <openvdb/io/Compression.h>
-
-#include <array>
-#include <bit>
-#include <set>
-
-#include "esvr/error.h"
-#include "esvr/sparse_volume.h"
+#include "vdb/tree_walk.h"
 
 namespace esvr::vdb {
 namespace {
 
-namespace io = openvdb::io;
-
-[[noreturn]] void damaged(const InputFile& file, const std::string& what) {
-  throw BadInput("is damaged at byte " + std::to_string(file.position()) + ": " + what);
-}
-
-/// One bit for each cell of a node, as OpenVDB stores it, with z fastest.
-template <int kLog2>
-struct NodeMask {
-  static constexpr std::size_t kCells = std::size_t{1} << (3 * kLog2);
-  std::array<std::uint64_t, kCells / 64> words;
-
-  [[nodiscard]] bool test(std::size_t n) const { return (words[n >> 6] >> (n & 63)) & 1u; }
-  [[nodiscard]] std::uint64_t count() const {
-    std::uint64_t n = 0;
-    for (auto word : words) n += std::uint64_t(std::popcount(word));
-    return n;
-  }
-  [[nodiscard]] bool overlaps(const NodeMask& other) const {
-    for (std::size_t i = 0; i < words.size(); ++i)
-      if (words[i] & other.words[i]) return true;
-    return false;
-  }
-  template <class Visit>
-  void forEachSet(Visit&& visit) const {
-    for (std::size_t i = 0; i < words.size(); ++i)
-      for (std::uint64_t word = words[i]; word; word &= word - 1)
-        visit(i * 64 + std::size_t(std::countr_zero(word)));
-  }
-};
-
-constexpr int kLowerLog2 = 4, kUpperLog2 = 5;
-constexpr std::int32_t kLowerExtent = kBrickSide << kLowerLog2;    ///< 128 voxels
-constexpr std::int32_t kUpperExtent = kLowerExtent << kUpperLog2;  ///< 4096
-
-using LeafMask = NodeMask<kBrickLog2>;
-using LowerMask = NodeMask<kLowerLog2>;
-using UpperMask = NodeMask<kUpperLog2>;
-
-/// The corner of the n-th cell of a node.
-template <int kLog2>
-Coord cellCorner(Coord corner, std::size_t n, std::int32_t cellExtent) {
-  constexpr std::size_t kMask = (std::size_t{1} << kLog2) - 1;
-  const Coord cell{std::int32_t(n >> (2 * kLog2)), std::int32_t((n >> kLog2) & kMask),
-                   std::int32_t(n & kMask)};
-  return corner + cell * cellExtent;
-}
-
+/// Adds up what a tree holds.
 class Surveyor {
  public:
-  Surveyor(InputFile& file, const ValueLayout& layout) : file_(file), layout_(layout) {}
-
-  TreeSurvey run() {
-    if (file_.read<std::int32_t>() != 1) damaged(file_, "other than one value a voxel");
-    file_.skip(layout_.valueBytes);  // background
-    const auto tiles = file_.read<std::uint32_t>();
-    const auto children = file_.read<std::uint32_t>();
-    for (std::uint32_t i = 0; i < tiles; ++i) rootTile();
-    for (std::uint32_t i = 0; i < children; ++i) upperNode(rootKey());
-    for (std::uint64_t i = 0; i < survey_.leaves; ++i) leafValues();
-    return survey_;
+  void leaf(Coord corner, const LeafMask& mask) {
+    ++survey.leaves;
+    survey.activeVoxels += mask.count();
+    mask.forEachSet([&](std::size_t n) { survey.activeBox.expand(corner + voxelLocal(int(n))); });
   }
+
+  void rootTile(Coord corner, std::uint64_t) { tile(corner, kUpperExtent); }
+
+  template <int kLog2>
+  void tiles(const NodeMask<kLog2>& mask, const TileValues& values, std::int32_t extent) {
+    mask.forEachSet(
+        [&](std::size_t n) { tile(cellCorner<kLog2>(values.corner, n, extent), extent); });
+  }
+
+  TreeSurvey survey;
 
  private:
-  Coord rootKey() {
-    const auto key = file_.read<Coord>();
-    if (key.x % kUpperExtent || key.y % kUpperExtent || key.z % kUpperExtent)
-      damaged(file_, "a node at the impossible place " + toString(key));
-    if (!rootKeys_.insert(key).second) damaged(file_, "two nodes at " + toString(key));
-    return key;
-  }
-
-  void rootTile() {
-    const Coord key = rootKey();
-    file_.skip(layout_.valueBytes);
-    const auto active = file_.read<std::uint8_t>();
-    if (active > 1) damaged(file_, "a flag that is neither 0 nor 1");
-    if (active) activeTile(key, kUpperExtent);
-    survey_.treeBytes += kRootTileBytes;
-  }
-
-  void upperNode(Coord corner) {
-    const auto children = nodeHead<UpperMask, kUpperLog2>(corner, kLowerExtent);
-    children.forEachSet(
-        [&](std::size_t n) { lowerNode(cellCorner<kUpperLog2>(corner, n, kLowerExtent)); });
-  }
-
-  void lowerNode(Coord corner) {
-    const auto children = nodeHead<LowerMask, kLowerLog2>(corner, kBrickSide);
-    children.forEachSet(
-        [&](std::size_t n) { leaf(cellCorner<kLowerLog2>(corner, n, kBrickSide)); });
-  }
-
-  void leaf(Coord corner) {
-    const auto mask = file_.read<LeafMask>();
-    ++survey_.leaves;
-    survey_.treeBytes += kLeafBytes;
-    survey_.activeVoxels += mask.count();
-    mask.forEachSet([&](std::size_t n) { survey_.activeBox.expand(corner + voxelLocal(int(n))); });
-  }
-
-  void leafValues() {
-    const auto mask = file_.read<LeafMask>();
-    valueBlock(mask);
-  }
-
-  /// Reads an inner node up to its child nodes. \return the cells that have one
-  template <class Mask, int kLog2>
-  Mask nodeHead(Coord corner, std::int32_t cellExtent) {
-    const auto children = file_.read<Mask>();
-    const auto active = file_.read<Mask>();
-    if (children.overlaps(active)) damaged(file_, "a cell that is both tile and node");
-    valueBlock(active);
-    active.forEachSet(
-        [&](std::size_t n) { activeTile(cellCorner<kLog2>(corner, n, cellExtent), cellExtent); });
-    survey_.treeBytes += Mask::kCells * sizeof(void*) + 2 * sizeof(Mask);
-    return children;
-  }
-
-  void activeTile(Coord corner, std::int32_t extent) {
+  void tile(Coord corner, std::int32_t extent) {
     const auto bricksASide = std::uint64_t(extent / kBrickSide);
     const std::uint64_t bricks = bricksASide * bricksASide * bricksASide;
-    survey_.tileBricks += bricks;
-    survey_.activeVoxels += bricks * kBrickVoxels;
+    survey.tileBricks += bricks;
+    survey.activeVoxels += bricks * kBrickVoxels;
     const std::int32_t last = extent - 1;
-    survey_.activeBox.expand(Box{corner, corner + Coord{last, last, last}});
+    survey.activeBox.expand(Box{corner, corner + Coord{last, last, last}});
   }
-
-  /// Skips the block of a node's values.
-  template <class Mask>
-  void valueBlock(const Mask& active) {
-    const auto inactive = file_.read<std::int8_t>();
-    if (inactive < io::NO_MASK_OR_INACTIVE_VALS || inactive > io::NO_MASK_AND_ALL_VALS)
-      damaged(file_, "unknown packing of a node");
-    file_.skip(inactiveValues(inactive) * layout_.valueBytes);
-    if (hasSelectionMask(inactive)) file_.skip(sizeof(Mask));
-    const bool activeOnly =
-        (layout_.compression & io::COMPRESS_ACTIVE_MASK) && inactive != io::NO_MASK_AND_ALL_VALS;
-    valueArray(activeOnly ? active.count() : Mask::kCells);
-  }
-
-  static std::uint64_t inactiveValues(std::int8_t inactive) {
-    if (inactive == io::MASK_AND_TWO_INACTIVE_VALS) return 2;
-    return inactive == io::NO_MASK_AND_ONE_INACTIVE_VAL ||
-           inactive == io::MASK_AND_ONE_INACTIVE_VAL;
-  }
-  static bool hasSelectionMask(std::int8_t inactive) {
-    return inactive == io::MASK_AND_NO_INACTIVE_VALS || inactive == io::MASK_AND_ONE_INACTIVE_VAL ||
-           inactive == io::MASK_AND_TWO_INACTIVE_VALS;
-  }
-
-  void valueArray(std::uint64_t count) {
-    if (layout_.savedAsHalf && count == 0) return;  // OpenVDB stores nothing then, not even a size
-    const std::uint64_t bytes = count * (layout_.savedAsHalf ? kHalfBytes : layout_.valueBytes);
-    if (layout_.compression & (io::COMPRESS_BLOSC | io::COMPRESS_ZIP))
-      chunk(bytes);
-    else
-      file_.skip(bytes);
-  }
-
-  /// Skips a size, which is negative if the bytes are not compressed, and the bytes.
-  void chunk(std::uint64_t rawBytes) {
-    const auto size = file_.read<std::int64_t>();
-    if (size <= 0) {
-      if (0 - std::uint64_t(size) != rawBytes) damaged(file_, "a chunk of a wrong size");
-      return file_.skip(rawBytes);
-    }
-    const bool blosc = layout_.compression & io::COMPRESS_BLOSC;
-    file_.skip(std::uint64_t(size) - (blosc ? bloscHeader(std::uint64_t(size), rawBytes) : 0));
-  }
-
-  /// \return the length of the header
-  std::uint64_t bloscHeader(std::uint64_t storedBytes, std::uint64_t rawBytes) {
-    file_.need(storedBytes);
-    if (storedBytes < BLOSC_MIN_HEADER_LENGTH) damaged(file_, "a Blosc chunk without a header");
-    const auto header = file_.read<std::array<std::byte, BLOSC_MIN_HEADER_LENGTH>>();
-    std::size_t announced = 0;
-    if (blosc_cbuffer_validate(header.data(), storedBytes, &announced) != 0 ||
-        announced != rawBytes)
-      damaged(file_, "a Blosc chunk whose header contradicts its size");
-    return BLOSC_MIN_HEADER_LENGTH;
-  }
-
-  static constexpr std::uint64_t kHalfBytes = 2;
-  static constexpr std::uint64_t kRootTileBytes = 96;  ///< a std::map node of coordinates and tile
-  static constexpr std::uint64_t kLeafBytes = 160;     ///< a leaf without its values
-
-  InputFile& file_;
-  ValueLayout layout_;
-  TreeSurvey survey_;
-  std::set<Coord> rootKeys_;
 };
 
 }  // namespace
 
 TreeSurvey surveyTree(InputFile& file, const ValueLayout& layout) {
-  return Surveyor(file, layout).run();
+  Surveyor surveyor;
+  TreeWalk walk(file, layout, surveyor);
+  walk.topology();
+  for (std::uint64_t i = 0; i < surveyor.survey.leaves; ++i) walk.leafValues();
+  return surveyor.survey;
 }
 
 }  // namespace esvr::vdb

@@ -31,7 +31,6 @@ struct TreeSurvey {
   std::uint64_t activeVoxels = 0;  ///< including those of tiles
   std::uint64_t tileBricks = 0;    ///< number of 8^3 bricks that the active tiles cover
   Box activeBox;
-  std::uint64_t treeBytes = 0;  ///< bytes that OpenVDB's tree takes in memory without its voxels
 };
 
 /// Surveys the tree at the position of the file. \throws BadInput  it is truncated or damaged

@@ -63,6 +63,7 @@ Table vdb2esvrTests() {
           {"--report", "Vdb2Esvr.reportsWhatTheFileHolds"},
           {"--representation", "Vdb2EsvrOption.representationIsTheOneWanted"},
           {"--resume", "Parts.ofAnInterruptedRunAreUsedAgain"},
+          {"--scratch", "Scratch.HoldsVoxelsAndChangesNoBit"},
           {"--seconds", "Vdb2EsvrOption.secondsEndTheFit"},
           {"--seed", "Vdb2EsvrOption.seedsGiveOtherFiles"},
           {"--size", "Vdb2Esvr.keepsToTheSizeAskedFor"},
@@ -86,6 +87,7 @@ Table esvr2vdbTests() {
           {"--max-memory", "Esvr2Vdb.refusesWhatNeedsMoreMemoryThanAllowed"},
           {"--no-tiles", "Esvr2VdbOption.noTilesWritesLeaves"},
           {"--reference", "Esvr2Vdb.printsTheErrorAgainstAReference"},
+          {"--scratch", "Scratch.HoldsVoxelsOfLosslessFilesOnTheWayThereAndBack"},
           {"--threshold", "Esvr2Vdb.hasFewerActiveVoxelsAtAHigherThreshold"}};
 }
 
@@ -121,6 +123,7 @@ Table renderTests() {
           {"--ref", "EsvrRender.ComparesWithAReference"},
           {"--report", "EsvrRender.ComparesWithAReference"},
           {"--resolution", "EsvrRender.MeasuresWithoutKeepingAPicture"},
+          {"--scratch", "Scratch.IsAFolderThatExistsInEveryProgram"},
           {"--sheet", "EsvrRender.ComparesWithAReference"},
           {"--slice", "EsvrRender.ModesAndBoxesChangeThePicture"},
           {"--step", "EsvrRender.TheSamplingOfRaysChangesThePicture"},
@@ -149,6 +152,7 @@ Table checkTests() {
           {"--min-ssim", "CompareLimit.passesOrFailsWithTheFigure"},
           {"--peak", "CompareOption.checkTakesTheGridTheBoxAndThePeak"},
           {"--report", "CompareOption.reportsAreReplacedWhereForced"},
+          {"--scratch", "Scratch.HoldsVoxelsOfLosslessFilesOnTheWayThereAndBack"},
           {"--ssim", "CompareCheck.findsNoErrorInTheFileItself"},
           {"--update", "CompareCheck.holdsARunAgainstItsBaseline"}};
 }
@@ -175,6 +179,7 @@ Table tableTests() {
           {"--row", "CompareTable.takesLpipsFromAProgramOfTheUsers"},
           {"--rows", "CompareTable.hasLosslessRowsWithoutError"},
           {"--runs", "CompareTable.SlowKeepsTheRowsThatAreMadeWhenInterrupted"},
+          {"--scratch", "Scratch.IsAFolderThatExistsInEveryProgram"},
           {"--size", "CompareTable.matchesACandidatesSizeAndShowsTheSearch"},
           {"--tf", "CompareOption.tablesPicturesTakeStepAndTransferFunctions"}};
 }
@@ -189,6 +194,7 @@ Table curvesTests() {
           {"--max-dense", "CompareOption.maxDenseSkipsZfpInCurves"},
           {"--max-memory", "CompareCurves.refusesWhatTakesMoreMemoryThanAllowed"},
           {"--no-baselines", "CompareCurves.hasTheCurveOfAFitAndTheFilesOfBoth"},
+          {"--scratch", "Scratch.IsAFolderThatExistsInEveryProgram"},
           {"--output", "CompareCurves.hasTheCurveOfAFitAndTheFilesOfBoth"},
           {"--peak", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"}};
 }
