@@ -11,8 +11,12 @@
 
 namespace esvr {
 
-/// Number of bricks that are evaluated at once. Their values take 32 MB.
+/// Largest number of bricks that are evaluated at once. Their values take 32 MB.
 inline constexpr std::size_t kBatchBricks = 16384;
+
+/// Largest number of pairs of an ellipsoid and a brick that are listed at once, unless a single
+/// brick has more. Their lists take 0.4 GB.
+inline constexpr double kMaxListedPairs = 0x1p25;
 
 /// Some bricks and their values.
 struct BrickBatch {
@@ -26,7 +30,8 @@ struct BrickBatch {
 };
 using BatchVisitor = std::function<void(const BrickBatch&)>;
 
-/// Calls `visit` for all bricks, in order and kBatchBricks at a time, from the calling thread.
+/// Calls `visit` for all bricks, in order and at most kBatchBricks at a time, from the calling
+/// thread.
 void forEachBatch(const Field& field, std::span<const Coord> corners, const BatchVisitor& visit);
 
 }  // namespace esvr

@@ -6,6 +6,7 @@
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "field/brick_walk.h"
 #include "field/offsets.h"
@@ -63,6 +64,32 @@ std::vector<std::uint32_t> bricksByEllipsoid(const BrickIndex& index, std::size_
   return bricks;
 }
 
+/// A list of bricks to which a brick is added again and again. It takes at most twice the memory of
+/// its different bricks, or that of kFew bricks.
+class BrickList {
+ public:
+  void add(Coord brick) {
+    if (bricks_.size() >= most_) makeUnique();
+    bricks_.push_back(brick);
+  }
+  [[nodiscard]] std::vector<Coord> take() {
+    makeUnique();
+    return std::move(bricks_);
+  }
+
+ private:
+  static constexpr std::size_t kFew = std::size_t{1} << 20;
+
+  void makeUnique() {
+    std::ranges::sort(bricks_);
+    bricks_.erase(std::unique(bricks_.begin(), bricks_.end()), bricks_.end());
+    most_ = std::max(kFew, 2 * bricks_.size());
+  }
+
+  std::vector<Coord> bricks_;
+  std::size_t most_ = kFew;
+};
+
 }  // namespace
 
 BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
@@ -87,16 +114,19 @@ BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
 
 std::vector<Coord> missingBricks(const BrickIndex& index, std::size_t ellipsoids,
                                  const SupportOf& supportOf, const Box& within) {
-  tbb::enumerable_thread_specific<std::vector<Coord>> found;
+  tbb::enumerable_thread_specific<BrickList> found;
   tbb::parallel_for(Range(0, ellipsoids, 64), [&](const Range& range) {
     auto& mine = found.local();
     for (std::size_t i = range.begin(); i != range.end(); ++i)
       forEachReachedBrick(supportOf(i), within, [&](Coord brick) {
-        if (index.find(brick) == BrickIndex::kNone) mine.push_back(brick);
+        if (index.find(brick) == BrickIndex::kNone) mine.add(brick);
       });
   });
   std::vector<Coord> all;
-  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
+  for (BrickList& part : found) {
+    const std::vector<Coord> bricks = part.take();
+    all.insert(all.end(), bricks.begin(), bricks.end());
+  }
   tbb::parallel_sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   return all;

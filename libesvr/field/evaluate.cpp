@@ -32,7 +32,8 @@ std::vector<Coord> reachedBricks(const Field& field, const Box& within) {
 }
 
 void evaluateBricks(const Field& field, std::span<const Coord> corners, std::span<float> out) {
-  BrickEvaluator(field, corners).evaluate(0, out);
+  const PreparedField prepared(field);
+  BrickEvaluator(prepared, corners).evaluate(0, out);
 }
 
 }  // namespace esvr

@@ -12,10 +12,13 @@ std::vector<Coord> asBricks(std::span<const Coord> corners) {
 
 }  // namespace
 
+BrickPairs pairsWith(std::span<const Support> reach, std::span<const Coord> corners) {
+  return pairsWithin(BrickIndex(asBricks(corners)), reach.size(),
+                     [&](std::size_t i) -> const Support& { return reach[i]; });
+}
+
 EvaluatePlan planEvaluation(const Field& field, std::span<const Coord> corners) {
-  const auto reach = supports(field);
-  return {gather(field), pairsWithin(BrickIndex(asBricks(corners)), reach.size(),
-                                     [&](std::size_t i) -> const Support& { return reach[i]; })};
+  return {gather(field), pairsWith(supports(field), corners)};
 }
 
 }  // namespace esvr

@@ -14,6 +14,10 @@ struct EvaluatePlan {
   BrickPairs pairs;  ///< pairs with the bricks, which are in the order of the corners
 };
 
+/// The pairs of supports and bricks.
+/// \param corners  index corners of the bricks, multiples of 8
+[[nodiscard]] BrickPairs pairsWith(std::span<const Support> reach, std::span<const Coord> corners);
+
 /// \param corners  index corners of the bricks, multiples of 8
 [[nodiscard]] EvaluatePlan planEvaluation(const Field& field, std::span<const Coord> corners);
 

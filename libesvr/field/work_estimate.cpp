@@ -15,6 +15,9 @@ namespace {
 // compares an estimate with what a program held.
 constexpr double kEvaluationBytesPerEllipsoid = 512.0;  // parameters, support, prepared form
 constexpr double kBytesPerPair = 16.0;  // both lists of pairs, and intermediate lists
+/// Pairs that are not listed at the same time take time only. They count a little, so that a limit on
+/// the memory also limits the time that a hostile file may take.
+constexpr double kBytesPerFurtherPair = 1.0;
 constexpr double kBytesOfValues = kBrickVoxels * sizeof(float);
 constexpr double kBytesPerEntry = 2.0 * sizeof(BrickMask) + 96.0;  // of a brick without its values
 
@@ -41,8 +44,9 @@ WorkEstimate boundOf(std::span<const Support> supports, const Box& within, doubl
 }  // namespace
 
 double WorkEstimate::bytes(const VoxelMemory& memory) const {
-  return ellipsoids * kEvaluationBytesPerEllipsoid + pairs * kBytesPerPair +
-         bricks * bytesPerBrick(bricks, memory) +
+  const double listed = std::min(pairs, std::max(kMaxListedPairs, ellipsoids));
+  return ellipsoids * kEvaluationBytesPerEllipsoid + listed * kBytesPerPair +
+         (pairs - listed) * kBytesPerFurtherPair + bricks * bytesPerBrick(bricks, memory) +
          std::min(bricks, double(kBatchBricks)) * kBytesOfValues;
 }
 

@@ -22,7 +22,7 @@ namespace esvr {
 inline constexpr std::array kRoundEnds{0.0, 0.1, 0.25, 0.5, 0.7, 0.85, 0.95, 1.0};
 /// Kappa is fitted in the rounds that begin before this fraction of the schedule. In these rounds,
 /// every chunk finds its own kappa. In later rounds, kappa is the same for all chunks and constant.
-inline constexpr double kKappaUntil = 0.7;
+inline constexpr double kKappaUntil = 0.5;
 /// A chunk's kappa may change in a round by this, and by this multiple of the change of the common
 /// kappa in the round before. Chunks that agree move fast. Chunks that disagree stay close, because
 /// the common kappa does not suit what they have fitted with their own: without a limit, a tree of
