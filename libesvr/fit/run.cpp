@@ -22,7 +22,6 @@ class FitRun {
         plan_(plan),
         schedule_{plan.firstCount, plan.count, plan.iterations, tuning},
         kappa_(tuning.kappaStep),
-        firstKappa_(double(optimiser.kernel().kappa)),
         first_(iterationAt(plan.from)),
         last_(iterationAt(plan.to)),
         done_(first_) {}
@@ -86,14 +85,9 @@ class FitRun {
     return optimiser_.iterate(factors);
   }
 
-  [[nodiscard]] float withinReach(float kappa) const {
-    return float(
-        std::clamp(double(kappa), firstKappa_ - plan_.kappaReach, firstKappa_ + plan_.kappaReach));
-  }
-
   void descendKappa(double factor) {
     const float now = optimiser_.kernel().kappa;
-    const float next = withinReach(kappa_.next(now, optimiser_.kappaSlope(), factor));
+    const float next = kappa_.next(now, optimiser_.kappaSlope(), factor);
     if (next != now) optimiser_.setKappa(next);
   }
 
@@ -125,7 +119,6 @@ class FitRun {
   const RunPlan& plan_;
   Schedule schedule_;
   KappaDescent kappa_;
-  double firstKappa_;
   std::uint32_t first_, last_;  ///< iterations at the ends of the part
   std::uint32_t done_;
 };

@@ -1,7 +1,6 @@
 #pragma once
 /// Runs an optimiser until the goal of the fit is reached.
 
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -20,7 +19,6 @@ struct RunPlan {
   std::optional<double> seconds;  ///< time limit; replaces `iterations` as length of the schedule
   FitState start{};               ///< ellipsoids to begin with; empty: seeds
   bool learnKappa = false;        ///< whether kappa is fitted or stays the same
-  double kappaReach = HUGE_VAL;   ///< largest change of kappa in the run
   double from = 0.0, to = 1.0;    ///< the part of the schedule that is run
   bool curve = true;              ///< whether points of the curve are measured during the run
 };

@@ -101,7 +101,7 @@ class ChunkedFit {
   }
 
   void runRound(int number) {
-    const Round round(scene_, {number, kernel_, kappaReach_}, states_, progress_, turns_);
+    const Round round(scene_, {number, kernel_}, states_, progress_, turns_);
     InOrder inOrder(options_.device);
     PartRunner& runner = options_.parts ? *options_.parts : inOrder;
     const auto outputs = runner.run(round);
@@ -125,9 +125,7 @@ class ChunkedFit {
       sum += double(states_[c].count()) * double(kernels[c].kappa);
       weight += double(states_[c].count());
     }
-    const double before = double(kernel_.kappa);
     if (weight > 0.0) kernel_.kappa = float(sum / weight);
-    kappaReach_ = kKappaReach + kKappaReachGrowth * std::abs(double(kernel_.kappa) - before);
     const auto widthOf = [](const Kernel& k) { return kernelWidth(kernelConstants<double>(k)).m; };
     for (std::size_t c = 0; c < states_.size(); ++c) {
       if (kernels[c] == kernel_) continue;
@@ -207,7 +205,6 @@ class ChunkedFit {
   WholeProgress progress_;
   DeviceTurns turns_;
   Kernel kernel_;
-  double kappaReach_ = HUGE_VAL;  ///< the first round is short
   Totals totals_;
 };
 

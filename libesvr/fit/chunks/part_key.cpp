@@ -72,7 +72,6 @@ void addPlan(Hash& hash, const RunPlan& plan) {
   hash.add(plan.psnr);
   hash.add(plan.seconds);
   hash.add(plan.learnKappa);
-  hash.add(plan.kappaReach);
   hash.add(plan.from);
   hash.add(plan.to);
   hash.addAll(plan.start.ellipsoids);

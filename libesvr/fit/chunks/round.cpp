@@ -64,7 +64,6 @@ RunPlan Round::runPlanOf(std::size_t chunk) const {
   plan.to = kRoundEnds[plan_.number + 1];
   plan.curve = false;
   plan.learnKappa = !options.kappa && plan.from < kKappaUntil;
-  plan.kappaReach = plan_.kappaReach;
   if (options.seconds)
     plan.seconds = *options.seconds * (plan.to - plan.from) * progress_.shareOf(chunk);
   return plan;

@@ -17,7 +17,6 @@ namespace esvr {
 struct RoundPlan {
   int number = 0;
   Kernel kernel;
-  double kappaReach = 0.0;  ///< see RunPlan
 };
 
 class Round : public RoundParts {
