@@ -36,12 +36,15 @@ double maxPairs(std::span<const Support> reach, std::span<const Coord> corners) 
 
 class Batches {
  public:
-  Batches(const Field& field, std::size_t bricks, const BatchVisitor& visit)
-      : field_(field), values_(std::min(kBatchBricks, bricks) * kBrickVoxels), visit_(visit) {}
+  Batches(const Field& field, std::size_t bricks, const BatchVisitor& visit, double maxListed)
+      : field_(field),
+        values_(std::min(kBatchBricks, bricks) * kBrickVoxels),
+        visit_(visit),
+        maxListed_(maxListed) {}
 
   /// Halves the bricks until their pairs can be listed.
   void visit(std::span<const Coord> corners) {
-    if (corners.size() > 1 && maxPairs(field_.reach, corners) > kMaxListedPairs) {
+    if (corners.size() > 1 && maxPairs(field_.reach, corners) > maxListed_) {
       visit(corners.first(corners.size() / 2));
       return visit(corners.subspan(corners.size() / 2));
     }
@@ -58,12 +61,14 @@ class Batches {
   PreparedField field_;
   std::vector<float> values_;
   const BatchVisitor& visit_;
+  double maxListed_;
 };
 
 }  // namespace
 
-void forEachBatch(const Field& field, std::span<const Coord> corners, const BatchVisitor& visit) {
-  if (!corners.empty()) Batches(field, corners.size(), visit).visit(corners);
+void forEachBatch(const Field& field, std::span<const Coord> corners, const BatchVisitor& visit,
+                  double maxListed) {
+  if (!corners.empty()) Batches(field, corners.size(), visit, maxListed).visit(corners);
 }
 
 }  // namespace esvr

@@ -32,6 +32,8 @@ using BatchVisitor = std::function<void(const BrickBatch&)>;
 
 /// Calls `visit` for all bricks, in order and at most kBatchBricks at a time, from the calling
 /// thread.
-void forEachBatch(const Field& field, std::span<const Coord> corners, const BatchVisitor& visit);
+/// \param maxListed  see kMaxListedPairs
+void forEachBatch(const Field& field, std::span<const Coord> corners, const BatchVisitor& visit,
+                  double maxListed = kMaxListedPairs);
 
 }  // namespace esvr
