@@ -59,7 +59,7 @@ class CompareCheck : public test::FolderTest {
 };
 
 TEST_F(CompareCheck, refusesWhatTakesMoreMemoryThanAllowed) {
-  EXPECT_EQ(check("ref.vdb", {"--max-memory", "1KB"}).exitCode, 5);
+  EXPECT_EQ(check("ref.vdb", {"--max-memory", "100B"}).exitCode, 5);
 }
 
 TEST_F(CompareCheck, findsNoErrorInTheFileItself) {

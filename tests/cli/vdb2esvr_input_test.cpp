@@ -123,7 +123,7 @@ TEST_F(Vdb2Esvr, fitsTheGridsThatAreNamedOnly) {
 }
 
 TEST_F(Vdb2Esvr, refusesWhatTakesMoreMemoryThanAllowed) {
-  const auto run = fitQuickly({"--max-memory", "1KB"});
+  const auto run = fitQuickly({"--max-memory", "100B"});
   EXPECT_EQ(run.exitCode, 5);
   EXPECT_THAT(run.err, HasSubstr("density"));
   EXPECT_FALSE(outIsThere());
