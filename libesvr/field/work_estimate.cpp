@@ -15,8 +15,8 @@ namespace {
 // compares an estimate with what a program held.
 constexpr double kEvaluationBytesPerEllipsoid = 512.0;  // parameters, support, prepared form
 constexpr double kBytesPerPair = 16.0;  // both lists of pairs, and intermediate lists
-/// Pairs that are not listed at the same time take time only. They count a little, so that a limit on
-/// the memory also limits the time that a hostile file may take.
+/// Pairs that are not listed at the same time take time only. They count a little, so that a limit
+/// on the memory also limits the time that a hostile file may take.
 constexpr double kBytesPerFurtherPair = 1.0;
 constexpr double kBytesOfValues = kBrickVoxels * sizeof(float);
 constexpr double kBytesPerEntry = 2.0 * sizeof(BrickMask) + 96.0;  // of a brick without its values

@@ -84,7 +84,7 @@ SparseVolume layOutBricks(std::vector<Coord>& corners, const FillRules& rules,
 
 std::size_t brickAt(const SparseVolume& volume, Coord corner) {
   if (const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin))) return *b;
-  throw BadInput("is damaged: a leaf without an active voxel has one after all");
+  throw BadInput("is damaged: there is no brick at " + toString(corner));
 }
 
 void fillTile(const TileSource& tile, SparseVolume& volume, NonFiniteTally& tally) {

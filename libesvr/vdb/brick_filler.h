@@ -76,7 +76,8 @@ inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
   return 0.0f;
 }
 
-/// Fills brick b. Access::value(leaf, i) is a leaf's voxel in voxelOffset order, and Access::mask(leaf) holds its active voxels.
+/// Fills brick b. Access::value(leaf, i) is a leaf's voxel in voxelOffset order, and
+/// Access::mask(leaf) holds its active voxels.
 template <class Leaf, class Access>
 void fillFromLeaf(const Leaf& leaf, const FillRules& rules, std::size_t b, SparseVolume& volume,
                   NonFiniteTally& tally) {

@@ -132,8 +132,10 @@ class VoxelReader {
   void readLeaf(Coord corner, const FillRules& rules, SparseVolume& volume, NonFiniteTally& tally) {
     Leaf leaf(openvdb::PartialCreate{}, toOpenVdb(corner), background_);
     leaf.readBuffers(file_.stream(), located_.owner.savedAsHalf);
-    if (leaf.valueMask().isOff()) return;
-    fillFromLeaf<Leaf, LeafAccess<Leaf>>(leaf, rules, brickAt(volume, corner), volume, tally);
+    const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin));
+    if (b.has_value() == leaf.valueMask().isOff())
+      throw BadInput("is damaged: a leaf has two different masks");
+    if (b) fillFromLeaf<Leaf, LeafAccess<Leaf>>(leaf, rules, *b, volume, tally);
   }
 
   InputFile& file_;

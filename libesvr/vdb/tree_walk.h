@@ -1,6 +1,6 @@
 #pragma once
-/// A walk over a grid's tree in a .vdb file (tree_survey.h has the layout) that checks all sizes and
-/// tells a visitor what the tree holds. The tree itself is never in memory.
+/// A walk over a grid's tree in a .vdb file (tree_survey.h has the layout) that checks all sizes
+/// and tells a visitor what the tree holds. The tree itself is never in memory.
 
 #include <blosc.h>
 

@@ -39,8 +39,8 @@ TEST(BrickBatch, NoBricksAreNotVisited) {
   forEachBatch(test::randomField({}), {}, [](const BrickBatch&) { FAIL(); });
 }
 
-// The bricks of each thread are made unique from time to time, so that ellipsoids that reach the same
-// bricks take no memory.
+// The bricks of each thread are made unique from time to time, so that ellipsoids that reach the
+// same bricks take no memory.
 TEST(ReachedBricks, OfManyEqualEllipsoidsAreThoseOfOne) {
   const Field one = test::randomField({.count = 1, .smallest = 10.0, .aspect = 1.0});
   Field many = one;

@@ -1,5 +1,5 @@
-// Plan: an optimiser that does nothing notes when a run grows, relocates and changes kappa. A run in
-// parts must do so at the same iterations as a run in one part.
+// Plan: an optimiser that does nothing notes when a run grows, relocates and changes kappa. A run
+// in parts must do so at the same iterations as a run in one part.
 
 #include "fit/run.h"
 

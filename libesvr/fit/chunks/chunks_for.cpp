@@ -19,8 +19,8 @@ constexpr std::size_t kMinBricks = 512;
 constexpr double kSpare = 2.0;
 
 // Memory of the host, measured with trees of 16 million voxels on a CPU: the target, the residual
-// and the constants of a brick with its masks and lists; an ellipsoid with its moments, its gradient
-// and its pairs.
+// and the constants of a brick with its masks and lists; an ellipsoid with its moments, its
+// gradient and its pairs.
 constexpr double kHostBytesPerBrick = 4.0 * kBrickVoxels * sizeof(float);
 constexpr double kHostBytesPerEllipsoid = 1024.0;
 

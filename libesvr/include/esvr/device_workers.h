@@ -11,8 +11,8 @@ namespace esvr {
 /// A thread for each device takes one part after the other.
 class DeviceWorkers : public PartRunner {
  public:
-  /// \param devices  at least one. If the CPU is listed twice, it runs two parts at the same time; if
-  ///                 a GPU is, a part is prepared on the host while the GPU fits another one
+  /// \param devices  at least one. If the CPU is listed twice, it runs two parts at the same time;
+  ///                 if a GPU is, a part is prepared on the host while the GPU fits another one
   explicit DeviceWorkers(std::vector<Device> devices);
 
   /// \throws Error  what a part threw; the other devices end their current parts first
