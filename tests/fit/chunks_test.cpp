@@ -72,6 +72,28 @@ INSTANTIATE_TEST_SUITE_P(Sums, Constants, testing::Bool(), [](const auto& satura
   return saturates.param ? "Clamped" : "NotClamped";
 });
 
+/// A row of bricks whose voxels are all active.
+SparseVolume rowOfBricks(std::int32_t count) {
+  SparseVolume volume;
+  for (std::int32_t x = 0; x < count; ++x) volume.bricks.push_back({x, 0, 0});
+  volume.active.resize(volume.brickCount());
+  for (BrickMask& mask : volume.active) mask.setAll();
+  volume.values.assign(volume.brickCount() * kBrickVoxels, 1.0f);
+  return volume;
+}
+
+// A fit takes about 8 KB of the host's memory for each brick (chunks_for.cpp).
+TEST(ChunksFor, DividesAVolumeWhoseFitExceedsTheMemoryOfTheHost) {
+  const SparseVolume volume = rowOfBricks(2000);
+  FitOptions options;
+  options.count = 100;
+  EXPECT_LE(chunksFor(volume, options).size(), 1u);
+  options.maxHostBytes = 20'000'000;
+  EXPECT_LE(chunksFor(volume, options).size(), 1u);
+  options.maxHostBytes = 9'500'000;
+  EXPECT_EQ(chunksFor(volume, options).size(), 2u);
+}
+
 TEST(ChunkTarget, CountsItsOwnVoxelsOnly) {
   const SparseVolume volume = test::tubeVolume();
   const auto chunks = divideBricks(volume, 10);
