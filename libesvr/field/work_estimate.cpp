@@ -19,7 +19,8 @@ constexpr double kBytesPerPair = 16.0;  // both lists of pairs, and intermediate
 /// on the memory also limits the time that a hostile file may take.
 constexpr double kBytesPerFurtherPair = 1.0;
 constexpr double kBytesOfValues = kBrickVoxels * sizeof(float);
-constexpr double kBytesPerEntry = 2.0 * sizeof(BrickMask) + 96.0;  // of a brick without its values
+/// Bytes that a brick takes without its values.
+constexpr double kBytesPerEntry = 2.0 * sizeof(BrickMask) + 96.0;
 
 /// Bytes of an evaluated brick in memory.
 double bytesPerBrick(double bricks, const VoxelMemory& memory) {

@@ -109,6 +109,19 @@ TEST_F(Damage, EveryBitOfALeafMayBeWrong) {
   }
 }
 
+// A leaf's mask is in the file twice, the second time before its values.
+TEST_F(Damage, ALeafWithoutTheActiveVoxelsOfItsTreeIsRefused) {
+  test::saveCompressed(path(), {test::smallGrid()}, COMPRESS_NONE);
+  Bytes bytes = test::bytesOf(path());
+  constexpr std::size_t kPacking = 1;
+  const std::size_t mask =
+      bytes.size() - kBrickVoxels * sizeof(float) - kPacking - sizeof(BrickMask);
+  std::fill_n(bytes.begin() + std::ptrdiff_t(mask), sizeof(BrickMask), std::byte{0});
+  test::writeBytes(path(), bytes);
+  EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
+              ThrowsMessage<BadInput>(HasSubstr("two different masks")));
+}
+
 TEST_F(Damage, ANegativeChunkSizeDoesNotOverrunTheLeaf) {
   test::saveCompressed(path(), {test::smallGrid()}, COMPRESS_ZIP | COMPRESS_ACTIVE_MASK);
   auto grid = test::smallGrid();
