@@ -25,8 +25,11 @@ std::string notes() {
          "active mask are drawn with --method bricks only.\n"
          "\n"
          "Positions and lengths are in voxels of the grid's index space; its transform is not\n"
-         "applied. By default the camera sees all active voxels. Samples whose value is exactly\n"
-         "the background are transparent.\n"
+         "applied. Samples whose value is exactly the background are transparent.\n"
+         "\n"
+         "By default the projected box of the active voxels takes 90 % of the picture's width or\n"
+         "height, whichever is tighter. In a turntable, no picture exceeds this, and all pictures\n"
+         "have the same scale. With --bench, the sphere around the box touches the edges.\n"
          "\n" +
          listOf("Color maps", builtInColorMaps()) + listOf("Opacity curves", builtInOpacities()) +
          "\n"

@@ -114,10 +114,22 @@ Between usualBetween(const Scene& scene) {
   return field ? fittedBetween(*field) : Between::kVoxels;
 }
 
+/// Benchmarks use the sphere around the volume, so that their figures are those of earlier versions.
+Framing framingOf(const Options& options) {
+  if (options.bench) return Framing::kSphere;
+  return options.turntable == 0 ? Framing::kBox : Framing::kTurn;
+}
+
+Camera cameraOf(const Options& options, const Scene& scene) {
+  CameraWish wish = options.camera;
+  wish.framing = framingOf(options);
+  return fitCamera(scene.box, wish, options.resolution);
+}
+
 RenderOptions renderOptions(const Options& options, const Scene& scene) {
   RenderOptions r;
   r.resolution = options.resolution;
-  r.camera = fitCamera(scene.box, options.camera, options.resolution);
+  r.camera = cameraOf(options, scene);
   r.transfer = options.rangeKind == RangeKind::kOwn
                    ? options.transfer
                    : rescaled(options.transfer, rangeOf(options, scene));
