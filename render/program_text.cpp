@@ -36,6 +36,12 @@ std::string notes() {
          "CAM.json has the values of the camera options: {\"eye\": [1, 2, 3], \"center\": [...],\n"
          "\"up\": [...], \"fov\": 30}, or \"height\" for an orthographic camera.\n"
          "\n"
+         "A turntable writes OUT.0000.png, OUT.0001.png and so on. %04d in the name of an output\n"
+         "stands for the number. If OUT is a folder, or ends in '/', the pictures are\n"
+         "OUT/frame.0000.png and so on. If it ends in .mp4 or .webm, the program ffmpeg, which "
+         "must\n"
+         "be in PATH, encodes a video. A video shows the background; the default is black.\n"
+         "\n"
          "--ref also draws the voxels of a VDB with the same camera, on the same device, and\n"
          "prints the error of each picture. OUT.error.png shows ten times the error.\n"
          "--bench draws a full turn, writes no picture, and reports the frames per second and the\n"
@@ -60,6 +66,7 @@ cli::ProgramText programText() {
           .usage =
               "  esvr-render IN.esvr OUT.png|OUT.exr [OPTION]...\n"
               "  esvr-render IN.vdb OUT.png|OUT.exr [OPTION]...\n"
+              "  esvr-render IN OUT.mp4|OUT.webm|FOLDER/ --turntable N [OPTION]...\n"
               "  esvr-render IN.esvr --bench [--ref IN.vdb] [--report FILE.json] [OPTION]...",
           .notes = notes(),
           .examples =
@@ -68,6 +75,7 @@ cli::ProgramText programText() {
               "  esvr-render smoke.esvr smoke.png --colors inferno --opacity-length 4\n"
               "  esvr-render smoke.esvr smoke.png --tf presets.json --preset Smoke\n"
               "  esvr-render smoke.esvr turn.png --turntable 36   turn.0000.png to turn.0035.png\n"
+              "  esvr-render smoke.esvr turn.mp4 --turntable 120 --fps 24\n"
               "  esvr-render smoke.esvr --bench --ref smoke.vdb   speed, memory, quality"};
 }
 

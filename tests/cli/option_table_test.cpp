@@ -106,6 +106,7 @@ Table renderTests() {
           {"--eye", "EsvrRender.AGivenCameraIsTaken"},
           {"--force", "EsvrRender.KeepsAPictureThatIsThere"},
           {"--fov", "EsvrRender.ACameraFileIsReplacedByOptions"},
+          {"--fps", "EsvrRenderTurn.FfmpegGetsTheRateAndTheCommandLine"},
           {"--frames", "EsvrRender.SomeFramesOfATurntableAreThoseOfTheWhole"},
           {"--grid", "EsvrRender.TheGridThatIsNamedIsDrawn"},
           {"--height", "EsvrRender.ACameraFileIsReplacedByOptions"},
