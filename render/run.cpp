@@ -222,10 +222,11 @@ void writeReport(const Options& options, const nlohmann::ordered_json& report) {
   if (!options.report.empty()) cli::writeJson({options.report, options.overwrite}, report);
 }
 
-void drawFrames(const Options& options, RenderOptions r, Frames& frames) {
+/// \param pivot  the point about which a turntable turns
+void drawFrames(const Options& options, RenderOptions r, const Vec3& pivot, Frames& frames) {
   const Camera first = r.camera;
   for (const PictureFiles& files : pictureFiles(options)) {
-    if (files.frame > 0) r.camera = turned(first, 360.0 * files.frame / options.turntable);
+    if (files.frame > 0) r.camera = turned(first, 360.0 * files.frame / options.turntable, pivot);
     frames.draw(r, files);
   }
   frames.finish();
@@ -258,7 +259,7 @@ void run(const Options& options) {
                         options.turntable, log));
   } else {
     Frames frames(options, drawing, reference.get(), interrupts.token());
-    drawFrames(options, r, frames);
+    drawFrames(options, r, pivotOf(drawing.scene.box, options.camera), frames);
     report["comparisons"] = frames.comparisons();
   }
   writeReport(options, report);

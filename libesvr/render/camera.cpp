@@ -20,13 +20,18 @@ void requireCamera(bool good, const char* otherwise) {
 
 }  // namespace
 
-Camera turned(const Camera& camera, double degrees) {
-  const Vec3 axis = unit(camera.up), arm = difference(camera.eye, camera.center);
+Camera turned(const Camera& camera, double degrees, const Vec3& pivot) {
+  const Vec3 axis = unit(camera.up);
   const double c = std::cos(radians(degrees)), s = std::sin(radians(degrees));
   // Rodrigues' rotation formula.
-  const Vec3 along = scaled(axis, inner(axis, arm) * (1.0 - c));
+  const auto moved = [&](const Vec3& place) {
+    const Vec3 arm = difference(place, pivot);
+    const Vec3 along = scaled(axis, inner(axis, arm) * (1.0 - c));
+    return sum(pivot, sum(along, sum(scaled(arm, c), scaled(cross(axis, arm), s))));
+  };
   Camera result = camera;
-  result.eye = sum(camera.center, sum(along, sum(scaled(arm, c), scaled(cross(axis, arm), s))));
+  result.eye = moved(camera.eye);
+  result.center = moved(camera.center);
   return result;
 }
 

@@ -43,7 +43,7 @@ Camera aroundSphere(const Box& box, const CameraWish& wish, Resolution resolutio
   camera.projection = wish.projection;
   camera.fov = wish.fov.value_or(camera.fov);
   camera.height = wish.height.value_or(2.0 * radius / std::min(1.0, aspect));
-  camera.center = wish.center.value_or(middle(box));
+  camera.center = pivotOf(box, wish);
   const double distance = fittingDistance(radius, camera.fov, aspect);
   camera.eye = wish.eye.value_or(sum(camera.center, scaled(unit(kFromCenter), distance)));
   camera.up = wish.up.value_or(defaultUp(camera));
@@ -129,39 +129,31 @@ std::array<Span, 2> spansOf(const View& view, const CameraWish& wish) {
   const double room = 1.0 - wish.freeRight;
   const bool movable = !wish.center && !wish.eye;
   return {Span{scaled(view.right, -1.0 / view.left), -kFilledShare * room - wish.freeRight,
-               kFilledShare * room - wish.freeRight, movable && wish.framing == Framing::kBox},
+               kFilledShare * room - wish.freeRight, movable},
           Span{scaled(view.up, 1.0 / view.top), -kFilledShare, kFilledShare, movable}};
-}
-
-/// Moves the camera by a displacement in the picture's plane. In a turn, the center stays on the
-/// axis through the middle of the box: it moves along the axis to the plane's line of sight.
-/// \param distance  distance of the eye from the plane through the middle of the box
-void place(Camera& camera, const View& view, const Vec3& shift, double distance, bool turning) {
-  const Vec3 eye = sum(camera.center, difference(shift, scaled(view.forward, distance)));
-  const Vec3 axis = unit(camera.up);
-  const Vec3 move = turning ? scaled(axis, inner(shift, view.up) / inner(axis, view.up)) : shift;
-  camera.center = sum(camera.center, move);
-  camera.eye = eye;
 }
 
 /// Fits a camera whose direction is right.
 Camera closer(const Box& box, Camera camera, const CameraWish& wish, Resolution resolution) {
   const bool perspective = camera.projection == Projection::kPerspective;
-  const bool turning = wish.framing == Framing::kTurn;
   if (!perspective) camera.height = 2.0;  // makes 1 the size of the picture
   const View view(camera, resolution);
-  const Corners corners(box, camera, turning);
+  const Corners corners(box, camera, wish.framing == Framing::kTurn);
   const auto spans = spansOf(view, wish);
   const Vec3 forward = perspective ? view.forward : Vec3{};
   const SpanFit columns(corners, spans[0], forward), rows(corners, spans[1], forward);
   const double size = std::max(columns.size(), rows.size());
   if (!perspective) camera.height = 2.0 * size;
   const double distance = perspective ? size : length(difference(camera.eye, camera.center));
-  if (!wish.eye) place(camera, view, sum(columns.shift(size), rows.shift(size)), distance, turning);
+  if (wish.eye) return camera;
+  camera.center = sum(camera.center, sum(columns.shift(size), rows.shift(size)));
+  camera.eye = difference(camera.center, scaled(view.forward, distance));
   return camera;
 }
 
 }  // namespace
+
+Vec3 pivotOf(const Box& box, const CameraWish& wish) { return wish.center.value_or(middle(box)); }
 
 Camera fitCamera(const Box& box, const CameraWish& wish, Resolution resolution) {
   const Camera camera = aroundSphere(box, wish, resolution);

@@ -55,11 +55,13 @@ Extent extentOf(const Box& box, const Camera& camera, Resolution resolution) {
 }
 
 /// The extent over many pictures of a turn.
-Extent extentOfTurn(const Box& box, const Camera& camera, Resolution resolution) {
+Extent extentOfTurn(const Box& box, const CameraWish& wish, Resolution resolution) {
+  const Camera camera = fitCamera(box, wish, resolution);
   constexpr int kSteps = 720;
   Extent all;
   for (int step = 0; step < kSteps; ++step) {
-    const Extent one = extentOf(box, turned(camera, 360.0 * step / kSteps), resolution);
+    const Extent one =
+        extentOf(box, turned(camera, 360.0 * step / kSteps, pivotOf(box, wish)), resolution);
     all.include(one.low);
     all.include(one.high);
   }
@@ -149,7 +151,7 @@ TEST(Camera, NoPictureOfATurnExceedsNineTenths) {
   constexpr double kBetweenPictures = 1e-4;
   forEachCamera([&](const Box& box, CameraWish wish, Resolution r) {
     wish.framing = Framing::kTurn;
-    const Extent extent = extentOfTurn(box, fitCamera(box, wish, r), r);
+    const Extent extent = extentOfTurn(box, wish, r);
     EXPECT_LE(extent.farthest(), kFilledShare + kRounding);
     EXPECT_GE(extent.share(), kFilledShare - kBetweenPictures);
   });
@@ -157,19 +159,28 @@ TEST(Camera, NoPictureOfATurnExceedsNineTenths) {
 
 TEST(Camera, ATurnAboutATiltedAxisStaysInThePicture) {
   for (const Vec3& up : kDirections) {
-    const Camera camera = fitCamera(kBox, {.up = up, .framing = Framing::kTurn}, {});
-    EXPECT_LE(extentOfTurn(kBox, camera, {}).farthest(), kFilledShare + kExact);
+    const Extent extent = extentOfTurn(kBox, {.up = up, .framing = Framing::kTurn}, {});
+    EXPECT_LE(extent.farthest(), kFilledShare + kExact);
   }
 }
 
 TEST(Camera, TheRightEdgeStaysFreeWhereAsked) {
+  // The middle of the part for the box is at -kFree, and its width is a share of 1 - kFree.
   constexpr double kFree = 0.2;
+  constexpr double kHigh = kFilledShare * (1 - kFree) - kFree;
+  constexpr double kLow = -kFilledShare * (1 - kFree) - kFree;
   forEachCamera([&](const Box& box, CameraWish wish, Resolution r) {
     wish.freeRight = kFree;
-    const Extent extent = extentOf(box, fitCamera(box, wish, r), r);
-    // The middle of the free part is at -kFree, and its width is a share of 1 - kFree.
-    EXPECT_LE(extent.high[0], kFilledShare * (1 - kFree) - kFree + kRounding);
-    EXPECT_GE(extent.low[0], -kFilledShare * (1 - kFree) - kFree - kRounding);
+    const Extent still = extentOf(box, fitCamera(box, wish, r), r);
+    EXPECT_LE(still.high[0], kHigh + kRounding);
+    EXPECT_GE(still.low[0], kLow - kRounding);
+    const double tightest = std::max((still.high[0] - still.low[0]) / (kHigh - kLow),
+                                     (still.high[1] - still.low[1]) / (2 * kFilledShare));
+    EXPECT_NEAR(tightest, 1.0, kRounding);
+    wish.framing = Framing::kTurn;
+    const Extent turning = extentOfTurn(box, wish, r);
+    EXPECT_LE(turning.high[0], kHigh + kRounding);
+    EXPECT_GE(turning.low[0], kLow - kRounding);
   });
 }
 
@@ -205,6 +216,10 @@ TEST(Camera, TurnsAboutItsUpAxis) {
   EXPECT_NEAR(quarter.eye[2], 20.0, kExact);
   const Camera once = turned(camera, 360.0);
   for (int a = 0; a < 3; ++a) EXPECT_NEAR(once.eye[a], camera.eye[a], kExact);
+  const Camera half = turned(camera, 180.0, {0, 0, 0});
+  const Vec3 eye{-10, 7, -50}, center{-10, 5, -20};
+  for (int a = 0; a < 3; ++a) EXPECT_NEAR(half.eye[a], eye[a], kExact);
+  for (int a = 0; a < 3; ++a) EXPECT_NEAR(half.center[a], center[a], kExact);
 }
 
 TEST(View, TheMiddlePixelLooksAtTheCenter) {

@@ -31,7 +31,7 @@ struct Resolution {
 /// What decides how large fitCamera shows a box.
 enum class Framing {
   kBox,  ///< the box itself, as the camera sees it
-  /// The box in all pictures of a full turn by turned(). The pictures have the same scale.
+  /// The box in all pictures of a full turn about pivotOf(). The pictures have the same scale.
   kTurn,
   /// The sphere around the box, which touches the edges of the picture. The scale depends neither
   /// on the direction nor on a turn, so that measured speeds are comparable.
@@ -59,13 +59,20 @@ inline constexpr double kFilledShare = 0.9;
 ///
 /// If `center` or `eye` is given, the box is not moved to the middle; the corner that is farthest
 /// from the middle of the picture then takes half of kFilledShare. If the eye of a perspective
-/// camera or the height of an orthographic picture is given, nothing is fitted. In a turn, the box
-/// is moved along the axis only.
+/// camera or the height of an orthographic picture is given, nothing is fitted.
 /// \param box  a box that is not empty
 [[nodiscard]] Camera fitCamera(const Box& box, const CameraWish& wish, Resolution resolution);
 
-/// Turns a camera about the axis through `center` along `up`, counterclockwise as seen from above.
-[[nodiscard]] Camera turned(const Camera& camera, double degrees);
+/// The point about which the pictures of Framing::kTurn turn: the center that was given, or the
+/// middle of the box.
+[[nodiscard]] Vec3 pivotOf(const Box& box, const CameraWish& wish);
+
+/// Turns a camera about the axis through `pivot` along `up`, counterclockwise as seen from above.
+[[nodiscard]] Camera turned(const Camera& camera, double degrees, const Vec3& pivot);
+/// Turns a camera about the point that it looks at.
+[[nodiscard]] inline Camera turned(const Camera& camera, double degrees) {
+  return turned(camera, degrees, camera.center);
+}
 
 /// Validates a camera and a resolution.
 /// \throws UsageError  a number is not finite; eye and center are equal; up has no length or is
