@@ -35,6 +35,7 @@ struct Options {
   double step = 1.0, opacityLength = 1.0;
   std::optional<double> minTransmittance;  ///< default: that of RenderOptions
   std::optional<Rgb> background;           ///< default: the picture is transparent
+  bool legend = false;                     ///< draw a color bar
   int bits = 8;                            ///< bits of a PNG's channel
   std::optional<Between> between;          ///< default: what the ellipsoids were fitted for
   RenderMode mode = RenderMode::kComposite;

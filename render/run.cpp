@@ -17,6 +17,7 @@
 #include "esvr/memory_limit.h"
 #include "render/bench.h"
 #include "render/exr_file.h"
+#include "render/legend.h"
 #include "render/output_files.h"
 #include "render/png_file.h"
 #include "render/scene.h"
@@ -59,19 +60,32 @@ Framing framingOf(const Options& options) {
   return options.turntable == 0 ? Framing::kBox : Framing::kTurn;
 }
 
+TransferFunction transferOf(const Options& options, const Scene& scene) {
+  return options.rangeKind == RangeKind::kOwn ? options.transfer
+                                              : rescaled(options.transfer, rangeOf(options, scene));
+}
+
+/// The color bar that is drawn into pictures; nothing without --legend.
+std::optional<report::ColorBar> barOf(const Options& options, const Scene& scene) {
+  if (!options.legend) return std::nullopt;
+  return legendOf(options, scene, transferOf(options, scene));
+}
+
+/// The camera; if it is fitted, the volume lies beside the color bar.
 Camera cameraOf(const Options& options, const Scene& scene) {
+  const Resolution r = options.resolution;
   CameraWish wish = options.camera;
   wish.framing = framingOf(options);
-  return fitCamera(scene.box, wish, options.resolution);
+  if (const auto bar = barOf(options, scene))
+    wish.freeRight = report::colorBarShare(*bar, r.width, r.height);
+  return fitCamera(scene.box, wish, r);
 }
 
 RenderOptions renderOptions(const Options& options, const Scene& scene) {
   RenderOptions r;
   r.resolution = options.resolution;
   r.camera = cameraOf(options, scene);
-  r.transfer = options.rangeKind == RangeKind::kOwn
-                   ? options.transfer
-                   : rescaled(options.transfer, rangeOf(options, scene));
+  r.transfer = transferOf(options, scene);
   r.step = options.step;
   r.opacityLength = options.opacityLength;
   r.minTransmittance = options.minTransmittance.value_or(r.minTransmittance);
@@ -125,7 +139,8 @@ class Frames {
       : options_(options),
         log_(kProgram, options.verbosity),
         drawing_(drawing),
-        reference_(reference) {
+        reference_(reference),
+        bar_(barOf(options, drawing.scene)) {
     if (report::isVideo(options.output))
       video_.emplace(options.output, videoForm(options, commandText()), cancel);
   }
@@ -135,7 +150,7 @@ class Frames {
     const Image image = drawing_.renderer->draw(r);
     const double seconds = watch.lap();
     if (video_)
-      video_->add(image), ++pictures_;
+      video_->add(withBar(image)), ++pictures_;
     else
       keep(image, r, files, seconds);
     if (!files.depth.empty()) drawDepth(r, files.depth);
@@ -152,9 +167,15 @@ class Frames {
 
  private:
   void keep(const Image& image, const RenderOptions& r, const PictureFiles& files, double seconds) {
-    write(files.picture, image, options_.background);
+    write(files.picture, withBar(image), options_.background);
     log_.info(summary(files.picture, drawing_.scene, r.resolution, seconds));
     if (reference_ != nullptr) compare(r, image, files);
+  }
+
+  /// The picture as it is shown; figures are measured without the color bar.
+  [[nodiscard]] Image withBar(Image image) const {
+    if (bar_) report::drawColorBar(*bar_, image);
+    return image;
   }
 
   void drawDepth(RenderOptions r, const fs::path& file) {
@@ -188,7 +209,8 @@ class Frames {
     const Image error = errorMap(expected, image, kGain);
     write(errorName(files.picture), error, std::nullopt);
     if (!files.sheet.empty())
-      write(files.sheet, sideBySide(std::array{image, expected, error}), options_.background);
+      write(files.sheet, sideBySide(std::array{withBar(image), expected, error}),
+            options_.background);
     log_.info(errorName(files.picture).string() + ": PSNR " + cli::shortNumber(m.psnr) +
               " dB, SSIM " + cli::shortNumber(m.ssim) + ", largest error " +
               cli::shortNumber(m.maxError));
@@ -202,6 +224,7 @@ class Frames {
   const cli::Log log_;
   Drawing& drawing_;
   Drawing* reference_;
+  const std::optional<report::ColorBar> bar_;
   std::optional<report::VideoFile> video_;
   int pictures_ = 0;  ///< pictures of the video
   cli::Stopwatch watch_;

@@ -111,6 +111,7 @@ Table renderTests() {
           {"--grid", "EsvrRender.TheGridThatIsNamedIsDrawn"},
           {"--height", "EsvrRender.ACameraFileIsReplacedByOptions"},
           {"--help", "EsvrRender.HelpNamesEveryBuiltInFunction"},
+          {"--legend", "EsvrRenderLegend.IsRefusedWhereItCannotBeDrawn"},
           {"--max-memory", "EsvrRender.PicturesBeyondTheMemoryAllowedAreRefused"},
           {"--max-vram", "EsvrRender.PartsOfTheDepthAndMemoryChangeNothingOnGpu"},
           {"--method", "EsvrRender.BricksAreTheVoxelsOfTheSum"},
