@@ -17,9 +17,9 @@ constexpr double kBarShare = 0.56;         // height of the bar, relative to the
 constexpr double kLegible = 5.0;           // pixels; smaller texts are left out
 
 // Lengths in heights of the text.
-constexpr double kMargin = 0.8, kPadding = 0.8, kGap = 0.35, kTickLength = 0.35;
-constexpr double kColors = 1.1, kOpacities = 0.7, kSquare = kOpacities / 2.0, kLine = 1.35;
-constexpr double kTickDistance = 2.6, kMaxName = 9.0, kHair = 0.07, kRounded = 0.4;
+constexpr double kPanelMargin = 0.8, kPanelPadding = 0.8, kGap = 0.35, kTickLength = 0.35;
+constexpr double kColors = 1.1, kOpacities = 0.7, kSquare = kOpacities / 2.0, kLineHeight = 1.35;
+constexpr double kTickDistance = 2.6, kMaxName = 9.0, kHairline = 0.07, kRounded = 0.4;
 
 using Color = std::array<double, 3>;
 constexpr Color kDarkInk{0.12, 0.12, 0.12}, kLightInk{0.92, 0.92, 0.92};
@@ -103,10 +103,10 @@ struct Layout {
     for (const Tick& tick : ticks) labels = std::max(labels, letters.width(tick.label, kPlain));
     const double heading = std::max(letters.width(name, kBold), letters.width(unit, kPlain));
     panel = std::max(heading, (kColors + kOpacities + kTickLength + kGap) * text + labels) +
-            2.0 * kPadding * text;
+            2.0 * kPanelPadding * text;
   }
   /// Width of the panel and the margins beside it.
-  [[nodiscard]] double strip() const { return panel + 2.0 * kMargin * text; }
+  [[nodiscard]] double strip() const { return panel + 2.0 * kPanelMargin * text; }
   [[nodiscard]] bool legible() const { return text >= kLegible; }
 
   double text;  ///< height of the text in pixels
@@ -146,15 +146,15 @@ class BarPainter {
         cr_(cairo_create(surface.get())),
         letters_(cr_.get(), layout.text),
         ink_(inkOn(bar.background)),
-        hair_(std::max(1.0, std::round(kHair * layout.text))) {
+        hair_(std::max(1.0, std::round(kHairline * layout.text))) {
     const double height = cairo_image_surface_get_height(surface.get());
-    const double text = layout.text, heading = (bar.unit.empty() ? 1.0 : 2.0) * kLine * text;
-    panel_ = {cairo_image_surface_get_width(surface.get()) - kMargin * text - layout.panel, 0.0,
-              layout.panel,
-              std::round(kBarShare * height) + heading + (2.0 * kPadding + kGap) * text};
+    const double text = layout.text, heading = (bar.unit.empty() ? 1.0 : 2.0) * kLineHeight * text;
+    panel_ = {cairo_image_surface_get_width(surface.get()) - kPanelMargin * text - layout.panel,
+              0.0, layout.panel,
+              std::round(kBarShare * height) + heading + (2.0 * kPanelPadding + kGap) * text};
     panel_.y = (height - panel_.height) / 2;
-    colors_ = {std::round(panel_.x + kPadding * text),
-               std::round(panel_.y + kPadding * text + heading + kGap * text),
+    colors_ = {std::round(panel_.x + kPanelPadding * text),
+               std::round(panel_.y + kPanelPadding * text + heading + kGap * text),
                std::round(kColors * text), std::round(kBarShare * height)};
     opacities_ = colors_;
     opacities_.x += colors_.width;
@@ -231,10 +231,10 @@ class BarPainter {
   }
 
   void paintTexts() {
-    const double x = panel_.x + kPadding * layout_.text;
-    const double y = panel_.y + (kPadding + 0.8) * layout_.text;
+    const double x = panel_.x + kPanelPadding * layout_.text;
+    const double y = panel_.y + (kPanelPadding + 0.8) * layout_.text;
     letters_.show(layout_.name, kBold, x, y);
-    letters_.show(layout_.unit, kPlain, x, y + kLine * layout_.text);
+    letters_.show(layout_.unit, kPlain, x, y + kLineHeight * layout_.text);
     for (const Tick& tick : layout_.ticks) paintTick(tick);
   }
 
