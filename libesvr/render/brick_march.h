@@ -154,7 +154,7 @@ ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
       }
     }
     if (values == nullptr) {
-      i += march::samplesToLeave(place, samples.apart, found.low, found.side);
+      i += march::samplesToLeave(place, samples.perVoxel, found.low, found.side);
       continue;
     }
     const float value = interpolate(values, place, cell);

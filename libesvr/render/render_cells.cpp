@@ -5,6 +5,7 @@
 
 #include "render/picture.h"
 #include "render/scene_depth.h"
+#include "render/tile_ranges.h"
 
 namespace esvr {
 namespace {
@@ -22,31 +23,64 @@ MarchScene sceneOf(const LazyCells& cells, const RenderOptions& o, const Picture
   return scene;
 }
 
-PixelColor pixelOf(const LazyCells& cells, const MarchScene& scene, int column, int row) {
-  RayProgress ray;
-  AllBricksAreThere visitor;
-  (void)marchBricks(cells.table().view(), LazySlots{cells}, scene,
-                    samplesOf(scene, column, row, SampleRange::all()), ray, visitor);
-  return scene.rule.finished(ray.ray);
-}
+class CellPicture {
+ public:
+  CellPicture(const LazyCells& cells, const RenderOptions& options, Picture& picture)
+      : cells_(cells),
+        scene_(sceneOf(cells, options, picture)),
+        view_{scene_.view, options.resolution, options.step, firstSample(options.step)},
+        ranges_(view_, cells.table().bricks),
+        picture_(picture) {}
+
+  [[nodiscard]] const TileRanges& tiles() const { return ranges_; }
+
+  void drawTile(int tileColumn, int tileRow) const {
+    const TileSamples range = ranges_.at(tileColumn, tileRow);
+    if (range.last < range.first) return;
+    constexpr int kSide = TileRanges::kSide;
+    const int pastColumn = std::min((tileColumn + 1) * kSide, view_.resolution.width);
+    const int pastRow = std::min((tileRow + 1) * kSide, view_.resolution.height);
+    for (int row = tileRow * kSide; row < pastRow; ++row)
+      for (int column = tileColumn * kSide; column < pastColumn; ++column)
+        picture_.set(column, row, pixel(column, row, range));
+  }
+
+ private:
+  [[nodiscard]] double firstSample(double step) const {
+    const BinRange bins = binsWithin(scene_.box, scene_.view, step);
+    checkRayLength(bins);
+    return double(bins.first) * kBinSamples;
+  }
+  [[nodiscard]] PixelColor pixel(int column, int row, const TileSamples& range) const {
+    const MarchSamples samples = samplesOf(
+        scene_, column, row, {view_.firstSample + range.first, view_.firstSample + range.last});
+    RayProgress ray;
+    AllBricksAreThere visitor;
+    (void)marchBricks(cells_.table().view(), LazySlots{cells_}, scene_, samples, ray, visitor);
+    return scene_.rule.finished(ray.ray);
+  }
+
+  const LazyCells& cells_;
+  MarchScene scene_;
+  CoverView view_;
+  TileRanges ranges_;
+  Picture& picture_;
+};
 
 }  // namespace
 
 Image renderCells(const LazyCells& cells, const RenderOptions& options) {
-  constexpr int kTile = 16;  // pixels; neighbouring rays read the same bricks
   Picture picture(options);
   if (cells.table().bricks.empty()) return picture.take();
-  const MarchScene scene = sceneOf(cells, options, picture);
-  checkRayLength(binsWithin(scene.box, scene.view, options.step));
-  const Resolution r = options.resolution;
-  tbb::parallel_for(tbb::blocked_range2d<int>(0, r.height, kTile, 0, r.width, kTile),
-                    [&](const tbb::blocked_range2d<int>& tile) {
-                      checkCancelled(options);
-                      for (int row = tile.rows().begin(); row != tile.rows().end(); ++row)
-                        for (int column = tile.cols().begin(); column != tile.cols().end();
-                             ++column)
-                          picture.set(column, row, pixelOf(cells, scene, column, row));
-                    });
+  const CellPicture drawing(cells, options, picture);
+  using Tiles = tbb::blocked_range2d<int>;
+  tbb::parallel_for(
+      Tiles(0, drawing.tiles().rows(), 0, drawing.tiles().columns()), [&](const Tiles& tiles) {
+        checkCancelled(options);
+        for (int row = tiles.rows().begin(); row != tiles.rows().end(); ++row)
+          for (int column = tiles.cols().begin(); column != tiles.cols().end(); ++column)
+            drawing.drawTile(column, row);
+      });
   return picture.take();
 }
 

@@ -86,6 +86,9 @@ TEST(RenderCells, DrawsTheVoxelsPictureAtEveryZoom) {
   for (const double times : {0.02, 0.3, 2.0, 10.0, 100.0}) {
     RenderOptions o = optionsFor(orthographic());
     o.camera.height *= times;
+    // Samples may lie exactly at voxels here. Rounding then decides whether a sample beside a voxel
+    // of the background is empty, which must not matter.
+    o.transfer.opacity = {{-1.0, 1.0}, {0.0, 0.0}, {1.0, 1.0}};
     EXPECT_GE(imagePsnr(renderVolume(revoxelise(field, {}), o), renderField(field, o)), kAsked)
         << times;
   }

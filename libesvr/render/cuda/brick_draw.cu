@@ -2,9 +2,9 @@
 
 #include <climits>
 
-#include "core/cell_corner.h"
 #include "core/cuda/reduce.cuh"
 #include "core/cuda/thread_number.cuh"
+#include "render/brick_cover.h"
 
 namespace esvr::cuda {
 namespace {
@@ -22,84 +22,37 @@ __global__ void clearRanges(int2* ranges, int tiles) {
 /// Lanes that look at a brick together, one for each corner.
 constexpr int kLanes = kCellCorners;
 
-/// The part of the picture that a brick of cells may cover, and the samples that lie in it.
-struct Cover {
-  float firstColumn, lastColumn, firstRow, lastRow;  ///< pixels
-  int first, last;                                   ///< samples, counted from firstSample
-};
-
-__device__ Vec3 cornerOf(const Coord& brick, int corner) {
-  const Coord step = stepToCorner(corner);
-  return {double((brick.x + step.x) * kBrickSide), double((brick.y + step.y) * kBrickSide),
-          double((brick.z + step.z) * kBrickSide)};
-}
-
-__device__ double distanceTo(const Coord& brick, const Vec3& eye) {
-  const Vec3 low = cornerOf(brick, 0), high = cornerOf(brick, kCellCorners - 1);
-  double squares = 0.0;
-  for (int a = 0; a < 3; ++a) {
-    const double away = fmax(fmax(low[a] - eye[a], eye[a] - high[a]), 0.0);
-    squares += away * away;
-  }
-  return sqrt(squares);
-}
-
-/// \param along  distance from the eye; orthographic: from its plane
-__device__ int sampleAt(const BrickDrawArguments& a, double along) {
-  return int(floor(along / a.scene.step - a.firstSample));
-}
-
-/// The cover of one corner. If it lies behind the eye, it cannot be projected, and the result is
-/// the whole picture.
-__device__ Cover coverOfCorner(const BrickDrawArguments& a, const Vec3& corner) {
-  const View& view = a.scene.view;
-  const Vec3 seen = view.coordinates(difference(corner, view.eye));
-  const double along = view.perspective ? sqrt(inner(seen, seen)) : seen[2];
-  const int sample = sampleAt(a, along);
-  constexpr float kAll = 1e9f;
-  if (view.perspective && !(seen[2] > 1e-3)) return {-kAll, kAll, -kAll, kAll, sample, sample + 1};
-  const double scale = view.perspective ? 1.0 / seen[2] : 1.0;
-  const auto column = float(view.columnAt(seen[0] * scale));
-  const auto row = float(view.rowAt(seen[1] * scale));
-  return {column, column, row, row, sample, sample + 1};
+__device__ CoverView coverView(const BrickDrawArguments& a) {
+  return {a.scene.view, a.resolution, a.scene.step, a.firstSample};
 }
 
 /// The cover of a brick, on all lanes of its group.
-__device__ Cover coverOf(const BrickDrawArguments& a, const Coord& brick) {
-  const Cover own = coverOfCorner(a, cornerOf(brick, int(threadIdx.x) % kLanes));
-  const auto least = [](auto v) {
-    return reduceLanes<kLanes>(v, [](auto x, auto y) { return x < y ? x : y; });
+__device__ BrickCover coverOf(const CoverView& v, const Coord& brick) {
+  const BrickCover own = coverOfCorner(v, brick, int(threadIdx.x) % kLanes);
+  const auto least = [](auto n) {
+    return reduceLanes<kLanes>(n, [](auto x, auto y) { return x < y ? x : y; });
   };
-  const auto largest = [](auto v) {
-    return reduceLanes<kLanes>(v, [](auto x, auto y) { return x < y ? y : x; });
+  const auto largest = [](auto n) {
+    return reduceLanes<kLanes>(n, [](auto x, auto y) { return x < y ? y : x; });
   };
-  const View& view = a.scene.view;
-  const int first = view.perspective ? sampleAt(a, distanceTo(brick, view.eye)) : least(own.first);
   return {least(own.firstColumn),
           largest(own.lastColumn),
           least(own.firstRow),
           largest(own.lastRow),
-          first,
+          v.view.perspective ? firstSampleOf(v, brick) : least(own.first),
           largest(own.last)};
 }
 
-__device__ int tileAt(float pixel, int count) {
-  return int(floorf(fminf(fmaxf(pixel, 0.0f), float(count - 1)))) / kSide;
-}
-
 /// Widens the sample ranges of the tiles that a cover meets. The lanes of a group share them.
-__device__ void widen(const BrickDrawArguments& a, const Cover& c) {
-  constexpr float kHalf = 0.5f;  // a pixel reaches half a pixel to each side of its middle
-  const int tileColumns = tilesAlong(a.resolution.width);
-  const int firstColumn = tileAt(c.firstColumn - kHalf, a.resolution.width);
-  const int lastColumn = tileAt(c.lastColumn + kHalf, a.resolution.width);
-  const int firstRow = max(tileAt(c.firstRow - kHalf, a.resolution.height), a.firstTileRow);
-  const int lastRow =
-      min(tileAt(c.lastRow + kHalf, a.resolution.height), a.firstTileRow + a.tileRows - 1);
-  const int columns = lastColumn - firstColumn + 1, rows = lastRow - firstRow + 1;
-  for (int n = int(threadIdx.x) % kLanes; n < columns * rows; n += kLanes) {
-    const int row = firstRow + n / columns - a.firstTileRow, column = firstColumn + n % columns;
-    int2& range = a.ranges[row * tileColumns + column];
+__device__ void widen(const BrickDrawArguments& a, const CoverView& v, const BrickCover& c) {
+  CoveredTiles tiles = tilesOf(v, c, kSide);
+  const int past = min(tiles.firstRow + tiles.rows, a.firstTileRow + a.tileRows);
+  tiles.firstRow = max(tiles.firstRow, a.firstTileRow);
+  const int count = tiles.columns * (past - tiles.firstRow);
+  for (int n = int(threadIdx.x) % kLanes; n < count; n += kLanes) {
+    const int row = tiles.firstRow - a.firstTileRow + n / tiles.columns;
+    int2& range =
+        a.ranges[row * tilesAlong(a.resolution.width) + tiles.firstColumn + n % tiles.columns];
     atomicMin(&range.x, c.first);
     atomicMax(&range.y, c.last);
   }
@@ -110,11 +63,8 @@ __device__ void widen(const BrickDrawArguments& a, const Cover& c) {
 __global__ void __launch_bounds__(kThreads) findRanges(const BrickDrawArguments a) {
   const std::size_t brick = threadNumber() / kLanes;
   if (brick >= a.count || a.slots.slot(std::uint32_t(brick)) == BrickSlotsView::kVacant) return;
-  const Cover c = coverOf(a, a.bricks[brick]);
-  const bool seen = c.last >= sampleAt(a, 0.0) && c.lastColumn >= -0.5f && c.lastRow >= -0.5f &&
-                    c.firstColumn <= float(a.resolution.width) &&
-                    c.firstRow <= float(a.resolution.height);
-  if (seen) widen(a, c);
+  const CoverView view = coverView(a);
+  widen(a, view, coverOf(view, a.bricks[brick]));
 }
 
 /// Asks for missing bricks.
