@@ -101,7 +101,7 @@ ESVR_HD inline PixelColor marchBricks(const BrickAtlasView& atlas, const MarchSc
     }
     const float value =
         interpolate(atlas.values + std::size_t(found.brick) * kCellBrickVoxels, place, cell);
-    if (value != scene.rule.background) scene.rule.add(ray, value, samples.number + float(i));
+    if (value != scene.rule.background) scene.rule.add(ray, value, samples.numberOf(i));
     ++i;
   }
   return scene.rule.finished(ray);

@@ -30,68 +30,44 @@ __device__ WindowPlace firstPlace(const Pass& pass, const SampledRay& ray, doubl
   return inAxes(difference(sum(ray.origin, scaled(ray.apart, number)), corner), axes);
 }
 
-/// The samples of a ray that one thread takes, counted from the block's first.
-struct Share {
-  int first, end;
-};
-/// The groups divide the samples of a ray among them. In RenderMode::kDepth the first group takes
-/// all, because that mode must stop at a sample that depends on all samples before it.
-__device__ Share shareOf(const VoxelArguments& a, const Pass& pass, const Place& place) {
-  const int samples = pass.block.samples;
-  if (a.draw.rule.mode == RenderMode::kDepth) return {0, place.group == 0 ? samples : 0};
-  const int each = (samples + kGroups - 1) / kGroups, first = min(place.group * each, samples);
-  return {first, min(first + each, samples)};
-}
-
 __device__ bool hasRay(const Pass& pass, const Place& place) {
   const Block& b = pass.block;
   return place.column >= b.column && place.column < b.column + b.columns && place.row >= b.row &&
          place.row < b.row + b.rows;
 }
 
-/// Adds the thread's share of the samples to a ray.
+/// Adds a share of a pass' samples to a ray. Samples count from the block's first.
 __device__ void addSamples(const VoxelArguments& a, const VoxelShared& s, const Place& place,
-                           const Work& work, int bin, RayState& ray) {
+                           const Work& work, int bin, const Share& share, RayState& ray) {
   const SampleRule& rule = a.draw.rule;
   const Pass& pass = s.pass;
-  const Share share = shareOf(a, pass, place);
   const double toFrame = double(a.draw.frame.firstBin) * kBinSamples;
   const WindowPlace first =
       firstPlace(pass, s.rays[place.ray], toFrame + double(bin) * kBinSamples);
   const WindowPlace apart = inAxes(s.rays[place.ray].apart, pass.window.axes);
   const auto* const values = reinterpret_cast<const float*>(s.values);
   const unsigned long long filled = s.filled, near = filled | filled >> 1;
-  const float ofBin = float(bin * kBinSamples + pass.block.firstSample);
+  const int ofBin = bin * kBinSamples + pass.block.firstSample;
   for (int i = share.first; i < share.end && rule.open(ray); ++i) {
     const float n = float(i);
     const WindowPlace p{first.slab + n * apart.slab, first.row + n * apart.row,
                         first.column + n * apart.column};
-    const float number = ofBin + n;
+    const float number = float(ofBin + i);
     if ((near >> wholeBelow(p.slab) & 1u) == 0) continue;
     if (!(number >= work.firstSample && number <= work.lastSample)) continue;
     const float value = interpolate(values, s.slabs, pass.window.columns, p);
-    if (value != rule.background) rule.add(ray, value, float(toFrame) + number);
+    if (value != rule.background)
+      rule.add(ray, value, {float(toFrame) + number, std::uint32_t(ofBin + i)});
   }
 }
 
-/// Draws the samples of a pass. Each group takes the samples behind those of the group before it;
-/// the first group then joins their results from front to back.
+/// Draws the samples of a pass.
 __device__ void drawSamples(const VoxelArguments& a, VoxelShared& s, const Place& place,
                             const Work& work, int bin, RayState& ray) {
   const bool own = hasRay(s.pass, place) && isOpen(s, place);
-  RayState part = place.group == 0 ? ray : RayState{};
-  if (own) addSamples(a, s, place, work, bin, part);
-  if (place.group == 0)
-    ray = part;
-  else if (own)
-    s.behind[place.group - 1][place.ray] = part;
-  __syncthreads();
-  if (place.group != 0) return;
-  if (own && a.draw.rule.mode != RenderMode::kDepth)
-    for (int g = 0; g < kGroups - 1 && a.draw.rule.open(ray); ++g)
-      a.draw.rule.join(ray, s.behind[g][place.ray]);
-  const unsigned open = __ballot_sync(kAllLanes, work.inPicture && a.draw.rule.open(ray));
-  if (place.lane == 0) s.openRays[place.half] = open;
+  addInShares(
+      a.draw.rule, s, s.behind, place, work, own, s.pass.block.samples, ray,
+      [&](const Share& share, RayState& part) { addSamples(a, s, place, work, bin, share, part); });
 }
 
 __device__ void drawBin(const VoxelArguments& a, VoxelShared& s, const Place& place,

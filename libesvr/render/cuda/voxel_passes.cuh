@@ -53,8 +53,8 @@ struct VoxelShared : WorkShared {
   int values[DrawTuning::kWindowVoxels];
   WindowSlab slabs[DrawTuning::kWindowSlabs];
   SampledRay rays[kRays];
-  RayState behind[kGroups - 1][kRays];  ///< samples of each ray taken by all groups but the first
-  unsigned long long filled;            ///< bit s is set if an ellipsoid reaches slab s
+  BehindShares behind;
+  unsigned long long filled;  ///< bit s is set if an ellipsoid reaches slab s
   RayBundle ofTile, ofBlock;
   Block blocks[kMaxBlocks];  ///< stack of the blocks that are not drawn yet
   int left;
