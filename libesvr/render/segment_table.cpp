@@ -10,7 +10,7 @@
 namespace esvr {
 namespace {
 
-constexpr int kIntervals = SegmentTableView::kIntervals;
+constexpr int kIntervals = SegmentSpan::kIntervals;
 constexpr int kExtinction = SegmentEntry::kExtinction;
 constexpr int kSamplesOfInterval = 4;  // values at which an interval is sampled
 

@@ -33,12 +33,44 @@ struct alignas(16) SegmentEntry {
   float mean[kChannels];            ///< mean over the interval
 };
 
-/// Pointers to a table in host or device memory. Places count intervals from the table's lowest
-/// value. Interval n ends at place n; the first and the last have no other end, because the
-/// transfer function is constant there.
-struct SegmentTableView {
+/// The values between two places of a table. Places count intervals from the table's lowest value.
+/// Interval n ends at place n; the first and the last have no other end, because the transfer
+/// function is constant there.
+///
+/// The parts in the first and in the last interval are summed by themselves, so that integrals are
+/// subtracted only where at least one whole interval lies between them.
+struct SegmentSpan {
   static constexpr int kIntervals = 4096;
-  static constexpr int kEntries = kIntervals + 2;
+
+  const SegmentEntry *first, *next, *last;  ///< next: the end of the first, or the same as the last
+  float inFirst, inLast;                    ///< shares of the span
+  float ofWhole;                            ///< share of a whole interval
+
+  ESVR_HD SegmentSpan(const SegmentEntry* entries, float a, float b) {
+    constexpr float kSame = 1e-6f;  // closer places have no values between them
+    const float from = a < b ? a : b, to = a < b ? b : a;
+    const int i = intervalAt(from), j = intervalAt(to);
+    const bool same = i == j || to - from < kSame;
+    first = entries + i, last = entries + j, next = same ? last : first + 1;
+    ofWhole = same ? 1.0f : 1.0f / (to - from);
+    inFirst = same ? 0.0f : (float(i) - from) * ofWhole;
+    inLast = same ? 1.0f : (to - float(j - 1)) * ofWhole;
+  }
+  /// \param unit  what one unit of the integrals stands for
+  [[nodiscard]] ESVR_HD float mean(int channel, float unit) const {
+    return inFirst * first->mean[channel] + inLast * last->mean[channel] +
+           float(last->before[channel] - next->before[channel]) * (unit * ofWhole);
+  }
+
+ private:
+  ESVR_HD static int intervalAt(float place) {
+    if (place < 0.0f) return 0;
+    return place < float(kIntervals) ? int(place) + 1 : kIntervals + 1;
+  }
+};
+
+/// Pointers to a table in host or device memory.
+struct SegmentTableView {
   /// Stands for the infinite extinction of an opacity of 1. A segment is opaque to within rounding
   /// if a quarter of it has this extinction.
   static constexpr float kMaxExtinction = 64.0f;
@@ -54,69 +86,37 @@ struct SegmentTableView {
   [[nodiscard]] ESVR_HD PixelColor operator()(float a, float b) const {
     if (!(a == a) || !(b == b)) return nan;
     const float from = placeOf(a), to = placeOf(b);
-    const Means whole = meansOver(from, to);
-    const float extinction = whole.of[SegmentEntry::kExtinction];
-    if (extinction <= kThin || from == to) return lightOf(whole, 1.0f);
     const float pieces =
-        std::ceil(extinction < kThin * kMaxPieces ? extinction / kThin : kMaxPieces);
-    return composited(from, (to - from) / pieces, int(pieces));
+        piecesOf(SegmentSpan(entries, from, to).mean(SegmentEntry::kExtinction, unit));
+    PixelColor all{0.0f, 0.0f, 0.0f, 0.0f};
+    const float length = 1.0f / pieces, apart = (to - from) * length;
+    for (float p = 0.0f; p < pieces; ++p)
+      addBehind(all, SegmentSpan(entries, from + p * apart, from + (p + 1.0f) * apart), length);
+    return all;
   }
 
  private:
-  struct Means {
-    float of[SegmentEntry::kChannels];
-  };
-  /// Places closer to each other than this have no segment between them, only a value.
-  static constexpr float kSame = 1e-6f;
-  /// Extinction of a piece, and largest number of pieces of a segment.
-  static constexpr float kThin = 0.5f, kMaxPieces = 16.0f;
-
   /// Values far beyond the table are as good as values a little beyond it, but are finite.
   [[nodiscard]] ESVR_HD float placeOf(float value) const {
     constexpr float kFar = 1e9f;
     const float place = (value - low) * scale;
     return place < -kFar ? -kFar : (place > kFar ? kFar : place);
   }
-  ESVR_HD static int intervalAt(float place) {
-    if (place < 0.0f) return 0;
-    return place < float(kIntervals) ? int(place) + 1 : kIntervals + 1;
+  ESVR_HD static float piecesOf(float extinction) {
+    constexpr float kThin = 0.5f, kMost = 16.0f;
+    if (!(extinction > 0.0f)) return 0.0f;
+    return extinction < kThin * kMost ? std::ceil(extinction / kThin) : kMost;
   }
-  [[nodiscard]] ESVR_HD Means meansOver(float a, float b) const {
-    return a < b ? meansUpwards(a, b) : meansUpwards(b, a);
-  }
-  /// The parts of the segment in its first and in its last interval are summed by themselves, so
-  /// that integrals are subtracted only where at least one whole interval lies between them.
-  [[nodiscard]] ESVR_HD Means meansUpwards(float from, float to) const {
-    const int i = intervalAt(from), j = intervalAt(to);
-    const bool same = i == j || to - from < kSame;
-    const SegmentEntry &first = entries[i], &last = entries[j], &next = entries[same ? j : i + 1];
-    const float inverse = same ? 1.0f : 1.0f / (to - from);
-    const float inFirst = same ? 0.0f : (float(i) - from) * inverse;
-    const float inLast = same ? 1.0f : (to - float(j - 1)) * inverse;
-    Means means;
-    for (int c = 0; c < SegmentEntry::kChannels; ++c)
-      means.of[c] = inFirst * first.mean[c] + inLast * last.mean[c] +
-                    float(last.before[c] - next.before[c]) * (unit * inverse);
-    return means;
-  }
-  /// \param length  length of the segment in steps
-  ESVR_HD static PixelColor lightOf(const Means& means, float length) {
-    const float extinction = means.of[SegmentEntry::kExtinction];
-    if (!(extinction > 0.0f)) return {0.0f, 0.0f, 0.0f, 0.0f};
-    const float alpha = -std::expm1(-extinction * length), share = alpha / extinction;
-    return {means.of[0] * share, means.of[1] * share, means.of[2] * share, alpha};
-  }
-  [[nodiscard]] ESVR_HD PixelColor composited(float from, float apart, int pieces) const {
-    const float length = 1.0f / float(pieces);
-    PixelColor all{0.0f, 0.0f, 0.0f, 0.0f};
-    for (int p = 0; p < pieces; ++p) {
-      const float begin = from + float(p) * apart;
-      const PixelColor piece = lightOf(meansOver(begin, begin + apart), length);
-      const float left = 1.0f - all.alpha;
-      all.r += left * piece.r, all.g += left * piece.g, all.b += left * piece.b;
-      all.alpha += left * piece.alpha;
-    }
-    return all;
+  /// \param length  length of the piece in steps
+  ESVR_HD void addBehind(PixelColor& all, const SegmentSpan& piece, float length) const {
+    const float extinction = piece.mean(SegmentEntry::kExtinction, unit);
+    if (!(extinction > 0.0f)) return;
+    const float alpha = (1.0f - all.alpha) * -std::expm1(-extinction * length);
+    const float share = alpha / extinction;
+    all.r += share * piece.mean(0, unit);
+    all.g += share * piece.mean(1, unit);
+    all.b += share * piece.mean(2, unit);
+    all.alpha += alpha;
   }
 };
 

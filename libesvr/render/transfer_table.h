@@ -18,7 +18,7 @@ struct alignas(16) Classified {
 
 /// Pointers to the tables in host or device memory.
 struct TransferTableView {
-  static constexpr int kIntervals = SegmentTableView::kIntervals;
+  static constexpr int kIntervals = SegmentSpan::kIntervals;
   static constexpr float kNoExtent = 0.0f;
 
   const Classified* entries;  ///< kIntervals + 1 entries
