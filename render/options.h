@@ -39,6 +39,7 @@ struct Options {
   int bits = 8;                            ///< bits of a PNG's channel
   std::optional<Between> between;          ///< default: what the ellipsoids were fitted for
   RenderMode mode = RenderMode::kComposite;
+  Classification classification = Classification::kPreIntegrated;
   std::optional<PlaceBox> clip;
   int turntable = 0;             ///< number of pictures of a full turn; 0: one picture
   int firstFrame = 0;            ///< first picture of the turn to draw

@@ -83,6 +83,14 @@ RenderMode modeOf(const Arguments& a) {
                                   {"average", RenderMode::kAverage}});
 }
 
+/// A slice is about one sample thick, so that its color shall be that of the sample's value.
+Classification classificationOf(const Arguments& a) {
+  const auto word = a.find<std::string>("classification");
+  return cli::choose<Classification>(
+      "classification", word.value_or(a.has("slice") ? "post" : "pre"),
+      {{"pre", Classification::kPreIntegrated}, {"post", Classification::kPost}});
+}
+
 }  // namespace
 
 void addPictureOptions(cli::po::options_description& options) {
@@ -103,6 +111,10 @@ void addPictureOptions(cli::po::options_description& options) {
     ("mode", value<std::string>()->value_name("M")->default_value("composite"),
      "composite: composite the samples of a ray from front to back; maximum or average: show the "
      "largest or the mean value of the samples")
+    ("classification", value<std::string>()->value_name("C"),
+     "pre: integrate the transfer function over the values from each sample of a ray to the next, "
+     "which draws smooth surfaces; post: give each sample the color and opacity of its value, which "
+     "leaves stripes where values change much within a step (default: pre; with --slice, post)")
     ("clip", value<std::string>()->value_name("BOX"),
      "draw only what lies in the box x0,y0,z0,x1,y1,z1")
     ("slice", value<std::string>()->value_name("A=P"),
@@ -122,6 +134,7 @@ void readPictureOptions(const Arguments& a, Options& options) {
   options.legend = legendOf(a, options);
   options.bits = bitsOf(a);
   options.mode = modeOf(a);
+  options.classification = classificationOf(a);
   options.clip = clipOf(a);
   options.depth = a.find<std::string>("depth").value_or("");
 }

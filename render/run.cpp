@@ -90,6 +90,7 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
   r.opacityLength = options.opacityLength;
   r.minTransmittance = options.minTransmittance.value_or(r.minTransmittance);
   r.mode = options.mode;
+  r.classification = options.classification;
   r.between = options.between.value_or(usualBetween(scene));
   r.clip = options.clip;
   return r;

@@ -158,7 +158,7 @@ ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
       continue;
     }
     const float value = interpolate(values, place, cell);
-    if (value != scene.rule.background) scene.rule.add(at.ray, value, samples.number + float(i));
+    if (value != scene.rule.background) scene.rule.add(at.ray, value, samples.numberOf(i));
     ++i;
   }
   return !looksAhead;

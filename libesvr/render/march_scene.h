@@ -32,6 +32,9 @@ struct MarchSamples {
     const float n = float(i);
     return {first.x + n * apart.x, first.y + n * apart.y, first.z + n * apart.z};
   }
+  [[nodiscard]] ESVR_HD SampleNumber numberOf(int i) const {
+    return {number + float(i), std::uint32_t(i)};
+  }
 };
 
 ESVR_HD inline float samplesPerVoxel(float apart) {

@@ -50,7 +50,7 @@ ESVR_HD inline PixelColor marchNano(const nanovdb::NanoGrid<Build>& grid, const 
       }
     }
     const float value = sample(place);
-    if (value != scene.rule.background) scene.rule.add(ray, value, samples.number + float(i));
+    if (value != scene.rule.background) scene.rule.add(ray, value, samples.numberOf(i));
     ++i;
   }
   return scene.rule.finished(ray);

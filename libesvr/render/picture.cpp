@@ -36,7 +36,7 @@ void checkRenderOptions(const RenderOptions& options) {
 
 Picture::Picture(const RenderOptions& options)
     : view(checked(options).camera, options.resolution),
-      table(options.transfer, opacitySteps(options)),
+      table(options.transfer, samplingOf(options)),
       image_{options.resolution.width, options.resolution.height, {}} {
   image_.rgba.resize(std::size_t(4) * std::size_t(image_.width) * std::size_t(image_.height));
 }

@@ -52,7 +52,7 @@ class RayMarch {
     const VoxelSampler::Corners* corners = sampler_.find(brick);
     if (corners == nullptr) return behindBrick(ray, brick, sample, options_.step);
     const float value = sampler_.interpolate(*corners, cell);
-    if (value != rule_.background) rule_.add(state, value, float(sample));
+    if (value != rule_.background) rule_.add(state, value, sampleNumber(sample));
     return sample + 1.0;
   }
 

@@ -2,25 +2,47 @@
 /// The rule that combines the samples of a ray into a pixel. The code is compiled for host and
 /// device.
 
+#include <cstdint>
+
 #include "esvr/render.h"
 #include "render/transfer_table.h"
 
 namespace esvr {
 
-/// The state of a ray while its samples are added. The meaning of r, g and b depends on the mode:
+/// A sample's place in the sequence of a ray's samples.
+struct SampleNumber {
+  float fromEye;        ///< number of the sample, counted from the eye
+  std::uint32_t index;  ///< the same modulo 2^32, counted from any sample; consecutive ones differ
+                        ///< by 1
+};
+[[nodiscard]] inline SampleNumber sampleNumber(double fromEye) {
+  return {float(fromEye), std::uint32_t(std::int64_t(fromEye))};
+}
+
+/// The state of a ray, or of a part of it, while its samples are added. The meaning of r, g and b
+/// depends on the mode:
 ///  - kComposite: the color so far, premultiplied by opacity;
 ///  - kMaximum: r is the largest value, g the number of values;
 ///  - kAverage: r is the sum of the values, g their number;
 ///  - kDepth: r is the distance, g is 1 once the distance is known.
+/// With Classification::kPreIntegrated, the first and the last sample that were added are kept. A
+/// part that lies behind other samples leaves out the light before its first sample, because it
+/// depends on them; SampleRule::join() adds it.
 struct alignas(16) RayState {
+  static constexpr std::uint32_t kNone = 0xfffffff0u;  ///< index of no sample
+
   float r = 0.0f, g = 0.0f, b = 0.0f;
   float transmittance = 1.0f;
-};
+  float firstValue = 0.0f, lastValue = 0.0f;
+  std::uint32_t first = 0;  ///< index of the first sample of a part; kNone: there is none yet
+  std::uint32_t last = kNone;
 
-/// The color of a pixel, which is premultiplied except in RenderMode::kDepth, or of a sample, whose
-/// meaning SampleRule::prepared() defines.
-struct alignas(16) PixelColor {
-  float r, g, b, alpha;
+  /// A part of a ray that lies behind other samples.
+  [[nodiscard]] ESVR_HD static RayState behind() {
+    RayState part;
+    part.first = kNone;
+    return part;
+  }
 };
 
 /// The parameters that all rays of a picture share.
@@ -29,6 +51,7 @@ struct SampleRule {
 
   TransferTableView table;
   RenderMode mode;
+  Classification classification;
   float background;  ///< background value of the field or volume
   float minTransmittance;
   float step;
@@ -38,94 +61,103 @@ struct SampleRule {
     return !(ray.transmittance < minTransmittance) && !(mode == RenderMode::kDepth && ray.g > 0.0f);
   }
 
-  /// Turns a value into what add() takes. In kComposite and kDepth it is the value's color, not
-  /// premultiplied. In kMaximum and kAverage, r is the value itself and alpha is 1. A sample with
-  /// an alpha of 0 does not change the ray.
-  [[nodiscard]] ESVR_HD PixelColor prepared(float value) const {
-    if (mode == RenderMode::kMaximum || mode == RenderMode::kAverage)
-      return {value, 0.0f, 0.0f, 1.0f};
-    const Classified c = table(value);
-    return {c.r, c.g, c.b, c.alpha};
-  }
-
-  /// \param number  number of the sample, counted from the eye
-  ESVR_HD void add(RayState& ray, const PixelColor& sample, float number) const {
-    if (sample.alpha == 0.0f) return;
-    switch (mode) {
-      case RenderMode::kComposite:
-        return composite(ray, sample);
-      case RenderMode::kMaximum:
-        if (ray.g == 0.0f || sample.r > ray.r) ray.r = sample.r;
-        ray.g += 1.0f;
-        return;
-      case RenderMode::kAverage:
-        ray.r += sample.r, ray.g += 1.0f;
-        return;
-      case RenderMode::kDepth:
-        ray.transmittance *= 1.0f - sample.alpha;
-        if (ray.transmittance < kHalf) ray.r = number * step, ray.g = 1.0f;
-        return;
+  /// Adds a sample that is not empty space. Samples that are left out are empty space.
+  ESVR_HD void add(RayState& ray, float value, const SampleNumber& number) const {
+    if (mode == RenderMode::kMaximum) return keepLargest(ray, value, 1.0f);
+    if (mode == RenderMode::kAverage) return sumUp(ray, value, 1.0f);
+    if (classification == Classification::kPost) {
+      setDistance(ray, number.fromEye * step);
+      return absorb(ray, premultiplied(table(value)));
     }
-  }
-  ESVR_HD void add(RayState& ray, float value, float number) const {
-    add(ray, prepared(value), number);
+    if (ray.first == RayState::kNone)
+      ray.first = number.index, ray.firstValue = value;
+    else
+      addSegments(ray, value, number);
+    ray.last = number.index, ray.lastValue = value;
   }
 
-  /// Adds the samples that lie behind those of `ray` and were gathered in `behind`. It is not used
-  /// in RenderMode::kDepth, where a ray cannot be divided into parts.
+  /// Adds the samples that lie behind those of `ray` and were gathered in `behind`, a part that
+  /// began as RayState::behind(). It is not used in RenderMode::kDepth, where a ray cannot be
+  /// divided into parts.
   ESVR_HD void join(RayState& ray, const RayState& behind) const {
-    if (mode == RenderMode::kComposite) {
-      ray.r += ray.transmittance * behind.r;
-      ray.g += ray.transmittance * behind.g;
-      ray.b += ray.transmittance * behind.b;
-      ray.transmittance *= behind.transmittance;
-    } else if (mode == RenderMode::kMaximum) {
-      if (behind.g > 0.0f && (ray.g == 0.0f || behind.r > ray.r)) ray.r = behind.r;
-      ray.g += behind.g;
-    } else {
-      ray.r += behind.r, ray.g += behind.g;
-    }
+    if (mode == RenderMode::kMaximum) return keepLargest(ray, behind.r, behind.g);
+    if (mode == RenderMode::kAverage) return sumUp(ray, behind.r, behind.g);
+    if (classification == Classification::kPreIntegrated && !connect(ray, behind)) return;
+    absorb(ray, {behind.r, behind.g, behind.b, 1.0f - behind.transmittance});
   }
 
-  [[nodiscard]] ESVR_HD PixelColor finished(const RayState& ray) const {
-    switch (mode) {
-      case RenderMode::kComposite:
-        return {ray.r, ray.g, ray.b, 1.0f - ray.transmittance};
-      case RenderMode::kMaximum:
-        return ray.g > 0.0f ? colored(ray.r) : PixelColor{0.0f, 0.0f, 0.0f, 0.0f};
-      case RenderMode::kAverage:
-        return ray.g > 0.0f ? colored(ray.r / ray.g) : PixelColor{0.0f, 0.0f, 0.0f, 0.0f};
-      case RenderMode::kDepth:
-        return {ray.r, 0.0f, 0.0f, ray.g};
+  [[nodiscard]] ESVR_HD PixelColor finished(RayState ray) const {
+    if (mode == RenderMode::kMaximum || mode == RenderMode::kAverage) {
+      if (!(ray.g > 0.0f)) return {0.0f, 0.0f, 0.0f, 0.0f};
+      return premultiplied(table(mode == RenderMode::kMaximum ? ray.r : ray.r / ray.g));
     }
-    return {0.0f, 0.0f, 0.0f, 0.0f};
+    leave(ray);
+    if (mode == RenderMode::kDepth) return {ray.g > 0.0f ? ray.r : 0.0f, 0.0f, 0.0f, ray.g};
+    return {ray.r, ray.g, ray.b, 1.0f - ray.transmittance};
   }
 
  private:
-  ESVR_HD static void composite(RayState& ray, const PixelColor& sample) {
-    const float weight = ray.transmittance * sample.alpha;
-    ray.r += weight * sample.r;
-    ray.g += weight * sample.g;
-    ray.b += weight * sample.b;
-    ray.transmittance *= 1.0f - sample.alpha;
-  }
-  [[nodiscard]] ESVR_HD PixelColor colored(float value) const {
-    const Classified c = table(value);
+  ESVR_HD static PixelColor premultiplied(const Classified& c) {
     return {c.r * c.alpha, c.g * c.alpha, c.b * c.alpha, c.alpha};
+  }
+  ESVR_HD static void keepLargest(RayState& ray, float value, float count) {
+    if (count > 0.0f && (ray.g == 0.0f || value > ray.r)) ray.r = value;
+    ray.g += count;
+  }
+  ESVR_HD static void sumUp(RayState& ray, float sum, float count) { ray.r += sum, ray.g += count; }
+  /// Says where the light that is absorbed next ends, which matters in RenderMode::kDepth.
+  ESVR_HD void setDistance(RayState& ray, float distance) const {
+    if (mode == RenderMode::kDepth && ray.g == 0.0f) ray.r = distance;
+  }
+  ESVR_HD void absorb(RayState& ray, const PixelColor& light) const {
+    if (mode == RenderMode::kComposite) {
+      ray.r += ray.transmittance * light.r;
+      ray.g += ray.transmittance * light.g;
+      ray.b += ray.transmittance * light.b;
+    }
+    ray.transmittance *= 1.0f - light.alpha;
+    if (mode == RenderMode::kDepth && ray.transmittance < kHalf) ray.g = 1.0f;
+  }
+  /// Adds the segment from the last sample into the empty space behind it.
+  ESVR_HD void leave(RayState& ray) const {
+    if (ray.last == RayState::kNone) return;
+    setDistance(ray, ray.r + step);
+    absorb(ray, table.segments(ray.lastValue, background));
+  }
+  /// Adds the light between the last sample and the next one that is not empty space.
+  ESVR_HD void addSegments(RayState& ray, float value, const SampleNumber& number) const {
+    const bool consecutive = ray.last != RayState::kNone && number.index == ray.last + 1;
+    if (!consecutive) leave(ray);
+    setDistance(ray, number.fromEye * step);
+    absorb(ray, table.segments(consecutive ? ray.lastValue : background, value));
+  }
+  /// Adds the light between a ray's samples and those of the next part. \return false if that part
+  /// has no samples, or if the ray has none before and has taken over the part
+  ESVR_HD bool connect(RayState& ray, const RayState& behind) const {
+    if (behind.last == RayState::kNone) return false;
+    if (ray.first == RayState::kNone) {
+      ray = behind;
+      return false;
+    }
+    addSegments(ray, behind.firstValue, {0.0f, behind.first});
+    ray.last = behind.last, ray.lastValue = behind.lastValue;
+    return true;
   }
 };
 
-/// The length that the opacity of a sample stands for, in units of opacityLength. In kMaximum and
-/// kAverage one value stands for the whole ray, and has the opacity of the transfer function.
-[[nodiscard]] inline double opacitySteps(const RenderOptions& options) {
+/// The sampling that the tables of a picture are made for. In kMaximum and kAverage one value stands
+/// for the whole ray, and has the opacity of the transfer function.
+[[nodiscard]] inline Sampling samplingOf(const RenderOptions& options) {
   const bool alongRay =
       options.mode == RenderMode::kComposite || options.mode == RenderMode::kDepth;
-  return alongRay ? options.step / options.opacityLength : 1.0;
+  if (!alongRay) return {1.0, false};
+  return {options.step / options.opacityLength,
+          options.classification == Classification::kPreIntegrated};
 }
 
 [[nodiscard]] inline SampleRule sampleRule(const RenderOptions& o, const TransferTableView& table,
                                            float background) {
-  return {table, o.mode, background, float(o.minTransmittance), float(o.step)};
+  return {table, o.mode, o.classification, background, float(o.minTransmittance), float(o.step)};
 }
 
 }  // namespace esvr

@@ -1,11 +1,13 @@
 #pragma once
-/// A table of a transfer function, with opacities that are corrected for the distance between
-/// samples. A renderer looks up every sample in it. The look-up is compiled for host and device.
+/// Tables of a transfer function, with opacities that are corrected for the distance between
+/// samples. A renderer looks up every sample, or every segment between two samples, in them. The
+/// look-up is compiled for host and device.
 
 #include <vector>
 
 #include "esvr/kernel.h"
 #include "esvr/render.h"
+#include "render/segment_table.h"
 
 namespace esvr {
 
@@ -14,15 +16,17 @@ struct alignas(16) Classified {
   float r, g, b, alpha;
 };
 
-/// Pointers to a table in host or device memory.
+/// Pointers to the tables in host or device memory.
 struct TransferTableView {
-  static constexpr int kIntervals = 4096;
+  static constexpr int kIntervals = SegmentSpan::kIntervals;
   static constexpr float kNoExtent = 0.0f;
 
   const Classified* entries;  ///< kIntervals + 1 entries
   float low, scale;           ///< lowest value, and intervals per unit of value
   Classified nan;
+  SegmentTableView segments;  ///< empty unless Sampling::segments asked for it
 
+  /// The color and opacity of a value.
   [[nodiscard]] ESVR_HD Classified operator()(float value) const {
     if (!(value == value)) return nan;
     const float place =
@@ -40,22 +44,36 @@ struct TransferTableView {
   }
 };
 
+/// What the tables are made for.
+struct Sampling {
+  double length;  ///< length of a step, in units of the length that opacities are given for
+  bool segments;  ///< true if segments between samples are looked up
+  friend bool operator==(const Sampling&, const Sampling&) = default;
+};
+
 class TransferTable {
  public:
-  /// \param length  length of a step, in units of the length that opacities are given for
-  TransferTable(const TransferFunction& function, double length);
+  /// Pointers to copies of both tables' entries, for example on a device.
+  struct Copies {
+    const Classified* values;
+    const SegmentEntry* segments;
+  };
 
-  [[nodiscard]] Classified operator()(float value) const { return view()(value); }
-  [[nodiscard]] TransferTableView view() const { return on(entries_.data()); }
-  [[nodiscard]] const std::vector<Classified>& entries() const { return entries_; }
-  /// A view of a copy of the entries, for example on a device.
-  [[nodiscard]] TransferTableView on(const Classified* entries) const {
-    return {entries, low_, scale_, nan_};
+  TransferTable(const TransferFunction& function, const Sampling& sampling);
+
+  [[nodiscard]] TransferTableView view() const {
+    return on({entries_.data(), segments_.entries().data()});
+  }
+  [[nodiscard]] const std::vector<Classified>& values() const { return entries_; }
+  [[nodiscard]] const std::vector<SegmentEntry>& segments() const { return segments_.entries(); }
+  [[nodiscard]] TransferTableView on(const Copies& copies) const {
+    return {copies.values, low_, scale_, nan_, segments_.on(copies.segments)};
   }
 
  private:
   float low_, scale_;
   std::vector<Classified> entries_;
+  SegmentTable segments_;
   Classified nan_;
 };
 

@@ -52,6 +52,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(Golden{"ellipsoids", "in.esvr", {}}, Golden{"voxels", "in.vdb", {}},
                     Golden{"sum", "in.esvr", {"--between", "sum", "--colors", "inferno"}},
                     Golden{"bricks", "in.esvr", {"--method", "bricks", "--opacity", "tent"}},
+                    Golden{"post", "in.vdb", {"--classification", "post"}},
                     Golden{"maximum", "in.esvr", {"--mode", "maximum", "--background", "1,1,1"}},
                     Golden{"slice", "in.vdb", {"--slice", "z=15", "--opacity-length", "0.2"}},
                     Golden{"orthographic", "in.esvr", {"--orthographic", "--eye", "15,15,90"}}),

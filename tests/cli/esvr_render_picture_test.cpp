@@ -101,7 +101,8 @@ TEST_F(EsvrRender, ModesAndBoxesChangeThePicture) {
   EXPECT_NE(picture("in.esvr", {"--mode", "average"}).rgba, whole.rgba);
   EXPECT_NE(picture("in.esvr", {"--clip", "0,0,0,15,40,40"}).rgba, whole.rgba);
   EXPECT_EQ(picture("in.esvr", {"--slice", "y=15"}).rgba,
-            picture("in.esvr", {"--clip", "-99,14.5,-99,99,15.5,99"}).rgba);
+            picture("in.esvr", {"--clip", "-99,14.5,-99,99,15.5,99", "--classification", "post"}).rgba)
+      << "the color of a slice is that of its values";
   for (const png_byte v : picture("in.esvr", {"--clip", "500,0,0,501,1,1"}).rgba) ASSERT_EQ(v, 0);
 }
 
@@ -112,6 +113,13 @@ TEST_F(EsvrRender, TheSamplingOfRaysChangesThePicture) {
   EXPECT_NE(picture("in.esvr", {"--min-transmittance", "0.6"}).rgba, usual.rgba);
   // The error of a ray that ends at 1/4096 of the light is below one level of 8 bits.
   EXPECT_GE(psnrOf(picture("in.esvr", {"--min-transmittance", "0"}), usual), 48.0);
+}
+
+TEST_F(EsvrRender, TheClassificationChangesThePicture) {
+  const auto usual = picture("in.esvr", {"--step", "3"});
+  EXPECT_EQ(picture("in.esvr", {"--step", "3", "--classification", "pre"}).rgba, usual.rgba);
+  EXPECT_NE(picture("in.esvr", {"--step", "3", "--classification", "post"}).rgba, usual.rgba);
+  expectRefused({"--classification", "no"}, 2, "--classification");
 }
 
 TEST_F(EsvrRender, PartsOfTheDepthAndMemoryChangeNothingOnGpu) {

@@ -98,6 +98,7 @@ Table renderTests() {
           {"--bits", "EsvrRender.APngMayHave16BitsAChannel"},
           {"--camera", "EsvrRender.ACameraFileIsReplacedByOptions"},
           {"--center", "EsvrRender.AGivenCameraIsTaken"},
+          {"--classification", "EsvrRender.TheClassificationChangesThePicture"},
           {"--clip", "EsvrRender.ModesAndBoxesChangeThePicture"},
           {"--colors", "EsvrRender.AnExrHasTheSamePictureInLinearLight"},
           {"--depth", "EsvrRender.DistancesAreWrittenWhereLightStops"},

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "field/line_form.h"
+#include "render/reference_light.h"
 #include "render/view.h"
 
 namespace esvr::test {
@@ -37,27 +38,12 @@ double valueOf(const Ellipsoid& e, const Vec3& place) {
   return e.intensity * kernelPhi(e.kernel, m);
 }
 
-struct Light {
-  double r = 0.0, g = 0.0, b = 0.0, transmittance = 1.0;
-};
-
-void addSample(Light& light, double value, const RenderOptions& o) {
-  const Rgb color = colorAt(o.transfer.colors, value);
-  const double opacity = opacityAt(o.transfer.opacity, value);
-  const double alpha = 1.0 - std::pow(1.0 - opacity, o.step / o.opacityLength);
-  light.r += light.transmittance * alpha * color.r;
-  light.g += light.transmittance * alpha * color.g;
-  light.b += light.transmittance * alpha * color.b;
-  light.transmittance *= 1.0 - alpha;
-}
-
-Light lightAlong(const Ray& ray, const SampledScene& scene, const RenderOptions& o) {
-  Light light;
-  for (int j = 0; j * o.step <= scene.farthest; ++j) {
-    const double value = scene.value(sum(ray.origin, scaled(ray.direction, j * o.step)));
-    if (value != scene.background) addSample(light, value, o);
-  }
-  return light;
+Light lightAlong(const Ray& ray, const SampledScene& scene, const Integrals& integrals,
+                 const RenderOptions& o) {
+  LightOnRay light(integrals, scene.background, o.classification);
+  for (int j = 0; j * o.step <= scene.farthest; ++j)
+    light.add(scene.value(sum(ray.origin, scaled(ray.direction, j * o.step))));
+  return light.light();
 }
 
 }  // namespace
@@ -76,10 +62,11 @@ ValueAtPlace sumOfEllipsoids(const Field& field) {
 
 Image referencePicture(const SampledScene& scene, const RenderOptions& o) {
   const View view(o.camera, o.resolution);
+  const Integrals integrals(o.transfer, o.step / o.opacityLength);
   Image image{o.resolution.width, o.resolution.height, {}};
   for (int row = 0; row < image.height; ++row)
     for (int column = 0; column < image.width; ++column) {
-      const Light l = lightAlong(view.ray(column, row), scene, o);
+      const Light l = lightAlong(view.ray(column, row), scene, integrals, o);
       for (const double v : {l.r, l.g, l.b, 1.0 - l.transmittance}) image.rgba.push_back(float(v));
     }
   return image;

@@ -1,6 +1,6 @@
 #pragma once
-/// Draws pictures in float64 by the definition in render.h: every ellipsoid at every sample, the
-/// transfer function itself instead of a table of it, no bounds, and no early end of a ray.
+/// Draws pictures in float64 by the definition in render.h: every ellipsoid at every sample, finer
+/// integrals of the transfer function than the library's, no bounds, and no early end of a ray.
 
 #include <functional>
 

@@ -11,6 +11,7 @@
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "field/random_field.h"
+#include "render/reference_light.h"
 #include "render/reference_picture.h"
 #include "render/vector.h"
 #include "render/view.h"
@@ -31,25 +32,24 @@ RenderOptions optionsFor(RenderMode mode, Projection projection = Projection::kP
   return o;
 }
 
-/// A mode by its definition.
+/// The modes by their definition.
 struct Gathered {
-  double largest = -std::numeric_limits<double>::infinity(), sum = 0.0, light = 1.0, depth = 0.0;
+  double largest = -std::numeric_limits<double>::infinity(), sum = 0.0, depth = 0.0;
   int count = 0;
 
-  void add(double value, double distance, const RenderOptions& o) {
-    largest = std::max(largest, value), sum += value, ++count;
-    const double opacity = opacityAt(o.transfer.opacity, value);
-    light *= std::pow(1.0 - opacity, o.step / o.opacityLength);
-    if (depth == 0.0 && light < 0.5) depth = distance;
-  }
+  void add(double value) { largest = std::max(largest, value), sum += value, ++count; }
 };
 
-Gathered gather(const ValueAtPlace& valueAt, const Ray& ray, const RenderOptions& o) {
+Gathered gather(const ValueAtPlace& valueAt, const Ray& ray, const Integrals& integrals,
+                double step) {
   Gathered all;
-  for (int j = 0; j < 400; ++j)
-    if (const double value = valueAt(sum(ray.origin, scaled(ray.direction, j * o.step)));
-        value != 0.0)
-      all.add(value, j * o.step, o);
+  LightOnRay light(integrals, 0.0, Classification::kPreIntegrated);
+  for (int j = 0; j < 400; ++j) {
+    const double value = valueAt(sum(ray.origin, scaled(ray.direction, j * step)));
+    if (value != 0.0) all.add(value);
+    light.add(value);
+    if (all.depth == 0.0 && light.light().transmittance < 0.5) all.depth = j * step;
+  }
   return all;
 }
 
@@ -69,11 +69,12 @@ std::array<double, 4> expected(const Gathered& all, const RenderOptions& o) {
 double shareOff(const Field& field, const RenderOptions& o, double tolerance) {
   const ValueAtPlace value = sumOfEllipsoids(field);
   const View view(o.camera, o.resolution);
+  const Integrals integrals(o.transfer, o.step / o.opacityLength);
   const Image drawn = renderField(field, o);
   int off = 0, lit = 0;
   for (int row = 0; row < drawn.height; ++row)
     for (int column = 0; column < drawn.width; ++column) {
-      const auto want = expected(gather(value, view.ray(column, row), o), o);
+      const auto want = expected(gather(value, view.ray(column, row), integrals, o.step), o);
       const float* pixel = &drawn.rgba[std::size_t(4 * (row * drawn.width + column))];
       bool differs = false;
       for (int c = 0; c < 4; ++c) differs |= !(std::abs(pixel[c] - want[c]) <= tolerance);

@@ -1,9 +1,9 @@
 #pragma once
 /// Draws pictures of a field or of a volume. Both follow one rule. The values along the ray of a
 /// pixel are sampled at the distances 0, step, 2 step, ... from the eye (orthographic: from the
-/// plane of the eye). The color and opacity of a sample depend on its value only
-/// (post-classification); samples are composited from front to back. A sample that is exactly the
-/// background is empty space: it is transparent, whatever the transfer function has there.
+/// plane of the eye). Classification determines how their colors and opacities follow from these
+/// values; they are composited from front to back. A sample that is exactly the background is empty
+/// space: it is transparent, whatever the transfer function has there.
 ///
 /// The same input and options give a bit-identical picture on any number of threads (those of the
 /// calling TBB arena).
@@ -27,6 +27,18 @@ enum class RenderMode {
   /// Red is the distance in voxels at which half of the light is absorbed (orthographic: from the
   /// plane of the eye), and alpha is 1. Both are 0 if the ray absorbs less than half.
   kDepth
+};
+
+/// The rule that gives values colors and opacities.
+enum class Classification {
+  /// Between two consecutive samples the value changes linearly, and the transfer function is
+  /// integrated over the values on the way (docs/math.md). Between two samples in empty space
+  /// nothing is drawn. Between empty space and a sample the value begins or ends at the background.
+  /// Surfaces are smooth at any step.
+  kPreIntegrated,
+  /// Each sample stands for a step and has the color and opacity of its value. Where values change
+  /// much within a step, stripes appear.
+  kPost
 };
 
 /// The rule for the values of a field between its voxels.
@@ -53,12 +65,14 @@ struct RenderOptions {
   TransferFunction transfer;  ///< tabulated at 4097 values from its first point to its last
   double step = 1.0;          ///< distance between samples, voxels
   /// The length, in voxels, over which the transfer function's opacities are reached. The opacity
-  /// of a sample is 1 - (1 - opacity)^(step / opacityLength).
+  /// of a step of constant value is 1 - (1 - opacity)^(step / opacityLength).
   double opacityLength = 1.0;
   /// A ray ends when its transmittance falls below this. The default changes a channel by at most
   /// 1/16 of 1/255.
   double minTransmittance = 1.0 / 4096;
   RenderMode mode = RenderMode::kComposite;
+  /// Used in RenderMode::kComposite and kDepth; the other modes classify one value for each ray.
+  Classification classification = Classification::kPreIntegrated;
   Between between = Between::kVoxels;   ///< used for fields only
   std::optional<PlaceBox> clip{};       ///< samples outside this box count as empty space
   const CancelToken* cancel = nullptr;  ///< checked before each row of tiles

@@ -1,7 +1,8 @@
 #pragma once
-/// A transfer function's table on a CUDA device.
+/// A transfer function's tables on a CUDA device.
 
 #include <optional>
+#include <vector>
 
 #include "core/cuda/growing_buffer.h"
 #include "render/sample_rule.h"
@@ -13,25 +14,35 @@ class DeviceTable {
   /// Makes the table anew only if the transfer function or its step changed, because making it can
   /// take longer than drawing a picture.
   void update(const RenderOptions& options, cudaStream_t stream) {
-    const double length = opacitySteps(options);
-    if (known_ && known_->length == length && known_->transfer == options.transfer) return;
-    known_ = {options.transfer, length, TransferTable(options.transfer, length)};
-    const auto& entries = known_->table.entries();
-    makeRoom(entries_, entries.size(), stream);
-    entries_.upload(entries);
+    const Sampling sampling = samplingOf(options);
+    if (known_ && known_->sampling == sampling && known_->transfer == options.transfer) return;
+    known_ = {options.transfer, sampling, TransferTable(options.transfer, sampling)};
+    copy(known_->table.values(), values_, stream);
+    copy(known_->table.segments(), segments_, stream);
   }
   /// Must be called after update().
-  [[nodiscard]] TransferTableView view() const { return known_->table.on(entries_.data()); }
-  [[nodiscard]] std::size_t bytes() const { return entries_.bytes(); }
+  [[nodiscard]] TransferTableView view() const {
+    return known_->table.on({values_.data(), segments_.data()});
+  }
+  [[nodiscard]] std::size_t bytes() const { return values_.bytes() + segments_.bytes(); }
 
  private:
   struct Known {
     TransferFunction transfer;
-    double length;
+    Sampling sampling;
     TransferTable table;
   };
+
+  template <class Entry>
+  static void copy(const std::vector<Entry>& from, DeviceBuffer<Entry>& to, cudaStream_t stream) {
+    if (from.empty()) return;
+    makeRoom(to, from.size(), stream);
+    to.upload(from);
+  }
+
   std::optional<Known> known_;
-  DeviceBuffer<Classified> entries_;
+  DeviceBuffer<Classified> values_;
+  DeviceBuffer<SegmentEntry> segments_;
 };
 
 }  // namespace esvr::cuda

@@ -5,7 +5,6 @@ namespace {
 
 constexpr int kStage = kWarp * kGroups;  // ellipsoids staged at once: one for each lane and group
 constexpr int kRowsOfHalf = kSide / kHalves;
-static_assert(kGroups == 4, "sums and colors of a sample share their place");
 
 /// An ellipsoid in shared memory, relative to the tile's first pixel and the bin's first sample.
 /// The members are those that spanOn() (ray_math.h) takes.
@@ -22,11 +21,13 @@ static_assert(sizeof(Staged) == sizeof(EllipsoidView) &&
 
 /// Shared memory of a block. Each group of threads adds its share of a list's ellipsoids.
 struct Shared : WorkShared {
-  /// First the partial sums of each sample, by group and ray. classify() then overwrites the sums
-  /// of a sample with a PixelColor for each ray. The rays of a warp lie next to each other, so its
-  /// accesses have no bank conflicts.
-  alignas(16) float sums[kBinSamples][kGroups][kRays];
-  Staged staged[kStage];
+  /// Partial sums of each sample, by group and ray. The rays of a warp lie next to each other, so
+  /// its accesses have no bank conflicts.
+  float sums[kBinSamples][kGroups][kRays];
+  union {
+    Staged staged[kStage];  ///< while ellipsoids are added
+    BehindShares behind;    ///< while samples are composited
+  };
   std::uint32_t ids[kThreads], sortedIds[kThreads];
   std::uint32_t touched;  ///< bit i is set if an ellipsoid was added to sample i of any ray
 };
@@ -193,48 +194,40 @@ __device__ void addBin(const SumArguments& a, Shared& s, const Place& place, con
   __syncthreads();
 }
 
-/// The color of a sample. One that is the background is empty space.
-__device__ PixelColor colorOf(const SamplingArguments& a, float sum) {
-  const float value = a.voxelRule.settled(a.rule.background + sum);
-  return value != a.rule.background ? a.rule.prepared(value) : PixelColor{0, 0, 0, 0};
+/// The sum of a sample on a ray. It is set to 0 for the next bin.
+__device__ float takeSum(Shared& s, int sample, int ray) {
+  float sum = 0.0f;
+  for (int g = 0; g < kGroups; ++g) {
+    sum += s.sums[sample][g][ray];
+    s.sums[sample][g][ray] = 0.0f;
+  }
+  return sum;
 }
 
-/// Turns the sums of all samples into colors. A warp takes whole samples, because colors overwrite
-/// the sums and no other warp may still need them.
-__device__ void classify(const SamplingArguments& a, Shared& s) {
-  const int warp = int(threadIdx.x) / kWarp, lane = int(threadIdx.x) % kWarp;
-  for (int sample = warp; sample < kBinSamples; sample += kWarps) {
-    if ((s.touched >> sample & 1u) == 0) continue;
-    const auto& sums = s.sums[sample];
-    PixelColor of[kHalves];
-    for (int h = 0; h < kHalves; ++h) {
-      const int ray = h * kWarp + lane;
-      of[h] = colorOf(a, (sums[0][ray] + sums[1][ray]) + (sums[2][ray] + sums[3][ray]));
-    }
-    __syncwarp();
-    auto* const colors = reinterpret_cast<PixelColor*>(&s.sums[sample][0][0]);
-    for (int h = 0; h < kHalves; ++h) colors[h * kWarp + lane] = of[h];
+/// Adds a share of a bin's samples to a ray.
+__device__ void addSamples(const SamplingArguments& a, Shared& s, const Place& place,
+                           const SumWork& work, int bin, const Share& share, RayState& ray) {
+  const float toEye = float(a.frame.firstBin) * kBinSamples;
+  std::uint32_t left = s.touched & samplesFrom(share.first, share.end - 1);
+  for (; left != 0; left &= left - 1) {
+    const int sample = __ffs(int(left)) - 1;
+    const float sum = takeSum(s, sample, place.ray);
+    const float value = a.voxelRule.settled(a.rule.background + sum);
+    const std::uint32_t index = std::uint32_t(bin * kBinSamples + sample);
+    const float number = float(index);
+    if (sum != 0.0f && value != a.rule.background && number >= work.firstSample && number <= work.lastSample &&
+        a.rule.open(ray))
+      a.rule.add(ray, value, {toEye + number, index});
   }
-  __syncthreads();
 }
 
-/// Composites the colors of a bin, by the threads of the first group, and sets the sums to 0.
-__device__ void composite(const SamplingArguments& a, Shared& s, const Place& place,
-                          const SumWork& work, float firstSample, RayState& ray) {
-  if (place.group == 0) {
-    const float toEye = float(a.frame.firstBin) * kBinSamples;
-    for (std::uint32_t left = s.touched; left != 0; left &= left - 1) {
-      const int sample = __ffs(int(left)) - 1;
-      PixelColor& color = reinterpret_cast<PixelColor*>(&s.sums[sample][0][0])[place.ray];
-      const float number = firstSample + float(sample);
-      if (number >= work.firstSample && number <= work.lastSample && a.rule.open(ray))
-        a.rule.add(ray, color, toEye + number);
-      color = {0.0f, 0.0f, 0.0f, 0.0f};
-    }
-    const unsigned open = __ballot_sync(kAllLanes, work.inPicture && a.rule.open(ray));
-    if (place.lane == 0) s.openRays[place.half] = open;
-  }
-  __syncthreads();
+/// Composites the samples of a bin. All rays take part, because their sums are set to 0; a ray that
+/// is closed has sums of 0 only.
+__device__ void drawSamples(const SamplingArguments& a, Shared& s, const Place& place,
+                            const SumWork& work, int bin, RayState& ray) {
+  addInShares(
+      a.rule, s, s.behind, place, work, true, kBinSamples, ray,
+      [&](const Share& share, RayState& part) { addSamples(a, s, place, work, bin, share, part); });
   if (threadIdx.x == 0) s.touched = 0;
   __syncthreads();
 }
@@ -252,8 +245,7 @@ __global__ void __launch_bounds__(kThreads, DrawTuning::kBlocksPerMultiprocessor
     const SumWork work = sumWorkOf(a, item.tile, place);
     drawItem(a.draw, s, item, place, work, [&](std::size_t list, int bin, RayState& ray) {
       addBin(a, s, place, work, list, bin);
-      classify(a.draw, s);
-      composite(a.draw, s, place, work, float(bin * kBinSamples), ray);
+      drawSamples(a.draw, s, place, work, bin, ray);
     });
   });
 }

@@ -79,9 +79,13 @@ __device__ inline void writePixel(const SamplingArguments& a, const Place& place
 }
 
 __device__ inline RayState loadResult(const RayState* results, std::uint32_t result, int ray) {
-  const float4 v = __ldcg(
-      reinterpret_cast<const float4*>(&results[std::size_t(result) * kRays + std::size_t(ray)]));
-  return {v.x, v.y, v.z, v.w};
+  static_assert(sizeof(RayState) == 2 * sizeof(float4));
+  const auto* const from =
+      reinterpret_cast<const float4*>(&results[std::size_t(result) * kRays + std::size_t(ray)]);
+  RayState state;
+  auto* const to = reinterpret_cast<float4*>(&state);
+  to[0] = __ldcg(from), to[1] = __ldcg(from + 1);
+  return state;
 }
 
 /// Composites the parts of a tile. The block that finished the last of them calls it.
@@ -135,17 +139,56 @@ __device__ inline bool isHidden(const SamplingArguments& a, const TilePart& item
   return __ldcg(&a.lists.closedAt[item.tile]) < item.part;
 }
 
+/// The samples of a ray that one thread takes.
+struct Share {
+  int first, end;
+};
+/// The groups divide the samples of a ray among them. In RenderMode::kDepth the first group takes
+/// all, because that mode must stop at a sample that depends on all samples before it.
+__device__ inline Share shareOf(const SampleRule& rule, const Place& place, int samples) {
+  if (rule.mode == RenderMode::kDepth) return {0, place.group == 0 ? samples : 0};
+  const int each = (samples + kGroups - 1) / kGroups, first = min(place.group * each, samples);
+  return {first, min(first + each, samples)};
+}
+
+/// The samples of a ray that each group but the first has gathered.
+using BehindShares = RayState[kGroups - 1][kRays];
+
+/// Adds samples to the rays. Each group takes the samples behind those of the group before it; the
+/// first group then joins their results from front to back, and updates s.openRays. The rays are
+/// those of the first group's threads.
+/// \param own        true if the thread's ray takes part
+/// \param addShare   called as addShare(share, ray): it adds the samples of the share to the ray
+template <class AddShare>
+__device__ void addInShares(const SampleRule& rule, WorkShared& s, BehindShares& behind,
+                            const Place& place, const Work& work, bool own, int samples,
+                            RayState& ray, AddShare&& addShare) {
+  RayState part = place.group == 0 ? ray : RayState::behind();
+  if (own) addShare(shareOf(rule, place, samples), part);
+  if (place.group == 0)
+    ray = part;
+  else if (own)
+    behind[place.group - 1][place.ray] = part;
+  __syncthreads();
+  if (place.group != 0) return;
+  if (own && rule.mode != RenderMode::kDepth)
+    for (int g = 0; g < kGroups - 1 && rule.open(ray); ++g) rule.join(ray, behind[g][place.ray]);
+  const unsigned open = __ballot_sync(kAllLanes, work.inPicture && rule.open(ray));
+  if (place.lane == 0) s.openRays[place.half] = open;
+}
+
 /// Draws the bins of a part from front to back, and stops when all rays of the tile are closed.
 /// Only the threads of the first group return a result.
+/// \param ray      the ray before its first sample
 /// \param drawBin  called as drawBin(list, bin, ray): it adds a bin's samples to the ray, and
 ///                 updates s.openRays
 template <class DrawBin>
 __device__ RayState drawPart(const SamplingArguments& a, WorkShared& s, const TilePart& item,
-                             const Place& place, const Work& work, DrawBin&& drawBin) {
+                             const Place& place, const Work& work, RayState ray,
+                             DrawBin&& drawBin) {
   const unsigned inside = __ballot_sync(kAllLanes, work.inPicture);
   if (place.group == 0 && place.lane == 0) s.openRays[place.half] = inside;
   __syncthreads();
-  RayState ray;
   const int first = int(item.part) * a.frame.binsOfPart;
   const int end = min(first + a.frame.binsOfPart, a.frame.bins);
   for (int bin = first; bin < end && anyOpen(s); ++bin) {
@@ -159,10 +202,11 @@ template <class DrawBin>
 __device__ void drawItem(const SamplingArguments& a, WorkShared& s, const TilePart& item,
                          const Place& place, const Work& work, DrawBin&& drawBin) {
   if (a.lists.partsOfTile[item.tile] == 1)
-    return writePixel(a, place, work, drawPart(a, s, item, place, work, drawBin));
+    return writePixel(a, place, work, drawPart(a, s, item, place, work, {}, drawBin));
   const bool hidden = __syncthreads_or(threadIdx.x == 0 && isHidden(a, item));
   if (hidden && threadIdx.x < kHalves) s.openRays[threadIdx.x] = 1;
-  const RayState ray = hidden ? RayState{} : drawPart(a, s, item, place, work, drawBin);
+  const RayState none = RayState::behind();
+  const RayState ray = hidden ? none : drawPart(a, s, item, place, work, none, drawBin);
   if (storeResult(a, s, item, place, ray)) joinParts(a, item, place, work);
 }
 

@@ -1,0 +1,143 @@
+#pragma once
+/// Pre-integrated classification. Between two consecutive samples of a ray, the value is taken to
+/// change linearly, so that the light of the segment between them follows from integrals of the
+/// transfer function over the value (docs/math.md). A table holds these integrals. The look-up is
+/// compiled for host and device.
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "esvr/kernel.h"
+#include "esvr/transfer_function.h"
+
+namespace esvr {
+
+/// A color that is premultiplied by its opacity.
+struct alignas(16) PixelColor {
+  float r, g, b, alpha;
+};
+
+/// One interval of values. The channels are red, green and blue, each times the extinction, and the
+/// extinction itself, for the length of a step.
+///
+/// The integrals are integers because the light of a segment is the difference of two of them. With
+/// 32 bits, the difference is exact to 2^-32 of the largest integral, which is 4096 intervals times
+/// SegmentTableView::kMaxExtinction. An opacity therefore errs by less than 1e-4, however much
+/// larger the extinction of other values is. Floats of the same size would err by 256 times as
+/// much, and float64 is slow on many GPUs.
+struct alignas(16) SegmentEntry {
+  static constexpr int kChannels = 4, kExtinction = 3;
+
+  std::uint32_t before[kChannels];  ///< integrals from the table's lowest value to the interval
+  float mean[kChannels];            ///< mean over the interval
+};
+
+/// The values between two places of a table. Places count intervals from the table's lowest value.
+/// Interval n ends at place n; the first and the last have no other end, because the transfer
+/// function is constant there.
+///
+/// The parts in the first and in the last interval are summed by themselves, so that integrals are
+/// subtracted only where at least one whole interval lies between them.
+struct SegmentSpan {
+  static constexpr int kIntervals = 4096;
+
+  const SegmentEntry *first, *next, *last;  ///< next: the end of the first, or the same as the last
+  float inFirst, inLast;                    ///< shares of the span
+  float ofWhole;                            ///< share of a whole interval
+
+  ESVR_HD SegmentSpan(const SegmentEntry* entries, float a, float b) {
+    constexpr float kSame = 1e-6f;  // closer places have no values between them
+    const float from = a < b ? a : b, to = a < b ? b : a;
+    const int i = intervalAt(from), j = intervalAt(to);
+    const bool same = i == j || to - from < kSame;
+    first = entries + i, last = entries + j, next = same ? last : first + 1;
+    ofWhole = same ? 1.0f : 1.0f / (to - from);
+    inFirst = same ? 0.0f : (float(i) - from) * ofWhole;
+    inLast = same ? 1.0f : (to - float(j - 1)) * ofWhole;
+  }
+  /// \param unit  what one unit of the integrals stands for
+  [[nodiscard]] ESVR_HD float mean(int channel, float unit) const {
+    return inFirst * first->mean[channel] + inLast * last->mean[channel] +
+           float(last->before[channel] - next->before[channel]) * (unit * ofWhole);
+  }
+
+ private:
+  ESVR_HD static int intervalAt(float place) {
+    if (place < 0.0f) return 0;
+    return place < float(kIntervals) ? int(place) + 1 : kIntervals + 1;
+  }
+};
+
+/// Pointers to a table in host or device memory.
+struct SegmentTableView {
+  /// Stands for the infinite extinction of an opacity of 1. A segment is opaque to within rounding
+  /// if a quarter of it has this extinction.
+  static constexpr float kMaxExtinction = 64.0f;
+
+  const SegmentEntry* entries;
+  float low, scale;  ///< lowest value, and intervals per unit of value
+  float unit;        ///< what one unit of the integrals stands for
+  PixelColor nan;
+
+  /// The light of the segment from a sample to the next, whose values are a and b. The color of a
+  /// segment is the mean of its colors, weighted by their extinction, as if none of its light were
+  /// absorbed within it. A segment of high extinction is therefore divided into pieces.
+  [[nodiscard]] ESVR_HD PixelColor operator()(float a, float b) const {
+    if (!(a == a) || !(b == b)) return nan;
+    const float from = placeOf(a), to = placeOf(b);
+    const float pieces =
+        piecesOf(SegmentSpan(entries, from, to).mean(SegmentEntry::kExtinction, unit));
+    PixelColor all{0.0f, 0.0f, 0.0f, 0.0f};
+    const float length = 1.0f / pieces, apart = (to - from) * length;
+    for (float p = 0.0f; p < pieces; ++p)
+      addBehind(all, SegmentSpan(entries, from + p * apart, from + (p + 1.0f) * apart), length);
+    return all;
+  }
+
+ private:
+  /// Values far beyond the table are as good as values a little beyond it, but are finite.
+  [[nodiscard]] ESVR_HD float placeOf(float value) const {
+    constexpr float kFar = 1e9f;
+    const float place = (value - low) * scale;
+    return place < -kFar ? -kFar : (place > kFar ? kFar : place);
+  }
+  ESVR_HD static float piecesOf(float extinction) {
+    constexpr float kThin = 0.5f, kMost = 16.0f;
+    if (!(extinction > 0.0f)) return 0.0f;
+    return extinction < kThin * kMost ? std::ceil(extinction / kThin) : kMost;
+  }
+  /// \param length  length of the piece in steps
+  ESVR_HD void addBehind(PixelColor& all, const SegmentSpan& piece, float length) const {
+    const float extinction = piece.mean(SegmentEntry::kExtinction, unit);
+    if (!(extinction > 0.0f)) return;
+    const float alpha = (1.0f - all.alpha) * -std::expm1(-extinction * length);
+    const float share = alpha / extinction;
+    all.r += share * piece.mean(0, unit);
+    all.g += share * piece.mean(1, unit);
+    all.b += share * piece.mean(2, unit);
+    all.alpha += alpha;
+  }
+};
+
+class SegmentTable {
+ public:
+  /// An empty table, which must not be read.
+  SegmentTable() = default;
+  /// \param length  length of a step, in units of the length that opacities are given for
+  SegmentTable(const TransferFunction& function, double length);
+
+  [[nodiscard]] SegmentTableView view() const { return on(entries_.data()); }
+  [[nodiscard]] const std::vector<SegmentEntry>& entries() const { return entries_; }
+  /// A view of a copy of the entries, for example on a device.
+  [[nodiscard]] SegmentTableView on(const SegmentEntry* entries) const {
+    return {entries, low_, scale_, unit_, nan_};
+  }
+
+ private:
+  std::vector<SegmentEntry> entries_;
+  float low_ = 0.0f, scale_ = 1.0f, unit_ = 0.0f;
+  PixelColor nan_{};
+};
+
+}  // namespace esvr
