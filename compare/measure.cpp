@@ -216,7 +216,7 @@ TableRow RowMaker::external(const External& external) {
   return row;
 }
 
-void RowMaker::measureEsvr(const std::filesystem::path& path, Drawing drawing, TableRow& row) {
+void RowMaker::measureEsvr(const std::filesystem::path& path, TableRow& row) {
   const cli::HostMemory& memory = scene_.options.memory;
   SparseVolume volume;
   const cli::MemoryMeter decoding;
@@ -232,21 +232,19 @@ void RowMaker::measureEsvr(const std::filesystem::path& path, Drawing drawing, T
   row.metrics = compare(volume);
   if (scene_.gallery)
     drawEsvr(gridOf(readEsvr(path, {memory.maxBytes, memory.voxels}), path, scene_.gridName),
-             volume, drawing, row);
+             volume, row);
 }
 
-void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Drawing drawing,
-                        TableRow& row) const {
+void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, TableRow& row) const {
   const Device& device = scene_.gallery->device();
-  if (drawing == Drawing::kBricks || !saysAll(grid))
+  if (!followsFromEllipsoids(grid))
     return measurePictures(*makeVolumeRenderer(voxels, device), row);
   measurePictures(*makeFieldRenderer(grid.field, device, {}, voxelRule(grid)), row,
                   fittedBetween(grid.field));
 }
 
-TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing) {
-  const std::string how = drawing == Drawing::kBricks ? ", bricks" : "";
-  TableRow row{.name = path.filename().string() + how, .group = "ESVR"};
+TableRow RowMaker::candidate(const std::filesystem::path& path) {
+  TableRow row{.name = path.filename().string(), .group = "ESVR"};
   const GridFile file(path, scene_.options.memory);
   if (!file.esvr())
     throw BadInput(path.string() +
@@ -254,7 +252,7 @@ TableRow RowMaker::candidate(const std::filesystem::path& path, Drawing drawing)
   const std::size_t place = placeOf(file, scene_.gridName);
   row.bytes = bytesOf(file, path, place);
   row.command = command(shellWord(path.string()) + " --rows none");
-  measureEsvr(path, drawing, row);
+  measureEsvr(path, row);
   return row;
 }
 
@@ -292,7 +290,7 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   if (scene_.cancel.cancelled()) throw Cancelled();
   row.note = "one fit, on " + deviceName(selectDevice(scene_.options.device));
   const auto memory = encoding.peakRise();
-  measureEsvr(path, Drawing::kEllipsoids, row);
+  measureEsvr(path, row);
   row.memory = std::max(row.memory, memory);
   return row;
 }

@@ -26,12 +26,6 @@ struct TableScene {
   const Gallery* gallery = nullptr;  ///< null: no pictures
 };
 
-/// The way an .esvr file is drawn, with the names of esvr-render --method.
-enum class Drawing {
-  kEllipsoids,  ///< ellipsoids, if they represent the whole grid (see row_renderer.h)
-  kBricks       ///< decoded voxels
-};
-
 struct FitWish {
   std::optional<std::uint64_t> bytes{};  ///< size of the file; nothing: default options
   bool paper = false;                    ///< whether the paper's method is used, stored as float32
@@ -49,7 +43,7 @@ class RowMaker {
   TableRow psnrMatched(const BaselineSetting& like, double psnr);
   TableRow external(const External& external);
   /// \throws BadInput  the candidate does not have the grid, or its voxels lie elsewhere
-  TableRow candidate(const std::filesystem::path& path, Drawing drawing = Drawing::kEllipsoids);
+  TableRow candidate(const std::filesystem::path& path);
   /// Fits ellipsoids.
   TableRow fitted(const FitWish& wish);
 
@@ -59,13 +53,12 @@ class RowMaker {
                    const std::function<Match()>& search);
   /// \param head  size of a file without grids, bytes
   [[nodiscard]] Conversion convert(const FitWish& wish, std::uint64_t head) const;
-  void measureEsvr(const std::filesystem::path& path, Drawing drawing, TableRow& row);
+  void measureEsvr(const std::filesystem::path& path, TableRow& row);
   [[nodiscard]] VolumeMetrics compare(const SparseVolume& volume) const;
   /// Measures the voxels and, if wanted, their pictures.
   void measureVoxels(const SparseVolume& volume, NanoValues values, TableRow& row) const;
   void measurePictures(Renderer& renderer, TableRow& row, Between between = Between::kVoxels) const;
-  void drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Drawing drawing,
-                TableRow& row) const;
+  void drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, TableRow& row) const;
   [[nodiscard]] std::string command(const std::string& arguments) const;
 
   const TableScene& scene_;

@@ -12,8 +12,4 @@ std::unique_ptr<Renderer> makeVoxelRenderer(const SparseVolume& volume, NanoValu
   return makeNanoRenderer(makeNanoVolume(grid, values), device);
 }
 
-bool saysAll(const StoredGrid& grid) {
-  return !grid.voxels && !grid.residual && grid.topology == TopologyKind::kThreshold;
-}
-
 }  // namespace esvr::compare

@@ -3,7 +3,6 @@
 
 #include <memory>
 
-#include "esvr/grid_coding.h"
 #include "esvr/renderer.h"
 
 namespace esvr::compare {
@@ -13,9 +12,5 @@ namespace esvr::compare {
 /// \throws DeviceError  as for makeNanoRenderer
 [[nodiscard]] std::unique_ptr<Renderer> makeVoxelRenderer(const SparseVolume& volume,
                                                           NanoValues values, const Device& device);
-
-/// True if a grid's ellipsoids represent the whole grid. This is not so for a narrow band, and if
-/// voxels, a residual or a mask are stored.
-[[nodiscard]] bool saysAll(const StoredGrid& grid);
 
 }  // namespace esvr::compare

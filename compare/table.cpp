@@ -26,7 +26,6 @@ class TableRun {
     record_.halfBlosc = maker_.baseline("", halfBlosc(), "").bytes;
     for (const auto& path : options_.candidates) {
       add(maker_.candidate(path));
-      if (scene_.gallery) add(maker_.candidate(path, Drawing::kBricks));
     }
     for (const auto& external : options_.externals) add(maker_.external(external));
     if (options_.fitDefault) add(maker_.fitted({}));

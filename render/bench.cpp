@@ -17,8 +17,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int kDefaultViews = 720;  // as in the paper: steps of 0.5 degrees
-constexpr int kWarmUp = 5;
 constexpr int kCompared = 36;
+constexpr int kCold = 36;          // views that are drawn with nothing decoded before
 constexpr double kSlowest = 0.01;  // share of the frames that "1 % low" averages
 
 /// The times of all frames after the warm-up.
@@ -55,17 +55,22 @@ void count(const FrameStats& stats, double seconds, int views, Times& times) {
   times.last = stats;
 }
 
-Times timed(Renderer& renderer, const RenderOptions& options, int views) {
+/// Times the views of a turn. \param cold  whether the renderer forgets what it decoded before
+Times timed(Renderer& renderer, const RenderOptions& options, int views, bool cold) {
   Times times;
-  for (int i = 0; i < std::min(kWarmUp, views); ++i)
-    renderer.drawOnDevice(viewOf(options, i, views));
   for (int i = 0; i < views; ++i) {
     const RenderOptions view = viewOf(options, i, views);
+    if (cold) renderer.forget();
     cli::Stopwatch watch;
     renderer.drawOnDevice(view);
     count(renderer.stats(), watch.lap(), views, times);
   }
   return times;
+}
+
+/// Draws a turn, after which the renderer has decoded what its views show.
+void warmUp(Renderer& renderer, const RenderOptions& options, int views) {
+  (void)timed(renderer, options, views, false);
 }
 
 Json figures(const Times& t) {
@@ -85,14 +90,23 @@ Json figures(const Times& t) {
 std::string summary(const std::string& what, const Json& f) {
   const auto number = [&](const char* key) { return cli::shortNumber(f[key].get<double>()); };
   return what + ": " + number("fps_median") + " frames a second (1 % low " +
-         number("fps_1_percent_low") + "), lists " + number("list_ms") + " ms, drawing " +
-         number("draw_ms") + " ms, device memory " +
-         cli::shortNumber(f["device_bytes"].get<double>() / 1e6) + " MB";
+         number("fps_1_percent_low") + ", nothing decoded before " + number("cold_fps_median") +
+         "), lists " + number("list_ms") + " ms, drawing " + number("draw_ms") +
+         " ms, device memory " + cli::shortNumber(f["device_bytes"].get<double>() / 1e6) + " MB";
 }
 
 Json meanAndMin(const std::vector<double>& v) {
   return {{"mean", jsonNumber(std::accumulate(v.begin(), v.end(), 0.0) / double(v.size()))},
           {"min", jsonNumber(*std::min_element(v.begin(), v.end()))}};
+}
+
+/// The figures of a renderer that has decoded what it draws, and of one that has decoded nothing.
+Json measured(Renderer& renderer, const RenderOptions& options, int views) {
+  warmUp(renderer, options, views);
+  Json report = figures(timed(renderer, options, views, false));
+  const Times cold = timed(renderer, options, std::min(views, kCold), true);
+  report["cold_fps_median"] = 1e3 / median(cold.frameMs);
+  return report;
 }
 
 Json compared(const Benched& benched, const RenderOptions& options, int views) {
@@ -122,10 +136,10 @@ Json bench(const Benched& benched, const RenderOptions& options, int views, cons
               {"height", options.resolution.height},
               {"step", options.step},
               {"views", count}};
-  report["drawn"] = figures(timed(benched.renderer, options, count));
+  report["drawn"] = measured(benched.renderer, options, count);
   log.info(summary("drawn", report["drawn"]));
   if (benched.reference == nullptr) return report;
-  report["reference"] = figures(timed(*benched.reference, options, count));
+  report["reference"] = measured(*benched.reference, options, count);
   log.info(summary("reference", report["reference"]));
   report["image"] = compared(benched, options, count);
   const Json& image = report["image"];

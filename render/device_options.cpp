@@ -42,14 +42,11 @@ void addDeviceOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("max-vram", value<double>()->value_name("GB"),
-     "GPU memory to use; if it is small, large pictures are drawn in bands (default: all free "
-     "memory)")
+     "GPU memory to use; if it is small, voxels are decoded again when they are needed again, and "
+     "large pictures are drawn in bands (default: all free memory)")
     ("depth-parts", value<int>()->value_name("N"),
      "number of parts, 1 to 16, into which a GPU divides the depth of the scene to draw them in "
      "parallel (default: chosen from the first picture)")
-    ("method", value<std::string>()->value_name("M")->default_value("ellipsoids"),
-     "ellipsoids: draw the ellipsoids of an .esvr file directly; bricks: decode all voxels once "
-     "and draw them; auto: try both and take the faster one that fits into memory")
     ("between", value<std::string>()->value_name("B")->default_value("auto"),
      "voxels: between voxels, interpolate the decoded voxels; sum: evaluate the sum of ellipsoids "
      "itself, which is faster where a pixel covers many voxels, but less accurate unless the file "
@@ -63,9 +60,6 @@ void readDeviceOptions(const Arguments& a, Options& options) {
   options.device = cli::deviceOf(a);
   options.limits = limitsOf(a);
   options.values = valuesOf(a);
-  options.method = cli::choose<Method>(
-      "method", a.get<std::string>("method"),
-      {{"ellipsoids", Method::kEllipsoids}, {"bricks", Method::kBricks}, {"auto", Method::kAuto}});
   options.between = cli::choose<std::optional<Between>>(
       "between", a.get<std::string>("between"),
       {{"auto", std::nullopt}, {"voxels", Between::kVoxels}, {"sum", Between::kSum}});

@@ -49,7 +49,6 @@ struct Options {
   std::filesystem::path saveTransfer;
   std::string device = "auto";
   RendererLimits limits;
-  Method method = Method::kEllipsoids;
   std::optional<NanoValues> values;  ///< form of the NanoVDB grid that voxels are marched in
   std::filesystem::path reference;   ///< empty: none
   std::filesystem::path sheet;       ///< empty: none

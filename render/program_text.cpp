@@ -20,9 +20,10 @@ std::string listOf(const std::string& title, const std::vector<std::string>& nam
 
 std::string notes() {
   return "IN may be an .esvr, a .vdb or an .nvdb file. All are drawn with the same camera,\n"
-         "samples, transfer function and compositing. Voxels are interpolated trilinearly. An\n"
-         ".esvr file that stores voxels is drawn from these voxels. A residual and a stored\n"
-         "active mask are drawn with --method bricks only.\n"
+         "samples, transfer function and compositing. Voxels are interpolated trilinearly. The\n"
+         "voxels of an .esvr file are decoded when a ray needs them, and kept for the next\n"
+         "picture. All are decoded before the first picture if the file stores voxels, a\n"
+         "residual or an active mask.\n"
          "\n"
          "Positions and lengths are in voxels of the grid's index space; its transform is not\n"
          "applied. Samples whose value is exactly the background are transparent.\n"

@@ -98,21 +98,20 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
 
 /// The scene of a file together with its renderer.
 struct Drawing {
-  Drawing(Scene from, const DrawSettings& settings, const RenderOptions& sample)
-      : scene(std::move(from)), renderer(scene, settings, sample) {}
+  Drawing(Scene from, const DrawSettings& settings)
+      : scene(std::move(from)), renderer(scene, settings) {}
 
   const Scene scene;
   SceneRenderer renderer;
 };
 
 /// The drawing of --ref. If the input is a VDB file, --values applies to the input alone.
-std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings& settings,
-                                     const RenderOptions& sample) {
+std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings& settings) {
   if (options.reference.empty()) return nullptr;
   DrawSettings own = settings;
   if (options.input.extension() != ".esvr") own.values.reset();
   return std::make_unique<Drawing>(readScene({options.reference, std::nullopt, options.memory}),
-                                   own, sample);
+                                   own);
 }
 
 std::string summary(const fs::path& file, const Scene& scene, Resolution r, double seconds) {
@@ -268,12 +267,12 @@ void run(const Options& options) {
   const cli::Interrupts interrupts;
   checkFiles(options);
   checkPictureSize(options);
-  const DrawSettings settings{selectDevice(options.device), options.method, options.limits,
-                              options.values, options.memory};
+  const DrawSettings settings{selectDevice(options.device), options.limits, options.values,
+                              options.memory};
   Scene scene = readScene({options.input, options.grid, options.memory});
   RenderOptions r = renderOptions(options, scene);
-  Drawing drawing(std::move(scene), settings, r);
-  const auto reference = referenceOf(options, settings, r);
+  Drawing drawing(std::move(scene), settings);
+  const auto reference = referenceOf(options, settings);
   r.cancel = &interrupts.token();
   saveTransfer(options, r.transfer);
   auto report = reportHead(options, settings.device);

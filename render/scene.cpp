@@ -1,6 +1,5 @@
 #include "render/scene.h"
 
-#include "cli/stopwatch.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
@@ -72,50 +71,20 @@ Scene readScene(const SceneFile& file) {
   return scene;
 }
 
-namespace {
-
-/// Seconds for a picture, measured on the second one because the first also prepares data.
-double timeOf(Renderer& renderer, const RenderOptions& options) {
-  renderer.drawOnDevice(options);
-  cli::Stopwatch watch;
-  renderer.drawOnDevice(options);
-  return watch.lap();
-}
-
-/// A renderer of decoded voxels, or null if they do not fit into the device memory.
-std::unique_ptr<Renderer> bricksThatFit(const SparseVolume& volume, const DrawSettings& s,
-                                        const RenderOptions& sample) {
-  try {
-    auto renderer = makeVolumeRenderer(volume, s.device, s.limits);
-    renderer->drawOnDevice(sample);
-    return renderer;
-  } catch (const DeviceError&) {
-    return nullptr;
-  }
-}
-
-}  // namespace
-
-SceneRenderer::SceneRenderer(const Scene& scene, const DrawSettings& s,
-                             const RenderOptions& sample) {
+SceneRenderer::SceneRenderer(const Scene& scene, const DrawSettings& s) {
   if (const auto* field = std::get_if<Field>(&scene.content))
-    drawField(*field, scene, s, sample);
+    drawField(*field, *scene.encoded, s);
   else
     sampleVoxels(std::get<VolumeGrid>(scene.content), s);
 }
 
-void SceneRenderer::drawField(const Field& field, const Scene& scene, const DrawSettings& s,
-                              const RenderOptions& sample) {
-  if (s.method != Method::kBricks)
-    renderer_ = makeFieldRenderer(field, s.device, s.limits, voxelRule(*scene.encoded));
-  if (s.method == Method::kEllipsoids) return;
-  decoded_ = decodeGrid(*scene.encoded, {.maxBytes = s.memory.maxBytes, .memory = s.memory.voxels});
-  if (s.method == Method::kBricks) {
-    renderer_ = makeVolumeRenderer(decoded_, s.device, s.limits);
+void SceneRenderer::drawField(const Field& field, const StoredGrid& grid, const DrawSettings& s) {
+  if (followsFromEllipsoids(grid)) {
+    renderer_ = makeFieldRenderer(field, s.device, s.limits, voxelRule(grid));
     return;
   }
-  auto bricks = bricksThatFit(decoded_, s, sample);
-  if (bricks && timeOf(*bricks, sample) < timeOf(*renderer_, sample)) renderer_ = std::move(bricks);
+  decoded_ = decodeGrid(grid, {.maxBytes = s.memory.maxBytes, .memory = s.memory.voxels});
+  renderer_ = makeVolumeRenderer(decoded_, s.device, s.limits);
 }
 
 void SceneRenderer::sampleVoxels(const VolumeGrid& grid, const DrawSettings& s) {

@@ -33,12 +33,8 @@ struct SceneFile {
 /// \throws MemoryExceeded  the grid needs more than SceneFile::maxMemory
 [[nodiscard]] Scene readScene(const SceneFile& file);
 
-/// The way to draw a field, with the names of --method.
-enum class Method { kEllipsoids, kBricks, kAuto };
-
 struct DrawSettings {
   Device device;
-  Method method = Method::kEllipsoids;
   RendererLimits limits;
   std::optional<NanoValues> values;  ///< draw voxels as a NanoVDB grid of this value type
   cli::HostMemory memory;            ///< memory that input may take
@@ -47,18 +43,17 @@ struct DrawSettings {
 /// Draws a scene, which must outlive it.
 class SceneRenderer {
  public:
-  /// Voxels are drawn as a NanoVDB grid on a CUDA device, or if `values` asks for one. A field is
-  /// drawn as `method` says: from its ellipsoids, or from voxels that are decoded once. kAuto draws
-  /// the options `sample` in both ways and takes the faster one that fits into memory.
+  /// Voxels are drawn as a NanoVDB grid on a CUDA device, or if `values` asks for one. The voxels of
+  /// a field are decoded when a ray needs them. If they do not follow from its ellipsoids alone, all
+  /// are decoded at once.
   /// \throws DeviceError  the device fails, or its memory is exhausted
-  SceneRenderer(const Scene& scene, const DrawSettings& settings, const RenderOptions& sample);
+  SceneRenderer(const Scene& scene, const DrawSettings& settings);
 
   Renderer* operator->() { return renderer_.get(); }
   Renderer& operator*() { return *renderer_; }
 
  private:
-  void drawField(const Field& field, const Scene& scene, const DrawSettings& settings,
-                 const RenderOptions& sample);
+  void drawField(const Field& field, const StoredGrid& grid, const DrawSettings& settings);
   void sampleVoxels(const VolumeGrid& grid, const DrawSettings& settings);
 
   SparseVolume decoded_;

@@ -77,7 +77,13 @@ RevoxeliseOptions voxelRule(const StoredGrid& grid) {
   if (grid.withinRange) options.range = rangeOf(grid);
   options.narrowBand = grid.topology != TopologyKind::kThreshold &&
                        isLevelSet(grid.descriptor, grid.field.background);
+  options.bricks = grid.bricks;
+  options.restrictToBricks = grid.topology != TopologyKind::kThreshold;
   return options;
+}
+
+bool followsFromEllipsoids(const StoredGrid& grid) {
+  return !grid.voxels && !grid.residual && grid.topology != TopologyKind::kMask;
 }
 
 bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) {

@@ -25,11 +25,30 @@ class CpuRenderer final : public Renderer {
     return image;
   }
   void drawOnDevice(const RenderOptions& options) override { (void)draw(options); }
+  void forget() override {
+    if constexpr (requires { draw_.forget(); }) draw_.forget();
+  }
   FrameStats stats() const override { return stats_; }
 
  private:
   Draw draw_;
   FrameStats stats_;
+};
+
+/// Draws a field on the CPU. Its voxels are kept from picture to picture.
+struct FieldDrawing {
+  Image operator()(const RenderOptions& options) {
+    if (options.between == Between::kSum) return renderField(field, options, voxels);
+    if (!cells) cells = std::make_unique<LazyCells>(field, voxels);
+    return renderCells(*cells, options);
+  }
+  void forget() {
+    if (cells) cells->forget();
+  }
+
+  const Field& field;
+  const RevoxeliseOptions voxels;
+  std::unique_ptr<LazyCells> cells{};
 };
 
 /// Draws a field on a CUDA device with one renderer for each rule between voxels. A renderer is

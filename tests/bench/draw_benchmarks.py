@@ -25,7 +25,7 @@ SHEETS = [("aneurism", "59000"), *SCENES[2:]]
 PURPOSES = [[], *(["--fit-for", "drawing", "--voxel-share", share]
                   for share in ["0.75", "0.5", "0.25", "0.125", "0"])]
 PURPOSE_VIEWS = ["--turntable", "36"]
-METHODS = {"ellipsoids": [], "sum": ["--between", "sum"], "bricks": ["--method", "bricks"]}
+METHODS = {"voxels": [], "sum": ["--between", "sum"]}
 PARTS = [*(["--depth-parts", parts] for parts in ["1", "4", "8", "16"]), ["--min-transmittance", "0"]]
 
 
@@ -68,17 +68,16 @@ def speed(arguments):
     for name, count in SCENES:
         file = esvr(arguments, name, count)
         reference = ["--ref", arguments.data / f"{name}.vdb"]
-        each, summed, bricks = (bench(arguments, file, *reference, *options)
-                                for options in METHODS.values())
-        nano, drawn = each["reference"], each["drawn"]
+        voxels, summed = (bench(arguments, file, *reference, *options)
+                          for options in METHODS.values())
+        nano, drawn = voxels["reference"], voxels["drawn"]
         print(f"| {label(name, count)} | {nano['fps_median']:.0f} | {megabytes(nano)} | "
-              f"{drawn['fps_median']:.0f} ({drawn['fps_1_percent_low']:.0f}) | {ratio(each)} | "
-              f"{drawn['list_ms']:.3f} | {drawn['draw_ms']:.3f} | {megabytes(drawn)} | "
-              f"{each['image']['psnr']['mean']:.1f} | {each['image']['ssim']['mean']:.4f} | "
+              f"{drawn['fps_median']:.0f} ({drawn['fps_1_percent_low']:.0f}) | {ratio(voxels)} | "
+              f"{drawn['cold_fps_median']:.0f} | "
+              f"{drawn['cold_fps_median'] / nano['fps_median']:.1f} | {megabytes(drawn)} | "
+              f"{voxels['image']['psnr']['mean']:.1f} | {voxels['image']['ssim']['mean']:.4f} | "
               f"{summed['drawn']['fps_median']:.0f} | {ratio(summed)} | "
-              f"{summed['image']['psnr']['mean']:.1f} | {bricks['drawn']['fps_median']:.0f} | "
-              f"{ratio(bricks)} | {megabytes(bricks['drawn'])} | "
-              f"{bricks['image']['psnr']['mean']:.1f} |", flush=True)
+              f"{megabytes(summed['drawn'])} | {summed['image']['psnr']['mean']:.1f} |", flush=True)
 
 
 def purpose_row(arguments, name, count, options):
@@ -105,14 +104,12 @@ def purpose(arguments):
 
 
 def parts(arguments):
-    for method in ["sum", "ellipsoids"]:
-        print(f"\n{method}")
-        for name, count in SCENES:
-            file = esvr(arguments, name, count)
-            reports = [bench(arguments, file, "--turntable", "180", *METHODS[method], *options)
-                       for options in PARTS]
-            print(f"| {label(name, count)} | "
-                  + " | ".join(f"{r['drawn']['fps_median']:.0f}" for r in reports) + " |", flush=True)
+    for name, count in SCENES:
+        file = esvr(arguments, name, count)
+        reports = [bench(arguments, file, "--turntable", "180", *METHODS["sum"], *options)
+                   for options in PARTS]
+        print(f"| {label(name, count)} | "
+              + " | ".join(f"{r['drawn']['fps_median']:.0f}" for r in reports) + " |", flush=True)
 
 
 def sheets(arguments):
@@ -133,7 +130,7 @@ def large(arguments):
          "float32", "--kappa", "2", "--seconds", "15", "--device", arguments.device, "--force"])
     reports = {name: bench(arguments, file, "--turntable", "120", "--ref", volume, *options)
                for name, options in METHODS.items()}
-    nano = reports["ellipsoids"]["reference"]
+    nano = reports["voxels"]["reference"]
     print(f"| NanoVDB float | {nano['fps_median']:.0f} | {nano['fps_1_percent_low']:.0f} | | "
           f"{megabytes(nano)} | | |")
     for name, report in reports.items():

@@ -49,9 +49,9 @@ TEST_P(GoldenPicture, isDrawnAgain) {
 
 INSTANTIATE_TEST_SUITE_P(
     Pictures, GoldenPicture,
-    testing::Values(Golden{"ellipsoids", "in.esvr", {}}, Golden{"voxels", "in.vdb", {}},
+    testing::Values(Golden{"default", "in.esvr", {}}, Golden{"voxels", "in.vdb", {}},
                     Golden{"sum", "in.esvr", {"--between", "sum", "--colors", "inferno"}},
-                    Golden{"bricks", "in.esvr", {"--method", "bricks", "--opacity", "tent"}},
+                    Golden{"tent", "in.esvr", {"--opacity", "tent"}},
                     Golden{"post", "in.vdb", {"--classification", "post"}},
                     Golden{"maximum", "in.esvr", {"--mode", "maximum", "--background", "1,1,1"}},
                     Golden{"slice", "in.vdb", {"--slice", "z=15", "--opacity-length", "0.2"}},

@@ -46,7 +46,6 @@ TEST_F(EsvrRender, OptionsThatMakeNoSenseAreRefused) {
   expectRefused({"--values", "fp32"}, 2, "fp16");
   expectRefused({"--sheet", "s.png"}, 2, "--ref");
   expectRefused({"--min-transmittance", "1"}, 2, "transmittance");
-  expectRefused({"--method", "tubes"}, 2, "bricks");
   expectRefused({"--device", "gpu"}, 2, "gpu");
   expectRefused({"--bench"}, 2, "--bench");
   expectRefused({"--report", "r.json"}, 2, "--ref");

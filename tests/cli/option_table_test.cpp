@@ -115,7 +115,6 @@ Table renderTests() {
           {"--legend", "EsvrRenderLegend.IsRefusedWhereItCannotBeDrawn"},
           {"--max-memory", "EsvrRender.PicturesBeyondTheMemoryAllowedAreRefused"},
           {"--max-vram", "EsvrRender.PartsOfTheDepthAndMemoryChangeNothingOnGpu"},
-          {"--method", "EsvrRender.BricksAreTheVoxelsOfTheSum"},
           {"--min-transmittance", "EsvrRender.TheSamplingOfRaysChangesThePicture"},
           {"--mode", "EsvrRender.ModesAndBoxesChangeThePicture"},
           {"--opacity", "EsvrRender.ASavedTransferFunctionDrawsTheSame"},

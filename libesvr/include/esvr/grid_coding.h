@@ -38,9 +38,13 @@ namespace esvr {
 [[nodiscard]] StoredGrid makeStoredVoxels(const GridDescriptor& descriptor,
                                           const SparseVolume& source, VoxelLayer layer);
 
-/// The rule by which decodeGrid() makes voxels from the sum: the grid's threshold, range and band,
-/// without its bricks, mask and residual.
+/// The rule by which decodeGrid() makes voxels from the sum: the grid's threshold, range, band and
+/// bricks, without its mask and residual. It refers to the bricks of `grid`.
 [[nodiscard]] RevoxeliseOptions voxelRule(const StoredGrid& grid);
+
+/// True if the voxels of a grid follow from its ellipsoids by voxelRule() alone. This is not so if
+/// it stores voxels, a residual or a mask.
+[[nodiscard]] bool followsFromEllipsoids(const StoredGrid& grid);
 
 struct DecodeOptions {
   std::optional<float> threshold{};  ///< replaces the grid's own threshold; 0 or above

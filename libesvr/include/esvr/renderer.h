@@ -38,7 +38,8 @@ struct RendererLimits {
   std::uint64_t maxBytes = 0;
 };
 
-/// A renderer is used from one thread. The field or volume that it draws must outlive it.
+/// A renderer is used from one thread. The field or volume that it draws must outlive it, and so must
+/// the bricks of RevoxeliseOptions.
 class Renderer {
  public:
   Renderer() = default;
