@@ -26,7 +26,10 @@ std::string notes() {
          "\n"
          "Positions and lengths are in voxels of the grid's index space; its transform is not\n"
          "applied. By default the camera sees all active voxels. Samples whose value is exactly\n"
-         "the background are transparent.\n"
+         "the background are transparent. A level set is drawn as an opaque body, whose faces "
+         "differ\n"
+         "in brightness by their angle to the rays, unless --colors, --opacity, --tf, --range or\n"
+         "--mode is given.\n"
          "\n" +
          listOf("Color maps", builtInColorMaps()) + listOf("Opacity curves", builtInOpacities()) +
          "\n"

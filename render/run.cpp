@@ -108,6 +108,19 @@ ValueRange rangeOf(const Options& options, const Scene& scene) {
   return {std::min(scene.data.min, scene.background), std::max(scene.data.max, scene.background)};
 }
 
+/// The transfer function over its range. A level set is drawn as an opaque body unless an option
+/// asks for another function or range.
+TransferFunction transferOf(const Options& options, const Scene& scene) {
+  const bool usual = !options.transfer && options.rangeKind == RangeKind::kAuto;
+  const bool composite = options.mode == RenderMode::kComposite;
+  if (usual && composite && scene.isLevelSet && scene.background > 0.0f)
+    return levelSetSurface(double(scene.background));
+  const TransferFunction function = options.transfer.value_or(
+      TransferFunction{builtInColorMap(kUsualColors), builtInOpacity(kUsualOpacity)});
+  if (options.rangeKind == RangeKind::kOwn) return function;
+  return rescaled(function, rangeOf(options, scene));
+}
+
 /// The rule between voxels unless --between was given.
 Between usualBetween(const Scene& scene) {
   const auto* field = std::get_if<Field>(&scene.content);
@@ -118,9 +131,7 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
   RenderOptions r;
   r.resolution = options.resolution;
   r.camera = fitCamera(scene.box, options.camera, options.resolution);
-  r.transfer = options.rangeKind == RangeKind::kOwn
-                   ? options.transfer
-                   : rescaled(options.transfer, rangeOf(options, scene));
+  r.transfer = transferOf(options, scene);
   r.step = options.step;
   r.opacityLength = options.opacityLength;
   r.minTransmittance = options.minTransmittance.value_or(r.minTransmittance);
