@@ -106,8 +106,9 @@ struct SegmentTableView {
     const float place = (value - low) * scale;
     return place < -kFar ? -kFar : (place > kFar ? kFar : place);
   }
+  /// Pieces are so thin that one more or less, by rounding, changes a channel by less than 1/255.
   ESVR_HD static float piecesOf(float extinction) {
-    constexpr float kThin = 0.5f, kMost = 16.0f;
+    constexpr float kThin = 0.25f, kMost = 16.0f;
     if (!(extinction > 0.0f)) return 0.0f;
     return extinction < kThin * kMost ? std::ceil(extinction / kThin) : kMost;
   }
