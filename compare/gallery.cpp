@@ -21,7 +21,8 @@ ValueRange rangeOf(const SparseVolume& volume) {
 
 std::vector<RenderOptions> viewsOf(const GalleryOptions& options, const SparseVolume& reference,
                                    const CancelToken& cancel) {
-  const Camera first = fitCamera(activeBox(reference), {}, options.resolution);
+  const Camera first =
+      fitCamera(activeBox(reference), {.framing = Framing::kSphere}, options.resolution);
   std::vector<RenderOptions> views;
   for (const auto& transfer : options.transfers)
     for (int view = 0; view < options.views; ++view) {

@@ -3,6 +3,7 @@
 #include "cli/number_list.h"
 #include "render/camera_file.h"
 #include "render/vector_option.h"
+#include "report/video_file.h"
 
 namespace esvr::render {
 namespace {
@@ -39,6 +40,24 @@ int turntableOf(const Arguments& a) {
   return frames.value_or(0);
 }
 
+/// \throws UsageError  --fps does not fit the output
+void readFps(const Arguments& a, Options& options) {
+  constexpr double kMinFps = 0.1, kMaxFps = 1000.0;
+  if (!a.has("fps")) return;
+  options.fps = a.get<double>("fps");
+  cli::requireRange("fps", options.fps, kMinFps, kMaxFps);
+  if (!report::isVideo(options.output))
+    throw UsageError("--fps says nothing unless the output is a video (.mp4 or .webm)");
+}
+
+/// \throws UsageError  options say something that a video cannot do
+void checkVideoOptions(const Arguments& a, const Options& options) {
+  if (!report::isVideo(options.output)) return;
+  if (options.turntable == 0) throw UsageError("a video needs --turntable");
+  if (a.has("ref")) throw UsageError("--ref compares pictures; a video has no files for them");
+  if (a.get<int>("bits") != 8) throw UsageError("a video has 8 bits per channel; leave --bits out");
+}
+
 void readFrames(const Arguments& a, Options& options) {
   const auto text = a.find<std::string>("frames");
   if (!text) return;
@@ -72,9 +91,11 @@ void addCameraOptions(cli::po::options_description& options) {
     ("height", value<double>()->value_name("H"),
      "height of an orthographic picture in voxels")
     ("turntable", value<int>()->value_name("N"),
-     "draw N pictures of a full turn about the up axis")
+     "draw N pictures of a full turn about the up axis, see the notes for their files")
     ("frames", value<std::string>()->value_name("A-B"),
-     "draw only the pictures A to B of a turntable, counted from 0");
+     "draw only the pictures A to B of a turntable, counted from 0")
+    ("fps", value<double>()->value_name("F"),
+     "pictures per second of a video (default: 30)");
   // clang-format on
 }
 
@@ -82,6 +103,8 @@ void readCameraOptions(const Arguments& a, Options& options) {
   options.camera = cameraOf(a);
   options.turntable = turntableOf(a);
   readFrames(a, options);
+  readFps(a, options);
+  checkVideoOptions(a, options);
 }
 
 }  // namespace esvr::render

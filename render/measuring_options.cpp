@@ -28,6 +28,8 @@ void readMeasuringOptions(const cli::Arguments& a, Options& options) {
   options.report = a.find<std::string>("report").value_or("");
   if (options.bench && !options.depth.empty())
     throw UsageError("--bench writes no picture; leave --depth out");
+  if (options.bench && options.legend)
+    throw UsageError("--bench writes no picture; leave --legend out");
   if (options.bench != options.output.empty())
     throw UsageError(options.bench ? "--bench writes no picture; leave OUT.png out"
                                    : "OUT.png is missing");

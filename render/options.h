@@ -38,6 +38,7 @@ struct Options {
   double step = 1.0, opacityLength = 1.0;
   std::optional<double> minTransmittance;  ///< default: that of RenderOptions
   std::optional<Rgb> background;           ///< default: the picture is transparent
+  bool legend = false;                     ///< draw a color bar
   int bits = 8;                            ///< bits of a PNG's channel
   std::optional<Between> between;          ///< default: what the ellipsoids were fitted for
   RenderMode mode = RenderMode::kComposite;
@@ -46,6 +47,7 @@ struct Options {
   int turntable = 0;             ///< number of pictures of a full turn; 0: one picture
   int firstFrame = 0;            ///< first picture of the turn to draw
   std::optional<int> lastFrame;  ///< last picture of the turn to draw; default: the turn's last
+  double fps = 30.0;             ///< pictures per second of a video
   std::filesystem::path depth;   ///< file of distances; empty: none
   std::filesystem::path saveTransfer;
   std::string device = "auto";

@@ -10,6 +10,7 @@ namespace esvr::render {
 namespace {
 
 using cli::Arguments;
+using cli::po::bool_switch;
 using cli::po::value;
 
 constexpr int kMaxSide = Resolution::kMaxSide;
@@ -66,6 +67,15 @@ int bitsOf(const Arguments& a) {
   return bits;
 }
 
+bool legendOf(const Arguments& a, const Options& options) {
+  const bool legend = a.get<bool>("legend");
+  if (legend && options.output.extension() == ".exr")
+    throw UsageError(
+        "--legend cannot be drawn into an EXR picture, whose pixels are data for "
+        "other programs; write a PNG");
+  return legend;
+}
+
 RenderMode modeOf(const Arguments& a) {
   return cli::choose<RenderMode>("mode", a.get<std::string>("mode"),
                                  {{"composite", RenderMode::kComposite},
@@ -94,6 +104,9 @@ void addPictureOptions(cli::po::options_description& options) {
      "width and height of the picture in pixels")
     ("background", value<std::string>()->value_name("R,G,B"),
      "color behind the volume, each channel from 0 to 1 (default: transparent)")
+    ("legend", bool_switch(),
+     "draw a color bar with the values, the name and the unit of the grid at the right edge, see "
+     "the notes")
     ("bits", value<int>()->value_name("B")->default_value(8), "bits per channel of a PNG, 8 or 16")
     ("mode", value<std::string>()->value_name("M")->default_value("composite"),
      "composite: composite the samples of a ray from front to back; maximum or average: show the "
@@ -118,6 +131,7 @@ void readPictureOptions(const Arguments& a, Options& options) {
   cli::requireRange("step", options.step, kMinStep, 1e6);
   options.minTransmittance = a.find<double>("min-transmittance");
   options.background = backgroundOf(a);
+  options.legend = legendOf(a, options);
   options.bits = bitsOf(a);
   options.mode = modeOf(a);
   options.classification = classificationOf(a);

@@ -25,16 +25,30 @@ std::string notes() {
          "active mask are drawn with --method bricks only.\n"
          "\n"
          "Positions and lengths are in voxels of the grid's index space; its transform is not\n"
-         "applied. By default the camera sees all active voxels. Samples whose value is exactly\n"
-         "the background are transparent. A level set is drawn as an opaque body, whose faces "
-         "differ\n"
-         "in brightness by their angle to the rays, unless --colors, --opacity, --tf, --range or\n"
-         "--mode is given.\n"
+         "applied. Samples whose value is exactly the background are transparent.\n"
+         "A level set is drawn as an opaque body, whose faces differ in brightness by their angle\n"
+         "to the rays, unless --colors, --opacity, --tf, --range or --mode is given.\n"
+         "\n"
+         "By default the projected box of the active voxels takes 90 % of the picture's width or\n"
+         "height, whichever is tighter. In a turntable, no picture exceeds this, and all pictures\n"
+         "have the same scale. With --bench, the sphere around the box touches the edges.\n"
          "\n" +
          listOf("Color maps", builtInColorMaps()) + listOf("Opacity curves", builtInOpacities()) +
          "\n"
          "CAM.json has the values of the camera options: {\"eye\": [1, 2, 3], \"center\": [...],\n"
          "\"up\": [...], \"fov\": 30}, or \"height\" for an orthographic camera.\n"
+         "\n"
+         "A turntable writes OUT.0000.png, OUT.0001.png and so on. %04d in the name of an output\n"
+         "stands for the number. If OUT is a folder, or ends in '/', the pictures are\n"
+         "OUT/frame.0000.png and so on. If it ends in .mp4 or .webm, the program ffmpeg, which "
+         "must\n"
+         "be in PATH, encodes a video. A video shows the background; the default is black.\n"
+         "\n"
+         "--legend shows the color of each value and, in a second column in front of a\n"
+         "checkerboard, its opacity over --opacity-length. The unit is the text of the grid's\n"
+         "metadata \"unit\" or \"units\". A fitted camera leaves room for the bar. It is not "
+         "drawn\n"
+         "into EXR pictures, and the errors of --ref are measured without it.\n"
          "\n"
          "--ref also draws the voxels of a VDB with the same camera, on the same device, and\n"
          "prints the error of each picture. OUT.error.png shows ten times the error.\n"
@@ -60,6 +74,7 @@ cli::ProgramText programText() {
           .usage =
               "  esvr-render IN.esvr OUT.png|OUT.exr [OPTION]...\n"
               "  esvr-render IN.vdb OUT.png|OUT.exr [OPTION]...\n"
+              "  esvr-render IN OUT.mp4|OUT.webm|FOLDER/ --turntable N [OPTION]...\n"
               "  esvr-render IN.esvr --bench [--ref IN.vdb] [--report FILE.json] [OPTION]...",
           .notes = notes(),
           .examples =
@@ -68,6 +83,7 @@ cli::ProgramText programText() {
               "  esvr-render smoke.esvr smoke.png --colors inferno --opacity-length 4\n"
               "  esvr-render smoke.esvr smoke.png --tf presets.json --preset Smoke\n"
               "  esvr-render smoke.esvr turn.png --turntable 36   turn.0000.png to turn.0035.png\n"
+              "  esvr-render smoke.esvr turn.mp4 --turntable 120 --fps 24\n"
               "  esvr-render smoke.esvr --bench --ref smoke.vdb   speed, memory, quality"};
 }
 

@@ -10,7 +10,6 @@
 #include "cli/bytes_file.h"
 #include "cli/interrupts.h"
 #include "cli/json_file.h"
-#include "cli/output.h"
 #include "cli/stopwatch.h"
 #include "cli/table.h"
 #include "cli/version_text.h"
@@ -18,8 +17,11 @@
 #include "esvr/memory_limit.h"
 #include "render/bench.h"
 #include "render/exr_file.h"
+#include "render/legend.h"
+#include "render/output_files.h"
 #include "render/png_file.h"
 #include "render/scene.h"
+#include "report/video_file.h"
 
 namespace esvr::render {
 namespace {
@@ -28,68 +30,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kReportSchema = "esvr-picture";
 constexpr int kReportVersion = 1;
-
-/// The file name of a frame: "turn.0007.png" for "turn.png" and 7.
-fs::path frameName(const fs::path& output, int frame) {
-  constexpr std::size_t kDigits = 4;
-  std::string number = std::to_string(frame);
-  number.insert(0, kDigits - std::min(kDigits, number.size()), '0');
-  fs::path name = output;
-  return name.replace_extension(number + output.extension().string());
-}
-
-std::vector<fs::path> frameNames(const Options& options, const fs::path& output) {
-  std::vector<fs::path> names;
-  const int last = options.lastFrame.value_or(options.turntable - 1);
-  for (int i = options.firstFrame; i <= last; ++i) names.push_back(frameName(output, i));
-  return names;
-}
-
-std::vector<fs::path> outputs(const Options& options) {
-  if (options.turntable == 0) return {options.output};
-  return frameNames(options, options.output);
-}
-
-std::vector<fs::path> sheetOutputs(const Options& options) {
-  if (options.sheet.empty()) return {};
-  if (options.turntable == 0) return {options.sheet};
-  return frameNames(options, options.sheet);
-}
-
-std::vector<fs::path> depthOutputs(const Options& options) {
-  if (options.depth.empty()) return {};
-  if (options.turntable == 0) return {options.depth};
-  return frameNames(options, options.depth);
-}
-
-/// The file name of a picture's error map: "turn.0007.error.png" for "turn.0007.png".
-fs::path errorName(const fs::path& picture) {
-  fs::path name = picture;
-  return name.replace_extension("error" + picture.extension().string());
-}
-
-/// Checks all output files before anything is drawn, so that a mistake costs no time.
-void checkFiles(const Options& options, const std::vector<fs::path>& files) {
-  for (const auto& file : files) {
-    cli::requireDistinct({options.input, file});
-    cli::checkOutput(file, {".png", ".exr"}, options.overwrite);
-    if (options.reference.empty()) continue;
-    cli::requireDistinct({options.reference, file, errorName(file)});
-    cli::checkOutput(errorName(file), {".png", ".exr"}, options.overwrite);
-  }
-  for (const auto& file : depthOutputs(options)) {
-    cli::requireDistinct({options.input, file});
-    cli::checkOutput(file, {".exr"}, options.overwrite);
-  }
-  for (const auto& file : sheetOutputs(options)) {
-    cli::requireDistinct({options.input, options.reference, file});
-    cli::checkOutput(file, {".png"}, options.overwrite);
-  }
-  if (!options.saveTransfer.empty())
-    cli::checkOutput(options.saveTransfer, {".json"}, options.overwrite);
-  const bool toFile = !options.report.empty() && options.report != cli::kStandardOutput;
-  if (toFile) cli::checkOutput(options.report, {".json"}, options.overwrite);
-}
 
 /// Checks the memory for pictures. Each is held as four floats a pixel and is encoded in memory.
 /// With --ref there are also the reference's picture, the difference and, with --sheet, the sheet.
@@ -127,10 +67,37 @@ Between usualBetween(const Scene& scene) {
   return field ? fittedBetween(*field) : Between::kVoxels;
 }
 
+/// Benchmarks use the sphere around the volume, so that their figures are those of earlier versions.
+Framing framingOf(const Options& options) {
+  if (options.bench) return Framing::kSphere;
+  return options.turntable == 0 ? Framing::kBox : Framing::kTurn;
+}
+
+TransferFunction transferOf(const Options& options, const Scene& scene) {
+  return options.rangeKind == RangeKind::kOwn ? options.transfer
+                                              : rescaled(options.transfer, rangeOf(options, scene));
+}
+
+/// The color bar that is drawn into pictures; nothing without --legend.
+std::optional<report::ColorBar> barOf(const Options& options, const Scene& scene) {
+  if (!options.legend) return std::nullopt;
+  return legendOf(options, scene, transferOf(options, scene));
+}
+
+/// The camera; if it is fitted, the volume lies beside the color bar.
+Camera cameraOf(const Options& options, const Scene& scene) {
+  const Resolution r = options.resolution;
+  CameraWish wish = options.camera;
+  wish.framing = framingOf(options);
+  if (const auto bar = barOf(options, scene))
+    wish.freeRight = report::colorBarShare(*bar, r.width, r.height);
+  return fitCamera(scene.box, wish, r);
+}
+
 RenderOptions renderOptions(const Options& options, const Scene& scene) {
   RenderOptions r;
   r.resolution = options.resolution;
-  r.camera = fitCamera(scene.box, options.camera, options.resolution);
+  r.camera = cameraOf(options, scene);
   r.transfer = transferOf(options, scene);
   r.step = options.step;
   r.opacityLength = options.opacityLength;
@@ -166,32 +133,72 @@ std::string summary(const fs::path& file, const Scene& scene, Resolution r, doub
          std::to_string(r.height) + ", " + cli::shortNumber(seconds) + " s";
 }
 
+/// The form of the video that the options ask for.
+report::VideoForm videoForm(const Options& options, const std::string& comment) {
+  const Rgb behind = options.background.value_or(Rgb{});
+  report::VideoForm form;
+  form.width = options.resolution.width;
+  form.height = options.resolution.height;
+  form.fps = options.fps;
+  form.background = {behind.r, behind.g, behind.b};
+  form.comment = comment;
+  form.overwrite = options.overwrite;
+  return form;
+}
+
+/// Draws pictures and writes them to files or to a video.
 class Frames {
  public:
-  Frames(const Options& options, Drawing& drawing, Drawing* reference)
+  Frames(const Options& options, Drawing& drawing, Drawing* reference, const CancelToken& cancel)
       : options_(options),
         log_(kProgram, options.verbosity),
         drawing_(drawing),
-        reference_(reference) {}
+        reference_(reference),
+        bar_(barOf(options, drawing.scene)) {
+    if (report::isVideo(options.output))
+      video_.emplace(options.output, videoForm(options, commandText()), cancel);
+  }
 
-  /// Draws one frame. \param sheet  file of the sheet; empty: none
-  void draw(const RenderOptions& r, const fs::path& file, const fs::path& sheet) {
+  void draw(const RenderOptions& r, const PictureFiles& files) {
     cli::Stopwatch watch;
     const Image image = drawing_.renderer->draw(r);
     const double seconds = watch.lap();
-    write(file, image, options_.background);
-    log_.info(summary(file, drawing_.scene, r.resolution, seconds));
-    if (reference_ != nullptr) compare(r, image, file, sheet);
+    if (video_)
+      video_->add(withBar(image)), ++pictures_;
+    else
+      keep(image, r, files, seconds);
+    if (!files.depth.empty()) drawDepth(r, files.depth);
   }
+  /// Completes a video.
+  void finish() {
+    if (!video_) return;
+    video_->finish();
+    log_.info(summary(options_.output, drawing_.scene, options_.resolution, watch_.lap()) + ", " +
+              std::to_string(pictures_) + " pictures, " +
+              cli::shortNumber(pictures_ / options_.fps) + " s of video");
+  }
+  [[nodiscard]] const nlohmann::ordered_json& comparisons() const { return comparisons_; }
+
+ private:
+  void keep(const Image& image, const RenderOptions& r, const PictureFiles& files, double seconds) {
+    write(files.picture, withBar(image), options_.background);
+    log_.info(summary(files.picture, drawing_.scene, r.resolution, seconds));
+    if (reference_ != nullptr) compare(r, image, files);
+  }
+
+  /// The picture as it is shown; figures are measured without the color bar.
+  [[nodiscard]] Image withBar(Image image) const {
+    if (bar_) report::drawColorBar(*bar_, image);
+    return image;
+  }
+
   void drawDepth(RenderOptions r, const fs::path& file) {
     r.mode = RenderMode::kDepth;
     const auto bytes = encodeDepthExr(drawing_.renderer->draw(r), {software(), commandText()});
     cli::writeBytes(file, bytes, options_.overwrite);
     log_.info(file.string() + ": distances in voxels");
   }
-  [[nodiscard]] const nlohmann::ordered_json& comparisons() const { return comparisons_; }
 
- private:
   void write(const fs::path& file, const Image& image, const std::optional<Rgb>& background) {
     const auto bytes = file.extension() == ".exr" ? encodeExr(image, {software(), commandText()})
                                                   : encodePng(image, {background, options_.bits},
@@ -209,18 +216,19 @@ class Frames {
 
   static std::string software() { return std::string(kProgram) + " " + cli::programVersion(); }
 
-  void compare(const RenderOptions& r, const Image& image, const fs::path& file,
-               const fs::path& sheet) {
+  void compare(const RenderOptions& r, const Image& image, const PictureFiles& files) {
     constexpr double kGain = 10.0;  // gain of the difference; --help states it
     const Image expected = reference_->renderer->draw(r);
     const ImageMetrics m = compareImages(expected, image);
     const Image error = errorMap(expected, image, kGain);
-    write(errorName(file), error, std::nullopt);
-    if (!sheet.empty())
-      write(sheet, sideBySide(std::array{image, expected, error}), options_.background);
-    log_.info(errorName(file).string() + ": PSNR " + cli::shortNumber(m.psnr) + " dB, SSIM " +
-              cli::shortNumber(m.ssim) + ", largest error " + cli::shortNumber(m.maxError));
-    comparisons_.push_back({{"picture", file.string()},
+    write(errorName(files.picture), error, std::nullopt);
+    if (!files.sheet.empty())
+      write(files.sheet, sideBySide(std::array{withBar(image), expected, error}),
+            options_.background);
+    log_.info(errorName(files.picture).string() + ": PSNR " + cli::shortNumber(m.psnr) +
+              " dB, SSIM " + cli::shortNumber(m.ssim) + ", largest error " +
+              cli::shortNumber(m.maxError));
+    comparisons_.push_back({{"picture", files.picture.string()},
                             {"psnr", jsonNumber(m.psnr)},
                             {"ssim", m.ssim},
                             {"max_error", m.maxError}});
@@ -230,6 +238,10 @@ class Frames {
   const cli::Log log_;
   Drawing& drawing_;
   Drawing* reference_;
+  const std::optional<report::ColorBar> bar_;
+  std::optional<report::VideoFile> video_;
+  int pictures_ = 0;  ///< pictures of the video
+  cli::Stopwatch watch_;
   nlohmann::ordered_json comparisons_ = nlohmann::ordered_json::array();
 };
 
@@ -247,16 +259,14 @@ void writeReport(const Options& options, const nlohmann::ordered_json& report) {
   if (!options.report.empty()) cli::writeJson({options.report, options.overwrite}, report);
 }
 
-void drawFrames(const Options& options, RenderOptions r, Frames& frames) {
-  const auto files = outputs(options), depths = depthOutputs(options);
-  const auto sheets = sheetOutputs(options);
+/// \param pivot  the point about which a turntable turns
+void drawFrames(const Options& options, RenderOptions r, const Vec3& pivot, Frames& frames) {
   const Camera first = r.camera;
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    const std::size_t number = std::size_t(options.firstFrame) + i;
-    if (number > 0) r.camera = turned(first, 360.0 * double(number) / options.turntable);
-    frames.draw(r, files[i], sheets.empty() ? fs::path{} : sheets[i]);
-    if (!depths.empty()) frames.drawDepth(r, depths[i]);
+  for (const PictureFiles& files : pictureFiles(options)) {
+    if (files.frame > 0) r.camera = turned(first, 360.0 * files.frame / options.turntable, pivot);
+    frames.draw(r, files);
   }
+  frames.finish();
 }
 
 void saveTransfer(const Options& options, const TransferFunction& transfer) {
@@ -269,8 +279,7 @@ void saveTransfer(const Options& options, const TransferFunction& transfer) {
 
 void run(const Options& options) {
   const cli::Interrupts interrupts;
-  const auto files = options.bench ? std::vector<fs::path>{} : outputs(options);
-  checkFiles(options, files);
+  checkFiles(options);
   checkPictureSize(options);
   const DrawSettings settings{selectDevice(options.device), options.method, options.limits,
                               options.values, options.memory};
@@ -286,8 +295,8 @@ void run(const Options& options) {
     report.update(bench({*drawing.renderer, reference ? &*reference->renderer : nullptr}, r,
                         options.turntable, log));
   } else {
-    Frames frames(options, drawing, reference.get());
-    drawFrames(options, r, frames);
+    Frames frames(options, drawing, reference.get(), interrupts.token());
+    drawFrames(options, r, pivotOf(drawing.scene.box, options.camera), frames);
     report["comparisons"] = frames.comparisons();
   }
   writeReport(options, report);

@@ -19,6 +19,12 @@ std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
   return findGrid(names, *grid, path);
 }
 
+/// The text of the grid's metadata "unit" or "units"; empty if it has neither.
+std::string unitOf(const GridDescriptor& grid) {
+  const std::string unit = stringValue(grid.metadata, "unit");
+  return unit.empty() ? stringValue(grid.metadata, "units") : unit;
+}
+
 /// Reads a grid of an .esvr file. If the grid stores its voxels, they are drawn instead of the
 /// ellipsoids, because they are exact.
 Scene encoded(const SceneFile& from) {
@@ -26,6 +32,7 @@ Scene encoded(const SceneFile& from) {
   StoredGrid& grid = file.grids[placeOf(file, from.path, from.grid)];
   Scene scene;
   scene.grid = grid.descriptor.name;
+  scene.unit = unitOf(grid.descriptor);
   scene.box = grid.activeBox;
   scene.data = {grid.valueMin, grid.valueMax};
   scene.background = float(grid.descriptor.background);
@@ -50,6 +57,7 @@ Scene voxels(const SceneFile& from) {
                              {.maxBytes = from.memory.maxBytes, .memory = from.memory.voxels});
   Scene scene;
   scene.grid = grid.descriptor.name;
+  scene.unit = unitOf(grid.descriptor);
   scene.box = activeBox(grid.volume);
   scene.data = activeRange(grid.volume);
   scene.background = grid.volume.background;

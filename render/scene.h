@@ -16,6 +16,7 @@ namespace esvr::render {
 struct Scene {
   std::variant<Field, VolumeGrid> content;
   std::string grid;  ///< name of the grid
+  std::string unit;  ///< unit of the values; empty if the grid has none
   Box box;           ///< bounding box of the active voxels
   ValueRange data;   ///< range of the active voxels
   float background = 0.0f;

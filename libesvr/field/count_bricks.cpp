@@ -1,9 +1,11 @@
 #include "field/count_bricks.h"
 
 #include <algorithm>
+#include <string>
 #include <unordered_map>
 
 #include "core/brick_hash.h"
+#include "esvr/error.h"
 #include "field/brick_walk.h"
 
 namespace esvr {
@@ -69,6 +71,15 @@ double countBricks(std::span<const Support> supports, const Box& within, double 
     }
   }
   return double(set.size());
+}
+
+void requireListable(std::span<const Support> supports, const Box& within) {
+  constexpr double kMaxListed = 0x1p32;
+  double bricks = 0.0;
+  for (const Support& support : supports) bricks += maxBricks(support, within);
+  if (bricks > kMaxListed)
+    throw MemoryExceeded("the ellipsoids reach up to " + std::to_string(bricks) +
+                         " bricks, more than 2^32");
 }
 
 }  // namespace esvr

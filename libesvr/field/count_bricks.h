@@ -15,4 +15,8 @@ namespace esvr {
 [[nodiscard]] double countBricks(std::span<const Support> supports, const Box& within,
                                  double enough);
 
+/// \throws MemoryExceeded  the supports may reach more than 2^32 bricks of a box together, whose list
+///                         would take 48 GiB
+void requireListable(std::span<const Support> supports, const Box& within);
+
 }  // namespace esvr

@@ -5,25 +5,19 @@
 #include <vector>
 
 #include "esvr/sparse_volume.h"
-#include "render/brick_march.h"
+#include "render/brick_table.h"
 
 namespace esvr {
 
 /// Holds every brick of cells that has a voxel other than the background.
 struct BrickAtlas {
-  Coord origin, blocks;
-  std::vector<std::uint32_t> blockOf, brickOf;
-  std::vector<Coord> bricks;  ///< relative to the origin, in bricks; in the order of `values`
-  std::vector<float> values;
+  BrickTable table;
+  std::vector<float> values;  ///< kCellBrickVoxels for each brick, in the order of the table
 
-  [[nodiscard]] BrickAtlasView view() const {
-    return {origin, blocks, blockOf.data(), brickOf.data(), values.data()};
-  }
+  /// Pointers to the pages of the values.
+  [[nodiscard]] std::vector<const float*> pages() const;
 };
 
 [[nodiscard]] BrickAtlas makeBrickAtlas(const SparseVolume& volume);
-
-/// The box of an atlas' cells, relative to its origin. It is empty for an atlas without bricks.
-[[nodiscard]] PlaceBox cellsOf(const BrickAtlas& atlas);
 
 }  // namespace esvr

@@ -1,7 +1,8 @@
 #pragma once
 /// Marches a ray through bricks of cells. A brick holds all voxels at the corners of its cells, so
 /// that the interpolation of a sample reads one brick only. A ray crosses an empty brick, or an
-/// empty block of bricks, in one step. The code is compiled for host and device.
+/// empty block of bricks, in one step. A ray that meets a brick whose voxels are not there stops,
+/// and can continue later. The code is compiled for host and device.
 
 #include <cstdint>
 
@@ -18,13 +19,35 @@ inline constexpr int kBlockSide = kBlockBricks * kBrickSide;  ///< voxels
 inline constexpr int kBricksOfBlock = kBlockBricks * kBlockBricks * kBlockBricks;
 inline constexpr std::uint32_t kNoCells = 0xffffffffu;
 
-/// Pointers to a brick atlas in host or device memory.
-struct BrickAtlasView {
+/// Numbers the bricks of cells. Pointers are to host or device memory.
+struct BrickTableView {
   Coord origin;                  ///< first voxel of the first block
   Coord blocks;                  ///< number of blocks along each axis
   const std::uint32_t* blockOf;  ///< number of each block, or kNoCells; z fastest
   const std::uint32_t* brickOf;  ///< by block: number of each brick, or kNoCells; z fastest
-  const float* values;           ///< kCellBrickVoxels for each brick
+};
+
+/// The voxels of bricks. They lie in slots, and the slots in pages.
+struct BrickSlotsView {
+  static constexpr int kPageLog2 = 8;
+  static constexpr std::uint32_t kPageSlots = 1u << kPageLog2;
+  static constexpr std::size_t kPageFloats = std::size_t(kPageSlots) * kCellBrickVoxels;
+  /// Values of slotOf for bricks without a slot.
+  static constexpr std::uint32_t kVacant = 0xffffffffu;   ///< all voxels are the background
+  static constexpr std::uint32_t kMissing = 0xfffffffeu;  ///< the voxels are not there
+  static constexpr std::uint32_t kAsked = 0xfffffffdu;    ///< as kMissing, and already asked for
+
+  const std::uint32_t* slotOf;  ///< by brick; null: brick n has slot n
+  const float* const* pages;    ///< kPageFloats values each
+
+  /// Slot of a brick, or kVacant, kMissing or kAsked.
+  [[nodiscard]] ESVR_HD std::uint32_t slot(std::uint32_t brick) const {
+    return slotOf == nullptr ? brick : slotOf[brick];
+  }
+  [[nodiscard]] ESVR_HD static bool hasSlot(std::uint32_t slot) { return slot < kAsked; }
+  [[nodiscard]] ESVR_HD const float* values(std::uint32_t slot) const {
+    return pages[slot >> kPageLog2] + std::size_t(slot & (kPageSlots - 1)) * kCellBrickVoxels;
+  }
 };
 
 namespace brick_march {
@@ -34,10 +57,16 @@ struct Found {
   std::uint32_t brick;  ///< kNoCells: empty
   Coord low;            ///< lowest corner of the brick or cube
   int side;
+
+  [[nodiscard]] ESVR_HD bool contains(const Coord& cell) const {
+    const Coord past{cell.x - low.x, cell.y - low.y, cell.z - low.z};
+    return past.x >= 0 && past.y >= 0 && past.z >= 0 && past.x < side && past.y < side &&
+           past.z < side;
+  }
 };
 
-/// \param v  cell relative to the atlas; it must lie within the blocks
-ESVR_HD inline Found find(const BrickAtlasView& a, const Coord& v) {
+/// \param v  cell relative to the table's origin; it must lie within the blocks
+ESVR_HD inline Found find(const BrickTableView& a, const Coord& v) {
   const Coord block{v.x / kBlockSide, v.y / kBlockSide, v.z / kBlockSide};
   const std::uint32_t number =
       a.blockOf[(std::size_t(block.x) * a.blocks.y + block.y) * a.blocks.z + block.z];
@@ -70,41 +99,69 @@ ESVR_HD inline Coord cellOf(const FloatPlace& p) {
   return {int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
 }
 
-ESVR_HD inline bool inside(const BrickAtlasView& a, const Coord& v) {
+ESVR_HD inline bool inside(const BrickTableView& a, const Coord& v) {
   return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < a.blocks.x * kBlockSide &&
          v.y < a.blocks.y * kBlockSide && v.z < a.blocks.z * kBlockSide;
 }
 
 }  // namespace brick_march
 
-/// \param scene  its box and view are relative to the atlas' origin
-ESVR_HD inline PixelColor marchBricks(const BrickAtlasView& atlas, const MarchScene& scene,
-                                      int column, int row, const SampleRange& wanted) {
-  using namespace brick_march;
-  const MarchSamples samples = samplesOf(scene, column, row, wanted);
+/// A ray whose first samples have been added.
+struct RayProgress {
   RayState ray;
+  int next = 0;  ///< first sample that has not been added
+};
+
+/// The visitor of a march whose bricks all have slots or are vacant.
+struct AllBricksAreThere {
+  ESVR_HD void entered(std::uint32_t) const {}
+  ESVR_HD bool wantsMore(std::uint32_t, std::uint32_t) const { return false; }
+};
+
+/// Adds samples to a ray until it ends or meets a brick that is missing.
+/// \param scene    its box and view are relative to the table's origin
+/// \param slots    BrickSlotsView, or a type with the same functions
+/// \param visitor  entered(slot) is called for each slot that the ray reads. wantsMore(brick, slot)
+///                 is called for each missing brick; while it returns true, the march looks for
+///                 further missing bricks on the ray, without adding samples
+/// \return true if the ray has ended
+template <class Slots, class Visitor>
+ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
+                                const MarchScene& scene, const MarchSamples& samples,
+                                RayProgress& at, Visitor& visitor) {
+  using namespace brick_march;
   Found found{kNoCells, {0, 0, 0}, 0};
-  for (int i = 0; i < samples.count && scene.rule.open(ray);) {
+  const float* values = nullptr;
+  bool looksAhead = false;
+  for (int i = at.next; i < samples.count && scene.rule.open(at.ray);) {
     const FloatPlace place = samples.at(i);
     const Coord cell = cellOf(place);
-    if (!inside(atlas, cell)) {  // rounding can move a place beyond the box
+    if (!inside(table, cell)) {  // rounding can move a place beyond the box
       ++i;
       continue;
     }
-    const Coord past{cell.x - found.low.x, cell.y - found.low.y, cell.z - found.low.z};
-    const bool same = past.x >= 0 && past.y >= 0 && past.z >= 0 && past.x < found.side &&
-                      past.y < found.side && past.z < found.side;
-    if (!same) found = find(atlas, cell);
-    if (found.brick == kNoCells) {
-      i += march::samplesToLeave(place, samples.apart, found.low, found.side);
+    if (!found.contains(cell)) {
+      found = find(table, cell);
+      const std::uint32_t slot =
+          found.brick == kNoCells ? BrickSlotsView::kVacant : slots.slot(found.brick);
+      const bool there = slots.hasSlot(slot);
+      values = there && !looksAhead ? slots.values(slot) : nullptr;
+      if (there && !looksAhead) visitor.entered(slot);
+      if (!there && slot != BrickSlotsView::kVacant) {
+        if (!looksAhead) at.next = i;
+        looksAhead = true;
+        if (!visitor.wantsMore(found.brick, slot)) return false;
+      }
+    }
+    if (values == nullptr) {
+      i += march::samplesToLeave(place, samples.perVoxel, found.low, found.side);
       continue;
     }
-    const float value =
-        interpolate(atlas.values + std::size_t(found.brick) * kCellBrickVoxels, place, cell);
-    if (value != scene.rule.background) scene.rule.add(ray, value, samples.numberOf(i));
+    const float value = interpolate(values, place, cell);
+    if (value != scene.rule.background) scene.rule.add(at.ray, value, samples.numberOf(i));
     ++i;
   }
-  return scene.rule.finished(ray);
+  return !looksAhead;
 }
 
 }  // namespace esvr

@@ -6,10 +6,10 @@
 
 namespace esvr {
 
-std::vector<Coord> bricksWithCells(const SparseVolume& volume) {
+std::vector<Coord> bricksWithCells(std::span<const Coord> voxels) {
   std::vector<Coord> bricks;
-  bricks.reserve(kCellCorners * volume.bricks.size());
-  for (const Coord brick : volume.bricks)
+  bricks.reserve(kCellCorners * voxels.size());
+  for (const Coord brick : voxels)
     for (int corner = 0; corner < kCellCorners; ++corner)
       bricks.push_back(brick - stepToCorner(corner));
   std::sort(bricks.begin(), bricks.end());

@@ -1,14 +1,15 @@
 #pragma once
-/// The bricks of a volume's cells. A cell is the cube between a voxel and its neighbours above
+/// The bricks of the cells of a volume. A cell is the cube between a voxel and its neighbours above
 /// along x, y and z; it belongs to the brick of that voxel.
 
+#include <span>
 #include <vector>
 
-#include "esvr/sparse_volume.h"
+#include "esvr/coord.h"
 
 namespace esvr {
 
-/// Bricks of which a cell has a corner in a brick of the volume, in increasing order.
-[[nodiscard]] std::vector<Coord> bricksWithCells(const SparseVolume& volume);
+/// Bricks of which a cell has a corner in one of the bricks of voxels, in increasing order.
+[[nodiscard]] std::vector<Coord> bricksWithCells(std::span<const Coord> voxels);
 
 }  // namespace esvr

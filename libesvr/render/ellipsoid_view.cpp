@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "render/window_scene.h"
-
 namespace esvr {
 namespace {
 
@@ -61,25 +59,19 @@ std::vector<RayKernel> rayKernels(const Field& field) {
   return kernels;
 }
 
-VisibleEllipsoids visibleEllipsoids(const Field& field, const View& view, Resolution resolution,
-                                    Between between) {
+VisibleEllipsoids visibleEllipsoids(const Field& field, const View& view, Resolution resolution) {
   const auto ellipsoids = packed(field);
   const auto origins = chunkOrigins(field);
   const auto kernels = rayKernels(field);
-  const bool ofVoxels = between == Between::kVoxels;
   VisibleEllipsoids out;
   for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
     const PackedEllipsoid& e = ellipsoids[i];
     const RayKernel& kernel = kernels[kernels.size() == 1 ? 0 : i];
     const SeenEllipsoid seen = seenBy(view, e, difference(origins[e.chunk], view.eye));
-    const ScreenExtent s =
-        screenExtentOf(view, seen, std::sqrt(double(kernel.cutoff)), ofVoxels, resolution);
+    const ScreenExtent s = screenExtentOf(view, seen, std::sqrt(double(kernel.cutoff)), resolution);
     if (!visible(s.bounds)) continue;
     out.bounds.push_back(s.bounds);
-    if (ofVoxels)
-      out.forms.push_back(windowForm(e, kernel));
-    else
-      out.views.push_back(viewOf(view, seen, s.outline.everywhere, e.intensity, kernel));
+    out.views.push_back(viewOf(view, seen, s.outline.everywhere, e.intensity, kernel));
   }
   return out;
 }

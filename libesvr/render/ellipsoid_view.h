@@ -6,19 +6,17 @@
 
 #include "esvr/render.h"
 #include "render/seen_ellipsoid.h"
-#include "render/window_form.h"
 
 namespace esvr {
 
 /// The ellipsoids that at least one ray of the picture may meet, in the order of the field.
 struct VisibleEllipsoids {
   std::vector<ScreenBounds> bounds;
-  std::vector<EllipsoidView> views;  ///< for Between::kSum
-  std::vector<WindowForm> forms;     ///< for Between::kVoxels
+  std::vector<EllipsoidView> views;
 };
 
 [[nodiscard]] VisibleEllipsoids visibleEllipsoids(const Field& field, const View& view,
-                                                  Resolution resolution, Between between);
+                                                  Resolution resolution);
 
 /// The ellipsoids of all chunks of a field in one array.
 [[nodiscard]] std::vector<PackedEllipsoid> packed(const Field& field);

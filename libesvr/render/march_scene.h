@@ -24,7 +24,8 @@ struct FloatPlace {
 /// first sample in the box and not from the eye, so that float32 is precise enough.
 struct MarchSamples {
   FloatPlace first, apart;
-  float number;  ///< number of the first sample, counted from the eye
+  FloatPlace perVoxel;  ///< samples in a step of a voxel along each axis; 0 where they do not move
+  float number;         ///< number of the first sample, counted from the eye
   int count;
 
   [[nodiscard]] ESVR_HD FloatPlace at(int i) const {
@@ -36,6 +37,11 @@ struct MarchSamples {
   }
 };
 
+ESVR_HD inline float samplesPerVoxel(float apart) {
+  constexpr float kStill = 1e-30f;  // so slow that no ray is long enough to leave a brick
+  return std::fabs(apart) < kStill ? 0.0f : 1.0f / apart;
+}
+
 ESVR_HD inline FloatPlace floatPlace(const Vec3& v) {
   return {float(v[0]), float(v[1]), float(v[2])};
 }
@@ -46,27 +52,30 @@ ESVR_HD inline MarchSamples samplesOf(const MarchScene& s, int column, int row,
   const Ray ray = s.view.ray(column, row);
   const SampleRange range =
       samplesIn(within(ray, s.box), s.step).both(samplesIn(ray, s.clip, s.step)).both(wanted);
-  if (!(range.first <= range.last)) return {{0, 0, 0}, {0, 0, 0}, 0.0f, 0};
+  if (!(range.first <= range.last)) return {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0.0f, 0};
+  const FloatPlace apart = floatPlace(scaled(ray.direction, s.step));
   return {floatPlace(sum(ray.origin, scaled(ray.direction, range.first * s.step))),
-          floatPlace(scaled(ray.direction, s.step)), float(range.first),
+          apart,
+          {samplesPerVoxel(apart.x), samplesPerVoxel(apart.y), samplesPerVoxel(apart.z)},
+          float(range.first),
           int(range.last - range.first) + 1};
 }
 
 namespace march {
 
-ESVR_HD inline float samplesToFace(float place, float apart, int low, int high) {
-  if (apart == 0.0f) return 1e30f;
-  return ((apart > 0.0f ? float(high) : float(low)) - place) / apart;
+ESVR_HD inline float samplesToFace(float place, float perVoxel, int low, int high) {
+  if (perVoxel == 0.0f) return 1e30f;
+  return ((perVoxel > 0.0f ? float(high) : float(low)) - place) * perVoxel;
 }
 
 /// Number of samples from a place to the first one outside an empty cube, at least 1.
 /// \param low, side  lowest corner and side of the cube
-ESVR_HD inline int samplesToLeave(const FloatPlace& p, const FloatPlace& apart, const Coord& low,
+ESVR_HD inline int samplesToLeave(const FloatPlace& p, const FloatPlace& perVoxel, const Coord& low,
                                   int side) {
   constexpr float kRounding = 1e-3f;
-  const float x = samplesToFace(p.x, apart.x, low.x, low.x + side);
-  const float y = samplesToFace(p.y, apart.y, low.y, low.y + side);
-  const float z = samplesToFace(p.z, apart.z, low.z, low.z + side);
+  const float x = samplesToFace(p.x, perVoxel.x, low.x, low.x + side);
+  const float y = samplesToFace(p.y, perVoxel.y, low.y, low.y + side);
+  const float z = samplesToFace(p.z, perVoxel.z, low.z, low.z + side);
   const float leave = x < y ? (x < z ? x : z) : (y < z ? y : z);
   const float whole = std::ceil(leave - kRounding);
   return whole > 1.0f ? (whole < 1e9f ? int(whole) : 1000000000) : 1;

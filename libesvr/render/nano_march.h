@@ -21,12 +21,12 @@ namespace nano_march {
 /// Number of samples from a place to the first one that may read a voxel outside an empty node; 0
 /// if the sample at the place already may. A cell reaches to the next voxel along each axis, so
 /// only the cells at the upper faces of a node read voxels outside it.
-ESVR_HD inline int samplesToLeave(const FloatPlace& place, const FloatPlace& apart,
+ESVR_HD inline int samplesToLeave(const FloatPlace& place, const FloatPlace& perVoxel,
                                   const nanovdb::Coord& at, std::uint32_t dim) {
   const int mask = ~(int(dim) - 1), side = int(dim) - 1;
   const Coord low{at[0] & mask, at[1] & mask, at[2] & mask};
   const bool within = at[0] < low.x + side && at[1] < low.y + side && at[2] < low.z + side;
-  return within ? march::samplesToLeave(place, apart, low, side) : 0;
+  return within ? march::samplesToLeave(place, perVoxel, low, side) : 0;
 }
 
 }  // namespace nano_march
@@ -44,7 +44,7 @@ ESVR_HD inline PixelColor marchNano(const nanovdb::NanoGrid<Build>& grid, const 
     const nanovdb::Coord voxel = nanovdb::Coord::Floor(place);
     if (accessor.probeLeaf(voxel) == nullptr) {
       const std::uint32_t dim = accessor.getDim(voxel, 0);
-      if (const int skip = nano_march::samplesToLeave(at, samples.apart, voxel, dim); skip > 0) {
+      if (const int skip = nano_march::samplesToLeave(at, samples.perVoxel, voxel, dim); skip > 0) {
         i += skip;
         continue;
       }

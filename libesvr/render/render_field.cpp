@@ -2,8 +2,9 @@
 
 #include "esvr/render.h"
 #include "render/picture.h"
+#include "render/render_cells.h"
 #include "render/scene_depth.h"
-#include "render/tile.h"
+#include "render/sum_tile.h"
 
 namespace esvr {
 namespace {
@@ -30,21 +31,17 @@ void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
   const Lists lists = ellipsoidsOfTiles(scene.ellipsoids, firstRow, tiles);
   tbb::parallel_for(0, tiles, [&](int t) {
     if (lists[t].empty()) return;
-    const auto tile = makeTile(scene, {t * kTileSide, firstRow});
-    tile->draw(lists[t]);
-    tile->copyTo(picture);
+    SumTile tile(scene, {t * kTileSide, firstRow});
+    tile.draw(lists[t]);
+    tile.copyTo(picture);
   });
 }
 
-}  // namespace
-
-Image renderField(const Field& field, const RenderOptions& options,
-                  const RevoxeliseOptions& voxels) {
+Image renderSum(const Field& field, const RenderOptions& options, const RevoxeliseOptions& voxels) {
   Picture picture(options);
   if (const auto box = supportBox(field))
-    checkRayLength(binsWithin(shownBox(*box, options.between), picture.view, options.step));
-  const auto ellipsoids =
-      visibleEllipsoids(field, picture.view, options.resolution, options.between);
+    checkRayLength(binsWithin(*box, picture.view, options.step));
+  const auto ellipsoids = visibleEllipsoids(field, picture.view, options.resolution);
   const auto origins = chunkOrigins(field);
   const TileScene scene{options,
                         picture.view,
@@ -57,6 +54,15 @@ Image renderField(const Field& field, const RenderOptions& options,
     drawRow(scene, row * kTileSide, picture);
   });
   return picture.take();
+}
+
+}  // namespace
+
+Image renderField(const Field& field, const RenderOptions& options,
+                  const RevoxeliseOptions& voxels) {
+  if (options.between == Between::kSum) return renderSum(field, options, voxels);
+  checkRenderOptions(options);
+  return renderCells(LazyCells(field, voxels), options);
 }
 
 }  // namespace esvr

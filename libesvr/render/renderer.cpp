@@ -6,6 +6,7 @@
 
 #include "esvr/error.h"
 #include "render/cuda/make_cuda_renderer.h"
+#include "render/render_cells.h"
 
 namespace esvr {
 namespace {
@@ -31,6 +32,44 @@ class CpuRenderer final : public Renderer {
   FrameStats stats_;
 };
 
+/// Draws a field on a CUDA device with one renderer for each rule between voxels. A renderer is
+/// made when it is needed, because each keeps data of its own on the device.
+class CudaFieldRenderers final : public Renderer {
+ public:
+  CudaFieldRenderers(const Field& field, const Device& device, const RendererLimits& limits,
+                     const RevoxeliseOptions& voxels)
+      : field_(field), device_(device), limits_(limits), voxels_(voxels) {
+    (void)of(fittedBetween(field));
+  }
+
+  Image draw(const RenderOptions& options) override { return of(options.between).draw(options); }
+  void drawOnDevice(const RenderOptions& options) override {
+    of(options.between).drawOnDevice(options);
+  }
+  void forget() override {
+    if (cells_) cells_->forget();
+  }
+  FrameStats stats() const override { return last_->stats(); }
+
+ private:
+  Renderer& of(Between between) {
+    auto& renderer = between == Between::kSum ? sums_ : cells_;
+    if (!renderer)
+      renderer =
+          (between == Between::kSum ? cuda::makeCudaFieldRenderer : cuda::makeCudaCellRenderer)(
+              field_, device_, limits_, voxels_);
+    last_ = renderer.get();
+    return *renderer;
+  }
+
+  const Field& field_;
+  const Device device_;
+  const RendererLimits limits_;
+  const RevoxeliseOptions voxels_;
+  std::unique_ptr<Renderer> sums_, cells_;
+  Renderer* last_ = nullptr;
+};
+
 template <class Draw>
 std::unique_ptr<Renderer> makeCpuRenderer(Draw draw) {
   return std::make_unique<CpuRenderer<Draw>>(std::move(draw));
@@ -45,9 +84,13 @@ std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& de
     throw UsageError("parts of the depth must be from 1 to " +
                      std::to_string(RendererLimits::kMaxDepthParts) + ", or 0 to have them chosen");
   if (device.kind == DeviceKind::kCuda)
-    return cuda::makeCudaFieldRenderer(field, device, limits, voxels);
+    return std::make_unique<CudaFieldRenderers>(field, device, limits, voxels);
   return makeCpuRenderer(
-      [&field, voxels](const RenderOptions& o) { return renderField(field, o, voxels); });
+      [&field, voxels, cells = std::unique_ptr<LazyCells>{}](const RenderOptions& o) mutable {
+        if (o.between == Between::kSum) return renderField(field, o, voxels);
+        if (!cells) cells = std::make_unique<LazyCells>(field, voxels);
+        return renderCells(*cells, o);
+      });
 }
 
 std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume, const Device& device,

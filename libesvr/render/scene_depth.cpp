@@ -70,12 +70,6 @@ std::optional<PlaceBox> supportBox(const Field& field) {
   return box;
 }
 
-PlaceBox shownBox(const PlaceBox& support, Between between) {
-  if (between == Between::kSum) return support;
-  constexpr Vec3 kCell{1.0, 1.0, 1.0};
-  return {difference(support.low, kCell), sum(support.high, kCell)};
-}
-
 BinRange binsWithin(const PlaceBox& box, const View& view, double step) {
   const Distances d = view.perspective ? fromEye(box, view) : alongForward(box, view);
   if (d.farthest < 0.0) return {0, -1};

@@ -12,10 +12,6 @@ namespace esvr {
 /// A box around the supports of all ellipsoids; nothing if there are no ellipsoids.
 [[nodiscard]] std::optional<PlaceBox> supportBox(const Field& field);
 
-/// The box in which samples can differ from the background. If samples are interpolated between
-/// voxels, it is larger than the box of the supports by the cells around their voxels.
-[[nodiscard]] PlaceBox shownBox(const PlaceBox& support, Between between);
-
 /// The bins whose samples may lie in a box; empty if last < first.
 [[nodiscard]] BinRange binsWithin(const PlaceBox& box, const View& view, double step);
 

@@ -130,20 +130,6 @@ ESVR_HD inline SeenEllipsoid seenBy(const View& view, const PackedEllipsoid& e,
           {double(e.scale[0]), double(e.scale[1]), double(e.scale[2])}};
 }
 
-/// An ellipsoid that contains all places whose interpolation reads a voxel in the support of `e`.
-/// These lie in the sum (Minkowski) of the support and a ball whose radius is the diagonal of a
-/// cell. Of the ellipsoids with the axes of `e` that contain this sum, the result is the one whose
-/// squared half axes have the minimum sum. Its scales are its half axes.
-ESVR_HD inline SeenEllipsoid widenedByCells(const SeenEllipsoid& e, double radius) {
-  constexpr double kCell2 = 3.0;  // squared diagonal of a cell
-  const Vec3 half = scaled(e.scale, radius);
-  const double p = std::sqrt(inner(half, half) / (3.0 * kCell2));
-  SeenEllipsoid wide = e;
-  for (int i = 0; i < 3; ++i)
-    wide.scale[i] = std::sqrt((1.0 + 1.0 / p) * half[i] * half[i] + (1.0 + p) * kCell2);
-  return wide;
-}
-
 /// \param radius  radius of the support in units of the scales
 ESVR_HD inline ScreenEllipse outlineOf(const View& view, const SeenEllipsoid& e, double radius) {
   using namespace ellipsoid_math;
@@ -184,14 +170,11 @@ struct ScreenExtent {
   ScreenBounds bounds;
 };
 
-/// \param radius    radius of the support in units of the scales
-/// \param ofVoxels  whether samples are interpolated from voxels, which widens the extent by a cell
+/// \param radius  radius of the support in units of the scales
 ESVR_HD inline ScreenExtent screenExtentOf(const View& view, const SeenEllipsoid& e, double radius,
-                                           bool ofVoxels, Resolution resolution) {
-  const SeenEllipsoid shown = ofVoxels ? widenedByCells(e, radius) : e;
-  const double reach = ofVoxels ? 1.0 : radius;
-  const ScreenEllipse outline = outlineOf(view, shown, reach);
-  return {outline, boundsOf(outline, shown, reach, resolution)};
+                                           Resolution resolution) {
+  const ScreenEllipse outline = outlineOf(view, e, radius);
+  return {outline, boundsOf(outline, e, radius, resolution)};
 }
 
 /// The columns that an outline covers between two rows; low > high if it covers none. The result is

@@ -2,9 +2,6 @@
 
 #include <algorithm>
 
-#include "render/sum_tile.h"
-#include "render/window_tile.h"
-
 namespace esvr {
 
 Tile::Tile(const TileScene& scene, TilePlace place)
@@ -63,11 +60,6 @@ void Tile::copyTo(Picture& picture) const {
     for (int column = 0; column < columns_; ++column)
       picture.set(place_.column + column, place_.row + row,
                   scene_.rule.finished(rays_[row * kTileSide + column]));
-}
-
-std::unique_ptr<Tile> makeTile(const TileScene& scene, TilePlace place) {
-  if (scene.options.between == Between::kVoxels) return std::make_unique<WindowTile>(scene, place);
-  return std::make_unique<SumTile>(scene, place);
 }
 
 }  // namespace esvr

@@ -65,7 +65,4 @@ class Tile {
   std::vector<RayState> rays_;
 };
 
-/// Makes a tile of the kind that RenderOptions::between asks for.
-[[nodiscard]] std::unique_ptr<Tile> makeTile(const TileScene& scene, TilePlace place);
-
 }  // namespace esvr

@@ -2,6 +2,7 @@
 /// Arithmetic on points and directions, for host and device.
 
 #include <cmath>
+#include <numbers>
 
 #include "esvr/camera.h"
 #include "esvr/kernel.h"
@@ -25,5 +26,10 @@ ESVR_HD inline Vec3 cross(const Vec3& a, const Vec3& b) {
 /// The length, also if its square overflows.
 inline double length(const Vec3& a) { return std::hypot(a[0], a[1], a[2]); }
 inline Vec3 unit(const Vec3& a) { return scaled(a, 1.0 / length(a)); }
+inline bool parallel(const Vec3& a, const Vec3& b) {
+  constexpr double kSine = 1e-6;  // sine of the angle below which vectors count as parallel
+  return length(cross(a, b)) <= kSine * length(a) * length(b);
+}
+inline double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
 }  // namespace esvr

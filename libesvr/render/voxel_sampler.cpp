@@ -15,7 +15,7 @@ float between(float a, float b, float s) { return a + s * (b - a); }
 }  // namespace
 
 VoxelSampler::VoxelSampler(const SparseVolume& volume)
-    : volume_(volume), index_(bricksWithCells(volume)) {
+    : volume_(volume), index_(bricksWithCells(volume.bricks)) {
   const BrickIndex stored(volume.bricks);
   for (const Coord brick : index_.bricks()) {
     Corners corners;

@@ -11,8 +11,10 @@ namespace {
 constexpr double kMargin = 0.04;  // margin at each end, relative to the range of the values
 constexpr double kMaxTicks = 8.0;
 
+constexpr double kRounding = 1e-6;  // relative error of ends, which may be rounded to float32
+constexpr double kPlainFrom = 1e-3, kPlainTo = 1e6;  // numbers that need no exponent
+
 std::string labelOf(double value) {
-  constexpr double kPlainFrom = 1e-3, kPlainTo = 1e6;
   const double size = std::abs(value);
   const bool plain = size == 0.0 || (size >= kPlainFrom && size < kPlainTo);
   std::array<char, 32> text;
@@ -20,15 +22,54 @@ std::string labelOf(double value) {
   return text.data();
 }
 
-/// The smallest number of the form 1, 2 or 5 times a power of ten that is not below a number.
+int powerOf(double value) { return int(std::floor(std::log10(value) + kRounding)); }
+
+/// The labels of multiples of a step.
+class StepLabels {
+ public:
+  /// \param largest  size of the largest value
+  StepLabels(double step, double largest)
+      : plain_(step >= kPlainFrom && largest < kPlainTo),
+        digits_(plain_ ? std::max(0, -powerOf(step))
+                       : std::max(0, powerOf(largest) - powerOf(step))) {}
+
+  [[nodiscard]] std::string of(double value) const {
+    if (value == 0.0) return "0";
+    std::array<char, 64> text;
+    std::snprintf(text.data(), text.size(), plain_ ? "%.*f" : "%.*e", digits_, value);
+    return text.data();
+  }
+
+ private:
+  bool plain_;
+  int digits_;
+};
+
+/// The smallest number of the form 1, 2 or 5 times a power of ten that is not below a number, up to
+/// rounding.
 double roundUp(double value) {
   const double power = std::pow(10.0, std::floor(std::log10(value)));
   for (const double digit : {1.0, 2.0, 5.0})
-    if (digit * power >= value) return digit * power;
+    if (digit * power >= value * (1.0 - kRounding)) return digit * power;
   return 10.0 * power;
 }
 
 }  // namespace
+
+std::vector<Tick> roundTicks(double low, double high, double intervals) {
+  constexpr double kNarrowest = 1e-12;  // smallest range, relative to its values
+  const double range = high - low, largest = std::max(std::abs(low), std::abs(high));
+  if (!(range > kNarrowest * largest) || !std::isfinite(range)) return {{low, labelOf(low)}};
+  const double room = kRounding * range, step = roundUp(range / intervals);
+  const double first = std::ceil((low - room) / step);
+  const StepLabels labels(step, largest);
+  std::vector<Tick> ticks;
+  for (double i = 0.0; i <= intervals && (first + i) * step <= high + room; ++i) {
+    const double value = (first + i) * step + 0.0;  // the sum turns -0 into 0
+    ticks.push_back({value, labels.of(value)});
+  }
+  return ticks;
+}
 
 Axis::Axis(std::span<const double> values, bool logarithmic) : logarithmic_(logarithmic) {
   include(values);
@@ -57,35 +98,25 @@ bool Axis::holds(double value) const {
 
 double Axis::place(double value) const { return (scaled(value) - low_) / (high_ - low_); }
 
-std::vector<double> Axis::linearTicks() const {
-  const double step = roundUp((high_ - low_) / kMaxTicks);
-  std::vector<double> values;
-  for (double n = std::ceil(low_ / step); n * step <= high_; ++n) values.push_back(n * step);
-  return values;
-}
-
 /// Ticks at the powers of ten; if there are few of them, also at 2 and 5, or at every digit.
-std::vector<double> Axis::logarithmicTicks() const {
+std::vector<Tick> Axis::logarithmicTicks() const {
   constexpr double kFewDecades = 3.0, kOneDecade = 1.0;
   const double decades = high_ - low_;
   const std::vector<double> digits = decades > kFewDecades ? std::vector<double>{1}
                                      : decades > kOneDecade
                                          ? std::vector<double>{1, 2, 5}
                                          : std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9};
-  std::vector<double> values;
+  std::vector<Tick> ticks;
   for (double decade = std::floor(low_); decade <= high_; ++decade)
     for (const double digit : digits) {
       const double value = digit * std::pow(10.0, decade);
-      if (holds(value)) values.push_back(value);
+      if (holds(value)) ticks.push_back({value, labelOf(value)});
     }
-  return values;
+  return ticks;
 }
 
 std::vector<Tick> Axis::ticks() const {
-  std::vector<Tick> ticks;
-  for (const double value : logarithmic_ ? logarithmicTicks() : linearTicks())
-    ticks.push_back({value, labelOf(value)});
-  return ticks;
+  return logarithmic_ ? logarithmicTicks() : roundTicks(low_, high_, kMaxTicks);
 }
 
 }  // namespace esvr::report

@@ -12,6 +12,11 @@ struct Tick {
   std::string label;
 };
 
+/// Ticks at round numbers from `low` to `high`. The labels have as many digits as distinguish them.
+/// A range that is too narrow for that, or not finite, has one tick, at `low`.
+/// \param intervals  largest number of intervals between the ticks
+[[nodiscard]] std::vector<Tick> roundTicks(double low, double high, double intervals);
+
 class Axis {
  public:
   /// Makes an axis that covers all values with a margin. A logarithmic axis ignores values that are
@@ -28,8 +33,7 @@ class Axis {
  private:
   [[nodiscard]] double scaled(double value) const;
   void include(std::span<const double> values);
-  [[nodiscard]] std::vector<double> linearTicks() const;
-  [[nodiscard]] std::vector<double> logarithmicTicks() const;
+  [[nodiscard]] std::vector<Tick> logarithmicTicks() const;
 
   bool logarithmic_;
   double low_ = 0.0, high_ = 1.0;  ///< range of the results of scaled()

@@ -1,11 +1,10 @@
 #include "report/png_image.h"
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 
 #include "report/cairo_surface.h"
+#include "report/pixel_level.h"
 
 namespace esvr::report {
 namespace {
@@ -13,8 +12,7 @@ namespace {
 /// A color in cairo's RGB24, with blue in the lowest byte of a word.
 std::uint32_t pixelOf(const float* rgba) {
   std::uint32_t pixel = 0;
-  for (int c = 0; c < 3; ++c)
-    pixel = pixel << 8 | std::uint32_t(std::lround(std::clamp(rgba[c], 0.0f, 1.0f) * 255.0f));
+  for (int c = 0; c < 3; ++c) pixel = pixel << 8 | levelOf(rgba[c]);
   return pixel;
 }
 

@@ -67,12 +67,6 @@ const MetaItem* findItem(std::span<const MetaItem> items, const std::string& nam
   return it == items.end() ? nullptr : &*it;
 }
 
-std::string stringValue(std::span<const MetaItem> items, const std::string& name) {
-  const MetaItem* item = findItem(items, name);
-  if (!item || item->type != "string") return {};
-  return {reinterpret_cast<const char*>(item->value.data()), item->value.size()};
-}
-
 bool isFileStatistic(const MetaItem& item) {
   using openvdb::GridBase;
   const std::array names{GridBase::META_FILE_BBOX_MIN,    GridBase::META_FILE_BBOX_MAX,
@@ -100,6 +94,12 @@ namespace esvr {
 MetaItem stringItem(const std::string& name, const std::string& value) {
   const auto* bytes = reinterpret_cast<const std::byte*>(value.data());
   return {name, "string", {bytes, bytes + value.size()}};
+}
+
+std::string stringValue(std::span<const MetaItem> items, const std::string& name) {
+  const MetaItem* item = vdb::findItem(items, name);
+  if (!item || item->type != "string") return {};
+  return {reinterpret_cast<const char*>(item->value.data()), item->value.size()};
 }
 
 }  // namespace esvr

@@ -21,8 +21,6 @@ namespace esvr::vdb {
 std::vector<MetaItem> readMetadata(InputFile& file);
 
 const MetaItem* findItem(std::span<const MetaItem> items, const std::string& name);
-/// The text of an item of type "string"; empty if there is none.
-std::string stringValue(std::span<const MetaItem> items, const std::string& name);
 /// The value of an item with this type and the size of T; nothing if there is none.
 template <class T>
 std::optional<T> fixedValue(std::span<const MetaItem> items, const std::string& name,

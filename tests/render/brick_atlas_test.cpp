@@ -15,6 +15,14 @@
 namespace esvr::test {
 namespace {
 
+PixelColor rayColor(const BrickTableView& table, const BrickSlotsView& slots,
+                    const MarchScene& scene, const MarchSamples& samples) {
+  RayProgress ray;
+  AllBricksAreThere visitor;
+  EXPECT_TRUE(marchBricks(table, slots, scene, samples, ray, visitor));
+  return scene.rule.finished(ray.ray);
+}
+
 SparseVolume volumeAt(const std::vector<Coord>& corners, float background = 0.0f) {
   return randomBricks(corners, 5, background);
 }
@@ -22,14 +30,17 @@ SparseVolume volumeAt(const std::vector<Coord>& corners, float background = 0.0f
 Image marched(const SparseVolume& volume, const RenderOptions& o) {
   const BrickAtlas atlas = makeBrickAtlas(volume);
   Picture picture(o);
+  const auto pages = atlas.pages();
+  const Coord origin = atlas.table.origin;
   View view = picture.view;
-  view.eye = difference(view.eye,
-                        {double(atlas.origin.x), double(atlas.origin.y), double(atlas.origin.z)});
-  const MarchScene scene{view, cellsOf(atlas), o.step, clipOf(o),
+  view.eye = difference(view.eye, {double(origin.x), double(origin.y), double(origin.z)});
+  const MarchScene scene{view, cellsOf(atlas.table), o.step, clipOf(o),
                          sampleRule(o, picture.table.view(), volume.background)};
   for (int row = 0; row < o.resolution.height; ++row)
     for (int column = 0; column < o.resolution.width; ++column)
-      picture.set(column, row, marchBricks(atlas.view(), scene, column, row, SampleRange::all()));
+      picture.set(column, row,
+                  rayColor(atlas.table.view(), {nullptr, pages.data()}, scene,
+                           samplesOf(scene, column, row, SampleRange::all())));
   return picture.take();
 }
 
@@ -59,13 +70,13 @@ TEST(BrickAtlas, KnowsItsBackground) {
 
 TEST(BrickAtlas, HoldsEveryCellThatShowsAnythingAndNoOthers) {
   SparseVolume volume = volumeAt({{0, 0, 0}});
-  EXPECT_EQ(makeBrickAtlas(volume).bricks.size(), 8u) << "cells reach one voxel below";
+  EXPECT_EQ(makeBrickAtlas(volume).table.bricks.size(), 8u) << "cells reach one voxel below";
   std::fill(volume.values.begin(), volume.values.end(), 0.0f);
   volume.values[std::size_t(voxelOffset({3, 3, 3}))] = 1.0f;
-  EXPECT_EQ(makeBrickAtlas(volume).bricks.size(), 1u);
+  EXPECT_EQ(makeBrickAtlas(volume).table.bricks.size(), 1u);
   volume.values[std::size_t(voxelOffset({0, 3, 3}))] = 1.0f;
-  EXPECT_EQ(makeBrickAtlas(volume).bricks.size(), 2u);
-  EXPECT_TRUE(makeBrickAtlas(SparseVolume{}).bricks.empty());
+  EXPECT_EQ(makeBrickAtlas(volume).table.bricks.size(), 2u);
+  EXPECT_TRUE(makeBrickAtlas(SparseVolume{}).table.bricks.empty());
 }
 
 TEST(BrickAtlas, RefusesVoxelsTooFarApart) {

@@ -86,7 +86,7 @@ TEST_P(Bounds, HoldEveryPixelThatMeetsTheSupport) {
       const Field field = randomField({.count = 1, .smallest = 0.5, .aspect = 20.0, .seed = seed});
       const View view(cameraFor(GetParam(), eye), kPicture);
       const Meeting meeting = meetingOf(field, view);
-      const auto visible = visibleEllipsoids(field, view, kPicture, Between::kSum);
+      const auto visible = visibleEllipsoids(field, view, kPicture);
       if (!meeting.any) continue;
       ++met;
       ASSERT_EQ(visible.bounds.size(), 1u) << "seed " << seed;
@@ -101,7 +101,7 @@ TEST_P(Bounds, AreNoLargerThanNeeded) {
     const View view(cameraFor(GetParam(), {60, 45, 90}), kPicture);
     const Meeting meeting = meetingOf(field, view);
     ASSERT_TRUE(meeting.any);
-    expectTight(meeting, visibleEllipsoids(field, view, kPicture, Between::kSum).bounds.at(0));
+    expectTight(meeting, visibleEllipsoids(field, view, kPicture).bounds.at(0));
   }
 }
 
@@ -111,8 +111,7 @@ INSTANTIATE_TEST_SUITE_P(Projections, Bounds,
 TEST(VisibleEllipsoids, LeaveOutWhatLiesBehindTheEye) {
   const Field field = randomField({.count = 10});
   const Camera away{.eye = {20, 20, 100}, .center = {20, 20, 200}, .up = {0, 1, 0}};
-  EXPECT_TRUE(
-      visibleEllipsoids(field, View(away, kPicture), kPicture, Between::kSum).bounds.empty());
+  EXPECT_TRUE(visibleEllipsoids(field, View(away, kPicture), kPicture).bounds.empty());
 }
 
 }  // namespace

@@ -225,16 +225,18 @@ TEST(RenderField, StopsWhereAsked) {
   EXPECT_THROW((void)renderField(randomField({}), o), Cancelled);
 }
 
-// A file may contain such a support. Without the limit, the rays would have no end.
-TEST(RenderField, RaysThroughASupportOfAnySizeAreRefused) {
-  for (const Between between : {Between::kSum, Between::kVoxels})
-    for (const float logScale : {18.0f, 32.0f}) {
-      Field field = randomField({.count = 3});
-      for (auto& scale : field.chunks[0].ellipsoids.logScale) scale[1] = logScale;
-      RenderOptions o = optionsFor({}, {4, 4});
-      o.between = between;
-      EXPECT_THROW((void)renderField(field, o), UsageError) << logScale;
-    }
+// A file may contain such a support. Without the limits, the rays and the list of bricks would have
+// no end.
+TEST(RenderField, SupportsOfAnySizeAreRefused) {
+  for (const float logScale : {18.0f, 32.0f}) {
+    Field field = randomField({.count = 3});
+    for (auto& scale : field.chunks[0].ellipsoids.logScale) scale[1] = logScale;
+    RenderOptions o = optionsFor({}, {4, 4});
+    o.between = Between::kSum;
+    EXPECT_THROW((void)renderField(field, o), UsageError) << logScale;
+    o.between = Between::kVoxels;
+    EXPECT_THROW((void)renderField(field, o), MemoryExceeded) << logScale;
+  }
 }
 
 }  // namespace

@@ -78,18 +78,18 @@ struct RenderOptions {
   const CancelToken* cancel = nullptr;  ///< checked before each row of tiles
 };
 
-/// Draws a field without storing its voxels (paper, section "Per-ellipsoid ray sampling",
-/// algorithm 2), by tiles of pixels and bins of samples. With Between::kSum, each ellipsoid adds to
-/// the samples of each ray that lie in its support, between the ray's entry and its exit. With
-/// Between::kVoxels, each ellipsoid adds to the voxels of its support that surround the samples of
-/// a tile and bin, and the samples are interpolated from these voxels. The result is the picture of
+/// Draws a field. With Between::kSum, no voxels are stored: each ellipsoid adds to the samples of
+/// each ray that lie in its support, between the ray's entry and its exit (paper, section
+/// "Per-ellipsoid ray sampling", algorithm 2). With Between::kVoxels, the bricks of voxels that
+/// rays read are decoded, and no others. The result is the picture of
 /// renderVolume(revoxelise(field, voxels)) up to rounding.
-/// \param voxels  rule by which sums become voxels; its bricks are ignored. In a narrow band, the
-///                voxels inside the surface are -background wherever an ellipsoid reaches.
-///                Between::kSum uses its range only
+/// \param voxels  rule by which sums become voxels. In a narrow band, the voxels inside the surface
+///                are -background wherever an ellipsoid reaches. Between::kSum uses its range only
 /// \throws UsageError  as for checkCamera and checkTransferFunction; step, opacityLength or
 ///                     minTransmittance is out of range; the clip box is invalid; a ray has more
-///                     than 2^24 samples in the supports
+///                     than 2^24 samples; with Between::kVoxels, the box of the bricks has more
+///                     than 2^28 blocks of 64^3 voxels
+/// \throws MemoryExceeded  with Between::kVoxels, as for reachedBricks
 /// \throws Cancelled   RenderOptions::cancel was set
 [[nodiscard]] Image renderField(const Field& field, const RenderOptions& options,
                                 const RevoxeliseOptions& voxels = {});

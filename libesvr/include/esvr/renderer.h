@@ -51,6 +51,9 @@ class Renderer {
   [[nodiscard]] virtual Image draw(const RenderOptions& options) = 0;
   /// Draws without a copy of the picture to the host, for measurements of speed.
   virtual void drawOnDevice(const RenderOptions& options) = 0;
+  /// Forgets all voxels that were decoded for earlier pictures, so that the next picture takes as
+  /// long as a first one. Pictures do not change.
+  virtual void forget() {}
   [[nodiscard]] virtual FrameStats stats() const = 0;
 };
 

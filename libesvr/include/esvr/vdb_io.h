@@ -102,6 +102,8 @@ inline constexpr const char* kWriterKey = "esvr_writer";
 
 /// A file-level metadata item of type "string".
 [[nodiscard]] MetaItem stringItem(const std::string& name, const std::string& value);
+/// The text of an item of type "string"; empty if there is none.
+[[nodiscard]] std::string stringValue(std::span<const MetaItem> items, const std::string& name);
 
 /// A uniform-scale transform, as openvdb::math::Transform::createLinearTransform makes it.
 [[nodiscard]] Transform uniformTransform(double voxelSize);

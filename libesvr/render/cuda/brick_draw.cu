@@ -2,14 +2,15 @@
 
 #include <climits>
 
-#include "core/cell_corner.h"
+#include "core/cuda/reduce.cuh"
 #include "core/cuda/thread_number.cuh"
+#include "render/brick_cover.h"
 
 namespace esvr::cuda {
 namespace {
 
-constexpr int kSide = kMarchTileSide, kTilePixels = kSide * kSide;
-constexpr int kThreads = 128, kBlocksPerMultiprocessor = 8;
+constexpr int kSide = kMarchTileSide;
+constexpr int kThreads = 128;
 
 __host__ __device__ int tilesAlong(int pixels) { return (pixels + kSide - 1) / kSide; }
 
@@ -18,106 +19,140 @@ __global__ void clearRanges(int2* ranges, int tiles) {
   if (tile < tiles) ranges[tile] = make_int2(INT_MAX, INT_MIN);
 }
 
-/// The part of the picture that a brick of cells may cover, and its distances from the eye.
-struct Cover {
-  double firstColumn, lastColumn, firstRow, lastRow;  ///< pixels
-  double nearest, farthest;                           ///< voxels
+/// Lanes that look at a brick together, one for each corner.
+constexpr int kLanes = kCellCorners;
+
+__device__ CoverView coverView(const BrickDrawArguments& a) {
+  return {a.scene.view, a.resolution, a.scene.step, a.firstSample};
+}
+
+/// The cover of a brick, on all lanes of its group.
+__device__ BrickCover coverOf(const CoverView& v, const Coord& brick) {
+  const BrickCover own = coverOfCorner(v, brick, int(threadIdx.x) % kLanes);
+  const auto least = [](auto n) {
+    return reduceLanes<kLanes>(n, [](auto x, auto y) { return x < y ? x : y; });
+  };
+  const auto largest = [](auto n) {
+    return reduceLanes<kLanes>(n, [](auto x, auto y) { return x < y ? y : x; });
+  };
+  return {least(own.firstColumn),
+          largest(own.lastColumn),
+          least(own.firstRow),
+          largest(own.lastRow),
+          v.view.perspective ? firstSampleOf(v, brick) : least(own.first),
+          largest(own.last)};
+}
+
+/// Widens the sample ranges of the tiles that a cover meets. The lanes of a group share them.
+__device__ void widen(const BrickDrawArguments& a, const CoverView& v, const BrickCover& c) {
+  CoveredTiles tiles = tilesOf(v, c, kSide);
+  const int past = min(tiles.firstRow + tiles.rows, a.firstTileRow + a.tileRows);
+  tiles.firstRow = max(tiles.firstRow, a.firstTileRow);
+  const int count = tiles.columns * (past - tiles.firstRow);
+  for (int n = int(threadIdx.x) % kLanes; n < count; n += kLanes) {
+    const int row = tiles.firstRow - a.firstTileRow + n / tiles.columns;
+    int2& range =
+        a.ranges[row * tilesAlong(a.resolution.width) + tiles.firstColumn + n % tiles.columns];
+    atomicMin(&range.x, c.first);
+    atomicMax(&range.y, c.last);
+  }
+}
+
+/// Each group of lanes looks at one brick and widens the sample range of every tile that the brick
+/// may cover. Bricks that are known to be vacant do not count.
+__global__ void __launch_bounds__(kThreads) findRanges(const BrickDrawArguments a) {
+  const std::size_t brick = threadNumber() / kLanes;
+  if (brick >= a.count || a.slots.slot(std::uint32_t(brick)) == BrickSlotsView::kVacant) return;
+  const CoverView view = coverView(a);
+  widen(a, view, coverOf(view, a.bricks[brick]));
+}
+
+/// Asks for missing bricks.
+struct Asking {
+  const BrickDemand& demand;
+  int left;  ///< number of further bricks that the ray asks for
+
+  __device__ void entered(std::uint32_t slot) const {
+    if (demand.stamps != nullptr && demand.stamps[slot] != demand.now)
+      demand.stamps[slot] = demand.now;
+  }
+  __device__ bool wantsMore(std::uint32_t brick, std::uint32_t slot) {
+    constexpr auto kMissing = BrickSlotsView::kMissing, kAsked = BrickSlotsView::kAsked;
+    if (slot == kMissing && atomicCAS(&demand.slotOf[brick], kMissing, kAsked) == kMissing)
+      demand.bricks[atomicAdd(&demand.counts->bricks, 1u)] = brick;
+    return left-- > 0;
+  }
 };
 
-__device__ Vec3 cornerOf(const Coord& brick, int corner) {
-  const Coord step = stepToCorner(corner);
-  return {double((brick.x + step.x) * kBrickSide), double((brick.y + step.y) * kBrickSide),
-          double((brick.z + step.z) * kBrickSide)};
-}
-
-__device__ double distanceTo(const Coord& brick, const Vec3& eye) {
-  const Vec3 low = cornerOf(brick, 0), high = cornerOf(brick, kCellCorners - 1);
-  double squares = 0.0;
-  for (int a = 0; a < 3; ++a) {
-    const double away = fmax(fmax(low[a] - eye[a], eye[a] - high[a]), 0.0);
-    squares += away * away;
+/// The pixel of a thread in a tile of the band.
+struct TilePixel {
+  int column, row, rowOfBand;
+  [[nodiscard]] __device__ bool within(const BrickDrawArguments& a) const {
+    return column < a.resolution.width && row < a.resolution.height;
   }
-  return sqrt(squares);
+};
+__device__ TilePixel pixelOf(const BrickDrawArguments& a, std::uint32_t tile) {
+  const int columns = tilesAlong(a.resolution.width);
+  const int rowOfBand = int(tile) / columns * kSide + int(threadIdx.x) / kSide;
+  return {int(tile) % columns * kSide + int(threadIdx.x) % kSide,
+          rowOfBand + a.firstTileRow * kSide, rowOfBand};
 }
 
-__device__ void add(const View& view, const Vec3& corner, Cover& c) {
-  const Vec3 seen = view.coordinates(difference(corner, view.eye));
-  const double along = view.perspective ? sqrt(inner(seen, seen)) : seen[2];
-  c.farthest = fmax(c.farthest, along);
-  if (!view.perspective) c.nearest = fmin(c.nearest, along);
-  constexpr double kAll = 1e9;
-  const bool before = !view.perspective || seen[2] > 1e-3;
-  const double scale = view.perspective ? 1.0 / seen[2] : 1.0;
-  const double column = view.columnAt(seen[0] * scale), row = view.rowAt(seen[1] * scale);
-  c.firstColumn = fmin(c.firstColumn, before ? column : -kAll);
-  c.lastColumn = fmax(c.lastColumn, before ? column : kAll);
-  c.firstRow = fmin(c.firstRow, before ? row : -kAll);
-  c.lastRow = fmax(c.lastRow, before ? row : kAll);
-}
-
-/// If a corner of the brick lies behind the eye, it cannot be projected, and the result is the
-/// whole picture.
-__device__ Cover coverOf(const View& view, const Coord& brick) {
-  constexpr double kAll = 1e9;
-  Cover c{kAll, -kAll, kAll, -kAll, view.perspective ? distanceTo(brick, view.eye) : 1e300, -1e300};
-  for (int corner = 0; corner < kCellCorners; ++corner) add(view, cornerOf(brick, corner), c);
-  return c;
-}
-
-__device__ int tileAt(double pixel, int count) {
-  return int(floor(fmin(fmax(pixel, 0.0), double(count - 1)))) / kSide;
-}
-
-/// Each warp handles one brick: it widens the sample range of every tile that the brick may cover.
-__global__ void __launch_bounds__(kThreads) findRanges(const BrickDrawArguments a) {
-  const int lane = int(threadIdx.x) % kWarp, tileColumns = tilesAlong(a.resolution.width);
-  for (std::size_t i = warpNumber(); i < a.count; i += warpCount()) {
-    const Cover c = coverOf(a.scene.view, a.bricks[i]);
-    const bool seen = c.farthest >= 0.0 && c.lastColumn >= -0.5 && c.lastRow >= -0.5 &&
-                      c.firstColumn <= a.resolution.width && c.firstRow <= a.resolution.height;
-    if (!seen) continue;
-    const int first = int(floor(fmax(c.nearest, 0.0) / a.scene.step - a.firstSample));
-    const int last = int(ceil(c.farthest / a.scene.step - a.firstSample));
-    const int firstColumn = tileAt(c.firstColumn - 0.5, a.resolution.width);
-    const int lastColumn = tileAt(c.lastColumn + 0.5, a.resolution.width);
-    const int firstRow = max(tileAt(c.firstRow - 0.5, a.resolution.height), a.firstTileRow);
-    const int lastRow =
-        min(tileAt(c.lastRow + 0.5, a.resolution.height), a.firstTileRow + a.tileRows - 1);
-    const int columns = lastColumn - firstColumn + 1, rows = lastRow - firstRow + 1;
-    for (int t = lane; t < columns * rows; t += kWarp) {
-      const int row = firstRow + t / columns - a.firstTileRow, column = firstColumn + t % columns;
-      int2& range = a.ranges[row * tileColumns + column];
-      atomicMin(&range.x, first);
-      atomicMax(&range.y, last);
-    }
-  }
-}
-
-/// Each block draws one tile and each thread one ray. The rays of a warp are 8 x 4 neighbours.
-__global__ void __launch_bounds__(kTilePixels) marchKernel(const BrickDrawArguments a) {
-  const int2 range = a.ranges[blockIdx.x];
-  if (range.x > range.y) return;
-  const int tileColumns = tilesAlong(a.resolution.width);
-  const int column = int(blockIdx.x) % tileColumns * kSide + int(threadIdx.x) % kSide;
-  const int rowOfBand = int(blockIdx.x) / tileColumns * kSide + int(threadIdx.x) / kSide;
-  const int row = rowOfBand + a.firstTileRow * kSide;
-  if (column >= a.resolution.width || row >= a.resolution.height) return;
-  const PixelColor c =
-      marchBricks(a.atlas, a.scene, column, row,
-                  {a.firstSample + double(range.x), a.firstSample + double(range.y)});
-  a.pixels[std::size_t(rowOfBand) * std::size_t(a.resolution.width) + std::size_t(column)] =
+/// Marches the ray of a thread and writes its pixel if it ends. \return whether it ends
+__device__ bool marchRay(const BrickDrawArguments& a, std::uint32_t tile, int2 range,
+                         RayProgress& ray) {
+  const TilePixel p = pixelOf(a, tile);
+  if (!p.within(a)) return true;
+  const MarchSamples samples = samplesOf(
+      a.scene, p.column, p.row, {a.firstSample + double(range.x), a.firstSample + double(range.y)});
+  Asking asking{a.demand, a.demand.ahead};
+  if (!marchBricks(a.table, a.slots, a.scene, samples, ray, asking)) return false;
+  const PixelColor c = a.scene.rule.finished(ray.ray);
+  a.pixels[std::size_t(p.rowOfBand) * std::size_t(a.resolution.width) + std::size_t(p.column)] =
       make_float4(c.r, c.g, c.b, c.alpha);
+  return true;
+}
+
+/// Lists what a block works on if one of its rays waits.
+__device__ void listIfWaiting(const BrickDrawArguments& a, bool ended, std::uint32_t number) {
+  const bool any = __syncthreads_or(ended ? 0 : 1) != 0;
+  if (any && threadIdx.x == 0) a.waiting[atomicAdd(&a.demand.counts->waiting, 1u)] = number;
+}
+
+/// Each block draws one tile and each thread one ray. The rays of a warp are 8 x 4 neighbours. The
+/// first pass and later ones share the code, because two kernels could be compiled to different
+/// roundings.
+__global__ void __launch_bounds__(kMarchTilePixels)
+    marchKernel(const BrickDrawArguments a, const WaitingTiles w) {
+  const bool isFirst = w.entries == nullptr;
+  const std::uint32_t entry = isFirst ? blockIdx.x : w.entries[blockIdx.x];
+  const std::uint32_t tile = isFirst ? entry : w.tiles[entry];
+  const int2 range = a.ranges[tile];
+  if (range.x > range.y) return;
+  RayProgress* const kept =
+      isFirst ? nullptr : w.rays + std::size_t(entry) * kMarchTilePixels + threadIdx.x;
+  RayProgress ray;
+  if (kept != nullptr) ray = *kept;
+  const bool ended = ray.next < 0 || marchRay(a, tile, range, ray);
+  if (ended) ray.next = -1;
+  if (kept != nullptr) *kept = ray;
+  if (a.demand.slotOf != nullptr) listIfWaiting(a, ended, entry);
 }
 
 }  // namespace
 
-void launchBricks(const BrickDrawArguments& a, int multiprocessors, cudaStream_t stream) {
+void launchRanges(const BrickDrawArguments& a, cudaStream_t stream) {
   const int tiles = tilesAlong(a.resolution.width) * a.tileRows;
   clearRanges<<<blocksFor(std::size_t(tiles), kThreads), kThreads, 0, stream>>>(a.ranges, tiles);
   check(cudaGetLastError(), "clearing tiles");
-  findRanges<<<unsigned(multiprocessors * kBlocksPerMultiprocessor), kThreads, 0, stream>>>(a);
+  findRanges<<<blocksFor(std::size_t(a.count) * kLanes, kThreads), kThreads, 0, stream>>>(a);
   check(cudaGetLastError(), "looking at bricks");
-  marchKernel<<<unsigned(tiles), kTilePixels, 0, stream>>>(a);
+}
+
+void launchMarch(const BrickDrawArguments& a, const WaitingTiles& w, cudaStream_t stream) {
+  const int tiles = tilesAlong(a.resolution.width) * a.tileRows;
+  marchKernel<<<w.entries == nullptr ? unsigned(tiles) : w.count, kMarchTilePixels, 0, stream>>>(a,
+                                                                                                 w);
   check(cudaGetLastError(), "marching bricks");
 }
 

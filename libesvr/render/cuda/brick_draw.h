@@ -1,6 +1,7 @@
 #pragma once
-/// Draws a brick atlas on a CUDA device. A first kernel finds, for each tile of pixels, the range
+/// Draws bricks of cells on a CUDA device. A first kernel finds, for each tile of pixels, the range
 /// of samples in which its rays may meet bricks. A second one marches the rays through that range.
+/// Rays that meet a missing brick ask for it and wait; they continue in later passes.
 
 #include <cuda_runtime_api.h>
 
@@ -11,19 +12,50 @@
 namespace esvr::cuda {
 
 inline constexpr int kMarchTileSide = 8;  ///< pixels
+inline constexpr int kMarchTilePixels = kMarchTileSide * kMarchTileSide;
+
+/// The bricks that rays ask for. All pointers are to device memory.
+struct BrickDemand {
+  struct Counts {
+    std::uint32_t bricks;   ///< bricks that are asked for
+    std::uint32_t waiting;  ///< tiles with rays that wait
+  };
+  Counts* counts;
+  std::uint32_t* slotOf;  ///< see BrickSlotsView; null: no brick can be missing
+  std::uint32_t* bricks;  ///< output: bricks that are asked for; room for all
+  std::uint32_t* stamps;  ///< output: `now`, for each slot that a ray reads; null: not wanted
+  std::uint32_t now;
+  int ahead;  ///< missing bricks that a ray asks for besides the one at which it waits
+};
+
+/// The tiles of a band whose rays wait, and how far these are.
+struct WaitingTiles {
+  std::uint32_t count = 0;
+  const std::uint32_t* entries = nullptr;  ///< numbers in `tiles` and `rays`
+  const std::uint32_t* tiles = nullptr;    ///< by entry: number of the tile
+  RayProgress* rays = nullptr;  ///< by entry: kMarchTilePixels rays; next < 0: the ray has ended
+};
 
 struct BrickDrawArguments {
-  BrickAtlasView atlas;  ///< on the device
-  const Coord* bricks;   ///< positions relative to the atlas, in bricks
+  BrickTableView table;  ///< on the device
+  BrickSlotsView slots;
+  const Coord* bricks;  ///< places relative to the table's origin, in bricks
   std::uint32_t count;
-  MarchScene scene;  ///< in coordinates relative to the atlas
+  MarchScene scene;  ///< in coordinates relative to the table's origin
   Resolution resolution;
   int firstTileRow, tileRows;  ///< rows of tiles in this band of the picture
   int2* ranges;                ///< for each tile: first and last sample, counted from firstSample
   double firstSample;          ///< the scene's first sample, counted from the eye
   float4* pixels;              ///< pixels of the band; must be zero before
+  BrickDemand demand;
+  std::uint32_t* waiting;  ///< output: numbers of the tiles or entries that wait
 };
 
-void launchBricks(const BrickDrawArguments& arguments, int multiprocessors, cudaStream_t stream);
+/// Finds the ranges of all tiles.
+void launchRanges(const BrickDrawArguments& arguments, cudaStream_t stream);
+/// Marches the rays that wait. \param tiles  without entries, the rays of all tiles are marched from
+/// their first samples, and rays that must wait are not kept
+void launchMarch(const BrickDrawArguments& arguments, const WaitingTiles& tiles,
+                 cudaStream_t stream);
 
 }  // namespace esvr::cuda

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/cuda/use_device.h"
 #include "render/brick_atlas.h"
 #include "render/cuda/brick_draw.h"
 #include "render/cuda/make_cuda_renderer.h"
@@ -17,20 +16,29 @@ std::size_t marchTilesAlong(int pixels) {
   return std::size_t((pixels + kMarchTileSide - 1) / kMarchTileSide);
 }
 
+/// Addresses of the pages into which contiguous slots are divided.
+std::vector<const float*> pagesOf(const DeviceBuffer<float>& values) {
+  std::vector<const float*> pages;
+  for (std::size_t first = 0; first < values.size(); first += BrickSlotsView::kPageFloats)
+    pages.push_back(values.data() + first);
+  return pages;
+}
+
 class BrickRenderer final : public MarchRenderer {
  public:
   BrickRenderer(const BrickAtlas& atlas, float background, const Device& device,
                 const RendererLimits& limits)
       : MarchRenderer(device, limits),
         background_(background),
-        origin_{double(atlas.origin.x), double(atlas.origin.y), double(atlas.origin.z)},
-        blocks_(atlas.blocks),
-        box_(cellsOf(atlas)),
-        multiprocessors_(multiprocessorsOf(device)),
-        blockOf_(atlas.blockOf, stream()),
-        brickOf_(atlas.brickOf, stream()),
-        bricks_(atlas.bricks, stream()),
-        values_(atlas.values, stream()) {}
+        origin_{double(atlas.table.origin.x), double(atlas.table.origin.y),
+                double(atlas.table.origin.z)},
+        blocks_(atlas.table.blocks),
+        box_(cellsOf(atlas.table)),
+        blockOf_(atlas.table.blockOf, stream()),
+        brickOf_(atlas.table.brickOf, stream()),
+        bricks_(atlas.table.bricks, stream()),
+        values_(atlas.values, stream()),
+        pages_(pagesOf(values_), stream()) {}
 
  private:
   static_assert(kBandRows % kMarchTileSide == 0);
@@ -43,21 +51,26 @@ class BrickRenderer final : public MarchRenderer {
     clip.box = {difference(clip.box.low, origin_), difference(clip.box.high, origin_)};
     const std::size_t tileRows = marchTilesAlong(band.rows);
     makeRoom(ranges_, tileRows * marchTilesAlong(o.resolution.width), stream());
-    launchBricks({.atlas = {{0, 0, 0}, blocks_, blockOf_.data(), brickOf_.data(), values_.data()},
-                  .bricks = bricks_.data(),
-                  .count = std::uint32_t(bricks_.size()),
-                  .scene = {view, box_, o.step, clip, sampleRule(o, table().view(), background_)},
-                  .resolution = o.resolution,
-                  .firstTileRow = band.firstRow / kMarchTileSide,
-                  .tileRows = int(tileRows),
-                  .ranges = ranges_.data(),
-                  .firstSample = double(binsWithin(box_, view, o.step).first) * kBinSamples,
-                  .pixels = pixels},
-                 multiprocessors_, stream());
+    const BrickDrawArguments arguments{
+        .table = {{0, 0, 0}, blocks_, blockOf_.data(), brickOf_.data()},
+        .slots = {nullptr, pages_.data()},
+        .bricks = bricks_.data(),
+        .count = std::uint32_t(bricks_.size()),
+        .scene = {view, box_, o.step, clip, sampleRule(o, table().view(), background_)},
+        .resolution = o.resolution,
+        .firstTileRow = band.firstRow / kMarchTileSide,
+        .tileRows = int(tileRows),
+        .ranges = ranges_.data(),
+        .firstSample = double(binsWithin(box_, view, o.step).first) * kBinSamples,
+        .pixels = pixels,
+        .demand = {},
+        .waiting = nullptr};
+    launchRanges(arguments, stream());
+    launchMarch(arguments, {}, stream());
   }
   std::size_t contentBytes() const override {
     return blockOf_.bytes() + brickOf_.bytes() + bricks_.bytes() + values_.bytes() +
-           ranges_.bytes();
+           pages_.bytes() + ranges_.bytes();
   }
   std::size_t bytesOfRow(Resolution r) const override {
     return marchTilesAlong(r.width) * sizeof(int2) / kMarchTileSide + 1;
@@ -67,10 +80,10 @@ class BrickRenderer final : public MarchRenderer {
   Vec3 origin_;
   Coord blocks_;
   PlaceBox box_;  ///< box of the cells, relative to the atlas
-  int multiprocessors_;
   DeviceBuffer<std::uint32_t> blockOf_, brickOf_;
   DeviceBuffer<Coord> bricks_;
   DeviceBuffer<float> values_;
+  DeviceBuffer<const float*> pages_;  ///< see BrickSlotsView
   DeviceBuffer<int2> ranges_;
 };
 

@@ -236,7 +236,7 @@ __global__ void __launch_bounds__(kThreads, DrawTuning::kBlocksPerMultiprocessor
     drawSumsKernel(const SumArguments a) {
   extern __shared__ float4 memory[];
   Shared& s = *reinterpret_cast<Shared*>(memory);
-  if (!listsFit(*a.draw.lists.counters, a.draw.lists, a.draw.frame.between)) return;
+  if (!listsFit(*a.draw.lists.counters, a.draw.lists)) return;
   const Place place;
   for (int i = int(threadIdx.x); i < kBinSamples * kThreads; i += kThreads)
     (&s.sums[0][0][0])[i] = 0.0f;

@@ -10,7 +10,6 @@
 #include "render/cuda/make_cuda_renderer.h"
 #include "render/ellipsoid_view.h"
 #include "render/picture.h"
-#include "render/window_scene.h"
 
 namespace esvr::cuda {
 namespace {
@@ -25,14 +24,6 @@ std::size_t withSpare(std::size_t n) { return n + n / 4 + 1024; }
 template <class... Buffers>
 std::size_t bytesOf(const Buffers&... buffers) {
   return (buffers.bytes() + ...);
-}
-
-float largestIntensity(const Field& field) {
-  float largest = 0.0f;
-  for (const Chunk& chunk : field.chunks)
-    for (const float intensity : chunk.ellipsoids.intensity)
-      largest = std::max(largest, std::abs(intensity));
-  return largest;
 }
 
 /// \throws DeviceError  there are more ellipsoids than 32-bit integers can number
@@ -51,18 +42,12 @@ SceneMemory::SceneMemory(const Field& field, cudaStream_t stream)
     : ellipsoids(numbered(packed(field)), stream),
       origins(chunkOrigins(field), stream),
       kernels(rayKernels(field), stream),
+      views(ellipsoids.size(), stream),
       footprints(ellipsoids.size(), stream),
       large(ellipsoids.size(), stream) {}
 
-void SceneMemory::prepare(const Field& field, Between between, cudaStream_t stream) {
-  if (between == Between::kSum)
-    makeRoom(views, ellipsoids.size(), stream);
-  else if (forms.size() < ellipsoids.size())
-    forms = DeviceBuffer<WindowForm>(windowForms(field), stream);
-}
-
 std::size_t SceneMemory::bytes() const {
-  return bytesOf(ellipsoids, origins, kernels, views, forms, footprints, large);
+  return bytesOf(ellipsoids, origins, kernels, views, footprints, large);
 }
 
 DeviceEllipsoids SceneMemory::view() const {
@@ -109,7 +94,6 @@ FieldRenderer::FieldRenderer(const Field& field, const Device& device, const Ren
     : field_(field),
       limits_(limits),
       voxelRule_(makeVoxelRule(field.background, voxels)),
-      bound_(largestIntensity(field)),
       box_(supportBox(field)),
       stream_(streamOn(device)),
       multiprocessors_(multiprocessorsOf(device)),
@@ -131,11 +115,10 @@ void FieldRenderer::drawFrame(const RenderOptions& options, Image* image) {
                        0.0f);
   stats_ = {.deviceBytes = stats_.deviceBytes};
   tiles_ = occupied_ = 0;
-  if (box_) scene.bins = binsWithin(shownBox(*box_, options.between), scene.view, options.step);
+  if (box_) scene.bins = binsWithin(*box_, scene.view, options.step);
   if (scene.bins.last < scene.bins.first) return;
   checkRayLength(scene.bins);
   table_.update(options, stream_.get());
-  scene_.prepare(field_, options.between, stream_.get());
   drawBand(scene, {0, tilesAlong(options.resolution.height)}, image);
 }
 
@@ -158,8 +141,7 @@ TileFrame FieldRenderer::frameOf(const Scene& scene, Band band) const {
           .firstBin = scene.bins.first,
           .bins = int(bins),
           .parts = parts,
-          .binsOfPart = (int(bins) + parts - 1) / parts,
-          .between = scene.options.between};
+          .binsOfPart = (int(bins) + parts - 1) / parts};
 }
 
 /// Bytes of the buffers that reserve() makes. Entries of lists and results of parts are not
@@ -208,28 +190,15 @@ FrameCounters FieldRenderer::readCounters() {
 }
 
 /// Number of parts into which the depth of tiles is divided. It is large enough that no tile has
-/// much more work in one part than the average block has. If there are tiles enough for all
-/// blocks, interpolated samples are drawn in one part, because work on a part that turns out to be
-/// hidden costs more than blocks that wait.
+/// much more work in one part than the average block has.
 int FieldRenderer::chosenParts(const TileFrame& f) {
   list(f);
   const FrameCounters c = readCounters();
   if (c.entries == 0) return 1;
   const double blocks = double(multiprocessors_) * DrawTuning::kBlocksPerMultiprocessor;
-  if (f.between == Between::kVoxels && c.occupiedTiles >= blocks) return 1;
   const double share = double(c.entries) / blocks;
   return int(std::clamp(std::ceil(double(c.longestTile) / (2.0 * share)), 1.0,
                         double(RendererLimits::kMaxDepthParts)));
-}
-
-void FieldRenderer::launch(const SamplingArguments& a) {
-  if (a.frame.between == Between::kSum)
-    launchDrawSums({a, scene_.views.data(), scene_.footprints.data()}, multiprocessors_,
-                   stream_.get());
-  else
-    launchDrawVoxels(
-        {a, scene_.forms.data(), scene_.footprints.data(), scene_.origins.data(), bound_},
-        multiprocessors_, stream_.get());
 }
 
 FrameCounters FieldRenderer::drawOnce(const Scene& scene, const TileFrame& f) {
@@ -240,23 +209,26 @@ FrameCounters FieldRenderer::drawOnce(const Scene& scene, const TileFrame& f) {
              multiprocessors_, stream);
   listed_.record(stream);
   band_.pixels.setZero();
-  launch({.frame = f,
-          .lists = band_.lists(),
-          .rule = sampleRule(scene.options, table_.view(), field_.background),
-          .voxelRule = voxelRule_,
-          .clip = clipOf(scene.options),
-          .pixels = band_.pixels.data()});
+  launchDrawSums({.draw = {.frame = f,
+                           .lists = band_.lists(),
+                           .rule = sampleRule(scene.options, table_.view(), field_.background),
+                           .voxelRule = voxelRule_,
+                           .clip = clipOf(scene.options),
+                           .pixels = band_.pixels.data()},
+                  .views = scene_.views.data(),
+                  .footprints = scene_.footprints.data()},
+                 multiprocessors_, stream);
   drawn_.record(stream);
   return readCounters();
 }
 
-void FieldRenderer::grow(const FrameCounters& c, Between between) {
+void FieldRenderer::grow(const FrameCounters& c) {
   if (c.entries > std::uint64_t(kMaxLists))
     throw DeviceError("drawing on the GPU: " + std::to_string(c.entries) +
                       " entries are more than the lists of ellipsoids can hold");
   const cudaStream_t stream = stream_.get();
   if (c.entries > band_.entries.size()) makeRoom(band_.entries, withSpare(c.entries), stream);
-  if (needSorting(c, between)) makeRoom(band_.sorted, band_.entries.size(), stream);
+  if (needSorting(c)) makeRoom(band_.sorted, band_.entries.size(), stream);
   if (std::uint64_t(c.results) * DrawTuning::kTilePixels > band_.results.size())
     makeRoom(band_.results, std::size_t(c.results + c.results / 4) * DrawTuning::kTilePixels,
              stream);
@@ -285,8 +257,8 @@ void FieldRenderer::drawBand(const Scene& scene, Band band, Image* image) {
     reserve(f);
   }
   FrameCounters counters = drawOnce(scene, f);
-  while (!listsFit(counters, band_.lists(), f.between)) {
-    grow(counters, f.between);
+  while (!listsFit(counters, band_.lists())) {
+    grow(counters);
     if (tooLarge(fixedBytes() + band_.bytes())) return halves();
     counters = drawOnce(scene, f);
   }

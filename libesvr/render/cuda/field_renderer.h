@@ -18,14 +18,10 @@ namespace esvr::cuda {
 struct SceneMemory {
   SceneMemory(const Field& field, cudaStream_t stream);
 
-  /// Makes the buffers that only this kind of picture needs, unless they exist already.
-  void prepare(const Field& field, Between between, cudaStream_t stream);
-
   DeviceBuffer<PackedEllipsoid> ellipsoids;
   DeviceBuffer<Vec3> origins;
   DeviceBuffer<RayKernel> kernels;
-  DeviceBuffer<EllipsoidView> views;  ///< for Between::kSum
-  DeviceBuffer<WindowForm> forms;     ///< for Between::kVoxels
+  DeviceBuffer<EllipsoidView> views;
   DeviceBuffer<Footprint> footprints;
   DeviceBuffer<std::uint32_t> large;
 
@@ -71,9 +67,8 @@ class FieldRenderer final : public Renderer {
   void reserve(const TileFrame& frame);
   void list(const TileFrame& frame);
   [[nodiscard]] int chosenParts(const TileFrame& frame);
-  void launch(const SamplingArguments& arguments);
   [[nodiscard]] FrameCounters drawOnce(const Scene& scene, const TileFrame& frame);
-  void grow(const FrameCounters& counters, Between between);
+  void grow(const FrameCounters& counters);
   [[nodiscard]] FrameCounters readCounters();
   void download(const TileFrame& frame, Image& image);
   void count(const TileFrame& frame, const FrameCounters& counters);
@@ -81,7 +76,6 @@ class FieldRenderer final : public Renderer {
   const Field& field_;
   RendererLimits limits_;
   VoxelRule voxelRule_;
-  float bound_;
   std::optional<PlaceBox> box_;
   Stream stream_;
   int multiprocessors_;

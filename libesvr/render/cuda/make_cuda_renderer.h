@@ -12,6 +12,13 @@ namespace esvr::cuda {
                                                               const Device& device,
                                                               const RendererLimits& limits,
                                                               const RevoxeliseOptions& voxels);
+/// Draws the voxels of a field, which are decoded on the device brick by brick.
+/// \throws DeviceError     as for makeCudaFieldRenderer
+/// \throws RuntimeFailure, UsageError  as for makeCellField
+[[nodiscard]] std::unique_ptr<Renderer> makeCudaCellRenderer(const Field& field,
+                                                             const Device& device,
+                                                             const RendererLimits& limits,
+                                                             const RevoxeliseOptions& voxels);
 /// \throws DeviceError  as for makeCudaFieldRenderer
 /// \throws UsageError   the voxels lie too far apart for the tables of a BrickAtlas
 [[nodiscard]] std::unique_ptr<Renderer> makeCudaVolumeRenderer(const SparseVolume& volume,

@@ -30,15 +30,18 @@ void MarchRenderer::drawFrame(const RenderOptions& options, Image* image) {
     drawBand(options, {first, std::min(rows, options.resolution.height - first)}, image);
 }
 
-int MarchRenderer::rowsOfBand(Resolution r) const {
+int MarchRenderer::rowsOfBand(Resolution r) {
   if (limits_.maxBytes == 0) return r.height;
-  const std::size_t fixed = contentBytes() + table_.bytes();
+  const std::size_t fixed = fixedBytes() + table_.bytes();
   const std::size_t ofRow = std::size_t(r.width) * sizeof(float4) + bytesOfRow(r);
   if (fixed + ofRow * kBandRows > limits_.maxBytes)
     throw DeviceError("marching voxels on the GPU needs more than " +
                       std::to_string(limits_.maxBytes) + " bytes");
-  const std::uint64_t rows = (limits_.maxBytes - fixed) / ofRow / kBandRows * kBandRows;
-  return int(std::min<std::uint64_t>(rows, std::uint64_t(r.height)));
+  const std::uint64_t room = limits_.maxBytes - fixed;
+  const std::uint64_t rows =
+      std::min<std::uint64_t>(room / ofRow / kBandRows * kBandRows, std::uint64_t(r.height));
+  shareMemory(room - std::min<std::uint64_t>(room, rows * ofRow));
+  return int(rows);
 }
 
 void MarchRenderer::drawBand(const RenderOptions& o, Band band, Image* image) {

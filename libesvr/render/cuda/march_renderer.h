@@ -27,6 +27,10 @@ class MarchRenderer : public Renderer {
   virtual void launch(const RenderOptions& options, Band band, float4* pixels) = 0;
   /// Bytes of device memory, without the pixels and the transfer function's table.
   [[nodiscard]] virtual std::size_t contentBytes() const = 0;
+  /// The smallest number of these bytes with which a picture can be drawn.
+  [[nodiscard]] virtual std::size_t fixedBytes() const { return contentBytes(); }
+  /// Tells how many bytes of RendererLimits::maxBytes are left beside the fixed ones and a band.
+  virtual void shareMemory(std::uint64_t /*left*/) {}
   /// Bytes that each row of pixels takes in addition to the pixels.
   [[nodiscard]] virtual std::size_t bytesOfRow(Resolution) const { return 0; }
 
@@ -36,7 +40,7 @@ class MarchRenderer : public Renderer {
  private:
   void drawFrame(const RenderOptions& options, Image* image);
   void drawBand(const RenderOptions& options, Band band, Image* image);
-  [[nodiscard]] int rowsOfBand(Resolution resolution) const;
+  [[nodiscard]] int rowsOfBand(Resolution resolution);
 
   RendererLimits limits_;
   Stream stream_;

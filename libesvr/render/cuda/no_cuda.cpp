@@ -8,6 +8,11 @@ std::unique_ptr<Renderer> makeCudaFieldRenderer(const Field&, const Device& devi
   refuseCuda("drawing", device);
 }
 
+std::unique_ptr<Renderer> makeCudaCellRenderer(const Field&, const Device& device,
+                                               const RendererLimits&, const RevoxeliseOptions&) {
+  refuseCuda("drawing", device);
+}
+
 std::unique_ptr<Renderer> makeCudaVolumeRenderer(const SparseVolume&, const Device& device,
                                                  const RendererLimits&) {
   refuseCuda("drawing", device);

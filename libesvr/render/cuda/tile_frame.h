@@ -11,7 +11,6 @@
 #include "render/ray_box.h"
 #include "render/sample_rule.h"
 #include "render/seen_ellipsoid.h"
-#include "render/window_form.h"
 
 namespace esvr::cuda {
 
@@ -22,12 +21,6 @@ struct DrawTuning {
   static constexpr int kGroups = 4;  ///< groups of threads that draw a tile together
   static constexpr int kDrawThreads = kTilePixels * kGroups;
   static constexpr int kBlocksPerMultiprocessor = 4;
-  /// Size of a voxel window. It is limited by the shared memory of a block of threads.
-  static constexpr int kWindowVoxels = 8192, kWindowSlabs = 64;
-  static constexpr int kLanesOfForm = 8;  ///< threads that add an ellipsoid's voxels together
-  /// A block of samples is not split below this depth unless the window of a single ray is too
-  /// large.
-  static constexpr int kFewSamples = 8;
   static constexpr int kListThreads = 128;
   /// An ellipsoid that may be in more lists than this is listed by a whole warp.
   static constexpr int kManyLists = 24;
@@ -56,7 +49,6 @@ struct TileFrame {
   int bins;
   int parts;       ///< parts of the depth that are drawn in parallel
   int binsOfPart;  ///< the last part may have fewer bins
-  Between between;
 
   [[nodiscard]] ESVR_HD int tiles() const { return tileColumns * tileRows; }
 };
@@ -97,16 +89,15 @@ struct TileLists {
 
 inline constexpr std::uint32_t kNoResult = 0xffffffffu;
 
-/// True if lists are sorted in global memory. Lists need sorting where floats are summed, because
-/// the result depends on the order. Lists of at most kDrawThreads entries are sorted in shared
-/// memory instead.
-ESVR_HD inline bool needSorting(const FrameCounters& c, Between between) {
-  return between == Between::kSum && c.longestBin > std::uint32_t(DrawTuning::kDrawThreads);
+/// True if lists are sorted in global memory. They need sorting, because the sum of floats depends
+/// on the order. Lists of at most kDrawThreads entries are sorted in shared memory instead.
+ESVR_HD inline bool needSorting(const FrameCounters& c) {
+  return c.longestBin > std::uint32_t(DrawTuning::kDrawThreads);
 }
 /// True if the buffers are large enough for the entries and results that a frame counted.
-ESVR_HD inline bool listsFit(const FrameCounters& c, const TileLists& lists, Between between) {
+ESVR_HD inline bool listsFit(const FrameCounters& c, const TileLists& lists) {
   return c.entries <= lists.entryCapacity && c.results <= lists.resultCapacity &&
-         (!needSorting(c, between) || c.entries <= lists.sortedCapacity);
+         (!needSorting(c) || c.entries <= lists.sortedCapacity);
 }
 
 struct DeviceEllipsoids {
@@ -119,7 +110,7 @@ struct DeviceEllipsoids {
 
 /// The ellipsoids as the camera of a frame sees them.
 struct SeenEllipsoids {
-  EllipsoidView* views;  ///< for Between::kSum
+  EllipsoidView* views;
   Footprint* footprints;
   std::uint32_t* large;  ///< numbers of the ellipsoids in many lists, in any order
 };
@@ -136,13 +127,12 @@ void launchPlan(const TileFrame& frame, const TileLists& lists, cudaStream_t str
 void launchFill(const TileFrame& frame, std::uint32_t count, const SeenEllipsoids& seen,
                 const TileLists& lists, int multiprocessors, cudaStream_t stream);
 
-/// The arguments of drawing that both ways of sampling (RenderOptions::between) share.
+/// The arguments of drawing.
 struct SamplingArguments {
   TileFrame frame;
   TileLists lists;
   SampleRule rule;
-  VoxelRule
-      voxelRule;  ///< the rule by which sums become voxels; sums that are drawn are clamped by it
+  VoxelRule voxelRule;  ///< clamps the sums
   ClipBox clip;
   float4* pixels;  ///< pixels of the band, row after row: red, green, blue, alpha
 };
@@ -153,17 +143,8 @@ struct SumArguments {
   const Footprint* footprints;
 };
 
-struct VoxelArguments {
-  SamplingArguments draw;
-  const WindowForm* forms;
-  const Footprint* footprints;
-  const Vec3* origins;  ///< origins of the chunks
-  float bound;          ///< largest |intensity|, which decides the unit of the integer sums
-};
-
-/// Draw the pictures. Both functions do nothing if the lists did not fit.
+/// Draws the picture. It does nothing if the lists did not fit.
 /// \param multiprocessors  number of multiprocessors of the device
 void launchDrawSums(const SumArguments& arguments, int multiprocessors, cudaStream_t stream);
-void launchDrawVoxels(const VoxelArguments& arguments, int multiprocessors, cudaStream_t stream);
 
 }  // namespace esvr::cuda

@@ -126,14 +126,12 @@ __device__ bool look(const TileFrame& frame, const DeviceEllipsoids& all, const 
   const double radius = sqrt(double(kernel.cutoff));
   const SeenEllipsoid seen =
       seenBy(frame.view, e, difference(all.origins[e.chunk], frame.view.eye));
-  const bool ofVoxels = frame.between == Between::kVoxels;
-  ScreenExtent s = screenExtentOf(frame.view, seen, radius, ofVoxels, frame.resolution);
+  ScreenExtent s = screenExtentOf(frame.view, seen, radius, frame.resolution);
   const bool any = visible(s.bounds);
   if (!any) s.bounds.firstRow = 1, s.bounds.lastRow = 0;
   const Footprint footprint = footprintOf(s.outline, s.bounds);
   out.footprints[i] = footprint;
-  if (any && !ofVoxels)
-    out.views[i] = viewOf(frame.view, seen, s.outline.everywhere, e.intensity, kernel);
+  if (any) out.views[i] = viewOf(frame.view, seen, s.outline.everywhere, e.intensity, kernel);
   return any && isSeen(frame, footprint);
 }
 

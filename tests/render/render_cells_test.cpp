@@ -41,7 +41,7 @@ double agreement(const Field& field, const RenderOptions& o, const RevoxeliseOpt
   return imagePsnr(renderVolume(revoxelise(field, rule), o), drawn);
 }
 
-TEST(WindowTile, DrawsTheVoxelsPictureFromEveryDirection) {
+TEST(RenderCells, DrawsTheVoxelsPictureFromEveryDirection) {
   const Field field = randomField({.count = 200});
   for (int turn = 0; turn < 8; ++turn) {
     RenderOptions o = optionsFor();
@@ -54,20 +54,20 @@ TEST(WindowTile, DrawsTheVoxelsPictureFromEveryDirection) {
     EXPECT_GE(agreement(field, optionsFor({.eye = eye, .up = Vec3{0, 0, 1}})), kAsked);
 }
 
-TEST(WindowTile, DrawsTheVoxelsPictureFromInside) {
+TEST(RenderCells, DrawsTheVoxelsPictureFromInside) {
   for (const double fov : {80.0, 170.0}) {
     const CameraWish inside{.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = fov};
     EXPECT_GE(agreement(randomField({.count = 200}), optionsFor(inside)), kAsked) << fov;
   }
 }
 
-TEST(WindowTile, DrawsTheVoxelsPictureFromFarAway) {
+TEST(RenderCells, DrawsTheVoxelsPictureFromFarAway) {
   CameraWish far{.eye = Vec3{1e6, 2e6, 3.3e6}, .center = Vec3{20, 20, 20}};
   far.fov = 2.0 * std::atan(30.0 / 4e6) * 180.0 / 3.14159265358979;
   EXPECT_GE(agreement(randomField({.count = 200}), optionsFor(far)), kAsked);
 }
 
-TEST(WindowTile, DrawsTheVoxelsPictureAtEveryStep) {
+TEST(RenderCells, DrawsTheVoxelsPictureAtEveryStep) {
   const Field field = randomField({.count = 200});
   for (const double step : {0.1, 0.5, 1.0, 2.5, 7.0}) {
     RenderOptions o = optionsFor();
@@ -81,17 +81,20 @@ TEST(WindowTile, DrawsTheVoxelsPictureAtEveryStep) {
   EXPECT_GE(agreement(randomField({.count = 2000}), o), kAsked);
 }
 
-TEST(WindowTile, DrawsTheVoxelsPictureAtEveryZoom) {
+TEST(RenderCells, DrawsTheVoxelsPictureAtEveryZoom) {
   const Field field = randomField({.count = 200});
   for (const double times : {0.02, 0.3, 2.0, 10.0, 100.0}) {
     RenderOptions o = optionsFor(orthographic());
     o.camera.height *= times;
+    // Samples may lie exactly at voxels here. Rounding then decides whether a sample beside a voxel
+    // of the background is empty, which must not matter.
+    o.transfer.opacity = {{-1.0, 1.0}, {0.0, 0.0}, {1.0, 1.0}};
     EXPECT_GE(imagePsnr(renderVolume(revoxelise(field, {}), o), renderField(field, o)), kAsked)
         << times;
   }
 }
 
-TEST(WindowTile, DrawsTheVoxelsPictureOfSmallAndThinEllipsoids) {
+TEST(RenderCells, DrawsTheVoxelsPictureOfSmallAndThinEllipsoids) {
   EXPECT_GE(agreement(randomField({.count = 4000, .smallest = 0.15, .aspect = 3.0}), optionsFor()),
             kAsked);
   EXPECT_GE(agreement(randomField({.count = 200, .smallest = 0.1, .aspect = 200.0}), optionsFor()),
@@ -101,14 +104,14 @@ TEST(WindowTile, DrawsTheVoxelsPictureOfSmallAndThinEllipsoids) {
         << kappa;
 }
 
-TEST(WindowTile, DrawsOneEllipsoidThatCoversEverything) {
+TEST(RenderCells, DrawsOneEllipsoidThatCoversEverything) {
   // The error is that of float32 at distances of hundreds of voxels: 1e-5.
   Field field = randomField({.count = 1, .smallest = 60.0, .aspect = 1.5});
   field.chunks[0].ellipsoids.intensity[0] = 0.3f;
   EXPECT_GE(agreement(field, optionsFor()), kAsked);
 }
 
-TEST(WindowTile, DrawsABackgroundSeveralChunksAndKappas) {
+TEST(RenderCells, DrawsABackgroundSeveralChunksAndKappas) {
   Field field = randomField({.count = 20});
   field.background = 0.25f;
   field.chunks.push_back(randomField({.count = 20, .extent = 20.0, .seed = 9}).chunks[0]);
@@ -119,13 +122,13 @@ TEST(WindowTile, DrawsABackgroundSeveralChunksAndKappas) {
   EXPECT_GE(agreement(field, optionsFor()), kAsked);
 }
 
-TEST(WindowTile, DrawsByTheRuleOfTheVoxels) {
+TEST(RenderCells, DrawsByTheRuleOfTheVoxels) {
   const Field field = randomField({.count = 200});
   EXPECT_GE(agreement(field, optionsFor(), {.threshold = 0.2f}), kAskedByThreshold);
   EXPECT_GE(agreement(field, optionsFor(), {.range = ValueRange{-0.3f, 0.4f}}), kAsked);
 }
 
-TEST(WindowTile, IsTheSameForAnyNumberOfThreads) {
+TEST(RenderCells, IsTheSameForAnyNumberOfThreads) {
   const Field field = randomField({.count = 300});
   const RenderOptions o = optionsFor({}, {130, 70});
   const auto draw = [&] { return renderField(field, o).rgba; };
@@ -134,14 +137,14 @@ TEST(WindowTile, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one, onThreads(5, draw));
 }
 
-TEST(WindowTile, NothingToSeeIsTransparent) {
+TEST(RenderCells, NothingToSeeIsTransparent) {
   const auto away = optionsFor({.eye = Vec3{20, 20, 200}, .center = Vec3{20, 20, 300}});
   for (const float v : renderField(randomField({}), away).rgba) ASSERT_EQ(v, 0.0f);
   for (const float v : renderField(Field{}, optionsFor()).rgba) ASSERT_EQ(v, 0.0f);
 }
 
 /// A short fit, in which many ellipsoids are smaller than a voxel.
-TEST(WindowTile, RealFileAgreesWithItsVoxelsAtEveryStep) {
+TEST(RenderCells, RealFileAgreesWithItsVoxelsAtEveryStep) {
   if (std::string(ESVR_DATA_DIR).empty())
     GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>";
   const VolumeGrid grid = readGrid(std::string(ESVR_DATA_DIR) + "/aneurism.vdb", "density");

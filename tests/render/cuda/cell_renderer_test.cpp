@@ -1,0 +1,96 @@
+// Plan: the voxels of a field are decoded when a ray asks for them. The pictures must have the same
+// bits whatever was decoded before, in any order, and with memory for a part of a picture's bricks
+// only; channels agree with the CPU's picture of the decoded volume to within 1/255. Memory follows
+// what is seen. Restricted bricks and fields of nothing are drawn too.
+#include <gtest/gtest.h>
+
+#include "esvr/error.h"
+#include "esvr/field.h"
+#include "esvr/renderer.h"
+#include "field/random_field.h"
+#include "support/on_device.h"
+
+namespace esvr::test {
+namespace {
+
+constexpr Box kBox{{0, 0, 0}, {199, 199, 199}};
+const RevoxeliseOptions kVoxels{.threshold = 0.05f};
+
+Field manyBlobs() { return randomField({.count = 2000, .extent = 200.0}); }
+
+RenderOptions options(double degrees = 0.0) {
+  RenderOptions o;
+  o.resolution = {160, 120};
+  o.camera = turned(fitCamera(kBox, {}, o.resolution), degrees);
+  o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
+  o.opacityLength = 20.0;
+  return o;
+}
+
+class CellsOnGpu : public OnGpu {
+ protected:
+  [[nodiscard]] std::unique_ptr<Renderer> renderer(const Field& field,
+                                                   const RendererLimits& limits = {}) const {
+    return makeFieldRenderer(field, device_, limits, kVoxels);
+  }
+};
+
+TEST_F(CellsOnGpu, DrawTheDecodedVolume) {
+  const Field field = manyBlobs();
+  const SparseVolume volume = revoxelise(field, kVoxels);
+  for (const double degrees : {0.0, 70.0, 145.0}) {
+    const Image expected = renderVolume(volume, options(degrees));
+    const Image image = renderer(field)->draw(options(degrees));
+    std::size_t different = 0;
+    for (std::size_t i = 0; i < image.rgba.size(); ++i)
+      different += std::abs(image.rgba[i] - expected.rgba[i]) > 1.0f / 255.0f;
+    // Rounding decides about the few voxels whose value is at the threshold.
+    EXPECT_LE(different, image.rgba.size() / 1000);
+  }
+}
+
+TEST_F(CellsOnGpu, HaveTheSameBitsWhateverWasDecodedBefore) {
+  const Field field = manyBlobs();
+  const Image fresh = renderer(field)->draw(options(70.0));
+  const auto other = renderer(field);
+  for (const double degrees : {0.0, 35.0, 140.0}) (void)other->draw(options(degrees));
+  EXPECT_EQ(other->draw(options(70.0)).rgba, fresh.rgba);
+  EXPECT_EQ(other->draw(options(70.0)).rgba, fresh.rgba);
+}
+
+TEST_F(CellsOnGpu, HaveTheSameBitsInMemoryForAPartOfTheBricks) {
+  const Field field = manyBlobs();
+  const auto unlimited = renderer(field);
+  const Image expected = unlimited->draw(options());
+  const std::uint64_t needed = unlimited->stats().deviceBytes;
+  for (const std::uint64_t less : {1u << 20, 4u << 20, 8u << 20}) {
+    const auto limited = renderer(field, {.maxBytes = needed - less});
+    EXPECT_EQ(limited->draw(options()).rgba, expected.rgba) << less;
+    EXPECT_EQ(limited->draw(options()).rgba, expected.rgba) << less;
+    EXPECT_LE(limited->stats().deviceBytes, needed - less);
+  }
+}
+
+TEST_F(CellsOnGpu, TakeMemoryForWhatIsSeen) {
+  const Field field = manyBlobs();
+  const auto whole = renderer(field), part = renderer(field);
+  RenderOptions clipped = options();
+  clipped.clip = PlaceBox{{0, 0, 0}, {40, 40, 40}};
+  (void)whole->draw(options());
+  (void)part->draw(clipped);
+  EXPECT_LT(part->stats().deviceBytes, whole->stats().deviceBytes);
+}
+
+TEST_F(CellsOnGpu, DrawNothingForAFieldOfNothing) {
+  const Image image = renderer(Field{})->draw(options());
+  EXPECT_EQ(std::count(image.rgba.begin(), image.rgba.end(), 0.0f),
+            std::ptrdiff_t(image.rgba.size()));
+}
+
+TEST_F(CellsOnGpu, RefuseALimitThatIsTooSmall) {
+  const Field field = manyBlobs();
+  EXPECT_THROW((void)renderer(field, {.maxBytes = 1000})->draw(options()), DeviceError);
+}
+
+}  // namespace
+}  // namespace esvr::test
