@@ -73,11 +73,6 @@ Framing framingOf(const Options& options) {
   return options.turntable == 0 ? Framing::kBox : Framing::kTurn;
 }
 
-TransferFunction transferOf(const Options& options, const Scene& scene) {
-  return options.rangeKind == RangeKind::kOwn ? options.transfer
-                                              : rescaled(options.transfer, rangeOf(options, scene));
-}
-
 /// The color bar that is drawn into pictures; nothing without --legend.
 std::optional<report::ColorBar> barOf(const Options& options, const Scene& scene) {
   if (!options.legend) return std::nullopt;
