@@ -14,6 +14,8 @@
 namespace esvr::render {
 
 inline constexpr const char* kProgram = "esvr-render";
+/// The transfer function unless an option says otherwise.
+inline constexpr const char *kUsualColors = "viridis", *kUsualOpacity = "linear";
 
 /// The range of values that the transfer function covers.
 enum class RangeKind {
@@ -27,7 +29,8 @@ struct Options {
   std::filesystem::path input;
   std::filesystem::path output;     ///< empty: no picture is written
   std::optional<std::string> grid;  ///< default: the first that can be drawn
-  TransferFunction transfer;        ///< before it is rescaled to its range
+  /// The transfer function before it is rescaled to its range. Default: that of the grid's class.
+  std::optional<TransferFunction> transfer;
   RangeKind rangeKind = RangeKind::kAuto;
   ValueRange range;  ///< the range of RangeKind::kGiven
   CameraWish camera;

@@ -27,6 +27,8 @@ std::string notes() {
          "\n"
          "Positions and lengths are in voxels of the grid's index space; its transform is not\n"
          "applied. Samples whose value is exactly the background are transparent.\n"
+         "A level set is drawn as an opaque body, whose faces differ in brightness by their angle\n"
+         "to the rays, unless --colors, --opacity, --tf, --range or --mode is given.\n"
          "\n"
          "By default the projected box of the active voxels takes 90 % of the picture's width or\n"
          "height, whichever is tighter. In a turntable, no picture exceeds this, and all pictures\n"

@@ -48,6 +48,19 @@ ValueRange rangeOf(const Options& options, const Scene& scene) {
   return {std::min(scene.data.min, scene.background), std::max(scene.data.max, scene.background)};
 }
 
+/// The transfer function over its range. A level set is drawn as an opaque body unless an option
+/// asks for another function or range.
+TransferFunction transferOf(const Options& options, const Scene& scene) {
+  const bool usual = !options.transfer && options.rangeKind == RangeKind::kAuto;
+  const bool composite = options.mode == RenderMode::kComposite;
+  if (usual && composite && scene.isLevelSet && scene.background > 0.0f)
+    return levelSetSurface(double(scene.background));
+  const TransferFunction function = options.transfer.value_or(
+      TransferFunction{builtInColorMap(kUsualColors), builtInOpacity(kUsualOpacity)});
+  if (options.rangeKind == RangeKind::kOwn) return function;
+  return rescaled(function, rangeOf(options, scene));
+}
+
 /// The rule between voxels unless --between was given.
 Between usualBetween(const Scene& scene) {
   const auto* field = std::get_if<Field>(&scene.content);
@@ -58,11 +71,6 @@ Between usualBetween(const Scene& scene) {
 Framing framingOf(const Options& options) {
   if (options.bench) return Framing::kSphere;
   return options.turntable == 0 ? Framing::kBox : Framing::kTurn;
-}
-
-TransferFunction transferOf(const Options& options, const Scene& scene) {
-  return options.rangeKind == RangeKind::kOwn ? options.transfer
-                                              : rescaled(options.transfer, rangeOf(options, scene));
 }
 
 /// The color bar that is drawn into pictures; nothing without --legend.

@@ -35,6 +35,7 @@ Scene encoded(const SceneFile& from) {
   scene.box = grid.activeBox;
   scene.data = {grid.valueMin, grid.valueMax};
   scene.background = float(grid.descriptor.background);
+  scene.isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet;
   if (grid.voxels)
     scene.content = VolumeGrid{
         grid.descriptor,
@@ -59,6 +60,7 @@ Scene voxels(const SceneFile& from) {
   scene.box = activeBox(grid.volume);
   scene.data = activeRange(grid.volume);
   scene.background = grid.volume.background;
+  scene.isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet;
   scene.content = std::move(grid);
   return scene;
 }

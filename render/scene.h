@@ -20,6 +20,7 @@ struct Scene {
   Box box;           ///< bounding box of the active voxels
   ValueRange data;   ///< range of the active voxels
   float background = 0.0f;
+  bool isLevelSet = false;
   std::optional<StoredGrid> encoded{};  ///< stored grid of the field; none for voxels
 };
 

@@ -8,13 +8,14 @@ namespace {
 using cli::Arguments;
 using cli::po::value;
 
-TransferFunction transferOf(const Arguments& a) {
+std::optional<TransferFunction> transferOf(const Arguments& a) {
   const auto file = a.find<std::string>("tf");
   const auto opacity = a.find<std::string>("opacity");
   if (!file && a.has("preset")) throw UsageError("--preset says nothing without --tf");
+  if (!file && !opacity && !a.has("colors")) return std::nullopt;
   if (!file)
-    return {builtInColorMap(a.find<std::string>("colors").value_or("viridis")),
-            builtInOpacity(opacity.value_or("linear"))};
+    return TransferFunction{builtInColorMap(a.find<std::string>("colors").value_or(kUsualColors)),
+                            builtInOpacity(opacity.value_or(kUsualOpacity))};
   if (a.has("colors")) throw UsageError("--tf and --colors are two color maps; give one");
   auto f = readParaViewPreset(*file, a.find<std::string>("preset").value_or(""));
   if (!opacity) return f;
@@ -46,7 +47,8 @@ void addTransferOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("colors", value<std::string>()->value_name("MAP"),
-     "color map, see the notes (default: viridis)")
+     "color map, see the notes (default: viridis; without this option, --opacity, --tf and --range, "
+     "a level set is drawn as an opaque body)")
     ("opacity", value<std::string>()->value_name("CURVE"),
      "opacity curve, see the notes (default: linear)")
     ("tf", value<std::string>()->value_name("FILE"),

@@ -193,6 +193,14 @@ ColorMap builtInColorMap(const std::string& name) {
   return named<ColorMap>(kColorMaps, name, "color map");
 }
 
+TransferFunction levelSetSurface(double band) {
+  constexpr Rgb kBody{0.90, 0.88, 0.84}, kLayer{0.15, 0.15, 0.20};
+  constexpr double kLayerOpacity = 0.2, kLayerEnd = 0.5;  // of the band
+  if (!(band > 0.0)) throw UsageError("the narrow band of a level set must be positive");
+  return {{ColorSpace::kRgb, {{-band, kBody}, {0.0, kBody}, {0.0, kLayer}, {band, kLayer}}, {}},
+          {{-band, 1.0}, {0.0, 1.0}, {0.0, kLayerOpacity}, {kLayerEnd * band, 0.0}, {band, 0.0}}};
+}
+
 std::vector<std::string> builtInOpacities() { return namesOf<OpacityCurve>(kOpacities); }
 OpacityCurve builtInOpacity(const std::string& name) {
   return named<OpacityCurve>(kOpacities, name, "opacity");

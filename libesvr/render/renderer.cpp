@@ -104,12 +104,7 @@ std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& de
                      std::to_string(RendererLimits::kMaxDepthParts) + ", or 0 to have them chosen");
   if (device.kind == DeviceKind::kCuda)
     return std::make_unique<CudaFieldRenderers>(field, device, limits, voxels);
-  return makeCpuRenderer(
-      [&field, voxels, cells = std::unique_ptr<LazyCells>{}](const RenderOptions& o) mutable {
-        if (o.between == Between::kSum) return renderField(field, o, voxels);
-        if (!cells) cells = std::make_unique<LazyCells>(field, voxels);
-        return renderCells(*cells, o);
-      });
+  return makeCpuRenderer(FieldDrawing{field, voxels});
 }
 
 std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume, const Device& device,

@@ -11,9 +11,10 @@ namespace esvr {
 
 /// A sample's place in the sequence of a ray's samples.
 struct SampleNumber {
-  float fromEye;        ///< number of the sample, counted from the eye
-  std::uint32_t index;  ///< the same modulo 2^32, counted from any sample; consecutive ones differ
-                        ///< by 1
+  float fromEye;  ///< number of the sample, counted from the eye
+  /// The same, counted from any sample of the ray and modulo 2^32. Unlike the float, it tells whether
+  /// two samples are consecutive however far away the eye is.
+  std::uint32_t index;
 };
 [[nodiscard]] inline SampleNumber sampleNumber(double fromEye) {
   return {float(fromEye), std::uint32_t(std::int64_t(fromEye))};

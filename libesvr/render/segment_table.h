@@ -86,9 +86,13 @@ struct SegmentTableView {
   [[nodiscard]] ESVR_HD PixelColor operator()(float a, float b) const {
     if (!(a == a) || !(b == b)) return nan;
     const float from = placeOf(a), to = placeOf(b);
-    const float pieces =
-        piecesOf(SegmentSpan(entries, from, to).mean(SegmentEntry::kExtinction, unit));
+    const SegmentSpan whole(entries, from, to);
+    const float pieces = piecesOf(whole.mean(SegmentEntry::kExtinction, unit));
     PixelColor all{0.0f, 0.0f, 0.0f, 0.0f};
+    if (pieces <= 1.0f) {
+      addBehind(all, whole, 1.0f);
+      return all;
+    }
     const float length = 1.0f / pieces, apart = (to - from) * length;
     for (float p = 0.0f; p < pieces; ++p)
       addBehind(all, SegmentSpan(entries, from + p * apart, from + (p + 1.0f) * apart), length);
@@ -102,16 +106,24 @@ struct SegmentTableView {
     const float place = (value - low) * scale;
     return place < -kFar ? -kFar : (place > kFar ? kFar : place);
   }
+  /// Pieces are so thin that one more or less, by rounding, changes a channel by less than 1/255.
   ESVR_HD static float piecesOf(float extinction) {
-    constexpr float kThin = 0.5f, kMost = 16.0f;
+    constexpr float kThin = 0.25f, kMost = 16.0f;
     if (!(extinction > 0.0f)) return 0.0f;
     return extinction < kThin * kMost ? std::ceil(extinction / kThin) : kMost;
+  }
+  /// 1 - exp(-t), without the cancellation that the difference has for a small t.
+  ESVR_HD static float absorbed(float t) {
+    if (t > 0.5f) return 1.0f - std::exp(-t);
+    float series = 1.0f;
+    for (float n = 7.0f; n > 1.0f; n -= 1.0f) series = 1.0f - series * t * (1.0f / n);
+    return series * t;
   }
   /// \param length  length of the piece in steps
   ESVR_HD void addBehind(PixelColor& all, const SegmentSpan& piece, float length) const {
     const float extinction = piece.mean(SegmentEntry::kExtinction, unit);
     if (!(extinction > 0.0f)) return;
-    const float alpha = (1.0f - all.alpha) * -std::expm1(-extinction * length);
+    const float alpha = (1.0f - all.alpha) * absorbed(extinction * length);
     const float share = alpha / extinction;
     all.r += share * piece.mean(0, unit);
     all.g += share * piece.mean(1, unit);

@@ -83,6 +83,25 @@ TEST_F(EsvrRender, ValuesOfFewerBitsChangeThePictureALittle) {
   EXPECT_GT(psnrOf(fp4, floats), 20.0);
 }
 
+TEST_F(EsvrRender, ALevelSetIsAnOpaqueBodyUnlessAnOptionSaysOtherwise) {
+  VolumeGrid grid = readGrid(folder_ / "in.vdb", "density");
+  grid.descriptor = density();  // without the metadata of the file, which name another class
+  grid.descriptor.gridClass = GridClass::kLevelSet;
+  grid.descriptor.background = grid.volume.background = 1.0f;
+  for (float& v : grid.volume.values) v = 1.0f - 2.0f * v;
+  writeGrids(folder_ / "surface.vdb", {}, std::span(&grid, 1));
+  const auto body = picture("surface.vdb");
+  EXPECT_EQ(body.at(32, 24)[3], 255);
+  EXPECT_THAT(body.corner(), ElementsAre(0, 0, 0, 0));
+  const auto saved = folder_ / "tf.json";
+  EXPECT_EQ(draw("surface.vdb", "again.png", {"--tf-save", saved}).exitCode, 0);
+  EXPECT_EQ(picture("surface.vdb", {"--tf", saved, "--range", "own"}).rgba, body.rgba);
+  for (const char* option : {"--colors", "--opacity"})
+    EXPECT_NE(picture("surface.vdb", {option, option[2] == 'c' ? "viridis" : "linear"}).rgba,
+              body.rgba);
+  EXPECT_NE(picture("surface.vdb", {"--range", "data"}).rgba, body.rgba);
+}
+
 TEST_F(EsvrRender, IsTransparentAroundTheVolumeUnlessABackgroundIsGiven) {
   EXPECT_THAT(picture("in.esvr").corner(), ElementsAre(0, 0, 0, 0));
   EXPECT_THAT(picture("in.esvr", {"--background", "1,0.5,0"}).corner(),

@@ -7,7 +7,7 @@ namespace esvr::test {
 namespace {
 
 constexpr int kIntervals = 1 << 16;
-constexpr double kMaxExtinction = 64.0, kThin = 0.5, kMaxPieces = 16.0;
+constexpr double kMaxExtinction = 64.0, kThin = 0.25, kMaxPieces = 16.0;
 constexpr std::size_t kExtinction = 3;
 
 }  // namespace

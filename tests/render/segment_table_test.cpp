@@ -1,7 +1,7 @@
 // Plan: the light of segments of random values agrees with sums over 4000 places in float64, for
 // curves with ramps, steps, plateaus of no opacity and of full opacity. In the sums each place
 // absorbs the light of those behind it; the table does so in pieces with an extinction of up to
-// 1/2, within which it is neglected. That moves a color by up to 1/24 of its change along the
+// 1/4, within which it is neglected. That moves a color by up to 1/48 of its change along the
 // segment and leaves the opacity unchanged. Opacities err by less than 1e-4 (segment_table.h), and
 // by as much again where an opacity of 1 is approached within one interval of the table. At a step
 // inside an interval, extinction may be off by 1/8 interval.
@@ -20,7 +20,7 @@ namespace esvr::test {
 namespace {
 
 constexpr int kPlaces = 4000;
-constexpr double kOpacity = 2e-4, kColor = 1.0 / 24.0;
+constexpr double kOpacity = 2e-4, kColor = 1.0 / 48.0;
 
 PixelColor summed(const TransferFunction& f, double length, double a, double b) {
   double color[3] = {}, left = 1.0;

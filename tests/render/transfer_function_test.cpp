@@ -133,6 +133,16 @@ TEST(TransferFunction, ARangeWithoutExtentShowsTheUpperEnd) {
   EXPECT_EQ(colorAt(f.colors, 3.0), (Rgb{1, 1, 1}));
 }
 
+TEST(TransferFunction, ALevelSetIsOpaqueInsideAndDarkInAThinLayerBeforeIt) {
+  const TransferFunction f = levelSetSurface(3.0);
+  EXPECT_NO_THROW(checkTransferFunction(f));
+  EXPECT_EQ(opacityAt(f.opacity, -1e-9), 1.0);
+  EXPECT_LT(opacityAt(f.opacity, 1e-9), 0.5);
+  EXPECT_EQ(opacityAt(f.opacity, 3.0), 0.0) << "the background";
+  EXPECT_LT(colorAt(f.colors, 1e-9).g, colorAt(f.colors, -1e-9).g);
+  EXPECT_THROW((void)levelSetSurface(0.0), UsageError);
+}
+
 TEST(TransferFunction, WhatMakesNoSenseIsRefused) {
   const auto good = TransferFunction{builtInColorMap("viridis"), builtInOpacity("linear")};
   const auto refused = [&](auto&& spoil) {

@@ -91,6 +91,13 @@ void checkTransferFunction(const TransferFunction& function);
 /// \throws UsageError  the name is unknown
 [[nodiscard]] OpacityCurve builtInOpacity(const std::string& name);
 
+/// Shows a level set, whose values are distances from a surface and negative inside, as an opaque
+/// body. A thin dark layer before the surface is longer on rays that meet it at a flat angle, so
+/// that faces of different directions differ in brightness.
+/// \param band  distance from the surface to the end of the narrow band, usually the background
+/// \throws UsageError  the band is not positive
+[[nodiscard]] TransferFunction levelSetSurface(double band);
+
 /// Reads a ParaView preset in one of two formats:
 ///  - JSON: an object, or an array of objects, with "RGBPoints" [x r g b ...] and optionally
 ///    "Name", "ColorSpace" (RGB, HSV, Lab, CIELAB, Diverging, Step), "HSVWrap", "Points"

@@ -215,8 +215,8 @@ __device__ void addSamples(const SamplingArguments& a, Shared& s, const Place& p
     const float value = a.voxelRule.settled(a.rule.background + sum);
     const std::uint32_t index = std::uint32_t(bin * kBinSamples + sample);
     const float number = float(index);
-    if (sum != 0.0f && value != a.rule.background && number >= work.firstSample && number <= work.lastSample &&
-        a.rule.open(ray))
+    if (sum != 0.0f && value != a.rule.background && number >= work.firstSample &&
+        number <= work.lastSample && a.rule.open(ray))
       a.rule.add(ray, value, {toEye + number, index});
   }
 }

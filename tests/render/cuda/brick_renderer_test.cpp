@@ -57,6 +57,9 @@ TEST_F(BricksOnGpu, AgreeForOtherStepsAndClipped) {
     expectTheCpusPicture(o);
   }
   RenderOptions o = options();
+  o.classification = Classification::kPost;
+  expectTheCpusPicture(o);
+  o.classification = Classification::kPreIntegrated;
   o.clip = PlaceBox{{-5, 20, 10.5}, {40, 70, 60.5}};
   expectTheCpusPicture(o);
 }

@@ -156,6 +156,16 @@ TEST_P(FieldOnGpu, DrawsThePartsOfTheDepthAsOne) {
   }
 }
 
+TEST_P(FieldOnGpu, AgreesWithPostClassificationAndOnSteepSurfaces) {
+  const Field field = randomField({.count = 400});
+  RenderOptions o = optionsFor();
+  o.classification = Classification::kPost;
+  for (const int parts : {1, 3}) expectTheCpusPicture(field, o, {.depthParts = parts});
+  o.classification = Classification::kPreIntegrated;
+  o.transfer.opacity = {{-1.0, 0.0}, {0.3, 0.0}, {0.4, 1.0}, {1.0, 1.0}};
+  for (const int parts : {1, 3}) expectTheCpusPicture(field, o, {.depthParts = parts});
+}
+
 TEST_P(FieldOnGpu, AgreesInEachModeAndClipped) {
   const Field field = randomField({.count = 400});
   for (const auto mode : {RenderMode::kMaximum, RenderMode::kAverage})
