@@ -133,7 +133,8 @@ ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
   Found found{kNoCells, {0, 0, 0}, 0};
   const float* values = nullptr;
   bool looksAhead = false;
-  for (int i = at.next; i < samples.count && scene.rule.open(at.ray);) {
+  for (int i = at.next > samples.begin ? at.next : samples.begin;
+       i < samples.end && scene.rule.open(at.ray);) {
     const FloatPlace place = samples.at(i);
     const Coord cell = cellOf(place);
     if (!inside(table, cell)) {  // rounding can move a place beyond the box

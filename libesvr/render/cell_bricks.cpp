@@ -1,19 +1,26 @@
 #include "render/cell_bricks.h"
 
 #include <algorithm>
-
-#include "core/cell_corner.h"
+#include <iterator>
 
 namespace esvr {
+namespace {
+
+/// The bricks and those one step below, in increasing order, which a shift does not change.
+std::vector<Coord> withShifted(const std::vector<Coord>& bricks, Coord step) {
+  std::vector<Coord> below(bricks), all;
+  for (Coord& brick : below) brick = brick - step;
+  all.reserve(bricks.size() + bricks.size() / 2);
+  std::ranges::set_union(bricks, below, std::back_inserter(all));
+  return all;
+}
+
+}  // namespace
 
 std::vector<Coord> bricksWithCells(std::span<const Coord> voxels) {
-  std::vector<Coord> bricks;
-  bricks.reserve(kCellCorners * voxels.size());
-  for (const Coord brick : voxels)
-    for (int corner = 0; corner < kCellCorners; ++corner)
-      bricks.push_back(brick - stepToCorner(corner));
-  std::sort(bricks.begin(), bricks.end());
-  bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
+  std::vector<Coord> bricks(voxels.begin(), voxels.end());
+  for (const Coord step : {Coord{0, 0, 1}, Coord{0, 1, 0}, Coord{1, 0, 0}})
+    bricks = withShifted(bricks, step);
   return bricks;
 }
 

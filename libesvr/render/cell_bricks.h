@@ -10,6 +10,7 @@
 namespace esvr {
 
 /// Bricks of which a cell has a corner in one of the bricks of voxels, in increasing order.
+/// \param voxels  in increasing order
 [[nodiscard]] std::vector<Coord> bricksWithCells(std::span<const Coord> voxels);
 
 }  // namespace esvr

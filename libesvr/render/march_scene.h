@@ -20,13 +20,15 @@ struct FloatPlace {
   float x, y, z;
 };
 
-/// The samples of a ray inside the box. Sample i lies at first + i apart. It is computed from the
-/// first sample in the box and not from the eye, so that float32 is precise enough.
+/// The samples of a ray inside the box, of which `begin` to `end` - 1 are wanted. Sample i lies at
+/// first + i apart. It is computed from the first sample in the box and not from the eye, so that
+/// float32 is precise enough, and not from the first one that is wanted, so that it does not depend
+/// on what is wanted.
 struct MarchSamples {
   FloatPlace first, apart;
   FloatPlace perVoxel;  ///< samples in a step of a voxel along each axis; 0 where they do not move
-  float number;         ///< number of the first sample, counted from the eye
-  int count;
+  float number;         ///< number of sample 0, counted from the eye
+  int begin, end;
 
   [[nodiscard]] ESVR_HD FloatPlace at(int i) const {
     const float n = float(i);
@@ -51,14 +53,16 @@ ESVR_HD inline MarchSamples samplesOf(const MarchScene& s, int column, int row,
                                       const SampleRange& wanted) {
   const Ray ray = s.view.ray(column, row);
   const SampleRange range =
-      samplesIn(within(ray, s.box), s.step).both(samplesIn(ray, s.clip, s.step)).both(wanted);
-  if (!(range.first <= range.last)) return {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0.0f, 0};
+      samplesIn(within(ray, s.box), s.step).both(samplesIn(ray, s.clip, s.step));
+  const SampleRange both = range.both(wanted);
+  if (!(both.first <= both.last)) return {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0.0f, 0, 0};
   const FloatPlace apart = floatPlace(scaled(ray.direction, s.step));
   return {floatPlace(sum(ray.origin, scaled(ray.direction, range.first * s.step))),
           apart,
           {samplesPerVoxel(apart.x), samplesPerVoxel(apart.y), samplesPerVoxel(apart.z)},
           float(range.first),
-          int(range.last - range.first) + 1};
+          int(both.first - range.first),
+          int(both.last - range.first) + 1};
 }
 
 namespace march {

@@ -38,7 +38,7 @@ ESVR_HD inline PixelColor marchNano(const nanovdb::NanoGrid<Build>& grid, const 
   const auto sample = ESVR_NANOVDB_MATH::createSampler<1>(accessor);
   const MarchSamples samples = samplesOf(scene, column, row, SampleRange::all());
   RayState ray;
-  for (int i = 0; i < samples.count && scene.rule.open(ray);) {
+  for (int i = samples.begin; i < samples.end && scene.rule.open(ray);) {
     const FloatPlace at = samples.at(i);
     const nanovdb::Vec3f place(at.x, at.y, at.z);
     const nanovdb::Coord voxel = nanovdb::Coord::Floor(place);

@@ -124,15 +124,15 @@ __device__ void listIfWaiting(const BrickDrawArguments& a, bool ended, std::uint
 /// roundings.
 __global__ void __launch_bounds__(kMarchTilePixels)
     marchKernel(const BrickDrawArguments a, const WaitingTiles w) {
-  const bool isFirst = w.entries == nullptr;
-  const std::uint32_t entry = isFirst ? blockIdx.x : w.entries[blockIdx.x];
+  const bool isFirst = w.count == 0;
+  const std::uint32_t entry = isFirst || w.begin ? blockIdx.x : w.entries[blockIdx.x];
   const std::uint32_t tile = isFirst ? entry : w.tiles[entry];
   const int2 range = a.ranges[tile];
   if (range.x > range.y) return;
   RayProgress* const kept =
       isFirst ? nullptr : w.rays + std::size_t(entry) * kMarchTilePixels + threadIdx.x;
   RayProgress ray;
-  if (kept != nullptr) ray = *kept;
+  if (kept != nullptr && !w.begin) ray = *kept;
   const bool ended = ray.next < 0 || marchRay(a, tile, range, ray);
   if (ended) ray.next = -1;
   if (kept != nullptr) *kept = ray;
@@ -151,8 +151,7 @@ void launchRanges(const BrickDrawArguments& a, cudaStream_t stream) {
 
 void launchMarch(const BrickDrawArguments& a, const WaitingTiles& w, cudaStream_t stream) {
   const int tiles = tilesAlong(a.resolution.width) * a.tileRows;
-  marchKernel<<<w.entries == nullptr ? unsigned(tiles) : w.count, kMarchTilePixels, 0, stream>>>(a,
-                                                                                                 w);
+  marchKernel<<<w.count == 0 ? unsigned(tiles) : w.count, kMarchTilePixels, 0, stream>>>(a, w);
   check(cudaGetLastError(), "marching bricks");
 }
 

@@ -31,6 +31,7 @@ struct BrickDemand {
 /// The tiles of a band whose rays wait, and how far these are.
 struct WaitingTiles {
   std::uint32_t count = 0;
+  bool begin = false;                      ///< the entries are all tiles, and their rays begin now
   const std::uint32_t* entries = nullptr;  ///< numbers in `tiles` and `rays`
   const std::uint32_t* tiles = nullptr;    ///< by entry: number of the tile
   RayProgress* rays = nullptr;  ///< by entry: kMarchTilePixels rays; next < 0: the ray has ended
@@ -53,8 +54,8 @@ struct BrickDrawArguments {
 
 /// Finds the ranges of all tiles.
 void launchRanges(const BrickDrawArguments& arguments, cudaStream_t stream);
-/// Marches the rays that wait. \param tiles  without entries, the rays of all tiles are marched from
-/// their first samples, and rays that must wait are not kept
+/// Marches the rays that wait. \param tiles  if there are none, the rays of the whole band are
+/// marched from their first samples, and rays that must wait are not kept
 void launchMarch(const BrickDrawArguments& arguments, const WaitingTiles& tiles,
                  cudaStream_t stream);
 

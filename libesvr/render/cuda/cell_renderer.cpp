@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/cuda/copy.h"
 #include "render/cuda/brick_cache.h"
 #include "render/cuda/make_cuda_renderer.h"
 #include "render/cuda/march_renderer.h"
@@ -26,17 +25,13 @@ class Waiting {
   /// Takes the tiles that were found after the first pass; their rays begin anew.
   WaitingTiles begin(std::uint32_t count) {
     copy(tiles_.reserve(count), count);
-    std::vector<std::uint32_t> all(count);
-    for (std::uint32_t n = 0; n < count; ++n) all[n] = n;
-    uploadTo(entries_.reserve(count), std::span<const std::uint32_t>(all), stream_);
-    const std::vector<RayProgress> rays(std::size_t(count) * kMarchTilePixels);
-    uploadTo(rays_.reserve(rays.size()), std::span<const RayProgress>(rays), stream_);
-    return view(count);
+    rays_.reserve(std::size_t(count) * kMarchTilePixels);
+    return view(count, true);
   }
   /// Takes the entries that were found in a later pass.
   WaitingTiles next(std::uint32_t count) {
     copy(entries_.reserve(count), count);
-    return view(count);
+    return view(count, false);
   }
   [[nodiscard]] std::size_t bytes() const {
     return found_.bytes() + entries_.bytes() + tiles_.bytes() + rays_.bytes();
@@ -48,8 +43,8 @@ class Waiting {
         cudaMemcpyAsync(to, found_.data(), count * sizeof(*to), cudaMemcpyDeviceToDevice, stream_),
         "listing waiting rays");
   }
-  WaitingTiles view(std::uint32_t count) {
-    return {count, entries_.data(), tiles_.data(), rays_.data()};
+  WaitingTiles view(std::uint32_t count, bool begin) {
+    return {count, begin, entries_.data(), tiles_.data(), rays_.data()};
   }
 
   cudaStream_t stream_;
