@@ -79,6 +79,81 @@ TEST(BrickAtlas, HoldsEveryCellThatShowsAnythingAndNoOthers) {
   EXPECT_TRUE(makeBrickAtlas(SparseVolume{}).table.bricks.empty());
 }
 
+/// Notes the bricks that a ray asks for, and lets it look for `ahead` more.
+struct Asking {
+  std::vector<std::uint32_t>& asked;
+  int ahead;
+  void entered(std::uint32_t) const {}
+  bool wantsMore(std::uint32_t brick, std::uint32_t) {
+    asked.push_back(brick);
+    return ahead-- > 0;
+  }
+};
+
+/// The color of a ray that meets only missing bricks. Those that it asks for are given slots, and it
+/// continues. \return also how often it had to wait
+std::pair<PixelColor, int> colorWithWaits(const BrickAtlas& atlas, const MarchScene& scene,
+                                          const MarchSamples& samples, int ahead) {
+  std::vector<std::uint32_t> slotOf(atlas.table.bricks.size(), BrickSlotsView::kMissing), asked;
+  const auto pages = atlas.pages();
+  RayProgress ray;
+  for (int waits = 0;; ++waits) {
+    Asking asking{asked, ahead};
+    if (marchBricks(atlas.table.view(), BrickSlotsView{slotOf.data(), pages.data()}, scene, samples,
+                    ray, asking))
+      return {scene.rule.finished(ray.ray), waits};
+    for (const std::uint32_t brick : asked) slotOf[brick] = brick;
+  }
+}
+
+TEST(BrickAtlas, RaysThatWaitForBricksHaveTheSameBits) {
+  const auto volume = volumeAt({{0, 0, 0}, {8, 0, 0}, {16, 0, 0}, {24, 0, 0}, {40, 0, 0}});
+  const BrickAtlas atlas = makeBrickAtlas(volume);
+  const auto pages = atlas.pages();
+  RenderOptions o = optionsFor(volume, {.eye = Vec3{100, 5, 4}, .center = Vec3{0, 4, 4}});
+  o.minTransmittance = 0.0;
+  const Picture picture(o);
+  MarchScene scene{picture.view, cellsOf(atlas.table), o.step, clipOf(o),
+                   sampleRule(o, picture.table.view(), volume.background)};
+  const Coord origin = atlas.table.origin;
+  scene.view.eye =
+      difference(scene.view.eye, {double(origin.x), double(origin.y), double(origin.z)});
+  const auto samples =
+      samplesOf(scene, o.resolution.width / 2, o.resolution.height / 2, SampleRange::all());
+  const PixelColor expected = rayColor(atlas.table.view(), {nullptr, pages.data()}, scene, samples);
+  EXPECT_GT(expected.alpha, 0.1f);
+  int waitsBefore = 1000;
+  for (const int ahead : {0, 1, 100}) {
+    const auto [color, waits] = colorWithWaits(atlas, scene, samples, ahead);
+    EXPECT_EQ((std::array<float, 4>{color.r, color.g, color.b, color.alpha}),
+              (std::array<float, 4>{expected.r, expected.g, expected.b, expected.alpha}));
+    EXPECT_LT(waits, waitsBefore);
+    waitsBefore = waits;
+  }
+  EXPECT_EQ(waitsBefore, 1) << "all bricks of the ray are found while it waits for the first";
+}
+
+// A tile knows in which samples its rays may meet bricks. This must not move the samples.
+TEST(BrickAtlas, SamplesDoNotDependOnTheRangeThatIsWanted) {
+  const auto volume = volumeAt({{0, 0, 0}, {40, 0, 16}});
+  RenderOptions o = optionsFor(volume);
+  o.step = 0.25;
+  const Picture picture(o);
+  const MarchScene scene{picture.view,
+                         {{0, 0, 0}, {48, 8, 24}},
+                         o.step,
+                         clipOf(o),
+                         sampleRule(o, picture.table.view(), volume.background)};
+  const int column = o.resolution.width / 2, row = o.resolution.height / 2;
+  const MarchSamples all = samplesOf(scene, column, row, SampleRange::all());
+  ASSERT_GT(all.end, 10);
+  const SampleRange some{all.number + 3.0, all.number + 8.0};
+  const MarchSamples part = samplesOf(scene, column, row, some);
+  EXPECT_EQ(part.first.x, all.first.x);
+  EXPECT_EQ(part.begin, 3);
+  EXPECT_EQ(part.end, 9);
+}
+
 TEST(BrickAtlas, RefusesVoxelsTooFarApart) {
   const auto volume = volumeAt({{0, 0, 0}, {1 << 20, 1 << 20, 1 << 20}});
   EXPECT_THROW((void)makeBrickAtlas(volume), UsageError);

@@ -17,6 +17,11 @@ struct SumLimits {
 /// Two bits are left for the sign and for rounding, which adds up to half a unit for each value.
 inline constexpr SumLimits kLimits32{29, 29}, kLimits64{61, 61};
 
+/// A brick that more ellipsoids reach than this is summed in 64-bit integers. In 32 bits a list of
+/// this length has units of 2^-17 of its largest intensity, and ordinary lists, of some 200 entries,
+/// units of 2^-22.
+inline constexpr std::uint32_t kMaxNarrowEntries = 4096;
+
 /// \return e, such that a sum of `count` values of at most `largest` keeps the limits in units of
 ///         2^-e and both 2^e and 2^-e are normal numbers of float32
 [[nodiscard]] ESVR_HD inline int unitExponent(float largest, std::uint32_t count,

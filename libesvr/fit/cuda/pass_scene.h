@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "core/cuda/integer_sum.cuh"
 #include "fit/cuda/pair_form.h"
 #include "fit/cuda/pair_lists.h"
 
@@ -28,11 +29,6 @@ struct PassScene {
           lists.view(),
           forms};
 }
-
-/// A brick whose list is longer than this is summed in 64-bit integers. In 32 bits a list of this
-/// length has units of 2^-17 of its largest intensity, and ordinary lists, of some 200 entries,
-/// units of 2^-22.
-inline constexpr std::uint32_t kMaxNarrowEntries = 4096;
 
 /// \return an upper bound for the number of bricks with lists of kMaxNarrowEntries or more, which
 ///         come first in PairListsView::brickOrder; 0 if no list can be longer

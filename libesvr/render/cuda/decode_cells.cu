@@ -12,9 +12,6 @@ namespace {
 
 constexpr int kThreads = 256, kWarps = kThreads / kWarp;
 
-/// A brick with a longer list is summed in 64-bit integers, as in a fit.
-constexpr std::uint32_t kMaxNarrowEntries = 4096;
-
 /// The brick that a block decodes.
 struct BlockBrick {
   std::uint32_t number;
