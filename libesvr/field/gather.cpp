@@ -1,5 +1,8 @@
 #include "field/gather.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 namespace esvr {
 namespace {
 
@@ -17,40 +20,51 @@ bool perEllipsoidKappa(const Field& field) {
   return false;
 }
 
+/// Calls visit(number, chunk's number, chunk, index in the chunk) for every ellipsoid, in parallel.
 template <class Visit>
 void forEachEllipsoid(const Field& field, Visit&& visit) {
-  for (std::uint32_t c = 0; c < field.chunks.size(); ++c)
-    for (std::size_t i = 0; i < field.chunks[c].ellipsoids.size(); ++i)
-      visit(c, field.chunks[c], i);
+  constexpr std::size_t kGrain = 1024;
+  std::size_t first = 0;
+  for (std::uint32_t c = 0; c < field.chunks.size(); ++c) {
+    const Chunk& chunk = field.chunks[c];
+    const tbb::blocked_range<std::size_t> all(0, chunk.ellipsoids.size(), kGrain);
+    tbb::parallel_for(all, [&](const auto& range) {
+      for (std::size_t i = range.begin(); i != range.end(); ++i) visit(first + i, c, chunk, i);
+    });
+    first += chunk.ellipsoids.size();
+  }
 }
 
 }  // namespace
 
 GatheredField gather(const Field& field) {
   GatheredField g;
+  const std::size_t count = field.ellipsoidCount();
   for (const auto& chunk : field.chunks) g.origins.push_back(chunk.origin);
   const bool several = perEllipsoidKappa(field);
-  if (!several) g.kernels.push_back(kernelConstants<float>(field.kernel));
-  forEachEllipsoid(field, [&](std::uint32_t c, const Chunk& chunk, std::size_t i) {
+  g.forms.resize(count);
+  g.chunkOf.resize(count);
+  g.kernels.resize(several ? count : 1, kernelConstants<float>(field.kernel));
+  forEachEllipsoid(field, [&](std::size_t n, std::uint32_t c, const Chunk& chunk, std::size_t i) {
     const Ellipsoids& e = chunk.ellipsoids;
     const double kappa = kappaOf(field, e, i);
     const double radius = supportRadius(kernelConstants<double>(field.kernel, kappa));
-    g.forms.push_back(makeLineForm(centerOf(e, i), unitFrame(e, i), radius, e.intensity[i]));
-    if (several) g.kernels.push_back(kernelConstants<float>(field.kernel, kappa));
-    g.chunkOf.push_back(c);
+    g.forms[n] = makeLineForm(centerOf(e, i), unitFrame(e, i), radius, e.intensity[i]);
+    if (several) g.kernels[n] = kernelConstants<float>(field.kernel, kappa);
+    g.chunkOf[n] = c;
   });
   return g;
 }
 
 std::vector<Support> supports(const Field& field) {
-  std::vector<Support> all;
-  forEachEllipsoid(field, [&](std::uint32_t, const Chunk& chunk, std::size_t i) {
+  std::vector<Support> all(field.ellipsoidCount());
+  forEachEllipsoid(field, [&](std::size_t n, std::uint32_t, const Chunk& chunk, std::size_t i) {
     const Ellipsoids& e = chunk.ellipsoids;
     auto center = centerOf(e, i);
     center[0] += chunk.origin.x, center[1] += chunk.origin.y, center[2] += chunk.origin.z;
     const double radius =
         supportRadius(kernelConstants<double>(field.kernel, kappaOf(field, e, i)));
-    all.push_back(makeSupport(center, unitFrame(e, i), radius, kRoundingSlack));
+    all[n] = makeSupport(center, unitFrame(e, i), radius, kRoundingSlack);
   });
   return all;
 }
