@@ -28,8 +28,6 @@ class Size:
     def __init__(self, volume, table, part):
         self.part = part
         self.ours = next(r for r in table['rows'] if r['name'] == volume.esvr(part).name)
-        self.bricks = next(r for r in table['rows']
-                           if r['name'] == volume.esvr(part).name + ', bricks')
         self.budget = volume.sizes[part]
         matched = [r for r in table['rows'] if r['group'] == f"at {self.ours['bytes']} bytes"]
         self.rows = [r for r in matched if 'psnr_box' in r]
@@ -50,12 +48,9 @@ class Size:
         return [r for r in rows if psnr(r, key) is not None and psnr(r, key) >= mine]
 
     def less_flip(self):
-        return [r for r in self.rows if 'flip' in r and r['flip'] <= self.bricks['flip']]
+        return [r for r in self.rows if 'flip' in r and r['flip'] <= self.ours['flip']]
 
     def better_pictures(self):
-        return self.better('image_psnr', self.rows, self.bricks)
-
-    def better_than_ellipsoids(self):
         return self.better('image_psnr', self.rows)
 
 
@@ -75,7 +70,7 @@ def flip_losses(title, sizes):
         rows = sorted(size.less_flip(), key=lambda r: r['flip'])
         if rows:
             less = ', '.join(f"{r['name']} ({text(r['flip'], 4)})" for r in rows)
-            lines.append(f"- {title}, {name}: ESVR has {text(size.bricks['flip'], 4)}; as "
+            lines.append(f"- {title}, {name}: ESVR has {text(size.ours['flip'], 4)}; as "
                          f"low or lower: {less}")
     return lines
 
@@ -120,11 +115,9 @@ def verdict(low, high):
         lines += losses(f'PSNR over the box at {at}', 'psnr_box',
                         lost(sizes, lambda s: s.better('psnr_box', s.all_others())),
                         lambda n: sizes[n].ours)
-        lines += losses(f'PSNR of pictures at {at}, drawn from decoded voxels', 'image_psnr',
-                        lost(sizes, Size.better_pictures), lambda n: sizes[n].bricks)
-        lines += losses(f'PSNR of pictures at {at}, drawn as ellipsoids', 'image_psnr',
-                        lost(sizes, Size.better_than_ellipsoids), lambda n: sizes[n].ours)
-        lines += flip_losses(f'FLIP of pictures at {at}, drawn from decoded voxels', sizes)
+        lines += losses(f'PSNR of pictures at {at}', 'image_psnr',
+                        lost(sizes, Size.better_pictures), lambda n: sizes[n].ours)
+        lines += flip_losses(f'FLIP of pictures at {at}', sizes)
     lines += ['', '## Where ESVR is better than every other row', '',
               'Each line counts volumes, and only those for which another row exists.', '']
     return lines + wins(LOW, low) + wins(HIGH, high) + ['']
@@ -158,11 +151,10 @@ def stored(ellipsoids):
 def section(size):
     ours = dict(size.ours, encode_s=size.time['seconds'], name='ESVR',
                 setting=f"{stored(size.time['ellipsoids'])}, {size.time['device']}")
-    bricks = dict(size.bricks, encode_s=size.time['seconds'], name='ESVR, drawn from voxels')
-    rows = [ours, bricks] + size.rows + size.externals
+    rows = [ours] + size.rows + size.externals
     rows.sort(key=lambda r: -psnr(r))
     lines = [f'### 1/{size.part}: {size.budget} bytes', '', HEADER]
-    lines += [line(row, row is ours or row is bricks) for row in rows]
+    lines += [line(row, row is ours) for row in rows]
     if size.missing:
         lines += ['', 'Out of reach at this size: ' + ', '.join(
             f"{r['name']} ({r['note']})" if r['note'] != 'out of reach' else r['name']
@@ -210,8 +202,7 @@ FULL_TABLES = """\
   pixels, the map viridis, linear opacity, and one voxel between samples. *FPS* is the number of pictures per
   second. *VRAM* is the device memory that drawing held. Voxels are drawn from NanoVDB grids; the rows of quantised
   NanoVDB files are drawn from grids of their quantised type.
-- Each ESVR file has two rows: one is drawn from the ellipsoids, the other from the decoded voxels
-  (`esvr-render --method bricks`). Files for which `vdb2esvr` chose voxels are drawn from voxels in both.
+- An ESVR file is drawn from voxels, which are decoded where rays need them.
 - Rows of `esvr-compare` are the best files that are not larger than the ESVR file; external compressors may use the
   whole size.
 - The times of external compressors were measured on another machine and cannot be compared with the others. Their
