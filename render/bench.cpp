@@ -126,6 +126,21 @@ Json compared(const Benched& benched, const RenderOptions& options, int views) {
           {"max_error", maxError}};
 }
 
+/// The share of a picture's pixels that the volume covers.
+double coveredShare(const Image& image) {
+  std::size_t covered = 0, pixels = image.rgba.size() / 4;
+  for (std::size_t p = 0; p < pixels; ++p) covered += image.rgba[4 * p + 3] > 0.0f;
+  return double(covered) / double(pixels);
+}
+
+/// The paper's 'screen occupancy': the mean share of covered pixels over a full turn.
+double screenOccupancy(Renderer& renderer, const RenderOptions& options, int views) {
+  const int count = std::min(kCompared, views);
+  double sum = 0.0;
+  for (int i = 0; i < count; ++i) sum += coveredShare(renderer.draw(viewOf(options, i, count)));
+  return sum / count;
+}
+
 }  // namespace
 
 Json jsonNumber(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -137,6 +152,7 @@ Json bench(const Benched& benched, const RenderOptions& options, int views, cons
               {"step", options.step},
               {"views", count}};
   report["drawn"] = measured(benched.renderer, options, count);
+  report["screen_occupancy"] = screenOccupancy(benched.renderer, options, count);
   log.info(summary("drawn", report["drawn"]));
   if (benched.reference == nullptr) return report;
   report["reference"] = measured(*benched.reference, options, count);

@@ -45,8 +45,8 @@ void addDeviceOptions(cli::po::options_description& options) {
      "GPU memory to use; if it is small, voxels are decoded again when they are needed again, and "
      "large pictures are drawn in bands (default: all free memory)")
     ("depth-parts", value<int>()->value_name("N"),
-     "number of parts, 1 to 16, into which a GPU divides the depth of the scene to draw them in "
-     "parallel (default: chosen from the first picture)")
+     "with --between sum: number of parts, 1 to 16, into which a GPU divides the depth of the scene "
+     "to draw them in parallel (default: chosen from the first picture)")
     ("between", value<std::string>()->value_name("B")->default_value("auto"),
      "voxels: between voxels, interpolate the decoded voxels; sum: evaluate the sum of ellipsoids "
      "itself, which is faster where a pixel covers many voxels, but less accurate unless the file "

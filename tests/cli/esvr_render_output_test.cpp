@@ -101,6 +101,9 @@ TEST_F(EsvrRender, MeasuresWithoutKeepingAPicture) {
   EXPECT_EQ(report["views"], 3);
   EXPECT_GT(report["drawn"]["fps_median"], 0.0);
   EXPECT_GE(report["drawn"]["fps_median"], report["drawn"]["fps_1_percent_low"]);
+  EXPECT_GT(report["drawn"]["cold_fps_median"], 0.0);
+  EXPECT_GT(report["screen_occupancy"], 0.1);
+  EXPECT_LT(report["screen_occupancy"], 0.9) << "the corners of the picture are empty";
   EXPECT_GT(report["reference"]["frame_ms"], 0.0);
   EXPECT_GT(report["image"]["psnr"]["min"], 30.0);
 }

@@ -17,10 +17,10 @@ struct FrameStats {
   double listMs = 0.0;  ///< CUDA: time to project the ellipsoids and list them by tile
   double drawMs = 0.0;  ///< CUDA: time to sum and composite the samples; CPU: whole time
   /// Number of entries of all lists. A tile of pixels has a list for each bin of 32 samples, with
-  /// an entry for each ellipsoid that may reach these samples. The number is 0 unless a field is
-  /// drawn with CUDA.
+  /// an entry for each ellipsoid that may reach these samples. The number is 0 unless the sum of a
+  /// field is drawn with CUDA.
   std::uint64_t listEntries = 0;
-  double occupancy = 0.0;  ///< share of the tiles that have a list; for a field with CUDA
+  double occupancy = 0.0;  ///< share of the tiles that have a list; for a sum with CUDA
   int depthParts = 1;      ///< parts of a tile's depth that are drawn in parallel
   /// Largest device memory that the renderer has held, including frame buffers; CUDA only.
   std::uint64_t deviceBytes = 0;
@@ -29,12 +29,13 @@ struct FrameStats {
 struct RendererLimits {
   static constexpr int kMaxDepthParts = 16;
 
-  /// Parts of a tile's depth that a CUDA device draws in parallel, at most kMaxDepthParts. More
+  /// Parts of a tile's depth in which a CUDA device draws a sum in parallel, at most kMaxDepthParts. More
   /// parts use the device better if few tiles have most of the work, but in opaque volumes samples
   /// behind the end of a ray are then computed without effect. If the number is 0, the renderer
   /// chooses it by the lists of the first picture.
   int depthParts = 0;
-  /// Limit on device memory; 0: no limit. If necessary, pictures are drawn in bands.
+  /// Limit on device memory; 0: no limit. If necessary, pictures are drawn in bands, and bricks of
+  /// voxels that were not read for the longest time are dropped.
   std::uint64_t maxBytes = 0;
 };
 
@@ -58,7 +59,9 @@ class Renderer {
   [[nodiscard]] virtual FrameStats stats() const = 0;
 };
 
-/// Makes a renderer that draws as renderField.
+/// Makes a renderer that draws as renderField. Voxels are decoded when a ray reads them, on the
+/// device that draws, and are kept for later pictures. Pictures have the same bits whatever was
+/// decoded before.
 /// \throws DeviceError  the device does not exist, the build has no CUDA, or memory is exhausted
 /// \throws UsageError   the limits are out of range
 [[nodiscard]] std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& device,
