@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <ostream>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -31,13 +32,13 @@ std::ostream& operator<<(std::ostream& out, const ProgramCommand& program) {
   return out << program.name;
 }
 
-/// The lines that a program printed, without numbers, which may be times, and without the spaces
-/// and dashes of tables, whose widths depend on them.
+/// The lines that a program printed, without numbers, which may be times as short as 1e-05 seconds,
+/// and without the spaces and dashes of tables, whose widths depend on them.
 std::vector<std::string> linesOf(const test::ProgramRun& run) {
-  std::string text = run.out + run.err;
-  std::erase_if(text, [](char c) {
-    return std::string_view("0123456789. -").find(c) != std::string_view::npos;
-  });
+  static const std::regex numbers("[0-9][0-9.]*(e[-+][0-9]+)?");
+  std::string text = std::regex_replace(run.out + run.err, numbers, "");
+  std::erase_if(text,
+                [](char c) { return std::string_view(" .-").find(c) != std::string_view::npos; });
   std::vector<std::string> lines;
   std::istringstream stream(text);
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
