@@ -1,0 +1,83 @@
+// Lesson 6: pictures.
+//
+// A Renderer draws many pictures of one field. It decodes bricks of voxels where rays need them and
+// keeps them for the pictures that follow, so it should live as long as its window or its shot.
+
+#include <algorithm>
+#include <cstdio>
+
+#include "check.h"
+#include "esvr/error.h"
+#include "esvr/fit.h"
+#include "esvr/grid_coding.h"
+#include "esvr/renderer.h"
+#include "ring.h"
+
+namespace {
+
+// Colors and opacities are functions of the value. Here they cover the values from 0 to 1.
+esvr::RenderOptions lookAt(const esvr::SparseVolume& volume) {
+  esvr::RenderOptions options;
+  options.resolution = {64, 64};
+  options.camera = esvr::fitCamera(esvr::activeBox(volume), {}, options.resolution);
+  options.transfer = esvr::rescaled(
+      {esvr::builtInColorMap("inferno"), esvr::builtInOpacity("linear")}, {0.0f, 1.0f});
+  return options;
+}
+
+// The pixels of an Image are floats, row by row from the top: red, green, blue and alpha. A program
+// copies them to its window. This one prints a character for each 2 x 4 pixels.
+void print(const esvr::Image& image) {
+  for (int row = 0; row < image.height; row += 4) {
+    for (int column = 0; column < image.width; column += 2) {
+      const auto pixel = std::size_t(row * image.width + column);
+      const float alpha = std::clamp(image.rgba[4 * pixel + 3], 0.0f, 1.0f);
+      std::putchar(" .:-=+*#%@"[int(9.0f * alpha)]);
+    }
+    std::putchar('\n');
+  }
+}
+
+}  // namespace
+
+int main() {
+  const esvr::SparseVolume ring = makeRing();
+  esvr::FitOptions fitting;
+  fitting.preset = esvr::Preset::kDraft;
+  const esvr::StoredGrid grid = esvr::makeStoredGrid({}, ring, esvr::fit(ring, fitting).field);
+
+  // The rule says which voxels are active, as when the grid is decoded. "auto" instead of "cpu"
+  // takes a GPU where there is one. Field and grid must outlive the renderer.
+  const auto renderer =
+      esvr::makeFieldRenderer(grid.field, esvr::selectDevice("cpu"), {}, esvr::voxelRule(grid));
+  esvr::RenderOptions options = lookAt(ring);
+  const esvr::Image first = renderer->draw(options);
+  print(first);
+  check(*std::max_element(first.rgba.begin(), first.rgba.end()) > 0.5f, "the ring is visible");
+  check(first.rgba[3] == 0.0f, "the corner of the picture is transparent");
+
+  // Another view needs other bricks. Pictures do not depend on what was decoded before.
+  const esvr::Camera camera = options.camera;
+  options.camera = esvr::turned(camera, 90.0);
+  check(renderer->draw(options).rgba != first.rgba, "another view is another picture");
+  options.camera = camera;
+  check(renderer->draw(options).rgba == first.rgba, "the same view has the same bits");
+
+  // The picture is that of the decoded voxels.
+  const esvr::Image decoded = esvr::renderVolume(esvr::decodeGrid(grid), options);
+  float largest = 0.0f;
+  for (std::size_t i = 0; i < decoded.rgba.size(); ++i)
+    largest = std::max(largest, std::abs(decoded.rgba[i] - first.rgba[i]));
+  check(largest < 0.01f, "it is the picture of the decoded voxels");
+
+  // Another thread may cancel a picture that takes too long.
+  esvr::CancelToken cancel;
+  options.cancel = &cancel;
+  cancel.cancel();
+  try {
+    (void)renderer->draw(options);
+    check(false, "a cancelled picture throws");
+  } catch (const esvr::Cancelled&) {
+    check(true, "a cancelled picture throws");
+  }
+}
