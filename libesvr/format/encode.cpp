@@ -2,9 +2,11 @@
 #include <functional>
 #include <utility>
 
+#include "core/atomic_file.h"
 #include "esvr/container.h"
 #include "format/bricks_stream.h"
 #include "format/byte_writer.h"
+#include "format/carried_record.h"
 #include "format/chunk_box.h"
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
@@ -153,7 +155,27 @@ void addExtras(SectionWriter& out, std::uint32_t g, const StoredGrid& grid) {
     out.add({SectionKind::kCurve, g}, kOptional, putCurve(grid.curve), kDoubleSize);
 }
 
+/// Adds the records of the carried grids, whose numbers follow those of the other grids.
+void addCarriedRecords(SectionWriter& out, const EsvrFile& file) {
+  for (std::size_t c = 0; c < file.carried.size(); ++c) {
+    ByteWriter content;
+    putCarried(content, file.carried[c]);
+    out.add({SectionKind::kCarried, std::uint32_t(file.grids.size() + c)}, kOptional,
+            content.take(), kByteSize);
+  }
+}
+
+void addCarriedBytes(SectionWriter& out, const EsvrFile& file) {
+  for (std::size_t c = 0; c < file.carried.size(); ++c) {
+    const CarriedGrid& grid = file.carried[c];
+    if (grid.bytes.empty())
+      throw RuntimeFailure("cannot store grid '" + grid.name + "': its bytes were not read");
+    out.addLarge({SectionKind::kCarriedBytes, std::uint32_t(file.grids.size() + c)}, grid.bytes);
+  }
+}
+
 SectionWriter sectionsOf(const EsvrFile& file) {
+  (void)gridsInOrder(file);  // refuses places that are impossible
   std::vector<SortedGrid> grids;
   for (const auto& grid : file.grids) {
     checkGrid(grid);
@@ -164,11 +186,13 @@ SectionWriter sectionsOf(const EsvrFile& file) {
   SectionWriter out;
   addFileMetadata(out, file);
   for (std::uint32_t g = 0; g < grids.size(); ++g) addGrid(out, g, grids[g]);
+  addCarriedRecords(out, file);
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
     addChunks(out, g, grids[g]);
     addExtras(out, g, grids[g].grid);
   }
+  addCarriedBytes(out, file);
   return out;
 }
 
@@ -176,12 +200,25 @@ SectionWriter sectionsOf(const EsvrFile& file) {
 
 std::vector<std::byte> encodeEsvr(const EsvrFile& file) { return sectionsOf(file).assemble(); }
 
+std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
+                        const ContainerWriteOptions& options) {
+  AtomicFile out(path, options.overwrite);  // refuses an existing file before anything is encoded
+  const std::uint64_t bytes = sectionsOf(file).writeTo([&](auto piece) { out.write(piece); });
+  out.commit();
+  return bytes;
+}
+
 std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata) {
   return alignUp(encodeEsvr({metadata, {}}).size());
 }
 
 std::uint64_t bytesAdded(const StoredGrid& grid) {
   const EsvrFile file{{}, {grid}};
+  return sectionsOf(file).bytesUnshared();
+}
+
+std::uint64_t bytesOfCarried(const std::vector<CarriedGrid>& grids) {
+  const EsvrFile file{{}, {}, grids};
   return sectionsOf(file).bytesUnshared();
 }
 
