@@ -155,22 +155,23 @@ void addExtras(SectionWriter& out, std::uint32_t g, const StoredGrid& grid) {
     out.add({SectionKind::kCurve, g}, kOptional, putCurve(grid.curve), kDoubleSize);
 }
 
-/// Adds the records of the carried grids, whose numbers follow those of the other grids.
-void addCarriedRecords(SectionWriter& out, const EsvrFile& file) {
-  for (std::size_t c = 0; c < file.carried.size(); ++c) {
+/// Adds the records of carried grids.
+/// \param first  number of the first of them
+void addCarriedRecords(SectionWriter& out, const std::vector<CarriedGrid>& grids,
+                       std::size_t first) {
+  for (std::size_t c = 0; c < grids.size(); ++c) {
     ByteWriter content;
-    putCarried(content, file.carried[c]);
-    out.add({SectionKind::kCarried, std::uint32_t(file.grids.size() + c)}, kOptional,
-            content.take(), kByteSize);
+    putCarried(content, grids[c]);
+    out.add({SectionKind::kCarried, std::uint32_t(first + c)}, kOptional, content.take(),
+            kByteSize);
   }
 }
 
-void addCarriedBytes(SectionWriter& out, const EsvrFile& file) {
-  for (std::size_t c = 0; c < file.carried.size(); ++c) {
-    const CarriedGrid& grid = file.carried[c];
-    if (grid.bytes.empty())
-      throw RuntimeFailure("cannot store grid '" + grid.name + "': its bytes were not read");
-    out.addLarge({SectionKind::kCarriedBytes, std::uint32_t(file.grids.size() + c)}, grid.bytes);
+void addCarriedBytes(SectionWriter& out, const std::vector<CarriedGrid>& grids, std::size_t first) {
+  for (std::size_t c = 0; c < grids.size(); ++c) {
+    if (grids[c].bytes.empty())
+      throw RuntimeFailure("cannot store grid '" + grids[c].name + "': its bytes were not read");
+    out.addLarge({SectionKind::kCarriedBytes, std::uint32_t(first + c)}, grids[c].bytes);
   }
 }
 
@@ -186,13 +187,13 @@ SectionWriter sectionsOf(const EsvrFile& file) {
   SectionWriter out;
   addFileMetadata(out, file);
   for (std::uint32_t g = 0; g < grids.size(); ++g) addGrid(out, g, grids[g]);
-  addCarriedRecords(out, file);
+  addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
     addChunks(out, g, grids[g]);
     addExtras(out, g, grids[g].grid);
   }
-  addCarriedBytes(out, file);
+  addCarriedBytes(out, file.carried, grids.size());
   return out;
 }
 
@@ -218,8 +219,10 @@ std::uint64_t bytesAdded(const StoredGrid& grid) {
 }
 
 std::uint64_t bytesOfCarried(const std::vector<CarriedGrid>& grids) {
-  const EsvrFile file{{}, {}, grids};
-  return sectionsOf(file).bytesUnshared();
+  SectionWriter out;
+  addCarriedRecords(out, grids, 0);
+  addCarriedBytes(out, grids, 0);
+  return out.bytesUnshared();
 }
 
 std::uint64_t bytesAddedTogether(std::vector<StoredGrid> grids) {

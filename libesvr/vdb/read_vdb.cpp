@@ -39,9 +39,9 @@ GridClass gridClassOf(const std::string& text) {
 std::string reasonToSkip(const ArchiveEntry& entry) {
   if (isScalarFloatTree(entry)) return {};
   const std::string type = entry.valueType();
-  if (isPointTree(entry.treeType)) return "it holds points (" + type + "), which are not supported";
+  if (isPointTree(entry.treeType)) return "it holds points (" + type + "), which cannot be fitted";
   if (type == "float" || type == "double")
-    return "its tree (" + entry.treeType + ") is not supported; OpenVDB's standard tree is";
+    return "its tree (" + entry.treeType + ") cannot be fitted; OpenVDB's standard tree can";
   return notAFloatType(type);
 }
 

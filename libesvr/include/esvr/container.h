@@ -169,7 +169,8 @@ struct PartOfFile {
 /// \throws RuntimeFailure  as for encodeEsvr
 [[nodiscard]] std::uint64_t bytesAddedTogether(std::vector<StoredGrid> grids);
 
-/// Bytes that carried grids add to a file, with their rows of the section table.
+/// Largest number of bytes that carried grids add to a file, with their rows of the section table.
+/// Their places do not matter.
 /// \throws RuntimeFailure  as for encodeEsvr
 [[nodiscard]] std::uint64_t bytesOfCarried(const std::vector<CarriedGrid>& grids);
 
