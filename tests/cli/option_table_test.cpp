@@ -145,6 +145,7 @@ Table checkTests() {
           {"--fail-on", "CompareCheck.tellsDifferencesBesidesTheVoxels"},
           {"--force", "CompareOption.reportsAreReplacedWhereForced"},
           {"--grid", "CompareOption.checkTakesTheGridTheBoxAndThePeak"},
+          {"--ignore-grids", "CompareCarried.AMissingGridFailsUnlessItIsIgnored"},
           {"--max-bytes", "CompareCheck.boundsTheFilesBytes"},
           {"--max-error", "CompareLimit.passesOrFailsWithTheFigure"},
           {"--max-mass-error", "CompareLimit.passesOrFailsWithTheFigure"},
