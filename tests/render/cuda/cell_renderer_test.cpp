@@ -79,6 +79,17 @@ TEST_F(CellsOnGpu, DrawTheLevelsOfTheDecodedVolume) {
   expectClose(ofVolume->draw(manyLevels()), renderVolume(volume, manyLevels()), 1000);
 }
 
+TEST_F(CellsOnGpu, AreShadedAsOnTheCpu) {
+  const Field field = manyBlobs();
+  const SparseVolume volume = revoxelise(field, kVoxels);
+  RenderOptions shaded = options(30.0), levels = manyLevels();
+  shaded.shading = levels.shading = Shading{};
+  // A gradient near a flat spot turns with the rounding of its values.
+  expectClose(renderer(field)->draw(shaded), renderVolume(volume, shaded), 200);
+  expectClose(renderer(field)->draw(levels), renderVolume(volume, levels), 200);
+  expectClose(makeVolumeRenderer(volume, device_)->draw(shaded), renderVolume(volume, shaded), 200);
+}
+
 TEST_F(CellsOnGpu, HaveTheSameBitsOfAllLevels) {
   const Field field = manyBlobs();
   const auto drawn = renderer(field);
