@@ -14,6 +14,10 @@ void Log::detail(const std::string& message) const {
   if (verbosity_ == Verbosity::kVerbose) std::cerr << printable(message) << '\n';
 }
 
+void Log::error(const std::string& message) const {
+  std::cerr << program_ << ": " << printable(message) << '\n';
+}
+
 void Log::warning(const std::string& message) const {
   if (verbosity_ != Verbosity::kQuiet)
     std::cerr << program_ << ": warning: " << printable(message) << '\n';

@@ -16,6 +16,8 @@ class Log {
   void info(const std::string& message) const;
   /// Prints a message if --verbose was given.
   void detail(const std::string& message) const;
+  /// Prints an error after which the program continues, also with --quiet.
+  void error(const std::string& message) const;
   /// Prints a warning that something was not done as asked, unless --quiet was given.
   void warning(const std::string& message) const;
 
