@@ -103,17 +103,21 @@ std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<s
 
 void convert(const Options& options) {
   const cli::Interrupts interrupts;  // Ctrl-C lets a file that is being written be completed
-  const cli::Log log(kProgram, options.verbosity);
   checkFiles(options);
+  convertFile(options, interrupts.token(), cli::Log(kProgram, options.verbosity), std::cout);
+}
+
+void convertFile(const Options& options, const CancelToken& cancel, const cli::Log& log,
+                 std::ostream& out) {
   const EsvrFile file = read(options, log);
   const auto chosen = chooseGrids(options.input, file, options.grids);
   std::vector<ComparedGrid> compared;
   if (options.reference) compared = counterparts(file, chosen, options);
   const auto grids = decodeAll(file, chosen, options, log);
-  if (interrupts.token().cancelled()) throw Cancelled();
+  if (cancel.cancelled()) throw Cancelled();
   tellLostMetadata(file, grids, options, log);
   writeGrids(options.output, file.metadata, grids, options.write);
-  if (options.reference) printErrors(options, compared, std::cout);
+  if (options.reference) printErrors(options, compared, out);
 }
 
 }  // namespace esvr::esvr2vdb

@@ -22,6 +22,7 @@ cli::ProgramText programText() {
               "the file was made. --list lists the contents of a file, --check verifies a file.",
           .usage =
               "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
+              "  esvr2vdb IN.####.esvr OUT.####.vdb [--frames 10-20] ...\n"
               "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
               "  esvr2vdb --check IN.esvr",
           .notes =
@@ -32,11 +33,18 @@ cli::ProgramText programText() {
               "which was chosen when the file was made. In a level set, the voxels of the narrow\n"
               "band are active. A file made with --topology exact stores the active mask.\n"
               "\n"
+              "A pattern such as smoke.####.esvr stands for the files of a sequence. In it, #,\n"
+              "#### and %04d are four digits, and @ is as many as needed. Frames are converted at\n"
+              "the same time on the threads of --threads, as far as --max-memory allows. A frame\n"
+              "that fails is named, and does not stop the others (--on-error stop). Ctrl-C keeps\n"
+              "the frames that are complete.\n"
+              "\n"
               "--list counts bytes that several grids share for the first of them only. The table\n"
               "of sections names the grid with which a section is shared.\n"
               "\n"
               "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
-              "be used, 5 not enough memory (--max-memory).",
+              "be used, 5 not enough memory (--max-memory). A sequence has the code of its first\n"
+              "frame that failed.",
           .examples =
               "  esvr2vdb smoke.esvr smoke.vdb\n"
               "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   also print the errors\n"
@@ -77,6 +85,7 @@ cli::CommandLine commandLine() {
      "the reference's active voxels)")
     ("force,f", bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
+  cli::addSequenceOptions(line.options());
   cli::addHostMemory(line);
   return line;
 }
@@ -85,8 +94,8 @@ Job jobOf(const Arguments& a) {
   const bool list = a.get<bool>("list"), check = a.get<bool>("check");
   if (list && check) throw UsageError("--list and --check are two jobs; ask for one");
   if (!list && !check) return Job::kConvert;
-  for (const char* option :
-       {"output", "grid", "threshold", "lod", "max-ellipsoids", "bbox", "reference", "box"})
+  for (const char* option : {"output", "grid", "threshold", "lod", "max-ellipsoids", "bbox",
+                             "reference", "box", "frames", "missing", "on-error"})
     if (a.has(option))
       throw UsageError(std::string(list ? "--list" : "--check") + " takes IN only, no " + option);
   return list ? Job::kList : Job::kCheck;
@@ -131,6 +140,10 @@ void readConversion(const Arguments& a, Options& options) {
   options.reference = a.find<std::string>("reference");
   if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
   if (options.box && !options.reference) throw UsageError("--box says nothing without --reference");
+  options.sequence = cli::readSequence(a);
+  if (options.sequence && options.reference && !cli::FramePattern::in(options.reference->string()))
+    throw UsageError("--reference needs a pattern for the number of a frame, as '" +
+                     options.input.string() + "' has one");
 }
 
 }  // namespace

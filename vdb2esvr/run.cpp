@@ -20,15 +20,12 @@
 #include "vdb2esvr/progress_bar.h"
 #include "vdb2esvr/report.h"
 #include "vdb2esvr/run_record.h"
+#include "vdb2esvr/run_sequence.h"
 #include "vdb2esvr/summary.h"
 #include "vdb2esvr/twins.h"
 
 namespace esvr::vdb2esvr {
 namespace {
-
-bool reportIsFile(const Options& options) {
-  return !options.report.empty() && options.report != cli::kStandardOutput;
-}
 
 void checkFiles(const Options& options) {
   std::vector<std::filesystem::path> files{options.input, options.output};
@@ -223,19 +220,21 @@ std::vector<Device> devicesFor(const Options& options, const Ranks* ranks) {
   return {devices[std::size_t(ranks->rankOnHost()) % devices.size()]};
 }
 
-RunRecord convertFile(const Options& options, Ranks* ranks, const cli::Interrupts& interrupts,
+}  // namespace
+
+RunRecord convertFile(const Options& options, Ranks* ranks, const CancelToken& cancel,
                       const cli::Log& log) {
   cli::Stopwatch watch;
   RunRecord record;
   auto devices = std::async(std::launch::async, [&] { return devicesFor(options, ranks); });
   record.input = inspectVdb(options.input);
   GridChoice choice = chooseGrids(options.input, record.input, options.grids);
-  tellSkipped(choice.skipped, log);
+  if (!options.sequence) tellSkipped(choice.skipped, log);  // a sequence tells them once
   record.skipped = std::move(choice.skipped);
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
-  Parts parts(options, selected.front(), interrupts.token(), ranks);
-  FileConversion(options, selected, interrupts.token(), parts, log).run(choice.fitted, record);
+  Parts parts(options, selected.front(), cancel, ranks);
+  FileConversion(options, selected, cancel, parts, log).run(choice.fitted, record);
   for (const auto& grid : record.grids) tellGrid(grid, log);
   if (options.job == Job::kPart) {
     if (!ranks) tellPart(options, record, log);
@@ -247,10 +246,12 @@ RunRecord convertFile(const Options& options, Ranks* ranks, const cli::Interrupt
   return record;
 }
 
+namespace {
+
 /// Converts the file; if that fails, writes a report of the failure.
 RunRecord convertOrReport(const Options& options, Ranks* ranks, const cli::Interrupts& interrupts,
                           const cli::Log& log) try {
-  return convertFile(options, ranks, interrupts, log);
+  return convertFile(options, ranks, interrupts.token(), log);
 } catch (const Error& error) {
   if (!options.report.empty())
     cli::writeJson({options.report, options.overwrite}, makeFailureReport(options, error));
@@ -286,6 +287,9 @@ int runAs(const Options& options, Ranks* ranks) {
 
 }  // namespace
 
-int run(const Options& options, Ranks* ranks) { return runAs(optionsOf(options, ranks), ranks); }
+int run(const Options& options, Ranks* ranks) {
+  if (options.sequence) return runSequence(options, ranks);
+  return runAs(optionsOf(options, ranks), ranks);
+}
 
 }  // namespace esvr::vdb2esvr

@@ -1,5 +1,5 @@
 #pragma once
-/// Messages for people. They go to stderr, because stdout is for data.
+/// Messages for people. They go to stderr, because stdout is for data. Any thread may print them.
 
 #include <string>
 
