@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <iostream>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <sstream>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "cli/failure.h"
+#include "cli/frame_messages.h"
 #include "cli/frame_output.h"
 #include "cli/frame_workers.h"
 #include "cli/interrupts.h"
@@ -26,6 +28,7 @@ class SequenceDecoding {
       : options_(options),
         frames_(frames),
         cancel_(cancel),
+        holders_(cli::holdersOf(frames)),
         workers_(cli::frameWorkers(options.threads, frames)),
         gate_(options.memory.maxBytes),
         log_(kProgram, options.verbosity),
@@ -49,9 +52,9 @@ class SequenceDecoding {
   /// \return false if one of them failed
   bool decodeWithHolders(std::size_t source) {
     bool isWell = attempt(source, [&] { decode(source); });
-    for (std::size_t i = 0; i < frames_.size(); ++i)
-      if (frames_[i].holds == source && !cancel_.cancelled())
-        isWell = attempt(i, [&] { hold(source, i); }) && isWell;
+    const auto [begin, end] = holders_.equal_range(source);
+    for (auto at = begin; at != end && !cancel_.cancelled(); ++at)
+      isWell = attempt(at->second, [&] { hold(source, at->second); }) && isWell;
     return isWell;
   }
 
@@ -66,7 +69,7 @@ class SequenceDecoding {
       if (cancel_.cancelled()) return false;
       done_[i].failure = error;
       const std::lock_guard lock(mutex_);
-      log_.error("frame " + std::to_string(frames_[i].number) + ": " + error.what());
+      log_.error(cli::textOf(frames_[i]) + ": " + error.what());
     }
     return !done_[i].failure;
   }
@@ -92,7 +95,7 @@ class SequenceDecoding {
     if (own.reference)
       own.reference = cli::FramePattern::in(own.reference->string())->at(frame.number);
     const cli::FrameFolder folder(own.output);
-    const cli::Log log(kProgram + (": frame " + std::to_string(frame.number)), own.verbosity);
+    const cli::Log log(kProgram + (": " + cli::textOf(frame)), own.verbosity);
     std::ostringstream table;
     convertFile(own, cancel_, log, table);
     done_[i].table = table.str();
@@ -100,8 +103,7 @@ class SequenceDecoding {
 
   void hold(std::size_t source, std::size_t holder) {
     if (const auto& failure = done_[source].failure)
-      throw Error(failure->kind(),
-                  "frame " + std::to_string(frames_[source].number) + ", which it holds, failed");
+      throw cli::failureToHold(frames_[source], *failure);
     cli::copyOutput(frames_[source].output, frames_[holder].output, options_.write.overwrite);
   }
 
@@ -122,14 +124,13 @@ class SequenceDecoding {
     std::ranges::sort(failed);
     const auto first =
         std::ranges::find_if(done_, [](const Done& done) { return done.failure.has_value(); });
-    throw Error(first->failure->kind(), std::to_string(failed.size()) + " of " +
-                                            std::to_string(frames_.size()) +
-                                            " frames failed: " + cli::textOfFrames(failed));
+    throw Error(first->failure->kind(), cli::sentenceOn(failed, frames_.size(), "failed"));
   }
 
   const Options& options_;
   const std::vector<cli::Frame>& frames_;
   const CancelToken& cancel_;
+  const std::multimap<std::size_t, std::size_t> holders_;
   const int workers_;
   cli::MemoryGate gate_;
   std::mutex mutex_;  ///< of the log

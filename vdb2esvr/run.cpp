@@ -65,12 +65,6 @@ void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
              cli::shortNumber(grid.metrics.iou));
 }
 
-/// False if the options exclude ellipsoids, so that no device is needed.
-bool mayFit(const Options& options) {
-  return !std::holds_alternative<LosslessGoal>(options.convert.goal) &&
-         options.convert.representation != Representation::kVoxels;
-}
-
 /// Converts one grid after the other until all are done or the run is interrupted. Grids with the
 /// same voxels are converted once.
 class FileConversion {
@@ -221,6 +215,11 @@ std::vector<Device> devicesFor(const Options& options, const Ranks* ranks) {
 }
 
 }  // namespace
+
+bool mayFit(const Options& options) {
+  return !std::holds_alternative<LosslessGoal>(options.convert.goal) &&
+         options.convert.representation != Representation::kVoxels;
+}
 
 RunRecord convertFile(const Options& options, Ranks* ranks, const CancelToken& cancel,
                       const cli::Log& log) {

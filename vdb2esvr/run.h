@@ -9,6 +9,9 @@
 
 namespace esvr::vdb2esvr {
 
+/// False if the options exclude ellipsoids, so that no device is needed.
+[[nodiscard]] bool mayFit(const Options& options);
+
 /// Reads, fits and measures the grids of a file, and writes the output.
 /// \param ranks  the processes that fit the parts together; may be null
 /// \throws Error  any error of its parts; RuntimeFailure if it was cancelled and writes no file

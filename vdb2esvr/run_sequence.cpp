@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "cli/failure.h"
+#include "cli/frame_messages.h"
 #include "cli/frame_output.h"
 #include "cli/frame_workers.h"
 #include "cli/interrupts.h"
@@ -54,15 +55,14 @@ class SequenceConversion {
         frames_(frames),
         cancel_(cancel),
         devices_(selectDevices(options.device)),
+        holders_(cli::holdersOf(frames)),
         gate_(options.read.maxBytes),
         bar_(options.input.string(), options.progress, options.verbosity),
         log_(kProgram, options.verbosity) {
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      const cli::Frame& frame = frames[i];
+    for (const cli::Frame& frame : frames) {
       const bool isLeftOut = frame.missing && !frame.holds;
       record_.frames.push_back(
           {.frame = frame, .state = isLeftOut ? FrameState::kMissing : FrameState::kNotBegun});
-      if (frame.holds) holders_.emplace(*frame.holds, i);
       if (!isLeftOut) ++progress_.frames;
     }
   }
@@ -78,7 +78,7 @@ class SequenceConversion {
  private:
   /// A GPU converts one frame after the other, because a fit may take all of its memory.
   [[nodiscard]] int workers() const {
-    if (devices_.front().kind == DeviceKind::kCuda) return int(devices_.size());
+    if (mayFit(options_) && devices_.front().kind == DeviceKind::kCuda) return int(devices_.size());
     return cli::frameWorkers(options_.threads, frames_);
   }
 
@@ -119,8 +119,7 @@ class SequenceConversion {
     const Options own = optionsOf(record.frame, worker);
     const auto memory = gate_.take(conversionMemory(inspectVdb(own.input)));
     const cli::FrameFolder folder(own.output);
-    const cli::Log log(kProgram + (": frame " + std::to_string(record.frame.number)),
-                       verbosityOfFrames(options_));
+    const cli::Log log(kProgram + (": " + cli::textOf(record.frame)), verbosityOfFrames(options_));
     const RunRecord run = convertFile(own, nullptr, cancel_, log);
     takeFigures(run, record);
     record.state = run.interrupted ? FrameState::kInterrupted : FrameState::kConverted;
@@ -129,9 +128,7 @@ class SequenceConversion {
   }
 
   void hold(const FrameRecord& source, FrameRecord& holder) {
-    if (source.failure)
-      throw Error(source.failure->kind(),
-                  "frame " + std::to_string(source.frame.number) + ", which it holds, failed");
+    if (source.failure) throw cli::failureToHold(source.frame, *source.failure);
     if (keep(holder)) return;
     cli::copyOutput(source.frame.output, holder.frame.output, options_.overwrite);
     holder.bytesOut = source.bytesOut;
@@ -150,7 +147,8 @@ class SequenceConversion {
   [[nodiscard]] Options optionsOf(const cli::Frame& frame, int worker) const {
     Options own = options_;
     own.input = frame.input, own.output = frame.output;
-    if (devices_.size() > 1) own.device = deviceOption(devices_[std::size_t(worker)]);
+    if (devices_.size() > 1)
+      own.device = deviceOption(devices_[std::size_t(worker) % devices_.size()]);
     own.progress = ProgressForm::kText;
     own.verbosity = cli::Verbosity::kQuiet;
     return own;
@@ -162,7 +160,7 @@ class SequenceConversion {
     if (record.state == FrameState::kFailed) {
       ++progress_.failed;
       bar_.hide();
-      log_.error("frame " + std::to_string(record.frame.number) + ": " + record.failure->what());
+      log_.error(cli::textOf(record.frame) + ": " + record.failure->what());
     }
     progress_.frame = record.frame.number;
     progress_.state = nameOf(record.state);
@@ -179,7 +177,7 @@ class SequenceConversion {
   const std::vector<cli::Frame>& frames_;
   const CancelToken& cancel_;
   const std::vector<Device> devices_;
-  std::multimap<std::size_t, std::size_t> holders_;  ///< frames that hold a frame, by its index
+  const std::multimap<std::size_t, std::size_t> holders_;
   cli::MemoryGate gate_;
   SequenceRecord record_;
   std::mutex mutex_;  ///< of the members below

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "cli/frame_messages.h"
+
 namespace esvr::vdb2esvr {
 namespace {
 
@@ -22,13 +24,6 @@ void widen(const FrameGrid& grid, GridRange& range) {
   range.highestActive = first ? grid.psnrActive : std::max(range.highestActive, grid.psnrActive);
   range.lowestBox = first ? grid.psnrBox : std::min(range.lowestBox, grid.psnrBox);
   range.highestBox = first ? grid.psnrBox : std::max(range.highestBox, grid.psnrBox);
-}
-
-/// "3 of 100 frames WHAT: 7, 9, 12".
-std::string sentence(const SequenceRecord& record, const std::string& what,
-                     const std::vector<cli::FrameNumber>& numbers) {
-  return std::to_string(numbers.size()) + " of " + std::to_string(record.frames.size()) +
-         " frames " + what + ": " + cli::textOfFrames(numbers);
 }
 
 Error interruption(const SequenceRecord& record) {
@@ -90,14 +85,14 @@ std::optional<Error> whatIsAmiss(const SequenceRecord& record) {
   if (record.interrupted) return interruption(record);
   const auto failed = std::ranges::find(record.frames, FrameState::kFailed, &FrameRecord::state);
   if (failed != record.frames.end())
-    return Error(failed->failure->kind(),
-                 sentence(record, "failed", framesIn(FrameState::kFailed, record)));
+    return Error(failed->failure->kind(), cli::sentenceOn(framesIn(FrameState::kFailed, record),
+                                                          record.frames.size(), "failed"));
   std::vector<cli::FrameNumber> missed;
   for (const FrameRecord& frame : record.frames)
     if (frame.missedPsnr) missed.push_back(frame.frame.number);
   if (missed.empty()) return std::nullopt;
   std::ranges::sort(missed);
-  return TargetMissed(sentence(record, "did not reach the PSNR", missed));
+  return TargetMissed(cli::sentenceOn(missed, record.frames.size(), "did not reach the PSNR"));
 }
 
 }  // namespace esvr::vdb2esvr

@@ -40,7 +40,7 @@ std::vector<std::string> rowOf(const SequenceRecord& record, const FrameRecord& 
 }
 
 /// "40.01 to 40.04 dB", or "exact".
-std::string toText(const GridRange& range) {
+std::string rangeText(const GridRange& range) {
   const std::string low = cli::decibels(range.lowestActive);
   const std::string high = cli::decibels(range.highestActive);
   if (std::isinf(range.lowestActive)) return low;
@@ -49,7 +49,7 @@ std::string toText(const GridRange& range) {
 
 void printRanges(const SequenceRecord& record, std::ostream& out) {
   for (const GridRange& range : gridRanges(record))
-    out << cli::printable(range.name) << ": " << toText(range) << " over the active voxels of "
+    out << cli::printable(range.name) << ": " << rangeText(range) << " over the active voxels of "
         << range.frames << (range.frames == 1 ? " frame\n" : " frames\n");
 }
 

@@ -38,8 +38,6 @@ std::string withPattern(const fs::path& path, const std::string& pattern) {
 }
 
 FramePattern outputPattern(const Arguments& arguments, const FramePattern& input) {
-  if (!arguments.has("output"))
-    throw UsageError("missing argument for the output of " + input.text());
   const auto& text = arguments.get<std::string>("output");
   const auto output = FramePattern::in(text);
   if (output) return *output;
@@ -163,6 +161,13 @@ std::vector<Frame> planFrames(const Sequence& sequence) {
   }
   treatMissing(sequence, frames);
   return frames;
+}
+
+std::multimap<std::size_t, std::size_t> holdersOf(const std::vector<Frame>& frames) {
+  std::multimap<std::size_t, std::size_t> holders;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (frames[i].holds) holders.emplace(*frames[i].holds, i);
+  return holders;
 }
 
 void checkFrameOutputs(const Sequence& sequence, const std::vector<Frame>& frames,

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <initializer_list>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -36,7 +37,7 @@ struct Sequence {
 /// Adds the options.
 void addSequenceOptions(po::options_description& options);
 
-/// Reads the options and the arguments `input` and `output`. An input that exists under its very
+/// Reads the options and the arguments `input` and `output`, which were given. An input that exists under its very
 /// name is a file, even if the name has a pattern.
 /// \return nothing if the input is a file
 /// \throws UsageError  the output has no pattern, although the input has one; one of the options is
@@ -46,7 +47,7 @@ void addSequenceOptions(po::options_description& options);
 /// A frame of a sequence.
 struct Frame {
   FrameNumber number = 0;
-  std::filesystem::path input, output;
+  std::filesystem::path input{}, output{};
   bool missing = false;
   std::optional<std::size_t> holds{};  ///< index of the frame whose output this missing one repeats
 };
@@ -55,6 +56,9 @@ struct Frame {
 /// \throws BadInput  no frame exists; or frames are missing, and MissingFrame::kError is wanted, or
 ///                   there is no frame to hold. The text names them
 [[nodiscard]] std::vector<Frame> planFrames(const Sequence& sequence);
+
+/// The frames that hold a frame, by the index of that frame.
+[[nodiscard]] std::multimap<std::size_t, std::size_t> holdersOf(const std::vector<Frame>& frames);
 
 struct FrameOutputRules {
   std::initializer_list<std::string_view> extensions;  ///< those that an output may have
