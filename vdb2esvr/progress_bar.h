@@ -1,5 +1,6 @@
 #pragma once
-/// Shows how far a fit or a sequence is: a bar on a terminal, lines in a log, or lines of JSON for programs.
+/// Shows how far a fit or a sequence is: a bar on a terminal, lines in a log, or lines of JSON for
+/// programs.
 
 #include <chrono>
 #include <string>

@@ -37,8 +37,8 @@ struct Sequence {
 /// Adds the options.
 void addSequenceOptions(po::options_description& options);
 
-/// Reads the options and the arguments `input` and `output`, which were given. An input that exists under its very
-/// name is a file, even if the name has a pattern.
+/// Reads the options and the arguments `input` and `output`, which were given. An input that exists
+/// under its very name is a file, even if the name has a pattern.
 /// \return nothing if the input is a file
 /// \throws UsageError  the output has no pattern, although the input has one; one of the options is
 ///                     invalid, or was given for a file

@@ -8,8 +8,8 @@
 namespace esvr::convert {
 
 /// See PresetGoal.
-/// \param fit  the conversion of a FitGoal, for volumes that are too large for a search, unless the goal is
-///             steady
+/// \param fit  the conversion of a FitGoal, for volumes that are too large for a search, unless the
+///             goal is steady
 [[nodiscard]] Conversion convertToPreset(const Job& job, const PresetGoal& goal,
                                          const std::function<Conversion()>& fit);
 
