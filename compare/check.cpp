@@ -14,6 +14,7 @@
 #include "compare/grid_file.h"
 #include "compare/limits.h"
 #include "compare/program.h"
+#include "compare/unfitted.h"
 #include "esvr/error.h"
 
 namespace esvr::compare {
@@ -47,23 +48,21 @@ std::optional<std::size_t> counterpart(const GridFile& file, const std::string& 
   return std::size_t(it - grids.begin());
 }
 
-/// Pairs all grids of the reference that can be compared; the others are recorded as skipped.
-std::vector<Pair> pairAll(const GridFile& reference, const GridFile& candidate,
-                          CheckRecord& record) {
+/// Pairs all grids of the reference, and records the grids that only the candidate has.
+std::vector<Pair> pairAll(const CheckOptions& options, const GridFile& reference,
+                          const GridFile& candidate, CheckRecord& record) {
   std::vector<Pair> pairs;
-  for (std::size_t g = 0; g < reference.grids().size(); ++g) {
-    const ListedGrid& grid = reference.grids()[g];
-    if (!grid.comparable)
-      record.skipped.push_back("grid \"" + grid.uniqueName + "\": its values are of type " +
-                               grid.valueType);
-    else if (grid.empty)
-      record.skipped.push_back("grid \"" + grid.uniqueName +
-                               "\": the reference has no active voxel there");
-    else
+  const auto isIgnored = [&](const ListedGrid& grid) {
+    return options.ignored.contains(grid.uniqueName);
+  };
+  for (std::size_t g = 0; g < reference.grids().size(); ++g)
+    if (const ListedGrid& grid = reference.grids()[g]; !isIgnored(grid))
       pairs.push_back({g, counterpart(candidate, grid.uniqueName)});
-  }
   for (const auto& grid : candidate.grids())
-    if (!counterpart(reference, grid.uniqueName)) record.extra.push_back(grid.uniqueName);
+    if (!isIgnored(grid) && !counterpart(reference, grid.uniqueName)) {
+      record.extra.push_back(grid.uniqueName);
+      record.failures.push_back("grid \"" + grid.uniqueName + "\" is not in the reference");
+    }
   return pairs;
 }
 
@@ -77,7 +76,7 @@ Pair pairNamed(const GridFile& reference, const GridFile& candidate, const std::
 
 std::vector<Pair> choosePairs(const CheckOptions& options, const GridFile& reference,
                               const GridFile& candidate, CheckRecord& record) {
-  if (options.grids.empty()) return pairAll(reference, candidate, record);
+  if (options.grids.empty()) return pairAll(options, reference, candidate, record);
   std::vector<Pair> pairs;
   for (const auto& wanted : options.grids) pairs.push_back(pairNamed(reference, candidate, wanted));
   return pairs;
@@ -91,15 +90,19 @@ std::string joinedNames(const GridFile& file) {
 }
 
 void requirePairs(const std::vector<Pair>& pairs, const GridFile& reference,
-                  const GridFile& candidate, const CheckRecord& record) {
-  if (pairs.empty()) {
-    std::string text = reference.path().string() + ": no grid can be compared";
-    for (const auto& line : record.skipped) text += "\n  " + line;
-    throw BadInput(text);
-  }
+                  const GridFile& candidate) {
+  if (pairs.empty()) throw BadInput(reference.path().string() + ": no grid can be compared");
   if (std::none_of(pairs.begin(), pairs.end(), [](const Pair& p) { return p.candidate; }))
     throw BadInput("no grid of " + reference.path().string() + " (" + joinedNames(reference) +
                    ") is in " + candidate.path().string() + " (" + joinedNames(candidate) + ")");
+}
+
+/// \throws BadInput  nothing could be compared
+void requireResults(const GridFile& reference, const CheckRecord& record) {
+  if (!record.grids.empty() || !record.same.empty() || !record.failures.empty()) return;
+  std::string text = reference.path().string() + ": no grid can be compared";
+  for (const auto& line : record.skipped) text += "\n  " + line;
+  throw BadInput(text);
 }
 
 bool disjoint(const Box& a, const Box& b) {
@@ -123,7 +126,13 @@ class Comparison {
                                 candidate_.path().string());
       return;
     }
-    record.grids.push_back(compare(pair, listed.uniqueName, record));
+    const GridPair both{reference_, pair.reference, candidate_, *pair.candidate};
+    if (isRetyped(both))
+      record.failures.push_back(retypedText(both));
+    else if (!listed.comparable || (listed.empty && options_.grids.empty()))
+      compareUnfitted(options_, both, record);
+    else
+      record.grids.push_back(compare(pair, listed.uniqueName, record));
   }
   [[nodiscard]] const std::vector<double>& ranges() const { return ranges_; }
 
@@ -189,7 +198,7 @@ void check(const CheckOptions& options) {
   CheckRecord record;
   record.candidateBytes = candidate.bytes();
   const auto pairs = choosePairs(options, reference, candidate, record);
-  requirePairs(pairs, reference, candidate, record);
+  requirePairs(pairs, reference, candidate);
   record.fileDifferences = compareMetadata(reference.metadata(), candidate.metadata(),
                                            std::array<std::string, 1>{kWriterKey});
   Comparison comparison(options, reference, candidate);
@@ -197,6 +206,7 @@ void check(const CheckOptions& options) {
     if (interrupts.token().cancelled()) throw Cancelled();
     comparison.run(pair, record);
   }
+  requireResults(reference, record);
   judgeLimits(options, comparison.ranges(), record);
   judgeDifferences(options, record);
   if (options.baseline && !options.update) judgeBaseline(*options.baseline, record);

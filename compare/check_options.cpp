@@ -31,8 +31,10 @@ cli::ProgramText programText() {
           "bytes of files, because the bytes of a .vdb file differ whenever it is written. Voxels\n"
           "are compared in index space. Different transforms, names, classes, value types,\n"
           "backgrounds and metadata are listed, and the check fails if --fail-on names them. It\n"
-          "always fails if CAND does not have a grid, or if the bounding boxes of the active\n"
-          "voxels of the two grids do not intersect.\n"
+          "always fails if only one of the files has a grid, if a grid has become one of another\n"
+          "type, or if the bounding boxes of the active voxels of the two grids do not intersect.\n"
+          "Grids that are not of floats or doubles are compared bit for bit. --ignore-grids\n"
+          "excludes a grid from all of this.\n"
           "\n"
           "A baseline holds figures and their tolerances. --update writes the figures of this\n"
           "run and keeps the tolerances of the file.\n"
@@ -54,6 +56,10 @@ cli::CommandLine makeCommandLine() {
   options.add_options()(
       "grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
       "compare this grid only; may be repeated; NAME=OTHER if its name in CAND is OTHER");
+  options.add_options()(
+      "ignore-grids", value<std::vector<std::string>>()->value_name("NAME")->composing(),
+      "do not compare this grid: it may be missing in either file, or be of another type; may be "
+      "repeated");
   for (const Figure& figure : allFigures())
     options.add_options()(figure.option, value<std::string>()->value_name("X"), figure.unit);
   // clang-format off
@@ -123,6 +129,8 @@ std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv)
   options.reference = a.get<std::string>("reference");
   options.candidate = a.get<std::string>("candidate");
   options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
+  if (const auto names = a.find<std::vector<std::string>>("ignore-grids"))
+    options.ignored = {names->begin(), names->end()};
   readLimits(a, options);
   options.baseline = a.find<std::string>("baseline");
   options.update = a.get<bool>("update");

@@ -21,6 +21,8 @@ namespace esvr::compare {
 struct CheckOptions {
   std::filesystem::path reference, candidate;
   std::vector<std::string> grids;  ///< NAME or NAME=NAME IN CAND; empty: all
+  /// Grids that are not compared, and that only one of the files may have.
+  std::set<std::string> ignored;
   std::array<std::optional<cli::ErrorBound>, kFigureCount> limits;
   std::optional<std::uint64_t> maxBytes;
   std::set<DifferenceKind> failOn;

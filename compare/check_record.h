@@ -22,6 +22,8 @@ struct CheckRecord {
   std::uint64_t candidateBytes = 0;
   std::vector<CheckedGrid> grids;
   std::vector<Difference> fileDifferences;
+  /// Grids without figures that are the same in both files, one line each.
+  std::vector<std::string> same;
   std::vector<std::string> skipped;   ///< grids that cannot be compared, with the reason
   std::vector<std::string> extra;     ///< grids of the candidate that the reference does not have
   std::vector<std::string> failures;  ///< one line for each failure

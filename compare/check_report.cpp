@@ -25,6 +25,7 @@ std::vector<Figure> columns(const CheckRecord& record) {
 }
 
 void printFigures(const CheckRecord& record, std::ostream& out) {
+  if (record.grids.empty()) return;
   const auto shown = columns(record);
   std::vector<std::string> header{"grid"};
   for (const Figure& figure : shown) header.push_back(figure.header);
@@ -95,6 +96,7 @@ void printCheck(const CheckRecord& record, std::ostream& out) {
     printLines(out, "grid \"" + grid.name + "\": ", grid.differences);
   for (const auto& name : record.extra)
     out << cli::printable("grid \"" + name + "\" is not in the reference") << '\n';
+  printLines(out, "", record.same);
   printLines(out, "skipped ", record.skipped);
   printLines(out, "", record.notes);
 }
@@ -111,6 +113,7 @@ Json checkReport(const CheckOptions& options, const CheckRecord& record) {
           {"grids", std::move(grids)},
           {"file_differences", toJson(record.fileDifferences)},
           {"extra", record.extra},
+          {"same", record.same},
           {"skipped", record.skipped},
           {"failures", record.failures},
           {"notes", record.notes}};

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct ListedGrid {
   bool comparable = true;    ///< true if the values are floats or doubles
   bool empty = false;        ///< true if there is no active voxel
   std::string valueType;
+  GridOfFile ofEsvr{};  ///< place in the content of an .esvr file
 };
 
 /// An .esvr file is recognised by its extension, a .vdb or .nvdb file by its first bytes.
@@ -40,6 +42,9 @@ class GridFile {
   [[nodiscard]] std::size_t find(const std::string& name) const;
   /// Index of the first comparable grid with an active voxel. \throws BadInput  there is none
   [[nodiscard]] std::size_t firstWithVoxels() const;
+  /// A grid as the bytes that OpenVDB wrote; nothing if the file does not have them, because the
+  /// grid was fitted or the file is a .nvdb. \throws BadInput, MemoryExceeded  as for readCarried
+  [[nodiscard]] std::optional<CarriedGrid> bytesOf(std::size_t grid) const;
   /// The voxels of a grid, which may be empty.
   /// \throws BadInput  the values are not floats or doubles; else as for readGrid
   [[nodiscard]] VolumeGrid read(std::size_t grid) const;
@@ -52,6 +57,7 @@ class GridFile {
   cli::HostMemory memory_;
   std::uint64_t bytes_ = 0;
   std::vector<ListedGrid> grids_;
+  std::vector<std::string> whyNoBytes_;  ///< of a .vdb or .nvdb file: reasons why bytesOf has none
   std::vector<MetaItem> metadata_;
   std::unique_ptr<EsvrFile> esvr_;
 };

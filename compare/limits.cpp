@@ -39,9 +39,6 @@ void judgeDifferences(const CheckOptions& options, CheckRecord& record) {
   };
   judge("file ", record.fileDifferences);
   for (const auto& grid : record.grids) judge("grid \"" + grid.name + "\": ", grid.differences);
-  if (!options.failOn.contains(DifferenceKind::kName)) return;
-  for (const auto& name : record.extra)
-    record.failures.push_back("grid \"" + name + "\" is not in the reference");
 }
 
 }  // namespace esvr::compare

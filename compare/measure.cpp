@@ -68,17 +68,18 @@ std::vector<SearchStep> searchOf(const Match& match) {
   return steps;
 }
 
-StoredGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::string& name) {
-  std::vector<std::string> names;
-  for (const auto& grid : file.grids) names.push_back(grid.descriptor.name);
-  const std::size_t place = names.size() == 1 ? 0 : findGrid(names, name, path);
-  return std::move(file.grids[place]);
+/// Index in EsvrFile::grids of the grid that has the reference's name; if only one grid of a file
+/// is not carried, it is taken.
+std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
+                    const std::string& name) {
+  if (file.grids.size() == 1) return 0;
+  const auto [isCarried, index] = gridsInOrder(file)[findGrid(namesInOrder(file), name, path)];
+  if (isCarried) throw BadInput(path.string() + ": grid \"" + name + "\" is carried unchanged");
+  return index;
 }
 
-/// Index of the grid of an .esvr file that has the reference's name; the only grid of a file is
-/// always taken.
-std::size_t placeOf(const GridFile& file, const std::string& name) {
-  return file.grids().size() == 1 ? 0 : file.find(name);
+StoredGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::string& name) {
+  return std::move(file.grids[placeOf(file, path, name)]);
 }
 
 void requireOverlap(const std::filesystem::path& path, const Box& a, const Box& b) {
@@ -249,7 +250,7 @@ TableRow RowMaker::candidate(const std::filesystem::path& path) {
   if (!file.esvr())
     throw BadInput(path.string() +
                    ": candidates must be .esvr files; --external takes other results");
-  const std::size_t place = placeOf(file, scene_.gridName);
+  const std::size_t place = placeOf(*file.esvr(), path, scene_.gridName);
   row.bytes = bytesOf(file, path, place);
   row.command = command(shellWord(path.string()) + " --rows none");
   measureEsvr(path, row);

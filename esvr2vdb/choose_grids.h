@@ -9,15 +9,21 @@
 
 namespace esvr::esvr2vdb {
 
-/// The names that --grid takes, in file order: the name of the grid, with "[i]" if several grids
-/// have it.
-[[nodiscard]] std::vector<std::string> uniqueNames(const EsvrFile& file);
+/// A grid of a file and the name that --grid takes: the name of the grid, with "[i]" if several
+/// grids of the file have it.
+struct NamedGrid {
+  GridOfFile grid;
+  std::string name;
+};
 
-/// Indices of the named grids, increasing; of all grids if none is named.
+/// All grids in file order.
+[[nodiscard]] std::vector<NamedGrid> namedGrids(const EsvrFile& file);
+
+/// The named grids in file order; all grids if none is named.
 /// \param path  file name for error texts
 /// \throws BadInput  a grid does not exist; the text lists the grids
-[[nodiscard]] std::vector<std::size_t> chooseGrids(const std::filesystem::path& path,
-                                                   const EsvrFile& file,
-                                                   const std::vector<std::string>& names);
+[[nodiscard]] std::vector<NamedGrid> chooseGrids(const std::filesystem::path& path,
+                                                 const EsvrFile& file,
+                                                 const std::vector<std::string>& names);
 
 }  // namespace esvr::esvr2vdb

@@ -10,6 +10,7 @@
 #include "cli/failure.h"
 #include "cli/frame_messages.h"
 #include "cli/frame_output.h"
+#include "cli/frame_warnings.h"
 #include "cli/frame_workers.h"
 #include "cli/interrupts.h"
 #include "cli/memory_gate.h"
@@ -37,6 +38,7 @@ class SequenceDecoding {
   void run() {
     cli::forEachFrame({frames_, workers_, options_.sequence->onError, cancel_},
                       [&](const cli::FrameTask& task) { return decodeWithHolders(task.frame); });
+    warnings_.tell(log_);
     for (std::size_t i = 0; i < frames_.size(); ++i) printTable(i);
     throwWhatIsAmiss();
   }
@@ -95,7 +97,7 @@ class SequenceDecoding {
     if (own.reference)
       own.reference = cli::FramePattern::in(own.reference->string())->at(frame.number);
     const cli::FrameFolder folder(own.output);
-    const cli::Log log(kProgram + (": " + cli::textOf(frame)), own.verbosity);
+    const cli::Log log = warnings_.logOf(frame, kProgram, own.verbosity);
     std::ostringstream table;
     convertFile(own, cancel_, log, table);
     done_[i].table = table.str();
@@ -133,6 +135,7 @@ class SequenceDecoding {
   const std::multimap<std::size_t, std::size_t> holders_;
   const int workers_;
   cli::MemoryGate gate_;
+  cli::FrameWarnings warnings_;
   std::mutex mutex_;  ///< of the log
   const cli::Log log_;
   std::vector<Done> done_;

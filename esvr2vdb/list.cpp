@@ -6,6 +6,8 @@
 #include "cli/printable.h"
 #include "cli/table.h"
 #include "esvr/container.h"
+#include "esvr/error.h"
+#include "esvr/vdb_io.h"
 #include "esvr2vdb/choose_grids.h"
 #include "esvr2vdb/jobs.h"
 
@@ -21,9 +23,15 @@ std::string bytesPerEllipsoid(std::uint64_t bytes, std::size_t ellipsoids) {
 }
 
 struct Listing {
+  const Options& options;
   EsvrFile file;
   EsvrSummary summary;
-  std::vector<std::string> names;
+  std::vector<NamedGrid> grids;  ///< in file order
+
+  /// The number of a grid in the summary.
+  [[nodiscard]] std::size_t numberOf(const GridOfFile& grid) const {
+    return grid.index + (grid.isCarried ? file.grids.size() : 0);
+  }
 };
 
 const char* purposeOf(const Field& field) {
@@ -31,26 +39,57 @@ const char* purposeOf(const Field& field) {
   return field.fitFor == FitFor::kDrawing ? "drawing" : "voxels";
 }
 
+std::vector<std::string> rowOfStored(const Listing& listing, const NamedGrid& named) {
+  const StoredGrid& grid = listing.file.grids[named.grid.index];
+  const std::uint64_t bytes = cli::storedBytes(listing.summary, named.grid.index);
+  const std::size_t ellipsoids = grid.field.ellipsoidCount();
+  return {named.name,
+          cli::nameOf(grid.descriptor.gridClass),
+          cli::nameOf(grid.descriptor.valueType),
+          std::to_string(grid.activeVoxels),
+          std::to_string(ellipsoids),
+          purposeOf(grid.field),
+          textOf(grid.field.kernel),
+          cli::nameOf(grid.topology),
+          std::to_string(cli::ownBytes(listing.summary, named.grid.index)),
+          bytesPerEllipsoid(bytes, ellipsoids)};
+}
+
+/// \throws BadInput  the bytes are not those of a grid
+GridSummary summaryOf(const Options& options, const CarriedGrid& grid) try {
+  return inspectCarried(grid);
+} catch (const BadInput& error) {
+  throw BadInput(options.input.string() + ": " + error.what());
+}
+
+std::vector<std::string> rowOfCarried(const Listing& listing, const NamedGrid& named) {
+  const GridSummary grid = summaryOf(listing.options, listing.file.carried[named.grid.index]);
+  const std::size_t number = listing.numberOf(named.grid);
+  return {named.name,
+          cli::nameOf(grid.gridClass),
+          cli::valuesOf(grid),
+          cli::activeVoxelsOf(grid),
+          "carried",
+          "-",
+          "-",
+          "-",
+          std::to_string(cli::ownBytes(listing.summary, number)),
+          "-"};
+}
+
 void printGrids(const Listing& listing) {
   cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "fitted for",
                     "kernel, kappa", "active by", "bytes", "bytes each"});
-  for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
-    const StoredGrid& grid = listing.file.grids[g];
-    const std::uint64_t bytes = cli::storedBytes(listing.summary, g);
-    const std::uint64_t own = cli::ownBytes(listing.summary, g);
-    const std::size_t ellipsoids = grid.field.ellipsoidCount();
-    table.add({listing.names[g], cli::nameOf(grid.descriptor.gridClass),
-               cli::nameOf(grid.descriptor.valueType), std::to_string(grid.activeVoxels),
-               std::to_string(ellipsoids), purposeOf(grid.field), textOf(grid.field.kernel),
-               cli::nameOf(grid.topology), std::to_string(own),
-               bytesPerEllipsoid(bytes, ellipsoids)});
-  }
+  for (const NamedGrid& named : listing.grids)
+    table.add(named.grid.isCarried ? rowOfCarried(listing, named) : rowOfStored(listing, named));
   table.print(std::cout);
 }
 
 /// The name of a section's grid; "-" if it belongs to the file.
 std::string gridOf(const Listing& listing, const SectionSummary& section) {
-  return section.grid < listing.names.size() ? listing.names[section.grid] : "-";
+  for (const auto& [grid, name] : listing.grids)
+    if (listing.numberOf(grid) == section.grid) return name;
+  return "-";
 }
 
 void printSections(const Listing& listing) {
@@ -71,15 +110,16 @@ void addStream(cli::Table& table, const std::string& grid, const char* stream, s
 /// Prints the bytes of the quantised ellipsoids, by stream.
 void printStreams(const Listing& listing) {
   cli::Table table({"grid", "stream", "bytes", "bytes each"});
-  for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
-    const StoredGrid& grid = listing.file.grids[g];
+  for (const auto& [place, name] : listing.grids) {
+    if (place.isCarried) continue;
+    const StoredGrid& grid = listing.file.grids[place.index];
     if (grid.quantised.empty()) continue;
     const StreamBytes bytes = streamBytes(grid);
     const std::size_t ellipsoids = grid.field.ellipsoidCount();
-    addStream(table, listing.names[g], "positions", bytes.positions, ellipsoids);
-    addStream(table, listing.names[g], "scales", bytes.scales, ellipsoids);
-    addStream(table, listing.names[g], "rotations", bytes.rotations, ellipsoids);
-    addStream(table, listing.names[g], "intensities", bytes.intensities, ellipsoids);
+    addStream(table, name, "positions", bytes.positions, ellipsoids);
+    addStream(table, name, "scales", bytes.scales, ellipsoids);
+    addStream(table, name, "rotations", bytes.rotations, ellipsoids);
+    addStream(table, name, "intensities", bytes.intensities, ellipsoids);
   }
   table.print(std::cout);
 }
@@ -87,15 +127,16 @@ void printStreams(const Listing& listing) {
 /// Prints the error and the bytes of the first layers.
 void printLayers(const Listing& listing) {
   cli::Table table({"grid", "layers", "ellipsoids", "bytes", "PSNR box", "max error"});
-  for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
-    const auto& errors = listing.file.grids[g].layerErrors;
-    const auto sizes = layerSizes(listing.file.grids[g]);
+  for (const auto& [place, name] : listing.grids) {
+    if (place.isCarried) continue;
+    const auto& errors = listing.file.grids[place.index].layerErrors;
+    const auto sizes = layerSizes(listing.file.grids[place.index]);
     LayerSize sum;
     for (std::size_t k = 0; k < sizes.size(); ++k) {
       sum.ellipsoids += sizes[k].ellipsoids;
       sum.bytes += sizes[k].bytes;
       const bool known = k < errors.size();
-      table.add({listing.names[g], std::to_string(k + 1), std::to_string(sum.ellipsoids),
+      table.add({name, std::to_string(k + 1), std::to_string(sum.ellipsoids),
                  std::to_string(sum.bytes), known ? cli::decibels(errors[k].psnrBox) : "-",
                  known ? cli::shortNumber(errors[k].maxError) : "-"});
     }
@@ -103,18 +144,28 @@ void printLayers(const Listing& listing) {
   table.print(std::cout);
 }
 
+void printStoredDetails(const std::string& name, const StoredGrid& grid) {
+  std::cout << cli::printable(name) << ": " << cli::printable(grid.descriptor.transform.mapType)
+            << ", background " << cli::shortNumber(grid.descriptor.background) << ", values "
+            << cli::shortNumber(grid.valueMin) << " to " << cli::shortNumber(grid.valueMax)
+            << ", threshold " << cli::shortNumber(grid.activeThreshold) << ", active box "
+            << cli::textOf(grid.activeBox) << ", chunks " << grid.field.chunks.size() << '\n';
+  cli::printMetadata(name + " metadata", grid.descriptor.metadata, std::cout);
+}
+
+void printCarriedDetails(const Options& options, const std::string& name, const CarriedGrid& grid) {
+  std::cout << cli::printable(name) << ": carried unchanged, " << cli::printable(grid.treeType)
+            << ", " << grid.bytes.size() << " bytes of VDB format " << grid.vdbVersion
+            << ", active box " << cli::textOf(summaryOf(options, grid).activeBox) << '\n';
+}
+
 void printDetails(const Listing& listing) {
   cli::printMetadata("file metadata", listing.file.metadata, std::cout);
-  for (std::size_t g = 0; g < listing.file.grids.size(); ++g) {
-    const StoredGrid& grid = listing.file.grids[g];
-    const std::string name = cli::printable(listing.names[g]);
-    std::cout << name << ": " << cli::printable(grid.descriptor.transform.mapType)
-              << ", background " << cli::shortNumber(grid.descriptor.background) << ", values "
-              << cli::shortNumber(grid.valueMin) << " to " << cli::shortNumber(grid.valueMax)
-              << ", threshold " << cli::shortNumber(grid.activeThreshold) << ", active box "
-              << cli::textOf(grid.activeBox) << ", chunks " << grid.field.chunks.size() << '\n';
-    cli::printMetadata(listing.names[g] + " metadata", grid.descriptor.metadata, std::cout);
-  }
+  for (const auto& [grid, name] : listing.grids)
+    if (grid.isCarried)
+      printCarriedDetails(listing.options, name, listing.file.carried[grid.index]);
+    else
+      printStoredDetails(name, listing.file.grids[grid.index]);
 }
 
 }  // namespace
@@ -122,10 +173,11 @@ void printDetails(const Listing& listing) {
 void list(const Options& options) {
   const auto extension = options.input.extension();
   if (extension == ".vdb" || extension == ".nvdb") return listVdb(options);
-  Listing listing{readEsvr(options.input, {options.memory.maxBytes, options.memory.voxels}),
+  Listing listing{options,
+                  readEsvr(options.input, {options.memory.maxBytes, options.memory.voxels}),
                   inspectEsvr(options.input),
                   {}};
-  listing.names = uniqueNames(listing.file);
+  listing.grids = namedGrids(listing.file);
   std::cout << cli::printable(options.input.string()) << ": .esvr format "
             << listing.summary.versionMajor << '.' << listing.summary.versionMinor << ", "
             << listing.summary.fileBytes << " bytes\n\n";

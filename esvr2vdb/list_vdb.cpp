@@ -10,20 +10,11 @@
 namespace esvr::esvr2vdb {
 namespace {
 
-std::string typeOf(const GridSummary& grid) {
-  return grid.savedAsHalf ? grid.valueType + " as half" : grid.valueType;
-}
-
-/// The number of active voxels of a grid that is not read; known only if the writer stored it.
-std::string voxelsOf(const GridSummary& grid) {
-  return grid.isScalar || grid.activeVoxels > 0 ? std::to_string(grid.activeVoxels) : "-";
-}
-
 void printGrids(const VdbSummary& file) {
   cli::Table table({"grid", "class", "values", "active voxels", "bytes"});
   for (const auto& grid : file.grids)
-    table.add({grid.uniqueName, cli::nameOf(grid.gridClass), typeOf(grid), voxelsOf(grid),
-               std::to_string(grid.storedBytes)});
+    table.add({grid.uniqueName, cli::nameOf(grid.gridClass), cli::valuesOf(grid),
+               cli::activeVoxelsOf(grid), std::to_string(grid.storedBytes)});
   table.print(std::cout);
 }
 

@@ -15,43 +15,40 @@ using cli::po::bool_switch;
 using cli::po::value;
 
 cli::ProgramText programText() {
-  return {.name = kProgram,
-          .purpose =
-              "Converts an .esvr file back to VDB. Names, transforms, metadata and background\n"
-              "are exactly those of the source; voxels have the accuracy that was chosen when\n"
-              "the file was made. --list lists the contents of a file, --check verifies a file.",
-          .usage =
-              "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
-              "  esvr2vdb IN.####.esvr OUT.####.vdb [--frames 10-20] ...\n"
-              "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
-              "  esvr2vdb --check IN.esvr",
-          .notes =
-              "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of\n"
-              "the file and of its grids.\n"
-              "\n"
-              "A voxel is active where it differs from the background by more than a threshold,\n"
-              "which was chosen when the file was made. In a level set, the voxels of the narrow\n"
-              "band are active. A file made with --topology exact stores the active mask.\n"
-              "\n"
-              "A pattern such as smoke.####.esvr stands for the files of a sequence. In it, #,\n"
-              "#### and %04d are four digits, and @ is as many as needed. Frames are converted at\n"
-              "the same time on the threads of --threads, as far as --max-memory allows. A frame\n"
-              "that fails is named, and does not stop the others (--on-error stop). Ctrl-C keeps\n"
-              "the frames that are complete.\n"
-              "\n"
-              "--list counts bytes that several grids share for the first of them only. The table\n"
-              "of sections names the grid with which a section is shared.\n"
-              "\n"
-              "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
-              "be used, 5 not enough memory (--max-memory). A sequence has the code of its first\n"
-              "frame that failed.",
-          .examples =
-              "  esvr2vdb smoke.esvr smoke.vdb\n"
-              "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   also print the errors\n"
-              "  esvr2vdb smoke.esvr density.nvdb -g density\n"
-              "  esvr2vdb smoke.esvr coarse.vdb --lod 1               a preview\n"
-              "  esvr2vdb smoke.esvr part.vdb --bbox 0,0,0,63,63,63   a part of the voxels\n"
-              "  esvr2vdb --list smoke.vdb"};
+  return {
+      .name = kProgram,
+      .purpose =
+          "Converts an .esvr file back to VDB. Names, transforms, metadata and background\n"
+          "are exactly those of the source; voxels have the accuracy that was chosen when\n"
+          "the file was made. Grids that vdb2esvr carried unchanged come back bit for bit, and\n"
+          "all grids in their order. --list lists the contents of a file, --check verifies it.",
+      .usage =
+          "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
+          "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
+          "  esvr2vdb --check IN.esvr",
+      .notes =
+          "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of\n"
+          "the file and of its grids, and no carried grids. --lod, --max-ellipsoids and --bbox\n"
+          "do not write carried grids either, because they cannot be cut. A warning names each\n"
+          "grid that is left out, and naming such a grid with -g is an error.\n"
+          "\n"
+          "A voxel is active where it differs from the background by more than a threshold,\n"
+          "which was chosen when the file was made. In a level set, the voxels of the narrow\n"
+          "band are active. A file made with --topology exact stores the active mask.\n"
+          "\n"
+          "--list counts bytes that several grids share for the first of them only. The table\n"
+          "of sections names the grid with which a section is shared.\n"
+          "\n"
+          "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
+          "be used, 5 not enough memory (--max-memory). A sequence has the code of its first\n"
+          "frame that failed.",
+      .examples =
+          "  esvr2vdb smoke.esvr smoke.vdb\n"
+          "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   also print the errors\n"
+          "  esvr2vdb smoke.esvr density.nvdb -g density\n"
+          "  esvr2vdb smoke.esvr coarse.vdb --lod 1               a preview\n"
+          "  esvr2vdb smoke.esvr part.vdb --bbox 0,0,0,63,63,63   a part of the voxels\n"
+          "  esvr2vdb --list smoke.vdb"};
 }
 
 cli::CommandLine commandLine() {

@@ -10,6 +10,7 @@
 #include "cli/stopwatch.h"
 #include "cli/table.h"
 #include "esvr/image_metrics.h"
+#include "render/supersample.h"
 
 namespace esvr::render {
 namespace {
@@ -116,7 +117,8 @@ Json compared(const Benched& benched, const RenderOptions& options, int views) {
   for (int i = 0; i < count; ++i) {
     const RenderOptions view = viewOf(options, i, count);
     const ImageMetrics m =
-        compareImages(benched.reference->draw(view), benched.renderer.draw(view));
+        compareImages(drawSupersampled(*benched.reference, view, benched.referenceSamples),
+                      benched.renderer.draw(view));
     psnrs.push_back(m.psnr), ssims.push_back(m.ssim);
     maxError = std::max(maxError, m.maxError);
   }

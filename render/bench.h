@@ -10,7 +10,8 @@ namespace esvr::render {
 
 struct Benched {
   Renderer& renderer;
-  Renderer* reference;  ///< null if there is no --ref
+  Renderer* reference;   ///< null if there is no --ref
+  int referenceSamples;  ///< rays along the side of a pixel in the pictures that are compared with
 };
 
 /// Draws the pictures of a full turn, after a few that warm up and do not count. If there is a

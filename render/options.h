@@ -43,6 +43,7 @@ struct Options {
   std::optional<Between> between;          ///< default: what the ellipsoids were fitted for
   RenderMode mode = RenderMode::kComposite;
   Classification classification = Classification::kPreIntegrated;
+  LevelOfDetail lod = LevelOfDetail::kAuto;
   std::optional<PlaceBox> clip;
   int turntable = 0;             ///< number of pictures of a full turn; 0: one picture
   int firstFrame = 0;            ///< first picture of the turn to draw
@@ -54,6 +55,7 @@ struct Options {
   RendererLimits limits;
   std::optional<NanoValues> values;  ///< form of the NanoVDB grid that voxels are marched in
   std::filesystem::path reference;   ///< empty: none
+  int referenceSamples = 1;          ///< the reference is the mean of this number squared of rays
   std::filesystem::path sheet;       ///< empty: none
   bool bench = false;
   std::string report;  ///< empty: none

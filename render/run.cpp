@@ -21,6 +21,7 @@
 #include "render/output_files.h"
 #include "render/png_file.h"
 #include "render/scene.h"
+#include "render/supersample.h"
 #include "report/video_file.h"
 
 namespace esvr::render {
@@ -35,7 +36,9 @@ constexpr int kReportVersion = 1;
 /// With --ref there are also the reference's picture, the difference and, with --sheet, the sheet.
 void checkPictureSize(const Options& options) {
   constexpr double kBytesPerPixel = 48.0;
-  const double pictures = options.reference.empty() ? 1.0 : (options.sheet.empty() ? 3.0 : 6.0);
+  const double more = double(options.referenceSamples) * options.referenceSamples - 1.0;
+  const double pictures =
+      options.reference.empty() ? 1.0 : (options.sheet.empty() ? 3.0 : 6.0) + more;
   const Resolution r = options.resolution;
   requireWithinMemory(
       pictures * kBytesPerPixel * r.width * r.height, options.memory.maxBytes,
@@ -99,6 +102,7 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
   r.minTransmittance = options.minTransmittance.value_or(r.minTransmittance);
   r.mode = options.mode;
   r.classification = options.classification;
+  r.lod = options.lod;
   r.between = options.between.value_or(usualBetween(scene));
   r.clip = options.clip;
   return r;
@@ -212,7 +216,7 @@ class Frames {
 
   void compare(const RenderOptions& r, const Image& image, const PictureFiles& files) {
     constexpr double kGain = 10.0;  // gain of the difference; --help states it
-    const Image expected = reference_->renderer->draw(r);
+    const Image expected = drawSupersampled(*reference_->renderer, r, options_.referenceSamples);
     const ImageMetrics m = compareImages(expected, image);
     const Image error = errorMap(expected, image, kGain);
     write(errorName(files.picture), error, std::nullopt);
@@ -286,8 +290,9 @@ void run(const Options& options) {
   auto report = reportHead(options, settings.device);
   if (options.bench) {
     const cli::Log log(kProgram, options.verbosity);
-    report.update(bench({*drawing.renderer, reference ? &*reference->renderer : nullptr}, r,
-                        options.turntable, log));
+    report.update(bench(
+        {*drawing.renderer, reference ? &*reference->renderer : nullptr, options.referenceSamples},
+        r, options.turntable, log));
   } else {
     Frames frames(options, drawing, reference.get(), interrupts.token());
     drawFrames(options, r, pivotOf(drawing.scene.box, options.camera), frames);

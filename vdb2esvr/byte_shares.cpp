@@ -33,20 +33,31 @@ std::uint64_t usualBytes(const GridDescriptor& twin) {
   return bytesAdded(withDescriptor(std::move(grid), twin)) + kRows * kSectionRowBytes;
 }
 
+/// Bytes of all that a file holds besides its fitted grids.
+/// \throws UsageError  they leave nothing of `size`
+std::uint64_t bytesBesideFitted(const VdbSummary& input, const std::vector<CarriedGrid>& carried,
+                                std::uint64_t size) {
+  const std::uint64_t ofCarried = bytesOfCarried(carried);
+  const std::uint64_t bytes = bytesBesideGrids(input.metadata) + ofCarried;
+  if (bytes < size) return bytes;
+  std::string text = "the file takes " + std::to_string(bytes) + " bytes without any fitted grid";
+  if (ofCarried > 0)
+    text += " (grids that are carried unchanged take " + std::to_string(ofCarried) +
+            " of them; --skip leaves them out)";
+  throw UsageError(text + "; the size allows " + std::to_string(size));
+}
+
 /// Subtracts without passing 0.
 std::uint64_t less(std::uint64_t bytes, std::uint64_t by) { return bytes - std::min(bytes, by); }
 
 }  // namespace
 
 ByteShares::ByteShares(const Options& options, const VdbSummary& input,
-                       const std::vector<GridSummary>& grids, const Twins& twins)
+                       const std::vector<GridSummary>& grids, const Twins& twins,
+                       const std::vector<CarriedGrid>& carried)
     : left_(sizeOf(options, input)), shares_(grids.size()) {
   if (!left_) return;
-  const std::uint64_t fixed = bytesBesideGrids(input.metadata);
-  if (fixed >= *left_)
-    throw UsageError("the file takes " + std::to_string(fixed) +
-                     " bytes without any grid; the size allows " + std::to_string(*left_));
-  *left_ -= fixed;
+  *left_ -= bytesBesideFitted(input, carried, *left_);
   for (std::size_t g = 0; g < grids.size(); ++g) {
     if (const auto twin = twins.find(g); twin != twins.end())
       reserve(twin->second);

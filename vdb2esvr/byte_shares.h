@@ -16,8 +16,10 @@ namespace esvr::vdb2esvr {
 /// Twins of a grid have no share; the bytes of their records are reserved.
 class ByteShares {
  public:
+  /// \param carried  grids that the file holds unchanged
+  /// \throws UsageError  the size has no room for what the file holds besides the fitted grids
   ByteShares(const Options& options, const VdbSummary& input, const std::vector<GridSummary>& grids,
-             const Twins& twins);
+             const Twins& twins, const std::vector<CarriedGrid>& carried);
 
   /// Bytes for a grid without its twins; nothing if no size is wanted.
   [[nodiscard]] std::optional<std::uint64_t> of(std::size_t grid) const;

@@ -1,5 +1,6 @@
 #include "vdb2esvr/choose_grids.h"
 
+#include <algorithm>
 #include <set>
 
 #include "esvr/error.h"
@@ -8,39 +9,79 @@
 namespace esvr::vdb2esvr {
 namespace {
 
-GridChoice allThatCanBeFitted(const std::filesystem::path& file, const VdbSummary& summary) {
-  GridChoice choice;
-  for (const auto& grid : summary.grids)
-    (grid.skipReason.empty() ? choice.fitted : choice.skipped).push_back(grid);
-  if (!choice.fitted.empty()) return choice;
-  std::string text = file.string() + ": the file has no grid that can be fitted";
-  for (const auto& grid : choice.skipped)
-    text += "\n  grid \"" + grid.uniqueName + "\": " + grid.skipReason;
-  throw BadInput(text);
-}
+using Places = std::set<std::size_t>;  // a set, so that a grid that is named twice counts once
 
-GridChoice named(const std::filesystem::path& file, const VdbSummary& summary,
-                 const std::vector<std::string>& names) {
+Places placesOf(const std::filesystem::path& file, const VdbSummary& summary,
+                const std::vector<std::string>& names) {
   std::vector<std::string> stored;
   for (const auto& grid : summary.grids) stored.push_back(grid.name);
-  std::set<std::size_t> places;  // a set, so that a grid that is named twice is fitted once
+  Places places;
   for (const auto& name : names) places.insert(findGrid(stored, name, file));
-  GridChoice choice;
-  for (const std::size_t i : places) {
-    const GridSummary& grid = summary.grids[i];
-    if (!grid.skipReason.empty())
-      throw BadInput(file.string() + ": grid \"" + grid.uniqueName + "\": " + grid.skipReason);
-    choice.fitted.push_back(grid);
+  return places;
+}
+
+/// The named places in a file.
+struct WantedPlaces {
+  Places only, keep, skip;
+  bool all = false;  ///< whether no grid is named by --grid
+
+  [[nodiscard]] bool wants(std::size_t place) const {
+    return all || only.contains(place) || keep.contains(place);
   }
-  return choice;
+};
+
+WantedPlaces wantedPlaces(const std::filesystem::path& file, const VdbSummary& summary,
+                          const WantedGrids& wanted) {
+  WantedPlaces places{placesOf(file, summary, wanted.only), placesOf(file, summary, wanted.keep),
+                      placesOf(file, summary, wanted.skip), wanted.only.empty()};
+  for (const std::size_t place : places.skip)
+    if (places.only.contains(place) || places.keep.contains(place))
+      throw UsageError("--skip and " + std::string(places.only.contains(place) ? "-g" : "--keep") +
+                       " both name grid \"" + summary.grids[place].uniqueName + '"');
+  return places;
+}
+
+/// The reason why a grid is not fitted; empty if it is.
+std::string whyCarried(const GridSummary& grid, bool isKept) {
+  return isKept ? "--keep names it" : grid.skipReason;
+}
+
+void refuseLostGrids(const std::filesystem::path& file, const std::vector<NotFitted>& carried) {
+  std::string text;
+  for (const auto& [grid, place, why] : carried)
+    if (!grid.whyNotCarried.empty())
+      text += "\n  grid \"" + grid.uniqueName + "\" can be neither fitted (" + why +
+              ") nor carried (" + grid.whyNotCarried + ')';
+  if (!text.empty())
+    throw BadInput(file.string() + ": grids would be lost; --skip NAME leaves them out" + text);
+}
+
+void refuseNothing(const std::filesystem::path& file, const VdbSummary& summary,
+                   const GridChoice& choice) {
+  if (!choice.fitted.empty() || !choice.carried.empty()) return;
+  throw BadInput(file.string() + (summary.grids.empty() ? ": the file has no grid"
+                                                        : ": all grids of the file are left out"));
 }
 
 }  // namespace
 
 GridChoice chooseGrids(const std::filesystem::path& file, const VdbSummary& summary,
-                       const std::vector<std::string>& names) {
-  if (names.empty()) return allThatCanBeFitted(file, summary);
-  return named(file, summary, names);
+                       const WantedGrids& wanted) {
+  const WantedPlaces places = wantedPlaces(file, summary, wanted);
+  GridChoice choice;
+  for (std::size_t i = 0; i < summary.grids.size(); ++i) {
+    const GridSummary& grid = summary.grids[i];
+    const std::string why = whyCarried(grid, places.keep.contains(i));
+    if (places.skip.contains(i))
+      choice.skipped.push_back({grid, i, "--skip names it"});
+    else if (places.wants(i) && why.empty())
+      choice.fitted.push_back(grid);
+    else if (places.wants(i))
+      choice.carried.push_back({grid, i, why});
+  }
+  refuseLostGrids(file, choice.carried);
+  refuseNothing(file, summary, choice);
+  return choice;
 }
 
 }  // namespace esvr::vdb2esvr

@@ -1,5 +1,6 @@
 #pragma once
-/// Chooses the grids of a file that are fitted.
+/// Chooses the grids of a file that are fitted, those that are carried unchanged, and those that
+/// are left out.
 
 #include <string>
 #include <vector>
@@ -8,15 +9,29 @@
 
 namespace esvr::vdb2esvr {
 
-struct GridChoice {
-  std::vector<GridSummary> fitted;   ///< grids in file order
-  std::vector<GridSummary> skipped;  ///< grids that cannot be fitted; empty if grids were named
+/// Names of grids in the options --grid, --keep and --skip.
+struct WantedGrids {
+  std::vector<std::string> only;  ///< empty: all grids
+  std::vector<std::string> keep;  ///< carried unchanged, even if they could be fitted
+  std::vector<std::string> skip;  ///< left out
 };
 
-/// \param names  names for --grid; empty: all grids
-/// \throws BadInput  a named grid does not exist (the text lists the grids) or cannot be fitted; or
-///                   no grid of the file can be fitted
+/// A grid that is not fitted, and the reason.
+struct NotFitted {
+  GridSummary grid;
+  std::size_t place = 0;  ///< index of the grid in VdbSummary::grids
+  std::string why;
+};
+
+struct GridChoice {
+  std::vector<GridSummary> fitted;  ///< grids in file order
+  std::vector<NotFitted> carried, skipped;
+};
+
+/// \throws BadInput  a named grid does not exist (the text lists the grids); a grid can be neither
+///                   fitted nor carried; or no grid is left
+/// \throws UsageError  a grid is named by --skip and by another option
 [[nodiscard]] GridChoice chooseGrids(const std::filesystem::path& file, const VdbSummary& summary,
-                                     const std::vector<std::string>& names);
+                                     const WantedGrids& wanted);
 
 }  // namespace esvr::vdb2esvr

@@ -24,13 +24,13 @@ double mostBricks(const VdbSummary& file, const GridSummary& grid) {
 
 }  // namespace
 
-std::uint64_t conversionMemory(const VdbSummary& file) {
-  double bricks = 0.0;
-  for (const GridSummary& grid : file.grids)
-    if (grid.skipReason.empty()) bricks = std::max(bricks, mostBricks(file, grid));
+std::uint64_t conversionMemory(const VdbSummary& file, const GridChoice& grids) {
+  double bricks = 0.0, carried = 0.0;
+  for (const GridSummary& grid : grids.fitted) bricks = std::max(bricks, mostBricks(file, grid));
+  for (const NotFitted& left : grids.carried) carried += double(left.grid.storedBytes);
   // A damaged file may claim any number of voxels.
   constexpr double kMost = 1e18;
-  return std::uint64_t(std::min(bricks * kBytesPerBrick, kMost));
+  return std::uint64_t(std::min(bricks * kBytesPerBrick + carried, kMost));
 }
 
 }  // namespace esvr::vdb2esvr

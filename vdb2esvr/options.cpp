@@ -42,8 +42,15 @@ cli::ProgramText programText() {
           "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]\n"
           "  vdb2esvr IN.####.vdb OUT.####.esvr [--frames 1-100x2] ...",
       .notes =
-          "Without -g, all float and double grids are converted; other grids are listed and\n"
-          "skipped. Without a goal, each grid gets the quality of --preset in as few bytes as\n"
+          "Without -g, all grids are converted. Grids that are not fitted come back bit for bit:\n"
+          "those that are not of floats or doubles (vectors, integers, masks, strings, points),\n"
+          "those without an active voxel, and those that --keep names are carried in the file as\n"
+          "the bytes that OpenVDB wrote. --skip leaves grids out, and the summary says what was\n"
+          "fitted, carried and left out. A grid of a .nvdb file cannot be carried; a file with "
+          "one\n"
+          "that cannot be fitted either is refused, unless --skip names it. --size and --ratio\n"
+          "count the bytes of carried grids.\n"
+          "Without a goal, each grid gets the quality of --preset in as few bytes as\n"
           "were found; a grid of more than 33 million voxels in bricks gets a single fit instead.\n"
           "--size and --ratio search for the best file that is not larger. Several\n"
           "grids share the bytes in proportion to their active voxels. --psnr searches for the\n"
@@ -89,6 +96,7 @@ cli::ProgramText programText() {
           "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          the best file of 100 KB\n"
           "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             the smallest file with 45 dB\n"
           "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report fit.json\n"
+          "  vdb2esvr frame.vdb frame.esvr --skip velocity       all grids but one\n"
           "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            every voxel within the bound\n"
           "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4 --resume\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255\n"
@@ -164,7 +172,12 @@ void addFileOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
-     "fit this grid only; may be repeated; 'density[1]' is the second grid of that name")
+     "convert this grid only; may be repeated; 'density[1]' is the second grid of that name")
+    ("keep", value<std::vector<std::string>>()->value_name("NAME")->composing(),
+     "carry this grid unchanged instead of fitting it; may be repeated; with -g, in addition to the "
+     "grids that -g names")
+    ("skip", value<std::vector<std::string>>()->value_name("NAME")->composing(),
+     "leave this grid out; may be repeated")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
      "refuse: fail on NaN or infinite voxels; zero: replace them by 0")
     ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
@@ -201,6 +214,11 @@ std::optional<To> bounded(const Arguments& arguments, const std::string& option,
   if (!given) return std::nullopt;
   requireRange(option, *given, low, high);
   return To(*given);
+}
+
+/// The names that an option gives.
+std::vector<std::string> namesIn(const Arguments& a, const char* option) {
+  return a.find<std::vector<std::string>>(option).value_or(std::vector<std::string>{});
 }
 
 FitOptions fitOptions(const Arguments& a) {
@@ -371,7 +389,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   Options options;
   options.input = a.get<std::string>("input");
   options.output = a.get<std::string>("output");
-  options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
+  options.grids = {namesIn(a, "grid"), namesIn(a, "keep"), namesIn(a, "skip")};
   options.psnr = bounded<double>(a, "psnr", 0.0, kHighestPsnr);
   options.convert.fit = fitOptions(a);
   options.convert.fit.psnr = options.psnr;

@@ -11,6 +11,7 @@
 #include "esvr/convert.h"
 #include "esvr/part_store.h"
 #include "esvr/vdb_io.h"
+#include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/progress_bar.h"
 
 namespace esvr::vdb2esvr {
@@ -28,7 +29,7 @@ struct Options {
   std::filesystem::path input, output;
   /// The frames, if the input and the output are patterns.
   std::optional<cli::Sequence> sequence;
-  std::vector<std::string> grids;     ///< names of the grids; empty: all that can be fitted
+  WantedGrids grids;
   ConvertOptions convert;             ///< options of every grid; a size replaces the goal
   std::optional<double> psnr;         ///< PSNR that every grid should reach, dB over the box
   std::optional<std::uint64_t> size;  ///< largest size of the file, bytes

@@ -34,7 +34,7 @@ std::vector<PartOrigin> originOf(const Options& options, const Device& device) {
   for (const auto& [name, value] : asked.items())
     if (name != "threads" && name != "device") origin.push_back({name, value.dump()});
   std::string grids;
-  for (const auto& grid : options.grids) grids += '"' + grid + '"';
+  for (const auto& grid : options.grids.only) grids += '"' + grid + '"';
   origin.push_back({"grids", grids});
   origin.push_back({"kind of device", device.kind == DeviceKind::kCpu ? "CPU" : "GPU"});
   return origin;

@@ -102,6 +102,8 @@ Json askedJson(const Options& options) {
           {"storage", storage.form == Storage::kCompact ? "compact" : "float32"},
           {"storage_loss", storage.loss},
           {"topology", storage.activity == Activity::kExact ? "exact" : "threshold"},
+          {"keep", options.grids.keep},
+          {"skip", options.grids.skip},
           {"seed", fit.seed},
           {"threads", options.threads > 0 ? Json(options.threads) : Json(nullptr)},
           {"device", options.device},
@@ -274,11 +276,24 @@ Json gridsOf(const RunRecord& record) {
   return grids;
 }
 
+Json toJson(const NotFitted& left) {
+  return {{"name", left.grid.uniqueName}, {"value_type", left.grid.valueType}, {"why", left.why}};
+}
+
+Json carriedOf(const RunRecord& record) {
+  Json carried = Json::array();
+  for (std::size_t c = 0; c < record.carried.size(); ++c) {
+    Json grid = toJson(record.carried[c]);
+    grid["bytes"] = cli::ownBytes(record.output, numberOfCarried(record, c));
+    grid["source_bytes"] = record.carried[c].grid.storedBytes;
+    carried.push_back(grid);
+  }
+  return carried;
+}
+
 Json skippedOf(const RunRecord& record) {
   Json skipped = Json::array();
-  for (const auto& grid : record.skipped)
-    skipped.push_back(
-        {{"name", grid.uniqueName}, {"value_type", grid.valueType}, {"why", grid.skipReason}});
+  for (const auto& left : record.skipped) skipped.push_back(toJson(left));
   for (const auto& name : record.notFitted)
     skipped.push_back({{"name", name}, {"value_type", nullptr}, {"why", "interrupted"}});
   return skipped;
@@ -343,6 +358,7 @@ Json makeReport(const Options& options, const RunRecord& record) {
                  {"output", {{"path", options.output.string()}, {"bytes", ratio.bytesOut}}},
                  {"ratio", ratio.value()},
                  {"grids", gridsOf(record)},
+                 {"carried", carriedOf(record)},
                  {"skipped", skippedOf(record)},
                  {"seconds", totalSeconds(record)},
                  {"peak_memory_bytes", cli::peakMemory()},

@@ -46,19 +46,22 @@ void tellDevices(const std::vector<Device>& devices, const Options& options, con
              " threads");
 }
 
-void tellSkipped(const std::vector<GridSummary>& skipped, const cli::Log& log) {
-  for (const auto& grid : skipped)
-    log.info("skipped grid \"" + grid.uniqueName + "\": " + grid.skipReason);
+void tellNothingFitted(const GridChoice& choice, const cli::Log& log) {
+  if (!choice.fitted.empty()) return;
+  log.warning("no grid is fitted; the output has carried grids only",
+              std::to_string(choice.carried.size()) + " of " +
+                  std::to_string(choice.carried.size() + choice.skipped.size()) +
+                  " grids are carried unchanged");
 }
 
 void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
   if (grid.nonFiniteReplaced > 0)
-    log.warning("grid \"" + grid.uniqueName + "\": " + std::to_string(grid.nonFiniteReplaced) +
-                " NaN or infinite voxels were replaced by 0");
+    log.warning("grid \"" + grid.uniqueName + "\": NaN or infinite voxels were replaced by 0",
+                std::to_string(grid.nonFiniteReplaced) + " voxels");
   if (const FitResult& fit = grid.conversion.fit; fit.deviceFull)
-    log.warning("grid \"" + grid.uniqueName + "\": the memory of the GPU was full: " +
+    log.warning("grid \"" + grid.uniqueName + "\": the memory of the GPU was full",
                 std::to_string(grid.stored().field.ellipsoidCount()) + " ellipsoids instead of " +
-                std::to_string(fit.wanted));
+                    std::to_string(fit.wanted));
   log.detail("grid \"" + grid.uniqueName + "\": kappa " +
              cli::shortNumber(grid.stored().field.kernel.kappa) + ", threshold " +
              cli::shortNumber(grid.stored().activeThreshold) + ", overlap of active voxels " +
@@ -83,9 +86,11 @@ class FileConversion {
     runOn(devices);
   }
 
-  void run(const std::vector<GridSummary>& grids, RunRecord& record) {
+  /// \param carried  grids that the file holds unchanged
+  void run(const std::vector<GridSummary>& grids, const std::vector<CarriedGrid>& carried,
+           RunRecord& record) {
     const Twins twins = findTwins(options_, grids);
-    ByteShares shares(options_, record.input, grids, twins);
+    ByteShares shares(options_, record.input, grids, twins, carried);
     for (std::size_t g = 0; g < grids.size(); ++g) {
       const std::string& name = grids[g].uniqueName;
       if (cancelled())
@@ -160,9 +165,24 @@ class FileConversion {
   std::future<void> started_;  ///< the device starts while the first grid is read; may be empty
 };
 
-void write(const Options& options, RunRecord& record) {
+/// Gives the carried grids their places among those that the file holds.
+void placeCarried(const RunRecord& record, std::vector<CarriedGrid>& carried) {
+  const auto& names = record.input.grids;
+  std::size_t source = 0, converted = 0;
+  for (std::size_t c = 0; c < carried.size(); ++c) {
+    for (; source < carried[c].place; ++source)
+      if (converted < record.grids.size() &&
+          names[source].uniqueName == record.grids[converted].uniqueName)
+        ++converted;
+    carried[c].place = std::uint32_t(converted + c);
+  }
+}
+
+void write(const Options& options, std::vector<CarriedGrid> carried, RunRecord& record) {
   cli::Stopwatch watch;
   EsvrFile file;
+  placeCarried(record, carried);
+  file.carried = std::move(carried);
   file.metadata = record.input.metadata;
   for (const auto& grid : record.grids) file.grids.push_back(grid.stored());
   writeEsvr(options.output, file, {.overwrite = options.overwrite});
@@ -214,6 +234,23 @@ std::vector<Device> devicesFor(const Options& options, const Ranks* ranks) {
   return {devices[std::size_t(ranks->rankOnHost()) % devices.size()]};
 }
 
+/// Reads the grids that the file holds unchanged. A process that fits parts only needs none.
+std::vector<CarriedGrid> readUnchanged(const Options& options,
+                                       const std::vector<NotFitted>& carried) {
+  std::vector<std::size_t> places;
+  for (const auto& grid : carried) places.push_back(grid.place);
+  if (options.job == Job::kPart || places.empty()) return {};
+  return readCarried(options.input, places, options.read);
+}
+
+/// The options with the memory that carried grids leave.
+Options besides(const std::vector<CarriedGrid>& carried, Options options) {
+  for (const auto& grid : carried)
+    if (const std::uint64_t bytes = grid.bytes.size(); !options.read.memory.isInFile(bytes))
+      options.read.maxBytes -= std::min(options.read.maxBytes, bytes);
+  return options;
+}
+
 }  // namespace
 
 bool mayFit(const Options& options) {
@@ -228,18 +265,21 @@ RunRecord convertFile(const Options& options, Ranks* ranks, const CancelToken& c
   auto devices = std::async(std::launch::async, [&] { return devicesFor(options, ranks); });
   record.input = inspectVdb(options.input);
   GridChoice choice = chooseGrids(options.input, record.input, options.grids);
-  if (!options.sequence) tellSkipped(choice.skipped, log);  // a sequence tells them once
+  tellNothingFitted(choice, log);
+  std::vector<CarriedGrid> carried = readUnchanged(options, choice.carried);
+  record.carried = std::move(choice.carried);
   record.skipped = std::move(choice.skipped);
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
   Parts parts(options, selected.front(), cancel, ranks);
-  FileConversion(options, selected, cancel, parts, log).run(choice.fitted, record);
+  FileConversion(besides(carried, options), selected, cancel, parts, log)
+      .run(choice.fitted, carried, record);
   for (const auto& grid : record.grids) tellGrid(grid, log);
   if (options.job == Job::kPart) {
     if (!ranks) tellPart(options, record, log);
     return record;
   }
-  write(options, record);
+  write(options, std::move(carried), record);
   if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();
   return record;

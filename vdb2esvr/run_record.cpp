@@ -11,8 +11,13 @@ bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& ki
                      [&](const SectionSummary& s) { return s.grid == grid && s.kind == kind; });
 }
 
+std::size_t numberOfCarried(const RunRecord& record, std::size_t carried) {
+  return record.grids.size() + carried;
+}
+
 Ratio ratioOf(const RunRecord& record) {
-  Ratio ratio{0, record.output.fileBytes, record.grids.size(), record.input.grids.size()};
+  Ratio ratio{0, record.output.fileBytes, record.grids.size() + record.carried.size(),
+              record.input.grids.size()};
   if (ratio.wholeInput()) {
     ratio.bytesIn = record.input.fileBytes;
     return ratio;
@@ -23,6 +28,7 @@ Ratio ratioOf(const RunRecord& record) {
   };
   for (const GridSummary& grid : record.input.grids)
     if (converted(grid)) ratio.bytesIn += grid.storedBytes;
+  for (const NotFitted& carried : record.carried) ratio.bytesIn += carried.grid.storedBytes;
   return ratio;
 }
 

@@ -8,13 +8,15 @@
 
 #include "esvr/container.h"
 #include "esvr/vdb_io.h"
+#include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/convert.h"
 
 namespace esvr::vdb2esvr {
 
 struct RunRecord {
   VdbSummary input;
-  std::vector<GridSummary> skipped;    ///< grids that cannot be fitted
+  std::vector<NotFitted> carried;      ///< grids that the file holds unchanged
+  std::vector<NotFitted> skipped;      ///< grids that the user left out
   std::vector<std::string> notFitted;  ///< grids that an interrupted run did not convert
   std::vector<ConvertedGrid> grids;
   EsvrSummary output;
@@ -22,7 +24,7 @@ struct RunRecord {
   double secondsWrite = 0.0, secondsTotal = 0.0;
 };
 
-/// The bytes of the converted grids in the input, and the bytes of the output.
+/// The bytes of the grids in the input that the output holds, and the bytes of the output.
 struct Ratio {
   std::uint64_t bytesIn = 0, bytesOut = 0;
   std::size_t grids = 0, gridsOfInput = 0;
@@ -30,8 +32,11 @@ struct Ratio {
   [[nodiscard]] double value() const { return double(bytesIn) / double(bytesOut); }
 };
 
-/// The grids that were converted against the output; the whole file where all were.
+/// The grids that the output holds against the output; the whole file where it holds all.
 [[nodiscard]] Ratio ratioOf(const RunRecord& record);
+
+/// Number of a carried grid in the file, which EsvrSummary uses.
+[[nodiscard]] std::size_t numberOfCarried(const RunRecord& record, std::size_t carried);
 
 /// True where the file holds a section of this kind for the grid.
 [[nodiscard]] bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& kind);

@@ -11,6 +11,7 @@
 #include "cli/failure.h"
 #include "cli/frame_messages.h"
 #include "cli/frame_output.h"
+#include "cli/frame_warnings.h"
 #include "cli/frame_workers.h"
 #include "cli/interrupts.h"
 #include "cli/json_file.h"
@@ -39,6 +40,12 @@ std::string deviceOption(const Device& device) {
 cli::Verbosity verbosityOfFrames(const Options& options) {
   return options.verbosity == cli::Verbosity::kQuiet ? cli::Verbosity::kQuiet
                                                      : cli::Verbosity::kNormal;
+}
+
+/// The memory that the conversion of a file may take, bytes.
+std::uint64_t memoryOf(const Options& options) {
+  const VdbSummary file = inspectVdb(options.input);
+  return conversionMemory(file, chooseGrids(options.input, file, options.grids));
 }
 
 bool isThere(const std::filesystem::path& path) {
@@ -72,6 +79,7 @@ class SequenceConversion {
                       [&](const cli::FrameTask& task) { return convertWithHolders(task); });
     record_.interrupted = cancel_.cancelled();
     record_.seconds = secondsSoFar();
+    warnings_.tell(log_);
     return std::move(record_);
   }
 
@@ -117,9 +125,9 @@ class SequenceConversion {
   void convert(FrameRecord& record, int worker) {
     if (keep(record)) return;
     const Options own = optionsOf(record.frame, worker);
-    const auto memory = gate_.take(conversionMemory(inspectVdb(own.input)));
+    const auto memory = gate_.take(memoryOf(own));
     const cli::FrameFolder folder(own.output);
-    const cli::Log log(kProgram + (": " + cli::textOf(record.frame)), verbosityOfFrames(options_));
+    const cli::Log log = warnings_.logOf(record.frame, kProgram, verbosityOfFrames(options_));
     const RunRecord run = convertFile(own, nullptr, cancel_, log);
     takeFigures(run, record);
     record.state = run.interrupted ? FrameState::kInterrupted : FrameState::kConverted;
@@ -179,6 +187,7 @@ class SequenceConversion {
   const std::vector<Device> devices_;
   const std::multimap<std::size_t, std::size_t> holders_;
   cli::MemoryGate gate_;
+  cli::FrameWarnings warnings_;
   SequenceRecord record_;
   std::mutex mutex_;  ///< of the members below
   ProgressBar bar_;
@@ -204,18 +213,7 @@ SequenceRecord convertFramesOrReport(const Options& options, const CancelToken& 
   throw;
 }
 
-/// Says once which grids were skipped, and in how many frames.
-void tellSkippedGrids(const SequenceRecord& record, const cli::Log& log) {
-  std::map<std::pair<std::string, std::string>, std::size_t> counts;
-  for (const FrameRecord& frame : record.frames)
-    for (const FrameSkip& grid : frame.skipped) ++counts[{grid.name, grid.why}];
-  for (const auto& [grid, frames] : counts)
-    log.info("skipped grid \"" + grid.first + "\" in " + std::to_string(frames) +
-             (frames == 1 ? " frame: " : " frames: ") + grid.second);
-}
-
 void tellSequence(const Options& options, const SequenceRecord& record) {
-  tellSkippedGrids(record, cli::Log(kProgram, options.verbosity));
   if (!options.report.empty())
     cli::writeJson({options.report, options.overwrite}, makeSequenceReport(options, record));
   if (options.report != cli::kStandardOutput && options.verbosity != cli::Verbosity::kQuiet)

@@ -62,8 +62,10 @@ void takeFigures(const RunRecord& run, FrameRecord& frame) {
   for (const ConvertedGrid& grid : run.grids)
     frame.grids.push_back({grid.uniqueName, grid.stored().field.ellipsoidCount(),
                            grid.metrics.psnrBox, grid.metrics.psnrActive});
-  for (const GridSummary& grid : run.skipped)
-    frame.skipped.push_back({grid.uniqueName, grid.skipReason});
+  for (const NotFitted& left : run.carried)
+    frame.carried.push_back({left.grid.uniqueName, left.why});
+  for (const NotFitted& left : run.skipped)
+    frame.skipped.push_back({left.grid.uniqueName, left.why});
 }
 
 std::vector<cli::FrameNumber> framesIn(FrameState state, const SequenceRecord& record) {

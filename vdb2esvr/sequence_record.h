@@ -35,17 +35,17 @@ struct FrameGrid {
   double psnrBox = 0.0, psnrActive = 0.0;  ///< dB
 };
 
-/// A grid of a frame that was not converted.
-struct FrameSkip {
+/// A grid of a frame that was not fitted.
+struct NotFittedName {
   std::string name, why;
 };
 
 struct FrameRecord {
   cli::Frame frame;
   FrameState state = FrameState::kNotBegun;
-  std::uint64_t bytesIn = 0, bytesOut = 0;  ///< of the converted grids, and of the output
+  std::uint64_t bytesIn = 0, bytesOut = 0;  ///< of the grids in the output, and of the output
   std::vector<FrameGrid> grids{};
-  std::vector<FrameSkip> skipped{};
+  std::vector<NotFittedName> carried{}, skipped{};
   double seconds = 0.0;
   bool missedPsnr = false;
   std::optional<Error> failure{};

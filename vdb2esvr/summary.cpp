@@ -58,9 +58,8 @@ void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& 
       << ", which has the same voxels\n";
 }
 
-}  // namespace
-
-void printSummary(const Options& options, const RunRecord& record, std::ostream& out) {
+void printFitted(const Options& options, const RunRecord& record, std::ostream& out) {
+  if (record.grids.empty()) return;
   cli::Table table({"grid", "ellipsoids", "bytes", "PSNR box", "active", "max error", "seconds"});
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
     const ConvertedGrid& grid = record.grids[g];
@@ -71,6 +70,30 @@ void printSummary(const Options& options, const RunRecord& record, std::ostream&
   }
   table.print(out);
   for (const ConvertedGrid& grid : record.grids) printNote(options, grid, out);
+}
+
+/// Lists the grids that the file holds unchanged, and those that it does not hold.
+void printNotFitted(const RunRecord& record, std::ostream& out) {
+  cli::Table table({"carried", "values", "bytes", "bytes in source"});
+  for (std::size_t c = 0; c < record.carried.size(); ++c) {
+    const GridSummary& grid = record.carried[c].grid;
+    table.add({grid.uniqueName, grid.valueType,
+               std::to_string(cli::ownBytes(record.output, numberOfCarried(record, c))),
+               std::to_string(grid.storedBytes)});
+  }
+  if (!record.carried.empty()) table.print(out);
+  for (const auto& [grid, place, why] : record.carried)
+    out << cli::printable(grid.uniqueName) << ": carried unchanged, because " << cli::printable(why)
+        << '\n';
+  for (const auto& [grid, place, why] : record.skipped)
+    out << cli::printable(grid.uniqueName) << ": left out, because " << cli::printable(why) << '\n';
+}
+
+}  // namespace
+
+void printSummary(const Options& options, const RunRecord& record, std::ostream& out) {
+  printFitted(options, record, out);
+  printNotFitted(record, out);
   const Ratio ratio = ratioOf(record);
   out << cli::printable(options.input.string());
   if (!ratio.wholeInput()) out << ", " << ratio.grids << " of " << ratio.gridsOfInput << " grids:";

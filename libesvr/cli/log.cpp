@@ -24,8 +24,10 @@ void Log::error(const std::string& message) const {
   printLine(program_ + ": " + printable(message));
 }
 
-void Log::warning(const std::string& message) const {
-  if (verbosity_ != Verbosity::kQuiet) printLine(program_ + ": warning: " + printable(message));
+void Log::warning(const std::string& message, const std::string& figure) const {
+  if (warnings_) return warnings_(message);
+  const std::string text = figure.empty() ? message : message + " (" + figure + ')';
+  if (verbosity_ != Verbosity::kQuiet) printLine(program_ + ": warning: " + printable(text));
 }
 
 }  // namespace esvr::cli

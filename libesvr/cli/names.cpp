@@ -35,6 +35,14 @@ std::string nameOf(TopologyKind kind) {
   return kind == TopologyKind::kBricks ? "bricks" : "threshold";
 }
 
+std::string valuesOf(const GridSummary& grid) {
+  return grid.savedAsHalf ? grid.valueType + " as half" : grid.valueType;
+}
+
+std::string activeVoxelsOf(const GridSummary& grid) {
+  return grid.isScalar || grid.activeVoxels > 0 ? std::to_string(grid.activeVoxels) : "-";
+}
+
 std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid) {
   std::uint64_t bytes = 0;
   for (const auto& section : file.sections)

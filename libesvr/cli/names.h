@@ -6,6 +6,7 @@
 #include "esvr/container.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/kernel.h"
+#include "esvr/vdb_io.h"
 
 namespace esvr::cli {
 
@@ -17,6 +18,12 @@ namespace esvr::cli {
 [[nodiscard]] std::string nameOf(KernelForm form);
 /// "threshold", "bricks" or "mask".
 [[nodiscard]] std::string nameOf(TopologyKind kind);
+
+/// The type of the values of a grid of a .vdb file: "int32", "vec3s as half".
+[[nodiscard]] std::string valuesOf(const GridSummary& grid);
+/// The number of its active voxels; "-" if the grid is of a type that is not counted, and the
+/// writer did not store the number.
+[[nodiscard]] std::string activeVoxelsOf(const GridSummary& grid);
 
 /// Bytes of the sections of a grid, whether it shares them with other grids or not.
 [[nodiscard]] std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid);

@@ -4,10 +4,12 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <utility>
 
+#include "field/brick_set.h"
 #include "field/brick_walk.h"
 #include "field/offsets.h"
 
@@ -64,30 +66,63 @@ std::vector<std::uint32_t> bricksByEllipsoid(const BrickIndex& index, std::size_
   return bricks;
 }
 
-/// A list of bricks to which a brick is added again and again. It takes at most twice the memory of
-/// its different bricks, or that of kFew bricks.
-class BrickList {
+/// Sorts pairs by brick. Parts of the ellipsoids are sorted in parallel; each part has its own places
+/// in the list of a brick.
+class PairSort {
  public:
-  void add(Coord brick) {
-    if (bricks_.size() >= most_) makeUnique();
-    bricks_.push_back(brick);
-  }
-  [[nodiscard]] std::vector<Coord> take() {
-    makeUnique();
-    return std::move(bricks_);
+  /// \param bricks  by pair: its brick, in the order of the ellipsoids
+  PairSort(const std::vector<std::uint32_t>& bricks, std::size_t brickCount, BrickPairs& pairs)
+      : bricks_(bricks), brickCount_(brickCount), pairs_(pairs) {}
+
+  void sort() {
+    // Tables of all parts take no more memory than a quarter of the pairs.
+    const std::size_t most = bricks_.size() / 4 / std::max<std::size_t>(1, brickCount_);
+    parts_ = std::clamp<std::size_t>(most, 1, std::size_t(tbb::this_task_arena::max_concurrency()));
+    next_.assign(parts_ * brickCount_, 0);
+    tbb::parallel_for(std::size_t(0), parts_, [&](std::size_t part) {
+      for (std::size_t k = firstOf(part); k < firstOf(part + 1); ++k) ++next(part, bricks_[k]);
+    });
+    makePlaces();
+    pairs_.ellipsoid.resize(bricks_.size());
+    pairs_.pairOf.resize(bricks_.size());
+    tbb::parallel_for(std::size_t(0), parts_, [&](std::size_t part) { place(part); });
   }
 
  private:
-  static constexpr std::size_t kFew = std::size_t{1} << 20;
-
-  void makeUnique() {
-    std::ranges::sort(bricks_);
-    bricks_.erase(std::unique(bricks_.begin(), bricks_.end()), bricks_.end());
-    most_ = std::max(kFew, 2 * bricks_.size());
+  [[nodiscard]] std::size_t firstOf(std::size_t part) const {
+    return bricks_.size() * part / parts_;
+  }
+  std::uint32_t& next(std::size_t part, std::uint32_t brick) {
+    return next_[part * brickCount_ + brick];
+  }
+  /// Turns the counts of the parts into their first places.
+  void makePlaces() {
+    std::uint32_t place = 0;
+    pairs_.brickBegin.reserve(brickCount_ + 1);
+    for (std::uint32_t b = 0; b < brickCount_; ++b) {
+      pairs_.brickBegin.push_back(place);
+      for (std::size_t part = 0; part < parts_; ++part)
+        place += std::exchange(next(part, b), place);
+    }
+    pairs_.brickBegin.push_back(place);
+  }
+  void place(std::size_t part) {
+    const auto& begin = pairs_.ellipsoidBegin;
+    const std::size_t first = firstOf(part), past = firstOf(part + 1);
+    std::size_t i = std::size_t(std::ranges::upper_bound(begin, first) - begin.begin()) - 1;
+    for (std::size_t k = first; k < past; ++k) {
+      while (k >= begin[i + 1]) ++i;
+      const std::uint32_t pair = next(part, bricks_[k])++;
+      pairs_.ellipsoid[pair] = std::uint32_t(i);
+      pairs_.pairOf[k] = pair;
+    }
   }
 
-  std::vector<Coord> bricks_;
-  std::size_t most_ = kFew;
+  const std::vector<std::uint32_t>& bricks_;
+  const std::size_t brickCount_;
+  BrickPairs& pairs_;
+  std::size_t parts_ = 1;
+  std::vector<std::uint32_t> next_;  ///< by part and brick
 };
 
 }  // namespace
@@ -96,37 +131,22 @@ BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
                        const SupportOf& supportOf) {
   BrickPairs pairs;
   const auto bricks = bricksByEllipsoid(index, ellipsoids, supportOf, pairs.ellipsoidBegin);
-  pairs.brickBegin.assign(index.size() + 1, 0);
-  for (const auto b : bricks) ++pairs.brickBegin[b];
-  makeOffsets(pairs.brickBegin);
-
-  pairs.ellipsoid.resize(bricks.size());
-  pairs.pairOf.resize(bricks.size());
-  auto next = pairs.brickBegin;
-  for (std::size_t i = 0; i < ellipsoids; ++i)
-    for (auto k = pairs.ellipsoidBegin[i]; k != pairs.ellipsoidBegin[i + 1]; ++k) {
-      const auto pair = next[bricks[k]]++;
-      pairs.ellipsoid[pair] = std::uint32_t(i);
-      pairs.pairOf[k] = pair;
-    }
+  PairSort(bricks, index.size(), pairs).sort();
   return pairs;
 }
 
 std::vector<Coord> missingBricks(const BrickIndex& index, std::size_t ellipsoids,
                                  const SupportOf& supportOf, const Box& within) {
-  tbb::enumerable_thread_specific<BrickList> found;
+  tbb::enumerable_thread_specific<BrickSet> found;
   tbb::parallel_for(Range(0, ellipsoids, 64), [&](const Range& range) {
     auto& mine = found.local();
     for (std::size_t i = range.begin(); i != range.end(); ++i)
       forEachReachedBrick(supportOf(i), within, [&](Coord brick) {
-        if (index.find(brick) == BrickIndex::kNone) mine.add(brick);
+        if (index.find(brick) == BrickIndex::kNone) mine.insert(brick);
       });
   });
   std::vector<Coord> all;
-  for (BrickList& part : found) {
-    const std::vector<Coord> bricks = part.take();
-    all.insert(all.end(), bricks.begin(), bricks.end());
-  }
+  for (const BrickSet& part : found) part.appendTo(all);
   tbb::parallel_sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   return all;

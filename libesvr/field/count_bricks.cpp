@@ -2,35 +2,13 @@
 
 #include <algorithm>
 #include <string>
-#include <unordered_map>
 
-#include "core/brick_hash.h"
 #include "esvr/error.h"
+#include "field/brick_set.h"
 #include "field/brick_walk.h"
 
 namespace esvr {
 namespace {
-
-struct HashOfBrick {
-  std::size_t operator()(Coord brick) const { return std::size_t(hashOf(brick)); }
-};
-
-/// A set of bricks, which are stored as bits in blocks of 8^3 bricks.
-class BrickSet {
- public:
-  void insert(Coord brick) {
-    BrickMask& block = blocks_[brickOf(brick)];
-    const int bit = voxelOffset(localOf(brick));
-    if (block.test(bit)) return;
-    block.set(bit);
-    ++size_;
-  }
-  [[nodiscard]] std::uint64_t size() const { return size_; }
-
- private:
-  std::unordered_map<Coord, BrickMask, HashOfBrick> blocks_;
-  std::uint64_t size_ = 0;
-};
 
 double determinant(const Matrix3& m) {
   return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +

@@ -31,18 +31,31 @@ void noteGrid(const StoredGrid& grid, std::vector<std::string>& notes) {
     notes.push_back(name + " has one background in its descriptor and another in its field");
 }
 
+void noteCarried(const CarriedGrid& grid, std::vector<std::string>& notes) {
+  notes.push_back("grid '" + grid.name + "' is carried unchanged (" + grid.treeType + ")");
+}
+
+/// The file without its carried grids, whose bytes are not decoded.
+std::vector<std::byte> encodedWithoutCarried(EsvrFile file) {
+  file.carried.clear();
+  return encodeEsvr(file);
+}
+
 }  // namespace
 
-std::vector<std::string> checkEsvr(const std::filesystem::path& path, const ReadLimits& limits) {
+std::vector<std::string> checkEsvr(const std::filesystem::path& path, const ReadLimits& allowed) {
+  ReadLimits limits = allowed;
+  limits.carriedBytes = false;  // they are checked, but not kept
   const auto table = readTable(FileSource(path));
   const EsvrFile file = readEsvr(path, limits);
-  if (encodeEsvr(file) != encodeEsvr(readEsvr(path, limits)))
+  if (encodedWithoutCarried(file) != encodedWithoutCarried(readEsvr(path, limits)))
     throw BadInput(path.string() + ": decoding it twice gives two contents");
 
   std::vector<std::string> notes;
   noteVersion(table, notes);
   noteSkipped(table, notes);
   for (const auto& grid : file.grids) noteGrid(grid, notes);
+  for (const auto& grid : file.carried) noteCarried(grid, notes);
   return notes;
 }
 

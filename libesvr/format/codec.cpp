@@ -20,8 +20,10 @@ constexpr std::size_t kBlockBytes = 256 * 1024;
 /// numbers.
 constexpr std::uint64_t kPadding = 8 * sizeof(double);
 
-/// Bytes of content in one Blosc buffer; Blosc's own limit is 2^31.
-constexpr std::size_t kBufferBytes = std::size_t{1} << 30;
+/// Bytes of content in one Blosc buffer. A reader needs memory for one buffer at a time.
+constexpr std::size_t kBufferBytes = std::size_t{1} << 26;
+static_assert(kBufferBytes % kPadding == 0);
+static_assert(kBloscHeaderBytes == BLOSC_MIN_HEADER_LENGTH);
 
 /// Limit on the ratio of content to stored bytes. The writer stays below it, so a reader can refuse
 /// higher ratios. Zeros in blocks of this size reach half of it.
@@ -38,68 +40,71 @@ struct Filter {
   std::size_t typeSize = 1;
 };
 
-std::uint64_t padded(std::uint64_t bytes) { return (bytes + kPadding - 1) / kPadding * kPadding; }
-
-void appendBuffer(std::vector<std::byte>& all, std::span<const std::byte> raw, Filter filter) {
+std::vector<std::byte> compressed(std::span<const std::byte> raw, Filter filter) {
   std::vector<std::byte> packed(raw.size() + BLOSC_MAX_OVERHEAD);
   const int n =
       blosc_compress_ctx(kLevel, filter.shuffle, filter.typeSize, raw.size(), raw.data(),
                          packed.data(), packed.size(), kCompressor, kBlockBytes, kThreads);
   if (n <= 0) throw std::logic_error("Blosc failed to compress a buffer");
-  all.insert(all.end(), packed.begin(), packed.begin() + n);
+  packed.resize(std::size_t(n));
+  return packed;
+}
+
+/// Appends buffers of the content, of which the last one is padded.
+template <class Bytes>
+void compressTo(Bytes& all, std::span<const std::byte> raw, Filter filter) {
+  while (!raw.empty()) {
+    const auto piece = raw.first(std::min(raw.size(), kBufferBytes));
+    std::vector<std::byte> content(piece.begin(), piece.end());
+    content.resize(paddedForBlosc(content.size()));
+    const auto buffer = compressed(content, filter);
+    all.insert(all.end(), buffer.begin(), buffer.end());
+    raw = raw.subspan(piece.size());
+  }
 }
 
 std::vector<std::byte> compress(std::span<const std::byte> raw, Filter filter) {
   std::vector<std::byte> all;
-  while (!raw.empty()) {
-    const auto piece = raw.first(std::min(raw.size(), kBufferBytes));
-    appendBuffer(all, piece, filter);
-    raw = raw.subspan(piece.size());
-  }
+  compressTo(all, raw, filter);
   return all;
 }
 
 /// Shuffles bytes and shuffles bits, and returns the smaller result. Which one it is differs
 /// between streams.
-std::vector<std::byte> compressSmallest(std::vector<std::byte> raw, std::size_t typeSize) {
-  raw.resize(padded(raw.size()));
+std::vector<std::byte> compressSmallest(std::span<const std::byte> raw, std::size_t typeSize) {
   if (typeSize == 1) return compress(raw, {});
   auto bytesShuffled = compress(raw, {BLOSC_SHUFFLE, typeSize});
   auto bitsShuffled = compress(raw, {BLOSC_BITSHUFFLE, typeSize});
   return bitsShuffled.size() < bytesShuffled.size() ? bitsShuffled : bytesShuffled;
 }
 
-struct BufferSizes {
-  std::size_t raw = 0, stored = 0;
-};
-
-/// Sizes of the first buffer in `stored`; zeros if they are impossible.
-BufferSizes frontBuffer(std::span<const std::byte> stored, std::size_t rawLeft) {
-  if (stored.size() < BLOSC_MIN_HEADER_LENGTH) return {};
+/// Bytes of content in the buffer; 0 if it is damaged or has more content than there is room for.
+std::size_t contentOf(std::span<const std::byte> buffer, std::size_t room) {
+  if (buffer.size() < BLOSC_MIN_HEADER_LENGTH) return 0;
   std::size_t raw = 0, packed = 0, block = 0, validated = 0;
-  blosc_cbuffer_sizes(stored.data(), &raw, &packed, &block);
-  const bool fits = packed <= stored.size() && raw <= rawLeft && block <= raw;
-  if (!fits || blosc_cbuffer_validate(stored.data(), packed, &validated) != 0) return {};
-  return {raw, packed};
+  blosc_cbuffer_sizes(buffer.data(), &raw, &packed, &block);
+  const bool fits = packed == buffer.size() && raw <= room && block <= raw;
+  return fits && blosc_cbuffer_validate(buffer.data(), packed, &validated) == 0 ? raw : 0;
 }
 
 std::vector<std::byte> decompress(std::span<const std::byte> stored, std::uint64_t rawBytes,
                                   const std::string& where) {
-  std::vector<std::byte> raw(padded(rawBytes));
+  std::vector<std::byte> raw(paddedForBlosc(rawBytes));
   std::span<std::byte> left(raw);
   while (!left.empty() || !stored.empty()) {
-    const BufferSizes sizes = frontBuffer(stored, left.size());
-    if (sizes.raw == 0 ||
-        blosc_decompress_ctx(stored.data(), left.data(), sizes.raw, kThreads) != int(sizes.raw))
-      throw BadInput(where + ": damaged Blosc buffer");
-    left = left.subspan(sizes.raw);
-    stored = stored.subspan(sizes.stored);
+    const auto buffer = stored.first(std::min(stored.size(), storedBytesOf(stored)));
+    left = left.subspan(decompressBuffer(buffer, left, where));
+    stored = stored.subspan(buffer.size());
   }
-  const auto isZero = [](std::byte b) { return b == std::byte{}; };
-  if (!std::all_of(raw.begin() + std::ptrdiff_t(rawBytes), raw.end(), isZero))
-    throw BadInput(where + ": content after its end");
+  refuseContentAfter(rawBytes, raw, where);
   raw.resize(rawBytes);
   return raw;
+}
+
+/// True if the compressed bytes are worth their decoder.
+bool pays(std::uint64_t packedBytes, std::uint64_t rawBytes) {
+  return packedBytes + kMinSaving <= rawBytes &&
+         plausibleSizes(Codec::kBlosc, packedBytes, rawBytes);
 }
 
 }  // namespace
@@ -107,10 +112,41 @@ std::vector<std::byte> decompress(std::span<const std::byte> stored, std::uint64
 Packed pack(std::vector<std::byte> raw, std::size_t typeSize) {
   const std::uint64_t rawBytes = raw.size();
   auto packed = compressSmallest(raw, typeSize);
-  const bool pays = packed.size() + kMinSaving <= rawBytes;
-  if (pays && plausibleSizes(Codec::kBlosc, packed.size(), rawBytes))
-    return {Codec::kBlosc, std::move(packed), rawBytes};
+  if (pays(packed.size(), rawBytes)) return {Codec::kBlosc, std::move(packed), rawBytes};
   return {Codec::kRaw, std::move(raw), rawBytes};
+}
+
+PackedLarge packLarge(const VoxelArray<std::byte>& raw) {
+  VoxelArray<std::byte> packed(raw.get_allocator());
+  compressTo(packed, raw, {});
+  if (pays(packed.size(), raw.size())) return {Codec::kBlosc, std::move(packed)};
+  return {Codec::kRaw, raw};
+}
+
+std::uint64_t paddedForBlosc(std::uint64_t rawBytes) {
+  return (rawBytes + kPadding - 1) / kPadding * kPadding;
+}
+
+std::uint64_t storedBytesOf(std::span<const std::byte> header) {
+  if (header.size() < kBloscHeaderBytes) return header.size();
+  std::size_t raw = 0, packed = 0, block = 0;
+  blosc_cbuffer_sizes(header.data(), &raw, &packed, &block);
+  return packed;
+}
+
+std::size_t decompressBuffer(std::span<const std::byte> buffer, std::span<std::byte> to,
+                             const std::string& where) {
+  const std::size_t raw = contentOf(buffer, to.size());
+  if (raw == 0 || blosc_decompress_ctx(buffer.data(), to.data(), raw, kThreads) != int(raw))
+    throw BadInput(where + ": damaged Blosc buffer");
+  return raw;
+}
+
+void refuseContentAfter(std::uint64_t rawBytes, std::span<const std::byte> content,
+                        const std::string& where) {
+  const auto isZero = [](std::byte b) { return b == std::byte{}; };
+  if (!std::ranges::all_of(content.subspan(rawBytes), isZero))
+    throw BadInput(where + ": content after its end");
 }
 
 bool plausibleSizes(Codec codec, std::uint64_t storedBytes, std::uint64_t rawBytes) {

@@ -1,22 +1,12 @@
 #include <map>
 #include <optional>
 
-#include "core/atomic_file.h"
 #include "esvr/container.h"
 #include "format/byte_source.h"
 #include "format/decode.h"
 #include "format/section_table.h"
 
 namespace esvr {
-
-std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
-                        const ContainerWriteOptions& options) {
-  AtomicFile out(path, options.overwrite);  // refuses an existing file before anything is encoded
-  const auto bytes = encodeEsvr(file);
-  out.write(bytes);
-  out.commit();
-  return bytes.size();
-}
 
 EsvrFile readEsvr(const std::filesystem::path& path, const ReadLimits& limits) {
   return format::decode(format::FileSource(path), limits);

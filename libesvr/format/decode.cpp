@@ -7,6 +7,7 @@
 
 #include "esvr/error.h"
 #include "format/bricks_stream.h"
+#include "format/carried_record.h"
 #include "format/chunk_box.h"
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
@@ -289,6 +290,33 @@ std::vector<MetaItem> readFileMetadata(SectionReader& sections) {
 namespace format {
 namespace {
 
+/// What is read of the bytes of carried grids.
+enum class CarriedBytes { kNothing, kChecked, kAll };
+
+CarriedGrid readCarriedGrid(SectionReader& sections, std::uint32_t number, CarriedBytes bytes) {
+  const SectionId record{SectionKind::kCarried, number};
+  const auto content = sections.get(record);
+  ByteReader in(content, sections.place(record));
+  CarriedGrid grid = getCarried(in);
+  in.finish();
+  const SectionId stored{SectionKind::kCarriedBytes, number};
+  if (bytes == CarriedBytes::kAll) grid.bytes = sections.getLarge(stored);
+  if (bytes == CarriedBytes::kChecked) sections.check(stored);
+  return grid;
+}
+
+void readCarriedGrids(SectionReader& sections, CarriedBytes bytes, EsvrFile& file) {
+  const std::uint32_t count = sections.count(SectionKind::kCarried);
+  for (std::uint32_t c = 0; c < count; ++c)
+    file.carried.push_back(readCarriedGrid(sections, std::uint32_t(file.grids.size()) + c, bytes));
+  try {
+    (void)gridsInOrder(file);
+  } catch (const RuntimeFailure& fault) {
+    throw BadInput(sections.place({SectionKind::kCarried, std::uint32_t(file.grids.size())}) +
+                   ": " + fault.what());
+  }
+}
+
 EsvrFile decodeGrids(SectionReader& sections, const ReadPart* part) {
   EsvrFile file;
   file.metadata = readFileMetadata(sections);
@@ -303,13 +331,17 @@ EsvrFile decodeGrids(SectionReader& sections, const ReadPart* part) {
 EsvrFile decode(const ByteSource& source, const ReadLimits& limits) {
   SectionReader sections(source, limits);
   EsvrFile file = decodeGrids(sections, nullptr);
+  readCarriedGrids(sections, limits.carriedBytes ? CarriedBytes::kAll : CarriedBytes::kChecked,
+                   file);
   sections.finish();
   return file;
 }
 
 EsvrFile decodePart(const ByteSource& source, const ReadPart& part) {
   SectionReader sections(source, part.limits);
-  return decodeGrids(sections, &part);
+  EsvrFile file = decodeGrids(sections, &part);
+  readCarriedGrids(sections, CarriedBytes::kNothing, file);
+  return file;
 }
 
 }  // namespace format

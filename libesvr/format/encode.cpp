@@ -2,9 +2,11 @@
 #include <functional>
 #include <utility>
 
+#include "core/atomic_file.h"
 #include "esvr/container.h"
 #include "format/bricks_stream.h"
 #include "format/byte_writer.h"
+#include "format/carried_record.h"
 #include "format/chunk_box.h"
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
@@ -153,7 +155,28 @@ void addExtras(SectionWriter& out, std::uint32_t g, const StoredGrid& grid) {
     out.add({SectionKind::kCurve, g}, kOptional, putCurve(grid.curve), kDoubleSize);
 }
 
+/// Adds the records of carried grids.
+/// \param first  number of the first of them
+void addCarriedRecords(SectionWriter& out, const std::vector<CarriedGrid>& grids,
+                       std::size_t first) {
+  for (std::size_t c = 0; c < grids.size(); ++c) {
+    ByteWriter content;
+    putCarried(content, grids[c]);
+    out.add({SectionKind::kCarried, std::uint32_t(first + c)}, kOptional, content.take(),
+            kByteSize);
+  }
+}
+
+void addCarriedBytes(SectionWriter& out, const std::vector<CarriedGrid>& grids, std::size_t first) {
+  for (std::size_t c = 0; c < grids.size(); ++c) {
+    if (grids[c].bytes.empty())
+      throw RuntimeFailure("cannot store grid '" + grids[c].name + "': its bytes were not read");
+    out.addLarge({SectionKind::kCarriedBytes, std::uint32_t(first + c)}, grids[c].bytes);
+  }
+}
+
 SectionWriter sectionsOf(const EsvrFile& file) {
+  (void)gridsInOrder(file);  // refuses places that are impossible
   std::vector<SortedGrid> grids;
   for (const auto& grid : file.grids) {
     checkGrid(grid);
@@ -164,17 +187,27 @@ SectionWriter sectionsOf(const EsvrFile& file) {
   SectionWriter out;
   addFileMetadata(out, file);
   for (std::uint32_t g = 0; g < grids.size(); ++g) addGrid(out, g, grids[g]);
+  addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
     addChunks(out, g, grids[g]);
     addExtras(out, g, grids[g].grid);
   }
+  addCarriedBytes(out, file.carried, grids.size());
   return out;
 }
 
 }  // namespace
 
 std::vector<std::byte> encodeEsvr(const EsvrFile& file) { return sectionsOf(file).assemble(); }
+
+std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
+                        const ContainerWriteOptions& options) {
+  AtomicFile out(path, options.overwrite);  // refuses an existing file before anything is encoded
+  const std::uint64_t bytes = sectionsOf(file).writeTo([&](auto piece) { out.write(piece); });
+  out.commit();
+  return bytes;
+}
 
 std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata) {
   return alignUp(encodeEsvr({metadata, {}}).size());
@@ -183,6 +216,13 @@ std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata) {
 std::uint64_t bytesAdded(const StoredGrid& grid) {
   const EsvrFile file{{}, {grid}};
   return sectionsOf(file).bytesUnshared();
+}
+
+std::uint64_t bytesOfCarried(const std::vector<CarriedGrid>& grids) {
+  SectionWriter out;
+  addCarriedRecords(out, grids, 0);
+  addCarriedBytes(out, grids, 0);
+  return out.bytesUnshared();
 }
 
 std::uint64_t bytesAddedTogether(std::vector<StoredGrid> grids) {

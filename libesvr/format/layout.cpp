@@ -17,6 +17,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kChunks, "chunks"},
     {SectionKind::kBricks, "bricks"},
     {SectionKind::kCurve, "curve"},
+    {SectionKind::kCarried, "carried grid"},
     {SectionKind::kLayerErrors, "layer errors"},
     {SectionKind::kCenters, "centers"},
     {SectionKind::kScales, "scales"},
@@ -28,6 +29,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kMask, "mask"},
     {SectionKind::kVoxels, "voxels"},
     {SectionKind::kResidual, "residual"},
+    {SectionKind::kCarriedBytes, "carried bytes"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
 
@@ -51,6 +53,9 @@ std::string nameIn(const Names& names, Id id) {
 std::string nameOf(SectionKind kind) { return nameIn(kKinds, kind); }
 std::string nameOf(Codec codec) { return nameIn(kCodecs, codec); }
 bool known(SectionKind kind) { return find(kKinds, kind) != nullptr; }
+std::uint16_t minorVersionOf(SectionKind kind) {
+  return kind == SectionKind::kCarried || kind == SectionKind::kCarriedBytes ? 1 : 0;
+}
 bool known(Codec codec) { return find(kCodecs, codec) != nullptr; }
 
 }  // namespace esvr::format

@@ -16,7 +16,7 @@ namespace esvr::format {
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
 
 inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
-inline constexpr std::uint16_t kVersionMinor = 0;
+inline constexpr std::uint16_t kVersionMinor = 1;
 
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
@@ -33,6 +33,7 @@ enum class SectionKind : std::uint32_t {
   kBricks = 4,
   kLayerErrors = 6,
   kCurve = 7,
+  kCarried = 8,
   kCenters = 16,
   kScales = 17,
   kRotations = 18,
@@ -43,6 +44,7 @@ enum class SectionKind : std::uint32_t {
   kMask = 35,
   kVoxels = 36,
   kResidual = 37,
+  kCarriedBytes = 38,
 };
 
 enum class Codec : std::uint16_t {
@@ -60,6 +62,8 @@ inline constexpr std::uint64_t kChunkRecordBytes = 44;
 [[nodiscard]] std::string nameOf(SectionKind kind);
 [[nodiscard]] std::string nameOf(Codec codec);
 [[nodiscard]] bool known(SectionKind kind);
+/// The first minor version of the format that has a kind.
+[[nodiscard]] std::uint16_t minorVersionOf(SectionKind kind);
 [[nodiscard]] bool known(Codec codec);
 
 constexpr std::uint64_t alignUp(std::uint64_t offset) {

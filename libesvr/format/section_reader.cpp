@@ -4,6 +4,7 @@
 #include <set>
 
 #include "esvr/error.h"
+#include "format/large_section.h"
 #include "format/table_check.h"
 
 namespace esvr::format {
@@ -52,6 +53,16 @@ std::vector<std::byte> SectionReader::get(const SectionId& id) {
   return readSection(source_, table_, taken);
 }
 
+VoxelArray<std::byte> SectionReader::getLarge(const SectionId& id) {
+  const std::size_t taken = take(id);
+  const std::uint64_t bytes = table_.entries[taken].rawBytes;
+  if (!budget_.voxels().isInFile(bytes))
+    budget_.take(double(bytes), placeOf(source_.name(), table_, taken));
+  return readLarge(source_, table_, taken, budget_.voxels());
+}
+
+void SectionReader::check(const SectionId& id) { checkStored(source_, table_, take(id)); }
+
 std::unique_ptr<ByteSource> SectionReader::open(const SectionId& id, bool whole) {
   const std::size_t taken = take(id);
   const SectionEntry& entry = table_.entries[taken];
@@ -70,8 +81,7 @@ void SectionReader::finish() {
   for (const auto& [id, entry] : unread_) {
     if (known(id.kind))
       throw BadInput(placeOf(source_.name(), table_, entry) + ": belongs to nothing in the file");
-    if (read.insert(placementOf(table_.entries[entry])).second)
-      (void)readStored(source_, table_, entry);
+    if (read.insert(placementOf(table_.entries[entry])).second) checkStored(source_, table_, entry);
   }
 }
 

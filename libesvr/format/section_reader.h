@@ -38,6 +38,13 @@ class SectionReader {
   /// \throws MemoryExceeded  the content exceeds the budget
   [[nodiscard]] std::vector<std::byte> get(const SectionId& id);
 
+  /// Reads the content of a section that may be too large for the heap, like get().
+  [[nodiscard]] VoxelArray<std::byte> getLarge(const SectionId& id);
+
+  /// Checks the checksum of a section whose content is not wanted. It is called instead of get().
+  /// \throws BadInput  the section is damaged or does not exist
+  void check(const SectionId& id);
+
   /// Opens a section that is to be read piece by piece. It is called instead of get(), and once.
   /// \param whole  true: the whole section is read and checked now; false: nothing is checked yet
   /// \throws BadInput  the section is damaged, does not exist, or is compressed

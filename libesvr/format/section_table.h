@@ -45,7 +45,7 @@ struct SectionTable {
   std::uint16_t versionMajor = kVersionMajor, versionMinor = kVersionMinor;
   std::uint64_t fileBytes = 0;
   std::uint64_t tableOffset = kHeaderBytes;
-  std::vector<SectionEntry> entries;
+  std::vector<SectionEntry> entries{};
 };
 
 /// A name for error texts, for example "centers of grid 0, chunk 2".

@@ -3,11 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <utility>
 #include <vector>
 
 #include "esvr/voxel_layer.h"
+#include "esvr/voxel_memory.h"
 #include "format/codec.h"
 #include "format/section_table.h"
 
@@ -27,18 +29,35 @@ class SectionWriter {
   /// \param layer  must outlive the writer
   void addVoxels(const SectionId& id, const VoxelLayer& layer);
 
-  /// Encodes the file. Sections that are stored alike share their bytes.
+  /// Adds a section of bytes that may be too large for the heap, without flags.
+  void addLarge(const SectionId& id, const VoxelArray<std::byte>& content);
+
+  using Sink = std::function<void(std::span<const std::byte>)>;
+  /// Passes the file to the sink, piece by piece. Sections that are stored alike share their bytes.
+  /// \return the size of the file
+  std::uint64_t writeTo(const Sink& sink);
+
+  /// The file in memory.
   [[nodiscard]] std::vector<std::byte> assemble();
 
   /// Bytes of the sections with their padding and their rows of the table, if none shared bytes.
   [[nodiscard]] std::uint64_t bytesUnshared() const;
 
  private:
-  void addPacked(const SectionId& id, std::uint16_t flags, Packed packed);
-  [[nodiscard]] std::size_t indexOf(const SectionEntry& entry, std::vector<std::byte> bytes);
+  /// Stored bytes, in one of two kinds of memory.
+  struct Content {
+    std::vector<std::byte> heap;
+    VoxelArray<std::byte> large;
+    [[nodiscard]] std::span<const std::byte> bytes() const;
+  };
 
-  SectionTable table_;
-  std::vector<std::vector<std::byte>> contents_;      ///< stored bytes without repetitions
+  void addPacked(const SectionId& id, std::uint16_t flags, Packed packed);
+  /// \param entry  without its size and its checksum
+  void addContent(SectionEntry entry, Content content);
+  [[nodiscard]] std::size_t indexOf(const SectionEntry& entry, Content content);
+
+  SectionTable table_{.versionMinor = 0};             ///< the lowest version that has all kinds
+  std::vector<Content> contents_;                     ///< stored bytes without repetitions
   std::vector<std::size_t> contentOf_;                ///< index in contents_ of each entry
   std::multimap<Placement, std::size_t> contentsBy_;  ///< index in contents_, by offset 0
   std::vector<std::pair<const VoxelLayer*, std::size_t>> coded_;  ///< voxels, index in contents_

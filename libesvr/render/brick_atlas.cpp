@@ -11,9 +11,11 @@
 namespace esvr {
 namespace {
 
+/// Reads cells by the place of their brick, which is not relative to the volume's origin.
 class CellReader {
  public:
-  explicit CellReader(const SparseVolume& volume) : volume_(volume), index_(volume.bricks) {}
+  explicit CellReader(const SparseVolume& volume)
+      : volume_(volume), origin_(brickOf(volume.origin)), index_(volume.bricks) {}
 
   /// Reads the voxels at the corners of a brick's cells. \return false if all are the background
   bool read(Coord brick, std::span<float, kCellBrickVoxels> values) const {
@@ -23,13 +25,20 @@ class CellReader {
 
  private:
   [[nodiscard]] const float* find(Coord brick) const {
-    const std::uint32_t at = index_.find(brick);
+    const std::uint32_t at = index_.find(brick - origin_);
     return at == BrickIndex::kNone ? nullptr : volume_.brickValues(at).data();
   }
 
   const SparseVolume& volume_;
+  const Coord origin_;
   const BrickIndex index_;
 };
+
+std::vector<Coord> placesOf(const SparseVolume& volume) {
+  std::vector<Coord> places(volume.bricks);
+  for (Coord& place : places) place = place + brickOf(volume.origin);
+  return places;
+}
 
 /// The candidates that have a voxel other than the background.
 std::vector<Coord> occupied(const CellReader& reader, const std::vector<Coord>& all) {
@@ -53,14 +62,15 @@ std::vector<const float*> BrickAtlas::pages() const {
   return pages;
 }
 
-BrickAtlas makeBrickAtlas(const SparseVolume& volume) {
+BrickAtlas makeBrickAtlas(const SparseVolume& volume, std::uint32_t first) {
   const CellReader reader(volume);
-  const std::vector<Coord> bricks = occupied(reader, bricksWithCells(volume.bricks));
-  BrickAtlas atlas{makeBrickTable(bricks, volume.origin), {}};
-  atlas.values.resize(bricks.size() * kCellBrickVoxels);
-  tbb::parallel_for(std::size_t(0), bricks.size(), [&](std::size_t i) {
-    (void)reader.read(bricks[i], std::span<float, kCellBrickVoxels>(
-                                     &atlas.values[i * kCellBrickVoxels], kCellBrickVoxels));
+  BrickAtlas atlas{makeBrickTable(occupied(reader, bricksWithCells(placesOf(volume))), first), {}};
+  const std::size_t count = atlas.table.bricks.size();
+  atlas.values.resize(count * kCellBrickVoxels);
+  tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+    (void)reader.read(
+        atlas.table.place(i),
+        std::span<float, kCellBrickVoxels>(&atlas.values[i * kCellBrickVoxels], kCellBrickVoxels));
   });
   return atlas;
 }

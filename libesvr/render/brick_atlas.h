@@ -18,6 +18,8 @@ struct BrickAtlas {
   [[nodiscard]] std::vector<const float*> pages() const;
 };
 
-[[nodiscard]] BrickAtlas makeBrickAtlas(const SparseVolume& volume);
+/// \param first   number of the first brick
+/// \throws UsageError  as for makeBrickTable
+[[nodiscard]] BrickAtlas makeBrickAtlas(const SparseVolume& volume, std::uint32_t first = 0);
 
 }  // namespace esvr

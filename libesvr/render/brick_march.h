@@ -4,6 +4,7 @@
 /// empty block of bricks, in one step. A ray that meets a brick whose voxels are not there stops,
 /// and can continue later. The code is compiled for host and device.
 
+#include <bit>
 #include <cstdint>
 
 #include "render/march_scene.h"
@@ -19,12 +20,22 @@ inline constexpr int kBlockSide = kBlockBricks * kBrickSide;  ///< voxels
 inline constexpr int kBricksOfBlock = kBlockBricks * kBlockBricks * kBlockBricks;
 inline constexpr std::uint32_t kNoCells = 0xffffffffu;
 
+/// Bricks of a block that follow each other (z fastest).
+struct alignas(16) BrickRow {
+  static constexpr int kLength = 64;
+
+  std::uint64_t there;  ///< bit i is set if brick i has a number
+  std::uint32_t first;  ///< number of the first brick that has one; the others follow in order
+};
+inline constexpr int kRowsOfBlock = kBricksOfBlock / BrickRow::kLength;
+static_assert(BrickRow::kLength == kBlockBricks * kBlockBricks, "a row has the bricks of one x");
+
 /// Numbers the bricks of cells. Pointers are to host or device memory.
 struct BrickTableView {
   Coord origin;                  ///< first voxel of the first block
   Coord blocks;                  ///< number of blocks along each axis
   const std::uint32_t* blockOf;  ///< number of each block, or kNoCells; z fastest
-  const std::uint32_t* brickOf;  ///< by block: number of each brick, or kNoCells; z fastest
+  const BrickRow* rows;          ///< kRowsOfBlock for each block
 };
 
 /// The voxels of bricks. They lie in slots, and the slots in pages.
@@ -55,29 +66,43 @@ namespace brick_march {
 /// The brick that has a cell, or the empty cube around the cell: a brick or a whole block.
 struct Found {
   std::uint32_t brick;  ///< kNoCells: empty
-  Coord low;            ///< lowest corner of the brick or cube
-  int side;
+  Coord low;            ///< lowest corner of the brick or cube, a multiple of its side
+  int side;             ///< a power of two
 
   [[nodiscard]] ESVR_HD bool contains(const Coord& cell) const {
-    const Coord past{cell.x - low.x, cell.y - low.y, cell.z - low.z};
-    return past.x >= 0 && past.y >= 0 && past.z >= 0 && past.x < side && past.y < side &&
-           past.z < side;
+    return (((cell.x ^ low.x) | (cell.y ^ low.y) | (cell.z ^ low.z)) & ~(side - 1)) == 0;
   }
 };
+/// An empty cube of one cell.
+ESVR_HD inline Found nothingAt(const Coord& cell) { return {kNoCells, cell, 1}; }
+
+ESVR_HD inline std::uint32_t countBits(std::uint64_t word) {
+#ifdef __CUDA_ARCH__
+  return std::uint32_t(__popcll(word));
+#else
+  return std::uint32_t(std::popcount(word));
+#endif
+}
+
+/// The number of a brick of a row, or kNoCells.
+ESVR_HD inline std::uint32_t numberIn(const BrickRow& row, int brick) {
+  const std::uint64_t bit = std::uint64_t{1} << brick;
+  return (row.there & bit) == 0 ? kNoCells : row.first + countBits(row.there & (bit - 1));
+}
 
 /// \param v  cell relative to the table's origin; it must lie within the blocks
 ESVR_HD inline Found find(const BrickTableView& a, const Coord& v) {
-  const Coord block{v.x / kBlockSide, v.y / kBlockSide, v.z / kBlockSide};
-  const std::uint32_t number =
-      a.blockOf[(std::size_t(block.x) * a.blocks.y + block.y) * a.blocks.z + block.z];
+  constexpr int kBlockLog2 = 6, kMask = kBlockBricks - 1;
+  static_assert(kBlockSide == 1 << kBlockLog2);
+  const Coord block{v.x >> kBlockLog2, v.y >> kBlockLog2, v.z >> kBlockLog2};
+  const std::uint32_t number = a.blockOf[(block.x * a.blocks.y + block.y) * a.blocks.z + block.z];
   if (number == kNoCells)
-    return {
-        kNoCells, {block.x * kBlockSide, block.y * kBlockSide, block.z * kBlockSide}, kBlockSide};
+    return {kNoCells,
+            {block.x << kBlockLog2, block.y << kBlockLog2, block.z << kBlockLog2},
+            kBlockSide};
   const Coord brick{v.x >> kBrickLog2, v.y >> kBrickLog2, v.z >> kBrickLog2};
-  constexpr int kMask = kBlockBricks - 1;
-  const int inBlock =
-      ((brick.x & kMask) * kBlockBricks + (brick.y & kMask)) * kBlockBricks + (brick.z & kMask);
-  return {a.brickOf[std::size_t(number) * kBricksOfBlock + inBlock],
+  const BrickRow row = a.rows[number * kRowsOfBlock + std::uint32_t(brick.x & kMask)];
+  return {numberIn(row, (brick.y & kMask) * kBlockBricks + (brick.z & kMask)),
           {brick.x << kBrickLog2, brick.y << kBrickLog2, brick.z << kBrickLog2},
           kBrickSide};
 }
@@ -100,8 +125,10 @@ ESVR_HD inline Coord cellOf(const FloatPlace& p) {
 }
 
 ESVR_HD inline bool inside(const BrickTableView& a, const Coord& v) {
-  return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < a.blocks.x * kBlockSide &&
-         v.y < a.blocks.y * kBlockSide && v.z < a.blocks.z * kBlockSide;
+  // Negative numbers become too large ones.
+  return std::uint32_t(v.x) < std::uint32_t(a.blocks.x * kBlockSide) &&
+         std::uint32_t(v.y) < std::uint32_t(a.blocks.y * kBlockSide) &&
+         std::uint32_t(v.z) < std::uint32_t(a.blocks.z * kBlockSide);
 }
 
 }  // namespace brick_march
@@ -109,7 +136,8 @@ ESVR_HD inline bool inside(const BrickTableView& a, const Coord& v) {
 /// A ray whose first samples have been added.
 struct RayProgress {
   RayState ray;
-  int next = 0;  ///< first sample that has not been added
+  int next = 0;   ///< first sample that has not been added
+  int level = 0;  ///< place of that sample's level in a LevelScene
 };
 
 /// The visitor of a march whose bricks all have slots or are vacant.
@@ -130,19 +158,16 @@ ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
                                 const MarchScene& scene, const MarchSamples& samples,
                                 RayProgress& at, Visitor& visitor) {
   using namespace brick_march;
-  Found found{kNoCells, {0, 0, 0}, 0};
+  Found found = nothingAt({-1, -1, -1});
   const float* values = nullptr;
   bool looksAhead = false;
   for (int i = at.next > samples.begin ? at.next : samples.begin;
        i < samples.end && scene.rule.open(at.ray);) {
     const FloatPlace place = samples.at(i);
     const Coord cell = cellOf(place);
-    if (!inside(table, cell)) {  // rounding can move a place beyond the box
-      ++i;
-      continue;
-    }
     if (!found.contains(cell)) {
-      found = find(table, cell);
+      // Rounding can move a place beyond the box.
+      found = inside(table, cell) ? find(table, cell) : nothingAt(cell);
       const std::uint32_t slot =
           found.brick == kNoCells ? BrickSlotsView::kVacant : slots.slot(found.brick);
       const bool there = slots.hasSlot(slot);

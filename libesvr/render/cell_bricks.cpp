@@ -1,7 +1,11 @@
 #include "render/cell_bricks.h"
 
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <iterator>
+
+#include "esvr/sparse_volume.h"
 
 namespace esvr {
 namespace {
@@ -16,6 +20,22 @@ std::vector<Coord> withShifted(const std::vector<Coord>& bricks, Coord step) {
 }
 
 }  // namespace
+
+std::vector<Coord> bricksAt(std::span<const Coord> corners) {
+  std::vector<Coord> bricks;
+  bricks.reserve(corners.size());
+  for (const Coord corner : corners) bricks.push_back(brickOf(corner));
+  return bricks;
+}
+
+std::vector<Coord> coarserBricks(std::span<const Coord> bricks) {
+  std::vector<Coord> coarser;
+  coarser.reserve(bricks.size());
+  for (const Coord b : bricks) coarser.push_back({b.x >> 1, b.y >> 1, b.z >> 1});
+  tbb::parallel_sort(coarser);
+  coarser.erase(std::unique(coarser.begin(), coarser.end()), coarser.end());
+  return coarser;
+}
 
 std::vector<Coord> bricksWithCells(std::span<const Coord> voxels) {
   std::vector<Coord> bricks(voxels.begin(), voxels.end());

@@ -1,12 +1,14 @@
 #include "render/cell_field.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "core/cell_corner.h"
 #include "field/brick_pairs.h"
 #include "field/count_bricks.h"
 #include "field/gather.h"
+#include "render/cell_bricks.h"
 
 namespace esvr {
 namespace {
@@ -35,22 +37,22 @@ std::uint8_t cornersIn(const BrickIndex& given, Coord brick) {
   return std::uint8_t(bits);
 }
 
-/// The bricks whose voxels are not all outside the given ones, and their corners.
-struct Restricted {
-  std::vector<Coord> bricks;
-  std::vector<std::uint8_t> corners;
-};
-Restricted restrictedTo(std::span<const Coord> givenCorners, const std::vector<Coord>& reached) {
-  std::vector<Coord> given;
-  for (const Coord corner : givenCorners) given.push_back(brickOf(corner));
-  const BrickIndex index(given);
-  Restricted kept;
-  for (const Coord brick : reached)
-    if (const std::uint8_t corners = cornersIn(index, brick); corners != 0) {
-      kept.bricks.push_back(brick);
-      kept.corners.push_back(corners);
-    }
+/// The bricks of cells of which a corner lies in a given brick of voxels.
+std::vector<Coord> withCornersIn(const BrickIndex& given, const std::vector<Coord>& bricks) {
+  std::vector<Coord> kept;
+  std::ranges::copy_if(bricks, std::back_inserter(kept),
+                       [&](Coord brick) { return cornersIn(given, brick) != 0; });
   return kept;
+}
+
+/// Numbers the bricks that supports reach.
+void numberBricks(CellField& cells, std::vector<Coord> reached, const RevoxeliseOptions& voxels) {
+  const BrickIndex given(bricksAt(voxels.bricks));
+  if (voxels.restrictToBricks) reached = withCornersIn(given, reached);
+  cells.table = makeBrickTable(std::move(reached));
+  if (!voxels.restrictToBricks) return;
+  for (std::size_t i = 0; i < cells.table.bricks.size(); ++i)
+    cells.corners.push_back(cornersIn(given, cells.table.place(i)));
 }
 
 }  // namespace
@@ -63,14 +65,11 @@ CellField makeCellField(const Field& field, const RevoxeliseOptions& voxels) {
   std::ranges::transform(reach, reach.begin(), reachOfCells);
   requireListable(reach, bricksOf(Box::whole()));
   const SupportOf supportOf = [&](std::size_t i) { return reach[i]; };
-  Restricted bricks{missingBricks(BrickIndex(std::span<const Coord>{}), reach.size(), supportOf),
-                    {}};
-  if (voxels.restrictToBricks) bricks = restrictedTo(voxels.bricks, bricks.bricks);
-  BrickPairs pairs = pairsWithin(BrickIndex(bricks.bricks), reach.size(), supportOf);
+  numberBricks(cells, missingBricks(BrickIndex(std::span<const Coord>{}), reach.size(), supportOf),
+               voxels);
+  BrickPairs pairs = pairsWithin(BrickIndex(placesOf(cells.table)), reach.size(), supportOf);
   cells.begin = std::move(pairs.brickBegin);
   cells.ellipsoid = std::move(pairs.ellipsoid);
-  cells.corners = std::move(bricks.corners);
-  cells.table = makeBrickTable(std::move(bricks.bricks), {0, 0, 0});
   cells.kernels = std::move(gathered.kernels);
   cells.origins = std::move(gathered.origins);
   cells.rule = makeVoxelRule(field.background, voxels);

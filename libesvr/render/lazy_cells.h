@@ -70,24 +70,41 @@ class LazyCells {
   /// \throws UsageError      as for makeBrickTable
   LazyCells(const Field& field, const RevoxeliseOptions& voxels);
 
-  [[nodiscard]] const BrickTable& table() const { return table_; }
   [[nodiscard]] float background() const { return rule_.background; }
+  /// Makes levels of detail up to this one; no thread may read at the same time.
+  /// \throws UsageError  as for makeBrickTable
+  void prepare(int lastLevel);
+  /// The bricks of level 0, or of a level that was prepared.
+  [[nodiscard]] const BrickTable& table(int level) const {
+    return levels_[std::size_t(level)]->table;
+  }
   /// The voxels of a brick of cells, or null if all of them are the background.
   [[nodiscard]] const float* values(std::uint32_t brick) const;
   void forget();
 
  private:
-  [[nodiscard]] const float* voxelsOf(std::uint32_t brick) const;
-  [[nodiscard]] bool fill(std::uint32_t brick, std::span<float, kCellBrickVoxels> values) const;
+  struct Level {
+    /// \param bricks  bricks of voxels of the level
+    Level(std::span<const Coord> bricks, std::uint32_t firstCells);
+
+    BrickIndex index;  ///< of the bricks of voxels
+    BrickTable table;
+    LazyArrays<kBrickVoxels> voxels;
+    LazyArrays<kCellBrickVoxels> cells;
+  };
+
+  [[nodiscard]] int levelOf(std::uint32_t brick) const;
+  [[nodiscard]] const float* voxelsOf(int level, Coord brick) const;
+  bool decode(std::uint32_t number, std::span<float, kBrickVoxels> values) const;
+  bool average(int level, Coord brick, std::span<float, kBrickVoxels> values) const;
+  [[nodiscard]] bool fill(int level, std::size_t brick,
+                          std::span<float, kCellBrickVoxels> values) const;
 
   PreparedField field_;
   VoxelRule rule_;
-  std::vector<Coord> corners_;  ///< index corners of the bricks of voxels
+  std::vector<Coord> corners_;  ///< index corners of the bricks of voxels of level 0
   BrickEvaluator evaluator_;
-  BrickIndex index_;  ///< of the bricks of voxels
-  BrickTable table_;
-  LazyArrays<kBrickVoxels> voxels_;
-  LazyArrays<kCellBrickVoxels> cells_;
+  std::vector<std::unique_ptr<Level>> levels_;
 };
 
 /// The bricks of LazyCells for marchBricks().

@@ -48,12 +48,16 @@ ESVR_HD inline FloatPlace floatPlace(const Vec3& v) {
   return {float(v[0]), float(v[1]), float(v[2])};
 }
 
+/// The samples of a ray in the box and in the clip box.
+ESVR_HD inline SampleRange samplesInScene(const MarchScene& s, const Ray& ray) {
+  return samplesIn(within(ray, s.box), s.step).both(samplesIn(ray, s.clip, s.step));
+}
+
 /// \param wanted  further limit on the range of samples
 ESVR_HD inline MarchSamples samplesOf(const MarchScene& s, int column, int row,
                                       const SampleRange& wanted) {
   const Ray ray = s.view.ray(column, row);
-  const SampleRange range =
-      samplesIn(within(ray, s.box), s.step).both(samplesIn(ray, s.clip, s.step));
+  const SampleRange range = samplesInScene(s, ray);
   const SampleRange both = range.both(wanted);
   if (!(both.first <= both.last)) return {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0.0f, 0, 0};
   const FloatPlace apart = floatPlace(scaled(ray.direction, s.step));

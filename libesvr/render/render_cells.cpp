@@ -3,7 +3,8 @@
 #include <tbb/blocked_range2d.h>
 #include <tbb/parallel_for.h>
 
-#include "render/picture.h"
+#include "render/level_march.h"
+#include "render/level_tables.h"
 #include "render/scene_depth.h"
 #include "render/tile_ranges.h"
 
@@ -12,25 +13,36 @@ namespace {
 
 Vec3 placeOf(Coord c) { return {double(c.x), double(c.y), double(c.z)}; }
 
-/// The parameters of all rays, relative to the origin of the cells.
-MarchScene sceneOf(const LazyCells& cells, const RenderOptions& o, const Picture& picture) {
-  const Vec3 origin = placeOf(cells.table().origin);
-  MarchScene scene{picture.view, cellsOf(cells.table()), o.step, clipOf(o),
-                   sampleRule(o, picture.table.view(), cells.background())};
-  scene.view.eye = difference(scene.view.eye, origin);
-  scene.clip.box = {difference(scene.clip.box.low, origin),
-                    difference(scene.clip.box.high, origin)};
+/// A box that contains all cells, in index space.
+PlaceBox boxOf(const BrickTable& table) {
+  const PlaceBox cells = cellsOf(table);
+  const Vec3 origin = placeOf(table.origin);
+  return {sum(cells.low, origin), sum(cells.high, origin)};
+}
+
+LevelScene sceneOf(LazyCells& cells, const RenderOptions& o, const Picture& picture) {
+  const SampleRule rule = sampleRule(o, picture.table.view(), cells.background());
+  LevelScene scene{{picture.view, {}, o.step, clipOf(o), rule},
+                   levelBounds(o, picture.view, boxOf(cells.table(0))),
+                   {}};
+  cells.prepare(scene.bounds.last);
   return scene;
 }
 
 class CellPicture {
  public:
-  CellPicture(const LazyCells& cells, const RenderOptions& options, Picture& picture)
+  CellPicture(LazyCells& cells, const RenderOptions& options, Picture& picture)
       : cells_(cells),
         scene_(sceneOf(cells, options, picture)),
-        view_{scene_.view, options.resolution, options.step, firstSample(options.step)},
-        ranges_(view_, cells.table().bricks),
-        picture_(picture) {}
+        tables_(picture, options, scene_.bounds),
+        last_{scene_.bounds.last},
+        view_{viewOfLast(), options.resolution, options.step, firstSample()},
+        ranges_(view_, lastTable().bricks),
+        picture_(picture) {
+    for (int level = scene_.bounds.first; level <= scene_.bounds.last; ++level)
+      scene_.levels[level - scene_.bounds.first] = {
+          cells.table(level).view(), cellsOf(cells.table(level)), tables_.view(level)};
+  }
 
   [[nodiscard]] const TileRanges& tiles() const { return ranges_; }
 
@@ -46,22 +58,29 @@ class CellPicture {
   }
 
  private:
-  [[nodiscard]] double firstSample(double step) const {
-    const BinRange bins = binsWithin(scene_.box, scene_.view, step);
+  [[nodiscard]] const BrickTable& lastTable() const { return cells_.table(last_.level); }
+  /// Tiles find their ranges among the bricks of the coarsest level, which are the fewest.
+  [[nodiscard]] View viewOfLast() const {
+    return sceneOfLevel(scene_.scene, last_, lastTable().origin).view;
+  }
+  [[nodiscard]] double firstSample() const {
+    const BinRange bins = binsWithin(cellsOf(lastTable()), viewOfLast(), scene_.scene.step);
     checkRayLength(bins);
     return double(bins.first) * kBinSamples;
   }
   [[nodiscard]] PixelColor pixel(int column, int row, const TileSamples& range) const {
-    const MarchSamples samples = samplesOf(
-        scene_, column, row, {view_.firstSample + range.first, view_.firstSample + range.last});
+    const SampleRange wanted{(view_.firstSample + range.first) * last_.side(),
+                             (view_.firstSample + range.last) * last_.side()};
     RayProgress ray;
     AllBricksAreThere visitor;
-    (void)marchBricks(cells_.table().view(), LazySlots{cells_}, scene_, samples, ray, visitor);
-    return scene_.rule.finished(ray.ray);
+    (void)marchLevels<MarchCode{}>(scene_, LazySlots{cells_}, column, row, wanted, ray, visitor);
+    return scene_.at(ray.level).rule.finished(ray.ray);
   }
 
   const LazyCells& cells_;
-  MarchScene scene_;
+  LevelScene scene_;
+  LevelTables tables_;
+  LevelFrame last_;
   CoverView view_;
   TileRanges ranges_;
   Picture& picture_;
@@ -69,9 +88,9 @@ class CellPicture {
 
 }  // namespace
 
-Image renderCells(const LazyCells& cells, const RenderOptions& options) {
+Image renderCells(LazyCells& cells, const RenderOptions& options) {
   Picture picture(options);
-  if (cells.table().bricks.empty()) return picture.take();
+  if (cells.table(0).bricks.empty()) return picture.take();
   const CellPicture drawing(cells, options, picture);
   using Tiles = tbb::blocked_range2d<int>;
   tbb::parallel_for(

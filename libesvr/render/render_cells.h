@@ -7,6 +7,6 @@ namespace esvr {
 
 /// Draws the picture of renderField() with Between::kVoxels.
 /// \throws UsageError, Cancelled  as for renderField
-[[nodiscard]] Image renderCells(const LazyCells& cells, const RenderOptions& options);
+[[nodiscard]] Image renderCells(LazyCells& cells, const RenderOptions& options);
 
 }  // namespace esvr

@@ -62,7 +62,8 @@ Image renderField(const Field& field, const RenderOptions& options,
                   const RevoxeliseOptions& voxels) {
   if (options.between == Between::kSum) return renderSum(field, options, voxels);
   checkRenderOptions(options);
-  return renderCells(LazyCells(field, voxels), options);
+  LazyCells cells(field, voxels);
+  return renderCells(cells, options);
 }
 
 }  // namespace esvr

@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
-#include "esvr/render.h"
-#include "render/picture.h"
-#include "render/ray_box.h"
+#include "render/level_tables.h"
+#include "render/render_levels.h"
+#include "render/scene_depth.h"
 #include "render/voxel_sampler.h"
 
 namespace esvr {
@@ -22,61 +23,118 @@ double behindBrick(const Ray& ray, Coord brick, double sample, double step) {
   return std::max(sample + 1.0, std::ceil(within(ray, {low, high}).end / step - kRounding));
 }
 
+/// Marches rays through a volume or one of its coarser levels.
 class RayMarch {
  public:
-  RayMarch(const SparseVolume& volume, const RenderOptions& options, const Picture& picture)
-      : options_(options),
-        picture_(picture),
-        sampler_(volume),
-        rule_(sampleRule(options, picture.table.view(), volume.background)),
-        origin_{double(volume.origin.x), double(volume.origin.y), double(volume.origin.z)} {}
+  /// \param scene   in the index space of level 0; its box is not used
+  /// \param volume  the voxels of the level
+  RayMarch(const SparseVolume& volume, LevelFrame frame, const MarchScene& scene)
+      : sampler_(volume), scene_(sceneOfLevel(scene, frame, volume.origin)) {
+    scene_.box = {sampler_.low(), sampler_.high()};
+  }
+  [[nodiscard]] const MarchScene& scene() const { return scene_; }
 
-  [[nodiscard]] PixelColor operator()(int column, int row) const {
-    RayState state;
-    Ray ray = picture_.view.ray(column, row);
-    const SampleRange clip = samplesIn(ray, clipOf(options_), options_.step);
-    ray.origin = difference(ray.origin, origin_);
-    const RayInterval t = within(ray, {sampler_.low(), sampler_.high()});
-    const SampleRange range = samplesIn(t, options_.step).both(clip);
-    for (double sample = range.first; range.has(sample) && rule_.open(state);)
+  /// Adds the samples of a range to a ray.
+  void march(const Ray& ray, const SampleRange& wanted, RayState& state) const {
+    const SampleRange range = samplesInScene(scene_, ray).both(wanted);
+    for (double sample = range.first; range.has(sample) && scene_.rule.open(state);)
       sample = advance(ray, sample, state);
-    return rule_.finished(state);
   }
 
  private:
   /// Adds a sample to the ray. \return the number of the next sample to visit
   double advance(const Ray& ray, double sample, RayState& state) const {
-    const Vec3 place = sum(ray.origin, scaled(ray.direction, sample * options_.step));
+    const Vec3 place = sum(ray.origin, scaled(ray.direction, sample * scene_.step));
     const Cell cell = cellOf(place);
     const auto brick = brickOf(cell.voxel);
     const VoxelSampler::Corners* corners = sampler_.find(brick);
-    if (corners == nullptr) return behindBrick(ray, brick, sample, options_.step);
+    if (corners == nullptr) return behindBrick(ray, brick, sample, scene_.step);
     const float value = sampler_.interpolate(*corners, cell);
-    if (value != rule_.background) rule_.add(state, value, sampleNumber(sample));
+    if (value != scene_.rule.background) scene_.rule.add(state, value, sampleNumber(sample));
     return sample + 1.0;
   }
 
-  const RenderOptions& options_;
-  const Picture& picture_;
   VoxelSampler sampler_;
-  SampleRule rule_;
-  Vec3 origin_;
+  MarchScene scene_;
+};
+
+/// A box that contains all voxels of a volume.
+PlaceBox boxOf(const SparseVolume& volume) {
+  Box box;
+  for (const Coord brick : volume.bricks) box.expand(brick);
+  const Coord low = volume.origin + box.min * kBrickSide;
+  const Coord high = volume.origin + (box.max + Coord{1, 1, 1}) * kBrickSide;
+  return {{double(low.x) - 1.0, double(low.y) - 1.0, double(low.z) - 1.0},
+          {double(high.x), double(high.y), double(high.z)}};
+}
+
+class VolumePicture {
+ public:
+  VolumePicture(VolumeLevels& levels, const RenderOptions& options, const Picture& picture)
+      : bounds_(levelBounds(options, picture.view, boxOf(levels[0]))),
+        tables_(picture, options, bounds_) {
+    levels.prepare(bounds_.last);
+    const float background = levels[0].background;
+    for (int level = bounds_.first; level <= bounds_.last; ++level)
+      marches_.emplace_back(levels[level], LevelFrame{level},
+                            MarchScene{picture.view,
+                                       {},
+                                       options.step,
+                                       clipOf(options),
+                                       sampleRule(options, tables_.view(level), background)});
+  }
+
+  [[nodiscard]] PixelColor operator()(int column, int row) const {
+    RayState state;
+    for (int level = bounds_.first; level <= bounds_.last; ++level) {
+      const RayMarch& march = marches_[std::size_t(level - bounds_.first)];
+      march.march(march.scene().view.ray(column, row), rangeOf(level), state);
+      if (level == bounds_.last || !march.scene().rule.open(state))
+        return march.scene().rule.finished(state);
+      passOn(march.scene().rule, level, state);
+    }
+    return {};
+  }
+
+ private:
+  /// The samples of a level, by its own numbers. The one at which the next level begins belongs to
+  /// both levels, so that the segment before it is drawn in the nearer one.
+  [[nodiscard]] SampleRange rangeOf(int level) const {
+    const double side = LevelFrame{level}.side();
+    const double first =
+        level == bounds_.first ? 0.0 : bounds_.begin[std::size_t(level)] / side + 1.0;
+    return {first, bounds_.begin[std::size_t(level) + 1] / side};
+  }
+  void passOn(const SampleRule& rule, int level, RayState& state) const {
+    const double shared = bounds_.begin[std::size_t(level) + 1], side = LevelFrame{level}.side();
+    rule.passOn(state, sampleNumber(shared / side).index,
+                sampleNumber(shared / (2.0 * side)).index);
+  }
+
+  LevelBounds bounds_;
+  LevelTables tables_;
+  std::vector<RayMarch> marches_;
 };
 
 }  // namespace
 
-Image renderVolume(const SparseVolume& volume, const RenderOptions& options) {
+Image renderLevels(VolumeLevels& levels, const RenderOptions& options) {
   Picture picture(options);
-  if (volume.bricks.empty()) return picture.take();
-  const RayMarch march(volume, options, picture);
+  if (levels[0].bricks.empty()) return picture.take();
+  const VolumePicture pixel(levels, options, picture);
   tbb::parallel_for(tbb::blocked_range<int>(0, options.resolution.height), [&](const auto& rows) {
     for (int row = rows.begin(); row != rows.end(); ++row) {
       checkCancelled(options);
       for (int column = 0; column < options.resolution.width; ++column)
-        picture.set(column, row, march(column, row));
+        picture.set(column, row, pixel(column, row));
     }
   });
   return picture.take();
+}
+
+Image renderVolume(const SparseVolume& volume, const RenderOptions& options) {
+  VolumeLevels levels(volume);
+  return renderLevels(levels, options);
 }
 
 }  // namespace esvr

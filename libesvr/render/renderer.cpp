@@ -7,6 +7,7 @@
 #include "esvr/error.h"
 #include "render/cuda/make_cuda_renderer.h"
 #include "render/render_cells.h"
+#include "render/render_levels.h"
 
 namespace esvr {
 namespace {
@@ -49,6 +50,13 @@ struct FieldDrawing {
   const Field& field;
   const RevoxeliseOptions voxels;
   std::unique_ptr<LazyCells> cells{};
+};
+
+/// Draws a volume on the CPU. Its levels of detail are kept from picture to picture.
+struct VolumeDrawing {
+  Image operator()(const RenderOptions& options) { return renderLevels(levels, options); }
+
+  VolumeLevels levels;
 };
 
 /// Draws a field on a CUDA device with one renderer for each rule between voxels. A renderer is
@@ -110,7 +118,7 @@ std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& de
 std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume, const Device& device,
                                              const RendererLimits& limits) {
   if (device.kind == DeviceKind::kCuda) return cuda::makeCudaVolumeRenderer(volume, device, limits);
-  return makeCpuRenderer([&volume](const RenderOptions& o) { return renderVolume(volume, o); });
+  return makeCpuRenderer(VolumeDrawing{VolumeLevels(volume)});
 }
 
 std::unique_ptr<Renderer> makeNanoRenderer(const NanoVolume& volume, const Device& device,

@@ -24,7 +24,7 @@ struct SampleNumber {
 /// depends on the mode:
 ///  - kComposite: the color so far, premultiplied by opacity;
 ///  - kMaximum: r is the largest value, g the number of values;
-///  - kAverage: r is the sum of the values, g their number;
+///  - kAverage: r is the sum of the values, each times the step, and g the sum of the steps;
 ///  - kDepth: r is the distance, g is 1 once the distance is known.
 /// With Classification::kPreIntegrated, the first and the last sample that were added are kept. A
 /// part that lies behind other samples leaves out the light before its first sample, because it
@@ -65,7 +65,7 @@ struct SampleRule {
   /// Adds a sample that is not empty space. Samples that are left out are empty space.
   ESVR_HD void add(RayState& ray, float value, const SampleNumber& number) const {
     if (mode == RenderMode::kMaximum) return keepLargest(ray, value, 1.0f);
-    if (mode == RenderMode::kAverage) return sumUp(ray, value, 1.0f);
+    if (mode == RenderMode::kAverage) return sumUp(ray, value * step, step);
     if (classification == Classification::kPost) {
       setDistance(ray, number.fromEye * step);
       return absorb(ray, premultiplied(table(value)));
@@ -75,6 +75,14 @@ struct SampleRule {
     else
       addSegments(ray, value, number);
     ray.last = number.index, ray.lastValue = value;
+  }
+
+  /// Goes on to samples that follow another rule, for example in another level of detail. Their first
+  /// one is the sample that this rule has reached.
+  /// \param here, there  index of that sample in the old and in the new samples
+  ESVR_HD void passOn(RayState& ray, std::uint32_t here, std::uint32_t there) const {
+    if (ray.last != here) leave(ray);
+    if (ray.last != RayState::kNone) ray.last = ray.last == here ? there : RayState::kNone;
   }
 
   /// Adds the samples that lie behind those of `ray` and were gathered in `behind`, a part that
@@ -148,11 +156,12 @@ struct SampleRule {
 
 /// The sampling that the tables of a picture are made for. In kMaximum and kAverage one value stands
 /// for the whole ray, and has the opacity of the transfer function.
-[[nodiscard]] inline Sampling samplingOf(const RenderOptions& options) {
+/// \param times  length of a step in units of options.step
+[[nodiscard]] inline Sampling samplingOf(const RenderOptions& options, double times = 1.0) {
   const bool alongRay =
       options.mode == RenderMode::kComposite || options.mode == RenderMode::kDepth;
   if (!alongRay) return {1.0, false};
-  return {options.step / options.opacityLength,
+  return {options.step * times / options.opacityLength,
           options.classification == Classification::kPreIntegrated};
 }
 

@@ -67,8 +67,8 @@ SegmentTable::SegmentTable(const TransferFunction& f, double length) {
   for (std::size_t n = 0; n < means.size(); ++n) {
     SegmentEntry& entry = entries_.emplace_back();
     for (std::size_t c = 0; c < before.size(); ++c) {
-      entry.before[c] = std::uint32_t(before[c] * unitsOfOne);
-      entry.mean[c] = float(means[n][c]);
+      entry.before.c[c] = std::uint32_t(before[c] * unitsOfOne);
+      entry.mean.c[c] = float(means[n][c]);
     }
     if (n > 0) addTimes(before, means[n], 1.0);
   }

@@ -26,11 +26,17 @@ struct alignas(16) PixelColor {
 /// SegmentTableView::kMaxExtinction. An opacity therefore errs by less than 1e-4, however much
 /// larger the extinction of other values is. Floats of the same size would err by 256 times as
 /// much, and float64 is slow on many GPUs.
-struct alignas(16) SegmentEntry {
+struct SegmentEntry {
   static constexpr int kChannels = 4, kExtinction = 3;
 
-  std::uint32_t before[kChannels];  ///< integrals from the table's lowest value to the interval
-  float mean[kChannels];            ///< mean over the interval
+  /// The channels of an entry, which a device reads at once.
+  template <class T>
+  struct alignas(16) Channels {
+    T c[kChannels];
+  };
+
+  Channels<std::uint32_t> before;  ///< integrals from the table's lowest value to the interval
+  Channels<float> mean;            ///< mean over the interval
 };
 
 /// The values between two places of a table. Places count intervals from the table's lowest value.
@@ -56,16 +62,23 @@ struct SegmentSpan {
     inFirst = same ? 0.0f : (float(i) - from) * ofWhole;
     inLast = same ? 1.0f : (to - float(j - 1)) * ofWhole;
   }
+  /// The means of the channels; alpha is the extinction.
   /// \param unit  what one unit of the integrals stands for
-  [[nodiscard]] ESVR_HD float mean(int channel, float unit) const {
-    return inFirst * first->mean[channel] + inLast * last->mean[channel] +
-           float(last->before[channel] - next->before[channel]) * (unit * ofWhole);
+  [[nodiscard]] ESVR_HD PixelColor means(float unit) const {
+    const SegmentEntry::Channels<float> a = first->mean, b = last->mean;
+    const SegmentEntry::Channels<std::uint32_t> begin = next->before, end = last->before;
+    const float ofUnit = unit * ofWhole;
+    const auto mean = [&](int c) {
+      return inFirst * a.c[c] + inLast * b.c[c] + float(end.c[c] - begin.c[c]) * ofUnit;
+    };
+    return {mean(0), mean(1), mean(2), mean(SegmentEntry::kExtinction)};
   }
 
  private:
+  /// Interval 0 lies below the table, and kIntervals + 1 above it.
   ESVR_HD static int intervalAt(float place) {
-    if (place < 0.0f) return 0;
-    return place < float(kIntervals) ? int(place) + 1 : kIntervals + 1;
+    const float above = place > -1.0f ? place : -1.0f;
+    return int(std::floor(above < float(kIntervals) ? above : float(kIntervals))) + 1;
   }
 };
 
@@ -86,8 +99,8 @@ struct SegmentTableView {
   [[nodiscard]] ESVR_HD PixelColor operator()(float a, float b) const {
     if (!(a == a) || !(b == b)) return nan;
     const float from = placeOf(a), to = placeOf(b);
-    const SegmentSpan whole(entries, from, to);
-    const float pieces = piecesOf(whole.mean(SegmentEntry::kExtinction, unit));
+    const PixelColor whole = SegmentSpan(entries, from, to).means(unit);
+    const float pieces = piecesOf(whole.alpha);
     PixelColor all{0.0f, 0.0f, 0.0f, 0.0f};
     if (pieces <= 1.0f) {
       addBehind(all, whole, 1.0f);
@@ -95,7 +108,8 @@ struct SegmentTableView {
     }
     const float length = 1.0f / pieces, apart = (to - from) * length;
     for (float p = 0.0f; p < pieces; ++p)
-      addBehind(all, SegmentSpan(entries, from + p * apart, from + (p + 1.0f) * apart), length);
+      addBehind(all, SegmentSpan(entries, from + p * apart, from + (p + 1.0f) * apart).means(unit),
+                length);
     return all;
   }
 
@@ -112,22 +126,20 @@ struct SegmentTableView {
     if (!(extinction > 0.0f)) return 0.0f;
     return extinction < kThin * kMost ? std::ceil(extinction / kThin) : kMost;
   }
-  /// 1 - exp(-t), without the cancellation that the difference has for a small t.
+  /// 1 - exp(-t). A series replaces the difference where it cancels.
   ESVR_HD static float absorbed(float t) {
-    if (t > 0.5f) return 1.0f - std::exp(-t);
-    float series = 1.0f;
-    for (float n = 7.0f; n > 1.0f; n -= 1.0f) series = 1.0f - series * t * (1.0f / n);
-    return series * t;
+    constexpr float kSmall = 1.0f / 64.0f;  // the next term of the series is below 3e-9
+    return t < kSmall ? t * (1.0f - t * (0.5f - t * (1.0f / 6.0f))) : 1.0f - std::exp(-t);
   }
+  /// \param means   means over a piece
   /// \param length  length of the piece in steps
-  ESVR_HD void addBehind(PixelColor& all, const SegmentSpan& piece, float length) const {
-    const float extinction = piece.mean(SegmentEntry::kExtinction, unit);
-    if (!(extinction > 0.0f)) return;
-    const float alpha = (1.0f - all.alpha) * absorbed(extinction * length);
-    const float share = alpha / extinction;
-    all.r += share * piece.mean(0, unit);
-    all.g += share * piece.mean(1, unit);
-    all.b += share * piece.mean(2, unit);
+  ESVR_HD static void addBehind(PixelColor& all, const PixelColor& means, float length) {
+    if (!(means.alpha > 0.0f)) return;
+    const float alpha = (1.0f - all.alpha) * absorbed(means.alpha * length);
+    const float share = alpha / means.alpha;
+    all.r += share * means.r;
+    all.g += share * means.g;
+    all.b += share * means.b;
     all.alpha += alpha;
   }
 };

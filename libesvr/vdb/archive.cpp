@@ -36,12 +36,13 @@ DirectoryRow readRow(InputFile& file) {
   row.entry.savedAsHalf = row.entry.treeType != type;
   row.entry.parent = file.readString();
   const auto gridAt = file.read<std::int64_t>();
-  file.read<std::int64_t>();  // position of the voxels, which is not needed
+  const auto blocksAt = file.read<std::int64_t>();
   row.next = file.read<std::int64_t>();
   if (gridAt < std::int64_t(file.position()) || row.next < gridAt)
     throw BadInput("is damaged: grid \"" + row.entry.name() + "\" has no valid place in the file");
   row.entry.gridAt = std::uint64_t(gridAt);
   row.entry.gridBytes = std::uint64_t(row.next - gridAt);
+  row.entry.blocksAt = std::uint64_t(blocksAt);
   return row;
 }
 
@@ -71,14 +72,28 @@ Archive::Archive(InputFile& file) : file_(file) {
   readDirectory();
 }
 
+Archive::Archive(InputFile& file, const CarriedGrid& grid)
+    : file_(file), vdbVersion_(grid.vdbVersion) {
+  initializeOpenVdb();
+  const openvdb::VersionId library{openvdb::OPENVDB_LIBRARY_MAJOR_VERSION,
+                                   openvdb::OPENVDB_LIBRARY_MINOR_VERSION};
+  openvdb::io::setVersion(file_.stream(), library, vdbVersion_);
+  ArchiveEntry& entry = entries_.emplace_back();
+  entry.storedName = grid.name;
+  entry.treeType = grid.treeType;
+  entry.savedAsHalf = grid.savedAsHalf;
+  entry.gridBytes = file.size();
+  entry.blocksAt = grid.blocksAt;
+}
+
 void Archive::readHeader() {
-  const auto fileVersion = file_.read<std::uint32_t>();
-  if (fileVersion < kOldestFileVersion)
-    throw BadInput("has VDB format version " + std::to_string(fileVersion) + ", older than " +
+  vdbVersion_ = file_.read<std::uint32_t>();
+  if (vdbVersion_ < kOldestFileVersion)
+    throw BadInput("has VDB format version " + std::to_string(vdbVersion_) + ", older than " +
                    std::to_string(kOldestFileVersion) + ": save it anew with a current program");
   const auto major = file_.read<std::uint32_t>();
   const auto minor = file_.read<std::uint32_t>();
-  openvdb::io::setVersion(file_.stream(), {major, minor}, fileVersion);
+  openvdb::io::setVersion(file_.stream(), {major, minor}, vdbVersion_);
   if (!file_.read<char>())
     throw BadInput("was written to a stream and has no table of grids: save it to a file");
   file_.skip(kUuidBytes);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "esvr/carried_grid.h"
 #include "esvr/grid_descriptor.h"
 #include "vdb/input_file.h"
 
@@ -20,6 +21,7 @@ struct ArchiveEntry {
   std::string parent;  ///< storedName of the grid whose tree this grid shares; else empty
   std::uint64_t gridAt = 0;
   std::uint64_t gridBytes = 0;
+  std::uint64_t blocksAt = 0;  ///< position of the values, as the file says; it is not checked
 
   [[nodiscard]] std::string name() const;       ///< the name without the number
   [[nodiscard]] std::string valueType() const;  ///< "float", "vec3s", "ptdataidx32", ...
@@ -37,8 +39,12 @@ class Archive {
  public:
   /// \throws BadInput  the file is not a .vdb, is too old, or is damaged
   explicit Archive(InputFile& file);
+  /// The archive of one grid that is carried.
+  /// \param file  the grid's bytes
+  Archive(InputFile& file, const CarriedGrid& grid);
 
   InputFile& file() { return file_; }
+  [[nodiscard]] std::uint32_t vdbVersion() const { return vdbVersion_; }
   [[nodiscard]] const std::vector<MetaItem>& metadata() const { return metadata_; }
   [[nodiscard]] const std::vector<ArchiveEntry>& entries() const { return entries_; }
   GridHead readHead(const ArchiveEntry& entry);
@@ -51,6 +57,7 @@ class Archive {
   void readDirectory();
 
   InputFile& file_;
+  std::uint32_t vdbVersion_ = 0;
   std::vector<MetaItem> metadata_;
   std::vector<ArchiveEntry> entries_;
 };

@@ -23,8 +23,7 @@ std::size_t findGrid(const std::vector<GridSummary>& grids, const std::string& w
 }
 
 std::string notAFloatType(const std::string& valueType) {
-  return "its values are of type " + valueType +
-         ", which is not supported; float, half and double are";
+  return "its values are of type " + valueType + "; only float, half and double can be fitted";
 }
 
 }  // namespace esvr::vdb

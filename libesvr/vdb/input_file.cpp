@@ -2,9 +2,11 @@
 
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <system_error>
 
 #include "esvr/error.h"
+#include "vdb/memory_buffer.h"
 
 namespace esvr::vdb {
 namespace {
@@ -29,11 +31,24 @@ std::uint64_t sizeOfRegularFile(const std::filesystem::path& path) {
 
 InputFile::InputFile(const std::filesystem::path& path)
     : buffer_(kBufferBytes), size_(sizeOfRegularFile(path)) {
-  stream_.rdbuf()->pubsetbuf(buffer_.data(), std::streamsize(buffer_.size()));
+  auto file = std::make_unique<std::ifstream>();
+  file->rdbuf()->pubsetbuf(buffer_.data(), std::streamsize(buffer_.size()));
   errno = 0;
-  stream_.open(path, std::ios::in | std::ios::binary);
-  if (!stream_) throw BadInput(std::string("cannot be opened: ") + std::strerror(errno));
-  stream_.exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
+  file->open(path, std::ios::in | std::ios::binary);
+  if (!*file) throw BadInput(std::string("cannot be opened: ") + std::strerror(errno));
+  stream_ = std::move(file);
+  throwAtErrors();
+}
+
+InputFile::InputFile(std::span<const std::byte> bytes)
+    : memory_(std::make_unique<MemoryBuffer>(bytes)),
+      stream_(std::make_unique<std::istream>(memory_.get())),
+      size_(bytes.size()) {
+  throwAtErrors();
+}
+
+void InputFile::throwAtErrors() {
+  stream_->exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
 }
 
 void InputFile::need(std::uint64_t bytes) const {
@@ -46,20 +61,20 @@ void InputFile::seek(std::uint64_t position) {
   if (position > size_)
     throw BadInput("is truncated or damaged: it points to byte " + std::to_string(position) +
                    ", the file has " + std::to_string(size_));
-  stream_.seekg(std::streamoff(position));
+  stream_->seekg(std::streamoff(position));
   position_ = position;
 }
 
 void InputFile::skip(std::uint64_t bytes) {
   need(bytes);
   if (bytes > kBufferBytes) return seek(position_ + bytes);
-  stream_.ignore(std::streamsize(bytes));
+  stream_->ignore(std::streamsize(bytes));
   position_ += bytes;
 }
 
 void InputFile::read(void* to, std::size_t bytes) {
   need(bytes);
-  stream_.read(static_cast<char*>(to), std::streamsize(bytes));
+  stream_->read(static_cast<char*>(to), std::streamsize(bytes));
   position_ += bytes;
 }
 
@@ -78,6 +93,6 @@ std::string InputFile::readString() {
   return text;
 }
 
-void InputFile::followStream() { position_ = std::uint64_t(stream_.tellg()); }
+void InputFile::followStream() { position_ = std::uint64_t(stream_->tellg()); }
 
 }  // namespace esvr::vdb

@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
+#include <istream>
+#include <memory>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -18,6 +20,8 @@ class InputFile {
   /// \throws BadInput  the file is missing, a directory or another special file, empty, or not
   ///                   readable
   explicit InputFile(const std::filesystem::path& path);
+  /// Bytes in memory, which must outlive this object, in place of a file.
+  explicit InputFile(std::span<const std::byte> bytes);
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
   [[nodiscard]] std::uint64_t position() const { return position_; }
@@ -42,12 +46,15 @@ class InputFile {
 
   /// The stream at position(), from which a library may read. It throws std::ios_base::failure at
   /// the end of the file. position() does not change before followStream() or seek() is called.
-  std::istream& stream() { return stream_; }
+  std::istream& stream() { return *stream_; }
   void followStream();
 
  private:
+  void throwAtErrors();
+
   std::vector<char> buffer_;
-  std::ifstream stream_;
+  std::unique_ptr<std::streambuf> memory_;  ///< null: a file
+  std::unique_ptr<std::istream> stream_;
   std::uint64_t size_ = 0;
   std::uint64_t position_ = 0;
 };

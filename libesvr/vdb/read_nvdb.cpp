@@ -28,6 +28,7 @@ GridSummary summarise(const NanoEntry& entry) {
   grid.skipReason = grid.isScalar ? "" : notAFloatType(grid.valueType);
   if (grid.skipReason.empty() && entry.activeVoxels == 0)
     grid.skipReason = "it has no active voxel";
+  grid.whyNotCarried = "only the grids of .vdb files can be carried unchanged";
   return grid;
 }
 

@@ -4,6 +4,7 @@
 
 #include "esvr/error.h"
 #include "vdb/archive.h"
+#include "vdb/carry.h"
 #include "vdb/errors.h"
 #include "vdb/grid_names.h"
 #include "vdb/metadata.h"
@@ -38,10 +39,9 @@ GridClass gridClassOf(const std::string& text) {
 std::string reasonToSkip(const ArchiveEntry& entry) {
   if (isScalarFloatTree(entry)) return {};
   const std::string type = entry.valueType();
-  if (type.starts_with("ptdataidx") || type.starts_with("ptidx"))
-    return "it holds points (" + type + "), which are not supported";
+  if (isPointTree(entry.treeType)) return "it holds points (" + type + "), which cannot be fitted";
   if (type == "float" || type == "double")
-    return "its tree (" + entry.treeType + ") is not supported; OpenVDB's standard tree is";
+    return "its tree (" + entry.treeType + ") cannot be fitted; OpenVDB's standard tree can";
   return notAFloatType(type);
 }
 
@@ -76,11 +76,12 @@ GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHea
   grid.isScalar = isScalarFloatTree(entry);
   grid.skipReason = reasonToSkip(entry);
   if (grid.skipReason.empty() && grid.activeVoxels == 0) grid.skipReason = "it has no active voxel";
+  grid.whyNotCarried = whyNotCarried(entry.treeType, archive.vdbVersion());
   return grid;
 }
 
-ListedArchive listGrids(InputFile& file) {
-  ListedArchive listed{Archive(file), {}, {}};
+ListedArchive listGrids(Archive archive) {
+  ListedArchive listed{std::move(archive), {}, {}};
   for (const auto& entry : listed.archive.entries()) {
     inGrid(entry.name(), [&] {
       listed.heads.push_back(listed.archive.readHead(entry));
@@ -117,14 +118,33 @@ VolumeGrid readListedGrid(ListedArchive& listed, std::size_t i, const ReadOption
 }  // namespace
 
 VdbSummary inspectOpenVdb(InputFile& file) {
-  ListedArchive listed = listGrids(file);
+  ListedArchive listed = listGrids(Archive(file));
   return {"OpenVDB", file.size(), listed.archive.metadata(), std::move(listed.grids)};
 }
 
 VolumeGrid readOpenVdbGrid(InputFile& file, const std::string& name, const ReadOptions& options) {
-  ListedArchive listed = listGrids(file);
+  ListedArchive listed = listGrids(Archive(file));
   const std::size_t i = findGrid(listed.grids, name);
   return inGrid(listed.grids[i].uniqueName, [&] { return readListedGrid(listed, i, options); });
 }
 
 }  // namespace esvr::vdb
+
+namespace esvr {
+
+GridSummary inspectCarried(const CarriedGrid& grid) {
+  return vdb::inGrid(grid.name, [&] {
+    vdb::InputFile file(std::span(grid.bytes));
+    return vdb::listGrids(vdb::Archive(file, grid)).grids.front();
+  });
+}
+
+VolumeGrid readGrid(const CarriedGrid& grid, const ReadOptions& options) {
+  return vdb::inGrid(grid.name, [&] {
+    vdb::InputFile file(std::span(grid.bytes));
+    vdb::ListedArchive listed = vdb::listGrids(vdb::Archive(file, grid));
+    return vdb::readListedGrid(listed, 0, options);
+  });
+}
+
+}  // namespace esvr

@@ -3,6 +3,7 @@
 #include "core/atomic_file.h"
 #include "esvr/error.h"
 #include "vdb/archive.h"
+#include "vdb/carry.h"
 #include "vdb/errors.h"
 #include "vdb/nano_file.h"
 #include "vdb/read_nvdb.h"
@@ -46,8 +47,24 @@ VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
   });
 }
 
+std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
+                                     std::span<const std::size_t> places,
+                                     const ReadOptions& options) {
+  return vdb::whileReading(path, [&] {
+    vdb::InputFile file(path);
+    return vdb::readOpenVdbCarried(file, places, options);
+  });
+}
+
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const VolumeGrid> grids, const WriteOptions& options) {
+  std::vector<GridToWrite> all;
+  for (const auto& grid : grids) all.emplace_back(&grid);
+  writeGrids(path, fileMetadata, all, options);
+}
+
+void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
+                std::span<const GridToWrite> grids, const WriteOptions& options) {
   const FileFormat format = formatNamedBy(path);
   AtomicFile file(path, options.overwrite);
   vdb::whileWriting(path, [&] {

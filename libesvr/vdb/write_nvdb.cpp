@@ -18,15 +18,28 @@ void refuseWhatNanoVdbLacks(const VolumeGrid& grid, const WriteOptions& options)
                      grid.descriptor.transform.mapType + "; ask for .vdb");
 }
 
+std::vector<const VolumeGrid*> volumesOf(std::span<const GridToWrite> grids) {
+  std::vector<const VolumeGrid*> volumes;
+  for (const auto& grid : grids) {
+    if (const auto* carried = std::get_if<const CarriedGrid*>(&grid))
+      throw UsageError("grid \"" + (*carried)->name + "\" (" + (*carried)->treeType +
+                       ") is carried unchanged, which a .nvdb file cannot hold; ask for .vdb");
+    volumes.push_back(std::get<const VolumeGrid*>(grid));
+  }
+  return volumes;
+}
+
 }  // namespace
 
-void writeNanoVdb(const std::filesystem::path& path, std::span<const VolumeGrid> grids,
+void writeNanoVdb(const std::filesystem::path& path, std::span<const GridToWrite> grids,
                   const WriteOptions& options) {
-  for (const auto& grid : grids) refuseWhatNanoVdbLacks(grid, options);
+  const auto volumes = volumesOf(grids);
+  for (const VolumeGrid* grid : volumes) refuseWhatNanoVdbLacks(*grid, options);
   WriteOptions whole = options;
   whole.half = HalfMode::kOff;
   std::vector<NanoHandle> handles;
-  for (const auto& grid : grids) handles.push_back(makeNano(*makeOpenVdbGrid(grid, whole)));
+  for (const VolumeGrid* grid : volumes)
+    handles.push_back(makeNano(*makeOpenVdbGrid(*grid, whole)));
 
   std::ofstream stream(path, std::ios::binary);
   stream.exceptions(std::ios::badbit | std::ios::failbit);

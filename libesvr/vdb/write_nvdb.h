@@ -11,7 +11,7 @@ namespace esvr::vdb {
 /// Writes to an existing empty file.
 /// \throws UsageError  NanoVDB cannot hold the grid
 /// \throws std::ios_base::failure  the disk is full
-void writeNanoVdb(const std::filesystem::path& path, std::span<const VolumeGrid> grids,
+void writeNanoVdb(const std::filesystem::path& path, std::span<const GridToWrite> grids,
                   const WriteOptions& options);
 
 }  // namespace esvr::vdb

@@ -6,8 +6,8 @@
 
 #include <fstream>
 
+#include "vdb/archive_writer.h"
 #include "vdb/metadata.h"
-#include "vdb/stream_archive.h"
 #include "vdb/volume_to_tree.h"
 
 namespace esvr::vdb {
@@ -20,6 +20,11 @@ std::uint32_t bestCompression() {
   return COMPRESS_ACTIVE_MASK | (Archive::hasBloscCompression() ? COMPRESS_BLOSC : COMPRESS_ZIP);
 }
 
+const std::string& nameOf(const GridToWrite& grid) {
+  if (const auto* carried = std::get_if<const CarriedGrid*>(&grid)) return (*carried)->name;
+  return std::get<const VolumeGrid*>(grid)->descriptor.name;
+}
+
 }  // namespace
 
 std::vector<MetaItem> withWriter(std::span<const MetaItem> fileMetadata) {
@@ -29,16 +34,23 @@ std::vector<MetaItem> withWriter(std::span<const MetaItem> fileMetadata) {
 }
 
 void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
-                  std::span<const VolumeGrid> grids, const WriteOptions& options) {
-  openvdb::GridPtrVec openVdbGrids;
-  for (const auto& grid : grids)
-    openVdbGrids.push_back(makeOpenVdbGrid(grid, options, LeafVoxels::kWhenWritten));
+                  std::span<const GridToWrite> grids, const WriteOptions& options) {
+  openvdb::initialize();
   openvdb::MetaMap metadata;
   insertItems(withWriter(fileMetadata), metadata);
+  std::vector<std::string> names;
+  for (const auto& grid : grids) names.push_back(nameOf(grid));
 
   std::ofstream stream(path, std::ios::binary);
   stream.exceptions(std::ios::badbit | std::ios::failbit);
-  StreamArchive(bestCompression()).writeTo(stream, openVdbGrids, metadata);
+  ArchiveWriter writer(stream, bestCompression(), metadata, std::move(names));
+  for (const auto& grid : grids) {
+    if (const auto* carried = std::get_if<const CarriedGrid*>(&grid))
+      writer.add(**carried);
+    else
+      writer.add(
+          makeOpenVdbGrid(*std::get<const VolumeGrid*>(grid), options, LeafVoxels::kWhenWritten));
+  }
   stream.close();
 }
 

@@ -11,7 +11,7 @@ namespace esvr::vdb {
 
 /// Writes to an existing empty file. \throws std::ios_base::failure  the disk is full
 void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
-                  std::span<const VolumeGrid> grids, const WriteOptions& options);
+                  std::span<const GridToWrite> grids, const WriteOptions& options);
 
 /// The source's file metadata, with an item that names this library as the writer, unless it has
 /// one.

@@ -92,6 +92,23 @@ TEST_F(EsvrRender, ComparesWithAReference) {
   EXPECT_GT(report["comparisons"][0]["ssim"], 0.9);
 }
 
+TEST_F(EsvrRender, ComparesWithAReferenceOfManyRays) {
+  const auto psnr = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> all{"--ref", folder_ / "in.vdb", "--report", folder_ / "report.json",
+                                 "-f"};
+    all.insert(all.end(), more.begin(), more.end());
+    EXPECT_EQ(draw("in.vdb", "out.png", all).exitCode, 0);
+    const auto report = nlohmann::json::parse(readText(folder_ / "report.json"));
+    return report["comparisons"][0]["psnr"];
+  };
+  EXPECT_TRUE(psnr({}).is_null()) << "the same picture: an infinite PSNR";
+  EXPECT_GT(psnr({"--ref-supersample", "3"}), 30.0);
+  expectRefused({"--ref-supersample", "3"}, 2, "--ref-supersample needs --ref");
+  expectRefused({"--ref", folder_ / "in.vdb", "--ref-supersample", "0"}, 2, "--ref-supersample");
+  expectRefused({"--ref", folder_ / "in.vdb", "--ref-supersample", "16", "--resolution", "4000x8"},
+                2, "--ref-supersample");
+}
+
 TEST_F(EsvrRender, MeasuresWithoutKeepingAPicture) {
   const auto run =
       runProgram(ESVR_RENDER, {folder_ / "in.esvr", "--bench", "--turntable", "3", "--resolution",

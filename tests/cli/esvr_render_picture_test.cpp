@@ -154,6 +154,19 @@ TEST_F(EsvrRender, TheClassificationChangesThePicture) {
   expectRefused({"--classification", "no"}, 2, "--classification");
 }
 
+TEST_F(EsvrRender, LevelsOfDetailChangePicturesOfWidePixels) {
+  const std::vector<std::string> wide{"--orthographic", "--height", "600"};
+  const auto drawn = [&](const std::string& lod) {
+    auto more = wide;
+    more.insert(more.end(), {"--lod", lod});
+    return picture("in.esvr", more).rgba;
+  };
+  EXPECT_EQ(drawn("auto"), picture("in.esvr", wide).rgba) << "the default";
+  EXPECT_NE(drawn("auto"), drawn("off"));
+  EXPECT_EQ(picture("in.esvr", {"--lod", "off"}).rgba, picture("in.esvr").rgba) << "narrow pixels";
+  expectRefused({"--lod", "3"}, 2, "--lod");
+}
+
 TEST_F(EsvrRender, PartsOfTheDepthAndMemoryChangeNothingOnGpu) {
   Device gpu;
   selectOrSkip("cuda", gpu);

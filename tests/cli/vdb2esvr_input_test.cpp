@@ -70,11 +70,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "neither an OpenVDB nor a NanoVDB"},
         BadFile{"truncated", truncated, "in.vdb"},
         BadFile{"no grid", [](const auto& path) { test::writeInput(path, {}); },
-                "no grid that can be fitted"},
-        BadFile{"no active voxel", [](const auto& path) { test::writeInput(path, {InputGrid{}}); },
-                "has no active voxel"},
-        BadFile{"only grids of other types",
-                [](const auto& path) { test::writeMixedInput(path, {}); }, "ptdataidx32"},
+                "the file has no grid"},
         BadFile{"not finite", [](const auto& path) { test::writeInput(path, {withNonFinite()}); },
                 "2 voxels are NaN, infinite or too large for float; the first is at (1, 2, 3)"}));
 
@@ -86,28 +82,22 @@ TEST_F(Vdb2Esvr, listsTheGridsWhereTheOneAskedForIsNotThere) {
   EXPECT_FALSE(outIsThere());
 }
 
-TEST_F(Vdb2Esvr, listsGridsOfOtherTypesAsSkippedAndGoesOn) {
-  test::writeMixedInput(in(), {{.voxels = softBall({})}});
+TEST_F(Vdb2Esvr, carriesGridsOfOtherTypesAndEmptyOnes) {
+  test::writeMixedInput(in(), {{.voxels = softBall({})}, {.name = "none"}});
   const auto run = fitQuickly();
   EXPECT_EQ(run.exitCode, 0);
-  for (const char* type : {"bool", "int32", "vec3s", "ptdataidx32"})
-    EXPECT_THAT(run.err, HasSubstr(type));
-  EXPECT_EQ(readEsvr(out()).grids.size(), 1u);
-}
-
-TEST_F(Vdb2Esvr, refusesAGridOfAnotherTypeThatIsAskedFor) {
-  test::writeMixedInput(in(), {{.voxels = softBall({})}});
-  const auto run = fitQuickly({"-g", "vec3s"});
-  EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err, HasSubstr("vec3s"));
-  EXPECT_FALSE(outIsThere());
+  for (const char* type : {"bool", "int32", "vec3s", "ptdataidx32", "no active voxel"})
+    EXPECT_THAT(run.out, HasSubstr(type));
+  const EsvrFile file = readEsvr(out());
+  EXPECT_EQ(file.grids.size(), 1u);
+  EXPECT_EQ(file.carried.size(), 5u);
 }
 
 TEST_F(Vdb2Esvr, takesNonFiniteVoxelsAsZeroWhereAskedAndSaysHowMany) {
   test::writeInput(in(), {withNonFinite()});
   const auto run = fitQuickly({"--nonfinite", "zero"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.err, HasSubstr("2 NaN or infinite voxels were replaced by 0"));
+  EXPECT_THAT(run.err, HasSubstr("NaN or infinite voxels were replaced by 0 (2 voxels)"));
   EXPECT_TRUE(outIsThere());
 }
 

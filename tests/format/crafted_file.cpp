@@ -13,6 +13,8 @@ using namespace format;
 CraftedFile::CraftedFile(const std::vector<std::byte>& bytes) {
   const MemorySource source(bytes, "crafted");
   const SectionTable table = readTable(source);
+  versionMajor = table.versionMajor;
+  versionMinor = table.versionMinor;
   for (std::size_t i = 0; i < table.entries.size(); ++i)
     sections_.push_back({table.entries[i], readStored(source, table, i)});
 }

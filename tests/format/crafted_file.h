@@ -49,7 +49,7 @@ class CraftedFile {
   /// The table of the last call of assemble().
   [[nodiscard]] const format::SectionTable& table() const { return table_; }
 
-  std::uint16_t versionMajor = format::kVersionMajor, versionMinor = format::kVersionMinor;
+  std::uint16_t versionMajor, versionMinor;  ///< of the file that was taken apart
 
  private:
   format::SectionTable table_;

@@ -136,6 +136,8 @@ std::vector<GoldenFile> goldenFiles() {
       {"mask", fileOf(masked())},
       {"twins", twins()},
       {"residual", fileOf(corrected())},
+      {"carried",
+       {{}, {oneEllipsoid()}, {carriedGrid(0, "vectors"), carriedGrid(2, "more vectors")}}},
       {"unknown_section", fileOf(oneEllipsoid()), true},
   };
 }

@@ -17,9 +17,9 @@ PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 96500
           2870177450012600261)
 NONE = 0xFFFFFFFF
 KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "bricks", 6: "layer errors",
-         7: "curve", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
+         7: "curve", 8: "carried grid", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
          20: "kappas", 32: "ellipsoids", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
-         37: "residual"}
+         37: "residual", 38: "carried bytes"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
 
@@ -487,6 +487,14 @@ def voxels(data):
     return head, v.held
 
 
+def carried(data):
+    r = Record(data)
+    record = {"name": r.sized(), "tree type": r.sized(), "half": r.get("B"),
+              "vdb version": r.get("I"), "place": r.get("I"), "values at": r.get("Q")}
+    r.end()
+    return record
+
+
 def content(name, data):
     if name in PLANES:
         n = len(data) // 4 // PLANES[name]
@@ -494,7 +502,8 @@ def content(name, data):
         return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
     readers = {"grid": grid, "chunks": chunks, "bricks": bricks, "ellipsoids": ellipsoids,
                "voxels": voxels, "mask": voxels, "residual": voxels,
-               "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve}
+               "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve,
+               "carried grid": carried}
     return readers[name](data) if name in readers else data
 
 
@@ -504,7 +513,7 @@ def read(path):
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
     assert magic == bytes.fromhex("89 45 53 56 52 0D 0A 0A"), "magic"
-    assert (major, minor, size) == (1, 0, len(data)), "version or size"
+    assert major == 1 and minor in (0, 1) and size == len(data), "version or size"
     assert table % 8 == 0 and header_sum == xxh64(data[:40]), "header checksum"
     assert table_sum == xxh64(data[table:table + 56 * count]), "table checksum"
 
@@ -526,7 +535,8 @@ def read(path):
         if name is None:
             assert flags == 0, "an unknown kind is optional here"
             continue
-        optional = name in ("curve", "layer errors")
+        assert minor == 1 or not name.startswith("carried"), "a kind of version 1.1"
+        optional = name in ("curve", "layer errors", "carried grid", "carried bytes")
         assert flags == (0 if optional else 1) and frame == layer == 0, "flags"
         assert codec in (0, 1) and (codec == 1 or raw == stored), "codec"
         sections[name, g, c] = content(name, part) if codec == 0 else None
@@ -704,11 +714,22 @@ def check_twins(sections):
     assert kinds[0]["mask", NONE][1] == kinds[1]["mask", NONE][1]
 
 
+def check_carried(sections):
+    """Expects that the carried grids have the numbers after those of the one other grid."""
+    first, second = sections["carried grid", 1, NONE], sections["carried grid", 2, NONE]
+    assert first["name"] == second["name"] == b"velocity"
+    assert first["tree type"] == b"Tree_vec3s_5_4_3" and first["half"] == 1
+    assert first["vdb version"] == 224 and first["values at"] == 5
+    assert (first["place"], second["place"]) == (0, 2)
+    assert sections["carried bytes", 1, NONE] == b"vectors"
+    assert sections["carried bytes", 2, NONE] == b"more vectors"
+
+
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
           "voxels": check_voxels, "mask": check_mask, "residual": check_residual,
           "mirrored_voxels": check_mirrored, "copied_voxels": check_copied,
-          "two_grids": check_two_grids, "twins": check_twins,
+          "two_grids": check_two_grids, "twins": check_twins, "carried": check_carried,
           "kappas_and_chunks": check_kappas_and_chunks}
 
 

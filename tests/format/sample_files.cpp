@@ -212,12 +212,24 @@ StoredGrid emptyGrid() {
   return grid;
 }
 
+CarriedGrid carriedGrid(std::uint32_t place, const std::string& bytes) {
+  const auto content = bytesOf(bytes);
+  return {.name = "velocity",
+          .treeType = "Tree_vec3s_5_4_3",
+          .savedAsHalf = true,
+          .vdbVersion = 224,
+          .place = place,
+          .blocksAt = 5,
+          .bytes = {content.begin(), content.end()}};
+}
+
 EsvrFile everything(std::size_t ellipsoids) {
   StoredGrid twin = fogGrid(ellipsoids);
   twin.descriptor.name = "twin of density";
   return {{{"creator", "string", bytesOf("Houdini/GEO_VDBTranslator")}},
           {fogGrid(ellipsoids), levelSetGrid(ellipsoids), chunkedGrid(ellipsoids),
-           quantisedGrid(ellipsoids), layeredGrid(ellipsoids), emptyGrid(), twin}};
+           quantisedGrid(ellipsoids), layeredGrid(ellipsoids), emptyGrid(), twin},
+          {carriedGrid(0, "vectors"), carriedGrid(4, std::string(1000, 'v'))}};
 }
 
 EsvrFile fileOf(StoredGrid grid) { return {{}, {std::move(grid)}}; }
@@ -234,6 +246,7 @@ std::string difference(const EsvrFile& a, const EsvrFile& b) {
     const auto text = difference(a.grids[g], b.grids[g]);
     if (!text.empty()) return "grid " + std::to_string(g) + ": " + text;
   }
+  if (a.carried != b.carried) return "carried grids";
   return "";
 }
 

@@ -41,7 +41,11 @@ struct EllipsoidParts {
 /// A grid with a background and nothing else.
 [[nodiscard]] StoredGrid emptyGrid();
 
-/// A file with all grids above, a grid that shares the data of the first one, and metadata.
+/// A carried grid with these bytes.
+[[nodiscard]] CarriedGrid carriedGrid(std::uint32_t place, const std::string& bytes);
+
+/// A file with all grids above, a grid that shares the data of the first one, two carried grids and
+/// metadata.
 [[nodiscard]] EsvrFile everything(std::size_t ellipsoids);
 
 [[nodiscard]] EsvrFile fileOf(StoredGrid grid);

@@ -29,6 +29,7 @@ inline RenderOptions optionsFor(const SparseVolume& volume, const CameraWish& wi
   o.camera = fitCamera(activeBox(volume), wish, o.resolution);
   o.transfer = {builtInColorMap("turbo"), builtInOpacity("linear")};
   o.opacityLength = 10.0;
+  o.lod = LevelOfDetail::kOff;
   return o;
 }
 

@@ -123,6 +123,7 @@ TEST(ClipBox, LeavesWhatIsInIt) {
                               PlaceBox{{20.01, -100, -100}, {21.03, 100, 100}}}) {
     RenderOptions o = optionsFor(RenderMode::kComposite);
     o.clip = box;
+    o.lod = LevelOfDetail::kOff;
     const auto clipped = [&](const Vec3& p) {
       for (int a = 0; a < 3; ++a)
         if (p[a] < box.low[a] || p[a] > box.high[a]) return 0.0;

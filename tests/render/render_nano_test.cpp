@@ -33,6 +33,7 @@ RenderOptions optionsFor(const CameraWish& wish = {}) {
   o.camera = fitCamera(kBox, wish, o.resolution);
   o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
   o.opacityLength = 8.0;
+  o.lod = LevelOfDetail::kOff;
   return o;
 }
 

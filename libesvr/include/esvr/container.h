@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "esvr/carried_grid.h"
 #include "esvr/coord.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/fit_record.h"
@@ -85,8 +86,26 @@ struct LayerSize {
 
 struct EsvrFile {
   std::vector<MetaItem> metadata;  ///< the source's file-level metadata, verbatim
-  std::vector<StoredGrid> grids;
+  std::vector<StoredGrid> grids;   ///< grids that were converted, in their order
+  /// Grids that were not converted, by increasing places. Those of a file that was read without
+  /// ReadLimits::carriedBytes have no bytes, and cannot be written.
+  std::vector<CarriedGrid> carried{};
 };
+
+/// One of all grids of a file.
+struct GridOfFile {
+  bool isCarried = false;  ///< whether it is one of EsvrFile::carried or of EsvrFile::grids
+  std::size_t index = 0;   ///< index in that list
+  friend bool operator==(const GridOfFile&, const GridOfFile&) = default;
+};
+
+/// All grids in the order of the file: carried grids have their places, and the others are between
+/// them in their order.
+/// \throws RuntimeFailure  the places do not increase, or one is not below the number of grids
+[[nodiscard]] std::vector<GridOfFile> gridsInOrder(const EsvrFile& file);
+
+/// The names of all grids in the order of the file.
+[[nodiscard]] std::vector<std::string> namesInOrder(const EsvrFile& file);
 
 struct ContainerWriteOptions {
   bool overwrite = false;
@@ -106,7 +125,9 @@ std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
 /// several grids may share their bytes.
 struct ReadLimits {
   std::uint64_t maxBytes = kNoMemoryLimit;
-  VoxelMemory memory{};  ///< holds voxels; those in a file do not count towards maxBytes
+  /// Holds voxels and the bytes of carried grids; those in a file do not count towards maxBytes.
+  VoxelMemory memory{};
+  bool carriedBytes = true;  ///< false: the bytes of carried grids are checked, but not kept
 };
 
 /// Reads a whole file. Every size is checked before memory is allocated, every section is checked
@@ -117,7 +138,8 @@ struct ReadLimits {
 [[nodiscard]] EsvrFile readEsvr(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// Selects a part of a file. A reader finds the part by the section table, the chunk records and
-/// the directories of blocks. A grid that is stored as voxels is read completely.
+/// the directories of blocks. A grid that is stored as voxels is read completely. Of carried grids,
+/// everything but their bytes is read.
 struct ReadPart {
   /// Selects every ellipsoid whose support meets the box; the result may contain others.
   std::optional<Box> box{};
@@ -147,6 +169,11 @@ struct PartOfFile {
 /// \throws RuntimeFailure  as for encodeEsvr
 [[nodiscard]] std::uint64_t bytesAddedTogether(std::vector<StoredGrid> grids);
 
+/// Largest number of bytes that carried grids add to a file, with their rows of the section table.
+/// Their places do not matter.
+/// \throws RuntimeFailure  as for encodeEsvr
+[[nodiscard]] std::uint64_t bytesOfCarried(const std::vector<CarriedGrid>& grids);
+
 /// Bytes of a file without grids, including the padding before the first grid.
 [[nodiscard]] std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata);
 
@@ -154,7 +181,8 @@ struct PartOfFile {
 /// content are stored once. The ellipsoids of a chunk are stored in Morton order of their centers;
 /// a reader gets them in that order, bit for bit.
 /// \throws RuntimeFailure  the content is invalid: a number is not finite, a quaternion has no unit
-///                         length, or the bricks' corners are not increasing
+///                         length, the bricks' corners are not increasing, the places of carried
+///                         grids are not those of gridsInOrder, or a carried grid has no bytes
 [[nodiscard]] std::vector<std::byte> encodeEsvr(const EsvrFile& file);
 /// Decodes a file in memory.
 /// \param nameForErrors  name of the file in error texts
@@ -166,7 +194,9 @@ struct PartOfFile {
 struct SectionSummary {
   std::string kind;   ///< "grid", "ellipsoids", ...; "unknown 0x...." if this reader has no name
   std::string codec;  ///< "raw" or "blosc"
-  std::uint32_t grid = 0;  ///< number of the section's grid, or 0xffffffff for the file
+  /// Number of the section's grid, or 0xffffffff for the file. Carried grids have the numbers after
+  /// those of the other grids.
+  std::uint32_t grid = 0;
   std::uint64_t storedBytes = 0, rawBytes = 0;
   /// The first section of the file that has the same bytes, as an index of EsvrSummary::sections;
   /// nothing for that section itself. The bytes of such a section are not stored again.
@@ -183,7 +213,7 @@ struct EsvrSummary {
 
 /// Checks a file as readEsvr does, and also that decoding it twice gives the same content.
 /// \return remarks on a valid file, one line each: sections that this reader skips, a newer minor
-///         version, grids without ellipsoids
+///         version, grids without ellipsoids, carried grids
 /// \throws BadInput, MemoryExceeded  as for readEsvr
 [[nodiscard]] std::vector<std::string> checkEsvr(const std::filesystem::path& path,
                                                  const ReadLimits& limits = {});

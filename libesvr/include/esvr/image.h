@@ -12,4 +12,9 @@ struct Image {
   std::vector<float> rgba;
 };
 
+/// The means of squares of pixels.
+/// \param side  side of a square in pixels
+/// \throws UsageError  the sides of the picture are not multiples of it
+[[nodiscard]] Image meansOfSquares(const Image& image, int side);
+
 }  // namespace esvr

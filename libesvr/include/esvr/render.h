@@ -54,6 +54,17 @@ enum class Between {
   return field.fitFor == FitFor::kDrawing ? Between::kSum : Between::kVoxels;
 }
 
+/// The rule for places where a pixel is wider than several voxels. Sums of ellipsoids (Between::kSum)
+/// and NanoVDB grids have no levels of detail.
+enum class LevelOfDetail {
+  /// At distances at which a pixel is at least 2.5 x 2^l voxels wide, means of 2^l x 2^l x 2^l voxels
+  /// are drawn, at steps that are 2^l times as long, for l up to 7. Pictures show fewer stray pixels,
+  /// take less time, and need less memory. A clip box has at least two voxels and two steps of a
+  /// level along each axis, or the level is not used.
+  kAuto,
+  kOff  ///< voxels are drawn wherever they are
+};
+
 /// A box with real-valued corners. Voxel (i, j, k) extends half a voxel to each side of (i, j, k).
 struct PlaceBox {
   Vec3 low, high;
@@ -73,7 +84,8 @@ struct RenderOptions {
   RenderMode mode = RenderMode::kComposite;
   /// Used in RenderMode::kComposite and kDepth; the other modes classify one value for each ray.
   Classification classification = Classification::kPreIntegrated;
-  Between between = Between::kVoxels;   ///< used for fields only
+  Between between = Between::kVoxels;  ///< used for fields only
+  LevelOfDetail lod = LevelOfDetail::kAuto;
   std::optional<PlaceBox> clip{};       ///< samples outside this box count as empty space
   const CancelToken* cancel = nullptr;  ///< checked before each row of tiles
 };

@@ -8,8 +8,10 @@
 #include <limits>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include "esvr/carried_grid.h"
 #include "esvr/coord.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/sparse_volume.h"
@@ -28,7 +30,9 @@ struct GridSummary {
   Box activeBox;
   std::uint64_t storedBytes = 0;  ///< bytes in the file; few if the grid shares another's tree
   std::string skipReason;  ///< reason, for the user, why the grid cannot be fitted; else empty
-  bool isScalar = false;   ///< true if readGrid can read the value type, even of an empty grid
+  /// Reason, for the user, why readCarried cannot read the grid; else empty.
+  std::string whyNotCarried;
+  bool isScalar = false;  ///< true if readGrid can read the value type, even of an empty grid
 };
 
 struct VdbSummary {
@@ -76,6 +80,24 @@ struct VolumeGrid {
 [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                                   const ReadOptions& options = {});
 
+/// Reads grids of a .vdb file as bytes. Their types may be unknown to OpenVDB, and their trees are
+/// not checked.
+/// \param places   indices of the grids in VdbSummary::grids
+/// \param options  `maxBytes` is a limit on the bytes of all these grids; `memory` holds them
+/// \throws BadInput  as for inspectVdb; a grid has GridSummary::whyNotCarried
+/// \throws MemoryExceeded  the grids need more than maxBytes
+[[nodiscard]] std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
+                                                   std::span<const std::size_t> places,
+                                                   const ReadOptions& options = {});
+
+/// The properties of a carried grid, as inspectVdb finds them in the file that the grid comes from.
+/// The unique name is the name.
+/// \throws BadInput  the bytes are damaged
+[[nodiscard]] GridSummary inspectCarried(const CarriedGrid& grid);
+
+/// Reads the voxels of a carried grid of floats or doubles. \throws  as for readGrid
+[[nodiscard]] VolumeGrid readGrid(const CarriedGrid& grid, const ReadOptions& options = {});
+
 /// Choice of half floats for a written file; kAuto: half if the source was saved as half.
 enum class HalfMode { kAuto, kOn, kOff };
 
@@ -95,6 +117,17 @@ struct WriteOptions {
 /// \throws UsageError  the extension is neither .vdb nor .nvdb
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const VolumeGrid> grids, const WriteOptions& options = {});
+
+/// A grid that is written: one of voxels, or one that is carried, whose bytes are written as they
+/// are. The grid must outlive this object.
+using GridToWrite = std::variant<const VolumeGrid*, const CarriedGrid*>;
+
+/// Writes grids of both kinds, in this order.
+/// \throws RuntimeFailure  as for writeGrids; a carried grid has a version of the VDB format that
+///                         this version of OpenVDB does not write
+/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid is carried
+void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
+                std::span<const GridToWrite> grids, const WriteOptions& options = {});
 
 /// Name of the file-level metadata item that names the writer. writeGrids adds it if
 /// `fileMetadata` has no item of this name.

@@ -4,165 +4,179 @@
 #include <span>
 
 #include "core/cuda/copy.h"
+#include "render/oldest_slots.h"
 
 namespace esvr::cuda {
 namespace {
 
-/// Missing bricks that a ray asks for besides the one at which it waits. More need fewer passes,
-/// but decode bricks that an opaque one may hide.
-constexpr int kAhead = 4;
+/// Missing bricks that a ray asks for besides the one at which it waits. More need fewer passes, but
+/// decode bricks that an opaque one may hide. A ray that has waited before is not stopped soon, and
+/// asks for four times as many.
+constexpr int kAhead = 16, kMostPasses = 4;
+
+LevelBricks bricksOf(const DeviceLevel& level) {
+  return {level.table().origin, level.first(), level.count(), level.bricks()};
+}
 
 }  // namespace
 
 DeviceCells::DeviceCells(const CellField& field, cudaStream_t stream)
-    : origin_(field.table.origin),
-      blocks_(field.table.blocks),
-      rule_(field.rule),
-      blockOf_(field.table.blockOf, stream),
-      brickOf_(field.table.brickOf, stream),
-      bricks_(field.table.bricks, stream),
+    : rule_(field.rule),
       forms_(field.forms, stream),
       kernels_(field.kernels, stream),
       origins_(field.origins, stream),
       begin_(field.begin, stream),
       ellipsoid_(field.ellipsoid, stream),
-      corners_(field.corners, stream) {}
+      corners_(field.corners, stream) {
+  add(DeviceLevel(field.table, stream));
+}
 
 CellFieldView DeviceCells::view() const {
-  return {.origin = origin_,
-          .bricks = bricks_.data(),
-          .forms = forms_.data(),
-          .kernels = kernels_.data(),
-          .kernelStride = kernels_.size() > 1 ? 1u : 0u,
-          .origins = origins_.data(),
-          .begin = begin_.data(),
-          .ellipsoid = ellipsoid_.data(),
-          .corners = corners_.data(),
-          .rule = rule_};
+  CellFieldView view{.table = level(0).table(),
+                     .levels = {},
+                     .forms = forms_.data(),
+                     .kernels = kernels_.data(),
+                     .kernelStride = kernels_.size() > 1 ? 1u : 0u,
+                     .origins = origins_.data(),
+                     .begin = begin_.data(),
+                     .ellipsoid = ellipsoid_.data(),
+                     .corners = corners_.data(),
+                     .rule = rule_};
+  for (int l = 0; l < levelCount(); ++l) view.levels[l] = bricksOf(level(l));
+  return view;
 }
 
 std::size_t DeviceCells::bytes() const {
-  return blockOf_.bytes() + brickOf_.bytes() + bricks_.bytes() + forms_.bytes() + kernels_.bytes() +
-         origins_.bytes() + begin_.bytes() + ellipsoid_.bytes() + corners_.bytes();
+  std::size_t bytes = forms_.bytes() + kernels_.bytes() + origins_.bytes() + begin_.bytes() +
+                      ellipsoid_.bytes() + corners_.bytes();
+  for (const DeviceLevel& level : levels_) bytes += level.bytes();
+  return bytes;
 }
 
 BrickCache::BrickCache(const DeviceCells& cells, cudaStream_t stream)
     : cells_(cells),
       stream_(stream),
       pageTable_(stream),
-      slotOf_(cells.count(), stream),
-      asked_(cells.count(), stream),
-      counts_(1, stream),
+      owners_(stream),
       stamps_(stream),
-      changes_(stream),
-      occupied_(stream) {
+      free_(stream),
+      spare_(stream),
+      occupied_(stream),
+      counts_(1, stream) {
+  number();
+}
+
+void BrickCache::number() {
+  makeRoom(slotOf_, cells_.brickCount(), stream_);
+  makeRoom(asked_, cells_.brickCount(), stream_);
   forget();
 }
 
-void BrickCache::forget() {
-  const std::vector<std::uint32_t> missing(slotOf_.size(), BrickSlotsView::kMissing);
-  slotOf_.upload(missing);
-  list_ = {};
-  list_.grow(std::uint32_t(pages_.size()) * BrickSlotsView::kPageSlots);
+SlotAccount BrickCache::account() {
+  return {slotOf_.data(),
+          owners_.data(),
+          stamps_.data(),
+          free_.data(),
+          spare_.data(),
+          counts_.data(),
+          now_};
 }
 
-BrickDemand BrickCache::demand() {
+void BrickCache::forget() {
   counts_.setZero();
+  launchSetAll(slotOf_.data(), cells_.brickCount(), BrickSlotsView::kMissing, stream_);
+  launchAddFree(account(), 0, slotCount(), 0, stream_);
+}
+
+BrickDemand BrickCache::demand(int pass) {
+  check(cudaMemsetAsync(counts_.data(), 0, 2 * sizeof(std::uint32_t), stream_), "clearing counts");
   return {.counts = counts_.data(),
           .slotOf = slotOf_.data(),
           .bricks = asked_.data(),
           .stamps = maxBytes_ == 0 ? nullptr : stamps_.data(),
           .now = ++now_,
-          .ahead = crowded_ ? 0 : kAhead};
+          .ahead = crowded_ ? 0 : kAhead << 2 * std::min(pass, kMostPasses)};
 }
 
 BrickDemand::Counts BrickCache::counts() { return downloaded_.download(counts_.data(), stream_); }
 
-void BrickCache::serve(std::uint32_t asked) {
-  std::vector<std::uint32_t> bricks(asked);
-  downloadTo(std::span(bricks), asked_.data(), stream_);
-  makeRoomFor(bricks.size());
-  const std::size_t served = std::min(bricks.size(), list_.freeCount());
+void BrickCache::serve(const BrickDemand::Counts& counts, const LevelBounds& levels) {
+  const std::uint32_t free = makeRoomFor(counts.bricks, counts.free);
+  const std::uint32_t served = std::min(counts.bricks, free);
   // A ray that asks for the brick at which it waits, and no other, makes progress with each brick.
-  crowded_ = served < bricks.size();
-  std::vector<SlotOfBrick> wanted, others;
-  for (std::size_t i = 0; i < bricks.size(); ++i)
-    if (i < served)
-      wanted.push_back({bricks[i], list_.take(bricks[i])});
-    else
-      others.push_back({bricks[i], BrickSlotsView::kMissing});
-  set(std::move(others));
-  decode(wanted);
+  crowded_ = served < counts.bricks;
+  launchMakeMissing(account(), asked_.data() + served, counts.bricks - served, stream_);
+  decode(served, free, levels);
 }
 
-/// Adds pages, or drops bricks where there cannot be more pages.
-void BrickCache::makeRoomFor(std::size_t bricks) {
-  while (list_.freeCount() < bricks)
-    if (!addPage()) break;
-  if (list_.freeCount() < bricks) evict(bricks - list_.freeCount());
+/// Adds pages, or drops bricks where there cannot be more pages. \return the number of free slots
+std::uint32_t BrickCache::makeRoomFor(std::uint32_t bricks, std::uint32_t free) {
+  while (free < bricks && addPage(free)) free += BrickSlotsView::kPageSlots;
+  return free < bricks ? free + evict(bricks - free, free) : free;
 }
 
+bool BrickCache::mayAddPage() const {
+  return pages_.empty() || maxBytes_ == 0 || (pages_.size() + 1) * kPageBytes <= maxBytes_;
+}
+
+/// \param free  number of free slots before
 /// \return false if there is no memory for a further page
-bool BrickCache::addPage() {
-  const bool isFirst = pages_.empty();
-  if (!isFirst && maxBytes_ != 0 && (pages_.size() + 1) * kPageBytes > maxBytes_) return false;
+bool BrickCache::addPage(std::uint32_t free) {
+  if (!mayAddPage()) return false;
+  const std::uint32_t before = slotCount();
   try {
-    pages_.emplace_back(BrickSlotsView::kPageFloats, stream_);
-    float* const page = pages_.back().data();
-    float** const table = pageTable_.extend(pages_.size(), pages_.size() - 1);
-    uploadTo(table + pages_.size() - 1, std::span<float* const>(&page, 1), stream_);
-    const std::size_t before = list_.size();
-    std::uint32_t* const stamps = stamps_.extend(before + BrickSlotsView::kPageSlots, before);
-    check(
-        cudaMemsetAsync(stamps + before, 0, BrickSlotsView::kPageSlots * sizeof(*stamps), stream_),
-        "clearing times");
+    DeviceBuffer<float> page(BrickSlotsView::kPageFloats, stream_);
+    extendTables(page.data());
+    pages_.push_back(std::move(page));
   } catch (const DeviceMemoryError&) {
-    if (isFirst) throw;
-    pages_.resize(list_.size() / BrickSlotsView::kPageSlots);
+    if (pages_.empty()) throw;
     maxBytes_ = pages_.size() * kPageBytes;
     return false;
   }
-  list_.grow(BrickSlotsView::kPageSlots);
+  launchAddFree(account(), before, BrickSlotsView::kPageSlots, free, stream_);
   return true;
 }
 
-void BrickCache::evict(std::size_t bricks) {
-  std::vector<std::uint32_t> stamps(list_.size());
+void BrickCache::extendTables(float* page) {
+  const std::size_t before = slotCount(), after = before + BrickSlotsView::kPageSlots;
+  float** const table = pageTable_.extend(pages_.size() + 1, pages_.size());
+  uploadTo(table + pages_.size(), std::span<float* const>(&page, 1), stream_);
+  (void)owners_.extend(after, before);
+  (void)stamps_.extend(after, before);
+  (void)free_.extend(after, before);
+  (void)spare_.reserve(after);
+}
+
+/// Drops the bricks that were not read for the longest time. \return how many
+std::uint32_t BrickCache::evict(std::uint32_t bricks, std::uint32_t free) {
+  std::vector<std::uint32_t> owners(slotCount()), stamps(slotCount());
+  downloadTo(std::span(owners), owners_.data(), stream_);
   downloadTo(std::span(stamps), stamps_.data(), stream_);
-  std::vector<SlotOfBrick> dropped;
-  for (const std::uint32_t brick : list_.evict(bricks, stamps))
-    dropped.push_back({brick, BrickSlotsView::kMissing});
-  set(std::move(dropped));
+  const auto slots = oldestSlots(bricks, owners, stamps);
+  uploadTo(spare_.data(), std::span<const std::uint32_t>(slots), stream_);
+  launchDrop(account(), spare_.data(), std::uint32_t(slots.size()), free, stream_);
+  return std::uint32_t(slots.size());
 }
 
-void BrickCache::set(std::vector<SlotOfBrick> changes) {
-  if (changes.empty()) return;
-  SlotOfBrick* const there = changes_.reserve(changes.size());
-  uploadTo(there, std::span<const SlotOfBrick>(changes), stream_);
-  launchSetSlots(there, std::uint32_t(changes.size()), slotOf_.data(), stream_);
-}
-
-void BrickCache::decode(const std::vector<SlotOfBrick>& wanted) {
-  if (wanted.empty()) return;
-  SlotOfBrick* const there = changes_.reserve(wanted.size());
-  uploadTo(there, std::span<const SlotOfBrick>(wanted), stream_);
-  std::uint8_t* const occupied = occupied_.reserve(wanted.size());
-  launchDecode({.field = cells_.view(),
-                .wanted = there,
-                .count = std::uint32_t(wanted.size()),
-                .pages = pageTable_.data(),
-                .slotOf = slotOf_.data(),
-                .occupied = occupied},
-               stream_);
-  std::vector<std::uint8_t> any(wanted.size());
-  downloadTo(std::span(any), occupied, stream_);
-  for (std::size_t i = 0; i < wanted.size(); ++i)
-    if (any[i] == 0) list_.giveBack(wanted[i].slot);
+void BrickCache::decode(std::uint32_t bricks, std::uint32_t free, const LevelBounds& levels) {
+  if (bricks == 0) return;
+  std::uint8_t* const occupied = occupied_.reserve(bricks);
+  check(cudaMemsetAsync(occupied, 0, bricks, stream_), "clearing marks");
+  const DecodeArguments arguments{.field = cells_.view(),
+                                  .bricks = asked_.data(),
+                                  .count = bricks,
+                                  .lastSlot = free_.data() + free - 1,
+                                  .pages = pageTable_.data(),
+                                  .occupied = occupied};
+  for (int level = levels.first; level <= levels.last; ++level)
+    launchDecode(arguments, level, stream_);
+  launchSettle(account(), {asked_.data(), bricks, free, occupied}, stream_);
 }
 
 std::size_t BrickCache::bytes() const {
-  return pages_.size() * kPageBytes + pageTable_.bytes() + slotOf_.bytes() + asked_.bytes() +
-         stamps_.bytes() + changes_.bytes() + occupied_.bytes();
+  return pages_.size() * BrickSlotsView::kPageFloats * sizeof(float) + pageTable_.bytes() +
+         slotOf_.bytes() + asked_.bytes() + owners_.bytes() + stamps_.bytes() + free_.bytes() +
+         spare_.bytes() + occupied_.bytes();
 }
 
 }  // namespace esvr::cuda

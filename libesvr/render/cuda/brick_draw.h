@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-#include "render/brick_march.h"
+#include "render/level_march.h"
 
 namespace esvr::cuda {
 
@@ -19,6 +19,8 @@ struct BrickDemand {
   struct Counts {
     std::uint32_t bricks;   ///< bricks that are asked for
     std::uint32_t waiting;  ///< tiles with rays that wait
+    std::uint32_t free;     ///< free slots
+    std::uint32_t spare;    ///< slots that became free while bricks are decoded
   };
   Counts* counts;
   std::uint32_t* slotOf;  ///< see BrickSlotsView; null: no brick can be missing
@@ -38,15 +40,16 @@ struct WaitingTiles {
 };
 
 struct BrickDrawArguments {
-  BrickTableView table;  ///< on the device
+  LevelScene scene;  ///< tables are on the device
   BrickSlotsView slots;
-  const Coord* bricks;  ///< places relative to the table's origin, in bricks
-  std::uint32_t count;
-  MarchScene scene;  ///< in coordinates relative to the table's origin
+  /// Bricks of the coarsest level of the scene: places relative to the table's origin. Tiles find
+  /// their ranges among them.
+  const Coord* bricks;
+  std::uint32_t firstBrick, count;  ///< number of the first of them, and how many there are
   Resolution resolution;
   int firstTileRow, tileRows;  ///< rows of tiles in this band of the picture
   int2* ranges;                ///< for each tile: first and last sample, counted from firstSample
-  double firstSample;          ///< the scene's first sample, counted from the eye
+  double firstSample;          ///< the first sample, counted from the eye in the coarsest level
   float4* pixels;              ///< pixels of the band; must be zero before
   BrickDemand demand;
   std::uint32_t* waiting;  ///< output: numbers of the tiles or entries that wait

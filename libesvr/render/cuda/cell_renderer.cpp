@@ -1,10 +1,9 @@
-// The renderer that marches rays through bricks of cells on a CUDA device, which are decoded from a
-// field when a ray asks for them.
+// The renderer that marches rays through bricks of cells on a CUDA device.
 
-#include <algorithm>
-#include <cmath>
+#include <functional>
+#include <optional>
 
-#include "render/cuda/brick_cache.h"
+#include "render/cuda/cell_store.h"
 #include "render/cuda/make_cuda_renderer.h"
 #include "render/cuda/march_renderer.h"
 #include "render/picture.h"
@@ -17,7 +16,7 @@ namespace {
 class Waiting {
  public:
   explicit Waiting(cudaStream_t stream)
-      : stream_(stream), found_(stream), entries_(stream), tiles_(stream), rays_(stream) {}
+      : stream_(stream), found_(stream), entries_(stream), tiles_(stream) {}
 
   /// Memory for the numbers of waiting tiles or entries.
   std::uint32_t* found(std::size_t tiles) { return found_.reserve(tiles); }
@@ -25,7 +24,7 @@ class Waiting {
   /// Takes the tiles that were found after the first pass; their rays begin anew.
   WaitingTiles begin(std::uint32_t count) {
     copy(tiles_.reserve(count), count);
-    rays_.reserve(std::size_t(count) * kMarchTilePixels);
+    makeRoom(rays_, std::size_t(count) * kMarchTilePixels, stream_);
     return view(count, true);
   }
   /// Takes the entries that were found in a later pass.
@@ -49,92 +48,110 @@ class Waiting {
 
   cudaStream_t stream_;
   GrowingBuffer<std::uint32_t> found_, entries_, tiles_;
-  GrowingBuffer<RayProgress> rays_;
+  DeviceBuffer<RayProgress> rays_;
 };
+
+/// Makes the bricks on the renderer's stream.
+using MakeStore = std::function<std::unique_ptr<CellStore>(cudaStream_t)>;
 
 class CellRenderer final : public MarchRenderer {
  public:
-  CellRenderer(const CellField& field, const Device& device, const RendererLimits& limits)
-      : MarchRenderer(device, limits),
-        origin_{double(field.table.origin.x), double(field.table.origin.y),
-                double(field.table.origin.z)},
-        background_(field.rule.background),
-        box_(cellsOf(field.table)),
-        cells_(field, stream()),
-        cache_(cells_, stream()),
-        waiting_(stream()) {}
+  CellRenderer(const MakeStore& makeStore, const Device& device, const RendererLimits& limits)
+      : MarchRenderer(device, limits), store_(makeStore(stream())), waiting_(stream()) {}
 
-  void forget() override { cache_.forget(); }
+  void forget() override {
+    if (store_->cache() != nullptr) store_->cache()->forget();
+  }
 
  private:
   static_assert(kBandRows % kMarchTileSide == 0);
 
+  void prepare(const RenderOptions& o) override {
+    const View view(o.camera, o.resolution);
+    scene_ = {{view, {}, o.step, clipOf(o), sampleRule(o, {}, store_->background())},
+              levelBounds(o, view, store_->box()),
+              {}};
+    store_->prepare(scene_->bounds);
+    for (int l = scene_->bounds.first; l <= scene_->bounds.last; ++l)
+      scene_->levels[l - scene_->bounds.first] = {store_->level(l).table(), store_->level(l).box(),
+                                                  tableOf(o, l)};
+  }
+
   void launch(const RenderOptions& o, Band band, float4* pixels) override {
-    if (cells_.count() == 0) return;
-    const BrickDrawArguments arguments = argumentsOf(o, band, pixels);
-    launchRanges(arguments, stream());
-    launchMarch(arguments, {}, stream());
-    serveAll(o, arguments);
+    if (store_->level(0).count() == 0) return;
+    BrickDrawArguments arguments = argumentsOf(o, band, pixels);
+    if (store_->cache() == nullptr) {
+      launchRanges(arguments, stream());
+      launchMarch(arguments, {}, stream());
+    } else {
+      drawAndServe(o, arguments, *store_->cache());
+    }
   }
 
   BrickDrawArguments argumentsOf(const RenderOptions& o, Band band, float4* pixels) {
-    View view(o.camera, o.resolution);
-    view.eye = difference(view.eye, origin_);
-    ClipBox clip = clipOf(o);
-    clip.box = {difference(clip.box.low, origin_), difference(clip.box.high, origin_)};
+    const int last = scene_->bounds.last;
+    const DeviceLevel& coarsest = store_->level(last);
+    const View view = scene_->at(scene_->last()).view;
     const int tileRows = tilesAlong(band.rows);
-    const std::size_t tiles = std::size_t(tileRows) * std::size_t(tilesAlong(o.resolution.width));
-    makeRoom(ranges_, tiles, stream());
-    return {.table = cells_.table(),
-            .slots = cache_.slots(),
-            .bricks = cells_.bricks(),
-            .count = cells_.count(),
-            .scene = {view, box_, o.step, clip, sampleRule(o, table().view(), background_)},
+    makeRoom(ranges_, std::size_t(tileRows) * std::size_t(tilesAlong(o.resolution.width)),
+             stream());
+    return {.scene = *scene_,
+            .slots = store_->slots(),
+            .bricks = coarsest.bricks(),
+            .firstBrick = coarsest.first(),
+            .count = coarsest.count(),
             .resolution = o.resolution,
             .firstTileRow = band.firstRow / kMarchTileSide,
             .tileRows = tileRows,
             .ranges = ranges_.data(),
-            .firstSample = double(binsWithin(box_, view, o.step).first) * kBinSamples,
+            .firstSample = double(binsWithin(coarsest.box(), view, o.step).first) * kBinSamples,
             .pixels = pixels,
-            .demand = cache_.demand(),
-            .waiting = waiting_.found(tiles)};
+            .demand = {},
+            .waiting = nullptr};
   }
 
-  /// Decodes the bricks that rays ask for and lets the rays continue, until none waits.
-  void serveAll(const RenderOptions& o, BrickDrawArguments arguments) {
-    auto counts = cache_.counts();
-    for (bool isFirst = true; counts.waiting > 0; isFirst = false) {
+  /// Draws, decodes the bricks that rays ask for and lets the rays continue, until none waits.
+  void drawAndServe(const RenderOptions& o, BrickDrawArguments arguments, BrickCache& cache) {
+    arguments.waiting = waiting_.found(ranges_.size());
+    arguments.demand = cache.demand(0);
+    launchRanges(arguments, stream());
+    launchMarch(arguments, {}, stream());
+    auto counts = cache.counts();
+    for (int pass = 1; counts.waiting > 0; ++pass) {
       checkCancelled(o);
       const WaitingTiles tiles =
-          isFirst ? waiting_.begin(counts.waiting) : waiting_.next(counts.waiting);
-      cache_.serve(counts.bricks);
-      arguments.slots = cache_.slots();
-      arguments.demand = cache_.demand();
+          pass == 1 ? waiting_.begin(counts.waiting) : waiting_.next(counts.waiting);
+      cache.serve(counts, arguments.scene.bounds);
+      arguments.slots = cache.slots();
+      arguments.demand = cache.demand(pass);
       launchMarch(arguments, tiles, stream());
-      counts = cache_.counts();
+      counts = cache.counts();
     }
   }
 
   static int tilesAlong(int pixels) { return (pixels + kMarchTileSide - 1) / kMarchTileSide; }
 
-  void shareMemory(std::uint64_t left) override { cache_.limit(left); }
+  void shareMemory(std::uint64_t left) override {
+    if (store_->cache() != nullptr) store_->cache()->limit(left);
+  }
   std::size_t fixedBytes() const override {
-    return cells_.bytes() + ranges_.bytes() + waiting_.bytes() + BrickCache::kPageBytes;
+    const BrickCache* const cache = store_->cache();
+    const std::size_t content = store_->bytes() + ranges_.bytes();
+    return cache == nullptr ? content : content - cache->bytes() + cache->fixedBytes();
   }
   std::size_t contentBytes() const override {
-    return cells_.bytes() + cache_.bytes() + ranges_.bytes() + waiting_.bytes();
+    return store_->bytes() + ranges_.bytes() + waiting_.bytes();
   }
   std::size_t bytesOfRow(Resolution r) const override {
+    const bool waits = store_->cache() != nullptr;
     const std::size_t ofTile =
-        sizeof(int2) + kMarchTilePixels * sizeof(RayProgress) + 3 * sizeof(std::uint32_t);
+        sizeof(int2) +
+        (waits ? kMarchTilePixels * sizeof(RayProgress) + 3 * sizeof(std::uint32_t) : 0);
     return std::size_t(tilesAlong(r.width)) * ofTile / kMarchTileSide + 1;
   }
 
-  Vec3 origin_;
-  float background_;
-  PlaceBox box_;  ///< box of the cells, relative to the origin
-  DeviceCells cells_;
-  BrickCache cache_;
+  std::unique_ptr<CellStore> store_;
+  std::optional<LevelScene> scene_;  ///< of the picture that is drawn
   Waiting waiting_;
   DeviceBuffer<int2> ranges_;
 };
@@ -144,7 +161,14 @@ class CellRenderer final : public MarchRenderer {
 std::unique_ptr<Renderer> makeCudaCellRenderer(const Field& field, const Device& device,
                                                const RendererLimits& limits,
                                                const RevoxeliseOptions& voxels) {
-  return std::make_unique<CellRenderer>(makeCellField(field, voxels), device, limits);
+  const auto store = [&](cudaStream_t stream) { return storeOf(field, voxels, stream); };
+  return std::make_unique<CellRenderer>(store, device, limits);
+}
+
+std::unique_ptr<Renderer> makeCudaVolumeRenderer(const SparseVolume& volume, const Device& device,
+                                                 const RendererLimits& limits) {
+  const auto store = [&](cudaStream_t stream) { return storeOf(volume, stream); };
+  return std::make_unique<CellRenderer>(store, device, limits);
 }
 
 }  // namespace esvr::cuda

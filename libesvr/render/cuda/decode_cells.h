@@ -1,20 +1,29 @@
 #pragma once
 /// Decodes bricks of cells from ellipsoids on a CUDA device. Each voxel is summed in integers, as
 /// in a fit, so that a brick has the same bits whenever it is decoded and whatever is decoded with
-/// it.
+/// it. Bricks of coarser levels of detail hold means of these voxels.
 
 #include <cuda_runtime_api.h>
 
 #include "field/voxel_rule.h"
 #include "render/brick_march.h"
 #include "render/cell_form.h"
+#include "render/level_of_detail.h"
 
 namespace esvr::cuda {
 
+/// The bricks of a level of detail; see DeviceLevel.
+struct LevelBricks {
+  Coord origin;         ///< first voxel of the table, in voxels of the level
+  std::uint32_t first;  ///< number of the level's first brick
+  std::uint32_t count;
+  const Coord* bricks;
+};
+
 /// A CellField on the device.
 struct CellFieldView {
-  Coord origin;         ///< first voxel of the table
-  const Coord* bricks;  ///< by brick: place relative to the origin, in bricks
+  BrickTableView table;  ///< of level 0
+  LevelBricks levels[kLevels];
   const CellForm* forms;
   const KernelConstants<float>* kernels;
   std::uint32_t kernelStride;  ///< 0: one kernel for all ellipsoids; 1: one for each
@@ -24,25 +33,17 @@ struct CellFieldView {
   VoxelRule rule;
 };
 
-/// A brick to be decoded and the slot that it gets.
-struct SlotOfBrick {
-  std::uint32_t brick, slot;
-};
-
 struct DecodeArguments {
   CellFieldView field;
-  const SlotOfBrick* wanted;
+  const std::uint32_t* bricks;  ///< bricks to decode
   std::uint32_t count;
-  float* const* pages;     ///< see BrickSlotsView
-  std::uint32_t* slotOf;   ///< output, by brick: its slot, or BrickSlotsView::kVacant
-  std::uint8_t* occupied;  ///< output, by wanted brick: 0 if all of its voxels are the background
+  const std::uint32_t* lastSlot;  ///< brick n gets the slot that lies n places before this one
+  float* const* pages;            ///< see BrickSlotsView
+  std::uint8_t* occupied;  ///< output, by brick: 1 if a voxel is not the background; must be 0
 };
 
-/// All pointers are to device memory that the caller owns.
-void launchDecode(const DecodeArguments& arguments, cudaStream_t stream);
-
-/// Sets slotOf of bricks. \param changes  `count` bricks and their new values
-void launchSetSlots(const SlotOfBrick* changes, std::uint32_t count, std::uint32_t* slotOf,
-                    cudaStream_t stream);
+/// Decodes those of the bricks that belong to a level. All pointers are to device memory that the
+/// caller owns.
+void launchDecode(const DecodeArguments& arguments, int level, cudaStream_t stream);
 
 }  // namespace esvr::cuda

@@ -13,8 +13,9 @@ class DeviceTable {
  public:
   /// Makes the table anew only if the transfer function or its step changed, because making it can
   /// take longer than drawing a picture.
-  void update(const RenderOptions& options, cudaStream_t stream) {
-    const Sampling sampling = samplingOf(options);
+  /// \param times  length of a step in units of options.step
+  void update(const RenderOptions& options, double times, cudaStream_t stream) {
+    const Sampling sampling = samplingOf(options, times);
     if (known_ && known_->sampling == sampling && known_->transfer == options.transfer) return;
     known_ = {options.transfer, sampling, TransferTable(options.transfer, sampling)};
     copy(known_->table.values(), values_, stream);

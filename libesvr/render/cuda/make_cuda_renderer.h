@@ -19,6 +19,7 @@ namespace esvr::cuda {
                                                              const Device& device,
                                                              const RendererLimits& limits,
                                                              const RevoxeliseOptions& voxels);
+/// Draws the voxels of a volume, which must outlive the renderer.
 /// \throws DeviceError  as for makeCudaFieldRenderer
 /// \throws UsageError   the voxels lie too far apart for the tables of a BrickAtlas
 [[nodiscard]] std::unique_ptr<Renderer> makeCudaVolumeRenderer(const SparseVolume& volume,

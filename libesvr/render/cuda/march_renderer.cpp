@@ -24,15 +24,27 @@ void MarchRenderer::drawFrame(const RenderOptions& options, Image* image) {
     image->rgba.assign(std::size_t(4) * std::size_t(image->width) * std::size_t(image->height),
                        0.0f);
   stats_ = {.deviceBytes = stats_.deviceBytes};
-  table_.update(options, stream_.get());
+  prepare(options);
   const int rows = rowsOfBand(options.resolution);
   for (int first = 0; first < options.resolution.height; first += rows)
     drawBand(options, {first, std::min(rows, options.resolution.height - first)}, image);
 }
 
+TransferTableView MarchRenderer::tableOf(const RenderOptions& options, int level) {
+  DeviceTable& table = tables_[std::size_t(level)];
+  table.update(options, LevelFrame{level}.side(), stream());
+  return table.view();
+}
+
+std::size_t MarchRenderer::tableBytes() const {
+  std::size_t bytes = 0;
+  for (const DeviceTable& table : tables_) bytes += table.bytes();
+  return bytes;
+}
+
 int MarchRenderer::rowsOfBand(Resolution r) {
   if (limits_.maxBytes == 0) return r.height;
-  const std::size_t fixed = fixedBytes() + table_.bytes();
+  const std::size_t fixed = fixedBytes() + tableBytes();
   const std::size_t ofRow = std::size_t(r.width) * sizeof(float4) + bytesOfRow(r);
   if (fixed + ofRow * kBandRows > limits_.maxBytes)
     throw DeviceError("marching voxels on the GPU needs more than " +
@@ -59,8 +71,8 @@ void MarchRenderer::drawBand(const RenderOptions& o, Band band, Image* image) {
           "copying a picture from the device");
   stream_.synchronize();
   stats_.drawMs += drawn_.millisecondsSince(begin_);
-  stats_.deviceBytes = std::max<std::uint64_t>(stats_.deviceBytes,
-                                               contentBytes() + table_.bytes() + pixels_.bytes());
+  stats_.deviceBytes =
+      std::max<std::uint64_t>(stats_.deviceBytes, contentBytes() + tableBytes() + pixels_.bytes());
 }
 
 }  // namespace esvr::cuda

@@ -1,10 +1,13 @@
 #pragma once
 /// Base class of the CUDA renderers that march through voxels. It manages bands, pixels and times.
 
+#include <array>
+
 #include "core/cuda/event.h"
 #include "core/cuda/stream.h"
 #include "esvr/renderer.h"
 #include "render/cuda/device_table.h"
+#include "render/level_of_detail.h"
 
 namespace esvr::cuda {
 
@@ -23,6 +26,8 @@ class MarchRenderer : public Renderer {
 
   MarchRenderer(const Device& device, const RendererLimits& limits);
 
+  /// Makes what the bands of a picture share.
+  virtual void prepare(const RenderOptions& options) = 0;
   /// Draws a band. \param pixels  pixels of the band, which are zero before
   virtual void launch(const RenderOptions& options, Band band, float4* pixels) = 0;
   /// Bytes of device memory, without the pixels and the transfer function's table.
@@ -35,17 +40,19 @@ class MarchRenderer : public Renderer {
   [[nodiscard]] virtual std::size_t bytesOfRow(Resolution) const { return 0; }
 
   [[nodiscard]] cudaStream_t stream() const { return stream_.get(); }
-  [[nodiscard]] const DeviceTable& table() const { return table_; }
+  /// The tables of the transfer function for the steps of a level of detail.
+  [[nodiscard]] TransferTableView tableOf(const RenderOptions& options, int level);
 
  private:
   void drawFrame(const RenderOptions& options, Image* image);
   void drawBand(const RenderOptions& options, Band band, Image* image);
   [[nodiscard]] int rowsOfBand(Resolution resolution);
+  [[nodiscard]] std::size_t tableBytes() const;
 
   RendererLimits limits_;
   Stream stream_;
   DeviceBuffer<float4> pixels_;
-  DeviceTable table_;
+  std::array<DeviceTable, kLevels> tables_;
   Event begin_, drawn_;
   FrameStats stats_;
 };

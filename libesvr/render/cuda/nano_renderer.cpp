@@ -18,12 +18,13 @@ class NanoRenderer final : public MarchRenderer {
         grid_(std::span(volume.data.get(), volume.bytes), stream()) {}
 
  private:
+  void prepare(const RenderOptions& o) override { table_ = tableOf(o, 0); }
   void launch(const RenderOptions& o, Band band, float4* pixels) override {
     launchNano({.view = View(o.camera, o.resolution),
                 .box = box_,
                 .step = o.step,
                 .clip = clipOf(o),
-                .rule = sampleRule(o, table().view(), background_),
+                .rule = sampleRule(o, table_, background_),
                 .grid = grid_.data(),
                 .values = values_,
                 .resolution = o.resolution,
@@ -34,6 +35,7 @@ class NanoRenderer final : public MarchRenderer {
   }
   std::size_t contentBytes() const override { return grid_.bytes(); }
 
+  TransferTableView table_{};
   NanoValues values_;
   float background_;
   PlaceBox box_;
