@@ -67,7 +67,7 @@ TEST(LevelOfDetail, WidePixelsShowTheCoarserVolume) {
     RenderOptions o = orthographic(volume), own = o;
     const LevelFrame frame{level};
     o.resolution = own.resolution = {20, 20};
-    o.camera.height = 20.0 * 3.0 * frame.side();  // a pixel is 3 voxels of the level wide
+    o.camera.height = 20.0 * 3.5 * frame.side();  // a pixel is 3.5 voxels of the level wide
     own.camera.height = o.camera.height / frame.side();
     own.camera.eye = frame.place(o.camera.eye), own.camera.center = frame.place(o.camera.center);
     own.opacityLength = o.opacityLength / frame.side();

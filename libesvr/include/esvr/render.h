@@ -57,7 +57,7 @@ enum class Between {
 /// The rule for places where a pixel is wider than several voxels. Sums of ellipsoids (Between::kSum)
 /// and NanoVDB grids have no levels of detail.
 enum class LevelOfDetail {
-  /// At distances at which a pixel is at least 2.5 x 2^l voxels wide, means of 2^l x 2^l x 2^l voxels
+  /// At distances at which a pixel is at least 3 x 2^l voxels wide, means of 2^l x 2^l x 2^l voxels
   /// are drawn, at steps that are 2^l times as long, for l up to 7. Pictures show fewer stray pixels,
   /// take less time, and need less memory. A clip box has at least two voxels and two steps of a
   /// level along each axis, or the level is not used.
