@@ -27,9 +27,9 @@ class TakenMemory {
   void* memory_ = nullptr;
 };
 
-using RendererMemory = OnGpu;
+using MemoryOnGpu = OnGpu;
 
-TEST_F(RendererMemory, IsSaidToBeExhaustedAndIsUsedAgain) {
+TEST_F(MemoryOnGpu, IsSaidToBeExhaustedAndIsUsedAgain) {
   const Field field = randomField({.count = 2000, .extent = 200.0});
   RenderOptions small;
   small.resolution = {160, 120};
