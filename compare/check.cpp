@@ -16,6 +16,7 @@
 #include "compare/program.h"
 #include "compare/unfitted.h"
 #include "esvr/error.h"
+#include "esvr/vector_metrics.h"
 
 namespace esvr::compare {
 namespace {
@@ -129,6 +130,8 @@ class Comparison {
     const GridPair both{reference_, pair.reference, candidate_, *pair.candidate};
     if (isRetyped(both))
       record.failures.push_back(retypedText(both));
+    else if (both.a().isVector && both.b().isVector && !haveSameBytes(both))
+      compareVectorGrids(pair, listed.uniqueName, record);
     else if (!listed.comparable || (listed.empty && options_.grids.empty()))
       compareUnfitted(options_, both, record);
     else
@@ -142,18 +145,58 @@ class Comparison {
     const VolumeGrid b = candidate_.read(*pair.candidate);
     CheckedGrid grid{.name = name, .candidateName = candidate_.grids()[*pair.candidate].uniqueName};
     requireRange(a.volume, name);
+    requireOverlap(a.volume, b.volume, name, record);
     grid.metrics = compareVolumes(a.volume, b.volume,
                                   {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
     grid.figures = figuresOf(grid.metrics);
     grid.differences = compareDescriptors(a.descriptor, b.descriptor);
-    if (disjoint(activeBox(a.volume), activeBox(b.volume)))
-      record.failures.push_back("grid \"" + name + "\": " +
-                                (activeVoxelCount(b.volume) == 0
-                                     ? "the candidate has no active voxel"
-                                     : "the active voxels lie in boxes that do not meet"));
-    const ValueRange range = activeRange(a.volume);
-    ranges_.push_back(double(range.max) - double(range.min));
+    addRange(a.volume);
     return grid;
+  }
+
+  /// Adds a row for the lengths of the vectors and one for each component.
+  void compareVectorGrids(const Pair& pair, const std::string& name, CheckRecord& record) {
+    const VectorGrid a = reference_.readVectors(pair.reference);
+    const VectorGrid b = candidate_.readVectors(*pair.candidate);
+    const std::string& other = candidate_.grids()[*pair.candidate].uniqueName;
+    const SparseVolume lengths = magnitudeOf(a.components);
+    requireRange(lengths, name);
+    requireOverlap(lengths, magnitudeOf(b.components), name, record);
+    const VectorMetrics metrics = compareVectors(
+        a.components, b.components, {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
+    record.grids.push_back({name, other, metrics.magnitude, figuresOf(metrics.magnitude),
+                            compareDescriptors(a.descriptor, b.descriptor)});
+    addRange(lengths);
+    for (std::size_t c = 0; c < kComponents; ++c) {
+      const VolumeMetrics& m = metrics.components[c];
+      record.grids.push_back({componentName(name, c), componentName(other, c), m, figuresOf(m),
+                              backgroundDifferences(a, b, c)});
+      addRange(a.components[c]);
+    }
+  }
+
+  /// The difference of the backgrounds of a component. That of x is one of the descriptors.
+  static std::vector<Difference> backgroundDifferences(const VectorGrid& a, const VectorGrid& b,
+                                                       std::size_t component) {
+    if (component == 0) return {};
+    GridDescriptor of, other;
+    of.background = a.background[component];
+    other.background = b.background[component];
+    return compareDescriptors(of, other);
+  }
+
+  void addRange(const SparseVolume& reference) {
+    const ValueRange range = activeRange(reference);
+    ranges_.push_back(double(range.max) - double(range.min));
+  }
+
+  static void requireOverlap(const SparseVolume& a, const SparseVolume& b, const std::string& name,
+                             CheckRecord& record) {
+    if (!disjoint(activeBox(a), activeBox(b))) return;
+    record.failures.push_back("grid \"" + name + "\": " +
+                              (activeVoxelCount(b) == 0
+                                   ? "the candidate has no active voxel"
+                                   : "the active voxels lie in boxes that do not meet"));
   }
 
   /// Checks that the reference has an active voxel and a peak, without which PSNR and SSIM are not

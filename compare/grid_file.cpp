@@ -27,7 +27,23 @@ ListedGrid listedGrid(const CarriedGrid& grid) {
   return {.name = grid.name,
           .comparable = summary.isScalar,
           .empty = summary.activeVoxels == 0,
-          .valueType = summary.valueType};
+          .valueType = summary.valueType,
+          .isVector = summary.isVector};
+}
+
+/// A grid of vectors; OpenVDB's name of its type is that of the source.
+ListedGrid listedGrid(const EsvrFile& file, const StoredVector& vector) {
+  const StoredGrid& first = componentsOf(file, vector).front();
+  return {.name = vector.name,
+          .comparable = false,
+          .empty = first.activeVoxels == 0,
+          .valueType = first.descriptor.valueType == ValueType::kDouble ? "vec3d" : "vec3s",
+          .isVector = true};
+}
+
+ListedGrid listedGrid(const EsvrFile& file, const GridOfFile& grid) {
+  if (grid.isVector) return listedGrid(file, file.vectors[grid.index]);
+  return grid.isCarried ? listedGrid(file.carried[grid.index]) : listedGrid(file.grids[grid.index]);
 }
 
 }  // namespace
@@ -45,8 +61,7 @@ void GridFile::listEsvr() {
   bytes_ = inspectEsvr(path_).fileBytes;
   metadata_ = esvr_->metadata;
   for (const auto& grid : gridsInOrder(*esvr_)) {
-    grids_.push_back(grid.isCarried ? listedGrid(esvr_->carried[grid.index])
-                                    : listedGrid(esvr_->grids[grid.index]));
+    grids_.push_back(listedGrid(*esvr_, grid));
     grids_.back().ofEsvr = grid;
   }
   const auto unique = uniqueNames(storedNames(grids_));
@@ -58,8 +73,12 @@ void GridFile::listVdb() {
   bytes_ = summary.fileBytes;
   metadata_ = std::move(summary.metadata);
   for (const auto& grid : summary.grids) {
-    grids_.push_back(
-        {grid.name, grid.uniqueName, grid.isScalar, grid.activeVoxels == 0, grid.valueType});
+    grids_.push_back({.name = grid.name,
+                      .uniqueName = grid.uniqueName,
+                      .comparable = grid.isScalar,
+                      .empty = grid.activeVoxels == 0,
+                      .valueType = grid.valueType,
+                      .isVector = grid.isVector});
     whyNoBytes_.push_back(grid.whyNotCarried);
   }
 }
@@ -75,8 +94,8 @@ std::size_t GridFile::firstWithVoxels() const {
 }
 
 std::optional<CarriedGrid> GridFile::bytesOf(std::size_t g) const {
-  const auto [isCarried, index] = grids_[g].ofEsvr;
-  if (esvr_) return isCarried ? std::optional(esvr_->carried[index]) : std::nullopt;
+  const GridOfFile& place = grids_[g].ofEsvr;
+  if (esvr_) return place.isCarried ? std::optional(esvr_->carried[place.index]) : std::nullopt;
   if (!whyNoBytes_[g].empty()) return std::nullopt;
   auto grids =
       readCarried(path_, {&g, 1}, {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});
@@ -87,13 +106,23 @@ VolumeGrid GridFile::read(std::size_t g) const {
   const ReadOptions options{
       .allowEmpty = true, .maxBytes = memory_.maxBytes, .memory = memory_.voxels};
   if (!esvr_) return readGrid(path_, grids_[g].uniqueName, options);
-  const auto [isCarried, index] = grids_[g].ofEsvr;
-  if (isCarried) return readGrid(esvr_->carried[index], options);
+  const GridOfFile& place = grids_[g].ofEsvr;
+  if (place.isCarried) return readGrid(esvr_->carried[place.index], options);
   VolumeGrid grid;
-  grid.descriptor = esvr_->grids[index].descriptor;
-  grid.volume =
-      decodeGrid(esvr_->grids[index], {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});
+  grid.descriptor = esvr_->grids.at(place.index).descriptor;
+  grid.volume = decodeGrid(esvr_->grids[place.index],
+                           {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});
   return grid;
+}
+
+VectorGrid GridFile::readVectors(std::size_t g) const {
+  const ReadOptions options{.maxBytes = memory_.maxBytes, .memory = memory_.voxels};
+  if (!esvr_) return readVector(path_, grids_[g].uniqueName, options);
+  const GridOfFile& place = grids_[g].ofEsvr;
+  if (place.isCarried) return readVector(esvr_->carried[place.index], options);
+  const StoredVector& vector = esvr_->vectors.at(place.index);
+  return decodeVector(vector.name, componentsOf(*esvr_, vector),
+                      {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});
 }
 
 }  // namespace esvr::compare

@@ -21,7 +21,8 @@ struct ListedGrid {
   bool comparable = true;    ///< true if the values are floats or doubles
   bool empty = false;        ///< true if there is no active voxel
   std::string valueType;
-  GridOfFile ofEsvr{};  ///< place in the content of an .esvr file
+  GridOfFile ofEsvr{};    ///< place in the content of an .esvr file
+  bool isVector = false;  ///< true if readVectors can read it
 };
 
 /// An .esvr file is recognised by its extension, a .vdb or .nvdb file by its first bytes.
@@ -48,6 +49,8 @@ class GridFile {
   /// The voxels of a grid, which may be empty.
   /// \throws BadInput  the values are not floats or doubles; else as for readGrid
   [[nodiscard]] VolumeGrid read(std::size_t grid) const;
+  /// The vectors of a grid. \throws BadInput  the grid has not ListedGrid::isVector
+  [[nodiscard]] VectorGrid readVectors(std::size_t grid) const;
 
  private:
   void listEsvr();

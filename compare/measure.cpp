@@ -73,9 +73,11 @@ std::vector<SearchStep> searchOf(const Match& match) {
 std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
                     const std::string& name) {
   if (file.grids.size() == 1) return 0;
-  const auto [isCarried, index] = gridsInOrder(file)[findGrid(namesInOrder(file), name, path)];
-  if (isCarried) throw BadInput(path.string() + ": grid \"" + name + "\" is carried unchanged");
-  return index;
+  const GridOfFile grid = gridsInOrder(file)[findGrid(namesInOrder(file), name, path)];
+  if (grid.isCarried)
+    throw BadInput(path.string() + ": grid \"" + name + "\" is carried unchanged");
+  if (grid.isVector) throw BadInput(path.string() + ": grid \"" + name + "\" has vectors");
+  return grid.index;
 }
 
 StoredGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::string& name) {

@@ -32,6 +32,12 @@ void compareEmpty(const CheckOptions& options, const GridPair& pair, CheckRecord
 
 }  // namespace
 
+bool haveSameBytes(const GridPair& pair) {
+  const auto a = pair.reference.bytesOf(pair.ofReference);
+  const auto b = pair.candidate.bytesOf(pair.ofCandidate);
+  return a && b && haveSameBytes(*a, *b);
+}
+
 bool isRetyped(const GridPair& pair) {
   if (!pair.a().comparable || !pair.b().comparable) return pair.a().valueType != pair.b().valueType;
   return (pair.a().valueType == kDouble) != (pair.b().valueType == kDouble);

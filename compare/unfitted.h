@@ -26,6 +26,9 @@ struct GridPair {
 /// The line that says how the type of a grid has changed.
 [[nodiscard]] std::string retypedText(const GridPair& pair);
 
+/// True if two grids have the same bytes in files without loss.
+[[nodiscard]] bool haveSameBytes(const GridPair& pair);
+
 /// Compares two grids whose bytes are the same in files without loss. Appends a line to the
 /// record's `same`, `failures` or, where one of the files is not a .vdb or .esvr file, `skipped`.
 void compareUnfitted(const CheckOptions& options, const GridPair& pair, CheckRecord& record);

@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <span>
 #include <utility>
+#include <variant>
 
 #include "cli/interrupts.h"
 #include "cli/output.h"
@@ -16,6 +18,9 @@
 namespace esvr::esvr2vdb {
 namespace {
 
+/// A grid that was decoded.
+using DecodedGrid = std::variant<VolumeGrid, VectorGrid>;
+
 /// Checks everything that can be checked before the work begins.
 void checkFiles(const Options& options) {
   std::vector<std::filesystem::path> files{options.input, options.output};
@@ -24,10 +29,19 @@ void checkFiles(const Options& options) {
   cli::checkOutput(options.output, {".vdb", ".nvdb"}, options.write.overwrite);
 }
 
+bool writesNano(const Options& options) { return options.output.extension() == ".nvdb"; }
+
 /// Why the output cannot hold carried grids; null if it can.
 const char* whyNoCarried(const Options& options) {
   if (!readsAll(options)) return "--lod, --max-ellipsoids and --bbox cannot cut a carried grid";
-  if (options.output.extension() == ".nvdb") return "a NanoVDB file cannot hold a carried grid";
+  if (writesNano(options)) return "a NanoVDB file cannot hold a carried grid";
+  return nullptr;
+}
+
+/// Why the output cannot hold a grid; null if it can.
+const char* whyNot(const GridOfFile& grid, const Options& options) {
+  if (grid.isCarried) return whyNoCarried(options);
+  if (grid.isVector && writesNano(options)) return "vectors are not written to NanoVDB files";
   return nullptr;
 }
 
@@ -48,10 +62,10 @@ EsvrFile read(const Options& options, const cli::Log& log) {
 /// \throws BadInput  no grid is left
 std::vector<NamedGrid> writable(const std::vector<NamedGrid>& chosen, const Options& options,
                                 const cli::Log& log) {
-  const char* why = whyNoCarried(options);
   std::vector<NamedGrid> kept;
   for (const NamedGrid& grid : chosen) {
-    if (!why || !grid.grid.isCarried) {
+    const char* why = whyNot(grid.grid, options);
+    if (!why) {
       kept.push_back(grid);
       continue;
     }
@@ -65,12 +79,25 @@ std::vector<NamedGrid> writable(const std::vector<NamedGrid>& chosen, const Opti
   return kept;
 }
 
+StoredGrid wantedPart(const StoredGrid& grid, const Options& options) {
+  return options.maxEllipsoids ? heaviest(grid, *options.maxEllipsoids) : grid;
+}
+
 VolumeGrid decoded(const StoredGrid& grid, const Options& options, const DecodeOptions& decode) {
   VolumeGrid result;
   result.descriptor = grid.descriptor;
-  result.volume = options.maxEllipsoids ? decodeGrid(heaviest(grid, *options.maxEllipsoids), decode)
+  result.volume = options.maxEllipsoids ? decodeGrid(wantedPart(grid, options), decode)
                                         : decodeGrid(grid, decode);
   return result;
+}
+
+VectorGrid decoded(const EsvrFile& file, const StoredVector& vector, const Options& options,
+                   const DecodeOptions& decode) {
+  const StoredComponents components = componentsOf(file, vector);
+  if (!options.maxEllipsoids) return decodeVector(vector.name, components, decode);
+  std::vector<StoredGrid> parts;
+  for (const StoredGrid& component : components) parts.push_back(wantedPart(component, options));
+  return decodeVector(vector.name, std::span(parts).first<kComponents>(), decode);
 }
 
 /// Bytes of a volume in memory.
@@ -80,44 +107,72 @@ std::uint64_t bytesOf(const SparseVolume& volume) {
          (memoryOf(volume).isInFile(values) ? 0 : values);
 }
 
-void tellEmpty(const VolumeGrid& grid, const cli::Log& log) {
-  if (activeVoxelCount(grid.volume) == 0)
-    log.warning("grid \"" + grid.descriptor.name + "\" comes back without an active voxel");
+std::uint64_t bytesOf(const DecodedGrid& grid) {
+  if (const auto* number = std::get_if<VolumeGrid>(&grid)) return bytesOf(number->volume);
+  std::uint64_t bytes = 0;
+  for (const auto& component : std::get<VectorGrid>(grid).components) bytes += bytesOf(component);
+  return bytes;
+}
+
+std::uint64_t activeVoxelsOf(const DecodedGrid& grid) {
+  if (const auto* number = std::get_if<VolumeGrid>(&grid)) return activeVoxelCount(number->volume);
+  std::uint64_t voxels = 0;
+  for (const auto& component : std::get<VectorGrid>(grid).components)
+    voxels += activeVoxelCount(component);
+  return voxels;
+}
+
+const GridDescriptor& descriptorOf(const DecodedGrid& grid) {
+  return std::visit([](const auto& g) -> const GridDescriptor& { return g.descriptor; }, grid);
+}
+
+void tellEmpty(const DecodedGrid& grid, const cli::Log& log) {
+  if (activeVoxelsOf(grid) == 0)
+    log.warning("grid \"" + descriptorOf(grid).name + "\" comes back without an active voxel");
+}
+
+DecodedGrid decoded(const EsvrFile& file, const GridOfFile& grid, const Options& options,
+                    const DecodeOptions& decode) {
+  if (grid.isVector) return decoded(file, file.vectors[grid.index], options, decode);
+  return decoded(file.grids[grid.index], options, decode);
 }
 
 /// The grids that are not carried, in order.
-std::vector<VolumeGrid> decodeAll(const EsvrFile& file, const std::vector<NamedGrid>& chosen,
-                                  const Options& options, const cli::Log& log) {
-  std::vector<VolumeGrid> grids;
+std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<NamedGrid>& chosen,
+                                   const Options& options, const cli::Log& log) {
+  std::vector<DecodedGrid> grids;
   DecodeOptions decode = options.decode;
   decode.maxBytes = options.memory.maxBytes;
   decode.memory = options.memory.voxels;
   for (const NamedGrid& named : chosen) {
     if (named.grid.isCarried) continue;
-    grids.push_back(decoded(file.grids[named.grid.index], options, decode));
+    grids.push_back(decoded(file, named.grid, options, decode));
     tellEmpty(grids.back(), log);
     // All grids are in memory, and twice while they are written.
-    decode.maxBytes -= std::min(decode.maxBytes, 2 * bytesOf(grids.back().volume));
+    decode.maxBytes -= std::min(decode.maxBytes, 2 * bytesOf(grids.back()));
   }
   return grids;
 }
 
 /// All chosen grids in order. \param decoded  those that are not carried
 std::vector<GridToWrite> inOrder(const EsvrFile& file, const std::vector<NamedGrid>& chosen,
-                                 const std::vector<VolumeGrid>& decoded) {
+                                 const std::vector<DecodedGrid>& decoded) {
   std::vector<GridToWrite> all;
   auto next = decoded.begin();
   for (const auto& [grid, name] : chosen)
-    all.push_back(grid.isCarried ? GridToWrite(&file.carried[grid.index]) : GridToWrite(&*next++));
+    if (grid.isCarried)
+      all.emplace_back(&file.carried[grid.index]);
+    else
+      all.push_back(std::visit([](const auto& g) { return GridToWrite(&g); }, *next++));
   return all;
 }
 
 /// Warns that a NanoVDB file cannot hold metadata.
-void tellLostMetadata(const EsvrFile& file, const std::vector<VolumeGrid>& grids,
+void tellLostMetadata(const EsvrFile& file, const std::vector<DecodedGrid>& grids,
                       const Options& options, const cli::Log& log) {
-  if (options.output.extension() != ".nvdb") return;
+  if (!writesNano(options)) return;
   std::size_t items = file.metadata.size();
-  for (const auto& grid : grids) items += grid.descriptor.metadata.size();
+  for (const auto& grid : grids) items += descriptorOf(grid).metadata.size();
   if (items == 0) return;
   log.warning("a NanoVDB file holds no metadata, which is left out",
               std::to_string(items) + " items");
@@ -126,9 +181,7 @@ void tellLostMetadata(const EsvrFile& file, const std::vector<VolumeGrid>& grids
 /// The names of the chosen grids in the output.
 std::vector<std::string> writtenNames(const EsvrFile& file, const std::vector<NamedGrid>& chosen) {
   std::vector<std::string> names;
-  for (const auto& [grid, name] : chosen)
-    names.push_back(grid.isCarried ? file.carried[grid.index].name
-                                   : file.grids[grid.index].descriptor.name);
+  for (const auto& [grid, name] : chosen) names.push_back(nameOf(file, grid));
   return uniqueNames(names);
 }
 
@@ -142,7 +195,7 @@ std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<N
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     if (chosen[i].grid.isCarried) continue;
     (void)findGrid(referenceNames, chosen[i].name, *options.reference);
-    grids.push_back({chosen[i].name, written[i]});
+    grids.push_back({chosen[i].name, written[i], chosen[i].grid.isVector});
   }
   return grids;
 }

@@ -4,26 +4,41 @@
 
 #include "cli/table.h"
 #include "esvr/metrics.h"
+#include "esvr/vdb_io.h"
+#include "esvr/vector_metrics.h"
 
 namespace esvr::esvr2vdb {
 namespace {
 
-/// The written voxels; none if the grid has no active voxel, which readGrid would refuse.
-SparseVolume readWritten(const Options& options, const std::string& name) {
+ReadOptions readingOf(const Options& options) {
+  return {.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels};
+}
+
+/// True if a written grid has no active voxel, which readGrid and readVector would refuse.
+bool isEmpty(const Options& options, const std::string& name) {
   for (const auto& grid : inspectVdb(options.output).grids)
-    if (grid.uniqueName == name && grid.activeVoxels == 0) return {};
-  return readGrid(options.output, name,
-                  {.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels})
-      .volume;
+    if (grid.uniqueName == name && grid.activeVoxels == 0) return true;
+  return false;
 }
 
 VolumeMetrics compare(const Options& options, const ComparedGrid& grid) {
-  const SparseVolume reference =
-      readGrid(*options.reference, grid.name,
-               {.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels})
-          .volume;
-  return compareVolumes(reference, readWritten(options, grid.writtenName),
-                        {.box = options.box, .ssim = true});
+  const auto read = [&](const auto& path, const std::string& name) {
+    return readGrid(path, name, readingOf(options)).volume;
+  };
+  const SparseVolume reference = read(*options.reference, grid.name);
+  const SparseVolume written =
+      isEmpty(options, grid.writtenName) ? SparseVolume{} : read(options.output, grid.writtenName);
+  return compareVolumes(reference, written, {.box = options.box, .ssim = true});
+}
+
+VectorMetrics compareVectorGrid(const Options& options, const ComparedGrid& grid) {
+  const auto read = [&](const auto& path, const std::string& name) {
+    return readVector(path, name, readingOf(options)).components;
+  };
+  const VectorVolume reference = read(*options.reference, grid.name);
+  const VectorVolume written =
+      isEmpty(options, grid.writtenName) ? VectorVolume{} : read(options.output, grid.writtenName);
+  return compareVectors(reference, written, {.box = options.box, .ssim = true});
 }
 
 std::vector<std::string> row(const std::string& name, const VolumeMetrics& m) {
@@ -38,13 +53,22 @@ std::vector<std::string> row(const std::string& name, const VolumeMetrics& m) {
           cli::shortNumber(m.massCandidate)};
 }
 
+/// Adds a row, or for vectors one for their lengths and one for each component.
+void addRows(const Options& options, const ComparedGrid& grid, cli::Table& table) {
+  if (!grid.isVector) return table.add(row(grid.name, compare(options, grid)));
+  const VectorMetrics metrics = compareVectorGrid(options, grid);
+  table.add(row(grid.name, metrics.magnitude));
+  for (std::size_t c = 0; c < kComponents; ++c)
+    table.add(row(componentName(grid.name, c), metrics.components[c]));
+}
+
 }  // namespace
 
 void printErrors(const Options& options, const std::vector<ComparedGrid>& grids,
                  std::ostream& out) {
   cli::Table table({"grid", "PSNR box", "active", "max error", "p99.9 error", "SSIM", "IoU",
                     "mass ref", "mass"});
-  for (const auto& grid : grids) table.add(row(grid.name, compare(options, grid)));
+  for (const auto& grid : grids) addRows(options, grid, table);
   table.print(out);
 }
 

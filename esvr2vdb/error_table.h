@@ -13,6 +13,7 @@ namespace esvr::esvr2vdb {
 struct ComparedGrid {
   std::string name;         ///< name in the reference
   std::string writtenName;  ///< name in the output
+  bool isVector = false;
 };
 
 /// Compares the written grids with the reference and prints a table.

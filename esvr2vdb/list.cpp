@@ -26,7 +26,8 @@ struct Listing {
   const Options& options;
   EsvrFile file;
   EsvrSummary summary;
-  std::vector<NamedGrid> grids;  ///< in file order
+  std::vector<NamedGrid> grids;    ///< in file order
+  std::vector<NamedGrid> parts{};  ///< the same, with the components in place of vectors
 
   /// The number of a grid in the summary.
   [[nodiscard]] std::size_t numberOf(const GridOfFile& grid) const {
@@ -37,6 +38,50 @@ struct Listing {
 const char* purposeOf(const Field& field) {
   if (field.ellipsoidCount() == 0) return "-";
   return field.fitFor == FitFor::kDrawing ? "drawing" : "voxels";
+}
+
+/// The grids and the components of vectors.
+std::vector<NamedGrid> withComponents(const EsvrFile& file, const std::vector<NamedGrid>& grids) {
+  std::vector<NamedGrid> parts;
+  for (const NamedGrid& named : grids) {
+    if (!named.grid.isVector) {
+      parts.push_back(named);
+      continue;
+    }
+    for (std::size_t c = 0; c < kComponents; ++c)
+      parts.push_back(
+          {{false, file.vectors[named.grid.index].first + c}, componentName(named.name, c)});
+  }
+  return parts;
+}
+
+/// OpenVDB's name of the type of vectors whose components have this type.
+std::string vectorsOf(ValueType component) {
+  if (component == ValueType::kDouble) return "vec3d";
+  return component == ValueType::kHalf ? "vec3s as half" : "vec3s";
+}
+
+/// The row of a grid of vectors. The rows of its components follow.
+std::vector<std::string> rowOfVector(const Listing& listing, const NamedGrid& named) {
+  const StoredVector& vector = listing.file.vectors[named.grid.index];
+  std::uint64_t voxels = 0, bytes = 0;
+  std::size_t ellipsoids = 0;
+  for (std::size_t g = vector.first; g < vector.first + kComponents; ++g) {
+    voxels = std::max(voxels, listing.file.grids[g].activeVoxels);
+    ellipsoids += listing.file.grids[g].field.ellipsoidCount();
+    bytes += cli::ownBytes(listing.summary, g);
+  }
+  const GridDescriptor& descriptor = listing.file.grids[vector.first].descriptor;
+  return {named.name,
+          cli::nameOf(descriptor.gridClass),
+          vectorsOf(descriptor.valueType),
+          std::to_string(voxels),
+          std::to_string(ellipsoids),
+          "-",
+          "-",
+          "-",
+          std::to_string(bytes),
+          "-"};
 }
 
 std::vector<std::string> rowOfStored(const Listing& listing, const NamedGrid& named) {
@@ -80,14 +125,17 @@ std::vector<std::string> rowOfCarried(const Listing& listing, const NamedGrid& n
 void printGrids(const Listing& listing) {
   cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "fitted for",
                     "kernel, kappa", "active by", "bytes", "bytes each"});
-  for (const NamedGrid& named : listing.grids)
-    table.add(named.grid.isCarried ? rowOfCarried(listing, named) : rowOfStored(listing, named));
+  for (const NamedGrid& named : listing.grids) {
+    if (named.grid.isVector) table.add(rowOfVector(listing, named));
+    for (const NamedGrid& part : withComponents(listing.file, {named}))
+      table.add(part.grid.isCarried ? rowOfCarried(listing, part) : rowOfStored(listing, part));
+  }
   table.print(std::cout);
 }
 
 /// The name of a section's grid; "-" if it belongs to the file.
 std::string gridOf(const Listing& listing, const SectionSummary& section) {
-  for (const auto& [grid, name] : listing.grids)
+  for (const auto& [grid, name] : listing.parts)
     if (listing.numberOf(grid) == section.grid) return name;
   return "-";
 }
@@ -110,7 +158,7 @@ void addStream(cli::Table& table, const std::string& grid, const char* stream, s
 /// Prints the bytes of the quantised ellipsoids, by stream.
 void printStreams(const Listing& listing) {
   cli::Table table({"grid", "stream", "bytes", "bytes each"});
-  for (const auto& [place, name] : listing.grids) {
+  for (const auto& [place, name] : listing.parts) {
     if (place.isCarried) continue;
     const StoredGrid& grid = listing.file.grids[place.index];
     if (grid.quantised.empty()) continue;
@@ -127,7 +175,7 @@ void printStreams(const Listing& listing) {
 /// Prints the error and the bytes of the first layers.
 void printLayers(const Listing& listing) {
   cli::Table table({"grid", "layers", "ellipsoids", "bytes", "PSNR box", "max error"});
-  for (const auto& [place, name] : listing.grids) {
+  for (const auto& [place, name] : listing.parts) {
     if (place.isCarried) continue;
     const auto& errors = listing.file.grids[place.index].layerErrors;
     const auto sizes = layerSizes(listing.file.grids[place.index]);
@@ -161,7 +209,7 @@ void printCarriedDetails(const Options& options, const std::string& name, const 
 
 void printDetails(const Listing& listing) {
   cli::printMetadata("file metadata", listing.file.metadata, std::cout);
-  for (const auto& [grid, name] : listing.grids)
+  for (const auto& [grid, name] : listing.parts)
     if (grid.isCarried)
       printCarriedDetails(listing.options, name, listing.file.carried[grid.index]);
     else
@@ -178,6 +226,7 @@ void list(const Options& options) {
                   inspectEsvr(options.input),
                   {}};
   listing.grids = namedGrids(listing.file);
+  listing.parts = withComponents(listing.file, listing.grids);
   std::cout << cli::printable(options.input.string()) << ": .esvr format "
             << listing.summary.versionMajor << '.' << listing.summary.versionMinor << ", "
             << listing.summary.fileBytes << " bytes\n\n";

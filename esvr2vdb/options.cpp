@@ -28,9 +28,11 @@ cli::ProgramText programText() {
           "  esvr2vdb --check IN.esvr",
       .notes =
           "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of\n"
-          "the file and of its grids, and no carried grids. --lod, --max-ellipsoids and --bbox\n"
-          "do not write carried grids either, because they cannot be cut. A warning names each\n"
-          "grid that is left out, and naming such a grid with -g is an error.\n"
+          "the file and of its grids, and it gets no grids of vectors and no carried grids. "
+          "--lod,\n"
+          "--max-ellipsoids and --bbox do not write carried grids either, because they cannot be\n"
+          "cut. A warning names each grid that is left out, and naming such a grid with -g is an\n"
+          "error.\n"
           "\n"
           "A voxel is active where it differs from the background by more than a threshold,\n"
           "which was chosen when the file was made. In a level set, the voxels of the narrow\n"

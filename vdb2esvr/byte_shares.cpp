@@ -17,7 +17,7 @@ std::optional<std::uint64_t> sizeOf(const Options& options, const VdbSummary& in
 }
 
 /// The weight of a grid in the division, which is above 0 for empty grids.
-double weightOf(const GridSummary& grid) { return double(grid.activeVoxels) + 1.0; }
+double weightOf(const FittedGrid& grid) { return double(grid.source.activeVoxels) + 1.0; }
 
 StoredGrid withDescriptor(StoredGrid grid, const GridDescriptor& descriptor) {
   grid.descriptor = descriptor;
@@ -33,12 +33,26 @@ std::uint64_t usualBytes(const GridDescriptor& twin) {
   return bytesAdded(withDescriptor(std::move(grid), twin)) + kRows * kSectionRowBytes;
 }
 
-/// Bytes of all that a file holds besides its fitted grids.
-/// \throws UsageError  they leave nothing of `size`
-std::uint64_t bytesBesideFitted(const VdbSummary& input, const std::vector<CarriedGrid>& carried,
-                                std::uint64_t size) {
-  const std::uint64_t ofCarried = bytesOfCarried(carried);
-  const std::uint64_t bytes = bytesBesideGrids(input.metadata) + ofCarried;
+/// The records of the grids of vectors.
+std::uint64_t bytesOfVectorRecords(const std::vector<FittedGrid>& grids) {
+  std::vector<StoredVector> vectors;
+  for (std::size_t g = 0; g < grids.size(); ++g)
+    if (grids[g].component == std::size_t{0}) vectors.push_back({grids[g].source.name, g});
+  return bytesOfVectors(vectors);
+}
+
+/// What a file holds besides its fitted grids.
+struct BesideFitted {
+  const VdbSummary& input;
+  const std::vector<FittedGrid>& grids;
+  const std::vector<CarriedGrid>& carried;
+};
+
+/// \throws UsageError  the bytes leave nothing of `size`
+std::uint64_t bytesOfAll(const BesideFitted& beside, std::uint64_t size) {
+  const std::uint64_t ofCarried = bytesOfCarried(beside.carried);
+  const std::uint64_t bytes =
+      bytesBesideGrids(beside.input.metadata) + ofCarried + bytesOfVectorRecords(beside.grids);
   if (bytes < size) return bytes;
   std::string text = "the file takes " + std::to_string(bytes) + " bytes without any fitted grid";
   if (ofCarried > 0)
@@ -53,11 +67,11 @@ std::uint64_t less(std::uint64_t bytes, std::uint64_t by) { return bytes - std::
 }  // namespace
 
 ByteShares::ByteShares(const Options& options, const VdbSummary& input,
-                       const std::vector<GridSummary>& grids, const Twins& twins,
+                       const std::vector<FittedGrid>& grids, const Twins& twins,
                        const std::vector<CarriedGrid>& carried)
     : left_(sizeOf(options, input)), shares_(grids.size()) {
   if (!left_) return;
-  *left_ -= bytesBesideFitted(input, carried, *left_);
+  *left_ -= bytesOfAll({input, grids, carried}, *left_);
   for (std::size_t g = 0; g < grids.size(); ++g) {
     if (const auto twin = twins.find(g); twin != twins.end())
       reserve(twin->second);

@@ -7,6 +7,7 @@
 
 #include "esvr/container.h"
 #include "esvr/vdb_io.h"
+#include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/twins.h"
 
@@ -18,7 +19,7 @@ class ByteShares {
  public:
   /// \param carried  grids that the file holds unchanged
   /// \throws UsageError  the size has no room for what the file holds besides the fitted grids
-  ByteShares(const Options& options, const VdbSummary& input, const std::vector<GridSummary>& grids,
+  ByteShares(const Options& options, const VdbSummary& input, const std::vector<FittedGrid>& grids,
              const Twins& twins, const std::vector<CarriedGrid>& carried);
 
   /// Bytes for a grid without its twins; nothing if no size is wanted.

@@ -42,8 +42,17 @@ WantedPlaces wantedPlaces(const std::filesystem::path& file, const VdbSummary& s
 }
 
 /// The reason why a grid is not fitted; empty if it is.
-std::string whyCarried(const GridSummary& grid, bool isKept) {
-  return isKept ? "--keep names it" : grid.skipReason;
+std::string whyCarried(const GridSummary& grid, bool isKept, bool lossless) {
+  if (isKept) return "--keep names it";
+  if (!grid.isVector) return grid.skipReason;
+  return lossless && grid.valueType == "vec3d"
+             ? "its vectors are of doubles, which a lossless file cannot hold in another way"
+             : "";
+}
+
+void addFitted(const GridSummary& grid, std::size_t place, std::vector<FittedGrid>& fitted) {
+  if (!grid.isVector) return fitted.push_back({grid, place});
+  for (std::size_t c = 0; c < kComponents; ++c) fitted.push_back({grid, place, c});
 }
 
 void refuseLostGrids(const std::filesystem::path& file, const std::vector<NotFitted>& carried) {
@@ -65,17 +74,21 @@ void refuseNothing(const std::filesystem::path& file, const VdbSummary& summary,
 
 }  // namespace
 
+std::string FittedGrid::uniqueName() const {
+  return component ? componentName(source.uniqueName, *component) : source.uniqueName;
+}
+
 GridChoice chooseGrids(const std::filesystem::path& file, const VdbSummary& summary,
                        const WantedGrids& wanted) {
   const WantedPlaces places = wantedPlaces(file, summary, wanted);
   GridChoice choice;
   for (std::size_t i = 0; i < summary.grids.size(); ++i) {
     const GridSummary& grid = summary.grids[i];
-    const std::string why = whyCarried(grid, places.keep.contains(i));
+    const std::string why = whyCarried(grid, places.keep.contains(i), wanted.lossless);
     if (places.skip.contains(i))
       choice.skipped.push_back({grid, i, "--skip names it"});
     else if (places.wants(i) && why.empty())
-      choice.fitted.push_back(grid);
+      addFitted(grid, i, choice.fitted);
     else if (places.wants(i))
       choice.carried.push_back({grid, i, why});
   }

@@ -2,6 +2,8 @@
 /// Chooses the grids of a file that are fitted, those that are carried unchanged, and those that
 /// are left out.
 
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,7 @@ struct WantedGrids {
   std::vector<std::string> only;  ///< empty: all grids
   std::vector<std::string> keep;  ///< carried unchanged, even if they could be fitted
   std::vector<std::string> skip;  ///< left out
+  bool lossless = false;  ///< whether doubles, which are fitted as float32, are carried in vectors
 };
 
 /// A grid that is not fitted, and the reason.
@@ -23,8 +26,19 @@ struct NotFitted {
   std::string why;
 };
 
+/// A grid that is fitted: one of numbers, or a component of a grid of vectors.
+struct FittedGrid {
+  GridSummary source;                      ///< the grid of the input
+  std::size_t place = 0;                   ///< its index in VdbSummary::grids
+  std::optional<std::size_t> component{};  ///< of vectors
+  std::optional<double> peak{};            ///< peak of the PSNR of vectors (findPeaks)
+
+  /// The unique name of the grid, or componentName() of it.
+  [[nodiscard]] std::string uniqueName() const;
+};
+
 struct GridChoice {
-  std::vector<GridSummary> fitted;  ///< grids in file order
+  std::vector<FittedGrid> fitted;  ///< grids in file order; the components of vectors in theirs
   std::vector<NotFitted> carried, skipped;
 };
 

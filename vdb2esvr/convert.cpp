@@ -8,6 +8,7 @@
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "esvr/psnr_between.h"
+#include "vdb2esvr/source.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -40,22 +41,33 @@ void countHits(const SparseVolume& source, ConvertedGrid& grid) {
 
 /// The error of the sum between voxels, where it is meant to be drawn.
 std::optional<double> errorBetween(const SparseVolume& source, const StoredGrid& grid,
-                                   const std::optional<Box>& box) {
+                                   const CommonFitOptions& fit) {
   if (grid.field.fitFor == FitFor::kVoxels || grid.field.ellipsoidCount() == 0) return std::nullopt;
   const RevoxeliseOptions rule = voxelRule(grid);
-  return psnrBetween(source, grid.field,
-                     {.box = box, .range = rule.range, .narrowBand = rule.narrowBand});
+  return psnrBetween(
+      source, grid.field,
+      {.box = fit.box, .range = rule.range, .narrowBand = rule.narrowBand, .peak = fit.peak});
+}
+
+/// A converted grid that has its names only.
+ConvertedGrid named(const FittedGrid& fitted) {
+  ConvertedGrid grid;
+  grid.uniqueName = fitted.uniqueName();
+  grid.sourceName = fitted.source.uniqueName;
+  grid.component = fitted.component;
+  return grid;
 }
 
 }  // namespace
 
-ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
+ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
                           std::optional<std::uint64_t> bytes) {
-  const CommonFitOptions& fit = options.convert.fit;
-  ConvertedGrid grid;
-  grid.uniqueName = uniqueName;
+  Options options = given;
+  CommonFitOptions& fit = options.convert.fit;
+  fit.peak = fitted.peak;
+  ConvertedGrid grid = named(fitted);
   cli::Stopwatch watch;
-  const VolumeGrid source = readGrid(options.input, uniqueName, options.read);
+  const VolumeGrid source = readSource(options, fitted);
   grid.bricks = source.volume.brickCount();
   grid.nonFiniteReplaced = source.nonFiniteReplaced;
   grid.seconds.read = watch.lap();
@@ -69,16 +81,18 @@ ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
 
   grid.metrics =
       compareVolumes(source.volume, decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)}),
-                     {.box = fit.box});
-  grid.psnrBetween = errorBetween(source.volume, grid.stored(), fit.box);
+                     {.box = fit.box, .peak = fit.peak});
+  grid.psnrBetween = errorBetween(source.volume, grid.stored(), fit);
   grid.seconds.measure = watch.lap();
   if (options.countHits) countHits(source.volume, grid);
   return grid;
 }
 
-ConvertedGrid twinOf(const ConvertedGrid& grid, const std::string& uniqueName, const Twin& twin) {
+ConvertedGrid twinOf(const ConvertedGrid& grid, const FittedGrid& fitted, const Twin& twin) {
   ConvertedGrid made = grid;
-  made.uniqueName = uniqueName;
+  made.uniqueName = fitted.uniqueName();
+  made.sourceName = fitted.source.uniqueName;
+  made.component = fitted.component;
   made.conversion.grid.descriptor = twin.descriptor;
   made.nonFiniteReplaced = twin.nonFiniteReplaced;
   made.sameAs = grid.uniqueName;

@@ -19,7 +19,9 @@ struct PhaseSeconds {
 };
 
 struct ConvertedGrid {
-  std::string uniqueName;  ///< name in the input (GridSummary::uniqueName)
+  std::string uniqueName;                ///< FittedGrid::uniqueName()
+  std::string sourceName;                ///< GridSummary::uniqueName of the grid of the input
+  std::optional<std::size_t> component;  ///< of vectors
   Conversion conversion;
   VolumeMetrics metrics;              ///< errors of the decoded grid
   std::optional<double> psnrBetween;  ///< of ellipsoids that were fitted for drawing, dB
@@ -37,11 +39,11 @@ struct ConvertedGrid {
 
 /// Reads, converts and measures a grid. A run with Job::kPart does not measure it.
 /// \param bytes  bytes that the grid may add to the file, if a size is wanted
-[[nodiscard]] ConvertedGrid convertGrid(const Options& options, const std::string& uniqueName,
+[[nodiscard]] ConvertedGrid convertGrid(const Options& options, const FittedGrid& fitted,
                                         std::optional<std::uint64_t> bytes);
 
 /// A twin of a converted grid, which takes the time of reading it only.
-[[nodiscard]] ConvertedGrid twinOf(const ConvertedGrid& grid, const std::string& uniqueName,
+[[nodiscard]] ConvertedGrid twinOf(const ConvertedGrid& grid, const FittedGrid& fitted,
                                    const Twin& twin);
 
 }  // namespace esvr::vdb2esvr

@@ -26,7 +26,8 @@ double mostBricks(const VdbSummary& file, const GridSummary& grid) {
 
 std::uint64_t conversionMemory(const VdbSummary& file, const GridChoice& grids) {
   double bricks = 0.0, carried = 0.0;
-  for (const GridSummary& grid : grids.fitted) bricks = std::max(bricks, mostBricks(file, grid));
+  for (const FittedGrid& grid : grids.fitted)
+    bricks = std::max(bricks, mostBricks(file, grid.source));
   for (const NotFitted& left : grids.carried) carried += double(left.grid.storedBytes);
   // A damaged file may claim any number of voxels.
   constexpr double kMost = 1e18;

@@ -42,8 +42,10 @@ cli::ProgramText programText() {
           "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]\n"
           "  vdb2esvr IN.####.vdb OUT.####.esvr [--frames 1-100x2] ...",
       .notes =
-          "Without -g, all grids are converted. Grids that are not fitted come back bit for bit:\n"
-          "those that are not of floats or doubles (vectors, integers, masks, strings, points),\n"
+          "Without -g, all grids are converted. Grids of vectors are fitted by components, unless\n"
+          "they take fewer bytes unchanged. Grids that are not fitted come back bit for bit: "
+          "those\n"
+          "that are not of floats, doubles or vectors of them (integers, masks, strings, points),\n"
           "those without an active voxel, and those that --keep names are carried in the file as\n"
           "the bytes that OpenVDB wrote. --skip leaves grids out, and the summary says what was\n"
           "fitted, carried and left out. A grid of a .nvdb file cannot be carried; a file with "
@@ -389,7 +391,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   Options options;
   options.input = a.get<std::string>("input");
   options.output = a.get<std::string>("output");
-  options.grids = {namesIn(a, "grid"), namesIn(a, "keep"), namesIn(a, "skip")};
+  options.grids = {namesIn(a, "grid"), namesIn(a, "keep"), namesIn(a, "skip"), false};
   options.psnr = bounded<double>(a, "psnr", 0.0, kHighestPsnr);
   options.convert.fit = fitOptions(a);
   options.convert.fit.psnr = options.psnr;
@@ -397,6 +399,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   readPaper(a, options);
   readSize(a, options);
   options.convert.goal = goalOf(a, options);
+  options.grids.lossless = a.get<bool>("lossless");
   options.convert.representation = representation(a);
   requireRepresentation(a, options);
   options.read.nonFinite = nonFinite(a);

@@ -202,13 +202,13 @@ Json layersOf(const StoredGrid& grid) {
   return layers;
 }
 
-Json metricsOf(const ConvertedGrid& grid) {
-  const VolumeMetrics& m = grid.metrics;
+/// \param between  PSNR between voxels
+Json metricsOf(const VolumeMetrics& m, const std::optional<double>& between) {
   return {{"peak", m.peak},
           {"box_voxels", m.boxVoxels},
           {"psnr_box", m.psnrBox},
           {"psnr_active", m.psnrActive},
-          {"psnr_between", orNull(grid.psnrBetween)},
+          {"psnr_between", orNull(between)},
           {"max_error", m.maxError},
           {"max_error_at", {m.maxErrorAt.x, m.maxErrorAt.y, m.maxErrorAt.z}},
           {"p999_error", m.p999Error},
@@ -252,6 +252,7 @@ Json curveOf(const std::vector<TimedCurvePoint>& curve) {
 Json gridOf(const RunRecord& record, std::size_t g) {
   const ConvertedGrid& grid = record.grids[g];
   return {{"name", grid.uniqueName},
+          {"component_of", grid.component ? Json(grid.sourceName) : Json(nullptr)},
           {"same_as", orNull(grid.sameAs)},
           {"source", sourceOf(grid)},
           {"ellipsoids", grid.stored().field.ellipsoidCount()},
@@ -264,7 +265,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"compact", compactOf(grid)},
           {"representation", choiceOf(grid)},
           {"layers", layersOf(grid.stored())},
-          {"metrics", metricsOf(grid)},
+          {"metrics", metricsOf(grid.metrics, grid.psnrBetween)},
           {"seconds", secondsOf(grid.seconds)},
           {"left_out", leftOutJson(leftOut(record, g))},
           {"curve", curveOf(grid.conversion.fit.curve)}};
@@ -274,6 +275,24 @@ Json gridsOf(const RunRecord& record) {
   Json grids = Json::array();
   for (std::size_t g = 0; g < record.grids.size(); ++g) grids.push_back(gridOf(record, g));
   return grids;
+}
+
+Json toJson(const EsvrSummary& file, const ConvertedVector& vector) {
+  Json components = Json::array();
+  for (std::size_t c = 0; c < kComponents; ++c)
+    components.push_back({{"name", componentName(vector.uniqueName, c)},
+                          {"metrics", metricsOf(vector.metrics.components[c], std::nullopt)}});
+  return {{"name", vector.uniqueName},
+          {"value_type", vector.valueType},
+          {"bytes", ownBytes(file, vector)},
+          {"metrics", metricsOf(vector.metrics.magnitude, std::nullopt)},
+          {"components", std::move(components)}};
+}
+
+Json vectorsOf(const RunRecord& record) {
+  Json vectors = Json::array();
+  for (const auto& vector : record.vectors) vectors.push_back(toJson(record.output, vector));
+  return vectors;
 }
 
 Json toJson(const NotFitted& left) {
@@ -358,6 +377,7 @@ Json makeReport(const Options& options, const RunRecord& record) {
                  {"output", {{"path", options.output.string()}, {"bytes", ratio.bytesOut}}},
                  {"ratio", ratio.value()},
                  {"grids", gridsOf(record)},
+                 {"vectors", vectorsOf(record)},
                  {"carried", carriedOf(record)},
                  {"skipped", skippedOf(record)},
                  {"seconds", totalSeconds(record)},

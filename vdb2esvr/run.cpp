@@ -21,8 +21,10 @@
 #include "vdb2esvr/report.h"
 #include "vdb2esvr/run_record.h"
 #include "vdb2esvr/run_sequence.h"
+#include "vdb2esvr/source.h"
 #include "vdb2esvr/summary.h"
 #include "vdb2esvr/twins.h"
+#include "vdb2esvr/vectors.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -87,19 +89,19 @@ class FileConversion {
   }
 
   /// \param carried  grids that the file holds unchanged
-  void run(const std::vector<GridSummary>& grids, const std::vector<CarriedGrid>& carried,
+  void run(const std::vector<FittedGrid>& grids, const std::vector<CarriedGrid>& carried,
            RunRecord& record) {
     const Twins twins = findTwins(options_, grids);
     ByteShares shares(options_, record.input, grids, twins, carried);
     for (std::size_t g = 0; g < grids.size(); ++g) {
-      const std::string& name = grids[g].uniqueName;
       if (cancelled())
-        record.notFitted.push_back(name);
+        record.notFitted.push_back(grids[g].uniqueName());
       else if (const auto twin = twins.find(g); twin != twins.end())
-        record.grids.push_back(twinOf(record.grids[twin->second.of], name, twin->second));
-      else if (!convert(g, name, shares, record))
-        record.notFitted.push_back(name);
+        record.grids.push_back(twinOf(record.grids[twin->second.of], grids[g], twin->second));
+      else if (!convert(g, grids[g], shares, record))
+        record.notFitted.push_back(grids[g].uniqueName());
     }
+    collectVectors(record);
     record.interrupted = cancelled();
     if (record.interrupted && (options_.onCancel == OnCancel::kDiscard || record.grids.empty()))
       throw RuntimeFailure("interrupted; " + whatIsLeft());
@@ -121,10 +123,10 @@ class FileConversion {
   }
 
   /// \return false if the run was interrupted before the fit had a result
-  bool convert(std::size_t g, const std::string& name, ByteShares& shares, RunRecord& record) try {
-    ProgressBar bar(name, options_.progress, options_.verbosity);
+  bool convert(std::size_t g, const FittedGrid& fitted, ByteShares& shares, RunRecord& record) try {
+    ProgressBar bar(fitted.uniqueName(), options_.progress, options_.verbosity);
     options_.convert.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
-    record.grids.push_back(convertToShare(g, name, shares));
+    record.grids.push_back(convertToShare(g, fitted, shares));
     return true;
   } catch (const Cancelled&) {
     return false;
@@ -133,29 +135,29 @@ class FileConversion {
   /// Converts a grid to the bytes of its share. Each of its twins repeats a row of the table for
   /// every section. How many there are is known after a conversion only; where they exceed what is
   /// reserved for the twins, the grid is converted again to fewer bytes.
-  ConvertedGrid convertToShare(std::size_t g, const std::string& name, ByteShares& shares) {
+  ConvertedGrid convertToShare(std::size_t g, const FittedGrid& fitted, ByteShares& shares) {
     std::optional<std::uint64_t> bytes = shares.of(g);
-    ConvertedGrid grid = convertWhereItFits(name, bytes);
+    ConvertedGrid grid = convertWhereItFits(fitted, bytes);
     while (const std::uint64_t excess = shares.take(g, grid.stored())) {
       if (cancelled()) break;
       bytes = *bytes - std::min(*bytes, excess);
-      grid = convertWhereItFits(name, bytes);
+      grid = convertWhereItFits(fitted, bytes);
     }
     return grid;
   }
 
   /// Converts a grid. If the GPU that "auto" selected fails, for example because its memory is too
   /// small, the CPU converts this grid and all later ones.
-  ConvertedGrid convertWhereItFits(const std::string& name, std::optional<std::uint64_t> bytes) {
+  ConvertedGrid convertWhereItFits(const FittedGrid& fitted, std::optional<std::uint64_t> bytes) {
     const bool onGpu = options_.convert.fit.device.kind == DeviceKind::kCuda;
     if (options_.device != kAuto || !onGpu || parts_.haveRanks())
-      return convertGrid(options_, name, bytes);
+      return convertGrid(options_, fitted, bytes);
     try {
-      return convertGrid(options_, name, bytes);
+      return convertGrid(options_, fitted, bytes);
     } catch (const DeviceError& error) {
       log_.warning(std::string(error.what()) + "; continuing on the CPU");
       runOn({Device{}});
-      return convertGrid(options_, name, bytes);
+      return convertGrid(options_, fitted, bytes);
     }
   }
 
@@ -171,8 +173,8 @@ void placeCarried(const RunRecord& record, std::vector<CarriedGrid>& carried) {
   std::size_t source = 0, converted = 0;
   for (std::size_t c = 0; c < carried.size(); ++c) {
     for (; source < carried[c].place; ++source)
-      if (converted < record.grids.size() &&
-          names[source].uniqueName == record.grids[converted].uniqueName)
+      while (converted < record.grids.size() &&
+             names[source].uniqueName == record.grids[converted].sourceName)
         ++converted;
     carried[c].place = std::uint32_t(converted + c);
   }
@@ -185,9 +187,11 @@ void write(const Options& options, std::vector<CarriedGrid> carried, RunRecord& 
   file.carried = std::move(carried);
   file.metadata = record.input.metadata;
   for (const auto& grid : record.grids) file.grids.push_back(grid.stored());
+  for (const auto& vector : record.vectors) file.vectors.push_back(vector.stored);
   writeEsvr(options.output, file, {.overwrite = options.overwrite});
   record.output = inspectEsvr(options.output);
   record.secondsWrite = watch.lap();
+  measureVectors(options, file, record);
 }
 
 void tellResult(const Options& options, const RunRecord& record) {
@@ -271,6 +275,7 @@ RunRecord convertFile(const Options& options, Ranks* ranks, const CancelToken& c
   record.skipped = std::move(choice.skipped);
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
+  findPeaks(besides(carried, options), choice.fitted);
   Parts parts(options, selected.front(), cancel, ranks);
   FileConversion(besides(carried, options), selected, cancel, parts, log)
       .run(choice.fitted, carried, record);
@@ -279,6 +284,7 @@ RunRecord convertFile(const Options& options, Ranks* ranks, const CancelToken& c
     if (!ranks) tellPart(options, record, log);
     return record;
   }
+  carrySmallerVectors(options, record, carried);
   write(options, std::move(carried), record);
   if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "cli/names.h"
 #include "esvr/error.h"
 
 namespace esvr::vdb2esvr {
@@ -15,19 +16,27 @@ std::size_t numberOfCarried(const RunRecord& record, std::size_t carried) {
   return record.grids.size() + carried;
 }
 
+std::uint64_t ownBytes(const EsvrSummary& file, const ConvertedVector& vector) {
+  std::uint64_t bytes = 0;
+  for (std::size_t c = 0; c < kComponents; ++c)
+    bytes += cli::ownBytes(file, vector.stored.first + c);
+  return bytes;
+}
+
 Ratio ratioOf(const RunRecord& record) {
-  Ratio ratio{0, record.output.fileBytes, record.grids.size() + record.carried.size(),
+  const std::size_t converted = record.grids.size() - record.vectors.size() * (kComponents - 1);
+  Ratio ratio{0, record.output.fileBytes, converted + record.carried.size(),
               record.input.grids.size()};
   if (ratio.wholeInput()) {
     ratio.bytesIn = record.input.fileBytes;
     return ratio;
   }
-  const auto converted = [&](const GridSummary& summary) {
+  const auto isConverted = [&](const GridSummary& summary) {
     return std::any_of(record.grids.begin(), record.grids.end(),
-                       [&](const auto& grid) { return grid.uniqueName == summary.uniqueName; });
+                       [&](const auto& grid) { return grid.sourceName == summary.uniqueName; });
   };
   for (const GridSummary& grid : record.input.grids)
-    if (converted(grid)) ratio.bytesIn += grid.storedBytes;
+    if (isConverted(grid)) ratio.bytesIn += grid.storedBytes;
   for (const NotFitted& carried : record.carried) ratio.bytesIn += carried.grid.storedBytes;
   return ratio;
 }

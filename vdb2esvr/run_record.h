@@ -8,10 +8,19 @@
 
 #include "esvr/container.h"
 #include "esvr/vdb_io.h"
+#include "esvr/vector_metrics.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/convert.h"
 
 namespace esvr::vdb2esvr {
+
+/// A grid of vectors, whose components are three of the converted grids.
+struct ConvertedVector {
+  std::string uniqueName;  ///< name in the input
+  std::string valueType;   ///< OpenVDB's name in the input: "vec3s" or "vec3d"
+  StoredVector stored;     ///< its first component is an index of RunRecord::grids
+  VectorMetrics metrics{};
+};
 
 struct RunRecord {
   VdbSummary input;
@@ -19,6 +28,7 @@ struct RunRecord {
   std::vector<NotFitted> skipped;      ///< grids that the user left out
   std::vector<std::string> notFitted;  ///< grids that an interrupted run did not convert
   std::vector<ConvertedGrid> grids;
+  std::vector<ConvertedVector> vectors;
   EsvrSummary output;
   bool interrupted = false;
   double secondsWrite = 0.0, secondsTotal = 0.0;
@@ -37,6 +47,9 @@ struct Ratio {
 
 /// Number of a carried grid in the file, which EsvrSummary uses.
 [[nodiscard]] std::size_t numberOfCarried(const RunRecord& record, std::size_t carried);
+
+/// Bytes of a grid of vectors in the file, without those that are shared with an earlier section.
+[[nodiscard]] std::uint64_t ownBytes(const EsvrSummary& file, const ConvertedVector& vector);
 
 /// True where the file holds a section of this kind for the grid.
 [[nodiscard]] bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& kind);

@@ -72,6 +72,19 @@ void printFitted(const Options& options, const RunRecord& record, std::ostream& 
   for (const ConvertedGrid& grid : record.grids) printNote(options, grid, out);
 }
 
+/// Lists the errors of the vectors. The table of fitted grids has their components.
+void printVectors(const RunRecord& record, std::ostream& out) {
+  if (record.vectors.empty()) return;
+  cli::Table table({"vectors", "values", "bytes", "PSNR box", "active", "max error"});
+  for (const ConvertedVector& vector : record.vectors) {
+    const VolumeMetrics& m = vector.metrics.magnitude;
+    table.add({vector.uniqueName, vector.valueType, std::to_string(ownBytes(record.output, vector)),
+               cli::decibels(m.psnrBox), cli::decibels(m.psnrActive),
+               cli::shortNumber(m.maxError)});
+  }
+  table.print(out);
+}
+
 /// Lists the grids that the file holds unchanged, and those that it does not hold.
 void printNotFitted(const RunRecord& record, std::ostream& out) {
   cli::Table table({"carried", "values", "bytes", "bytes in source"});
@@ -93,6 +106,7 @@ void printNotFitted(const RunRecord& record, std::ostream& out) {
 
 void printSummary(const Options& options, const RunRecord& record, std::ostream& out) {
   printFitted(options, record, out);
+  printVectors(record, out);
   printNotFitted(record, out);
   const Ratio ratio = ratioOf(record);
   out << cli::printable(options.input.string());

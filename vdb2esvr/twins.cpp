@@ -1,10 +1,12 @@
 #include "vdb2esvr/twins.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "cli/stopwatch.h"
 #include "esvr/convert.h"
+#include "vdb2esvr/source.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -14,9 +16,10 @@ bool maybeTwins(const GridSummary& a, const GridSummary& b) {
   return a.activeVoxels == b.activeVoxels && a.activeBox == b.activeBox;
 }
 
-bool maybeHasTwin(const std::vector<GridSummary>& grids, const GridSummary& grid) {
-  return std::count_if(grids.begin(), grids.end(),
-                       [&](const auto& other) { return maybeTwins(grid, other); }) > 1;
+bool maybeHasTwin(const std::vector<FittedGrid>& grids, const FittedGrid& grid) {
+  return std::count_if(grids.begin(), grids.end(), [&](const auto& other) {
+           return maybeTwins(grid.source, other.source);
+         }) > 1;
 }
 
 /// Reads grids and remembers the keys of those that are the first with their voxels. A key takes 16
@@ -25,10 +28,11 @@ class TwinSearch {
  public:
   explicit TwinSearch(const Options& options) : options_(options) {}
 
-  void read(std::size_t index, const std::string& name) {
+  void read(std::size_t index, const FittedGrid& fitted) {
     cli::Stopwatch watch;
-    VolumeGrid grid = readGrid(options_.input, name, options_.read);
-    const auto [first, isNew] = firstBy_.emplace(keyOf({grid.descriptor, grid.volume}), index);
+    VolumeGrid grid = readSource(options_, fitted);
+    const std::pair key(keyOf({grid.descriptor, grid.volume}), fitted.peak);
+    const auto [first, isNew] = firstBy_.emplace(key, index);
     if (isNew) return;
     twins_[index] = {first->second, std::move(grid.descriptor), grid.nonFiniteReplaced,
                      watch.lap()};
@@ -38,16 +42,16 @@ class TwinSearch {
 
  private:
   const Options& options_;
-  std::map<InputKey, std::size_t> firstBy_;
+  std::map<std::pair<InputKey, std::optional<double>>, std::size_t> firstBy_;
   Twins twins_;
 };
 
 }  // namespace
 
-Twins findTwins(const Options& options, const std::vector<GridSummary>& grids) {
+Twins findTwins(const Options& options, const std::vector<FittedGrid>& grids) {
   TwinSearch search(options);
   for (std::size_t g = 0; g < grids.size() && !options.convert.fit.cancel->cancelled(); ++g)
-    if (maybeHasTwin(grids, grids[g])) search.read(g, grids[g].uniqueName);
+    if (maybeHasTwin(grids, grids[g])) search.read(g, grids[g]);
   return search.take();
 }
 

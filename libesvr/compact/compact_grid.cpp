@@ -35,8 +35,8 @@ bool missedByReader(const StoredGrid& grid, const SparseVolume& source,
                     const CompactOptions& options) {
   if (!options.psnr || *options.psnr < kMaxPsnrOfMargin || options.device.kind == DeviceKind::kCpu)
     return false;
-  return psnrOverBox(source, decodeGrid(grid, {.memory = memoryOf(source)}), {.box = options.box}) <
-         *options.psnr;
+  return psnrOverBox(source, decodeGrid(grid, {.memory = memoryOf(source)}),
+                     {.box = options.box, .peak = options.peak}) < *options.psnr;
 }
 
 void requireOneKappa(const StoredGrid& grid) {
@@ -62,16 +62,20 @@ CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
   if (grid.field.ellipsoidCount() == 0) return result;
   const Box box = options.box.value_or(activeBox(source));
   const auto own = ownVoxels(grid, memoryOf(source));
-  TrialMaker maker(
-      grid,
-      {.source = source, .box = box, .device = options.device, .solvedFor = own ? &*own : nullptr});
+  TrialMaker maker(grid, {.source = source,
+                          .box = box,
+                          .device = options.device,
+                          .solvedFor = own ? &*own : nullptr,
+                          .peak = options.peak});
   Trial chosen = choose(maker, options);
   // with a mask, the layers' errors depend on more than the trial's values
   const bool byValues = grid.topology != TopologyKind::kMask;
   if (byValues) result.grid.layerErrors = maker.layerErrors(chosen);
   result.grid.field = std::move(chosen.field);
   result.grid.quantised = std::move(chosen.quantised);
-  if (!byValues) result.grid.layerErrors = measureLayers(result.grid, source, box);
+  if (!byValues)
+    result.grid.layerErrors =
+        measureLayers(result.grid, source, {.box = box, .peak = options.peak});
   if (missedByReader(result.grid, source, options)) {
     CompactOptions again = options;
     again.device = {};

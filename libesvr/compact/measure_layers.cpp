@@ -7,13 +7,12 @@
 namespace esvr {
 
 std::vector<LayerError> measureLayers(const StoredGrid& grid, const SparseVolume& source,
-                                      const Box& box) {
+                                      const CompareOptions& options) {
   std::vector<LayerError> errors;
   const std::size_t layers = layerCount(grid);
   for (std::size_t k = 1; k <= layers && layers > 1; ++k) {
-    const auto metrics =
-        compareVolumes(source, decodeGrid(firstLayers(grid, k), {.memory = memoryOf(source)}),
-                       {.box = box, .peak = {}, .ssim = false});
+    const auto metrics = compareVolumes(
+        source, decodeGrid(firstLayers(grid, k), {.memory = memoryOf(source)}), options);
     errors.push_back({float(metrics.psnrBox), float(metrics.maxError)});
   }
   return errors;

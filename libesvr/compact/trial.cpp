@@ -109,7 +109,7 @@ TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
       problem_(target_, target.device),
       sampleProblem_(sampleTarget_, target.device),
       field_(grid.field),
-      peak_(peakOf(target.source)) {
+      peak_(target.peak ? *target.peak : peakOf(target.source)) {
   if (target.solvedFor) {
     sourceTarget_.emplace(IntensityTarget{target.source, target_.rule, target.box, bricks_,
                                           target_.restrictToBricks});

@@ -30,6 +30,7 @@ struct TrialTarget {
   Device device;
   /// The voxels for which intensities are solved, if these are not the source's.
   const SparseVolume* solvedFor = nullptr;
+  std::optional<double> peak{};  ///< peak of the PSNR; default: peakOf(source)
 };
 
 class TrialMaker {

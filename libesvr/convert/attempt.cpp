@@ -96,7 +96,8 @@ Activity voxelActivity(const Job& job) {
 }
 
 double psnrOf(const Job& job, const SparseVolume& volume) {
-  return psnrOverBox(job.input.source, volume, {.box = job.options.fit.box});
+  return psnrOverBox(job.input.source, volume,
+                     {.box = job.options.fit.box, .peak = job.options.fit.peak});
 }
 
 double psnrOf(const Job& job, const StoredGrid& grid) {
@@ -145,6 +146,7 @@ CompactResult compacted(const Job& job, const Attempt& attempt, const StorageTar
                       .psnr = target.psnr,
                       .bytes = target.bytes,
                       .box = fit.box,
+                      .peak = fit.peak,
                       .device = rateControlDevice(attempt.fit, fit.device)});
 }
 

@@ -45,7 +45,8 @@ std::optional<Conversion> withEllipsoids(const Job& job, double bound, std::uint
   if (!grid) return std::nullopt;
   conversion->grid = std::move(*grid);
   const Box box = job.options.fit.box.value_or(activeBox(job.input.source));
-  conversion->grid.layerErrors = measureLayers(conversion->grid, job.input.source, box);
+  conversion->grid.layerErrors =
+      measureLayers(conversion->grid, job.input.source, {.box = box, .peak = job.options.fit.peak});
   return conversion;
 }
 

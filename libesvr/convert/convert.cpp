@@ -33,6 +33,7 @@ Conversion stored(const ConvertInput& input, FitResult fit, const CommonFitOptio
                                       {.loss = storage.loss,
                                        .psnr = options.psnr,
                                        .box = options.box,
+                                       .peak = options.peak,
                                        .device = convert::rateControlDevice(fit, options.device)});
   return convert::conversionOf(std::move(fit), std::move(compact));
 }

@@ -71,7 +71,7 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
 
 FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   checkOptions(options);
-  const TargetScale scale = scaleOf(volume);
+  const TargetScale scale = scaleOf(volume, options.peak);
   if (isEmpty(scale)) return emptyFit(volume, options.kappa.value_or(Kernel{}.kappa));
   const std::size_t count = plannedCount(options, activeVoxelCount(volume));
   if (options.start && options.start->ellipsoidCount() > count)

@@ -46,6 +46,8 @@ void checkOptions(const FitOptions& options) {
     throw UsageError("iterations must be at least 1");
   if (options.seconds && !(*options.seconds > 0.0)) throw UsageError("seconds must be positive");
   if (options.psnr && !std::isfinite(*options.psnr)) throw UsageError("psnr must be finite");
+  if (options.peak && !(*options.peak > 0.0 && std::isfinite(*options.peak)))
+    throw UsageError("the peak must be positive");
   if (options.kappa && !std::isfinite(*options.kappa)) throw UsageError("kappa must be finite");
   if (!(options.voxelShare >= 0.0 && options.voxelShare <= 1.0))
     throw UsageError("the share of iterations at voxels must be between 0 and 1");

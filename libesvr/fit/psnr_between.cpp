@@ -126,7 +126,7 @@ class BetweenError {
 }  // namespace
 
 double psnrBetween(const SparseVolume& volume, const Field& field, const BetweenOptions& options) {
-  const double peak = peakOf(volume);
+  const double peak = options.peak ? *options.peak : peakOf(volume);
   const BetweenError error(volume, options);
   double squares = 0.0;
   for (std::uint64_t n = 0; n < kPositions; ++n)

@@ -44,12 +44,12 @@ float scaled(float value, double background, double scale) {
 
 }  // namespace
 
-TargetScale scaleOf(const SparseVolume& volume) {
+TargetScale scaleOf(const SparseVolume& volume, std::optional<double> peak) {
   const ValueRange range = rangeOfAll(volume.values);
   const double background = volume.background;
   TargetScale scale;
   scale.scale = powerOfTwoScale(std::max(range.max - background, background - range.min));
-  scale.peak = peakOf(volume) * scale.scale;
+  scale.peak = (peak ? *peak : peakOf(volume)) * scale.scale;
   scale.lowest = std::min(0.0, double(scaled(range.min, background, scale.scale)));
   scale.highest = std::max(0.0, double(scaled(range.max, background, scale.scale)));
   return scale;
@@ -91,8 +91,9 @@ FitTarget makeTarget(const SparseVolume& volume, const Box& box, const TargetSca
   return target;
 }
 
-FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box) {
-  return makeTarget(volume, boxOf(volume, box), scaleOf(volume));
+FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box,
+                     std::optional<double> peak) {
+  return makeTarget(volume, boxOf(volume, box), scaleOf(volume, peak));
 }
 
 }  // namespace esvr

@@ -15,7 +15,7 @@ namespace esvr {
 /// The units of a target and its range.
 struct TargetScale {
   double scale = 1.0;                  ///< a power of two, so that scaling is exact
-  double peak = 1.0;                   ///< scaled peakOf(volume)
+  double peak = 1.0;                   ///< scaled peak of the PSNR
   double lowest = 0.0, highest = 0.0;  ///< range of the scaled values and 0
 };
 
@@ -43,15 +43,18 @@ struct FitTarget : TargetScale {
   [[nodiscard]] bool betweenVoxels() const { return voxelShare < 1.0; }
 };
 
+/// \param peak  peak of the PSNR in the units of the volume; default: peakOf(volume)
 /// \throws BadInput  the volume has no active voxel
-[[nodiscard]] TargetScale scaleOf(const SparseVolume& volume);
+[[nodiscard]] TargetScale scaleOf(const SparseVolume& volume, std::optional<double> peak = {});
 
 /// The given box or else the box of all active voxels, relative to the volume's origin.
 [[nodiscard]] Box boxOf(const SparseVolume& volume, const std::optional<Box>& box);
 
 /// Makes the target of a volume, which must outlive it.
+/// \param peak  as for scaleOf
 /// \throws BadInput  the volume has no active voxel
-[[nodiscard]] FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box);
+[[nodiscard]] FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box,
+                                   std::optional<double> peak = {});
 
 /// Makes the target of a volume, which must outlive it.
 /// \param box  box of the PSNR, relative to the volume's origin

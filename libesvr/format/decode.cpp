@@ -309,12 +309,31 @@ void readCarriedGrids(SectionReader& sections, CarriedBytes bytes, EsvrFile& fil
   const std::uint32_t count = sections.count(SectionKind::kCarried);
   for (std::uint32_t c = 0; c < count; ++c)
     file.carried.push_back(readCarriedGrid(sections, std::uint32_t(file.grids.size()) + c, bytes));
-  try {
-    (void)gridsInOrder(file);
-  } catch (const RuntimeFailure& fault) {
-    throw BadInput(sections.place({SectionKind::kCarried, std::uint32_t(file.grids.size())}) +
-                   ": " + fault.what());
+}
+
+void readVectors(SectionReader& sections, EsvrFile& file) {
+  for (std::uint32_t g = 0; g < file.grids.size(); ++g) {
+    const SectionId section{SectionKind::kVector, g};
+    if (!sections.has(section)) continue;
+    const auto content = sections.get(section);
+    ByteReader in(content, sections.place(section));
+    file.vectors.push_back({in.getString(), g});
+    in.finish();
   }
+}
+
+/// Checks that carried grids and vectors have possible places.
+void checkOrder(const SectionReader& sections, const EsvrFile& file) try {
+  (void)gridsInOrder(file);
+  for (const StoredVector& vector : file.vectors)
+    if (const auto fault = faultOf(componentsOf(file, vector)))
+      throw BadInput(sections.place({fault->section, std::uint32_t(vector.first)}) + ": " +
+                     fault->text);
+} catch (const RuntimeFailure& fault) {
+  const bool carried = !file.carried.empty();
+  const SectionId place{carried ? SectionKind::kCarried : SectionKind::kVector,
+                        std::uint32_t(carried ? file.grids.size() : file.vectors.front().first)};
+  throw BadInput(sections.place(place) + ": " + fault.what());
 }
 
 EsvrFile decodeGrids(SectionReader& sections, const ReadPart* part) {
@@ -333,6 +352,8 @@ EsvrFile decode(const ByteSource& source, const ReadLimits& limits) {
   EsvrFile file = decodeGrids(sections, nullptr);
   readCarriedGrids(sections, limits.carriedBytes ? CarriedBytes::kAll : CarriedBytes::kChecked,
                    file);
+  readVectors(sections, file);
+  checkOrder(sections, file);
   sections.finish();
   return file;
 }
@@ -341,6 +362,8 @@ EsvrFile decodePart(const ByteSource& source, const ReadPart& part) {
   SectionReader sections(source, part.limits);
   EsvrFile file = decodeGrids(sections, &part);
   readCarriedGrids(sections, CarriedBytes::kNothing, file);
+  readVectors(sections, file);
+  checkOrder(sections, file);
   return file;
 }
 

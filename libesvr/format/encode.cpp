@@ -175,8 +175,23 @@ void addCarriedBytes(SectionWriter& out, const std::vector<CarriedGrid>& grids, 
   }
 }
 
+void addVectors(SectionWriter& out, const std::vector<StoredVector>& vectors) {
+  for (const StoredVector& vector : vectors) {
+    ByteWriter content;
+    content.putSized(vector.name);
+    out.addRaw({SectionKind::kVector, std::uint32_t(vector.first)}, kOptional, content.take());
+  }
+}
+
+void checkVectors(const EsvrFile& file) {
+  for (const StoredVector& vector : file.vectors)
+    if (const auto fault = faultOf(componentsOf(file, vector)))
+      throw RuntimeFailure("cannot store grid '" + vector.name + "': " + fault->text);
+}
+
 SectionWriter sectionsOf(const EsvrFile& file) {
   (void)gridsInOrder(file);  // refuses places that are impossible
+  checkVectors(file);
   std::vector<SortedGrid> grids;
   for (const auto& grid : file.grids) {
     checkGrid(grid);
@@ -187,6 +202,7 @@ SectionWriter sectionsOf(const EsvrFile& file) {
   SectionWriter out;
   addFileMetadata(out, file);
   for (std::uint32_t g = 0; g < grids.size(); ++g) addGrid(out, g, grids[g]);
+  addVectors(out, file.vectors);
   addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
@@ -222,6 +238,12 @@ std::uint64_t bytesOfCarried(const std::vector<CarriedGrid>& grids) {
   SectionWriter out;
   addCarriedRecords(out, grids, 0);
   addCarriedBytes(out, grids, 0);
+  return out.bytesUnshared();
+}
+
+std::uint64_t bytesOfVectors(const std::vector<StoredVector>& vectors) {
+  SectionWriter out;
+  addVectors(out, vectors);
   return out.bytesUnshared();
 }
 

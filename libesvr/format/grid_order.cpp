@@ -2,28 +2,77 @@
 #include "esvr/error.h"
 
 namespace esvr {
+namespace {
+
+/// The grids that are not carried, in order: those of numbers, and those of vectors in place of
+/// their components.
+class OthersInOrder {
+ public:
+  explicit OthersInOrder(const EsvrFile& file) : file_(file) {}
+
+  /// Number of components and grids of numbers that were taken.
+  [[nodiscard]] std::size_t taken() const { return taken_; }
+  [[nodiscard]] bool done() const { return taken_ == file_.grids.size(); }
+
+  GridOfFile take() {
+    if (vector_ == file_.vectors.size() || file_.vectors[vector_].first > taken_)
+      return {false, taken_++};
+    requireComponents(file_.vectors[vector_]);
+    taken_ += kComponents;
+    return {false, vector_++, true};
+  }
+
+  /// \throws RuntimeFailure  a vector was not reached
+  void finish() const {
+    if (vector_ < file_.vectors.size()) requireComponents(file_.vectors[vector_]);
+  }
+
+ private:
+  void requireComponents(const StoredVector& vector) const {
+    const std::size_t grids = file_.grids.size();
+    if (vector.first != taken_ || grids - taken_ < kComponents)
+      throw RuntimeFailure("grid '" + vector.name + "' has no three components of its own from " +
+                           std::to_string(vector.first) + " on among " + std::to_string(grids) +
+                           " grids");
+  }
+
+  const EsvrFile& file_;
+  std::size_t taken_ = 0, vector_ = 0;
+};
+
+}  // namespace
 
 std::vector<GridOfFile> gridsInOrder(const EsvrFile& file) {
-  const std::size_t total = file.grids.size() + file.carried.size();
+  OthersInOrder others(file);
   std::vector<GridOfFile> order;
-  std::size_t converted = 0;
   for (std::size_t c = 0; c < file.carried.size(); ++c) {
     const std::size_t place = file.carried[c].place;
-    if (place < order.size() || place - c > file.grids.size())
+    while (!others.done() && others.taken() + c < place) order.push_back(others.take());
+    if (others.taken() + c != place)
       throw RuntimeFailure("grid '" + file.carried[c].name + "' cannot have place " +
-                           std::to_string(place) + " among " + std::to_string(total) + " grids");
-    while (order.size() < place) order.push_back({false, converted++});
+                           std::to_string(place) + " among " +
+                           std::to_string(file.grids.size() + file.carried.size()) + " grids");
     order.push_back({true, c});
   }
-  while (order.size() < total) order.push_back({false, converted++});
+  while (!others.done()) order.push_back(others.take());
+  others.finish();
   return order;
+}
+
+const std::string& nameOf(const EsvrFile& file, const GridOfFile& grid) {
+  if (grid.isCarried) return file.carried[grid.index].name;
+  if (grid.isVector) return file.vectors[grid.index].name;
+  return file.grids[grid.index].descriptor.name;
 }
 
 std::vector<std::string> namesInOrder(const EsvrFile& file) {
   std::vector<std::string> names;
-  for (const auto& [isCarried, index] : gridsInOrder(file))
-    names.push_back(isCarried ? file.carried[index].name : file.grids[index].descriptor.name);
+  for (const GridOfFile& grid : gridsInOrder(file)) names.push_back(nameOf(file, grid));
   return names;
+}
+
+StoredComponents componentsOf(const EsvrFile& file, const StoredVector& vector) {
+  return std::span(file.grids).subspan(vector.first).first<kComponents>();
 }
 
 }  // namespace esvr

@@ -18,6 +18,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kBricks, "bricks"},
     {SectionKind::kCurve, "curve"},
     {SectionKind::kCarried, "carried grid"},
+    {SectionKind::kVector, "vector grid"},
     {SectionKind::kLayerErrors, "layer errors"},
     {SectionKind::kCenters, "centers"},
     {SectionKind::kScales, "scales"},
@@ -54,7 +55,15 @@ std::string nameOf(SectionKind kind) { return nameIn(kKinds, kind); }
 std::string nameOf(Codec codec) { return nameIn(kCodecs, codec); }
 bool known(SectionKind kind) { return find(kKinds, kind) != nullptr; }
 std::uint16_t minorVersionOf(SectionKind kind) {
-  return kind == SectionKind::kCarried || kind == SectionKind::kCarriedBytes ? 1 : 0;
+  switch (kind) {
+    case SectionKind::kCarried:
+    case SectionKind::kCarriedBytes:
+      return 1;
+    case SectionKind::kVector:
+      return 2;
+    default:
+      return 0;
+  }
 }
 bool known(Codec codec) { return find(kCodecs, codec) != nullptr; }
 

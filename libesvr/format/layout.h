@@ -16,7 +16,7 @@ namespace esvr::format {
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
 
 inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
-inline constexpr std::uint16_t kVersionMinor = 1;
+inline constexpr std::uint16_t kVersionMinor = 2;
 
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
@@ -34,6 +34,7 @@ enum class SectionKind : std::uint32_t {
   kLayerErrors = 6,
   kCurve = 7,
   kCarried = 8,
+  kVector = 9,
   kCenters = 16,
   kScales = 17,
   kRotations = 18,

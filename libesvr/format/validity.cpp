@@ -73,6 +73,17 @@ std::optional<Fault> residualFaultOf(const StoredGrid& grid) {
   return std::nullopt;
 }
 
+std::optional<Fault> faultOf(StoredComponents components) {
+  const GridDescriptor& first = components.front().descriptor;
+  for (const StoredGrid& component : components) {
+    const GridDescriptor& d = component.descriptor;
+    if (d.gridClass != first.gridClass || d.valueType != first.valueType ||
+        d.transform != first.transform)
+      return Fault{SectionKind::kVector, "its components differ in class, value type or transform"};
+  }
+  return std::nullopt;
+}
+
 std::optional<Fault> faultOf(const Ellipsoids& e) {
   if (auto f = nonFinite(SectionKind::kCenters, "the center", e.center)) return f;
   if (auto f = nonFinite(SectionKind::kScales, "a scale", e.logScale)) return f;

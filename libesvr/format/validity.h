@@ -21,6 +21,9 @@ struct Fault {
 
 [[nodiscard]] std::optional<Fault> residualFaultOf(const StoredGrid& grid);
 
+/// The components of a grid of vectors must agree in class, value type and transform.
+[[nodiscard]] std::optional<Fault> faultOf(StoredComponents components);
+
 /// Parameters must be finite, scales within kMaxLogScale and quaternions of unit length.
 [[nodiscard]] std::optional<Fault> faultOf(const Ellipsoids& ellipsoids);
 

@@ -76,16 +76,16 @@ inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
   return 0.0f;
 }
 
-/// Fills brick b. Access::value(leaf, i) is a leaf's voxel in voxelOffset order, and
-/// Access::mask(leaf) holds its active voxels.
+/// Fills brick b. access.value(leaf, i) is a leaf's voxel in voxelOffset order, and
+/// access.mask(leaf) holds its active voxels.
 template <class Leaf, class Access>
-void fillFromLeaf(const Leaf& leaf, const FillRules& rules, std::size_t b, SparseVolume& volume,
-                  NonFiniteTally& tally) {
+void fillFromLeaf(const Leaf& leaf, const Access& access, const FillRules& rules, std::size_t b,
+                  SparseVolume& volume, NonFiniteTally& tally) {
   const Coord corner = volume.brickCorner(b);
   const auto out = volume.brickValues(b);
-  const BrickMask active = volume.active[b] = Access::mask(leaf);
+  const BrickMask active = volume.active[b] = access.mask(leaf);
   for (int i = 0; i < kBrickVoxels; ++i) {
-    const auto value = Access::value(leaf, i);
+    const auto value = access.value(leaf, i);
     if (active.test(i))
       out[i] = narrowValue(double(value), corner + voxelLocal(i), tally);
     else if (rules.levelSet)

@@ -181,7 +181,7 @@ void readVoxelsAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGr
   tree.visit(
       [&](Coord corner, const Leaf& leaf) {
         if (Access::mask(leaf).count() == 0) return;
-        fillFromLeaf<Leaf, Access>(leaf, rules, brickAt(volume, corner), volume, tally);
+        fillFromLeaf(leaf, Access{}, rules, brickAt(volume, corner), volume, tally);
       },
       [&](Coord corner, std::int32_t extent, double value) {
         fillTile({corner, extent, value}, volume, tally);

@@ -2,6 +2,8 @@
 
 #include <openvdb/Grid.h>
 
+#include <algorithm>
+
 #include "esvr/error.h"
 #include "vdb/archive.h"
 #include "vdb/carry.h"
@@ -36,8 +38,13 @@ GridClass gridClassOf(const std::string& text) {
   }
 }
 
-std::string reasonToSkip(const ArchiveEntry& entry) {
+std::string reasonToSkip(const ArchiveEntry& entry, const GridSummary& grid) {
+  if ((isScalarFloatTree(entry) || isVectorTree(entry)) && grid.activeVoxels == 0)
+    return "it has no active voxel";
   if (isScalarFloatTree(entry)) return {};
+  if (grid.isVector)
+    return "its values are vectors (" + grid.valueType + "), which are fitted by components";
+  if (isVectorTree(entry)) return "it is a level set of vectors, which cannot be fitted";
   const std::string type = entry.valueType();
   if (isPointTree(entry.treeType)) return "it holds points (" + type + "), which cannot be fitted";
   if (type == "float" || type == "double")
@@ -59,7 +66,7 @@ bool countFromStatistics(const std::vector<MetaItem>& items, GridSummary& grid) 
 }
 
 void countFromTree(Archive& archive, const ArchiveEntry& entry, GridSummary& grid) {
-  if (!isScalarFloatTree(entry)) return;
+  if (!isScalarFloatTree(entry) && !isVectorTree(entry)) return;
   const TreeSurvey survey = surveyTree(archive, entry);
   grid.activeVoxels = survey.activeVoxels;
   grid.activeBox = survey.activeBox;
@@ -74,8 +81,9 @@ GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHea
   grid.gridClass = gridClassOf(stringValue(head.metadata, GridBase::META_GRID_CLASS));
   if (!countFromStatistics(head.metadata, grid)) countFromTree(archive, entry, grid);
   grid.isScalar = isScalarFloatTree(entry);
-  grid.skipReason = reasonToSkip(entry);
-  if (grid.skipReason.empty() && grid.activeVoxels == 0) grid.skipReason = "it has no active voxel";
+  grid.isVector =
+      isVectorTree(entry) && grid.activeVoxels > 0 && grid.gridClass != GridClass::kLevelSet;
+  grid.skipReason = reasonToSkip(entry, grid);
   grid.whyNotCarried = whyNotCarried(entry.treeType, archive.vdbVersion());
   return grid;
 }
@@ -93,26 +101,66 @@ ListedArchive listGrids(Archive archive) {
 }
 
 ValueType valueTypeOf(const GridSummary& grid) {
-  if (grid.valueType == "double") return ValueType::kDouble;
+  if (grid.valueType == "double" || grid.valueType == "vec3d") return ValueType::kDouble;
   return grid.savedAsHalf ? ValueType::kHalf : ValueType::kFloat;
 }
 
-VolumeGrid readListedGrid(ListedArchive& listed, std::size_t i, const ReadOptions& options) {
+/// \param component  of a grid of vectors; 0 for others
+VolumeGrid readTree(ListedArchive& listed, std::size_t i, std::size_t component,
+                    const ReadOptions& options) {
   const GridSummary& summary = listed.grids[i];
-  const ArchiveEntry& entry = listed.archive.entries()[i];
-  // Only the type is checked here. Statistics that call the grid empty may be wrong.
-  if (!isScalarFloatTree(entry)) throw BadInput(summary.skipReason);
-  TreeVoxels voxels = readVoxels(listed.archive, entry, summary.gridClass, options);
+  TreeVoxels voxels = readVoxels(listed.archive, listed.archive.entries()[i],
+                                 {summary.gridClass, component}, options);
   VolumeGrid grid;
   grid.descriptor.name = summary.name;
   grid.descriptor.gridClass = summary.gridClass;
   grid.descriptor.valueType = valueTypeOf(summary);
   grid.descriptor.background = voxels.background;
-  grid.descriptor.transform = std::move(listed.heads[i].transform);
-  grid.descriptor.metadata = withoutFileStatistics(std::move(listed.heads[i].metadata));
+  grid.descriptor.transform = listed.heads[i].transform;
+  grid.descriptor.metadata = withoutFileStatistics(listed.heads[i].metadata);
   grid.volume = std::move(voxels.volume);
   grid.nonFiniteReplaced = voxels.nonFiniteReplaced;
   return grid;
+}
+
+VolumeGrid readListedGrid(ListedArchive& listed, std::size_t i, const ReadOptions& options) {
+  // Only the type is checked here. Statistics that call the grid empty may be wrong.
+  if (!isScalarFloatTree(listed.archive.entries()[i])) throw BadInput(listed.grids[i].skipReason);
+  return readTree(listed, i, 0, options);
+}
+
+void requireVector(const GridSummary& grid) {
+  if (grid.isVector) return;
+  throw BadInput(grid.isScalar ? "its values are numbers, not vectors" : grid.skipReason);
+}
+
+/// Adds the component to the text of errors.
+VolumeGrid readListedComponent(ListedArchive& listed, std::size_t i, std::size_t component,
+                               const ReadOptions& options) {
+  inGrid(listed.grids[i].uniqueName, [&] { requireVector(listed.grids[i]); });
+  return inGrid(componentName(listed.grids[i].uniqueName, component),
+                [&] { return readTree(listed, i, component, options); });
+}
+
+/// The options with the memory that the components before leave.
+ReadOptions besides(const SparseVolume& volume, ReadOptions options) {
+  const std::uint64_t values = volume.values.size() * sizeof(float);
+  const std::uint64_t bytes = options.memory.isInFile(values) ? 0 : values;
+  options.maxBytes -= std::min(options.maxBytes, bytes);
+  return options;
+}
+
+VectorGrid readListedVector(ListedArchive& listed, std::size_t i, ReadOptions options) {
+  VectorGrid vectors;
+  for (std::size_t c = 0; c < kComponents; ++c) {
+    VolumeGrid component = readListedComponent(listed, i, c, options);
+    options = besides(component.volume, options);
+    vectors.background[c] = component.descriptor.background;
+    if (c == 0) vectors.descriptor = std::move(component.descriptor);
+    vectors.components[c] = std::move(component.volume);
+    vectors.nonFiniteReplaced += component.nonFiniteReplaced;
+  }
+  return vectors;
 }
 
 }  // namespace
@@ -126,6 +174,20 @@ VolumeGrid readOpenVdbGrid(InputFile& file, const std::string& name, const ReadO
   ListedArchive listed = listGrids(Archive(file));
   const std::size_t i = findGrid(listed.grids, name);
   return inGrid(listed.grids[i].uniqueName, [&] { return readListedGrid(listed, i, options); });
+}
+
+VolumeGrid readOpenVdbComponent(InputFile& file, const std::string& name, std::size_t component,
+                                const ReadOptions& options) {
+  ListedArchive listed = listGrids(Archive(file));
+  VolumeGrid grid = readListedComponent(listed, findGrid(listed.grids, name), component, options);
+  grid.descriptor.name = componentName(grid.descriptor.name, component);
+  if (component > 0) grid.descriptor.metadata.clear();
+  return grid;
+}
+
+VectorGrid readOpenVdbVector(InputFile& file, const std::string& name, const ReadOptions& options) {
+  ListedArchive listed = listGrids(Archive(file));
+  return readListedVector(listed, findGrid(listed.grids, name), options);
 }
 
 }  // namespace esvr::vdb
@@ -145,6 +207,12 @@ VolumeGrid readGrid(const CarriedGrid& grid, const ReadOptions& options) {
     vdb::ListedArchive listed = vdb::listGrids(vdb::Archive(file, grid));
     return vdb::readListedGrid(listed, 0, options);
   });
+}
+
+VectorGrid readVector(const CarriedGrid& grid, const ReadOptions& options) {
+  vdb::InputFile file(std::span(grid.bytes));
+  vdb::ListedArchive listed = vdb::listGrids(vdb::Archive(file, grid));
+  return vdb::readListedVector(listed, 0, options);
 }
 
 }  // namespace esvr

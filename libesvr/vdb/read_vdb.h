@@ -10,5 +10,8 @@ namespace esvr::vdb {
 
 VdbSummary inspectOpenVdb(InputFile& file);
 VolumeGrid readOpenVdbGrid(InputFile& file, const std::string& name, const ReadOptions& options);
+VolumeGrid readOpenVdbComponent(InputFile& file, const std::string& name, std::size_t component,
+                                const ReadOptions& options);
+VectorGrid readOpenVdbVector(InputFile& file, const std::string& name, const ReadOptions& options);
 
 }  // namespace esvr::vdb

@@ -3,47 +3,69 @@
 /// other. The tree of a large volume then takes a tenth of the memory of its voxels.
 
 #include "vdb/scalar_trees.h"
+#include "vdb/vector_trees.h"
 
-#include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "esvr/sparse_volume.h"
+#include "esvr/vector_grid.h"
 
 namespace esvr::vdb {
 
+/// The numbers of a volume, which must outlive this object.
+struct NumberVoxels {
+  const SparseVolume& volume;
+
+  [[nodiscard]] const SparseVolume& bricks() const { return volume; }
+  [[nodiscard]] float value(std::size_t b, int i) const { return volume.brickValues(b)[i]; }
+};
+
+/// Vectors whose components have the same bricks and active voxels (aligned()).
+struct VectorVoxels {
+  VectorVolume components;
+
+  [[nodiscard]] const SparseVolume& bricks() const { return components.front(); }
+  [[nodiscard]] openvdb::Vec3s value(std::size_t b, int i) const {
+    const auto& [x, y, z] = components;
+    return {x.brickValues(b)[i], y.brickValues(b)[i], z.brickValues(b)[i]};
+  }
+};
+
 /// The leaf of a brick. Inactive voxels have the background.
-template <class Leaf>
-std::unique_ptr<Leaf> makeLeaf(const SparseVolume& volume, std::size_t b,
-                               typename Leaf::ValueType background) {
-  const Coord corner = volume.brickCorner(b);
+template <class Leaf, class Voxels>
+std::unique_ptr<Leaf> makeLeaf(const Voxels& voxels, std::size_t b,
+                               const typename Leaf::ValueType& background) {
+  using Value = typename Leaf::ValueType;
+  const Coord corner = voxels.bricks().brickCorner(b);
   auto leaf = std::make_unique<Leaf>(openvdb::Coord(corner.x, corner.y, corner.z), background);
-  const auto values = volume.brickValues(b);
-  const BrickMask& active = volume.active[b];
+  const BrickMask& active = voxels.bricks().active[b];
   for (int i = 0; i < kBrickVoxels; ++i)
-    if (active.test(i)) leaf->setValueOn(openvdb::Index(i), values[i]);
+    if (active.test(i)) leaf->setValueOn(openvdb::Index(i), Value(voxels.value(b, i)));
   return leaf;
 }
 
-template <class Tree>
+/// \tparam Voxels  NumberVoxels or VectorVoxels
+template <class Tree, class Voxels>
 class StreamedGrid : public openvdb::Grid<Tree> {
  public:
   using Leaf = typename Tree::LeafNodeType;
   using Value = typename Tree::ValueType;
 
-  /// \param volume         must outlive the grid
   /// \param constantTiles  bricks whose voxels are all active and equal become tiles
-  StreamedGrid(const SparseVolume& volume, Value background, bool constantTiles)
-      : openvdb::Grid<Tree>(background), volume_(volume) {
+  StreamedGrid(Voxels voxels, const Value& background, bool constantTiles)
+      : openvdb::Grid<Tree>(background), voxels_(std::move(voxels)) {
     openvdb::tree::ValueAccessor<Tree> accessor(this->tree());
-    for (std::size_t b = 0; b < volume.brickCount(); ++b) add(b, constantTiles, accessor);
+    for (std::size_t b = 0; b < voxels_.bricks().brickCount(); ++b) add(b, constantTiles, accessor);
     if (constantTiles) mergeTiles();
   }
 
   void writeBuffers(std::ostream& stream) const override {
     for (auto leaf = this->tree().cbeginLeaf(); leaf; ++leaf) {
       const Coord corner{leaf->origin().x(), leaf->origin().y(), leaf->origin().z()};
-      const auto b = findBrick(volume_, brickOf(corner) - brickOf(volume_.origin));
-      makeLeaf<Leaf>(volume_, b.value(), this->background())
+      const auto b =
+          findBrick(voxels_.bricks(), brickOf(corner) - brickOf(voxels_.bricks().origin));
+      makeLeaf<Leaf>(voxels_, b.value(), this->background())
           ->writeBuffers(stream, this->saveFloatAsHalf());
     }
   }
@@ -52,21 +74,23 @@ class StreamedGrid : public openvdb::Grid<Tree> {
   using Accessor = openvdb::tree::ValueAccessor<Tree>;
 
   void add(std::size_t b, bool constantTiles, Accessor& accessor) {
-    const BrickMask& active = volume_.active[b];
+    const BrickMask& active = voxels_.bricks().active[b];
     const int count = active.count();
     if (count == 0) return;
-    const Coord c = volume_.brickCorner(b);
+    const Coord c = voxels_.bricks().brickCorner(b);
     const openvdb::Coord corner(c.x, c.y, c.z);
     constexpr openvdb::Index kTileOfABrick = 1;  // level in the tree
-    if (constantTiles && count == kBrickVoxels && isConstant(volume_.brickValues(b)))
-      return accessor.addTile(kTileOfABrick, corner, volume_.brickValues(b).front(), true);
+    if (constantTiles && count == kBrickVoxels && isConstant(b))
+      return accessor.addTile(kTileOfABrick, corner, Value(voxels_.value(b, 0)), true);
     auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate{}, corner, this->background());
     leaf->setValueMask(maskOf(active));
     accessor.addLeaf(leaf.release());
   }
 
-  static bool isConstant(std::span<const float> values) {
-    return std::ranges::all_of(values, [&](float v) { return v == values.front(); });
+  [[nodiscard]] bool isConstant(std::size_t b) const {
+    for (int i = 1; i < kBrickVoxels; ++i)
+      if (voxels_.value(b, i) != voxels_.value(b, 0)) return false;
+    return true;
   }
 
   static typename Leaf::NodeMaskType maskOf(const BrickMask& active) {
@@ -83,9 +107,10 @@ class StreamedGrid : public openvdb::Grid<Tree> {
     for (auto upper = root.beginChildOn(); upper; ++upper) {
       for (auto lower = upper->beginChildOn(); lower; ++lower)
         mergeInto(*lower,
-                  [&](Value value, bool isOn) { upper->addTile(lower.pos(), value, isOn); });
-      mergeInto(*upper,
-                [&](Value value, bool isOn) { root.addTile(upper.getCoord(), value, isOn); });
+                  [&](const Value& value, bool isOn) { upper->addTile(lower.pos(), value, isOn); });
+      mergeInto(*upper, [&](const Value& value, bool isOn) {
+        root.addTile(upper.getCoord(), value, isOn);
+      });
     }
   }
 
@@ -96,7 +121,7 @@ class StreamedGrid : public openvdb::Grid<Tree> {
     if (node.isConstant(value, isOn)) addTile(value, isOn);
   }
 
-  const SparseVolume& volume_;
+  Voxels voxels_;
 };
 
 }  // namespace esvr::vdb

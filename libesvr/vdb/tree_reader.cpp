@@ -3,6 +3,7 @@
 #include "vdb/versions.h"
 
 #include "vdb/scalar_trees.h"
+#include "vdb/vector_trees.h"
 
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/io.h>
@@ -14,11 +15,24 @@
 namespace esvr::vdb {
 namespace {
 
-/// Access to the leaves of OpenVDB. Their voxels are in voxelOffset order.
+/// A component of a value; of a number, itself.
+template <class Value>
+auto componentOf(const Value& value, std::size_t component) {
+  if constexpr (openvdb::VecTraits<Value>::IsVec)
+    return value[int(component)];
+  else
+    return value;
+}
+
+/// Access to a component of the leaves of OpenVDB. Their voxels are in voxelOffset order.
 template <class Leaf>
 struct LeafAccess {
-  static auto value(const Leaf& leaf, int i) { return leaf.buffer().data()[i]; }
-  static BrickMask mask(const Leaf& leaf) {
+  std::size_t component = 0;
+
+  auto value(const Leaf& leaf, int i) const {
+    return componentOf(leaf.buffer().data()[i], component);
+  }
+  BrickMask mask(const Leaf& leaf) const {
     BrickMask mask;
     for (openvdb::Index w = 0; w < mask.words.size(); ++w)
       mask.words[w] = leaf.valueMask().template getWord<openvdb::Index64>(w);
@@ -34,13 +48,19 @@ struct LocatedTree {
   TreeSurvey survey;
 };
 
+ValueLayout layoutOf(const ArchiveEntry& owner, const GridHead& head) {
+  const bool isDouble = owner.valueType() == "double" || owner.valueType() == "vec3d";
+  const std::uint64_t numbers = isVectorTree(owner) ? kComponents : 1;
+  return {numbers * (isDouble ? sizeof(double) : sizeof(float)),
+          numbers * sizeof(openvdb::math::half), owner.savedAsHalf, head.compression};
+}
+
 LocatedTree locateTree(Archive& archive, const ArchiveEntry& entry) {
   const ArchiveEntry& owner = archive.treeOwner(entry);
   if (owner.treeType != entry.treeType)
     throw BadInput("is damaged: it shares the voxels of a grid of another type");
   GridHead head = archive.readHead(owner);
-  const std::uint64_t valueBytes = entry.valueType() == "double" ? sizeof(double) : sizeof(float);
-  const ValueLayout layout{valueBytes, owner.savedAsHalf, head.compression};
+  const ValueLayout layout = layoutOf(owner, head);
   const TreeSurvey survey = surveyTree(archive.file(), layout);
   return {owner, std::move(head), layout, survey};
 }
@@ -51,7 +71,8 @@ openvdb::Coord openVdbCoord(Coord c) { return {c.x, c.y, c.z}; }
 template <class Value>
 class TopologyReader {
  public:
-  TopologyReader(InputFile& file, bool savedAsHalf) : file_(file), savedAsHalf_(savedAsHalf) {}
+  TopologyReader(InputFile& file, bool savedAsHalf, std::size_t component)
+      : file_(file), savedAsHalf_(savedAsHalf), component_(component) {}
 
   void leaf(Coord corner, const LeafMask& mask) {
     leaves.push_back(corner);
@@ -61,7 +82,9 @@ class TopologyReader {
   void rootTile(Coord corner, std::uint64_t at) {
     const std::uint64_t back = file_.position();
     file_.seek(at);
-    tile({corner, kUpperExtent, double(file_.read<Value>())});
+    Value value;
+    file_.read(&value, sizeof value);
+    tile({corner, kUpperExtent, numberOf(value)});
     file_.seek(back);
   }
 
@@ -77,7 +100,7 @@ class TopologyReader {
                                       savedAsHalf_);
     file_.followStream();
     mask.forEachSet([&](std::size_t n) {
-      tile({cellCorner<kLog2>(place.corner, n, extent), extent, double(values[n])});
+      tile({cellCorner<kLog2>(place.corner, n, extent), extent, numberOf(values[n])});
     });
   }
 
@@ -86,6 +109,10 @@ class TopologyReader {
   std::vector<TileSource> activeTiles;
 
  private:
+  [[nodiscard]] double numberOf(const Value& value) const {
+    return double(componentOf(value, component_));
+  }
+
   void tile(const TileSource& tile) {
     activeTiles.push_back(tile);
     appendBricks(tile, bricks);
@@ -93,24 +120,28 @@ class TopologyReader {
 
   InputFile& file_;
   bool savedAsHalf_;
+  std::size_t component_;
 };
 
 /// Reads the voxels of a tree leaf by leaf. There is no tree of OpenVDB in memory.
 template <class Tree>
 class VoxelReader {
  public:
-  VoxelReader(Archive& archive, const LocatedTree& located)
-      : file_(archive.file()), located_(located), topology_(file_, located.owner.savedAsHalf) {
+  VoxelReader(Archive& archive, const LocatedTree& located, std::size_t component)
+      : file_(archive.file()),
+        located_(located),
+        topology_(file_, located.owner.savedAsHalf, component),
+        component_(component) {
     openvdb::io::setDataCompression(file_.stream(), located.head.compression);
     file_.seek(located.head.treeAt + sizeof(std::int32_t));
-    background_ = file_.read<Value>();
+    file_.read(&background_, sizeof background_);
     openvdb::io::setGridBackgroundValuePtr(file_.stream(), &background_);
   }
   ~VoxelReader() { openvdb::io::setGridBackgroundValuePtr(file_.stream(), nullptr); }
   VoxelReader(const VoxelReader&) = delete;
   VoxelReader& operator=(const VoxelReader&) = delete;
 
-  [[nodiscard]] double background() const { return double(background_); }
+  [[nodiscard]] double background() const { return double(componentOf(background_, component_)); }
 
   SparseVolume read(const FillRules& rules, const VoxelMemory& memory, NonFiniteTally& tally) {
     file_.seek(located_.head.treeAt);
@@ -135,24 +166,26 @@ class VoxelReader {
     const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin));
     if (b.has_value() == leaf.valueMask().isOff())
       throw BadInput("is damaged: a leaf has two different masks");
-    if (b) fillFromLeaf<Leaf, LeafAccess<Leaf>>(leaf, rules, *b, volume, tally);
+    if (b) fillFromLeaf(leaf, LeafAccess<Leaf>{component_}, rules, *b, volume, tally);
   }
 
   InputFile& file_;
   const LocatedTree& located_;
   TopologyReader<Value> topology_;
+  std::size_t component_;
   Value background_{};
 };
 
 template <class Tree>
-TreeVoxels readVoxelsAs(Archive& archive, const LocatedTree& located, GridClass gridClass,
+TreeVoxels readVoxelsAs(Archive& archive, const LocatedTree& located, const WantedVoxels& wanted,
                         const ReadOptions& options) {
   refuseTooLarge(located.survey.leaves + located.survey.tileBricks, options);
-  VoxelReader<Tree> reader(archive, located);
+  VoxelReader<Tree> reader(archive, located, wanted.component);
   TreeVoxels result;
   result.background = reader.background();
-  const FillRules rules{narrowBackground(result.background), gridClass == GridClass::kLevelSet,
-                        options.nonFinite, options.allowEmpty};
+  const FillRules rules{narrowBackground(result.background),
+                        wanted.gridClass == GridClass::kLevelSet, options.nonFinite,
+                        options.allowEmpty};
   NonFiniteTally tally;
   result.volume = reader.read(rules, options.memory, tally);
   refuseNonFinite(tally, rules.nonFinite);
@@ -167,16 +200,26 @@ bool isScalarFloatTree(const ArchiveEntry& entry) {
          entry.treeType == openvdb::DoubleTree::treeType();
 }
 
+bool isVectorTree(const ArchiveEntry& entry) {
+  return entry.treeType == openvdb::Vec3STree::treeType() ||
+         entry.treeType == openvdb::Vec3DTree::treeType();
+}
+
 TreeSurvey surveyTree(Archive& archive, const ArchiveEntry& entry) {
   return locateTree(archive, entry).survey;
 }
 
-TreeVoxels readVoxels(Archive& archive, const ArchiveEntry& entry, GridClass gridClass,
+TreeVoxels readVoxels(Archive& archive, const ArchiveEntry& entry, const WantedVoxels& wanted,
                       const ReadOptions& options) {
   const LocatedTree located = locateTree(archive, entry);
-  return entry.treeType == openvdb::DoubleTree::treeType()
-             ? readVoxelsAs<openvdb::DoubleTree>(archive, located, gridClass, options)
-             : readVoxelsAs<openvdb::FloatTree>(archive, located, gridClass, options);
+  const auto is = [&](const openvdb::Name& type) { return entry.treeType == type; };
+  if (is(openvdb::DoubleTree::treeType()))
+    return readVoxelsAs<openvdb::DoubleTree>(archive, located, wanted, options);
+  if (is(openvdb::Vec3STree::treeType()))
+    return readVoxelsAs<openvdb::Vec3STree>(archive, located, wanted, options);
+  if (is(openvdb::Vec3DTree::treeType()))
+    return readVoxelsAs<openvdb::Vec3DTree>(archive, located, wanted, options);
+  return readVoxelsAs<openvdb::FloatTree>(archive, located, wanted, options);
 }
 
 }  // namespace esvr::vdb

@@ -10,7 +10,10 @@ namespace esvr::vdb {
 /// True if the grid's tree can be fitted.
 bool isScalarFloatTree(const ArchiveEntry& entry);
 
-/// Surveys the tree of an entry for which isScalarFloatTree is true.
+/// True if the components of the grid's tree can be fitted.
+bool isVectorTree(const ArchiveEntry& entry);
+
+/// Surveys the tree of an entry for which isScalarFloatTree or isVectorTree is true.
 /// \throws BadInput  the tree is truncated or damaged
 TreeSurvey surveyTree(Archive& archive, const ArchiveEntry& entry);
 
@@ -21,9 +24,15 @@ struct TreeVoxels {
   std::uint64_t nonFiniteReplaced = 0;
 };
 
+/// What is read of a tree.
+struct WantedVoxels {
+  GridClass gridClass = GridClass::kUnknown;
+  std::size_t component = 0;  ///< of vectors; 0 for other values
+};
+
 /// \throws BadInput  the tree is damaged or has no active voxel; voxels are not finite
 /// \throws MemoryExceeded  it takes more than options.maxBytes
-TreeVoxels readVoxels(Archive& archive, const ArchiveEntry& entry, GridClass gridClass,
+TreeVoxels readVoxels(Archive& archive, const ArchiveEntry& entry, const WantedVoxels& wanted,
                       const ReadOptions& options);
 
 }  // namespace esvr::vdb

@@ -21,7 +21,8 @@ namespace esvr::vdb {
 
 /// The way in which a grid's values are stored in the file.
 struct ValueLayout {
-  std::uint64_t valueBytes = 4;   ///< size in memory: 4 for float, 8 for double
+  std::uint64_t valueBytes = 4;   ///< size in memory: 4 for float, 8 for double, 12 for vec3s, ...
+  std::uint64_t halfBytes = 2;    ///< size of a value as half: 2 for float, 6 for vec3s, ...
   bool savedAsHalf = false;       ///< in blocks, not in the background and the root's tiles
   std::uint32_t compression = 0;  ///< OpenVDB's flags
 };

@@ -172,7 +172,8 @@ class TreeWalk {
 
   void valueArray(std::uint64_t count) {
     if (layout_.savedAsHalf && count == 0) return;  // OpenVDB stores nothing then, not even a size
-    const std::uint64_t bytes = count * (layout_.savedAsHalf ? kHalfBytes : layout_.valueBytes);
+    const std::uint64_t bytes =
+        count * (layout_.savedAsHalf ? layout_.halfBytes : layout_.valueBytes);
     if (layout_.compression & (openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ZIP))
       chunk(bytes);
     else
@@ -201,8 +202,6 @@ class TreeWalk {
       damaged("a Blosc chunk whose header contradicts its size");
     return BLOSC_MIN_HEADER_LENGTH;
   }
-
-  static constexpr std::uint64_t kHalfBytes = 2;
 
   InputFile& file_;
   ValueLayout layout_;

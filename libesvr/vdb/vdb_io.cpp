@@ -47,6 +47,34 @@ VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
   });
 }
 
+namespace {
+
+/// Opens a file whose grids may be vectors. NanoVDB's vectors are not read.
+template <class Read>
+auto readVectors(const std::filesystem::path& path, const Read& read) {
+  return vdb::whileReading(path, [&] {
+    vdb::InputFile file(path);
+    if (formatOf(file) != FileFormat::kOpenVdb)
+      throw BadInput("is a NanoVDB file, whose grids of vectors cannot be read");
+    return read(file);
+  });
+}
+
+}  // namespace
+
+VolumeGrid readComponent(const std::filesystem::path& path, const std::string& name,
+                         std::size_t component, const ReadOptions& options) {
+  return readVectors(path, [&](vdb::InputFile& file) {
+    return vdb::readOpenVdbComponent(file, name, component, options);
+  });
+}
+
+VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
+                      const ReadOptions& options) {
+  return readVectors(
+      path, [&](vdb::InputFile& file) { return vdb::readOpenVdbVector(file, name, options); });
+}
+
 std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
                                      std::span<const std::size_t> places,
                                      const ReadOptions& options) {

@@ -3,6 +3,7 @@
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include "vdb/scalar_trees.h"
+#include "vdb/vector_trees.h"
 
 #include <cmath>
 
@@ -36,7 +37,8 @@ void addLeaves(const SparseVolume& volume, Tree& tree) {
   for (std::size_t b = 0; b < volume.brickCount(); ++b)
     if (volume.active[b].count() > 0)
       accessor.addLeaf(
-          makeLeaf<typename Tree::LeafNodeType>(volume, b, tree.background()).release());
+          makeLeaf<typename Tree::LeafNodeType>(NumberVoxels{volume}, b, tree.background())
+              .release());
 }
 
 template <class Tree>
@@ -46,7 +48,8 @@ typename openvdb::Grid<Tree>::Ptr makeGrid(const VolumeGrid& source, const Write
   const bool levelSet = source.descriptor.gridClass == GridClass::kLevelSet;
   // The flood fill of a level set needs the voxels of all leaves.
   if (voxels == LeafVoxels::kWhenWritten && !levelSet)
-    return std::make_shared<StreamedGrid<Tree>>(source.volume, background, options.constantTiles);
+    return std::make_shared<StreamedGrid<Tree, NumberVoxels>>(NumberVoxels{source.volume},
+                                                              background, options.constantTiles);
   auto grid = openvdb::Grid<Tree>::create(background);
   Tree& tree = grid->tree();
   addLeaves(source.volume, tree);
@@ -63,14 +66,13 @@ bool wantsHalf(const GridDescriptor& descriptor, const GridBase& grid, HalfMode 
 
 bool fitsHalf(float value) { return std::isfinite(float(openvdb::math::half(value))); }
 
-void refuseBeyondHalf(const VolumeGrid& grid) {
-  const SparseVolume& volume = grid.volume;
-  bool fits = fitsHalf(float(grid.descriptor.background));
+void refuseBeyondHalf(const std::string& name, double background, const SparseVolume& volume) {
+  bool fits = fitsHalf(float(background));
   for (std::size_t b = 0; fits && b < volume.brickCount(); ++b)
     for (int i = 0; i < kBrickVoxels; ++i)
       if (volume.active[b].test(i)) fits &= fitsHalf(volume.brickValues(b)[i]);
   if (!fits)
-    throw UsageError("grid \"" + grid.descriptor.name +
+    throw UsageError("grid \"" + name +
                      "\" has values beyond 65504, the largest that half precision holds");
 }
 
@@ -84,6 +86,24 @@ void restoreDescriptor(const GridDescriptor& descriptor, GridBase& grid) {
   grid.setTransform(toOpenVdb(descriptor.transform));
 }
 
+/// Saves a grid as half where the options or the source want it.
+/// \param fits  refuses values that half cannot hold
+template <class Fits>
+void chooseHalf(const GridDescriptor& descriptor, const WriteOptions& options, const Fits& fits,
+                GridBase& grid) {
+  const bool half = wantsHalf(descriptor, grid, options.half);
+  if (half) fits();
+  if (half != grid.saveFloatAsHalf()) grid.setSaveFloatAsHalf(half);
+}
+
+template <class Tree>
+GridBase::Ptr makeVectors(const VectorGrid& source, const WriteOptions& options) {
+  using Vector = typename Tree::ValueType;
+  const openvdb::Vec3d background(source.background.data());
+  return std::make_shared<StreamedGrid<Tree, VectorVoxels>>(
+      VectorVoxels{aligned(source.components)}, Vector(background), options.constantTiles);
+}
+
 }  // namespace
 
 GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& source, const WriteOptions& options,
@@ -95,9 +115,26 @@ GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& source, const WriteOptions& opti
   else
     grid = makeGrid<openvdb::FloatTree>(source, options, voxels);
   restoreDescriptor(source.descriptor, *grid);
-  const bool half = wantsHalf(source.descriptor, *grid, options.half);
-  if (half) refuseBeyondHalf(source);
-  if (half != grid->saveFloatAsHalf()) grid->setSaveFloatAsHalf(half);
+  chooseHalf(
+      source.descriptor, options,
+      [&] {
+        refuseBeyondHalf(source.descriptor.name, source.descriptor.background, source.volume);
+      },
+      *grid);
+  return grid;
+}
+
+GridBase::Ptr makeOpenVdbGrid(const VectorGrid& source, const WriteOptions& options) {
+  initializeOpenVdb();
+  GridBase::Ptr grid = source.descriptor.valueType == ValueType::kDouble
+                           ? makeVectors<openvdb::Vec3DTree>(source, options)
+                           : makeVectors<openvdb::Vec3STree>(source, options);
+  restoreDescriptor(source.descriptor, *grid);
+  const auto fits = [&] {
+    for (std::size_t c = 0; c < kComponents; ++c)
+      refuseBeyondHalf(source.descriptor.name, source.background[c], source.components[c]);
+  };
+  chooseHalf(source.descriptor, options, fits, *grid);
   return grid;
 }
 

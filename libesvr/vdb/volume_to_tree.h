@@ -22,4 +22,9 @@ enum class LeafVoxels {
 openvdb::GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& grid, const WriteOptions& options,
                                        LeafVoxels voxels = LeafVoxels::kInMemory);
 
+/// A grid of the vectors: of type vec3d if the source was double, else vec3s. Its leaves get their
+/// voxels when it is written.
+/// \throws UsageError  as for a grid of numbers
+openvdb::GridBase::Ptr makeOpenVdbGrid(const VectorGrid& grid, const WriteOptions& options);
+
 }  // namespace esvr::vdb

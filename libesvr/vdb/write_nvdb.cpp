@@ -24,6 +24,9 @@ std::vector<const VolumeGrid*> volumesOf(std::span<const GridToWrite> grids) {
     if (const auto* carried = std::get_if<const CarriedGrid*>(&grid))
       throw UsageError("grid \"" + (*carried)->name + "\" (" + (*carried)->treeType +
                        ") is carried unchanged, which a .nvdb file cannot hold; ask for .vdb");
+    if (const auto* vectors = std::get_if<const VectorGrid*>(&grid))
+      throw UsageError("grid \"" + (*vectors)->descriptor.name +
+                       "\" has vectors, which are not written to .nvdb files; ask for .vdb");
     volumes.push_back(std::get<const VolumeGrid*>(grid));
   }
   return volumes;

@@ -20,10 +20,23 @@ std::uint32_t bestCompression() {
   return COMPRESS_ACTIVE_MASK | (Archive::hasBloscCompression() ? COMPRESS_BLOSC : COMPRESS_ZIP);
 }
 
-const std::string& nameOf(const GridToWrite& grid) {
-  if (const auto* carried = std::get_if<const CarriedGrid*>(&grid)) return (*carried)->name;
-  return std::get<const VolumeGrid*>(grid)->descriptor.name;
-}
+struct NameOf {
+  const std::string& operator()(const CarriedGrid* grid) const { return grid->name; }
+  const std::string& operator()(const VolumeGrid* grid) const { return grid->descriptor.name; }
+  const std::string& operator()(const VectorGrid* grid) const { return grid->descriptor.name; }
+};
+
+/// Adds a grid of any kind to a file.
+struct AddTo {
+  ArchiveWriter& writer;
+  const WriteOptions& options;
+
+  void operator()(const CarriedGrid* grid) const { writer.add(*grid); }
+  void operator()(const VolumeGrid* grid) const {
+    writer.add(makeOpenVdbGrid(*grid, options, LeafVoxels::kWhenWritten));
+  }
+  void operator()(const VectorGrid* grid) const { writer.add(makeOpenVdbGrid(*grid, options)); }
+};
 
 }  // namespace
 
@@ -39,18 +52,12 @@ void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> f
   openvdb::MetaMap metadata;
   insertItems(withWriter(fileMetadata), metadata);
   std::vector<std::string> names;
-  for (const auto& grid : grids) names.push_back(nameOf(grid));
+  for (const auto& grid : grids) names.push_back(std::visit(NameOf{}, grid));
 
   std::ofstream stream(path, std::ios::binary);
   stream.exceptions(std::ios::badbit | std::ios::failbit);
   ArchiveWriter writer(stream, bestCompression(), metadata, std::move(names));
-  for (const auto& grid : grids) {
-    if (const auto* carried = std::get_if<const CarriedGrid*>(&grid))
-      writer.add(**carried);
-    else
-      writer.add(
-          makeOpenVdbGrid(*std::get<const VolumeGrid*>(grid), options, LeafVoxels::kWhenWritten));
-  }
+  for (const auto& grid : grids) std::visit(AddTo{writer, options}, grid);
   stream.close();
 }
 

@@ -93,7 +93,7 @@ TEST_F(CarriedFile, IsSummarisedAndReported) {
   const auto run =
       test::quickFit(in(), out(), {"--skip", "bool", "--report", at("r.json"), "--keep", "points"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, AllOf(HasSubstr("vec3s: carried unchanged, because its values are of type"),
+  EXPECT_THAT(run.out, AllOf(HasSubstr("int32: carried unchanged, because its values are of type"),
                              HasSubstr("empty: carried unchanged, because it has no active voxel"),
                              HasSubstr("points: carried unchanged, because --keep names it"),
                              HasSubstr("bool: left out, because --skip names it")));

@@ -68,14 +68,24 @@ TEST_F(EdgeFile, RealFileOfDoublesComesBackAsDoubles) {
   EXPECT_EQ(back().grids.at(0).valueType, "double");
 }
 
-TEST_F(EdgeFile, RealFileOfVectorsIsCarried) { expectCarried("vec3_velocity.vdb"); }
+TEST_F(EdgeFile, RealFileOfAMillionVectorsIsSmallestUnchanged) {
+  const auto run = test::vdb2esvr({path("vec3_velocity.vdb"), folder_ / "out.esvr"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("vel: carried unchanged, because its components would take"));
+  EXPECT_EQ(back().grids.at(0).activeVoxels, 1'000'000u);
+}
+
+TEST_F(EdgeFile, RealFileOfAMillionVectorsIsFittedWhereEllipsoidsAreAskedFor) {
+  ASSERT_EQ(fit("vec3_velocity.vdb").exitCode, 0);
+  EXPECT_TRUE(back().grids.at(0).isVector);
+}
 
 TEST_F(EdgeFile, RealFileOfPointsIsCarried) { expectCarried("points_only.vdb"); }
 
 TEST_F(EdgeFile, RealFileWithATypeThatOpenVdbCannotReadGivesAllItsGrids) {
   const auto run = fit("unregistered_type.vdb");
   ASSERT_EQ(run.exitCode, 0) << run.err;
-  for (const char* carried : {"velocity", "flags", "velocity_previous", "particles"})
+  for (const char* carried : {"flags", "particles"})
     EXPECT_THAT(run.out, HasSubstr(std::string(carried) + ": carried unchanged"));
   EXPECT_THAT(namesOf(back()), ElementsAre("velocity", "phi_obstacle", "phi_inflow", "phi_out",
                                            "flags", "velocity_previous", "particles",

@@ -23,7 +23,8 @@ using Keys = std::set<std::string>;
 using Table = std::map<std::string, std::string>;  // meaning of each key
 
 /// Words in backticks in the document that are values, or keys of another object.
-const Keys kNoKeys{"default", "drawing", "learned", "mask", "null", "paper", "voxels"};
+const Keys kNoKeys{"default", "drawing", "learned", "mask",  "null",
+                   "paper",   "vec3d",   "vec3s",   "voxels"};
 
 /// Words in backticks that may be keys: options have dashes, and values capitals or spaces.
 Keys namedIn(const std::string& text) {
@@ -139,6 +140,8 @@ TEST_F(ReportDoc, namesTheKeysOfAConversion) {
   };
   convert("in.vdb", {"--count", "30"});
   convert("cloud.vdb", {"--max-error", "5%"});
+  test::writeVectorInput(at("wind.vdb"), {.voxels = test::softBall({})});
+  convert("wind.vdb", {"--count", "30", "--representation", "ellipsoids"});
   add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--paper", "epochs=28,points=60", "--count", "40",
                  "--device", "cpu", "--hits"});
 

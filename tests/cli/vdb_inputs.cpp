@@ -4,6 +4,7 @@
 
 #include "vdb/empty_grid.h"
 #include "vdb/scalar_trees.h"
+#include "vdb/vector_trees.h"
 
 namespace esvr::test {
 namespace {
@@ -54,6 +55,22 @@ void write(const std::filesystem::path& path, const openvdb::GridPtrVec& grids) 
   openvdb::io::File(path.string()).write(grids, metadata);
 }
 
+template <class Grid>
+openvdb::GridBase::Ptr vectorGrid(const InputVectors& input) {
+  using Vector = typename Grid::ValueType;
+  auto grid = Grid::create(Vector(0, 0, 0.5));
+  grid->setName(input.name);
+  grid->setGridClass(openvdb::GRID_STAGGERED);
+  grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
+  grid->setTransform(transformOf(InputMap::kRotated));
+  grid->insertMeta("note", openvdb::StringMetadata("of " + input.name));
+  auto accessor = grid->getAccessor();
+  for (const auto& [at, value] : input.voxels)
+    accessor.setValue({at.x, at.y, at.z}, Vector(value * input.scale[0], value * input.scale[1],
+                                                 value * input.scale[2]));
+  return grid;
+}
+
 template <class Value>
 std::vector<InputVoxel> cube(int reach, const Value& valueAt) {
   std::vector<InputVoxel> voxels;
@@ -68,6 +85,14 @@ std::vector<InputVoxel> cube(int reach, const Value& valueAt) {
 
 void writeInput(const std::filesystem::path& path, const std::vector<InputGrid>& grids) {
   write(path, floatGrids(grids));
+}
+
+void writeVectorInput(const std::filesystem::path& path, const InputVectors& vectors,
+                      const std::vector<InputGrid>& inputs) {
+  openvdb::GridPtrVec grids = floatGrids(inputs);
+  grids.insert(grids.begin(), vectors.asDouble ? vectorGrid<openvdb::Vec3DGrid>(vectors)
+                                               : vectorGrid<openvdb::Vec3SGrid>(vectors));
+  write(path, grids);
 }
 
 void writeMixedInput(const std::filesystem::path& path, const std::vector<InputGrid>& inputs) {

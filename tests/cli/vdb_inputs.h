@@ -2,6 +2,7 @@
 /// Writes VDB files with OpenVDB itself, as other programs do: inputs for the tests of the
 /// programs.
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -29,6 +30,19 @@ inline constexpr const char* kInputCreator = "Houdini/SOP_OpenVDB_Write";
 
 /// Writes float grids with a custom metadata item each. The file's `creator` is kInputCreator.
 void writeInput(const std::filesystem::path& path, const std::vector<InputGrid>& grids);
+
+/// A staggered grid of vectors, contravariant relative, with a custom metadata item and the
+/// background (0, 0, 0.5). Component c of a voxel is its value times scale[c].
+struct InputVectors {
+  std::string name = "velocity";
+  std::vector<InputVoxel> voxels{};
+  std::array<float, 3> scale{1.0f, -0.5f, 0.0f};
+  bool asDouble = false;
+};
+
+/// Writes the grid of vectors and then the float grids, as writeInput does.
+void writeVectorInput(const std::filesystem::path& path, const InputVectors& vectors,
+                      const std::vector<InputGrid>& grids = {});
 
 /// Writes a bool, an int32, a vec3s and a points grid, named after their types, and the given
 /// grids.

@@ -42,6 +42,17 @@ TEST(Fit, ReachesHighQualityOnAFieldOfEllipsoids) {
   EXPECT_LE(result.field.ellipsoidCount(), 200u);
 }
 
+TEST(Fit, MeasuresThePsnrWithAGivenPeak) {
+  const SparseVolume volume = test::tubeVolume();
+  FitOptions options = quick();
+  const double own = fit(volume, options).curve.back().psnrBox;
+  options.peak = 10.0 * peakOf(volume);
+  // Ten times the peak are 20 dB; the fit itself is the same, up to the rounding of float64.
+  EXPECT_NEAR(fit(volume, options).curve.back().psnrBox, own + 20.0, 1e-9);
+  options.peak = 0.0;
+  EXPECT_THROW((void)fit(volume, options), UsageError);
+}
+
 TEST(Fit, CurveAgreesWithTheMetricsOfItsField) {
   const SparseVolume volume = test::tubeVolume();
   const FitResult result = fit(volume, quick());

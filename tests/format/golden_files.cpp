@@ -102,6 +102,15 @@ EsvrFile twins() {
   return file;
 }
 
+/// A grid of numbers and one of vectors after it.
+EsvrFile vectors() {
+  EsvrFile file{{}, {fewValues(), oneEllipsoid(), oneEllipsoid(), oneEllipsoid()}};
+  for (std::size_t c = 0; c < kComponents; ++c)
+    file.grids[1 + c].descriptor.name = componentName("velocity", c);
+  file.vectors = {{"velocity", 1}};
+  return file;
+}
+
 /// An ellipsoid with a residual that corrects three voxels of a brick.
 StoredGrid corrected() {
   StoredGrid grid = oneEllipsoid();
@@ -138,6 +147,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"residual", fileOf(corrected())},
       {"carried",
        {{}, {oneEllipsoid()}, {carriedGrid(0, "vectors"), carriedGrid(2, "more vectors")}}},
+      {"vector_grid", vectors()},
       {"unknown_section", fileOf(oneEllipsoid()), true},
   };
 }

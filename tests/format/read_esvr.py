@@ -17,7 +17,7 @@ PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 96500
           2870177450012600261)
 NONE = 0xFFFFFFFF
 KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "bricks", 6: "layer errors",
-         7: "curve", 8: "carried grid", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
+         7: "curve", 8: "carried grid", 9: "vector grid", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
          20: "kappas", 32: "ellipsoids", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
          37: "residual", 38: "carried bytes"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
@@ -495,6 +495,13 @@ def carried(data):
     return record
 
 
+def vectors(data):
+    r = Record(data)
+    name = r.sized()
+    r.end()
+    return name
+
+
 def content(name, data):
     if name in PLANES:
         n = len(data) // 4 // PLANES[name]
@@ -503,7 +510,7 @@ def content(name, data):
     readers = {"grid": grid, "chunks": chunks, "bricks": bricks, "ellipsoids": ellipsoids,
                "voxels": voxels, "mask": voxels, "residual": voxels,
                "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve,
-               "carried grid": carried}
+               "carried grid": carried, "vector grid": vectors}
     return readers[name](data) if name in readers else data
 
 
@@ -513,7 +520,7 @@ def read(path):
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
     assert magic == bytes.fromhex("89 45 53 56 52 0D 0A 0A"), "magic"
-    assert major == 1 and minor in (0, 1) and size == len(data), "version or size"
+    assert major == 1 and minor in (0, 1, 2) and size == len(data), "version or size"
     assert table % 8 == 0 and header_sum == xxh64(data[:40]), "header checksum"
     assert table_sum == xxh64(data[table:table + 56 * count]), "table checksum"
 
@@ -535,8 +542,10 @@ def read(path):
         if name is None:
             assert flags == 0, "an unknown kind is optional here"
             continue
-        assert minor == 1 or not name.startswith("carried"), "a kind of version 1.1"
-        optional = name in ("curve", "layer errors", "carried grid", "carried bytes")
+        assert minor >= 1 or not name.startswith("carried"), "a kind of version 1.1"
+        assert minor >= 2 or name != "vector grid", "a kind of version 1.2"
+        optional = name in ("curve", "layer errors", "carried grid", "carried bytes",
+                            "vector grid")
         assert flags == (0 if optional else 1) and frame == layer == 0, "flags"
         assert codec in (0, 1) and (codec == 1 or raw == stored), "codec"
         sections[name, g, c] = content(name, part) if codec == 0 else None
@@ -725,11 +734,19 @@ def check_carried(sections):
     assert sections["carried bytes", 2, NONE] == b"more vectors"
 
 
+def check_vector_grid(sections):
+    """Expects that the grids 1, 2 and 3 are the components of a grid of vectors."""
+    assert sections["vector grid", 1, NONE] == b"velocity"
+    names = [sections["grid", g, NONE]["name"] for g in (1, 2, 3)]
+    assert names == [b"velocity.x", b"velocity.y", b"velocity.z"]
+
+
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
           "voxels": check_voxels, "mask": check_mask, "residual": check_residual,
           "mirrored_voxels": check_mirrored, "copied_voxels": check_copied,
           "two_grids": check_two_grids, "twins": check_twins, "carried": check_carried,
+          "vector_grid": check_vector_grid,
           "kappas_and_chunks": check_kappas_and_chunks}
 
 

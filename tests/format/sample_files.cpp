@@ -247,6 +247,7 @@ std::string difference(const EsvrFile& a, const EsvrFile& b) {
     if (!text.empty()) return "grid " + std::to_string(g) + ": " + text;
   }
   if (a.carried != b.carried) return "carried grids";
+  if (a.vectors != b.vectors) return "vectors";
   return "";
 }
 

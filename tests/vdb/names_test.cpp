@@ -94,7 +94,7 @@ TEST_F(Names, OfAFileWithoutGridsAreNone) {
 
 TEST_F(Names, OfGridsThatCannotBeFittedComeWithTheirType) {
   openvdb::GridPtrVec grids;
-  for (const char* type : {"bool", "mask", "int32", "int64", "vec3d", "ptdataidx32"})
+  for (const char* type : {"bool", "mask", "int32", "int64", "vec3i", "ptdataidx32"})
     grids.push_back(test::emptyGrid(std::string("Tree_") + type + "_5_4_3", type));
   grids.push_back(test::smallGrid());
   test::save(path(), grids);
@@ -104,11 +104,11 @@ TEST_F(Names, OfGridsThatCannotBeFittedComeWithTheirType) {
   EXPECT_THAT(listed[1].skipReason, HasSubstr("mask"));
   EXPECT_THAT(listed[2].skipReason, HasSubstr("int32"));
   EXPECT_THAT(listed[3].skipReason, HasSubstr("int64"));
-  EXPECT_THAT(listed[4].skipReason, HasSubstr("vec3d"));
+  EXPECT_THAT(listed[4].skipReason, HasSubstr("vec3i"));
   EXPECT_THAT(listed[5].skipReason, HasSubstr("points"));
   EXPECT_EQ(listed[6].skipReason, "");
-  EXPECT_THAT([&] { (void)readGrid(path(), "vec3d"); },
-              ThrowsMessage<BadInput>(HasSubstr("of type vec3d")));
+  EXPECT_THAT([&] { (void)readGrid(path(), "vec3i"); },
+              ThrowsMessage<BadInput>(HasSubstr("of type vec3i")));
   EXPECT_EQ(activeVoxelCount(readGrid(path(), "density").volume), 3u);
 }
 

@@ -94,7 +94,7 @@ namespace esvr {
 PaperFitResult fitByPaper(const SparseVolume& volume, const PaperFitOptions& options) {
   using namespace paper;
   check(options);
-  const FitTarget target = makeTarget(volume, options.box);
+  const FitTarget target = makeTarget(volume, options.box, options.peak);
   PaperRecord record = newRecord(target, options);
   if (isEmpty(target)) return {emptyFit(volume, Kernel{}.kappa), std::move(record)};
   Recorder recorder(target, options);

@@ -22,8 +22,9 @@ struct CompactOptions {
   std::optional<double> psnr{};
   /// Bytes that the ellipsoids of the best result may take. It replaces `loss` and `psnr`.
   std::optional<std::uint64_t> bytes{};
-  std::optional<Box> box{};  ///< box of the PSNR; default: the active bounding box
-  Device device{};           ///< device that evaluates the trials
+  std::optional<Box> box{};      ///< box of the PSNR; default: the active bounding box
+  std::optional<double> peak{};  ///< peak of the PSNR, above 0; default: peakOf() of the source
+  Device device{};               ///< device that evaluates the trials
 };
 
 struct CompactResult {

@@ -17,6 +17,7 @@
 #include "esvr/memory_limit.h"
 #include "esvr/quantised.h"
 #include "esvr/sparse_volume.h"
+#include "esvr/vector_grid.h"
 #include "esvr/voxel_layer.h"
 
 namespace esvr {
@@ -84,25 +85,46 @@ struct LayerSize {
 /// The sizes of the layers of a grid; empty if its ellipsoids are not quantised.
 [[nodiscard]] std::vector<LayerSize> layerSizes(const StoredGrid& grid);
 
+/// A grid of vectors, whose components are the grids `first`, `first` + 1 and `first` + 2 of
+/// EsvrFile::grids. They agree in class, value type and transform. Component x has the metadata.
+struct StoredVector {
+  std::string name;       ///< name in the source; not necessarily unique
+  std::size_t first = 0;  ///< index of component x
+  friend bool operator==(const StoredVector&, const StoredVector&) = default;
+};
+
 struct EsvrFile {
   std::vector<MetaItem> metadata;  ///< the source's file-level metadata, verbatim
   std::vector<StoredGrid> grids;   ///< grids that were converted, in their order
   /// Grids that were not converted, by increasing places. Those of a file that was read without
   /// ReadLimits::carriedBytes have no bytes, and cannot be written.
   std::vector<CarriedGrid> carried{};
+  /// Grids of vectors, by increasing indices of their components. No two share a component.
+  std::vector<StoredVector> vectors{};
 };
+
+using StoredComponents = std::span<const StoredGrid, kComponents>;
+/// The components of a grid of vectors of a file.
+[[nodiscard]] StoredComponents componentsOf(const EsvrFile& file, const StoredVector& vector);
 
 /// One of all grids of a file.
 struct GridOfFile {
-  bool isCarried = false;  ///< whether it is one of EsvrFile::carried or of EsvrFile::grids
-  std::size_t index = 0;   ///< index in that list
+  bool isCarried = false;  ///< whether it is one of EsvrFile::carried
+  std::size_t index = 0;   ///< index in that list, in EsvrFile::vectors or in EsvrFile::grids
+  bool isVector = false;   ///< whether it is one of EsvrFile::vectors
   friend bool operator==(const GridOfFile&, const GridOfFile&) = default;
 };
 
 /// All grids in the order of the file: carried grids have their places, and the others are between
-/// them in their order.
-/// \throws RuntimeFailure  the places do not increase, or one is not below the number of grids
+/// them in their order. A grid of vectors stands for its components, which count as three grids in
+/// the places.
+/// \throws RuntimeFailure  the places do not increase, or one is not below the number of grids; a
+///                         carried grid is between components of a vector; a vector has not three
+///                         components of its own
 [[nodiscard]] std::vector<GridOfFile> gridsInOrder(const EsvrFile& file);
+
+/// The name of a grid in the source.
+[[nodiscard]] const std::string& nameOf(const EsvrFile& file, const GridOfFile& grid);
 
 /// The names of all grids in the order of the file.
 [[nodiscard]] std::vector<std::string> namesInOrder(const EsvrFile& file);
@@ -174,6 +196,9 @@ struct PartOfFile {
 /// \throws RuntimeFailure  as for encodeEsvr
 [[nodiscard]] std::uint64_t bytesOfCarried(const std::vector<CarriedGrid>& grids);
 
+/// Largest number of bytes that grids of vectors add to a file besides their components.
+[[nodiscard]] std::uint64_t bytesOfVectors(const std::vector<StoredVector>& vectors);
+
 /// Bytes of a file without grids, including the padding before the first grid.
 [[nodiscard]] std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata);
 
@@ -182,7 +207,8 @@ struct PartOfFile {
 /// a reader gets them in that order, bit for bit.
 /// \throws RuntimeFailure  the content is invalid: a number is not finite, a quaternion has no unit
 ///                         length, the bricks' corners are not increasing, the places of carried
-///                         grids are not those of gridsInOrder, or a carried grid has no bytes
+///                         grids or the vectors are not those of gridsInOrder, a carried grid has
+///                         no bytes, or components differ in class, value type or transform
 [[nodiscard]] std::vector<std::byte> encodeEsvr(const EsvrFile& file);
 /// Decodes a file in memory.
 /// \param nameForErrors  name of the file in error texts

@@ -41,6 +41,7 @@ struct CommonFitOptions {
   std::optional<double> psnr;        ///< dB over the box; the fit ends as soon as it is reached
   std::optional<double> seconds;     ///< time limit; the fit then ends with its best state
   std::optional<Box> box;            ///< box over which PSNR is measured; default: the active box
+  std::optional<double> peak;        ///< peak of the PSNR, above 0; default: peakOf() of the volume
   std::uint64_t seed = 1;
   Device device;                              ///< the CPU or a GPU (selectDevice)
   std::optional<std::size_t> maxDeviceBytes;  ///< GPU memory to use; default: all free memory

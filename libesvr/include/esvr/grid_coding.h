@@ -2,6 +2,7 @@
 /// Turns a fitted field into a stored grid, and a stored grid back into voxels.
 
 #include <optional>
+#include <string>
 
 #include "esvr/container.h"
 #include "esvr/ellipsoids.h"
@@ -9,6 +10,7 @@
 #include "esvr/grid_descriptor.h"
 #include "esvr/memory_limit.h"
 #include "esvr/sparse_volume.h"
+#include "esvr/vector_grid.h"
 #include "esvr/voxel_layer.h"
 #include "esvr/work_estimate.h"
 
@@ -63,5 +65,11 @@ struct DecodeOptions {
 /// \throws UsageError  the threshold is negative or not finite
 /// \throws MemoryExceeded  the estimate is above options.maxBytes; nothing was evaluated
 [[nodiscard]] SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options = {});
+
+/// The vectors that the components of a grid represent. Their bricks and active masks are those of
+/// decodeGrid().
+/// \throws  as for decodeGrid; the components together may take options.maxBytes
+[[nodiscard]] VectorGrid decodeVector(const std::string& name, StoredComponents components,
+                                      const DecodeOptions& options = {});
 
 }  // namespace esvr

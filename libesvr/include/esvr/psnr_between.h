@@ -15,11 +15,12 @@ struct BetweenOptions {
   /// As in FitOptions: only the volume's bricks count. Sums are clamped to the band instead of
   /// `range`.
   bool narrowBand = false;
+  std::optional<double> peak{};  ///< peak of the PSNR; default: peakOf(volume)
 };
 
 /// PSNR, in dB, of the sum of a field against the trilinear interpolation of a volume. It is
 /// measured at eight positions near each voxel, which are the same for all voxels and cover the
-/// space between voxels evenly. The peak is peakOf(volume).
+/// space between voxels evenly.
 /// \throws BadInput  the volume has no active voxel
 [[nodiscard]] double psnrBetween(const SparseVolume& volume, const Field& field,
                                  const BetweenOptions& options = {});

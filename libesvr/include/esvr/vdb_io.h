@@ -15,6 +15,7 @@
 #include "esvr/coord.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/sparse_volume.h"
+#include "esvr/vector_grid.h"
 
 namespace esvr {
 
@@ -29,10 +30,13 @@ struct GridSummary {
   std::uint64_t activeVoxels = 0;
   Box activeBox;
   std::uint64_t storedBytes = 0;  ///< bytes in the file; few if the grid shares another's tree
-  std::string skipReason;  ///< reason, for the user, why the grid cannot be fitted; else empty
+  std::string skipReason;  ///< reason, for the user, why readGrid's grid cannot be fitted; or empty
   /// Reason, for the user, why readCarried cannot read the grid; else empty.
   std::string whyNotCarried;
   bool isScalar = false;  ///< true if readGrid can read the value type, even of an empty grid
+  /// True if readVector can read the grid: its values are of type "vec3s" or "vec3d" and it has an
+  /// active voxel. A level set of vectors cannot be read.
+  bool isVector = false;
 };
 
 struct VdbSummary {
@@ -80,6 +84,22 @@ struct VolumeGrid {
 [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                                   const ReadOptions& options = {});
 
+/// Reads a component of a grid of vectors in a .vdb file, as readGrid reads a grid of numbers. The
+/// name of the result is componentName(). The component x has the metadata of the grid; the others
+/// have none, so that a file with all of them holds the metadata once.
+/// \param name       as for readGrid
+/// \param component  0, 1 or 2
+/// \throws BadInput  as for readGrid; the grid has not GridSummary::isVector
+/// \throws MemoryExceeded  the component needs more than maxBytes
+[[nodiscard]] VolumeGrid readComponent(const std::filesystem::path& path, const std::string& name,
+                                       std::size_t component, const ReadOptions& options = {});
+
+/// Reads all components of a grid of vectors.
+/// \throws BadInput  as for readComponent
+/// \throws MemoryExceeded  the components together need more than maxBytes
+[[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
+                                    const ReadOptions& options = {});
+
 /// Reads grids of a .vdb file as bytes. Their types may be unknown to OpenVDB, and their trees are
 /// not checked.
 /// \param places   indices of the grids in VdbSummary::grids
@@ -97,6 +117,9 @@ struct VolumeGrid {
 
 /// Reads the voxels of a carried grid of floats or doubles. \throws  as for readGrid
 [[nodiscard]] VolumeGrid readGrid(const CarriedGrid& grid, const ReadOptions& options = {});
+
+/// Reads the voxels of a carried grid of vectors. \throws  as for readVector
+[[nodiscard]] VectorGrid readVector(const CarriedGrid& grid, const ReadOptions& options = {});
 
 /// Choice of half floats for a written file; kAuto: half if the source was saved as half.
 enum class HalfMode { kAuto, kOn, kOff };
@@ -118,14 +141,15 @@ struct WriteOptions {
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const VolumeGrid> grids, const WriteOptions& options = {});
 
-/// A grid that is written: one of voxels, or one that is carried, whose bytes are written as they
-/// are. The grid must outlive this object.
-using GridToWrite = std::variant<const VolumeGrid*, const CarriedGrid*>;
+/// A grid that is written: one of numbers or of vectors, or one that is carried, whose bytes are
+/// written as they are. The grid must outlive this object.
+using GridToWrite = std::variant<const VolumeGrid*, const CarriedGrid*, const VectorGrid*>;
 
-/// Writes grids of both kinds, in this order.
+/// Writes grids of all kinds, in this order. A voxel of a grid of vectors is active if it is active
+/// in any component.
 /// \throws RuntimeFailure  as for writeGrids; a carried grid has a version of the VDB format that
 ///                         this version of OpenVDB does not write
-/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid is carried
+/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid is carried or of vectors
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const GridToWrite> grids, const WriteOptions& options = {});
 

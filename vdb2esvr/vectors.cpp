@@ -1,0 +1,106 @@
+#include "vdb2esvr/vectors.h"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "esvr/grid_coding.h"
+
+namespace esvr::vdb2esvr {
+namespace {
+
+using Grids = std::vector<ConvertedGrid>;
+
+/// The place of a grid in the input.
+std::size_t placeOf(const RunRecord& record, const std::string& uniqueName) {
+  const auto& grids = record.input.grids;
+  return std::size_t(std::ranges::find(grids, uniqueName, &GridSummary::uniqueName) -
+                     grids.begin());
+}
+
+bool isComplete(const Grids& grids, std::size_t first) {
+  return grids.size() - first >= kComponents &&
+         grids[first].sourceName == grids[first + kComponents - 1].sourceName;
+}
+
+/// The grids that are not of numbers, by their first components.
+std::vector<ConvertedVector> listVectors(const RunRecord& record) {
+  std::vector<ConvertedVector> vectors;
+  for (std::size_t g = 0; g < record.grids.size(); ++g) {
+    const ConvertedGrid& grid = record.grids[g];
+    if (grid.component != std::size_t{0}) continue;
+    const GridSummary& source = record.input.grids[placeOf(record, grid.sourceName)];
+    vectors.push_back({source.uniqueName, source.valueType, {source.name, g}});
+  }
+  return vectors;
+}
+
+/// Removes a vector from the converted grids. Its components are no longer twins of other grids.
+void removeVector(const std::string& uniqueName, RunRecord& record) {
+  std::erase_if(record.grids, [&](const auto& grid) { return grid.sourceName == uniqueName; });
+  for (ConvertedGrid& grid : record.grids)
+    for (std::size_t c = 0; c < kComponents; ++c)
+      if (grid.sameAs == componentName(uniqueName, c)) grid.sameAs.reset();
+  record.vectors = listVectors(record);
+}
+
+/// Bytes that a vector adds to a file.
+std::uint64_t bytesAddedBy(const RunRecord& record, const ConvertedVector& vector) {
+  std::vector<StoredGrid> components;
+  for (std::size_t c = 0; c < kComponents; ++c)
+    components.push_back(record.grids[vector.stored.first + c].stored());
+  return bytesAddedTogether(std::move(components)) + bytesOfVectors({vector.stored});
+}
+
+bool mayCarry(const Options& options) {
+  return options.convert.representation == Representation::kAuto &&
+         options.convert.storage.form == Storage::kCompact && !options.size && !options.ratio &&
+         options.job == Job::kWhole;
+}
+
+/// Adds a grid at its place in the input.
+void insertCarried(const NotFitted& left, CarriedGrid grid, RunRecord& record,
+                   std::vector<CarriedGrid>& carried) {
+  const auto at =
+      std::ranges::lower_bound(carried, grid.place, {}, &CarriedGrid::place) - carried.begin();
+  record.carried.insert(record.carried.begin() + at, left);
+  carried.insert(carried.begin() + at, std::move(grid));
+}
+
+}  // namespace
+
+void collectVectors(RunRecord& record) {
+  for (std::size_t g = 0; g < record.grids.size(); ++g)
+    if (record.grids[g].component == std::size_t{0} && !isComplete(record.grids, g))
+      record.grids.resize(g);
+  record.vectors = listVectors(record);
+}
+
+void carrySmallerVectors(const Options& options, RunRecord& record,
+                         std::vector<CarriedGrid>& carried) {
+  if (!mayCarry(options)) return;
+  const auto vectors = record.vectors;
+  for (const ConvertedVector& vector : vectors) {
+    const std::size_t place = placeOf(record, vector.uniqueName);
+    const GridSummary& source = record.input.grids[place];
+    if (!source.whyNotCarried.empty()) continue;
+    auto unchanged = readCarried(options.input, std::span(&place, 1), options.read);
+    const std::uint64_t bytes = bytesAddedBy(record, vector);
+    if (bytesOfCarried(unchanged) >= bytes) continue;
+    const std::string why = "its components would take " + std::to_string(bytes) + " bytes";
+    removeVector(vector.uniqueName, record);
+    insertCarried({source, place, why}, std::move(unchanged.front()), record, carried);
+  }
+}
+
+void measureVectors(const Options& options, const EsvrFile& file, RunRecord& record) {
+  for (ConvertedVector& vector : record.vectors) {
+    const VectorGrid source = readVector(options.input, vector.uniqueName, options.read);
+    const VectorGrid decoded = decodeVector(vector.stored.name, componentsOf(file, vector.stored),
+                                            {.memory = options.read.memory});
+    vector.metrics =
+        compareVectors(source.components, decoded.components, {.box = options.convert.fit.box});
+  }
+}
+
+}  // namespace esvr::vdb2esvr
