@@ -69,8 +69,9 @@ std::vector<NamedGrid> writable(const std::vector<NamedGrid>& chosen, const Opti
       kept.push_back(grid);
       continue;
     }
-    const std::string text = options.output.string() + ": grid \"" + grid.name + "\" ";
-    if (!options.grids.empty()) throw UsageError(text + "cannot be written: " + why);
+    const std::string text = "grid \"" + grid.name + "\" ";
+    if (!options.grids.empty())
+      throw UsageError(options.output.string() + ": " + text + "cannot be written: " + why);
     log.warning(text + "is left out: " + why);
   }
   if (kept.empty() && !chosen.empty())
@@ -173,8 +174,8 @@ void tellLostMetadata(const EsvrFile& file, const std::vector<DecodedGrid>& grid
   std::size_t items = file.metadata.size();
   for (const auto& grid : grids) items += descriptorOf(grid).metadata.size();
   if (items == 0) return;
-  log.warning(options.output.string() + ": a NanoVDB file holds no metadata; " +
-              std::to_string(items) + " items of " + options.input.string() + " are left out");
+  log.warning("a NanoVDB file holds no metadata, which is left out",
+              std::to_string(items) + " items");
 }
 
 /// The names of the chosen grids in the output.
@@ -203,17 +204,21 @@ std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<N
 
 void convert(const Options& options) {
   const cli::Interrupts interrupts;  // Ctrl-C lets a file that is being written be completed
-  const cli::Log log(kProgram, options.verbosity);
   checkFiles(options);
+  convertFile(options, interrupts.token(), cli::Log(kProgram, options.verbosity), std::cout);
+}
+
+void convertFile(const Options& options, const CancelToken& cancel, const cli::Log& log,
+                 std::ostream& out) {
   const EsvrFile file = read(options, log);
   const auto chosen = writable(chooseGrids(options.input, file, options.grids), options, log);
   std::vector<ComparedGrid> compared;
   if (options.reference) compared = counterparts(file, chosen, options);
   const auto grids = decodeAll(file, chosen, options, log);
-  if (interrupts.token().cancelled()) throw Cancelled();
+  if (cancel.cancelled()) throw Cancelled();
   tellLostMetadata(file, grids, options, log);
   writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);
-  if (options.reference) printErrors(options, compared, std::cout);
+  if (options.reference) printErrors(options, compared, out);
 }
 
 }  // namespace esvr::esvr2vdb

@@ -1,12 +1,26 @@
 #pragma once
 /// The jobs of esvr2vdb. Each throws an esvr::Error if it fails.
 
+#include <iosfwd>
+
+#include "cli/log.h"
+#include "esvr/progress.h"
 #include "esvr2vdb/options.h"
 
 namespace esvr::esvr2vdb {
 
 /// Writes the VDB. If there is a reference, prints the errors of the written grids.
 void convert(const Options& options);
+
+/// The same for one file whose paths were checked. \param out  gets the errors
+/// \throws Cancelled  nothing was written
+void convertFile(const Options& options, const CancelToken& cancel, const cli::Log& log,
+                 std::ostream& out);
+
+/// Writes a VDB for each frame of the sequence, on several threads.
+/// \throws Error  the kind of the first frame that failed; RuntimeFailure if the run was
+///                interrupted. Frames may have been written
+void convertSequence(const Options& options);
 
 /// Prints the grids of a file and, for an .esvr file, its sections. It evaluates no voxel.
 void list(const Options& options);

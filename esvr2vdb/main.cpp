@@ -13,7 +13,7 @@ void run(const Options& options) {
   const esvr::cli::ThreadLimit threads(options.threads);
   switch (options.job) {
     case Job::kConvert:
-      return convert(options);
+      return options.sequence ? convertSequence(options) : convert(options);
     case Job::kList:
       return list(options);
     case Job::kCheck:

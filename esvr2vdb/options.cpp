@@ -42,7 +42,8 @@ cli::ProgramText programText() {
           "of sections names the grid with which a section is shared.\n"
           "\n"
           "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
-          "be used, 5 not enough memory (--max-memory).",
+          "be used, 5 not enough memory (--max-memory). A sequence has the code of its first\n"
+          "frame that failed.",
       .examples =
           "  esvr2vdb smoke.esvr smoke.vdb\n"
           "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   also print the errors\n"
@@ -83,6 +84,7 @@ cli::CommandLine commandLine() {
      "the reference's active voxels)")
     ("force,f", bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
+  cli::addSequenceOptions(line.options());
   cli::addHostMemory(line);
   return line;
 }
@@ -91,8 +93,8 @@ Job jobOf(const Arguments& a) {
   const bool list = a.get<bool>("list"), check = a.get<bool>("check");
   if (list && check) throw UsageError("--list and --check are two jobs; ask for one");
   if (!list && !check) return Job::kConvert;
-  for (const char* option :
-       {"output", "grid", "threshold", "lod", "max-ellipsoids", "bbox", "reference", "box"})
+  for (const char* option : {"output", "grid", "threshold", "lod", "max-ellipsoids", "bbox",
+                             "reference", "box", "frames", "missing", "on-error"})
     if (a.has(option))
       throw UsageError(std::string(list ? "--list" : "--check") + " takes IN only, no " + option);
   return list ? Job::kList : Job::kCheck;
@@ -137,6 +139,10 @@ void readConversion(const Arguments& a, Options& options) {
   options.reference = a.find<std::string>("reference");
   if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
   if (options.box && !options.reference) throw UsageError("--box says nothing without --reference");
+  options.sequence = cli::readSequence(a);
+  if (options.sequence && options.reference && !cli::FramePattern::in(options.reference->string()))
+    throw UsageError("--reference needs a pattern for the number of a frame, as '" +
+                     options.input.string() + "' has one");
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "cli/host_memory.h"
 #include "cli/log.h"
+#include "cli/sequence.h"
 #include "esvr/container.h"
 #include "esvr/coord.h"
 #include "esvr/grid_coding.h"
@@ -22,6 +23,8 @@ enum class Job { kConvert, kList, kCheck };
 struct Options {
   Job job = Job::kConvert;
   std::filesystem::path input, output;
+  /// The frames, if the input and the output are patterns. The reference is a pattern, too.
+  std::optional<cli::Sequence> sequence;
   std::vector<std::string> grids;  ///< names of the grids; empty: all
   DecodeOptions decode;
   ReadPart part;                             ///< the part of the file that is read

@@ -44,6 +44,7 @@ struct Options {
   RenderMode mode = RenderMode::kComposite;
   Classification classification = Classification::kPreIntegrated;
   LevelOfDetail lod = LevelOfDetail::kAuto;
+  std::optional<Shading> shading;
   std::optional<PlaceBox> clip;
   int turntable = 0;             ///< number of pictures of a full turn; 0: one picture
   int firstFrame = 0;            ///< first picture of the turn to draw

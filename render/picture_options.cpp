@@ -74,6 +74,18 @@ LevelOfDetail lodOf(const Arguments& a) {
                                     {{"auto", LevelOfDetail::kAuto}, {"off", LevelOfDetail::kOff}});
 }
 
+std::optional<Shading> shadingOf(const Arguments& a, const Options& options) {
+  const auto light = findVector(a, "light");
+  if (!a.get<bool>("shade")) {
+    if (light) throw UsageError("--light needs --shade");
+    return std::nullopt;
+  }
+  if (options.mode != RenderMode::kComposite) throw UsageError("--shade needs --mode composite");
+  Shading shading;
+  shading.light = light;
+  return shading;
+}
+
 bool legendOf(const Arguments& a, const Options& options) {
   const bool legend = a.get<bool>("legend");
   if (legend && options.output.extension() == ".exr")
@@ -122,8 +134,13 @@ void addPictureOptions(cli::po::options_description& options) {
      "pre: integrate the transfer function over the values from each sample of a ray to the next, "
      "which draws smooth surfaces; post: give each sample the color and opacity of its value, which "
      "leaves stripes where values change much within a step (default: pre; with --slice, post)")
+    ("shade", bool_switch(),
+     "shade surfaces by the gradient of the values, with one light above and to the left of the "
+     "camera")
+    ("light", value<std::string>()->value_name("X,Y,Z"),
+     "direction to the light of --shade, in index space")
     ("lod", value<std::string>()->value_name("L"),
-     "levels of detail. auto: where a pixel is wider than 5 voxels, draw means of 2^3, 4^3, ... voxels "
+     "levels of detail. auto: where a pixel is wider than 6 voxels, draw means of 2^3, 4^3, ... voxels "
      "at longer steps, which is faster, needs less memory and shows fewer stray pixels; off: draw "
      "the voxels everywhere (default: auto; with --slice, off)")
     ("clip", value<std::string>()->value_name("BOX"),
@@ -147,6 +164,7 @@ void readPictureOptions(const Arguments& a, Options& options) {
   options.mode = modeOf(a);
   options.classification = classificationOf(a);
   options.lod = lodOf(a);
+  options.shading = shadingOf(a, options);
   options.clip = clipOf(a);
   options.depth = a.find<std::string>("depth").value_or("");
 }

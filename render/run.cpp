@@ -103,6 +103,7 @@ RenderOptions renderOptions(const Options& options, const Scene& scene) {
   r.mode = options.mode;
   r.classification = options.classification;
   r.lod = options.lod;
+  r.shading = options.shading;
   r.between = options.between.value_or(usualBetween(scene));
   r.clip = options.clip;
   return r;
@@ -280,7 +281,7 @@ void run(const Options& options) {
   checkFiles(options);
   checkPictureSize(options);
   const DrawSettings settings{selectDevice(options.device), options.limits, options.values,
-                              options.memory};
+                              options.shading.has_value(), options.memory};
   Scene scene = readScene({options.input, options.grid, options.memory});
   RenderOptions r = renderOptions(options, scene);
   Drawing drawing(std::move(scene), settings);

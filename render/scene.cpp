@@ -90,7 +90,7 @@ void SceneRenderer::drawField(const Field& field, const StoredGrid& grid, const 
 }
 
 void SceneRenderer::sampleVoxels(const VolumeGrid& grid, const DrawSettings& s) {
-  if (s.device.kind == DeviceKind::kCpu && !s.values) {
+  if (s.shaded || (s.device.kind == DeviceKind::kCpu && !s.values)) {
     renderer_ = makeVolumeRenderer(grid.volume, s.device, s.limits);
     return;
   }

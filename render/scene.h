@@ -38,13 +38,15 @@ struct DrawSettings {
   Device device;
   RendererLimits limits;
   std::optional<NanoValues> values;  ///< draw voxels as a NanoVDB grid of this value type
+  bool shaded = false;               ///< whether pictures are shaded
   cli::HostMemory memory;            ///< memory that input may take
 };
 
 /// Draws a scene, which must outlive it.
 class SceneRenderer {
  public:
-  /// Voxels are drawn as a NanoVDB grid on a CUDA device, or if `values` asks for one. The voxels of
+  /// Voxels are drawn as a NanoVDB grid on a CUDA device, or if `values` asks for one, but not if
+  /// pictures are shaded. The voxels of
   /// a field are decoded when a ray needs them. If they do not follow from its ellipsoids alone, all
   /// are decoded at once.
   /// \throws DeviceError  the device fails, or its memory is exhausted

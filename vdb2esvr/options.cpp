@@ -35,9 +35,12 @@ cli::ProgramText programText() {
       .name = kProgram,
       .purpose =
           "Fits ellipsoids to the sparse grids of a VDB file and writes them to an .esvr file.\n"
+          "A pattern such as smoke.####.vdb stands for the files of a sequence.\n"
           "esvr2vdb converts the file back to VDB. Transforms, names and metadata are then\n"
           "exactly those of the source, and voxels have the chosen accuracy.",
-      .usage = "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]",
+      .usage =
+          "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]\n"
+          "  vdb2esvr IN.####.vdb OUT.####.esvr [--frames 1-100x2] ...",
       .notes =
           "Without -g, all grids are converted. Grids of vectors are fitted by components, unless\n"
           "they take fewer bytes unchanged. Grids that are not fitted come back bit for bit: "
@@ -70,6 +73,19 @@ cli::ProgramText programText() {
           "result so far is written. A second Ctrl-C ends the program at once. OUT.esvr is never\n"
           "incomplete. With --resume, the same command continues a run that was interrupted.\n"
           "\n"
+          "Each frame of a sequence is converted as a file of its own, so that it does not depend "
+          "on\n"
+          "other frames. Without a goal, all frames have the PSNR of --preset, whatever their "
+          "size.\n"
+          "In a pattern, #, #### and %04d are four digits, and @ is as many as needed. Frames are\n"
+          "converted at the same time on the threads of --threads, or one on each GPU of "
+          "--device,\n"
+          "as far as --max-memory allows. A frame that fails is named, and does not stop the "
+          "others\n"
+          "(--on-error stop); the exit code is that of the first one. Ctrl-C keeps the frames "
+          "that\n"
+          "are complete. With --resume, frames whose files are there are not converted again.\n"
+          "\n"
           "mpirun -n N vdb2esvr ... fits the chunks of a volume on N processes, if the program "
           "was\n"
           "built with MPI. All devices and processes together write the bytes that one writes.\n"
@@ -85,7 +101,8 @@ cli::ProgramText programText() {
           "  vdb2esvr frame.vdb frame.esvr --skip velocity       all grids but one\n"
           "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            every voxel within the bound\n"
           "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4 --resume\n"
-          "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255"};
+          "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255\n"
+          "  vdb2esvr 'smoke.####.vdb' 'smoke.####.esvr' --frames 1-100 --missing hold"};
 }
 
 void addGoalOptions(cli::po::options_description& options) {
@@ -182,6 +199,7 @@ cli::CommandLine commandLine() {
   line.argument("input", "IN.vdb");
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
+  cli::addSequenceOptions(line.options());
   addGoalOptions(line.options());
   addFitOptions(line.options());
   addPartOptions(line.options());
@@ -340,6 +358,22 @@ OnCancel onCancel(const Arguments& a) {
                                {{"keep", OnCancel::kKeep}, {"discard", OnCancel::kDiscard}});
 }
 
+/// Reads the options of a sequence of files.
+void readFrames(const Arguments& a, Options& options) {
+  options.sequence = cli::readSequence(a);
+  if (!options.sequence) return;
+  for (const char* option : {"part", "merge"})
+    if (a.has(option) && !a.values[option].defaulted())
+      throw UsageError("--" + std::string(option) +
+                       " is for one volume; give each job some frames of the sequence (--frames)");
+  if (options.resume && a.get<bool>("force"))
+    throw UsageError(
+        "--resume keeps the frames whose files are there, and --force replaces them; choose one");
+  if (auto* goal = std::get_if<PresetGoal>(&options.convert.goal)) goal->steady = true;
+  // A frame that ended early would look as if it were complete.
+  if (a.values["on-cancel"].defaulted()) options.onCancel = OnCancel::kDiscard;
+}
+
 void readMemory(const Arguments& a, Options& options) {
   constexpr std::uint64_t kFitsShare = 2;  // one of two; the rest is for the volume and its copy
   const cli::HostMemory memory = cli::hostMemoryOf(a);
@@ -373,6 +407,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.device = cli::deviceOf(a);
   options.onCancel = onCancel(a);
   readParts(a, options);
+  readFrames(a, options);
   options.report = a.find<std::string>("report").value_or("");
   options.progress = progressForm(a);
   options.countHits = a.get<bool>("hits");

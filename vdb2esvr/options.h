@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/log.h"
+#include "cli/sequence.h"
 #include "esvr/convert.h"
 #include "esvr/part_store.h"
 #include "esvr/vdb_io.h"
@@ -26,6 +27,8 @@ enum class OnCancel { kKeep, kDiscard };
 
 struct Options {
   std::filesystem::path input, output;
+  /// The frames, if the input and the output are patterns.
+  std::optional<cli::Sequence> sequence;
   WantedGrids grids;
   ConvertOptions convert;             ///< options of every grid; a size replaces the goal
   std::optional<double> psnr;         ///< PSNR that every grid should reach, dB over the box

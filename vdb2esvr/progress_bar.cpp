@@ -39,6 +39,21 @@ std::string clock(double seconds) {
   return text;
 }
 
+/// The start of a line: a name, a share of the whole, and a bar.
+std::string startOfLine(const std::string& name, double fraction) {
+  return cli::printable(name) + "  " + std::to_string(std::lround(100.0 * fraction)) + " % " +
+         bar(fraction);
+}
+
+std::string cut(std::string line, std::size_t width) {
+  line.resize(std::min(line.size(), width));
+  return line;
+}
+
+std::string dumped(const nlohmann::ordered_json& json) {
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
 }  // namespace
 
 std::string progressLine(const std::string& grid, const FitProgress& progress, std::size_t width) {
@@ -50,11 +65,17 @@ std::string progressLine(const std::string& grid, const FitProgress& progress, s
   if (progress.parts > 1)
     parts = "part " + std::to_string(progress.partsDone) + " of " + std::to_string(progress.parts) +
             "  ";
-  std::string line = cli::printable(grid) + "  " + std::to_string(std::lround(100.0 * fraction)) +
-                     " % " + bar(fraction) + numbers + parts + clock(progress.secondsLeft) +
-                     " left";
-  line.resize(std::min(line.size(), width));
-  return line;
+  return cut(startOfLine(grid, fraction) + numbers + parts + clock(progress.secondsLeft) + " left",
+             width);
+}
+
+std::string progressLine(const std::string& pattern, const SequenceProgress& progress,
+                         std::size_t width) {
+  std::string line = startOfLine(pattern, progress.fraction()) + "  " +
+                     std::to_string(progress.done) + " of " + std::to_string(progress.frames) +
+                     " frames  ";
+  if (progress.failed > 0) line += std::to_string(progress.failed) + " failed  ";
+  return cut(line + clock(progress.secondsLeft()) + " left", width);
 }
 
 std::string progressJson(const std::string& grid, const FitProgress& progress) {
@@ -67,7 +88,18 @@ std::string progressJson(const std::string& grid, const FitProgress& progress) {
                                     {"parts_done", progress.partsDone},
                                     {"parts", progress.parts},
                                     {"voxels_per_second", progress.voxelsPerSecond}};
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return dumped(json);
+}
+
+std::string progressJson(const SequenceProgress& progress) {
+  return dumped({{"frame", progress.frame},
+                 {"state", progress.state},
+                 {"frames_done", progress.done},
+                 {"frames_failed", progress.failed},
+                 {"frames", progress.frames},
+                 {"fraction", progress.fraction()},
+                 {"seconds", progress.seconds},
+                 {"seconds_left", progress.secondsLeft()}});
 }
 
 ProgressBar::ProgressBar(std::string grid, ProgressForm form, cli::Verbosity verbosity)
@@ -83,16 +115,20 @@ ProgressBar::ProgressBar(std::string grid, ProgressForm form, cli::Verbosity ver
     form_ = Form::kLines;
 }
 
-ProgressBar::~ProgressBar() {
+ProgressBar::~ProgressBar() { hide(); }
+
+void ProgressBar::hide() const {
   if (form_ == Form::kBar) std::cerr << kBackAndClear << std::flush;
 }
 
-void ProgressBar::redraw(const FitProgress& progress) const {
+template <class Progress>
+void ProgressBar::redraw(const Progress& progress) const {
   const std::size_t width = terminalWidth() - 1;  // a full line would wrap
   std::cerr << kBackAndClear << progressLine(grid_, progress, width) << std::flush;
 }
 
-void ProgressBar::printLine(const FitProgress& progress) {
+template <class Progress>
+void ProgressBar::printLine(const Progress& progress) {
   const auto now = Clock::now();
   if (now - lastLine_ < kLineInterval) return;
   lastLine_ = now;
@@ -111,6 +147,12 @@ void ProgressBar::show(const FitProgress& progress) {
   if (form_ == Form::kBar) redraw(progress);
   if (form_ == Form::kLines) printLine(progress);
   if (form_ == Form::kJson) printJson(progress);
+}
+
+void ProgressBar::show(const SequenceProgress& progress) {
+  if (form_ == Form::kBar) redraw(progress);
+  if (form_ == Form::kLines) printLine(progress);
+  if (form_ == Form::kJson) std::cerr << progressJson(progress) + '\n' << std::flush;
 }
 
 }  // namespace esvr::vdb2esvr

@@ -1,9 +1,11 @@
 #pragma once
-/// Shows how far a fit is: a bar on a terminal, lines in a log, or lines of JSON for programs.
+/// Shows how far a fit or a sequence is: a bar on a terminal, lines in a log, or lines of JSON for
+/// programs.
 
 #include <chrono>
 #include <string>
 
+#include "cli/frame_range.h"
 #include "cli/log.h"
 #include "esvr/fit.h"
 
@@ -14,9 +16,23 @@ namespace esvr::vdb2esvr {
 /// kJson: lines on stderr that docs/report.md describes.
 enum class ProgressForm { kText, kJson };
 
+/// How far a sequence is, when a frame has ended.
+struct SequenceProgress {
+  cli::FrameNumber frame = 0;  ///< the frame that has ended
+  std::string state;           ///< what became of it, as in the report
+  std::size_t done = 0, failed = 0, frames = 0;
+  double seconds = 0.0;  ///< since the sequence began
+
+  [[nodiscard]] double fraction() const { return double(done) / double(frames); }
+  /// As long for each frame as so far.
+  [[nodiscard]] double secondsLeft() const {
+    return seconds * double(frames - done) / double(done);
+  }
+};
+
 class ProgressBar {
  public:
-  /// \param grid       begins the line
+  /// \param grid       begins the line; the pattern of a sequence
   /// \param verbosity  kQuiet: no text is shown
   ProgressBar(std::string grid, ProgressForm form, cli::Verbosity verbosity);
   ~ProgressBar();
@@ -24,13 +40,18 @@ class ProgressBar {
   ProgressBar& operator=(const ProgressBar&) = delete;
 
   void show(const FitProgress& progress);
+  void show(const SequenceProgress& progress);
+  /// Erases the line, so that a message can be printed.
+  void hide() const;
 
  private:
   enum class Form { kNone, kBar, kLines, kJson };
   using Clock = std::chrono::steady_clock;
 
-  void redraw(const FitProgress& progress) const;
-  void printLine(const FitProgress& progress);
+  template <class Progress>
+  void redraw(const Progress& progress) const;
+  template <class Progress>
+  void printLine(const Progress& progress);
   void printJson(const FitProgress& progress);
 
   std::string grid_;
@@ -44,7 +65,13 @@ class ProgressBar {
 [[nodiscard]] std::string progressLine(const std::string& grid, const FitProgress& progress,
                                        std::size_t width);
 
-/// The same as an object of JSON.
+/// The same for a sequence, for example
+/// "smoke.####.vdb  45 % [#########-----------]  45 of 100 frames  1 failed  1:23 left".
+[[nodiscard]] std::string progressLine(const std::string& pattern, const SequenceProgress& progress,
+                                       std::size_t width);
+
+/// The same as objects of JSON.
 [[nodiscard]] std::string progressJson(const std::string& grid, const FitProgress& progress);
+[[nodiscard]] std::string progressJson(const SequenceProgress& progress);
 
 }  // namespace esvr::vdb2esvr

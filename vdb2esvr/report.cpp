@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/json_file.h"
 #include "cli/memory.h"
 #include "cli/names.h"
 #include "cli/version_json.h"
@@ -14,8 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kSchema = "esvr-report";
-constexpr int kSchemaVersion = 1;  // docs/report.md says when it changes
+constexpr ReportSchema kSchema{"esvr-report", 1};
 
 const char* nameOf(FitEnd end) {
   switch (end) {
@@ -351,21 +351,24 @@ const char* nameOf(ErrorKind kind) {
   return "failure";
 }
 
-/// The first items of every report, also of a failed run.
-Json head(const Options& options) {
-  return {{"schema", kSchema},
-          {"schema_version", kSchemaVersion},
+}  // namespace
+
+bool reportIsFile(const Options& options) {
+  return !options.report.empty() && options.report != cli::kStandardOutput;
+}
+
+Json reportHead(const Options& options, const ReportSchema& schema) {
+  return {{"schema", schema.name},
+          {"schema_version", schema.version},
           {"program", kProgram},
           {"command_line", options.commandLine},
           {"versions", cli::versionJson()},
           {"asked", askedJson(options)}};
 }
 
-}  // namespace
-
 Json makeReport(const Options& options, const RunRecord& record) {
   const Ratio ratio = ratioOf(record);
-  Json report = head(options);
+  Json report = reportHead(options, kSchema);
   report.update({{"input",
                   {{"path", options.input.string()},
                    {"format", record.input.format},
@@ -386,7 +389,7 @@ Json makeReport(const Options& options, const RunRecord& record) {
 }
 
 Json makeFailureReport(const Options& options, const Error& error) {
-  Json report = head(options);
+  Json report = reportHead(options, kSchema);
   report.update({{"input", {{"path", options.input.string()}}},
                  {"error", {{"kind", nameOf(error.kind())}, {"message", error.what()}}},
                  {"exit_code", error.exitCode()}});

@@ -9,7 +9,20 @@
 
 namespace esvr::vdb2esvr {
 
+/// The name and the version of a report's form. docs/report.md says when the version changes.
+struct ReportSchema {
+  const char* name;
+  int version;
+};
+
 [[nodiscard]] nlohmann::ordered_json makeReport(const Options& options, const RunRecord& record);
+
+/// True if the options want a report in a file.
+[[nodiscard]] bool reportIsFile(const Options& options);
+
+/// The first items of every report: program, versions and options.
+/// \param schema  its name and its version
+[[nodiscard]] nlohmann::ordered_json reportHead(const Options& options, const ReportSchema& schema);
 
 /// The options that affect the conversion, with those of its speed (`asked` in the report).
 [[nodiscard]] nlohmann::ordered_json askedJson(const Options& options);

@@ -20,6 +20,7 @@
 #include "vdb2esvr/progress_bar.h"
 #include "vdb2esvr/report.h"
 #include "vdb2esvr/run_record.h"
+#include "vdb2esvr/run_sequence.h"
 #include "vdb2esvr/source.h"
 #include "vdb2esvr/summary.h"
 #include "vdb2esvr/twins.h"
@@ -27,10 +28,6 @@
 
 namespace esvr::vdb2esvr {
 namespace {
-
-bool reportIsFile(const Options& options) {
-  return !options.report.empty() && options.report != cli::kStandardOutput;
-}
 
 void checkFiles(const Options& options) {
   std::vector<std::filesystem::path> files{options.input, options.output};
@@ -51,32 +48,26 @@ void tellDevices(const std::vector<Device>& devices, const Options& options, con
              " threads");
 }
 
-void tellNothingFitted(const Options& options, const GridChoice& choice, const cli::Log& log) {
+void tellNothingFitted(const GridChoice& choice, const cli::Log& log) {
   if (!choice.fitted.empty()) return;
-  log.warning(options.input.string() + ": no grid is fitted; " +
+  log.warning("no grid is fitted; the output has carried grids only",
               std::to_string(choice.carried.size()) + " of " +
-              std::to_string(choice.carried.size() + choice.skipped.size()) +
-              " grids are carried unchanged");
+                  std::to_string(choice.carried.size() + choice.skipped.size()) +
+                  " grids are carried unchanged");
 }
 
 void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
   if (grid.nonFiniteReplaced > 0)
-    log.warning("grid \"" + grid.uniqueName + "\": " + std::to_string(grid.nonFiniteReplaced) +
-                " NaN or infinite voxels were replaced by 0");
+    log.warning("grid \"" + grid.uniqueName + "\": NaN or infinite voxels were replaced by 0",
+                std::to_string(grid.nonFiniteReplaced) + " voxels");
   if (const FitResult& fit = grid.conversion.fit; fit.deviceFull)
-    log.warning("grid \"" + grid.uniqueName + "\": the memory of the GPU was full: " +
+    log.warning("grid \"" + grid.uniqueName + "\": the memory of the GPU was full",
                 std::to_string(grid.stored().field.ellipsoidCount()) + " ellipsoids instead of " +
-                std::to_string(fit.wanted));
+                    std::to_string(fit.wanted));
   log.detail("grid \"" + grid.uniqueName + "\": kappa " +
              cli::shortNumber(grid.stored().field.kernel.kappa) + ", threshold " +
              cli::shortNumber(grid.stored().activeThreshold) + ", overlap of active voxels " +
              cli::shortNumber(grid.metrics.iou));
-}
-
-/// False if the options exclude ellipsoids, so that no device is needed.
-bool mayFit(const Options& options) {
-  return !std::holds_alternative<LosslessGoal>(options.convert.goal) &&
-         options.convert.representation != Representation::kVoxels;
 }
 
 /// Converts one grid after the other until all are done or the run is interrupted. Grids with the
@@ -264,22 +255,29 @@ Options besides(const std::vector<CarriedGrid>& carried, Options options) {
   return options;
 }
 
-RunRecord convertFile(const Options& options, Ranks* ranks, const cli::Interrupts& interrupts,
+}  // namespace
+
+bool mayFit(const Options& options) {
+  return !std::holds_alternative<LosslessGoal>(options.convert.goal) &&
+         options.convert.representation != Representation::kVoxels;
+}
+
+RunRecord convertFile(const Options& options, Ranks* ranks, const CancelToken& cancel,
                       const cli::Log& log) {
   cli::Stopwatch watch;
   RunRecord record;
   auto devices = std::async(std::launch::async, [&] { return devicesFor(options, ranks); });
   record.input = inspectVdb(options.input);
   GridChoice choice = chooseGrids(options.input, record.input, options.grids);
-  tellNothingFitted(options, choice, log);
+  tellNothingFitted(choice, log);
   std::vector<CarriedGrid> carried = readUnchanged(options, choice.carried);
   record.carried = std::move(choice.carried);
   record.skipped = std::move(choice.skipped);
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
   findPeaks(besides(carried, options), choice.fitted);
-  Parts parts(options, selected.front(), interrupts.token(), ranks);
-  FileConversion(besides(carried, options), selected, interrupts.token(), parts, log)
+  Parts parts(options, selected.front(), cancel, ranks);
+  FileConversion(besides(carried, options), selected, cancel, parts, log)
       .run(choice.fitted, carried, record);
   for (const auto& grid : record.grids) tellGrid(grid, log);
   if (options.job == Job::kPart) {
@@ -293,10 +291,12 @@ RunRecord convertFile(const Options& options, Ranks* ranks, const cli::Interrupt
   return record;
 }
 
+namespace {
+
 /// Converts the file; if that fails, writes a report of the failure.
 RunRecord convertOrReport(const Options& options, Ranks* ranks, const cli::Interrupts& interrupts,
                           const cli::Log& log) try {
-  return convertFile(options, ranks, interrupts, log);
+  return convertFile(options, ranks, interrupts.token(), log);
 } catch (const Error& error) {
   if (!options.report.empty())
     cli::writeJson({options.report, options.overwrite}, makeFailureReport(options, error));
@@ -332,6 +332,9 @@ int runAs(const Options& options, Ranks* ranks) {
 
 }  // namespace
 
-int run(const Options& options, Ranks* ranks) { return runAs(optionsOf(options, ranks), ranks); }
+int run(const Options& options, Ranks* ranks) {
+  if (options.sequence) return runSequence(options, ranks);
+  return runAs(optionsOf(options, ranks), ranks);
+}
 
 }  // namespace esvr::vdb2esvr

@@ -5,18 +5,29 @@
 #include "cli/printable.h"
 
 namespace esvr::cli {
+namespace {
+
+/// Writes the line at once, so that the lines of several threads do not mix.
+void printLine(const std::string& line) { std::cerr << line + '\n'; }
+
+}  // namespace
 
 void Log::info(const std::string& message) const {
-  if (verbosity_ != Verbosity::kQuiet) std::cerr << printable(message) << '\n';
+  if (verbosity_ != Verbosity::kQuiet) printLine(printable(message));
 }
 
 void Log::detail(const std::string& message) const {
-  if (verbosity_ == Verbosity::kVerbose) std::cerr << printable(message) << '\n';
+  if (verbosity_ == Verbosity::kVerbose) printLine(printable(message));
 }
 
-void Log::warning(const std::string& message) const {
-  if (verbosity_ != Verbosity::kQuiet)
-    std::cerr << program_ << ": warning: " << printable(message) << '\n';
+void Log::error(const std::string& message) const {
+  printLine(program_ + ": " + printable(message));
+}
+
+void Log::warning(const std::string& message, const std::string& figure) const {
+  if (warnings_) return warnings_(message);
+  const std::string text = figure.empty() ? message : message + " (" + figure + ')';
+  if (verbosity_ != Verbosity::kQuiet) printLine(program_ + ": warning: " + printable(text));
 }
 
 }  // namespace esvr::cli

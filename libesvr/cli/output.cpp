@@ -29,12 +29,16 @@ std::string alternatives(std::initializer_list<std::string_view> extensions) {
 
 }  // namespace
 
-void checkOutput(const fs::path& path, std::initializer_list<std::string_view> extensions,
-                 bool overwrite) {
+void requireExtension(const fs::path& path, std::initializer_list<std::string_view> extensions) {
   const std::string given = path.extension().string();
   if (std::find(extensions.begin(), extensions.end(), given) == extensions.end())
     throw UsageError("cannot write " + path.string() + ": its name must end in " +
                      alternatives(extensions));
+}
+
+void checkOutput(const fs::path& path, std::initializer_list<std::string_view> extensions,
+                 bool overwrite) {
+  requireExtension(path, extensions);
   std::error_code unreadable;  // AtomicFile reports the reason
   if (!overwrite && fs::exists(path, unreadable))
     throw RuntimeFailure("cannot write " + path.string() +

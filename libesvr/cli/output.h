@@ -8,6 +8,10 @@
 
 namespace esvr::cli {
 
+/// \throws UsageError  the extension is none of these
+void requireExtension(const std::filesystem::path& path,
+                      std::initializer_list<std::string_view> extensions);
+
 /// Checks before the work begins that a file can be written.
 /// \throws UsageError  the extension is another one
 /// \throws RuntimeFailure  the file exists (without `overwrite`) or is not writable

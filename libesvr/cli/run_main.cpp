@@ -1,10 +1,9 @@
 #include "cli/run_main.h"
 
 #include <csignal>
-#include <exception>
 #include <iostream>
-#include <new>
 
+#include "cli/failure.h"
 #include "cli/printable.h"
 #include "esvr/error.h"
 
@@ -27,19 +26,16 @@ int runMain(const std::string& program, const std::function<int()>& body) {
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes then gives an error, not a signal
   try {
     return runAndFlush(body);
-  } catch (const Error& error) {
+  } catch (const MemoryExceeded& error) {
+    complain(error.what());
+    std::cerr << "The option --max-memory allows more.\n";
+    return error.exitCode();
+  } catch (...) {
+    const Error error = currentFailure();
     complain(error.what());
     if (error.kind() == ErrorKind::kUsage)
       std::cerr << "Try '" << program << " --help' for more information.\n";
-    if (dynamic_cast<const MemoryExceeded*>(&error) != nullptr)
-      std::cerr << "The option --max-memory allows more.\n";
     return error.exitCode();
-  } catch (const std::bad_alloc&) {
-    complain("out of memory");
-    return int(ErrorKind::kDevice);
-  } catch (const std::exception& error) {
-    complain(error.what());
-    return int(ErrorKind::kRuntime);
   }
 }
 

@@ -49,8 +49,8 @@ class Converter {
       return stored(job_.input, fit(job_.input.source, options), options, job_.options.storage);
     });
   }
-  Conversion operator()(const PresetGoal&) const {
-    return convert::convertToPreset(job_, [&] { return (*this)(FitGoal{}); });
+  Conversion operator()(const PresetGoal& goal) const {
+    return convert::convertToPreset(job_, goal, [&] { return (*this)(FitGoal{}); });
   }
   Conversion operator()(const SizeGoal& goal) const {
     if (job_.options.storage.form != Storage::kCompact)

@@ -41,10 +41,14 @@ double boxPsnrFor(const Job& job, double psnrActive) {
   return psnrActive + 10.0 * std::log10(std::max(box.volume() / double(active), 1.0));
 }
 
-FitOptions bounded(FitOptions options, const SparseVolume& volume) {
+/// Bounds the number of ellipsoids and, on the CPU, the iterations. Fits of a large volume keep all
+/// iterations: with a few hundredths of them, ellipsoids would not reach the PSNR.
+FitOptions bounded(const Job& job) {
+  const SparseVolume& volume = job.input.source;
+  FitOptions options = job.options.fit;
   const auto activeVoxels = double(activeVoxelCount(volume));
   options.count = std::max<std::size_t>(std::size_t(activeVoxels / kMinVoxelsPerEllipsoid), 1);
-  if (options.device.kind == DeviceKind::kCuda) return options;
+  if (options.device.kind == DeviceKind::kCuda || isLarge(job)) return options;
   const double share =
       std::min(1.0, kBricksOfWholeFit / double(std::max<std::size_t>(volume.brickCount(), 1)));
   options.iterations = std::uint32_t(std::ceil(share * plannedIterations(options)));
@@ -53,10 +57,12 @@ FitOptions bounded(FitOptions options, const SparseVolume& volume) {
 
 }  // namespace
 
-Conversion convertToPreset(const Job& job, const std::function<Conversion()>& fit) {
-  if (isLarge(job) && job.options.representation != Representation::kVoxels) return fit();
+Conversion convertToPreset(const Job& job, const PresetGoal& goal,
+                           const std::function<Conversion()>& fit) {
+  const bool mayFit = job.options.representation != Representation::kVoxels;
+  if (isLarge(job) && mayFit && !goal.steady) return fit();
   ConvertOptions options = job.options;
-  options.fit = bounded(job.options.fit, job.input.source);
+  options.fit = bounded(job);
   const double psnr = boxPsnrFor(job, presetPsnr(job.options.fit.preset));
   return convertToPsnr({job.input, options, job.limits}, {psnr, kSmallEnough, kWorthwhileShare});
 }

@@ -8,7 +8,9 @@
 namespace esvr::convert {
 
 /// See PresetGoal.
-/// \param fit  the conversion of a FitGoal, for volumes that are too large for a search
-[[nodiscard]] Conversion convertToPreset(const Job& job, const std::function<Conversion()>& fit);
+/// \param fit  the conversion of a FitGoal, for volumes that are too large for a search, unless the
+///             goal is steady
+[[nodiscard]] Conversion convertToPreset(const Job& job, const PresetGoal& goal,
+                                         const std::function<Conversion()>& fit);
 
 }  // namespace esvr::convert

@@ -120,6 +120,16 @@ ESVR_HD inline float interpolate(const float* values, const FloatPlace& p, const
   return between(low, high, x);
 }
 
+/// The gradient of the values of a brick. \param low  lowest corner of the brick
+ESVR_HD inline FloatPlace gradientIn(const float* values, const FloatPlace& p, const Coord& low) {
+  const FloatPlace local{p.x - float(low.x), p.y - float(low.y), p.z - float(low.z)};
+  constexpr int kLast = kBrickSide - 1;
+  const auto cellAt = [](float at) { return at < float(kLast) ? int(at) : kLast; };
+  return gradientAt(local, float(kBrickSide), [&](const FloatPlace& at) {
+    return interpolate(values, at, {cellAt(at.x), cellAt(at.y), cellAt(at.z)});
+  });
+}
+
 ESVR_HD inline Coord cellOf(const FloatPlace& p) {
   return {int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
 }
@@ -138,6 +148,7 @@ struct RayProgress {
   RayState ray;
   int next = 0;   ///< first sample that has not been added
   int level = 0;  ///< place of that sample's level in a LevelScene
+  Shade shade;    ///< at the last sample that was added; used if the scene is shaded
 };
 
 /// The visitor of a march whose bricks all have slots or are vacant.
@@ -146,17 +157,46 @@ struct AllBricksAreThere {
   ESVR_HD bool wantsMore(std::uint32_t, std::uint32_t) const { return false; }
 };
 
+/// A sample and where its value comes from.
+struct BrickSample {
+  const float* values;  ///< of the brick
+  Coord low;            ///< lowest corner of the brick
+  FloatPlace place;
+  float value;
+  SampleNumber number;
+};
+
+/// Adds samples whose colors are not lit.
+struct UnlitSamples {
+  ESVR_HD void add(const SampleRule& rule, const BrickSample& sample, RayProgress& at) const {
+    rule.add(at.ray, sample.value, sample.number);
+  }
+};
+/// Adds samples whose colors are lit by their gradients.
+struct LitSamples {
+  LightRule light;
+  FloatPlace direction;  ///< of the ray, of unit length
+
+  ESVR_HD void add(const SampleRule& rule, const BrickSample& sample, RayProgress& at) const {
+    const FloatPlace gradient = brick_march::gradientIn(sample.values, sample.place, sample.low);
+    const Shade shade = light.shadeOf(gradient, direction);
+    rule.add(at.ray, sample.value, sample.number, Shades{at.shade, shade});
+    at.shade = shade;
+  }
+};
+
 /// Adds samples to a ray until it ends or meets a brick that is missing.
 /// \param scene    its box and view are relative to the table's origin
 /// \param slots    BrickSlotsView, or a type with the same functions
 /// \param visitor  entered(slot) is called for each slot that the ray reads. wantsMore(brick, slot)
 ///                 is called for each missing brick; while it returns true, the march looks for
 ///                 further missing bricks on the ray, without adding samples
+/// \param adding   UnlitSamples or LitSamples
 /// \return true if the ray has ended
-template <class Slots, class Visitor>
+template <class Slots, class Visitor, class Adding = UnlitSamples>
 ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
                                 const MarchScene& scene, const MarchSamples& samples,
-                                RayProgress& at, Visitor& visitor) {
+                                RayProgress& at, Visitor& visitor, const Adding& adding = {}) {
   using namespace brick_march;
   Found found = nothingAt({-1, -1, -1});
   const float* values = nullptr;
@@ -184,7 +224,8 @@ ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
       continue;
     }
     const float value = interpolate(values, place, cell);
-    if (value != scene.rule.background) scene.rule.add(at.ray, value, samples.numberOf(i));
+    if (value != scene.rule.background)
+      adding.add(scene.rule, {values, found.low, place, value, samples.numberOf(i)}, at);
     ++i;
   }
   return !looksAhead;

@@ -35,11 +35,14 @@ struct LevelScene {
 struct MarchCode {
   bool hasOneLevel = false;
   bool isUsual = false;  ///< RenderMode::kComposite and Classification::kPreIntegrated
+  bool isShaded = false;
 };
 /// What is known about a scene.
 [[nodiscard]] inline MarchCode codeFor(const LevelScene& s) {
-  return {s.bounds.oneLevel(), s.scene.rule.mode == RenderMode::kComposite &&
-                                   s.scene.rule.classification == Classification::kPreIntegrated};
+  return {s.bounds.oneLevel(),
+          s.scene.rule.mode == RenderMode::kComposite &&
+              s.scene.rule.classification == Classification::kPreIntegrated,
+          s.scene.isShaded};
 }
 
 namespace level_march {
@@ -72,7 +75,8 @@ ESVR_HD inline void passOn(const LevelScene& s, int column, int row, RayProgress
   const LevelFrame before = s.frame(at.level), behind = s.frame(at.level + 1);
   const double shared = s.bounds.begin[behind.level];
   from.rule.passOn(at.ray, indexOf(from, from.view.ray(column, row), before, shared),
-                   indexOf(to, to.view.ray(column, row), behind, shared));
+                   indexOf(to, to.view.ray(column, row), behind, shared),
+                   Shades{at.shade, at.shade});
   ++at.level;
   at.next = 0;
 }
@@ -88,10 +92,21 @@ ESVR_HD inline bool marchLevel(const LevelScene& s, int place, const Slots& slot
     scene.rule.classification = Classification::kPreIntegrated;
   }
   const MarchSamples samples = samplesOf(scene, column, row, rangeOf(s, place, wanted));
-  return marchBricks(s.levels[place].table, slots, scene, samples, at, visitor);
+  const BrickTableView& table = s.levels[place].table;
+  if constexpr (kCode.isShaded) {
+    const LitSamples lit{scene.light, floatPlace(scene.view.ray(column, row).direction)};
+    return marchBricks(table, slots, scene, samples, at, visitor, lit);
+  } else {
+    return marchBricks(table, slots, scene, samples, at, visitor);
+  }
 }
 
 }  // namespace level_march
+
+/// The color of a ray that has ended.
+[[nodiscard]] ESVR_HD inline PixelColor finished(const LevelScene& s, const RayProgress& at) {
+  return s.at(at.level).rule.finished(at.ray, Shades{at.shade, at.shade});
+}
 
 /// Adds samples to a ray until it ends or meets a brick that is missing; see marchBricks().
 /// \tparam kCode   what is known about the scene when the code is compiled

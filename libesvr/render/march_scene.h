@@ -4,6 +4,7 @@
 
 #include "render/ray_box.h"
 #include "render/sample_rule.h"
+#include "render/shading.h"
 
 namespace esvr {
 
@@ -14,10 +15,8 @@ struct MarchScene {
   double step;
   ClipBox clip;
   SampleRule rule;
-};
-
-struct FloatPlace {
-  float x, y, z;
+  bool isShaded = false;
+  LightRule light{};  ///< used if isShaded
 };
 
 /// The samples of a ray inside the box, of which `begin` to `end` - 1 are wanted. Sample i lies at
@@ -42,10 +41,6 @@ struct MarchSamples {
 ESVR_HD inline float samplesPerVoxel(float apart) {
   constexpr float kStill = 1e-30f;  // so slow that no ray is long enough to leave a brick
   return std::fabs(apart) < kStill ? 0.0f : 1.0f / apart;
-}
-
-ESVR_HD inline FloatPlace floatPlace(const Vec3& v) {
-  return {float(v[0]), float(v[1]), float(v[2])};
 }
 
 /// The samples of a ray in the box and in the clip box.

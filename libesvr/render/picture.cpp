@@ -12,6 +12,13 @@ void requirePositive(double value, const char* what) {
     throw UsageError(std::string(what) + " must be positive, not " + std::to_string(value));
 }
 
+void checkShading(const RenderOptions& options) {
+  if (!options.shading) return;
+  if (options.mode != RenderMode::kComposite)
+    throw UsageError("only composited pictures can be shaded");
+  (void)lightRule(*options.shading, View(options.camera, options.resolution), options.transfer);
+}
+
 void checkClip(const PlaceBox& box) {
   for (int a = 0; a < 3; ++a)
     if (!(box.low[a] <= box.high[a])) throw UsageError("a clip box must not end before it begins");
@@ -31,7 +38,21 @@ void checkRenderOptions(const RenderOptions& options) {
   requirePositive(options.opacityLength, "the opacity's length");
   if (!(options.minTransmittance >= 0.0 && options.minTransmittance < 1.0))
     throw UsageError("the transmittance that ends a ray must be from 0 to below 1");
+  checkShading(options);
   if (options.clip) checkClip(*options.clip);
+}
+
+void refuseShading(const RenderOptions& options) {
+  if (options.shading)
+    throw UsageError("sums of ellipsoids and NanoVDB grids cannot be shaded; draw voxels");
+}
+
+MarchScene marchScene(const RenderOptions& o, const SampleRule& rule) {
+  const View view(o.camera, o.resolution);
+  MarchScene scene{view, {}, o.step, clipOf(o), rule};
+  scene.isShaded = o.shading.has_value();
+  if (o.shading) scene.light = lightRule(*o.shading, view, o.transfer);
+  return scene;
 }
 
 Picture::Picture(const RenderOptions& options)

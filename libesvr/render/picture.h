@@ -2,6 +2,7 @@
 /// The checked options of a picture, and its pixels while it is drawn. All CPU renderers use it.
 
 #include "esvr/render.h"
+#include "render/march_scene.h"
 #include "render/sample_rule.h"
 #include "render/view.h"
 
@@ -9,6 +10,11 @@ namespace esvr {
 
 /// \throws UsageError  as for renderField
 void checkRenderOptions(const RenderOptions& options);
+/// \throws UsageError  the options have a shading, which needs voxels in bricks
+void refuseShading(const RenderOptions& options);
+
+/// What all rays of a picture share, in the index space of level 0 and without a box.
+[[nodiscard]] MarchScene marchScene(const RenderOptions& options, const SampleRule& rule);
 
 class Picture {
  public:

@@ -22,9 +22,7 @@ PlaceBox boxOf(const BrickTable& table) {
 
 LevelScene sceneOf(LazyCells& cells, const RenderOptions& o, const Picture& picture) {
   const SampleRule rule = sampleRule(o, picture.table.view(), cells.background());
-  LevelScene scene{{picture.view, {}, o.step, clipOf(o), rule},
-                   levelBounds(o, picture.view, boxOf(cells.table(0))),
-                   {}};
+  LevelScene scene{marchScene(o, rule), levelBounds(o, picture.view, boxOf(cells.table(0))), {}};
   cells.prepare(scene.bounds.last);
   return scene;
 }
@@ -73,8 +71,13 @@ class CellPicture {
                              (view_.firstSample + range.last) * last_.side()};
     RayProgress ray;
     AllBricksAreThere visitor;
-    (void)marchLevels<MarchCode{}>(scene_, LazySlots{cells_}, column, row, wanted, ray, visitor);
-    return scene_.at(ray.level).rule.finished(ray.ray);
+    const LazySlots slots{cells_};
+    if (scene_.scene.isShaded)
+      (void)marchLevels<MarchCode{.isShaded = true}>(scene_, slots, column, row, wanted, ray,
+                                                     visitor);
+    else
+      (void)marchLevels<MarchCode{}>(scene_, slots, column, row, wanted, ray, visitor);
+    return finished(scene_, ray);
   }
 
   const LazyCells& cells_;

@@ -39,6 +39,7 @@ void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
 
 Image renderSum(const Field& field, const RenderOptions& options, const RevoxeliseOptions& voxels) {
   Picture picture(options);
+  refuseShading(options);
   if (const auto box = supportBox(field))
     checkRayLength(binsWithin(*box, picture.view, options.step));
   const auto ellipsoids = visibleEllipsoids(field, picture.view, options.resolution);

@@ -45,6 +45,7 @@ void drawInto(Picture& picture, const NanoVolume& volume, const RenderOptions& o
 
 Image renderNano(const NanoVolume& volume, const RenderOptions& options) {
   Picture picture(options);
+  refuseShading(options);
   drawInto(picture, volume, options);
   return picture.take();
 }

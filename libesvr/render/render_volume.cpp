@@ -23,6 +23,12 @@ double behindBrick(const Ray& ray, Coord brick, double sample, double step) {
   return std::max(sample + 1.0, std::ceil(within(ray, {low, high}).end / step - kRounding));
 }
 
+/// A ray, and the shade at its last sample.
+struct LitRay {
+  RayState ray;
+  Shade shade;
+};
+
 /// Marches rays through a volume or one of its coarser levels.
 class RayMarch {
  public:
@@ -35,23 +41,45 @@ class RayMarch {
   [[nodiscard]] const MarchScene& scene() const { return scene_; }
 
   /// Adds the samples of a range to a ray.
-  void march(const Ray& ray, const SampleRange& wanted, RayState& state) const {
+  void march(const Ray& ray, const SampleRange& wanted, LitRay& state) const {
     const SampleRange range = samplesInScene(scene_, ray).both(wanted);
-    for (double sample = range.first; range.has(sample) && scene_.rule.open(state);)
+    for (double sample = range.first; range.has(sample) && scene_.rule.open(state.ray);)
       sample = advance(ray, sample, state);
   }
 
  private:
   /// Adds a sample to the ray. \return the number of the next sample to visit
-  double advance(const Ray& ray, double sample, RayState& state) const {
+  double advance(const Ray& ray, double sample, LitRay& state) const {
     const Vec3 place = sum(ray.origin, scaled(ray.direction, sample * scene_.step));
     const Cell cell = cellOf(place);
     const auto brick = brickOf(cell.voxel);
     const VoxelSampler::Corners* corners = sampler_.find(brick);
     if (corners == nullptr) return behindBrick(ray, brick, sample, scene_.step);
     const float value = sampler_.interpolate(*corners, cell);
-    if (value != scene_.rule.background) scene_.rule.add(state, value, sampleNumber(sample));
+    if (value != scene_.rule.background) {
+      const Shade shade = scene_.isShaded ? shadeAt(ray, place, *corners, brick) : Shade{};
+      scene_.rule.add(state.ray, value, sampleNumber(sample), Shades{state.shade, shade});
+      state.shade = shade;
+    }
     return sample + 1.0;
+  }
+  [[nodiscard]] Shade shadeAt(const Ray& ray, const Vec3& place,
+                              const VoxelSampler::Corners& corners, Coord brick) const {
+    const Coord corner = brick * kBrickSide;
+    const Vec3 low{double(corner.x), double(corner.y), double(corner.z)};
+    const auto valueAt = [&](const FloatPlace& p) {
+      return sampler_.interpolate(corners, cellIn(corner, p));
+    };
+    const FloatPlace gradient =
+        gradientAt(floatPlace(difference(place, low)), float(kBrickSide), valueAt);
+    return scene_.light.shadeOf(gradient, floatPlace(ray.direction));
+  }
+  /// The cell of a place relative to a brick, also on the brick's upper faces.
+  static Cell cellIn(Coord corner, const FloatPlace& p) {
+    constexpr int kLast = kBrickSide - 1;
+    const Coord local{std::min(int(p.x), kLast), std::min(int(p.y), kLast),
+                      std::min(int(p.z), kLast)};
+    return {corner + local, {p.x - float(local.x), p.y - float(local.y), p.z - float(local.z)}};
   }
 
   VoxelSampler sampler_;
@@ -76,21 +104,18 @@ class VolumePicture {
     levels.prepare(bounds_.last);
     const float background = levels[0].background;
     for (int level = bounds_.first; level <= bounds_.last; ++level)
-      marches_.emplace_back(levels[level], LevelFrame{level},
-                            MarchScene{picture.view,
-                                       {},
-                                       options.step,
-                                       clipOf(options),
-                                       sampleRule(options, tables_.view(level), background)});
+      marches_.emplace_back(
+          levels[level], LevelFrame{level},
+          marchScene(options, sampleRule(options, tables_.view(level), background)));
   }
 
   [[nodiscard]] PixelColor operator()(int column, int row) const {
-    RayState state;
+    LitRay state;
     for (int level = bounds_.first; level <= bounds_.last; ++level) {
       const RayMarch& march = marches_[std::size_t(level - bounds_.first)];
       march.march(march.scene().view.ray(column, row), rangeOf(level), state);
-      if (level == bounds_.last || !march.scene().rule.open(state))
-        return march.scene().rule.finished(state);
+      if (level == bounds_.last || !march.scene().rule.open(state.ray))
+        return march.scene().rule.finished(state.ray, Shades{state.shade, state.shade});
       passOn(march.scene().rule, level, state);
     }
     return {};
@@ -105,10 +130,10 @@ class VolumePicture {
         level == bounds_.first ? 0.0 : bounds_.begin[std::size_t(level)] / side + 1.0;
     return {first, bounds_.begin[std::size_t(level) + 1] / side};
   }
-  void passOn(const SampleRule& rule, int level, RayState& state) const {
+  void passOn(const SampleRule& rule, int level, LitRay& state) const {
     const double shared = bounds_.begin[std::size_t(level) + 1], side = LevelFrame{level}.side();
-    rule.passOn(state, sampleNumber(shared / side).index,
-                sampleNumber(shared / (2.0 * side)).index);
+    rule.passOn(state.ray, sampleNumber(shared / side).index,
+                sampleNumber(shared / (2.0 * side)).index, Shades{state.shade, state.shade});
   }
 
   LevelBounds bounds_;

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "esvr/render.h"
+#include "render/shading.h"
 #include "render/transfer_table.h"
 
 namespace esvr {
@@ -63,25 +64,30 @@ struct SampleRule {
   }
 
   /// Adds a sample that is not empty space. Samples that are left out are empty space.
-  ESVR_HD void add(RayState& ray, float value, const SampleNumber& number) const {
+  /// \param shades  rule by which colors are lit: NoShades or Shades
+  template <class ShadeRule = NoShades>
+  ESVR_HD void add(RayState& ray, float value, const SampleNumber& number,
+                   const ShadeRule& shades = {}) const {
     if (mode == RenderMode::kMaximum) return keepLargest(ray, value, 1.0f);
     if (mode == RenderMode::kAverage) return sumUp(ray, value * step, step);
     if (classification == Classification::kPost) {
       setDistance(ray, number.fromEye * step);
-      return absorb(ray, premultiplied(table(value)));
+      return absorb(ray, shades.ofThis(premultiplied(table(value))));
     }
     if (ray.first == RayState::kNone)
       ray.first = number.index, ray.firstValue = value;
     else
-      addSegments(ray, value, number);
+      addSegments(ray, value, number, shades);
     ray.last = number.index, ray.lastValue = value;
   }
 
   /// Goes on to samples that follow another rule, for example in another level of detail. Their first
   /// one is the sample that this rule has reached.
   /// \param here, there  index of that sample in the old and in the new samples
-  ESVR_HD void passOn(RayState& ray, std::uint32_t here, std::uint32_t there) const {
-    if (ray.last != here) leave(ray);
+  template <class ShadeRule = NoShades>
+  ESVR_HD void passOn(RayState& ray, std::uint32_t here, std::uint32_t there,
+                      const ShadeRule& shades = {}) const {
+    if (ray.last != here) leave(ray, shades);
     if (ray.last != RayState::kNone) ray.last = ray.last == here ? there : RayState::kNone;
   }
 
@@ -95,12 +101,13 @@ struct SampleRule {
     absorb(ray, {behind.r, behind.g, behind.b, 1.0f - behind.transmittance});
   }
 
-  [[nodiscard]] ESVR_HD PixelColor finished(RayState ray) const {
+  template <class ShadeRule = NoShades>
+  [[nodiscard]] ESVR_HD PixelColor finished(RayState ray, const ShadeRule& shades = {}) const {
     if (mode == RenderMode::kMaximum || mode == RenderMode::kAverage) {
       if (!(ray.g > 0.0f)) return {0.0f, 0.0f, 0.0f, 0.0f};
       return premultiplied(table(mode == RenderMode::kMaximum ? ray.r : ray.r / ray.g));
     }
-    leave(ray);
+    leave(ray, shades);
     if (mode == RenderMode::kDepth) return {ray.g > 0.0f ? ray.r : 0.0f, 0.0f, 0.0f, ray.g};
     return {ray.r, ray.g, ray.b, 1.0f - ray.transmittance};
   }
@@ -128,17 +135,20 @@ struct SampleRule {
     if (mode == RenderMode::kDepth && ray.transmittance < kHalf) ray.g = 1.0f;
   }
   /// Adds the segment from the last sample into the empty space behind it.
-  ESVR_HD void leave(RayState& ray) const {
+  template <class ShadeRule>
+  ESVR_HD void leave(RayState& ray, const ShadeRule& shades) const {
     if (ray.last == RayState::kNone) return;
     setDistance(ray, ray.r + step);
-    absorb(ray, table.segments(ray.lastValue, background));
+    absorb(ray, shades.ofLast(table.segments(ray.lastValue, background)));
   }
   /// Adds the light between the last sample and the next one that is not empty space.
-  ESVR_HD void addSegments(RayState& ray, float value, const SampleNumber& number) const {
+  template <class ShadeRule>
+  ESVR_HD void addSegments(RayState& ray, float value, const SampleNumber& number,
+                           const ShadeRule& shades) const {
     const bool consecutive = ray.last != RayState::kNone && number.index == ray.last + 1;
-    if (!consecutive) leave(ray);
+    if (!consecutive) leave(ray, shades);
     setDistance(ray, number.fromEye * step);
-    absorb(ray, table.segments(consecutive ? ray.lastValue : background, value));
+    absorb(ray, shades.ofThis(table.segments(consecutive ? ray.lastValue : background, value)));
   }
   /// Adds the light between a ray's samples and those of the next part. \return false if that part
   /// has no samples, or if the ray has none before and has taken over the part
@@ -148,7 +158,7 @@ struct SampleRule {
       ray = behind;
       return false;
     }
-    addSegments(ray, behind.firstValue, {0.0f, behind.first});
+    addSegments(ray, behind.firstValue, {0.0f, behind.first}, NoShades{});
     ray.last = behind.last, ray.lastValue = behind.lastValue;
     return true;
   }

@@ -65,7 +65,7 @@ LocatedTree locateTree(Archive& archive, const ArchiveEntry& entry) {
   return {owner, std::move(head), layout, survey};
 }
 
-openvdb::Coord toOpenVdb(Coord c) { return {c.x, c.y, c.z}; }
+openvdb::Coord openVdbCoord(Coord c) { return {c.x, c.y, c.z}; }
 
 /// Notes the leaves and the active tiles of a tree.
 template <class Value>
@@ -161,7 +161,7 @@ class VoxelReader {
   using Value = typename Tree::ValueType;
 
   void readLeaf(Coord corner, const FillRules& rules, SparseVolume& volume, NonFiniteTally& tally) {
-    Leaf leaf(openvdb::PartialCreate{}, toOpenVdb(corner), background_);
+    Leaf leaf(openvdb::PartialCreate{}, openVdbCoord(corner), background_);
     leaf.readBuffers(file_.stream(), located_.owner.savedAsHalf);
     const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin));
     if (b.has_value() == leaf.valueMask().isOff())

@@ -10,7 +10,7 @@
 #include "esvr/error.h"
 #include "esvr/fit.h"
 #include "esvr/grid_coding.h"
-#include "esvr/renderer.h"
+#include "esvr/progressive.h"
 #include "ring.h"
 
 namespace {
@@ -62,6 +62,12 @@ int main() {
   check(renderer->draw(options).rgba != first.rgba, "another view is another picture");
   options.camera = camera;
   check(renderer->draw(options).rgba == first.rgba, "the same view has the same bits");
+
+  // While a user drags the view, a coarse picture at once is better than the whole one later. Each
+  // call of refine() draws as many passes as fit into its budget, here 20 ms, and at least one.
+  esvr::ProgressivePicture progressive(*renderer, options);
+  while (!progressive.refine(0.02)) print(*progressive.image());
+  check(progressive.image()->rgba == first.rgba, "the last pass is the picture itself");
 
   // The picture is that of the decoded voxels.
   const esvr::Image decoded = esvr::renderVolume(esvr::decodeGrid(grid), options);

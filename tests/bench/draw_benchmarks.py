@@ -45,7 +45,7 @@ def fit(arguments):
     for name, count in SCENES:
         run([arguments.bin / "vdb2esvr/vdb2esvr", arguments.data / f"{name}.vdb",
              esvr(arguments, name, count), "--count", count, "--iterations", ITERATIONS, "--storage",
-             "float32", *box_of(name), "--device", arguments.device, "--force", "--quiet"])
+             "float32", "--representation", "ellipsoids", *box_of(name), "--device", arguments.device, "--force", "--quiet"])
 
 
 def bench(arguments, file, *options):
@@ -74,10 +74,10 @@ def speed(arguments):
         print(f"| {label(name, count)} | {nano['fps_median']:.0f} | {megabytes(nano)} | "
               f"{drawn['fps_median']:.0f} ({drawn['fps_1_percent_low']:.0f}) | {ratio(voxels)} | "
               f"{drawn['cold_fps_median']:.0f} | "
-              f"{drawn['cold_fps_median'] / nano['fps_median']:.1f} | {megabytes(drawn)} | "
+              f"{drawn['cold_fps_median'] / nano['fps_median']:.2f} | {megabytes(drawn)} | "
               f"{voxels['image']['psnr']['mean']:.1f} | {voxels['image']['ssim']['mean']:.4f} | "
               f"{summed['drawn']['fps_median']:.0f} | {ratio(summed)} | "
-              f"{megabytes(summed['drawn'])} | {summed['image']['psnr']['mean']:.1f} |", flush=True)
+              f"{megabytes(summed['drawn'])} |", flush=True)
 
 
 def purpose_row(arguments, name, count, options):
@@ -127,17 +127,19 @@ def large(arguments):
     run([arguments.bin / "samples/swc2vdb", arguments.swc, volume, "--resolution", "7400",
          "--min-radius", "5.4", "--force"])
     run([arguments.bin / "vdb2esvr/vdb2esvr", volume, file, "--count", "150000", "--storage",
-         "float32", "--kappa", "2", "--seconds", "15", "--device", arguments.device, "--force"])
-    reports = {name: bench(arguments, file, "--turntable", "120", "--ref", volume, *options)
-               for name, options in METHODS.items()}
-    nano = reports["voxels"]["reference"]
-    print(f"| NanoVDB float | {nano['fps_median']:.0f} | {nano['fps_1_percent_low']:.0f} | | "
-          f"{megabytes(nano)} | | |")
-    for name, report in reports.items():
-        drawn, image = report["drawn"], report["image"]
-        print(f"| {name} | {drawn['fps_median']:.0f} | {drawn['fps_1_percent_low']:.0f} | "
-              f"{ratio(report)} | {megabytes(drawn)} | {image['psnr']['mean']:.1f} | "
-              f"{image['ssim']['mean']:.4f} |")
+         "float32", "--representation", "ellipsoids", "--kappa", "2", "--seconds", "15", "--device",
+         arguments.device, "--force"])
+    for lod in ["off", "auto"]:
+        report = bench(arguments, file, "--turntable", "120", "--ref", volume, "--lod", lod,
+                       "--ref-supersample", "4")
+        nano, drawn, image = report["reference"], report["drawn"], report["image"]
+        if lod == "off":
+            print(f"| NanoVDB float | {nano['fps_median']:.0f} | {nano['fps_1_percent_low']:.0f} | | "
+                  f"| | {megabytes(nano)} | | |")
+        print(f"| `--lod {lod}` | {drawn['fps_median']:.0f} | {drawn['fps_1_percent_low']:.0f} | "
+              f"{ratio(report)} | {drawn['cold_fps_median']:.0f} | "
+              f"{drawn['cold_fps_median'] / nano['fps_median']:.2f} | {megabytes(drawn)} | "
+              f"{image['psnr']['mean']:.1f} | {image['ssim']['mean']:.4f} |", flush=True)
 
 
 def main():

@@ -7,10 +7,10 @@
 #include <openvdb/io/File.h>
 
 #include <nlohmann/json.hpp>
-#include <numeric>
 
 #include "cli/converters.h"
 #include "cli/folder_test.h"
+#include "cli/grids_in_file.h"
 #include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
@@ -21,29 +21,14 @@
 namespace esvr {
 namespace {
 
+using test::bytesIn;
+using test::namesIn;
 using test::softBall;
 using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
-
-std::vector<std::string> namesIn(const std::string& path) {
-  std::vector<std::string> names;
-  for (const auto& grid : inspectVdb(path).grids) names.push_back(grid.uniqueName);
-  return names;
-}
-
-/// The grids of a .vdb file as bytes, without their places.
-std::vector<CarriedGrid> bytesIn(const std::string& path, std::vector<std::size_t> places = {}) {
-  if (places.empty()) {
-    places.resize(inspectVdb(path).grids.size());
-    std::iota(places.begin(), places.end(), std::size_t{0});
-  }
-  auto grids = readCarried(path, places);
-  for (auto& grid : grids) grid.place = 0;
-  return grids;
-}
 
 /// A folder with a file of the grids bool, int32, vec3s, points, density, empty and density.
 class CarriedFile : public test::FolderTest {
@@ -99,7 +84,7 @@ TEST_F(CarriedFile, LeavesOutTheGridsThatAreNamedBySkip) {
 TEST_F(CarriedFile, WithNothingToFitIsConvertedWithAWarning) {
   const auto run = test::quickFit(in(), out(), {"-g", "int32", "-g", "empty"});
   EXPECT_EQ(run.exitCode, 0);
-  EXPECT_THAT(run.err, HasSubstr("no grid is fitted; 2 of 2 grids are carried unchanged"));
+  EXPECT_THAT(run.err, HasSubstr("carried grids only (2 of 2 grids are carried unchanged)"));
   convertBack();
   EXPECT_EQ(bytesIn(back()), bytesIn(in(), {1, 5}));
 }

@@ -167,6 +167,17 @@ TEST_F(EsvrRender, LevelsOfDetailChangePicturesOfWidePixels) {
   expectRefused({"--lod", "3"}, 2, "--lod");
 }
 
+TEST_F(EsvrRender, ShadingChangesThePicture) {
+  const auto usual = picture("in.esvr"), shaded = picture("in.esvr", {"--shade"});
+  EXPECT_NE(shaded.rgba, usual.rgba);
+  EXPECT_NE(picture("in.esvr", {"--shade", "--light", "0,0,1"}).rgba, shaded.rgba);
+  EXPECT_GE(psnrOf(picture("in.vdb", {"--shade"}), shaded), 30.0);
+  expectRefused({"--light", "0,0,1"}, 2, "--light needs --shade");
+  expectRefused({"--shade", "--light", "0,0,0"}, 2, "must have a length");
+  expectRefused({"--shade", "--mode", "average"}, 2, "--shade needs --mode composite");
+  expectRefused({"--shade", "--between", "sum"}, 2, "cannot be shaded");
+}
+
 TEST_F(EsvrRender, PartsOfTheDepthAndMemoryChangeNothingOnGpu) {
   Device gpu;
   selectOrSkip("cuda", gpu);

@@ -157,6 +157,27 @@ TEST_F(ReportDoc, namesTheKeysOfAConversion) {
   expectNamed(all_["seconds"], grid.at("seconds") + seconds, "seconds");
 }
 
+TEST_F(ReportDoc, namesTheKeysOfASequence) {
+  test::writeInput(at("in.1.vdb"), {{.voxels = test::softBall({})}});
+  test::writeText(at("in.2.vdb"), "no volume");
+  add(VDB2ESVR,
+      {at("in.@.vdb"), at("out.@.esvr"), "--frames", "1-2", "--count", "30", "--iterations", "60",
+       "--device", "cpu"},
+      3);
+  const Table report = tableAfter(document_, "## The report of a sequence");
+  // The table names the words of the states for the frames.
+  expectTable(all_, report, {"asked", "command_line", "frames", "states", "versions"}, "sequence");
+  expectTable(all_["frames"], tableAfter(document_, "The objects of `frames`:"),
+              {"grids", "input", "output", "seconds", "skipped"}, "frame");
+}
+
+TEST_F(ReportDoc, namesTheKeysOfTheProgressOfASequence) {
+  test::writeInput(at("in.1.vdb"), {{.voxels = test::softBall({})}});
+  const auto run = test::quickFit(at("in.@.vdb"), at("out.@.esvr"), {"--progress", "json"});
+  const Table table = tableAfter(document_, "For a sequence, there is a line");
+  EXPECT_EQ(keysOf(Json::parse(run.err)), keysOf(table));
+}
+
 TEST_F(ReportDoc, namesTheKeysOfAFailure) {
   test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
   add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--size", "99"}, 2);

@@ -97,7 +97,7 @@ TEST_F(Vdb2Esvr, takesNonFiniteVoxelsAsZeroWhereAskedAndSaysHowMany) {
   test::writeInput(in(), {withNonFinite()});
   const auto run = fitQuickly({"--nonfinite", "zero"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.err, HasSubstr("2 NaN or infinite voxels were replaced by 0"));
+  EXPECT_THAT(run.err, HasSubstr("NaN or infinite voxels were replaced by 0 (2 voxels)"));
   EXPECT_TRUE(outIsThere());
 }
 

@@ -28,7 +28,11 @@ struct FitGoal {};
 /// fewer iterations. FitOptions::count, psnr and seconds are ignored. A volume of more than 2^25
 /// voxels in bricks is converted as for a FitGoal, unless the representation is kVoxels; its
 /// quality then is that of its fit.
-struct PresetGoal {};
+struct PresetGoal {
+  /// True: a volume of more than 2^25 voxels has the PSNR of the preset too. This takes several
+  /// fits with all iterations. The frames of a sequence then have one quality, whatever their size.
+  bool steady = false;
+};
 
 /// The best grid that adds at most `bytes` to a file (bytesAdded). Ellipsoids use at least 98 % of
 /// these bytes, less 7 for the padding of each chunk, unless more bytes would not improve the grid.

@@ -57,12 +57,26 @@ enum class Between {
 /// The rule for places where a pixel is wider than several voxels. Sums of ellipsoids (Between::kSum)
 /// and NanoVDB grids have no levels of detail.
 enum class LevelOfDetail {
-  /// At distances at which a pixel is at least 2.5 x 2^l voxels wide, means of 2^l x 2^l x 2^l voxels
+  /// At distances at which a pixel is at least 3 x 2^l voxels wide, means of 2^l x 2^l x 2^l voxels
   /// are drawn, at steps that are 2^l times as long, for l up to 7. Pictures show fewer stray pixels,
   /// take less time, and need less memory. A clip box has at least two voxels and two steps of a
   /// level along each axis, or the level is not used.
   kAuto,
   kOff  ///< voxels are drawn wherever they are
+};
+
+/// Shading by the gradient of the values, with one distant light from which both sides of a surface
+/// are lit (Blinn and Phong). The color of a sample is multiplied by ambient + diffuse |n . l|, where
+/// n is the direction of the gradient and l that to the light, and a highlight of
+/// specular |n . h|^shininess is added, where h lies halfway between l and the direction to the eye.
+/// Derivatives are differences over half a voxel to each side, at most up to the faces of the brick
+/// of 8^3 voxels. A weak gradient is likely to be noise: both terms go over to those of n = l without
+/// a highlight, halfway where the gradient is 2 % of the transfer function's range per voxel.
+struct Shading {
+  /// Direction to the light in index space; by default, the light is above and to the left of the
+  /// camera and moves with it.
+  std::optional<Vec3> light{};
+  double ambient = 0.3, diffuse = 0.7, specular = 0.25, shininess = 25.0;
 };
 
 /// A box with real-valued corners. Voxel (i, j, k) extends half a voxel to each side of (i, j, k).
@@ -86,6 +100,8 @@ struct RenderOptions {
   Classification classification = Classification::kPreIntegrated;
   Between between = Between::kVoxels;  ///< used for fields only
   LevelOfDetail lod = LevelOfDetail::kAuto;
+  /// Only composited pictures of voxels are shaded: Between::kVoxels and RenderMode::kComposite.
+  std::optional<Shading> shading{};
   std::optional<PlaceBox> clip{};       ///< samples outside this box count as empty space
   const CancelToken* cancel = nullptr;  ///< checked before each row of tiles
 };
@@ -98,7 +114,8 @@ struct RenderOptions {
 /// \param voxels  rule by which sums become voxels. In a narrow band, the voxels inside the surface
 ///                are -background wherever an ellipsoid reaches. Between::kSum uses its range only
 /// \throws UsageError  as for checkCamera and checkTransferFunction; step, opacityLength or
-///                     minTransmittance is out of range; the clip box is invalid; a ray has more
+///                     minTransmittance is out of range; the clip box is invalid; a picture that
+///                     cannot be shaded has a shading, or its light is invalid; a ray has more
 ///                     than 2^24 samples; with Between::kVoxels, the box of the bricks has more
 ///                     than 2^28 blocks of 64^3 voxels
 /// \throws MemoryExceeded  with Between::kVoxels, as for reachedBricks

@@ -39,8 +39,10 @@ struct RendererLimits {
   std::uint64_t maxBytes = 0;
 };
 
-/// A renderer is used from one thread. The field or volume that it draws must outlive it, and so must
-/// the bricks of RevoxeliseOptions.
+/// A renderer is used from one thread at a time. Renderers can be made and used on several threads at
+/// the same time, also for the same field, volume and device; each has data of its own on the device.
+/// The field or volume that it draws must outlive it and not change, and so must the bricks of
+/// RevoxeliseOptions.
 class Renderer {
  public:
   Renderer() = default;
@@ -70,7 +72,7 @@ class Renderer {
 
 /// Makes a renderer that draws as renderVolume. A CUDA renderer makes its own bricks of 8^3 cells,
 /// with the 9^3 voxels at the cells' corners (2.9 KB), wherever a voxel is not the background. It
-/// does not need the volume after that.
+/// makes those of a coarser level of detail when a picture first needs them.
 /// \throws DeviceError  as for makeFieldRenderer
 /// \throws UsageError   on a CUDA device: the bounding box of the voxels has more than 2^28 blocks
 ///                      of 64^3 voxels

@@ -115,7 +115,7 @@ __device__ bool marchRay(const BrickDrawArguments& a, std::uint32_t tile, int2 r
   Asking asking{a.demand, a.demand.ahead};
   ray.ray.first = 0;  // so that the code for parts of rays is left out
   if (!marchLevels<kCode>(a.scene, a.slots, p.column, p.row, wanted, ray, asking)) return false;
-  const PixelColor c = a.scene.at(kCode.hasOneLevel ? 0 : ray.level).rule.finished(ray.ray);
+  const PixelColor c = finished(a.scene, ray);
   a.pixels[std::size_t(p.rowOfBand) * std::size_t(a.resolution.width) + std::size_t(p.column)] =
       make_float4(c.r, c.g, c.b, c.alpha);
   return true;
@@ -134,8 +134,9 @@ constexpr int kBlocksOfOne = 16, kBlocksOfMany = 8;
 /// Each block draws one tile and each thread one ray. The rays of a warp are 8 x 4 neighbours. The
 /// first pass and later ones share the code, because two kernels could be compiled to different
 /// roundings.
-template <bool kHasOneLevel, bool kIsUsual>
-__global__ void __launch_bounds__(kMarchTilePixels, kHasOneLevel ? kBlocksOfOne : kBlocksOfMany)
+template <bool kHasOneLevel, bool kIsUsual, bool kIsShaded>
+__global__ void __launch_bounds__(kMarchTilePixels,
+                                  kHasOneLevel && !kIsShaded ? kBlocksOfOne : kBlocksOfMany)
     marchKernel(const BrickDrawArguments a, const WaitingTiles w) {
   const bool isFirst = w.count == 0;
   const std::uint32_t entry = isFirst || w.begin ? blockIdx.x : w.entries[blockIdx.x];
@@ -147,7 +148,7 @@ __global__ void __launch_bounds__(kMarchTilePixels, kHasOneLevel ? kBlocksOfOne 
   RayProgress ray;
   if (kept != nullptr && !w.begin) ray = *kept;
   const bool ended =
-      ray.next < 0 || marchRay<MarchCode{kHasOneLevel, kIsUsual}>(a, tile, range, ray);
+      ray.next < 0 || marchRay<MarchCode{kHasOneLevel, kIsUsual, kIsShaded}>(a, tile, range, ray);
   if (ended) ray.next = -1;
   if (kept != nullptr) *kept = ray;
   if (a.demand.slotOf != nullptr) listIfWaiting(a, ended, entry);
@@ -156,8 +157,11 @@ __global__ void __launch_bounds__(kMarchTilePixels, kHasOneLevel ? kBlocksOfOne 
 using MarchKernel = void (*)(BrickDrawArguments, WaitingTiles);
 
 MarchKernel kernelFor(const MarchCode& code) {
-  if (code.hasOneLevel) return code.isUsual ? marchKernel<true, true> : marchKernel<true, false>;
-  return code.isUsual ? marchKernel<false, true> : marchKernel<false, false>;
+  if (code.isShaded)
+    return code.hasOneLevel ? marchKernel<true, false, true> : marchKernel<false, false, true>;
+  if (code.hasOneLevel)
+    return code.isUsual ? marchKernel<true, true, false> : marchKernel<true, false, false>;
+  return code.isUsual ? marchKernel<false, true, false> : marchKernel<false, false, false>;
 }
 
 }  // namespace

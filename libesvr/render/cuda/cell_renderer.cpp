@@ -68,7 +68,7 @@ class CellRenderer final : public MarchRenderer {
 
   void prepare(const RenderOptions& o) override {
     const View view(o.camera, o.resolution);
-    scene_ = {{view, {}, o.step, clipOf(o), sampleRule(o, {}, store_->background())},
+    scene_ = {marchScene(o, sampleRule(o, {}, store_->background())),
               levelBounds(o, view, store_->box()),
               {}};
     store_->prepare(scene_->bounds);

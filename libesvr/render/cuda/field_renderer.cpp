@@ -82,7 +82,9 @@ TileLists BandMemory::lists() {
 /// The checked options of a picture, and values that are computed from them.
 struct FieldRenderer::Scene {
   explicit Scene(const RenderOptions& o)
-      : options(o), view((checkRenderOptions(o), o.camera), o.resolution) {}
+      : options(o), view((checkRenderOptions(o), o.camera), o.resolution) {
+    refuseShading(o);
+  }
 
   const RenderOptions& options;
   View view;

@@ -4,6 +4,7 @@
 #include "render/cuda/march_renderer.h"
 #include "render/cuda/nano_draw.h"
 #include "render/nano_box.h"
+#include "render/picture.h"
 
 namespace esvr::cuda {
 namespace {
@@ -18,7 +19,10 @@ class NanoRenderer final : public MarchRenderer {
         grid_(std::span(volume.data.get(), volume.bytes), stream()) {}
 
  private:
-  void prepare(const RenderOptions& o) override { table_ = tableOf(o, 0); }
+  void prepare(const RenderOptions& o) override {
+    refuseShading(o);
+    table_ = tableOf(o, 0);
+  }
   void launch(const RenderOptions& o, Band band, float4* pixels) override {
     launchNano({.view = View(o.camera, o.resolution),
                 .box = box_,

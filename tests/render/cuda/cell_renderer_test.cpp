@@ -4,6 +4,9 @@
 // what is seen. Restricted bricks and fields of nothing are drawn too.
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <thread>
+
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/renderer.h"
@@ -77,6 +80,38 @@ TEST_F(CellsOnGpu, DrawTheLevelsOfTheDecodedVolume) {
   }
   expectClose(drawn->draw(manyLevels()), renderVolume(volume, manyLevels()), 1000);
   expectClose(ofVolume->draw(manyLevels()), renderVolume(volume, manyLevels()), 1000);
+}
+
+TEST_F(CellsOnGpu, AreShadedAsOnTheCpu) {
+  const Field field = manyBlobs();
+  const SparseVolume volume = revoxelise(field, kVoxels);
+  RenderOptions shaded = options(30.0), levels = manyLevels();
+  shaded.shading = levels.shading = Shading{};
+  // A gradient near a flat spot turns with the rounding of its values.
+  expectClose(renderer(field)->draw(shaded), renderVolume(volume, shaded), 200);
+  expectClose(renderer(field)->draw(levels), renderVolume(volume, levels), 200);
+  expectClose(makeVolumeRenderer(volume, device_)->draw(shaded), renderVolume(volume, shaded), 200);
+}
+
+TEST_F(CellsOnGpu, AreMadeAndDrawnOnSeveralThreads) {
+  const Field field = manyBlobs();
+  const Image expected = renderer(field)->draw(options());
+  std::atomic<int> equal = 0;
+  std::vector<std::thread> threads;
+  for (int n = 0; n < 4; ++n)
+    threads.emplace_back([&] { equal += renderer(field)->draw(options()).rgba == expected.rgba; });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(equal, 4);
+}
+
+TEST_F(CellsOnGpu, DrawManyEllipsoidsInOneBrickSlow) {
+  const Field field = randomField({.count = 10'000'000, .extent = 8.0, .smallest = 0.3});
+  RenderOptions o = options();
+  o.resolution = {24, 18};
+  o.camera = fitCamera({{0, 0, 0}, {7, 7, 7}}, {}, o.resolution);
+  o.transfer = rescaled(o.transfer, {-1000.0f, 1000.0f});
+  expectClose(makeFieldRenderer(field, device_, {}, {})->draw(o),
+              renderVolume(revoxelise(field, {}), o), 100);
 }
 
 TEST_F(CellsOnGpu, HaveTheSameBitsOfAllLevels) {

@@ -1,0 +1,154 @@
+#include <algorithm>
+#include <iostream>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "cli/failure.h"
+#include "cli/frame_messages.h"
+#include "cli/frame_output.h"
+#include "cli/frame_warnings.h"
+#include "cli/frame_workers.h"
+#include "cli/interrupts.h"
+#include "cli/memory_gate.h"
+#include "cli/output.h"
+#include "esvr/error.h"
+#include "esvr2vdb/jobs.h"
+
+namespace esvr::esvr2vdb {
+namespace {
+
+/// Decodes the frames of a sequence on several threads.
+class SequenceDecoding {
+ public:
+  SequenceDecoding(const Options& options, const std::vector<cli::Frame>& frames,
+                   const CancelToken& cancel)
+      : options_(options),
+        frames_(frames),
+        cancel_(cancel),
+        holders_(cli::holdersOf(frames)),
+        workers_(cli::frameWorkers(options.threads, frames)),
+        gate_(options.memory.maxBytes),
+        log_(kProgram, options.verbosity),
+        done_(frames.size()) {}
+
+  void run() {
+    cli::forEachFrame({frames_, workers_, options_.sequence->onError, cancel_},
+                      [&](const cli::FrameTask& task) { return decodeWithHolders(task.frame); });
+    warnings_.tell(log_);
+    for (std::size_t i = 0; i < frames_.size(); ++i) printTable(i);
+    throwWhatIsAmiss();
+  }
+
+ private:
+  struct Done {
+    bool isWritten = false;
+    std::string table;  ///< errors against the reference
+    std::optional<Error> failure{};
+  };
+
+  /// Decodes a frame and repeats its output for the frames that hold it.
+  /// \return false if one of them failed
+  bool decodeWithHolders(std::size_t source) {
+    bool isWell = attempt(source, [&] { decode(source); });
+    const auto [begin, end] = holders_.equal_range(source);
+    for (auto at = begin; at != end && !cancel_.cancelled(); ++at)
+      isWell = attempt(at->second, [&] { hold(source, at->second); }) && isWell;
+    return isWell;
+  }
+
+  /// Runs an action that gives a frame its output, and records whether it failed.
+  template <class Action>
+  bool attempt(std::size_t i, const Action& action) {
+    try {
+      action();
+      done_[i].isWritten = true;
+    } catch (...) {
+      const Error error = cli::currentFailure();
+      if (cancel_.cancelled()) return false;
+      done_[i].failure = error;
+      const std::lock_guard lock(mutex_);
+      log_.error(cli::textOf(frames_[i]) + ": " + error.what());
+    }
+    return !done_[i].failure;
+  }
+
+  /// Decodes a frame with its share of the memory. A frame that needs more is decoded alone.
+  void decode(std::size_t i) {
+    const std::uint64_t share = options_.memory.maxBytes / std::uint64_t(workers_);
+    try {
+      const auto part = gate_.take(share);
+      return decodeWithin(i, share);
+    } catch (const MemoryExceeded&) {
+      if (workers_ == 1) throw;
+    }
+    const auto all = gate_.takeAll();
+    decodeWithin(i, options_.memory.maxBytes);
+  }
+
+  void decodeWithin(std::size_t i, std::uint64_t maxBytes) {
+    const cli::Frame& frame = frames_[i];
+    Options own = options_;
+    own.memory.maxBytes = maxBytes;
+    own.input = frame.input, own.output = frame.output;
+    if (own.reference)
+      own.reference = cli::FramePattern::in(own.reference->string())->at(frame.number);
+    const cli::FrameFolder folder(own.output);
+    const cli::Log log = warnings_.logOf(frame, kProgram, own.verbosity);
+    std::ostringstream table;
+    convertFile(own, cancel_, log, table);
+    done_[i].table = table.str();
+  }
+
+  void hold(std::size_t source, std::size_t holder) {
+    if (const auto& failure = done_[source].failure)
+      throw cli::failureToHold(frames_[source], *failure);
+    cli::copyOutput(frames_[source].output, frames_[holder].output, options_.write.overwrite);
+  }
+
+  void printTable(std::size_t i) const {
+    if (!done_[i].table.empty())
+      std::cout << "frame " << frames_[i].number << ":\n" << done_[i].table;
+  }
+
+  void throwWhatIsAmiss() const {
+    const auto written = std::ranges::count_if(done_, &Done::isWritten);
+    if (cancel_.cancelled())
+      throw RuntimeFailure("interrupted; " + std::to_string(written) + " of " +
+                           std::to_string(frames_.size()) + " frames are complete");
+    std::vector<cli::FrameNumber> failed;
+    for (std::size_t i = 0; i < frames_.size(); ++i)
+      if (done_[i].failure) failed.push_back(frames_[i].number);
+    if (failed.empty()) return;
+    std::ranges::sort(failed);
+    const auto first =
+        std::ranges::find_if(done_, [](const Done& done) { return done.failure.has_value(); });
+    throw Error(first->failure->kind(), cli::sentenceOn(failed, frames_.size(), "failed"));
+  }
+
+  const Options& options_;
+  const std::vector<cli::Frame>& frames_;
+  const CancelToken& cancel_;
+  const std::multimap<std::size_t, std::size_t> holders_;
+  const int workers_;
+  cli::MemoryGate gate_;
+  cli::FrameWarnings warnings_;
+  std::mutex mutex_;  ///< of the log
+  const cli::Log log_;
+  std::vector<Done> done_;
+};
+
+}  // namespace
+
+void convertSequence(const Options& options) {
+  const cli::Interrupts interrupts;
+  const cli::Sequence& sequence = *options.sequence;
+  const auto frames = cli::planFrames(sequence);
+  cli::checkFrameOutputs(sequence, frames, {{".vdb", ".nvdb"}, options.write.overwrite});
+  SequenceDecoding(options, frames, interrupts.token()).run();
+}
+
+}  // namespace esvr::esvr2vdb

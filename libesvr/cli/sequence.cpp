@@ -1,0 +1,185 @@
+#include "cli/sequence.h"
+
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <system_error>
+
+#include "cli/choice.h"
+#include "cli/output.h"
+#include "esvr/error.h"
+
+namespace esvr::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFrames = "frames";
+constexpr const char* kMissing = "missing";
+constexpr const char* kOnError = "on-error";
+
+bool isThere(const fs::path& path) {
+  std::error_code unreadable;  // whoever opens the file reports the reason
+  return fs::exists(path, unreadable);
+}
+
+void refuseSequenceOptions(const Arguments& arguments) {
+  for (const char* option : {kFrames, kMissing, kOnError})
+    if (arguments.has(option))
+      throw UsageError("--" + std::string(option) + " needs a sequence as input: '" +
+                       arguments.get<std::string>("input") +
+                       "' has no pattern such as #### or %04d for the number of a frame");
+}
+
+/// A name like that of a path, with a pattern before its extension.
+std::string withPattern(const fs::path& path, const std::string& pattern) {
+  const std::string name = path.stem().string() + "." + pattern + path.extension().string();
+  return (path.parent_path() / name).string();
+}
+
+FramePattern outputPattern(const Arguments& arguments, const FramePattern& input) {
+  const auto& text = arguments.get<std::string>("output");
+  const auto output = FramePattern::in(text);
+  if (output) return *output;
+  throw UsageError("'" + text + "' has no pattern for the number of a frame, but '" + input.text() +
+                   "' has one; each frame needs a file of its own, for example '" +
+                   withPattern(text, input.pattern()) + "'");
+}
+
+MissingFrame missingOf(const Arguments& arguments) {
+  return choose<MissingFrame>(kMissing, arguments.find<std::string>(kMissing).value_or("error"),
+                              {{"error", MissingFrame::kError},
+                               {"hold", MissingFrame::kHold},
+                               {"skip", MissingFrame::kSkip}});
+}
+
+OnFrameError onErrorOf(const Arguments& arguments) {
+  return choose<OnFrameError>(
+      kOnError, arguments.find<std::string>(kOnError).value_or("continue"),
+      {{"continue", OnFrameError::kContinue}, {"stop", OnFrameError::kStop}});
+}
+
+std::vector<FrameNumber> framesOnDisk(const FramePattern& input) {
+  auto frames = input.onDisk();
+  if (!frames.empty()) return frames;
+  std::string text = "no file matches " + input.text();
+  if (const auto other = input.withOtherDigits())
+    text += "; " + other->string() +
+            " has another number of digits (# and #### are 4 digits, @ is as many as needed)";
+  throw BadInput(text);
+}
+
+std::vector<FrameNumber> missingNumbers(const std::vector<Frame>& frames) {
+  std::vector<FrameNumber> numbers;
+  for (const Frame& frame : frames)
+    if (frame.missing) numbers.push_back(frame.number);
+  std::ranges::sort(numbers);
+  return numbers;
+}
+
+/// Sets what each missing frame holds: the frame with the next lower number that exists.
+void holdFrames(const Sequence& sequence, std::vector<Frame>& frames) {
+  std::map<FrameNumber, std::size_t> existing;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (!frames[i].missing) existing[frames[i].number] = i;
+  for (Frame& frame : frames) {
+    if (!frame.missing) continue;
+    const auto after = existing.lower_bound(frame.number);
+    if (after == existing.begin())
+      throw BadInput(sequence.input.text() + ": frame " + std::to_string(frame.number) +
+                     " is missing, and no frame before it can be held");
+    frame.holds = std::prev(after)->second;
+  }
+}
+
+void treatMissing(const Sequence& sequence, std::vector<Frame>& frames) {
+  const auto missing = missingNumbers(frames);
+  if (missing.empty()) return;
+  const std::string text = sequence.input.text() + ": " +
+                           (missing.size() == 1 ? "frame " : "frames ") + textOfFrames(missing) +
+                           (missing.size() == 1 ? " is missing" : " are missing");
+  if (missing.size() == frames.size()) throw BadInput(text + ", and no other frame is wanted");
+  if (sequence.missing == MissingFrame::kError)
+    throw BadInput(text +
+                   " (--missing skip leaves them out, --missing hold repeats the frame before)");
+  if (sequence.missing == MissingFrame::kHold) holdFrames(sequence, frames);
+}
+
+void refuseExisting(const std::vector<Frame>& frames) {
+  std::vector<FrameNumber> existing;
+  const Frame* first = nullptr;
+  for (const Frame& frame : frames) {
+    if (!isThere(frame.output)) continue;
+    if (!first) first = &frame;
+    existing.push_back(frame.number);
+  }
+  if (!first) return;
+  std::ranges::sort(existing);
+  std::string text = "cannot write " + first->output.string() + ": it exists already";
+  if (existing.size() > 1)
+    text += ", as do the files of other frames (" + textOfFrames(existing) + ")";
+  throw RuntimeFailure(text + "; --force replaces files");
+}
+
+}  // namespace
+
+void addSequenceOptions(po::options_description& options) {
+  // clang-format off
+  options.add_options()
+    (kFrames, po::value<std::string>()->value_name("RANGE"),
+     "with a pattern such as smoke.####.vdb as input: the frames to convert, for example 1-100, "
+     "1-100x2, 1-10,20-30 or -5--1 (default: all on the disk)")
+    (kMissing, po::value<std::string>()->value_name("W"),
+     "frames of --frames that are not on the disk: error (nothing is converted; the default), hold "
+     "(repeat the output of the frame before) or skip")
+    (kOnError, po::value<std::string>()->value_name("W"),
+     "continue (the default) or stop after a frame that could not be converted");
+  // clang-format on
+}
+
+std::optional<Sequence> readSequence(const Arguments& arguments) {
+  const auto& text = arguments.get<std::string>("input");
+  const auto input = isThere(text) ? std::nullopt : FramePattern::in(text);
+  if (!input) {
+    refuseSequenceOptions(arguments);
+    return std::nullopt;
+  }
+  Sequence sequence{.input = *input, .output = outputPattern(arguments, *input)};
+  if (const auto range = arguments.find<std::string>(kFrames))
+    sequence.frames = parseFrames(kFrames, *range);
+  sequence.missing = missingOf(arguments);
+  sequence.onError = onErrorOf(arguments);
+  return sequence;
+}
+
+std::vector<Frame> planFrames(const Sequence& sequence) {
+  std::vector<Frame> frames;
+  for (const FrameNumber number :
+       sequence.frames ? *sequence.frames : framesOnDisk(sequence.input)) {
+    const fs::path input = sequence.input.at(number);
+    frames.push_back({number, input, sequence.output.at(number), !isThere(input), {}});
+  }
+  treatMissing(sequence, frames);
+  return frames;
+}
+
+std::multimap<std::size_t, std::size_t> holdersOf(const std::vector<Frame>& frames) {
+  std::multimap<std::size_t, std::size_t> holders;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (frames[i].holds) holders.emplace(*frames[i].holds, i);
+  return holders;
+}
+
+void checkFrameOutputs(const Sequence& sequence, const std::vector<Frame>& frames,
+                       const FrameOutputRules& rules) {
+  for (const Frame& frame : frames) requireDistinct({frame.input, frame.output});
+  if (!rules.mayExist) refuseExisting(frames);
+  requireExtension(frames.front().output, rules.extensions);
+  if (!isThere(sequence.output.folder()))
+    throw RuntimeFailure("cannot write " + sequence.output.text() + ": there is no folder " +
+                         sequence.output.folder().string());
+  // One file shows whether the folder is writable. The folders of frames need not exist yet.
+  if (!sequence.output.isInFolder()) checkOutput(frames.front().output, rules.extensions, true);
+}
+
+}  // namespace esvr::cli

@@ -1,0 +1,131 @@
+// Plan: folders with some frames. The plan of a sequence has the frames that the options name, and
+// treats missing ones as wanted. Outputs are checked before the work begins.
+
+#include "cli/sequence.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "cli/folder_test.h"
+#include "esvr/error.h"
+
+namespace esvr::cli {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class SequencePlan : public test::FolderTest {
+ protected:
+  void write(const std::string& name) const { test::writeText(at(name), ""); }
+  void writeFrames(const std::vector<FrameNumber>& numbers) const {
+    for (const FrameNumber number : numbers) write("a." + std::to_string(number) + ".vdb");
+  }
+  [[nodiscard]] Sequence sequence() const {
+    return {.input = *FramePattern::in(at("a.@.vdb")),
+            .output = *FramePattern::in(at("b.##.esvr"))};
+  }
+  [[nodiscard]] std::vector<Frame> plan(std::vector<FrameNumber> frames,
+                                        MissingFrame missing) const {
+    Sequence wanted = sequence();
+    wanted.frames = std::move(frames);
+    wanted.missing = missing;
+    return planFrames(wanted);
+  }
+  template <class Refused>
+  static void expectRefused(const std::function<void()>& action, const char* words) {
+    try {
+      action();
+      ADD_FAILURE() << "not refused: " << words;
+    } catch (const Refused& error) {
+      EXPECT_THAT(error.what(), HasSubstr(words));
+    }
+  }
+};
+
+std::vector<FrameNumber> numbersOf(const std::vector<Frame>& frames) {
+  std::vector<FrameNumber> numbers;
+  for (const Frame& frame : frames) numbers.push_back(frame.number);
+  return numbers;
+}
+
+TEST_F(SequencePlan, HasAllFramesOnTheDiskUnlessSomeAreNamed) {
+  writeFrames({3, 1, 20});
+  EXPECT_THAT(numbersOf(planFrames(sequence())), ElementsAre(1, 3, 20));
+  const auto frames = plan({20, 1}, MissingFrame::kError);
+  EXPECT_THAT(numbersOf(frames), ElementsAre(20, 1)) << "in the order in which they are named";
+  EXPECT_EQ(frames[1].input, at("a.1.vdb"));
+  EXPECT_EQ(frames[1].output, at("b.01.esvr"));
+}
+
+TEST_F(SequencePlan, NamesWhatDoesNotMatch) {
+  expectRefused<BadInput>([&] { (void)planFrames(sequence()); }, "no file matches");
+  write("a.0001.vdb");
+  expectRefused<BadInput>([&] { (void)planFrames(sequence()); }, "a.0001.vdb has another number");
+}
+
+TEST_F(SequencePlan, RefusesMissingFramesUnlessToldWhatToDo) {
+  writeFrames({1, 4});
+  expectRefused<BadInput>(
+      [&] {
+        (void)plan({1, 2, 3, 4, 6}, MissingFrame::kError);
+      },
+      "frames 2-3, 6 are missing (--missing skip");
+  expectRefused<BadInput>([&] { (void)plan({1, 2}, MissingFrame::kError); }, "frame 2 is missing");
+}
+
+TEST_F(SequencePlan, SkipsMissingFrames) {
+  writeFrames({1, 4});
+  const auto frames = plan({1, 2, 4}, MissingFrame::kSkip);
+  EXPECT_FALSE(frames[0].missing);
+  EXPECT_TRUE(frames[1].missing && !frames[1].holds);
+  expectRefused<BadInput>([&] { (void)plan({2, 3}, MissingFrame::kSkip); }, "no other frame");
+}
+
+TEST_F(SequencePlan, HoldsTheFrameBefore) {
+  writeFrames({1, 2, 4});
+  const auto frames = plan({6, 4, 1, 3}, MissingFrame::kHold);
+  EXPECT_EQ(frames[0].holds, 1u) << "6 holds 4";
+  EXPECT_FALSE(frames[1].holds);
+  EXPECT_EQ(frames[3].holds, 2u) << "3 holds 1, because 2 was not named";
+  expectRefused<BadInput>(
+      [&] {
+        (void)plan({0, 1}, MissingFrame::kHold);
+      },
+      "frame 0 is missing, and no frame before it");
+}
+
+using SequenceOutput = SequencePlan;
+
+TEST_F(SequenceOutput, MustNotExistUnlessItMay) {
+  writeFrames({1, 2, 3});
+  const auto frames = planFrames(sequence());
+  const auto check = [&](bool mayExist) {
+    checkFrameOutputs(sequence(), frames, {{".esvr"}, mayExist});
+  };
+  EXPECT_NO_THROW(check(false));
+  write("b.02.esvr");
+  expectRefused<RuntimeFailure>([&] { check(false); }, "b.02.esvr: it exists already;");
+  write("b.03.esvr");
+  expectRefused<RuntimeFailure>([&] { check(false); }, "other frames (2-3); --force");
+  EXPECT_NO_THROW(check(true));
+}
+
+TEST_F(SequenceOutput, NeedsItsExtensionAndAFolder) {
+  writeFrames({1});
+  Sequence wanted = sequence();
+  const auto check = [&](const char* output) {
+    wanted.output = *FramePattern::in(at(output));
+    checkFrameOutputs(wanted, planFrames(wanted), {{".esvr"}, false});
+  };
+  expectRefused<UsageError>([&] { check("b.#.png"); }, "must end in .esvr");
+  expectRefused<RuntimeFailure>([&] { check("no/b.#.esvr"); }, "there is no folder");
+  expectRefused<RuntimeFailure>([&] { check("no/#/b.esvr"); }, "there is no folder");
+  EXPECT_NO_THROW(check("#/b.esvr"));
+  expectRefused<UsageError>([&] { check("a.@.vdb"); }, "are one file");
+}
+
+}  // namespace
+}  // namespace esvr::cli

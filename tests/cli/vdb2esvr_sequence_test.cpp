@@ -1,0 +1,324 @@
+// Plan: sequences of small volumes are converted as a user does. Each frame must have the bytes of
+// the conversion of its file alone, on any number of threads and beside any other frames. Frames
+// that are missing, damaged or interrupted are treated as the options say, and the report has an
+// entry for each.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "cli/converters.h"
+#include "cli/folder_test.h"
+#include "cli/vdb_inputs.h"
+#include "esvr/container.h"
+#include "esvr/convert.h"
+
+namespace esvr {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using test::readText;
+using test::runInterrupted;
+using test::vdb2esvr;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Words = std::vector<std::string>;
+
+class SequenceFiles : public test::FolderTest {
+ protected:
+  /// Balls of different values in in.0001.vdb, in.0002.vdb, ...
+  void writeFrames(int count) const {
+    for (int frame = 1; frame <= count; ++frame)
+      test::writeInput(at(nameOf("in", frame, "vdb")),
+                       {{.voxels = test::softBall({frame, 0, 0}, float(frame))}});
+  }
+  static std::string nameOf(const std::string& start, int frame, const std::string& end) {
+    std::string digits = std::to_string(frame);
+    digits.insert(0, 4 - digits.size(), '0');
+    return start + "." + digits + "." + end;
+  }
+  [[nodiscard]] test::ProgramRun convert(Words more = {},
+                                         const std::string& output = "out.####.esvr") const {
+    more.insert(more.begin(), {at("in.####.vdb"), at(output), "--device", "cpu"});
+    return vdb2esvr(more);
+  }
+  /// Single fits, which take milliseconds.
+  [[nodiscard]] test::ProgramRun convertQuickly(const Words& more = {}) const {
+    return test::quickFit(at("in.####.vdb"), at("out.####.esvr"), more);
+  }
+  [[nodiscard]] bool isThere(const std::string& name) const { return fs::exists(at(name)); }
+  /// The names of files and folders whose names begin with "out".
+  [[nodiscard]] Words outputs() const {
+    Words names = folder_.names();
+    std::erase_if(names, [](const std::string& name) { return name.starts_with("in."); });
+    return names;
+  }
+};
+
+TEST_F(SequenceFiles, haveTheBytesOfSingleFilesOnAnyNumberOfThreads) {
+  writeFrames(5);
+  const auto run = convert({"--threads", "1"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  ASSERT_EQ(convert({"--threads", "4"}, "four.####.esvr").exitCode, 0);
+  ASSERT_EQ(convert({"--frames", "5,2"}, "some.####.esvr").exitCode, 0);
+  for (int frame = 1; frame <= 5; ++frame) {
+    ASSERT_EQ(vdb2esvr({at(nameOf("in", frame, "vdb")), at("one.esvr"), "-f"}).exitCode, 0);
+    const std::string one = readText(at("one.esvr"));
+    EXPECT_EQ(readText(at(nameOf("out", frame, "esvr"))), one);
+    EXPECT_EQ(readText(at(nameOf("four", frame, "esvr"))), one);
+    const std::string some = nameOf("some", frame, "esvr");
+    EXPECT_EQ(isThere(some), frame == 2 || frame == 5);
+    if (isThere(some)) {
+      EXPECT_EQ(readText(at(some)), one);
+    }
+  }
+}
+
+TEST_F(SequenceFiles, haveAnyPatternAndAnyDigits) {
+  test::writeInput(at("in.0000.vdb"), {{.voxels = test::softBall({})}});
+  test::writeInput(at("in.-005.vdb"), {{.voxels = test::softBall({})}});
+  test::writeInput(at("in.12345.vdb"), {{.voxels = test::softBall({})}});
+  test::writeInput(at("in.7.vdb"), {{.voxels = test::softBall({})}});
+  const auto to = [&](const char* input, const char* output, Words more = {}) {
+    more.insert(more.begin(), {at(input), at(output)});
+    const auto run = vdb2esvr(more);
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+  };
+  to("in.%04d.vdb", "out.@@@@@@@@@@@@.esvr", {"--frames", "-5-0x5"});
+  to("in.$F4.vdb", "out.@.esvr");
+  to("in.@.vdb", "out##/ball.esvr", {"--frames", "7"});
+  EXPECT_THAT(outputs(), ElementsAre("out.-00000000005.esvr", "out.-5.esvr", "out.0.esvr",
+                                     "out.000000000000.esvr", "out.12345.esvr", "out07"));
+  EXPECT_TRUE(isThere("out07/ball.esvr"));
+}
+
+TEST_F(SequenceFiles, haveOneQualityWithoutAGoal) {
+  // The first frame is smooth. The last one has waves, so that it needs more bytes.
+  for (int frame = 1; frame <= 3; ++frame) {
+    auto voxels = test::cloud(12);
+    for (auto& voxel : voxels)
+      voxel.value *= 1.0f + 0.2f * float(frame - 1) * float((voxel.at.x ^ voxel.at.y) & 1);
+    test::writeInput(at(nameOf("in", frame, "vdb")), {{.voxels = voxels}});
+  }
+  const auto run = convert({"--report", "-"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const Json range = Json::parse(run.out)["grids"][0]["psnr_active"];
+  // The bound of quantised voxels is found to within some hundredths of a dB.
+  EXPECT_GE(range[0], presetPsnr(Preset::kStandard));
+  EXPECT_LE(range[1], presetPsnr(Preset::kStandard) + 0.5);
+  EXPECT_GT(sizeOf("out.0003.esvr"), sizeOf("out.0001.esvr"));
+}
+
+TEST_F(SequenceFiles, mayBeHeldOrSkippedWhereTheyAreMissing) {
+  writeFrames(2);
+  test::writeInput(at("in.0005.vdb"), {{.voxels = test::softBall({})}});
+  const auto refused = convertQuickly({"--frames", "1-5"});
+  EXPECT_EQ(refused.exitCode, 3);
+  EXPECT_THAT(refused.err, HasSubstr("frames 3-4 are missing"));
+  EXPECT_THAT(outputs(), IsEmpty());
+
+  const auto skipped = convertQuickly({"--frames", "1-5", "--missing", "skip"});
+  EXPECT_EQ(skipped.exitCode, 0) << skipped.err;
+  EXPECT_THAT(outputs(), ElementsAre("out.0001.esvr", "out.0002.esvr", "out.0005.esvr"));
+
+  const auto held = convertQuickly({"--frames", "1-5", "--missing", "hold", "-f"});
+  EXPECT_EQ(held.exitCode, 0) << held.err;
+  EXPECT_THAT(held.out, HasSubstr("held from 2"));
+  for (const char* name : {"out.0003.esvr", "out.0004.esvr"})
+    EXPECT_EQ(readText(at(name)), readText(at("out.0002.esvr")));
+}
+
+TEST_F(SequenceFiles, areNamedWhereTheyAreDamaged) {
+  writeFrames(4);
+  test::writeText(at("in.0002.vdb"), "no volume");
+  const auto run = convertQuickly(
+      {"--report", at("r.json"), "--frames", "1-5", "--missing", "hold", "--threads", "1"});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("vdb2esvr: frame 2: "), HasSubstr("in.0002.vdb"),
+                             HasSubstr("1 of 5 frames failed: 2")));
+  EXPECT_FALSE(isThere("out.0002.esvr"));
+  for (const char* name : {"out.0001.esvr", "out.0003.esvr", "out.0004.esvr", "out.0005.esvr"})
+    EXPECT_TRUE(isThere(name)) << name;
+  const Json report = Json::parse(readText(at("r.json")));
+  EXPECT_EQ(report["exit_code"], 3);
+  EXPECT_EQ(report["states"]["failed"], 1);
+  EXPECT_EQ(report["frames"][1]["state"], "failed");
+  EXPECT_EQ(report["frames"][1]["error"]["kind"], "bad input");
+}
+
+TEST_F(SequenceFiles, stopAfterADamagedOneWhereAsked) {
+  writeFrames(4);
+  test::writeText(at("in.0002.vdb"), "no volume");
+  const auto run = convertQuickly({"--on-error", "stop", "--threads", "1"});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.out, HasSubstr("not begun"));
+  EXPECT_THAT(outputs(), ElementsAre("out.0001.esvr"));
+}
+
+TEST_F(SequenceFiles, thatHoldADamagedOneFailToo) {
+  writeFrames(2);
+  test::writeText(at("in.0002.vdb"), "no volume");
+  const auto run = convertQuickly({"--frames", "1-3", "--missing", "hold"});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("frame 3: frame 2, which it holds, failed"),
+                             HasSubstr("2 of 3 frames failed: 2-3")));
+}
+
+TEST_F(SequenceFiles, leaveNoFolderWhereTheyFail) {
+  writeFrames(2);
+  test::writeText(at("in.0002.vdb"), "no volume");
+  EXPECT_EQ(convert({}, "out.####/a.esvr").exitCode, 3);
+  EXPECT_THAT(outputs(), ElementsAre("out.0001"));
+}
+
+TEST_F(SequenceFiles, areReportedWithAnEntryEach) {
+  writeFrames(3);
+  const auto run = convertQuickly({"--report", "-", "--frames", "3,1"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const Json report = Json::parse(run.out);
+  EXPECT_EQ(report["schema"], "esvr-sequence");
+  EXPECT_EQ(report["asked"]["count"], 30);
+  EXPECT_EQ(report["frames"][0]["frame"], 3);
+  EXPECT_EQ(report["frames"][1]["output"]["bytes"], sizeOf("out.0001.esvr"));
+  const Json& grid = report["frames"][1]["grids"][0];
+  EXPECT_EQ(grid["ellipsoids"], readEsvr(at("out.0001.esvr")).grids[0].field.ellipsoidCount());
+  const double first = grid["metrics"]["psnr_active"];
+  const double third = report["frames"][0]["grids"][0]["metrics"]["psnr_active"];
+  EXPECT_THAT(report["grids"][0]["psnr_active"],
+              ElementsAre(std::min(first, third), std::max(first, third)));
+}
+
+TEST_F(SequenceFiles, areReportedAlsoWhereNothingCanBeConverted) {
+  const auto run = convertQuickly({"--report", at("r.json")});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_EQ(Json::parse(readText(at("r.json")))["error"]["kind"], "bad input");
+}
+
+TEST_F(SequenceFiles, tellTheirProgressAsJson) {
+  writeFrames(3);
+  test::writeText(at("in.0003.vdb"), "no volume");
+  std::istringstream lines(convertQuickly({"--progress", "json"}).err);
+  std::vector<Json> progress;
+  for (std::string line; std::getline(lines, line);)
+    if (line.starts_with("{")) progress.push_back(Json::parse(line));
+  ASSERT_EQ(progress.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(progress[i]["frames_done"], i + 1);
+  EXPECT_EQ(progress[2]["fraction"], 1.0);
+  EXPECT_EQ(progress[2]["frames_failed"], 1);
+  EXPECT_EQ(progress[2]["frames"], 3);
+}
+
+TEST_F(SequenceFiles, keepExistingFilesUnlessForced) {
+  writeFrames(2);
+  test::writeText(at("out.0002.esvr"), "mine");
+  const auto refused = convertQuickly();
+  EXPECT_EQ(refused.exitCode, 1);
+  EXPECT_THAT(refused.err, HasSubstr("out.0002.esvr: it exists already"));
+  EXPECT_FALSE(isThere("out.0001.esvr")) << "nothing begins";
+  EXPECT_EQ(convertQuickly({"--force"}).exitCode, 0);
+  EXPECT_NE(readText(at("out.0002.esvr")), "mine");
+}
+
+TEST_F(SequenceFiles, areContinuedWhereTheyAreMissingOnly) {
+  writeFrames(3);
+  test::writeText(at("out.0002.esvr"), "mine");
+  const auto run = convertQuickly({"--resume"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("kept"));
+  EXPECT_EQ(readText(at("out.0002.esvr")), "mine");
+  EXPECT_TRUE(isThere("out.0001.esvr") && isThere("out.0003.esvr"));
+}
+
+TEST_F(SequenceFiles, thatAreCompleteStayAfterAnInterruption) {
+  writeFrames(2);
+  test::writeInput(at("in.0003.vdb"), {{.voxels = test::cloud(30)}});  // it takes seconds
+  const Words inOrder{"--representation", "ellipsoids", "--threads", "1"};
+  Words arguments{at("in.####.vdb"), at("out.####.esvr"), "--progress", "json", "--device", "cpu"};
+  arguments.insert(arguments.end(), inOrder.begin(), inOrder.end());
+  const auto stopped = runInterrupted(VDB2ESVR, arguments, "\"frames_done\":2");
+  EXPECT_EQ(stopped.exitCode, 1);
+  EXPECT_THAT(stopped.err, HasSubstr("interrupted; 2 of 3 frames are complete, and --resume"));
+  EXPECT_THAT(outputs(), ElementsAre("out.0001.esvr", "out.0002.esvr"));
+
+  test::writeInput(at("in.0003.vdb"), {{.voxels = test::softBall({})}});
+  arguments.emplace_back("--resume");
+  const auto continued = vdb2esvr(arguments);
+  EXPECT_EQ(continued.exitCode, 0) << continued.err;
+  EXPECT_THAT(continued.err, AllOf(HasSubstr("\"kept\""), HasSubstr("\"converted\"")));
+  EXPECT_THAT(outputs(), ElementsAre("out.0001.esvr", "out.0002.esvr", "out.0003.esvr"));
+}
+
+TEST_F(SequenceFiles, thatMissTheirPsnrAreNamed) {
+  writeFrames(3);
+  const auto run = convert(
+      {"--psnr", "90", "--count", "5", "--representation", "ellipsoids", "--iterations", "20"});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("3 of 3 frames did not reach the PSNR: 1-3"));
+  EXPECT_TRUE(isThere("out.0001.esvr"));
+}
+
+TEST_F(SequenceFiles, areConvertedOneByOneWhereMemoryIsShort) {
+  writeFrames(3);
+  const auto within = [&](std::uint64_t bytes, const char* threads) {
+    return convertQuickly({"--max-memory", std::to_string(bytes), "--threads", threads, "--force"})
+        .exitCode;
+  };
+  std::uint64_t enough = 1024;
+  while (within(enough, "1") == 5) enough *= 2;
+  EXPECT_EQ(within(enough, "3"), 0) << "a third of it is too little for a frame";
+  EXPECT_EQ(within(enough / 2, "3"), 5);
+}
+
+TEST_F(SequenceFiles, thatHaveTheNameOfAPatternAreFiles) {
+  test::writeInput(at("take#2.vdb"), {{.voxels = test::softBall({})}});
+  const auto run = test::quickFit(at("take#2.vdb"), at("out.esvr"));
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_TRUE(isThere("out.esvr"));
+}
+
+struct BadSequence {
+  Words arguments;
+  int code;
+  const char* words;
+};
+std::ostream& operator<<(std::ostream& out, const BadSequence& bad) { return out << bad.words; }
+
+class RefusedSequence : public SequenceFiles, public testing::WithParamInterface<BadSequence> {};
+
+TEST_P(RefusedSequence, saysWhy) {
+  writeFrames(2);
+  Words arguments = GetParam().arguments;
+  arguments[0] = at(arguments[0]), arguments[1] = at(arguments[1]);
+  const auto run = vdb2esvr(arguments);
+  EXPECT_EQ(run.exitCode, GetParam().code);
+  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  EXPECT_THAT(outputs(), IsEmpty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Options, RefusedSequence,
+    testing::Values(
+        BadSequence{{"in.####.vdb", "out.esvr"}, 2, "out.####.esvr'"},
+        BadSequence{{"in.0001.vdb", "out.esvr", "--frames", "1"}, 2, "--frames needs a sequence"},
+        BadSequence{{"in.0001.vdb", "out.esvr", "--missing", "skip"}, 2, "--missing needs"},
+        BadSequence{{"in.0001.vdb", "out.esvr", "--on-error", "stop"}, 2, "--on-error needs"},
+        BadSequence{{"in.####.vdb", "out.####.esvr", "--frames", "1-x"}, 2, "'1-x' is no range"},
+        BadSequence{{"in.####.vdb", "out.####.esvr", "--missing", "x"}, 2, "error, hold, skip"},
+        BadSequence{{"in.####.vdb", "out.####.esvr", "--on-error", "x"}, 2, "continue, stop"},
+        BadSequence{{"in.####.vdb", "out.####.png"}, 2, "must end in .esvr"},
+        BadSequence{{"in.@.vdb", "out.@.esvr"}, 3, "has another number of digits"},
+        BadSequence{{"no.####.vdb", "out.####.esvr"}, 3, "no file matches"},
+        BadSequence{{"in.####.vdb", "out.####.esvr", "--part", "1/2"}, 2, "--part is for one"},
+        BadSequence{{"in.####.vdb", "out.####.esvr", "--merge"}, 2, "--merge is for one"},
+        BadSequence{{"in.####.vdb", "out.####.esvr", "--resume", "-f"}, 2, "choose one"}));
+
+}  // namespace
+}  // namespace esvr

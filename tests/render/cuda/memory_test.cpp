@@ -1,0 +1,51 @@
+// Plan: a picture for which the device has too little memory ends with an error that says so, and the
+// renderer draws again afterwards.
+#include <cuda_runtime_api.h>
+#include <gtest/gtest.h>
+
+#include "esvr/error.h"
+#include "esvr/renderer.h"
+#include "field/random_field.h"
+#include "support/on_device.h"
+
+namespace esvr::test {
+namespace {
+
+/// Takes all memory of the device but for some bytes.
+class TakenMemory {
+ public:
+  explicit TakenMemory(std::size_t left) {
+    std::size_t free = 0, all = 0;
+    EXPECT_EQ(cudaMemGetInfo(&free, &all), cudaSuccess);
+    EXPECT_EQ(cudaMalloc(&memory_, free - left), cudaSuccess);
+  }
+  TakenMemory(const TakenMemory&) = delete;
+  TakenMemory& operator=(const TakenMemory&) = delete;
+  ~TakenMemory() { cudaFree(memory_); }
+
+ private:
+  void* memory_ = nullptr;
+};
+
+using RendererMemory = OnGpu;
+
+TEST_F(RendererMemory, IsSaidToBeExhaustedAndIsUsedAgain) {
+  const Field field = randomField({.count = 2000, .extent = 200.0});
+  RenderOptions small;
+  small.resolution = {160, 120};
+  small.camera = fitCamera({{0, 0, 0}, {199, 199, 199}}, {}, small.resolution);
+  small.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
+  RenderOptions large = small;
+  large.resolution = {4000, 3000};  // 192 MB of pixels
+  const auto renderer = makeFieldRenderer(field, device_);
+  const Image expected = renderer->draw(small);
+  {
+    const TakenMemory taken(std::size_t(64) << 20);
+    EXPECT_THROW((void)renderer->draw(large), DeviceError);
+    EXPECT_EQ(renderer->draw(small).rgba, expected.rgba);
+  }
+  EXPECT_EQ(renderer->draw(large).width, 4000);
+}
+
+}  // namespace
+}  // namespace esvr::test

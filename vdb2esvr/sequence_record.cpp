@@ -1,0 +1,100 @@
+#include "vdb2esvr/sequence_record.h"
+
+#include <algorithm>
+
+#include "cli/frame_messages.h"
+
+namespace esvr::vdb2esvr {
+namespace {
+
+bool isWritten(const FrameRecord& frame) {
+  return frame.state == FrameState::kConverted || frame.state == FrameState::kHeld ||
+         frame.state == FrameState::kKept;
+}
+
+GridRange& rangeOf(const std::string& name, std::vector<GridRange>& ranges) {
+  const auto known = std::ranges::find(ranges, name, &GridRange::name);
+  if (known != ranges.end()) return *known;
+  return ranges.emplace_back(GridRange{.name = name});
+}
+
+void widen(const FrameGrid& grid, GridRange& range) {
+  const bool first = range.frames++ == 0;
+  range.lowestActive = first ? grid.psnrActive : std::min(range.lowestActive, grid.psnrActive);
+  range.highestActive = first ? grid.psnrActive : std::max(range.highestActive, grid.psnrActive);
+  range.lowestBox = first ? grid.psnrBox : std::min(range.lowestBox, grid.psnrBox);
+  range.highestBox = first ? grid.psnrBox : std::max(range.highestBox, grid.psnrBox);
+}
+
+Error interruption(const SequenceRecord& record) {
+  const auto written = std::ranges::count_if(record.frames, isWritten);
+  return RuntimeFailure("interrupted; " + std::to_string(written) + " of " +
+                        std::to_string(record.frames.size()) +
+                        " frames are complete, and --resume continues with the others");
+}
+
+}  // namespace
+
+const char* nameOf(FrameState state) {
+  switch (state) {
+    case FrameState::kNotBegun:
+      return "not begun";
+    case FrameState::kConverted:
+      return "converted";
+    case FrameState::kHeld:
+      return "held";
+    case FrameState::kKept:
+      return "kept";
+    case FrameState::kMissing:
+      return "missing";
+    case FrameState::kInterrupted:
+      return "interrupted";
+    case FrameState::kFailed:
+      break;
+  }
+  return "failed";
+}
+
+void takeFigures(const RunRecord& run, FrameRecord& frame) {
+  const Ratio ratio = ratioOf(run);
+  frame.bytesIn = ratio.bytesIn, frame.bytesOut = ratio.bytesOut;
+  frame.seconds = run.secondsTotal;
+  for (const ConvertedGrid& grid : run.grids)
+    frame.grids.push_back({grid.uniqueName, grid.stored().field.ellipsoidCount(),
+                           grid.metrics.psnrBox, grid.metrics.psnrActive});
+  for (const NotFitted& left : run.carried)
+    frame.carried.push_back({left.grid.uniqueName, left.why});
+  for (const NotFitted& left : run.skipped)
+    frame.skipped.push_back({left.grid.uniqueName, left.why});
+}
+
+std::vector<cli::FrameNumber> framesIn(FrameState state, const SequenceRecord& record) {
+  std::vector<cli::FrameNumber> numbers;
+  for (const FrameRecord& frame : record.frames)
+    if (frame.state == state) numbers.push_back(frame.frame.number);
+  std::ranges::sort(numbers);
+  return numbers;
+}
+
+std::vector<GridRange> gridRanges(const SequenceRecord& record) {
+  std::vector<GridRange> ranges;
+  for (const FrameRecord& frame : record.frames)
+    for (const FrameGrid& grid : frame.grids) widen(grid, rangeOf(grid.name, ranges));
+  return ranges;
+}
+
+std::optional<Error> whatIsAmiss(const SequenceRecord& record) {
+  if (record.interrupted) return interruption(record);
+  const auto failed = std::ranges::find(record.frames, FrameState::kFailed, &FrameRecord::state);
+  if (failed != record.frames.end())
+    return Error(failed->failure->kind(), cli::sentenceOn(framesIn(FrameState::kFailed, record),
+                                                          record.frames.size(), "failed"));
+  std::vector<cli::FrameNumber> missed;
+  for (const FrameRecord& frame : record.frames)
+    if (frame.missedPsnr) missed.push_back(frame.frame.number);
+  if (missed.empty()) return std::nullopt;
+  std::ranges::sort(missed);
+  return TargetMissed(cli::sentenceOn(missed, record.frames.size(), "did not reach the PSNR"));
+}
+
+}  // namespace esvr::vdb2esvr

@@ -1,0 +1,83 @@
+#pragma once
+/// The record of a sequence, from which its summary and its report are made.
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/sequence.h"
+#include "esvr/error.h"
+#include "vdb2esvr/run_record.h"
+
+namespace esvr::vdb2esvr {
+
+/// What became of a frame.
+enum class FrameState {
+  kNotBegun,
+  kConverted,
+  kHeld,         ///< its output is that of the frame before it
+  kKept,         ///< its output was there already
+  kMissing,      ///< it has no input, and was left out
+  kInterrupted,  ///< the fit was interrupted; the output, if there is one, is not the best
+  kFailed
+};
+
+/// The states as in reports: "not begun", "converted", ...
+[[nodiscard]] const char* nameOf(FrameState state);
+
+/// The figures of a grid in a frame.
+struct FrameGrid {
+  std::string name;
+  std::size_t ellipsoids = 0;
+  double psnrBox = 0.0, psnrActive = 0.0;  ///< dB
+};
+
+/// A grid of a frame that was not fitted.
+struct NotFittedName {
+  std::string name, why;
+};
+
+struct FrameRecord {
+  cli::Frame frame;
+  FrameState state = FrameState::kNotBegun;
+  std::uint64_t bytesIn = 0, bytesOut = 0;  ///< of the grids in the output, and of the output
+  std::vector<FrameGrid> grids{};
+  std::vector<NotFittedName> carried{}, skipped{};
+  double seconds = 0.0;
+  bool missedPsnr = false;
+  std::optional<Error> failure{};
+  nlohmann::ordered_json report{};  ///< the frame's own report, if one is wanted
+};
+
+struct SequenceRecord {
+  std::vector<FrameRecord> frames;  ///< in the order in which they are named
+  double seconds = 0.0;
+  bool interrupted = false;
+};
+
+/// Takes the figures of a converted frame. They are small, so that a sequence may be long.
+void takeFigures(const RunRecord& run, FrameRecord& frame);
+
+/// The numbers of the frames in a state, increasing.
+[[nodiscard]] std::vector<cli::FrameNumber> framesIn(FrameState state,
+                                                     const SequenceRecord& record);
+
+/// The range of a grid's PSNR over its frames.
+struct GridRange {
+  std::string name;
+  std::size_t frames = 0;
+  double lowestActive = 0.0, highestActive = 0.0;  ///< PSNR over the active voxels, dB
+  double lowestBox = 0.0, highestBox = 0.0;        ///< PSNR over the box, dB
+};
+
+/// The ranges of all grids, in the order in which they first occur.
+[[nodiscard]] std::vector<GridRange> gridRanges(const SequenceRecord& record);
+
+/// The error that gives the exit code of a sequence that was interrupted, or in which frames failed
+/// or missed the PSNR; nothing if all is well. Frames that failed count more than missed ones.
+[[nodiscard]] std::optional<Error> whatIsAmiss(const SequenceRecord& record);
+
+}  // namespace esvr::vdb2esvr
