@@ -23,8 +23,8 @@ struct Twin {
 /// The twins by their index in the list of grids.
 using Twins = std::map<std::size_t, Twin>;
 
-/// Reads the grids whose numbers and boxes of active voxels are the same, one after the other. Twins
-/// have the same peak of the PSNR. It ends early if the run is interrupted.
+/// Reads the grids whose numbers and boxes of active voxels are the same, one after the other.
+/// Twins have the same peak of the PSNR. It ends early if the run is interrupted.
 [[nodiscard]] Twins findTwins(const Options& options, const std::vector<FittedGrid>& grids);
 
 }  // namespace esvr::vdb2esvr

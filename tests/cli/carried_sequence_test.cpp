@@ -74,7 +74,7 @@ TEST_F(CarriedSequence, KeepsAndLeavesOutTheNamedGridsOfEachFrame) {
   EXPECT_THAT(run.out,
               AllOf(HasSubstr("bool: left out in 3 frames, because --skip names it"),
                     HasSubstr("density: carried unchanged in 3 frames, because --keep names it"),
-                    HasSubstr("vec3s: carried unchanged in 3 frames, because its values")));
+                    HasSubstr("int32: carried unchanged in 3 frames, because its values")));
   ASSERT_EQ(convertBack("back.@.vdb").exitCode, 0);
   for (int frame = 1; frame <= 3; ++frame) {
     EXPECT_THAT(namesIn(back(frame)), ElementsAre("int32", "vec3s", "density"));

@@ -1,6 +1,6 @@
 // Plan: grids of vectors come back with their names and components. They stand for their components
-// in the order of a file, also between carried grids. Components that do not exist, that two vectors
-// share or that differ in their descriptors are refused by the writer and by the reader. Files
+// in the order of a file, also between carried grids. Components that do not exist, that two
+// vectors share or that differ in their descriptors are refused by the writer and by the reader. Files
 // without vectors have the version that had none.
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
-// Plan: the errors of vectors are compared with figures that are computed by hand. All PSNR have the
-// peak of the longest vector. A voxel that is active in one component counts in all.
+// Plan: the errors of vectors are compared with figures that are computed by hand. All PSNR have
+// the peak of the longest vector. A voxel that is active in one component counts in all.
 
 #include <gtest/gtest.h>
 

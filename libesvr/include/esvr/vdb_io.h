@@ -149,7 +149,8 @@ using GridToWrite = std::variant<const VolumeGrid*, const CarriedGrid*, const Ve
 /// in any component.
 /// \throws RuntimeFailure  as for writeGrids; a carried grid has a version of the VDB format that
 ///                         this version of OpenVDB does not write
-/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid is carried or of vectors
+/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid is carried or has
+///                      vectors
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const GridToWrite> grids, const WriteOptions& options = {});
 

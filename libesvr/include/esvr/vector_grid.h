@@ -28,11 +28,11 @@ struct VectorGrid {
 /// \param component  0, 1 or 2
 [[nodiscard]] std::string componentName(const std::string& grid, std::size_t component);
 
-/// The same volumes with the bricks and the active voxels that any of them has. Voxels that a volume
-/// gets have its background.
+/// The same volumes with the bricks and the active voxels that any of them has. Voxels that are
+/// added to a volume have its background.
 [[nodiscard]] VectorVolume aligned(const VectorVolume& vectors);
 
-/// The lengths of the vectors, at the voxels that are active in any component. The sum of squares is
+/// The lengths of the vectors, at the voxels that are active in any component. Sums of squares are
 /// formed in float64.
 [[nodiscard]] SparseVolume magnitudeOf(const VectorVolume& vectors);
 

@@ -20,8 +20,8 @@ struct VectorMetrics {
 /// \throws BadInput  there is no active voxel
 [[nodiscard]] double peakOfVectors(const VectorVolume& reference);
 
-/// Compares vectors by compareVolumes. A voxel of a grid of vectors is active if it is active in any
-/// component.
+/// Compares vectors by compareVolumes. A voxel of a grid of vectors is active if it is active in
+/// any component.
 /// \param options  the default of the peak is peakOfVectors(reference)
 /// \throws BadInput, UsageError  as for compareVolumes
 [[nodiscard]] VectorMetrics compareVectors(const VectorVolume& reference,
