@@ -9,10 +9,19 @@
 namespace esvr::render {
 namespace {
 
+/// The first grid that is no component of vectors, or else the first one.
+std::size_t firstOf(const EsvrFile& file) {
+  std::size_t place = 0;
+  for (const StoredVector& vector : file.vectors)
+    if (vector.first == place) place += kComponents;
+  return place < file.grids.size() ? place : 0;
+}
+
 std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
                     const std::optional<std::string>& grid) {
-  if (file.grids.empty()) throw BadInput(path.string() + ": no grids");
-  if (!grid) return 0;
+  if (file.grids.empty())
+    throw BadInput(path.string() + ": no grid that can be drawn; carried grids have no voxels");
+  if (!grid) return firstOf(file);
   std::vector<std::string> names;
   for (const auto& g : file.grids) names.push_back(g.descriptor.name);
   return findGrid(names, *grid, path);
@@ -27,7 +36,9 @@ std::string unitOf(const GridDescriptor& grid) {
 /// Reads a grid of an .esvr file. If the grid stores its voxels, they are drawn instead of the
 /// ellipsoids, because they are exact.
 Scene encoded(const SceneFile& from) {
-  EsvrFile file = readEsvr(from.path, {from.memory.maxBytes, from.memory.voxels});
+  ReadLimits limits{from.memory.maxBytes, from.memory.voxels};
+  limits.carriedBytes = false;
+  EsvrFile file = readEsvr(from.path, limits);
   StoredGrid& grid = file.grids[placeOf(file, from.path, from.grid)];
   Scene scene;
   scene.grid = grid.descriptor.name;

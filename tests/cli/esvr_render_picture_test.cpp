@@ -76,6 +76,20 @@ TEST_F(EsvrRender, TheGridThatIsNamedIsDrawn) {
   EXPECT_NE(picture("two.esvr", {"--grid", "heat"}).rgba, first.rgba);
 }
 
+TEST_F(EsvrRender, AComponentOfVectorsIsDrawnOnlyWhereThereIsNothingElse) {
+  const auto stored = readEsvr(folder_ / "in.esvr").grids[0];
+  auto component = stored;
+  component.descriptor.name = "velocity";
+  for (float& i : component.field.chunks[0].ellipsoids.intensity) i *= -1.0f;
+  EsvrFile file{{}, {component, component, component, stored}, {}, {{"velocity", 0}}};
+  writeEsvr(folder_ / "vectors.esvr", file);
+  EXPECT_EQ(picture("vectors.esvr").rgba, picture("in.esvr").rgba);
+  file.grids.pop_back();
+  std::filesystem::remove(folder_ / "vectors.esvr");
+  writeEsvr(folder_ / "vectors.esvr", file);
+  EXPECT_NE(picture("vectors.esvr").rgba, picture("in.esvr").rgba);
+}
+
 TEST_F(EsvrRender, ValuesOfFewerBitsChangeThePictureALittle) {
   const auto floats = picture("in.vdb", {"--values", "float"});
   const auto fp4 = picture("in.vdb", {"--values", "fp4"});

@@ -1,7 +1,7 @@
 // Plan: grids of vectors are converted and converted back. Type, class, vector type, transform,
 // metadata, background and active voxels are those of the source. The goals hold for each
-// component. Vectors that are smaller unchanged are carried. The summary, the report, --list, --reference and
-// esvr-compare treat the components as one grid.
+// component. Vectors that are smaller unchanged are carried. The summary, the report, --list,
+// --reference and esvr-compare treat the components as one grid.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
