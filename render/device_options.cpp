@@ -63,6 +63,8 @@ void readDeviceOptions(const Arguments& a, Options& options) {
   options.between = cli::choose<std::optional<Between>>(
       "between", a.get<std::string>("between"),
       {{"auto", std::nullopt}, {"voxels", Between::kVoxels}, {"sum", Between::kSum}});
+  if (options.shading && options.values)
+    throw UsageError("--shade cannot be drawn from a NanoVDB grid; leave --values out");
 }
 
 }  // namespace esvr::render

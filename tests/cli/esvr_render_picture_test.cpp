@@ -190,6 +190,7 @@ TEST_F(EsvrRender, ShadingChangesThePicture) {
   expectRefused({"--shade", "--light", "0,0,0"}, 2, "must have a length");
   expectRefused({"--shade", "--mode", "average"}, 2, "--shade needs --mode composite");
   expectRefused({"--shade", "--between", "sum"}, 2, "cannot be shaded");
+  expectRefused({"--shade", "--values", "fp8"}, 2, "leave --values out");
 }
 
 TEST_F(EsvrRender, PartsOfTheDepthAndMemoryChangeNothingOnGpu) {
