@@ -79,7 +79,7 @@ VectorVolume aligned(const VectorVolume& vectors) {
 
 SparseVolume magnitudeOf(const VectorVolume& vectors) {
   const VectorVolume all = aligned(vectors);
-  const auto& [x, y, z] = all;
+  const SparseVolume &x = all[0], &y = all[1], &z = all[2];  // a lambda cannot capture bindings
   SparseVolume result = x;
   result.background = lengthOf(x.background, y.background, z.background);
   tbb::parallel_for(std::size_t{0}, result.values.size(), [&](std::size_t v) {
