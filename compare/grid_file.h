@@ -60,7 +60,7 @@ class GridFile {
   cli::HostMemory memory_;
   std::uint64_t bytes_ = 0;
   std::vector<ListedGrid> grids_;
-  std::vector<std::string> whyNoBytes_;  ///< of a .vdb or .nvdb file: reasons why bytesOf has none
+  std::vector<std::string> whyNoBytes_;  ///< why bytesOf() has no figures; VDB files only
   std::vector<MetaItem> metadata_;
   std::unique_ptr<EsvrFile> esvr_;
 };

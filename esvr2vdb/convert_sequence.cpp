@@ -136,7 +136,7 @@ class SequenceDecoding {
   const int workers_;
   cli::MemoryGate gate_;
   cli::FrameWarnings warnings_;
-  std::mutex mutex_;  ///< of the log
+  std::mutex mutex_;  ///< guards the log
   const cli::Log log_;
   std::vector<Done> done_;
 };

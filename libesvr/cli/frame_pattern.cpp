@@ -96,7 +96,7 @@ std::vector<FramePattern::Entry> FramePattern::entries() const {
     const auto frame = digits ? parseWhole(*digits) : std::nullopt;
     if (!frame || !isFrameNumber(*frame)) continue;
     Entry entry{*frame, *digits == digitsOf(*frame), before_ + *digits + after_};
-    std::error_code notThere;  // what is behind a folder's name may be missing
+    std::error_code notThere;  // a link may lead to nothing
     if (fs::exists(entry.path, notThere)) found.push_back(std::move(entry));
   }
   return found;

@@ -15,12 +15,12 @@ Resolution coarser(Resolution r, int side) {
 }
 
 /// Two neighbouring pixels along an axis and the share of the second one.
-struct Between2 {
+struct PixelPair {
   int first, second;
   float share;
 };
 /// \param place  in pixels; beyond the middles of the outer pixels, these are taken
-Between2 pixelsAt(double place, int count) {
+PixelPair pixelsAt(double place, int count) {
   const double inside = std::clamp(place, 0.0, double(count - 1));
   const int first = int(inside);
   return {first, std::min(first + 1, count - 1), float(inside - first)};
@@ -41,13 +41,13 @@ class Enlarged {
   [[nodiscard]] Image take() { return std::move(image_); }
 
  private:
-  void addRow(const Between2& rows) {
-    for (const Between2& columns : columns_)
+  void addRow(const PixelPair& rows) {
+    for (const PixelPair& columns : columns_)
       for (int channel = 0; channel < 4; ++channel)
         image_.rgba.push_back(mix(along(rows.first, columns, channel),
                                   along(rows.second, columns, channel), rows.share));
   }
-  [[nodiscard]] float along(int row, const Between2& columns, int channel) const {
+  [[nodiscard]] float along(int row, const PixelPair& columns, int channel) const {
     return mix(at(row, columns.first, channel), at(row, columns.second, channel), columns.share);
   }
   [[nodiscard]] float at(int row, int column, int channel) const {
@@ -58,7 +58,7 @@ class Enlarged {
 
   const Image& from_;
   const View fine_, coarse_;
-  std::vector<Between2> columns_;
+  std::vector<PixelPair> columns_;
   Image image_;
 };
 
