@@ -7,7 +7,8 @@
 
 namespace esvr::render {
 
-/// The transfer function and its range.
+/// The transfer function and its range, and the further grids with theirs. The options of the
+/// picture and of the device are read before.
 void addTransferOptions(cli::po::options_description& options);
 void readTransferOptions(const cli::Arguments& a, Options& options);
 

@@ -41,10 +41,10 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.input = a.get<std::string>("input");
   options.output = a.find<std::string>("output").value_or("");
   options.grid = a.find<std::string>("grid");
-  readTransferOptions(a, options);
   readCameraOptions(a, options);
   readPictureOptions(a, options);
   readDeviceOptions(a, options);
+  readTransferOptions(a, options);
   readMeasuringOptions(a, options);
   options.overwrite = a.get<bool>("force");
   options.memory = cli::hostMemoryOf(a);

@@ -16,6 +16,7 @@ namespace esvr::render {
 inline constexpr const char* kProgram = "esvr-render";
 /// The transfer function unless an option says otherwise.
 inline constexpr const char *kUsualColors = "viridis", *kUsualOpacity = "linear";
+inline constexpr const char* kUsualFurtherColors = "inferno";  ///< colors of the grids of --with
 
 /// The range of values that the transfer function covers.
 enum class RangeKind {
@@ -25,14 +26,27 @@ enum class RangeKind {
   kGiven
 };
 
-struct Options {
-  std::filesystem::path input;
-  std::filesystem::path output;     ///< empty: no picture is written
-  std::optional<std::string> grid;  ///< default: the first that can be drawn
+/// How a grid looks.
+struct Look {
   /// The transfer function before it is rescaled to its range. Default: that of the grid's class.
   std::optional<TransferFunction> transfer;
   RangeKind rangeKind = RangeKind::kAuto;
   ValueRange range;  ///< the range of RangeKind::kGiven
+};
+
+/// A grid of --with.
+struct FurtherGrid {
+  std::string name;
+  Look look;
+  bool absorbs = true;  ///< see GridLook
+};
+
+struct Options {
+  std::filesystem::path input;
+  std::filesystem::path output;     ///< empty: no picture is written
+  std::optional<std::string> grid;  ///< default: the first that can be drawn
+  Look look;
+  std::vector<FurtherGrid> with;  ///< grids that are drawn in the same picture
   CameraWish camera;
   Resolution resolution;
   double step = 1.0, opacityLength = 1.0;

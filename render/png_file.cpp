@@ -22,8 +22,12 @@ void append(double v, int bits, std::vector<png_byte>& to) {
   to.push_back(png_byte(level & 0xffu));
 }
 
+/// The alpha of a transparent pixel. Light of a grid that emits but does not absorb can exceed the
+/// alpha of the picture, and a PNG could not hold it.
+double alphaFor(const float* pixel) { return *std::max_element(pixel, pixel + kPngChannels); }
+
 void appendPixel(const float* from, const PngForm& form, std::vector<png_byte>& to) {
-  const double alpha = from[3], behind = 1.0 - alpha;
+  const double alpha = form.background ? from[3] : alphaFor(from), behind = 1.0 - alpha;
   const Rgb ground = form.background.value_or(Rgb{});
   const double grounds[] = {ground.r, ground.g, ground.b};
   for (int c = 0; c < 3; ++c) {

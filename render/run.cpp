@@ -17,9 +17,9 @@
 #include "esvr/memory_limit.h"
 #include "render/bench.h"
 #include "render/exr_file.h"
-#include "render/legend.h"
 #include "render/output_files.h"
 #include "render/png_file.h"
+#include "render/render_options.h"
 #include "render/scene.h"
 #include "render/supersample.h"
 #include "report/video_file.h"
@@ -45,90 +45,35 @@ void checkPictureSize(const Options& options) {
       "a picture of " + std::to_string(r.width) + " x " + std::to_string(r.height) + " pixels");
 }
 
-ValueRange rangeOf(const Options& options, const Scene& scene) {
-  if (options.rangeKind == RangeKind::kGiven) return options.range;
-  if (options.rangeKind == RangeKind::kData) return scene.data;
-  return {std::min(scene.data.min, scene.background), std::max(scene.data.max, scene.background)};
-}
-
-/// The transfer function over its range. A level set is drawn as an opaque body unless an option
-/// asks for another function or range.
-TransferFunction transferOf(const Options& options, const Scene& scene) {
-  const bool usual = !options.transfer && options.rangeKind == RangeKind::kAuto;
-  const bool composite = options.mode == RenderMode::kComposite;
-  if (usual && composite && scene.isLevelSet && scene.background > 0.0f)
-    return levelSetSurface(double(scene.background));
-  const TransferFunction function = options.transfer.value_or(
-      TransferFunction{builtInColorMap(kUsualColors), builtInOpacity(kUsualOpacity)});
-  if (options.rangeKind == RangeKind::kOwn) return function;
-  return rescaled(function, rangeOf(options, scene));
-}
-
-/// The rule between voxels unless --between was given.
-Between usualBetween(const Scene& scene) {
-  const auto* field = std::get_if<Field>(&scene.content);
-  return field ? fittedBetween(*field) : Between::kVoxels;
-}
-
-/// Benchmarks use the sphere around the volume, so that their figures are those of earlier versions.
-Framing framingOf(const Options& options) {
-  if (options.bench) return Framing::kSphere;
-  return options.turntable == 0 ? Framing::kBox : Framing::kTurn;
-}
-
-/// The color bar that is drawn into pictures; nothing without --legend.
-std::optional<report::ColorBar> barOf(const Options& options, const Scene& scene) {
-  if (!options.legend) return std::nullopt;
-  return legendOf(options, scene, transferOf(options, scene));
-}
-
-/// The camera; if it is fitted, the volume lies beside the color bar.
-Camera cameraOf(const Options& options, const Scene& scene) {
-  const Resolution r = options.resolution;
-  CameraWish wish = options.camera;
-  wish.framing = framingOf(options);
-  if (const auto bar = barOf(options, scene))
-    wish.freeRight = report::colorBarShare(*bar, r.width, r.height);
-  return fitCamera(scene.box, wish, r);
-}
-
-RenderOptions renderOptions(const Options& options, const Scene& scene) {
-  RenderOptions r;
-  r.resolution = options.resolution;
-  r.camera = cameraOf(options, scene);
-  r.transfer = transferOf(options, scene);
-  r.step = options.step;
-  r.opacityLength = options.opacityLength;
-  r.minTransmittance = options.minTransmittance.value_or(r.minTransmittance);
-  r.mode = options.mode;
-  r.classification = options.classification;
-  r.lod = options.lod;
-  r.shading = options.shading;
-  r.between = options.between.value_or(usualBetween(scene));
-  r.clip = options.clip;
-  return r;
-}
-
-/// The scene of a file together with its renderer.
+/// Grids of a file together with their renderer.
 struct Drawing {
-  Drawing(Scene from, const DrawSettings& settings)
-      : scene(std::move(from)), renderer(scene, settings) {}
+  Drawing(std::vector<Scene> from, const DrawSettings& settings)
+      : scenes(std::move(from)), renderer(scenes, settings) {}
 
-  const Scene scene;
+  const std::vector<Scene> scenes;
   SceneRenderer renderer;
 };
+
+/// The grids of a file that the options name.
+SceneFile sceneFile(const Options& options, const fs::path& path) {
+  SceneFile file{path, options.grid, {}, options.memory};
+  for (const FurtherGrid& grid : options.with) file.with.push_back(grid.name);
+  return file;
+}
 
 /// The drawing of --ref. If the input is a VDB file, --values applies to the input alone.
 std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings& settings) {
   if (options.reference.empty()) return nullptr;
   DrawSettings own = settings;
   if (options.input.extension() != ".esvr") own.values.reset();
-  return std::make_unique<Drawing>(readScene({options.reference, std::nullopt, options.memory}),
-                                   own);
+  return std::make_unique<Drawing>(readScenes(sceneFile(options, options.reference)), own);
 }
 
-std::string summary(const fs::path& file, const Scene& scene, Resolution r, double seconds) {
-  return file.string() + ": " + scene.grid + ", " + std::to_string(r.width) + " x " +
+std::string summary(const fs::path& file, const std::vector<Scene>& scenes, Resolution r,
+                    double seconds) {
+  std::string grids = scenes.front().grid;
+  for (std::size_t i = 1; i < scenes.size(); ++i) grids += " + " + scenes[i].grid;
+  return file.string() + ": " + grids + ", " + std::to_string(r.width) + " x " +
          std::to_string(r.height) + ", " + cli::shortNumber(seconds) + " s";
 }
 
@@ -153,7 +98,7 @@ class Frames {
         log_(kProgram, options.verbosity),
         drawing_(drawing),
         reference_(reference),
-        bar_(barOf(options, drawing.scene)) {
+        bar_(barOf(options, drawing.scenes.front())) {
     if (report::isVideo(options.output))
       video_.emplace(options.output, videoForm(options, commandText()), cancel);
   }
@@ -172,7 +117,7 @@ class Frames {
   void finish() {
     if (!video_) return;
     video_->finish();
-    log_.info(summary(options_.output, drawing_.scene, options_.resolution, watch_.lap()) + ", " +
+    log_.info(summary(options_.output, drawing_.scenes, options_.resolution, watch_.lap()) + ", " +
               std::to_string(pictures_) + " pictures, " +
               cli::shortNumber(pictures_ / options_.fps) + " s of video");
   }
@@ -181,7 +126,7 @@ class Frames {
  private:
   void keep(const Image& image, const RenderOptions& r, const PictureFiles& files, double seconds) {
     write(files.picture, withBar(image), options_.background);
-    log_.info(summary(files.picture, drawing_.scene, r.resolution, seconds));
+    log_.info(summary(files.picture, drawing_.scenes, r.resolution, seconds));
     if (reference_ != nullptr) compare(r, image, files);
   }
 
@@ -282,9 +227,9 @@ void run(const Options& options) {
   checkPictureSize(options);
   const DrawSettings settings{selectDevice(options.device), options.limits, options.values,
                               options.shading.has_value(), options.memory};
-  Scene scene = readScene({options.input, options.grid, options.memory});
-  RenderOptions r = renderOptions(options, scene);
-  Drawing drawing(std::move(scene), settings);
+  auto scenes = readScenes(sceneFile(options, options.input));
+  RenderOptions r = renderOptions(options, scenes);
+  Drawing drawing(std::move(scenes), settings);
   const auto reference = referenceOf(options, settings);
   r.cancel = &interrupts.token();
   saveTransfer(options, r.transfer);
@@ -296,7 +241,7 @@ void run(const Options& options) {
         r, options.turntable, log));
   } else {
     Frames frames(options, drawing, reference.get(), interrupts.token());
-    drawFrames(options, r, pivotOf(drawing.scene.box, options.camera), frames);
+    drawFrames(options, r, pivotOf(options, drawing.scenes), frames);
     report["comparisons"] = frames.comparisons();
   }
   writeReport(options, report);

@@ -1,10 +1,12 @@
 #pragma once
-/// Reads the content of a file and draws it.
+/// Reads grids of a file and draws them.
 
+#include <deque>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "cli/host_memory.h"
 #include "esvr/grid_coding.h"
@@ -13,6 +15,7 @@
 
 namespace esvr::render {
 
+/// A grid to draw.
 struct Scene {
   std::variant<Field, VolumeGrid> content;
   std::string grid;  ///< name of the grid
@@ -27,12 +30,15 @@ struct Scene {
 struct SceneFile {
   std::filesystem::path path;
   std::optional<std::string> grid;  ///< default: the first grid that can be drawn
+  std::vector<std::string> with;    ///< further grids, which are drawn in the same picture
   cli::HostMemory memory;           ///< memory that input may take
 };
 
-/// \throws BadInput        the file cannot be read, or has no such grid or none that can be drawn
-/// \throws MemoryExceeded  the grid needs more than SceneFile::maxMemory
-[[nodiscard]] Scene readScene(const SceneFile& file);
+/// Reads the grid and the further grids of a file.
+/// \throws BadInput        the file cannot be read, or has no such grid or none that can be drawn;
+///                         the grids differ in their transforms
+/// \throws MemoryExceeded  the grids need more than SceneFile::memory
+[[nodiscard]] std::vector<Scene> readScenes(const SceneFile& file);
 
 struct DrawSettings {
   Device device;
@@ -42,24 +48,24 @@ struct DrawSettings {
   cli::HostMemory memory;            ///< memory that input may take
 };
 
-/// Draws a scene, which must outlive it.
+/// Draws a grid, or several grids in one picture. They must outlive it.
 class SceneRenderer {
  public:
   /// Voxels are drawn as a NanoVDB grid on a CUDA device, or if `values` asks for one, but not if
-  /// pictures are shaded. The voxels of
-  /// a field are decoded when a ray needs them. If they do not follow from its ellipsoids alone, all
-  /// are decoded at once.
+  /// pictures are shaded or have several grids. The voxels of a field are decoded when a ray needs
+  /// them. If they do not follow from its ellipsoids alone, all are decoded at once.
   /// \throws DeviceError  the device fails, or its memory is exhausted
-  SceneRenderer(const Scene& scene, const DrawSettings& settings);
+  SceneRenderer(const std::vector<Scene>& scenes, const DrawSettings& settings);
 
   Renderer* operator->() { return renderer_.get(); }
   Renderer& operator*() { return *renderer_; }
 
  private:
-  void drawField(const Field& field, const StoredGrid& grid, const DrawSettings& settings);
-  void sampleVoxels(const VolumeGrid& grid, const DrawSettings& settings);
+  [[nodiscard]] DrawnGrid drawnGrid(const Scene& scene, const cli::HostMemory& memory);
+  void drawAlone(const Scene& scene, const DrawSettings& settings);
+  void sampleNano(const VolumeGrid& grid, const DrawSettings& settings);
 
-  SparseVolume decoded_;
+  std::deque<SparseVolume> decoded_;
   NanoVolume nano_;
   std::unique_ptr<Renderer> renderer_;
 };

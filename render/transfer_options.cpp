@@ -1,44 +1,25 @@
+#include "render/look_text.h"
 #include "render/option_groups.h"
-
-#include "cli/number_list.h"
 
 namespace esvr::render {
 namespace {
 
 using cli::Arguments;
 using cli::po::value;
+using Texts = std::vector<std::string>;
 
-std::optional<TransferFunction> transferOf(const Arguments& a) {
-  const auto file = a.find<std::string>("tf");
-  const auto opacity = a.find<std::string>("opacity");
-  if (!file && a.has("preset")) throw UsageError("--preset says nothing without --tf");
-  if (!file && !opacity && !a.has("colors")) return std::nullopt;
-  if (!file)
-    return TransferFunction{builtInColorMap(a.find<std::string>("colors").value_or(kUsualColors)),
-                            builtInOpacity(opacity.value_or(kUsualOpacity))};
-  if (a.has("colors")) throw UsageError("--tf and --colors are two color maps; give one");
-  auto f = readParaViewPreset(*file, a.find<std::string>("preset").value_or(""));
-  if (!opacity) return f;
-  const auto& points = f.colors.points;
-  f.opacity = builtInOpacity(*opacity);
-  for (auto& p : f.opacity) p.x = points.front().x + p.x * (points.back().x - points.front().x);
-  return f;
-}
-
-void readRange(const Arguments& a, Options& options) {
-  const auto& text = a.get<std::string>("range");
-  if (text == "auto")
-    options.rangeKind = RangeKind::kAuto;
-  else if (text == "data")
-    options.rangeKind = RangeKind::kData;
-  else if (text == "own")
-    options.rangeKind = RangeKind::kOwn;
-  else {
-    const auto v = cli::parseNumbers("range", text, 2);
-    if (v[0] > v[1]) throw UsageError("--range must have LO <= HI, not '" + text + "'");
-    options.rangeKind = RangeKind::kGiven;
-    options.range = {float(v[0]), float(v[1])};
-  }
+/// Refuses what several grids in one picture do not have.
+void checkSeveralGrids(const Options& options) {
+  if (int(options.with.size()) >= kMostGrids)
+    throw UsageError("--with can be given up to " + std::to_string(kMostGrids - 1) + " times");
+  const auto refuse = [](bool given, const std::string& option) {
+    if (given) throw UsageError(option + " cannot be given with --with");
+  };
+  refuse(options.mode != RenderMode::kComposite, "--mode maximum or average");
+  refuse(options.shading.has_value(), "--shade");
+  refuse(!options.depth.empty(), "--depth");
+  refuse(options.values.has_value(), "--values");
+  refuse(options.between == Between::kSum, "--between sum");
 }
 
 }  // namespace
@@ -63,16 +44,23 @@ void addTransferOptions(cli::po::options_description& options) {
      "auto (that range and the background), own (the range in the file of --tf), or LO,HI")
     ("opacity-length", value<double>()->value_name("L")->default_value(1.0),
      "length in voxels over which a constant value has the opacity of the curve; a larger length "
-     "makes the volume more transparent");
+     "makes the volume more transparent")
+    ("with", value<Texts>()->composing()->value_name("NAME[:LOOK]"),
+     "also draw this grid in the same picture, see the notes; can be repeated");
   // clang-format on
 }
 
 void readTransferOptions(const Arguments& a, Options& options) {
-  options.transfer = transferOf(a);
-  readRange(a, options);
+  options.look = lookOf(
+      {a.find<std::string>("colors"), a.find<std::string>("opacity"), a.find<std::string>("tf"),
+       a.find<std::string>("preset"), a.get<std::string>("range")},
+      kUsualColors);
   options.opacityLength = a.get<double>("opacity-length");
   cli::requireRange("opacity-length", options.opacityLength, 1e-6, 1e6);
   options.saveTransfer = a.find<std::string>("tf-save").value_or("");
+  for (const std::string& text : a.find<Texts>("with").value_or(Texts{}))
+    options.with.push_back(furtherGridOf(text));
+  if (!options.with.empty()) checkSeveralGrids(options);
 }
 
 }  // namespace esvr::render

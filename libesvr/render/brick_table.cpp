@@ -85,8 +85,7 @@ PlaceBox cellsOf(const BrickTable& table) {
   for (const Coord brick : table.bricks) box.expand(brick);
   if (box.empty()) return {{1.0, 1.0, 1.0}, {0.0, 0.0, 0.0}};
   const Coord low = box.min * kBrickSide, high = (box.max + Coord{1, 1, 1}) * kBrickSide;
-  return {{double(low.x), double(low.y), double(low.z)},
-          {double(high.x), double(high.y), double(high.z)}};
+  return {pointOf(low), pointOf(high)};
 }
 
 }  // namespace esvr

@@ -42,7 +42,7 @@ struct LevelFrame {
 /// \param origin  a voxel of the level
 ESVR_HD inline MarchScene sceneOfLevel(const MarchScene& scene, LevelFrame frame,
                                        const Coord& origin) {
-  const Vec3 from{double(origin.x), double(origin.y), double(origin.z)};
+  const Vec3 from = pointOf(origin);
   MarchScene s = scene;
   s.view.eye = difference(frame.place(scene.view.eye), from);
   if (!s.view.perspective) {

@@ -24,16 +24,25 @@ void checkClip(const PlaceBox& box) {
     if (!(box.low[a] <= box.high[a])) throw UsageError("a clip box must not end before it begins");
 }
 
-const RenderOptions& checked(const RenderOptions& options) {
-  checkRenderOptions(options);
+void requireLooks(const RenderOptions& options, std::size_t grids) {
+  const std::size_t looks = options.further.size() + 1;
+  if (looks != grids)
+    throw UsageError("a picture of " + std::to_string(grids) + " grids needs as many looks, not " +
+                     std::to_string(looks));
+}
+
+const RenderOptions& checked(const RenderOptions& options, std::size_t grids) {
+  checkRenderOptions(options, grids);
   return options;
 }
 
 }  // namespace
 
-void checkRenderOptions(const RenderOptions& options) {
+void checkRenderOptions(const RenderOptions& options, std::size_t grids) {
+  requireLooks(options, grids);
   checkCamera(options.camera, options.resolution);
   checkTransferFunction(options.transfer);
+  for (const GridLook& look : options.further) checkTransferFunction(look.transfer);
   requirePositive(options.step, "the step");
   requirePositive(options.opacityLength, "the opacity's length");
   if (!(options.minTransmittance >= 0.0 && options.minTransmittance < 1.0))
@@ -55,8 +64,8 @@ MarchScene marchScene(const RenderOptions& o, const SampleRule& rule) {
   return scene;
 }
 
-Picture::Picture(const RenderOptions& options)
-    : view(checked(options).camera, options.resolution),
+Picture::Picture(const RenderOptions& options, std::size_t grids)
+    : view(checked(options, grids).camera, options.resolution),
       table(options.transfer, samplingOf(options)),
       image_{options.resolution.width, options.resolution.height, {}} {
   image_.rgba.resize(std::size_t(4) * std::size_t(image_.width) * std::size_t(image_.height));

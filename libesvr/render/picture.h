@@ -8,8 +8,8 @@
 
 namespace esvr {
 
-/// \throws UsageError  as for renderField
-void checkRenderOptions(const RenderOptions& options);
+/// \throws UsageError  as for renderField, or the options have not as many looks as there are grids
+void checkRenderOptions(const RenderOptions& options, std::size_t grids = 1);
 /// \throws UsageError  the options have a shading, which needs voxels in bricks
 void refuseShading(const RenderOptions& options);
 
@@ -19,7 +19,7 @@ void refuseShading(const RenderOptions& options);
 class Picture {
  public:
   /// \throws UsageError  as for renderField
-  explicit Picture(const RenderOptions& options);
+  explicit Picture(const RenderOptions& options, std::size_t grids = 1);
 
   const View view;
   const TransferTable table;

@@ -66,7 +66,7 @@ class Enlarged {
 
 ProgressivePicture::ProgressivePicture(Renderer& renderer, RenderOptions options)
     : renderer_(renderer), options_(std::move(options)) {
-  checkRenderOptions(options_);
+  checkRenderOptions(options_, options_.further.size() + 1);  // the renderer checks their number
 }
 
 bool ProgressivePicture::refine(double seconds) {

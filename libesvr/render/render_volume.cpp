@@ -66,7 +66,7 @@ class RayMarch {
   [[nodiscard]] Shade shadeAt(const Ray& ray, const Vec3& place,
                               const VoxelSampler::Corners& corners, Coord brick) const {
     const Coord corner = brick * kBrickSide;
-    const Vec3 low{double(corner.x), double(corner.y), double(corner.z)};
+    const Vec3 low = pointOf(corner);
     const auto valueAt = [&](const FloatPlace& p) {
       return sampler_.interpolate(corners, cellIn(corner, p));
     };

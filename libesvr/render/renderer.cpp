@@ -7,6 +7,7 @@
 #include "esvr/error.h"
 #include "render/cuda/make_cuda_renderer.h"
 #include "render/render_cells.h"
+#include "render/render_grids.h"
 #include "render/render_levels.h"
 
 namespace esvr {
@@ -97,6 +98,22 @@ class CudaFieldRenderers final : public Renderer {
   Renderer* last_ = nullptr;
 };
 
+/// Draws several grids on the CPU. Their voxels are kept from picture to picture.
+struct GridsDrawing {
+  Image operator()(const RenderOptions& options) { return renderGrids(grids, options); }
+  void forget() {
+    for (GridCells& grid : grids) grid.forget();
+  }
+
+  std::vector<GridCells> grids;
+};
+
+void requireNumberOfGrids(std::size_t grids) {
+  if (grids < 1 || grids > std::size_t(kMostGrids))
+    throw UsageError("a picture can show 1 to " + std::to_string(kMostGrids) + " grids, not " +
+                     std::to_string(grids));
+}
+
 template <class Draw>
 std::unique_ptr<Renderer> makeCpuRenderer(Draw draw) {
   return std::make_unique<CpuRenderer<Draw>>(std::move(draw));
@@ -119,6 +136,13 @@ std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume, const D
                                              const RendererLimits& limits) {
   if (device.kind == DeviceKind::kCuda) return cuda::makeCudaVolumeRenderer(volume, device, limits);
   return makeCpuRenderer(VolumeDrawing{VolumeLevels(volume)});
+}
+
+std::unique_ptr<Renderer> makeGridsRenderer(const std::vector<DrawnGrid>& grids,
+                                            const Device& device, const RendererLimits& limits) {
+  requireNumberOfGrids(grids.size());
+  if (device.kind == DeviceKind::kCuda) return cuda::makeCudaGridsRenderer(grids, device, limits);
+  return makeCpuRenderer(GridsDrawing{{grids.begin(), grids.end()}});
 }
 
 std::unique_ptr<Renderer> makeNanoRenderer(const NanoVolume& volume, const Device& device,

@@ -26,15 +26,17 @@ BrickCover coverOf(const CoverView& view, const Coord& brick) {
 
 }  // namespace
 
-TileRanges::TileRanges(const CoverView& view, const std::vector<Coord>& bricks)
-    : columns_(tilesAlong(view.resolution.width)),
-      rows_(tilesAlong(view.resolution.height)),
+TileRanges::TileRanges(Resolution resolution)
+    : columns_(tilesAlong(resolution.width)),
+      rows_(tilesAlong(resolution.height)),
       ranges_(std::size_t(columns_) * std::size_t(rows_),
-              {std::numeric_limits<int>::max(), std::numeric_limits<int>::min()}) {
-  for (const Coord brick : bricks) add(view, brick);
+              {std::numeric_limits<int>::max(), std::numeric_limits<int>::min()}) {}
+
+void TileRanges::add(const CoverView& view, const std::vector<Coord>& bricks) {
+  for (const Coord brick : bricks) addOne(view, brick);
 }
 
-void TileRanges::add(const CoverView& view, const Coord& brick) {
+void TileRanges::addOne(const CoverView& view, const Coord& brick) {
   const BrickCover cover = coverOf(view, brick);
   const CoveredTiles tiles = tilesOf(view, cover, kSide);
   for (int row = tiles.firstRow; row < tiles.firstRow + tiles.rows; ++row)

@@ -15,8 +15,12 @@ class TileRanges {
  public:
   static constexpr int kSide = 8;  ///< pixels
 
+  /// The rays meet no bricks.
+  explicit TileRanges(Resolution resolution);
+  /// Widens the ranges by those of further bricks.
+  /// \param view    has the resolution of all other views; its first sample is the same too
   /// \param bricks  places in bricks, in the frame of the view
-  TileRanges(const CoverView& view, const std::vector<Coord>& bricks);
+  void add(const CoverView& view, const std::vector<Coord>& bricks);
 
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] int rows() const { return rows_; }
@@ -25,7 +29,7 @@ class TileRanges {
   }
 
  private:
-  void add(const CoverView& view, const Coord& brick);
+  void addOne(const CoverView& view, const Coord& brick);
 
   int columns_, rows_;
   std::vector<TileSamples> ranges_;

@@ -5,10 +5,12 @@
 #include <numbers>
 
 #include "esvr/camera.h"
+#include "esvr/coord.h"
 #include "esvr/kernel.h"
 
 namespace esvr {
 
+ESVR_HD inline Vec3 pointOf(const Coord& c) { return {double(c.x), double(c.y), double(c.z)}; }
 ESVR_HD inline Vec3 sum(const Vec3& a, const Vec3& b) {
   return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
 }

@@ -6,9 +6,7 @@
 namespace esvr {
 namespace {
 
-Vec3 corner(Coord brick) {
-  return scaled({double(brick.x), double(brick.y), double(brick.z)}, kBrickSide);
-}
+Vec3 corner(Coord brick) { return scaled(pointOf(brick), kBrickSide); }
 
 float between(float a, float b, float s) { return a + s * (b - a); }
 

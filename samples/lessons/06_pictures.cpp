@@ -76,6 +76,16 @@ int main() {
     largest = std::max(largest, std::abs(decoded.rgba[i] - first.rgba[i]));
   check(largest < 0.01f, "it is the picture of the decoded voxels");
 
+  // Several grids that have one index space can share a picture. Each has its own transfer function;
+  // here the second one glows within the ring and hides nothing. A file's temperature often does.
+  const auto pair = esvr::makeGridsRenderer(
+      {esvr::DrawnField{&grid.field, esvr::voxelRule(grid)}, &ring}, esvr::selectDevice("cpu"));
+  esvr::RenderOptions glowing = options;
+  glowing.further = {{options.transfer, /*absorbs=*/false}};
+  const esvr::Image glow = pair->draw(glowing);
+  check(glow.rgba[4 * (32 * 64 + 32)] >= first.rgba[4 * (32 * 64 + 32)], "light is only added");
+  check(glow.rgba != first.rgba, "the second grid is visible");
+
   // Another thread may cancel a picture that takes too long.
   esvr::CancelToken cancel;
   options.cancel = &cancel;

@@ -146,7 +146,8 @@ Table renderTests() {
           {"--threads", "EsvrRender.TheNumberOfThreadsChangesNothing"},
           {"--turntable", "EsvrRender.ATurntableWritesAPictureForEveryAngle"},
           {"--up", "EsvrRender.AGivenCameraIsTaken"},
-          {"--values", "EsvrRender.ValuesOfFewerBitsChangeThePictureALittle"}};
+          {"--values", "EsvrRender.ValuesOfFewerBitsChangeThePictureALittle"},
+          {"--with", "EsvrRenderGrids.EachPartOfALookChangesThePicture"}};
 }
 
 Table checkTests() {

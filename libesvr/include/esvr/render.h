@@ -9,6 +9,7 @@
 /// calling TBB arena).
 
 #include <optional>
+#include <vector>
 
 #include "esvr/camera.h"
 #include "esvr/field.h"
@@ -84,11 +85,20 @@ struct PlaceBox {
   Vec3 low, high;
 };
 
+/// How a grid looks that is drawn together with others (makeGridsRenderer).
+struct GridLook {
+  TransferFunction transfer;
+  /// False: the grid emits light, as much as if it absorbed some, but absorbs none. It does not hide
+  /// what lies behind it, and adds nothing to alpha.
+  bool absorbs = true;
+};
+
 struct RenderOptions {
   Camera camera;
   Resolution resolution;
-  TransferFunction transfer;  ///< tabulated at 4097 values from its first point to its last
-  double step = 1.0;          ///< distance between samples, voxels
+  TransferFunction transfer;        ///< tabulated at 4097 values from its first point to its last
+  std::vector<GridLook> further{};  ///< looks of the second grid and of those after it
+  double step = 1.0;                ///< distance between samples, voxels
   /// The length, in voxels, over which the transfer function's opacities are reached. The opacity
   /// of a step of constant value is 1 - (1 - opacity)^(step / opacityLength).
   double opacityLength = 1.0;
@@ -115,8 +125,8 @@ struct RenderOptions {
 ///                are -background wherever an ellipsoid reaches. Between::kSum uses its range only
 /// \throws UsageError  as for checkCamera and checkTransferFunction; step, opacityLength or
 ///                     minTransmittance is out of range; the clip box is invalid; a picture that
-///                     cannot be shaded has a shading, or its light is invalid; a ray has more
-///                     than 2^24 samples; with Between::kVoxels, the box of the bricks has more
+///                     cannot be shaded has a shading, or its light is invalid; there are looks of
+///                     further grids; a ray has more than 2^24 samples; with Between::kVoxels, the box of the bricks has more
 ///                     than 2^28 blocks of 64^3 voxels
 /// \throws MemoryExceeded  with Between::kVoxels, as for reachedBricks
 /// \throws Cancelled   RenderOptions::cancel was set

@@ -7,6 +7,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <variant>
+#include <vector>
 
 #include "esvr/device.h"
 #include "esvr/nano_volume.h"
@@ -81,6 +83,35 @@ class Renderer {
 [[nodiscard]] std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume,
                                                            const Device& device,
                                                            const RendererLimits& limits = {});
+
+/// A field that is drawn as in makeFieldRenderer with Between::kVoxels.
+struct DrawnField {
+  const Field* field = nullptr;
+  RevoxeliseOptions voxels{};
+};
+/// A grid that is drawn together with others. What it points to must outlive its renderer.
+using DrawnGrid = std::variant<DrawnField, const SparseVolume*>;
+
+/// The largest number of grids that are drawn together.
+inline constexpr int kMostGrids = 4;
+
+/// Makes a renderer that draws several grids in one picture, for example a density that absorbs and a
+/// temperature that emits. The grids have one index space, and all are sampled at the same places.
+/// The first one looks as RenderOptions::transfer says, and the others as RenderOptions::further
+/// says, which has a look for each. In a segment between two samples the extinctions of all grids
+/// add up, and its color is the mean of the colors of the grids, weighted by their extinctions
+/// (docs/math.md).
+///
+/// The voxels of level 0 are drawn wherever they are, whatever RenderOptions::lod says.
+/// Pictures are composited and not shaded.
+/// \throws UsageError   there is no grid or there are more than kMostGrids; as for
+///                      makeVolumeRenderer
+/// \throws DeviceError  as for makeFieldRenderer
+/// Renderer::draw() also throws a UsageError if RenderOptions has another mode than kComposite, a
+/// shading, or not as many looks as there are grids.
+[[nodiscard]] std::unique_ptr<Renderer> makeGridsRenderer(const std::vector<DrawnGrid>& grids,
+                                                          const Device& device,
+                                                          const RendererLimits& limits = {});
 
 /// Draws a NanoVDB grid by the rule of renderVolume. Other renderers are compared with this one.
 /// The position of a sample is computed in float32 as an offset from the point where its ray enters

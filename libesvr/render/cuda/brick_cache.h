@@ -7,7 +7,7 @@
 #include "core/cuda/growing_buffer.h"
 #include "core/cuda/pinned.h"
 #include "render/cell_field.h"
-#include "render/cuda/brick_draw.h"
+#include "render/cuda/brick_demand.h"
 #include "render/cuda/decode_cells.h"
 #include "render/cuda/device_level.h"
 #include "render/cuda/slot_account.h"
@@ -63,6 +63,13 @@ class BrickCache {
   /// \param pass  how often the rays of the picture have waited
   [[nodiscard]] BrickDemand demand(int pass);
   [[nodiscard]] BrickDemand::Counts counts();
+  /// Whether there was no room for all bricks that rays asked for last. In the next pass, a ray then
+  /// asks for no brick but the one at which it waits.
+  [[nodiscard]] bool isCrowded() const { return crowded_; }
+  /// The number of bricks for which there is room now.
+  [[nodiscard]] std::uint32_t slotCount() const {
+    return std::uint32_t(pages_.size()) * BrickSlotsView::kPageSlots;
+  }
   /// Forgets all bricks. The memory stays.
   void forget();
   /// Decodes the bricks that rays have asked for, as many as there is room for; the others become
@@ -78,9 +85,6 @@ class BrickCache {
   }
 
  private:
-  [[nodiscard]] std::uint32_t slotCount() const {
-    return std::uint32_t(pages_.size()) * BrickSlotsView::kPageSlots;
-  }
   [[nodiscard]] SlotAccount account();
   [[nodiscard]] std::uint32_t makeRoomFor(std::uint32_t bricks, std::uint32_t free);
   [[nodiscard]] bool mayAddPage() const;
@@ -92,7 +96,7 @@ class BrickCache {
   const DeviceCells& cells_;
   cudaStream_t stream_;
   std::uint64_t maxBytes_ = 0;  ///< 0: no limit
-  bool crowded_ = false;        ///< whether the last rays asked for more bricks than had room
+  bool crowded_ = false;
   std::uint32_t now_ = 0;
   std::vector<DeviceBuffer<float>> pages_;
   GrowingBuffer<float*> pageTable_;

@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 
+#include "render/cuda/brick_draw.h"
 #include "render/cuda/cell_store.h"
 #include "render/cuda/make_cuda_renderer.h"
 #include "render/cuda/march_renderer.h"
@@ -11,45 +12,6 @@
 
 namespace esvr::cuda {
 namespace {
-
-/// The tiles whose rays wait for bricks, in memory that grows with their number.
-class Waiting {
- public:
-  explicit Waiting(cudaStream_t stream)
-      : stream_(stream), found_(stream), entries_(stream), tiles_(stream) {}
-
-  /// Memory for the numbers of waiting tiles or entries.
-  std::uint32_t* found(std::size_t tiles) { return found_.reserve(tiles); }
-
-  /// Takes the tiles that were found after the first pass; their rays begin anew.
-  WaitingTiles begin(std::uint32_t count) {
-    copy(tiles_.reserve(count), count);
-    makeRoom(rays_, std::size_t(count) * kMarchTilePixels, stream_);
-    return view(count, true);
-  }
-  /// Takes the entries that were found in a later pass.
-  WaitingTiles next(std::uint32_t count) {
-    copy(entries_.reserve(count), count);
-    return view(count, false);
-  }
-  [[nodiscard]] std::size_t bytes() const {
-    return found_.bytes() + entries_.bytes() + tiles_.bytes() + rays_.bytes();
-  }
-
- private:
-  void copy(std::uint32_t* to, std::uint32_t count) {
-    check(
-        cudaMemcpyAsync(to, found_.data(), count * sizeof(*to), cudaMemcpyDeviceToDevice, stream_),
-        "listing waiting rays");
-  }
-  WaitingTiles view(std::uint32_t count, bool begin) {
-    return {count, begin, entries_.data(), tiles_.data(), rays_.data()};
-  }
-
-  cudaStream_t stream_;
-  GrowingBuffer<std::uint32_t> found_, entries_, tiles_;
-  DeviceBuffer<RayProgress> rays_;
-};
 
 /// Makes the bricks on the renderer's stream.
 using MakeStore = std::function<std::unique_ptr<CellStore>(cudaStream_t)>;
@@ -73,54 +35,58 @@ class CellRenderer final : public MarchRenderer {
               {}};
     store_->prepare(scene_->bounds);
     for (int l = scene_->bounds.first; l <= scene_->bounds.last; ++l)
-      scene_->levels[l - scene_->bounds.first] = {store_->level(l).table(), store_->level(l).box(),
-                                                  tableOf(o, l)};
+      scene_->levels[l - scene_->bounds.first] = {
+          store_->level(l).table(), store_->level(l).box(),
+          table(std::size_t(l - scene_->bounds.first), o.transfer,
+                samplingOf(o, LevelFrame{l}.side()))};
   }
 
   void launch(const RenderOptions& o, Band band, float4* pixels) override {
     if (store_->level(0).count() == 0) return;
-    BrickDrawArguments arguments = argumentsOf(o, band, pixels);
-    if (store_->cache() == nullptr) {
-      launchRanges(arguments, stream());
+    const TileBand tiles = bandOf(o, band, pixels);
+    BrickDrawArguments arguments{*scene_, store_->slots(), tiles, {}, nullptr};
+    launchClearRanges(tiles, stream());
+    launchWidenRanges(tiles, coveringBricks(o), stream());
+    if (store_->cache() == nullptr)
       launchMarch(arguments, {}, stream());
-    } else {
+    else
       drawAndServe(o, arguments, *store_->cache());
-    }
   }
 
-  BrickDrawArguments argumentsOf(const RenderOptions& o, Band band, float4* pixels) {
-    const int last = scene_->bounds.last;
-    const DeviceLevel& coarsest = store_->level(last);
-    const View view = scene_->at(scene_->last()).view;
-    const int tileRows = tilesAlong(band.rows);
-    makeRoom(ranges_, std::size_t(tileRows) * std::size_t(tilesAlong(o.resolution.width)),
+  TileBand bandOf(const RenderOptions& o, Band band, float4* pixels) {
+    const int tileRows = TileBand::tilesAlong(band.rows);
+    makeRoom(ranges_, std::size_t(tileRows) * std::size_t(TileBand::tilesAlong(o.resolution.width)),
              stream());
-    return {.scene = *scene_,
-            .slots = store_->slots(),
-            .bricks = coarsest.bricks(),
-            .firstBrick = coarsest.first(),
-            .count = coarsest.count(),
-            .resolution = o.resolution,
+    const PlaceBox box = store_->level(scene_->bounds.last).box();
+    return {.resolution = o.resolution,
             .firstTileRow = band.firstRow / kMarchTileSide,
             .tileRows = tileRows,
             .ranges = ranges_.data(),
-            .firstSample = double(binsWithin(coarsest.box(), view, o.step).first) * kBinSamples,
-            .pixels = pixels,
-            .demand = {},
-            .waiting = nullptr};
+            .firstSample = double(binsWithin(box, coarsestView(), o.step).first) * kBinSamples,
+            .pixels = pixels};
   }
+
+  /// The bricks of the coarsest level, which are the fewest. Those that are known to be vacant do not
+  /// count. If there are several levels, they do: means may be the background where voxels are not.
+  CoveringBricks coveringBricks(const RenderOptions& o) const {
+    const DeviceLevel& coarsest = store_->level(scene_->bounds.last);
+    return {coarsestView(),    o.step,
+            coarsest.bricks(), coarsest.first(),
+            coarsest.count(),  scene_->bounds.oneLevel() ? store_->slots().slotOf : nullptr};
+  }
+
+  View coarsestView() const { return scene_->at(scene_->last()).view; }
 
   /// Draws, decodes the bricks that rays ask for and lets the rays continue, until none waits.
   void drawAndServe(const RenderOptions& o, BrickDrawArguments arguments, BrickCache& cache) {
-    arguments.waiting = waiting_.found(ranges_.size());
+    arguments.waiting = waiting_.found(std::size_t(arguments.band.tiles()));
     arguments.demand = cache.demand(0);
-    launchRanges(arguments, stream());
     launchMarch(arguments, {}, stream());
     auto counts = cache.counts();
     for (int pass = 1; counts.waiting > 0; ++pass) {
       checkCancelled(o);
-      const WaitingTiles tiles =
-          pass == 1 ? waiting_.begin(counts.waiting) : waiting_.next(counts.waiting);
+      const auto tiles = pass == 1 ? waiting_.begin(counts.waiting)
+                                   : waiting_.next(0, counts.waiting, counts.waiting);
       cache.serve(counts, arguments.scene.bounds);
       arguments.slots = cache.slots();
       arguments.demand = cache.demand(pass);
@@ -128,8 +94,6 @@ class CellRenderer final : public MarchRenderer {
       counts = cache.counts();
     }
   }
-
-  static int tilesAlong(int pixels) { return (pixels + kMarchTileSide - 1) / kMarchTileSide; }
 
   void shareMemory(std::uint64_t left) override {
     if (store_->cache() != nullptr) store_->cache()->limit(left);
@@ -143,16 +107,12 @@ class CellRenderer final : public MarchRenderer {
     return store_->bytes() + ranges_.bytes() + waiting_.bytes();
   }
   std::size_t bytesOfRow(Resolution r) const override {
-    const bool waits = store_->cache() != nullptr;
-    const std::size_t ofTile =
-        sizeof(int2) +
-        (waits ? kMarchTilePixels * sizeof(RayProgress) + 3 * sizeof(std::uint32_t) : 0);
-    return std::size_t(tilesAlong(r.width)) * ofTile / kMarchTileSide + 1;
+    return bytesOfTileRow<RayProgress>(r, store_->cache() != nullptr) / kMarchTileSide + 1;
   }
 
   std::unique_ptr<CellStore> store_;
   std::optional<LevelScene> scene_;  ///< of the picture that is drawn
-  Waiting waiting_;
+  WaitingMemory<RayProgress> waiting_;
   DeviceBuffer<int2> ranges_;
 };
 

@@ -21,8 +21,7 @@ class CellStore {
   /// A box around all cells of level 0, in index space.
   [[nodiscard]] PlaceBox box() const {
     const DeviceLevel& cells = level(0);
-    const Coord origin = cells.table().origin;
-    const Vec3 from{double(origin.x), double(origin.y), double(origin.z)};
+    const Vec3 from = pointOf(cells.table().origin);
     return {sum(cells.box().low, from), sum(cells.box().high, from)};
   }
   /// Makes the levels that a picture needs.

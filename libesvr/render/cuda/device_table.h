@@ -11,13 +11,11 @@ namespace esvr::cuda {
 
 class DeviceTable {
  public:
-  /// Makes the table anew only if the transfer function or its step changed, because making it can
-  /// take longer than drawing a picture.
-  /// \param times  length of a step in units of options.step
-  void update(const RenderOptions& options, double times, cudaStream_t stream) {
-    const Sampling sampling = samplingOf(options, times);
-    if (known_ && known_->sampling == sampling && known_->transfer == options.transfer) return;
-    known_ = {options.transfer, sampling, TransferTable(options.transfer, sampling)};
+  /// Makes the table anew only if the transfer function or its sampling changed, because making it
+  /// can take longer than drawing a picture.
+  void update(const TransferFunction& transfer, const Sampling& sampling, cudaStream_t stream) {
+    if (known_ && known_->sampling == sampling && known_->transfer == transfer) return;
+    known_ = {transfer, sampling, TransferTable(transfer, sampling)};
     copy(known_->table.values(), values_, stream);
     copy(known_->table.segments(), segments_, stream);
   }

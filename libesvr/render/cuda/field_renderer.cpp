@@ -120,7 +120,7 @@ void FieldRenderer::drawFrame(const RenderOptions& options, Image* image) {
   if (box_) scene.bins = binsWithin(*box_, scene.view, options.step);
   if (scene.bins.last < scene.bins.first) return;
   checkRayLength(scene.bins);
-  table_.update(options, 1.0, stream_.get());
+  table_.update(options.transfer, samplingOf(options), stream_.get());
   drawBand(scene, {0, tilesAlong(options.resolution.height)}, image);
 }
 

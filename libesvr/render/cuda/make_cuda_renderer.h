@@ -29,5 +29,11 @@ namespace esvr::cuda {
 [[nodiscard]] std::unique_ptr<Renderer> makeCudaNanoRenderer(const NanoVolume& volume,
                                                              const Device& device,
                                                              const RendererLimits& limits);
+/// Draws several grids (makeGridsRenderer).
+/// \throws DeviceError  as for makeCudaFieldRenderer
+/// \throws RuntimeFailure, UsageError  as for makeCudaCellRenderer and makeCudaVolumeRenderer
+[[nodiscard]] std::unique_ptr<Renderer> makeCudaGridsRenderer(const std::vector<DrawnGrid>& grids,
+                                                              const Device& device,
+                                                              const RendererLimits& limits);
 
 }  // namespace esvr::cuda

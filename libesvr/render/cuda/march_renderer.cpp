@@ -19,7 +19,7 @@ Image MarchRenderer::draw(const RenderOptions& options) {
 }
 
 void MarchRenderer::drawFrame(const RenderOptions& options, Image* image) {
-  checkRenderOptions(options);
+  checkRenderOptions(options, gridCount());
   if (image != nullptr)
     image->rgba.assign(std::size_t(4) * std::size_t(image->width) * std::size_t(image->height),
                        0.0f);
@@ -30,10 +30,11 @@ void MarchRenderer::drawFrame(const RenderOptions& options, Image* image) {
     drawBand(options, {first, std::min(rows, options.resolution.height - first)}, image);
 }
 
-TransferTableView MarchRenderer::tableOf(const RenderOptions& options, int level) {
-  DeviceTable& table = tables_[std::size_t(level)];
-  table.update(options, LevelFrame{level}.side(), stream());
-  return table.view();
+TransferTableView MarchRenderer::table(std::size_t number, const TransferFunction& transfer,
+                                       const Sampling& sampling) {
+  if (tables_.size() <= number) tables_.resize(number + 1);
+  tables_[number].update(transfer, sampling, stream());
+  return tables_[number].view();
 }
 
 std::size_t MarchRenderer::tableBytes() const {

@@ -1,13 +1,12 @@
 #pragma once
 /// Base class of the CUDA renderers that march through voxels. It manages bands, pixels and times.
 
-#include <array>
+#include <vector>
 
 #include "core/cuda/event.h"
 #include "core/cuda/stream.h"
 #include "esvr/renderer.h"
 #include "render/cuda/device_table.h"
-#include "render/level_of_detail.h"
 
 namespace esvr::cuda {
 
@@ -26,6 +25,8 @@ class MarchRenderer : public Renderer {
 
   MarchRenderer(const Device& device, const RendererLimits& limits);
 
+  /// The number of grids that RenderOptions must have looks for.
+  [[nodiscard]] virtual std::size_t gridCount() const { return 1; }
   /// Makes what the bands of a picture share.
   virtual void prepare(const RenderOptions& options) = 0;
   /// Draws a band. \param pixels  pixels of the band, which are zero before
@@ -40,8 +41,10 @@ class MarchRenderer : public Renderer {
   [[nodiscard]] virtual std::size_t bytesOfRow(Resolution) const { return 0; }
 
   [[nodiscard]] cudaStream_t stream() const { return stream_.get(); }
-  /// The tables of the transfer function for the steps of a level of detail.
-  [[nodiscard]] TransferTableView tableOf(const RenderOptions& options, int level);
+  /// The tables of a transfer function. Those of the last picture are reused if they have not changed.
+  /// \param number  tells apart the tables of a picture; 0 or above, without gaps
+  [[nodiscard]] TransferTableView table(std::size_t number, const TransferFunction& transfer,
+                                        const Sampling& sampling);
 
  private:
   void drawFrame(const RenderOptions& options, Image* image);
@@ -52,7 +55,7 @@ class MarchRenderer : public Renderer {
   RendererLimits limits_;
   Stream stream_;
   DeviceBuffer<float4> pixels_;
-  std::array<DeviceTable, kLevels> tables_;
+  std::vector<DeviceTable> tables_;
   Event begin_, drawn_;
   FrameStats stats_;
 };

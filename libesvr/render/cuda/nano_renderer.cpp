@@ -21,7 +21,7 @@ class NanoRenderer final : public MarchRenderer {
  private:
   void prepare(const RenderOptions& o) override {
     refuseShading(o);
-    table_ = tableOf(o, 0);
+    table_ = table(0, o.transfer, samplingOf(o));
   }
   void launch(const RenderOptions& o, Band band, float4* pixels) override {
     launchNano({.view = View(o.camera, o.resolution),

@@ -23,4 +23,9 @@ std::unique_ptr<Renderer> makeCudaNanoRenderer(const NanoVolume&, const Device& 
   refuseCuda("drawing", device);
 }
 
+std::unique_ptr<Renderer> makeCudaGridsRenderer(const std::vector<DrawnGrid>&, const Device& device,
+                                                const RendererLimits&) {
+  refuseCuda("drawing", device);
+}
+
 }  // namespace esvr::cuda

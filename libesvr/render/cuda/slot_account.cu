@@ -1,6 +1,8 @@
 #include "core/cuda/check.h"
 #include "core/cuda/thread_number.cuh"
 #include "render/cuda/slot_account.h"
+
+#include "render/brick_march.h"
 #include "render/oldest_slots.h"
 
 namespace esvr::cuda {

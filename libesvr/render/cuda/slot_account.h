@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "render/cuda/brick_draw.h"
+#include "render/cuda/brick_demand.h"
 
 namespace esvr::cuda {
 

@@ -1,0 +1,172 @@
+#pragma once
+/// Marches a ray through several grids at once. The code is compiled for host and device.
+
+#include "esvr/renderer.h"
+#include "render/brick_march.h"
+#include "render/light_mixture.h"
+
+namespace esvr {
+
+/// One grid of a GridsScene.
+struct GridInScene {
+  BrickTableView table;
+  TransferTableView transfer;
+  float background;
+  bool absorbs;
+  /// What is added to a place of the scene to get the place relative to the table's origin.
+  FloatPlace toTable;
+};
+
+struct GridsScene {
+  /// Relative to an origin that all grids share; its box contains the cells of all. The table and the
+  /// background of its rule are not used.
+  MarchScene scene;
+  GridInScene grids[kMostGrids];
+};
+
+/// A ray whose first samples have been added.
+struct GridsProgress {
+  float r = 0.0f, g = 0.0f, b = 0.0f, transmittance = 1.0f;
+  int next = 0;                 ///< first sample that has not been added
+  std::uint32_t inside = 0;     ///< bit g is set if the last sample of grid g is not empty space
+  float last[kMostGrids] = {};  ///< value of that sample
+};
+
+/// The visitor of a march through grids whose bricks all have slots or are vacant.
+struct AllGridsAreThere {
+  ESVR_HD void entered(int, std::uint32_t) const {}
+  ESVR_HD bool wantsMore(int, std::uint32_t, std::uint32_t) const { return false; }
+};
+
+namespace grids_march {
+
+/// The brick of a grid that a ray is in.
+struct Cursor {
+  brick_march::Found found{kNoCells, {-1, -1, -1}, 1};
+  const float* values = nullptr;
+  bool isMissing = false;
+
+  /// \return false if a brick is missing and the ray asks for no more
+  template <class Slots, class Visitor>
+  ESVR_HD bool moveTo(const Coord& cell, const BrickTableView& table, const Slots& slots, int grid,
+                      Visitor& visitor) {
+    using namespace brick_march;
+    if (found.contains(cell)) return true;
+    found = inside(table, cell) ? find(table, cell) : outside(cell);
+    const std::uint32_t slot =
+        found.brick == kNoCells ? BrickSlotsView::kVacant : slots.slot(found.brick);
+    const bool there = slots.hasSlot(slot);
+    values = there ? slots.values(slot) : nullptr;
+    isMissing = !there && slot != BrickSlotsView::kVacant;
+    if (there) visitor.entered(grid, slot);
+    return !isMissing || visitor.wantsMore(grid, found.brick, slot);
+  }
+
+ private:
+  /// The cube around a cell that lies outside a table. Blocks of the table begin at multiples of their
+  /// side, so that none lies in it.
+  ESVR_HD static brick_march::Found outside(const Coord& cell) {
+    constexpr int kMask = ~(kBlockSide - 1);
+    return {kNoCells, {cell.x & kMask, cell.y & kMask, cell.z & kMask}, kBlockSide};
+  }
+};
+
+/// What the grids have at one place.
+struct Sample {
+  float value[kMostGrids] = {};
+  std::uint32_t inside = 0;  ///< as GridsProgress::inside
+  bool isMissing = false;
+  int advance = 1 << 30;  ///< samples to the next place where any grid may differ from here
+
+  ESVR_HD void mayAdvance(int samples) { advance = samples < advance ? samples : advance; }
+};
+
+/// Looks up one grid. \return false if the ray asks for no more bricks
+template <class Slots, class Visitor>
+ESVR_HD inline bool look(const GridInScene& grid, const Slots& slots, int number,
+                         const MarchSamples& samples, const FloatPlace& scenePlace, Cursor& cursor,
+                         Sample& sample, Visitor& visitor) {
+  const FloatPlace place{scenePlace.x + grid.toTable.x, scenePlace.y + grid.toTable.y,
+                         scenePlace.z + grid.toTable.z};
+  const Coord cell = brick_march::cellOf(place);
+  const bool goesOn = cursor.moveTo(cell, grid.table, slots, number, visitor);
+  sample.isMissing = sample.isMissing || cursor.isMissing;
+  if (cursor.values == nullptr) {
+    sample.mayAdvance(
+        march::samplesToLeave(place, samples.perVoxel, cursor.found.low, cursor.found.side));
+    return goesOn;
+  }
+  sample.mayAdvance(1);
+  sample.value[number] = brick_march::interpolate(cursor.values, place, cell);
+  if (sample.value[number] != grid.background) sample.inside |= 1u << number;
+  return goesOn;
+}
+
+/// The light of a grid in the segment before a sample, or at the sample (Classification).
+ESVR_HD inline PixelColor lightOf(const GridInScene& grid, Classification classification,
+                                  bool wasInside, float last, bool isInside, float value) {
+  if (classification == Classification::kPreIntegrated)
+    return grid.transfer.segments(wasInside ? last : grid.background,
+                                  isInside ? value : grid.background);
+  if (!isInside) return {0.0f, 0.0f, 0.0f, 0.0f};
+  const Classified c = grid.transfer(value);
+  return {c.r * c.alpha, c.g * c.alpha, c.b * c.alpha, c.alpha};
+}
+
+/// Adds a sample to a ray, with the segment before it.
+template <int kGrids>
+ESVR_HD inline void add(const GridsScene& s, const Sample& sample, GridsProgress& at) {
+  LightMixture mixture;
+  for (int g = 0; g < kGrids; ++g) {
+    const bool was = (at.inside >> g & 1u) != 0, is = (sample.inside >> g & 1u) != 0;
+    if (was || is)
+      mixture.add(
+          lightOf(s.grids[g], s.scene.rule.classification, was, at.last[g], is, sample.value[g]),
+          s.grids[g].absorbs);
+    if (is) at.last[g] = sample.value[g];
+  }
+  at.inside = sample.inside;
+  const PixelColor light = mixture.total();
+  at.r += at.transmittance * light.r;
+  at.g += at.transmittance * light.g;
+  at.b += at.transmittance * light.b;
+  at.transmittance *= 1.0f - light.alpha;
+}
+
+}  // namespace grids_march
+
+/// Adds samples to a ray until it ends or meets a brick that is missing.
+/// \tparam kGrids  number of grids
+/// \param slots    for each grid: BrickSlotsView, or a type with the same functions
+/// \param visitor  as for marchBricks(), with the number of the grid as first argument
+/// \return true if the ray has ended
+template <int kGrids, class Slots, class Visitor>
+ESVR_HD inline bool marchGrids(const GridsScene& s, const Slots* slots, const MarchSamples& samples,
+                               GridsProgress& at, Visitor& visitor) {
+  using namespace grids_march;
+  Cursor cursors[kGrids];
+  bool looksAhead = false;
+  for (int i = at.next > samples.begin ? at.next : samples.begin;
+       i < samples.end && !(at.transmittance < s.scene.rule.minTransmittance);) {
+    Sample sample;
+    bool goesOn = true;
+    for (int g = 0; g < kGrids; ++g)
+      goesOn = look(s.grids[g], slots[g], g, samples, samples.at(i), cursors[g], sample, visitor) &&
+               goesOn;
+    if (sample.isMissing && !looksAhead) at.next = i;
+    looksAhead = looksAhead || sample.isMissing;
+    if (!goesOn) return false;
+    if (!looksAhead && (sample.inside | at.inside) != 0) add<kGrids>(s, sample, at);
+    i += sample.advance;
+  }
+  return !looksAhead;
+}
+
+/// The color of a ray that has ended, with the segment from its last sample into empty space.
+template <int kGrids>
+[[nodiscard]] ESVR_HD inline PixelColor finished(const GridsScene& s, GridsProgress at) {
+  if (at.inside != 0) grids_march::add<kGrids>(s, {}, at);
+  return {at.r, at.g, at.b, 1.0f - at.transmittance};
+}
+
+}  // namespace esvr

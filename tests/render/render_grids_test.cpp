@@ -1,0 +1,274 @@
+// Plan: several grids in one picture. The reference solves the equation of emission and absorption in
+// float64: each segment is divided into many parts, in which the values are interpolated linearly,
+// and the extinctions and emissions of the grids add up. Further: one grid, and a second one that
+// is transparent or empty, look as a grid does by itself; the order of the grids does not matter;
+// emission hides nothing. Fields and their decoded volumes give the same picture.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "esvr/error.h"
+#include "esvr/field.h"
+#include "render/reference_light.h"
+#include "render/reference_picture.h"
+#include "render/trilinear.h"
+#include "render/two_grids.h"
+#include "render/vector.h"
+#include "render/view.h"
+#include "support/on_threads.h"
+
+namespace esvr::test {
+namespace {
+
+/// Positions are rounded to float32, which moves samples by 1e-5 voxel (render_cells_test.cpp).
+constexpr double kSamePicture = 80.0;
+const Device kCpu{};
+/// A segment takes the colors of both grids as mixed evenly. The error is a share of the square of
+/// the segment's optical depth, which is up to -ln(0.1) / 20 = 0.115 for each grid here.
+constexpr double kMixing = 5e-4;
+
+struct ReferenceGrid {
+  const SparseVolume& volume;
+  Integrals integrals;
+  bool absorbs;
+};
+
+/// Adds a part of a segment, whose values at its ends are given for each grid.
+void addPart(const std::vector<ReferenceGrid>& grids, const std::vector<double>& from,
+             const std::vector<double>& to, double length, Light& light) {
+  Channels sum{};
+  for (std::size_t g = 0; g < grids.size(); ++g) {
+    const Channels mean = grids[g].integrals.meanBetween(from[g], to[g]);
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += mean[c];
+    if (grids[g].absorbs) sum[3] += mean[3];
+  }
+  const double depth = sum[3] * length;
+  const double weight = light.transmittance * (depth > 0.0 ? -std::expm1(-depth) / sum[3] : length);
+  light.r += weight * sum[0], light.g += weight * sum[1], light.b += weight * sum[2];
+  light.transmittance *= std::exp(-depth);
+}
+
+void addSegment(const std::vector<ReferenceGrid>& grids, const std::vector<double>& from,
+                const std::vector<double>& to, Light& light) {
+  constexpr int kParts = 16;
+  std::vector<double> a(from.size()), b(from.size());
+  for (int p = 0; p < kParts; ++p) {
+    for (std::size_t g = 0; g < from.size(); ++g) {
+      a[g] = from[g] + (to[g] - from[g]) * p / kParts;
+      b[g] = from[g] + (to[g] - from[g]) * (p + 1) / kParts;
+    }
+    addPart(grids, a, b, 1.0 / kParts, light);
+  }
+}
+
+/// A segment between two samples of empty space is empty, whatever the background looks like; here
+/// the background is transparent.
+Image reference(const std::vector<const SparseVolume*>& volumes, const RenderOptions& o) {
+  std::vector<ReferenceGrid> grids;
+  for (std::size_t g = 0; g < volumes.size(); ++g)
+    grids.push_back({*volumes[g],
+                     {g == 0 ? o.transfer : o.further[g - 1].transfer, o.step / o.opacityLength},
+                     g == 0 || o.further[g - 1].absorbs});
+  const View view(o.camera, o.resolution);
+  const double farthest = length(difference(o.camera.eye, o.camera.center)) + 100.0;
+  Image image{o.resolution.width, o.resolution.height, {}};
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column) {
+      const Ray ray = view.ray(column, row);
+      Light light;
+      std::vector<double> last(grids.size(), 0.0), now(grids.size());
+      for (int j = 0; j * o.step <= farthest; ++j, last = now) {
+        const Vec3 place = sum(ray.origin, scaled(ray.direction, j * o.step));
+        for (std::size_t g = 0; g < grids.size(); ++g) now[g] = trilinear(grids[g].volume, place);
+        if (now != last || now != std::vector<double>(grids.size(), 0.0))
+          addSegment(grids, last, now, light);
+      }
+      for (const double v : {light.r, light.g, light.b, 1.0 - light.transmittance})
+        image.rgba.push_back(float(v));
+    }
+  return image;
+}
+
+/// A transfer function whose opacity is 0 at the background.
+TransferFunction clearAtZero(const char* colors) {
+  TransferFunction transfer{builtInColorMap(colors), builtInOpacity("linear")};
+  transfer.opacity = {{-1.0, 0.9}, {0.0, 0.0}, {1.0, 0.9}};
+  return rescaled(transfer, {-1.0f, 1.0f});
+}
+
+/// Two volumes, and a picture in which the background is clear.
+struct TwoVolumes {
+  SparseVolume first = revoxelise(firstField(), kVoxelsOfGrids);
+  SparseVolume second = revoxelise(secondField(), kVoxelsOfGrids);
+  RenderOptions options = optionsForTwo();
+
+  TwoVolumes() {
+    options.transfer = clearAtZero("viridis");
+    options.further = {{clearAtZero("inferno")}};
+    options.minTransmittance = 0.0;
+  }
+  [[nodiscard]] Image drawn() const {
+    return makeGridsRenderer({&first, &second}, kCpu)->draw(options);
+  }
+};
+
+TEST(RenderGrids, SolveTheEquationOfEmissionAndAbsorption) {
+  TwoVolumes two;
+  const auto error = [&] {
+    return largestDifference(two.drawn(), reference({&two.first, &two.second}, two.options));
+  };
+  EXPECT_LE(error(), kMixing);
+  two.options.step = 0.25;
+  EXPECT_LE(error(), kMixing / 4.0) << "the error falls with the step";
+}
+
+TEST(RenderGrids, SolveItForEmissionToo) {
+  TwoVolumes two;
+  two.options.further[0].absorbs = false;
+  EXPECT_LE(largestDifference(two.drawn(), reference({&two.first, &two.second}, two.options)),
+            kMixing);
+}
+
+TEST(RenderGrids, OneGridLooksAsByItself) {
+  const Field field = firstField();
+  const SparseVolume volume = revoxelise(field, kVoxelsOfGrids);
+  for (const Classification classification :
+       {Classification::kPreIntegrated, Classification::kPost}) {
+    RenderOptions o = optionsForTwo();
+    o.further.clear();
+    o.classification = classification;
+    const Image expected = renderVolume(volume, o);
+    EXPECT_GE(imagePsnr(makeGridsRenderer({&volume}, kCpu)->draw(o), expected), kSamePicture);
+    const DrawnField drawn{&field, kVoxelsOfGrids};
+    EXPECT_GE(imagePsnr(makeGridsRenderer({drawn}, kCpu)->draw(o), expected), 70.0)
+        << "voxels at the threshold may differ";
+  }
+}
+
+TEST(RenderGrids, ATransparentGridChangesNothing) {
+  TwoVolumes two;
+  two.options.further[0].transfer = transparent();
+  RenderOptions alone = two.options;
+  alone.further.clear();
+  EXPECT_GE(imagePsnr(two.drawn(), renderVolume(two.first, alone)), kSamePicture);
+  EXPECT_GE(imagePsnr(two.drawn(), makeGridsRenderer({&two.first}, kCpu)->draw(alone)), 100.0);
+}
+
+TEST(RenderGrids, AnEmptyGridChangesNothing) {
+  TwoVolumes two;
+  two.second = SparseVolume{};
+  RenderOptions alone = two.options;
+  alone.further.clear();
+  const Image expected = makeGridsRenderer({&two.first}, kCpu)->draw(alone);
+  EXPECT_EQ(two.drawn().rgba, expected.rgba);
+  std::swap(two.first, two.second);
+  std::swap(two.options.transfer, two.options.further[0].transfer);
+  EXPECT_EQ(two.drawn().rgba, expected.rgba);
+  two.second = SparseVolume{};
+  for (const float v : two.drawn().rgba) ASSERT_EQ(v, 0.0f);
+}
+
+TEST(RenderGrids, TheirOrderDoesNotMatter) {
+  TwoVolumes two;
+  const Image expected = two.drawn();
+  std::swap(two.first, two.second);
+  std::swap(two.options.transfer, two.options.further[0].transfer);
+  EXPECT_GE(imagePsnr(two.drawn(), expected), kSamePicture);
+}
+
+TEST(RenderGrids, HalvesOfAnExtinctionAddUpToIt) {
+  TwoVolumes two;
+  two.second = two.first;
+  two.options.further[0].transfer = two.options.transfer;
+  two.options.opacityLength = 40.0;
+  RenderOptions alone = two.options;
+  alone.further.clear();
+  alone.opacityLength = 20.0;
+  EXPECT_LE(largestDifference(two.drawn(), renderVolume(two.first, alone)), 1e-4);
+}
+
+TEST(RenderGrids, EmissionHidesNothingAndAddsNoAlpha) {
+  TwoVolumes two;
+  two.options.further[0].absorbs = false;
+  RenderOptions alone = two.options;
+  alone.further.clear();
+  const Image both = two.drawn(), first = makeGridsRenderer({&two.first}, kCpu)->draw(alone);
+  double added = 0.0;
+  for (std::size_t i = 0; i < both.rgba.size(); ++i) {
+    const float more = both.rgba[i] - first.rgba[i];
+    ASSERT_GE(more, -1e-5f);
+    ASSERT_LE(more, i % 4 == 3 ? 1e-5f : 10.0f);
+    added += more;
+  }
+  EXPECT_GT(added, 1.0);
+}
+
+TEST(RenderGrids, FieldsLookAsTheirVolumes) {
+  const Field first = firstField(), second = secondField();
+  const TwoVolumes two;
+  const RenderOptions o = optionsForTwo();
+  const std::vector<DrawnGrid> fields{DrawnField{&first, kVoxelsOfGrids},
+                                      DrawnField{&second, kVoxelsOfGrids}};
+  const Image expected = makeGridsRenderer({&two.first, &two.second}, kCpu)->draw(o);
+  const auto drawn = makeGridsRenderer(fields, kCpu);
+  EXPECT_GE(imagePsnr(drawn->draw(o), expected), 70.0) << "voxels at the threshold may differ";
+  const Image once = drawn->draw(o);
+  drawn->forget();
+  EXPECT_EQ(drawn->draw(o).rgba, once.rgba);
+}
+
+TEST(RenderGrids, AreClippedAndSeenFromInside) {
+  TwoVolumes two;
+  two.options.clip = PlaceBox{{20, 10, 5}, {45, 40, 30}};
+  const Image clipped = two.drawn();
+  RenderOptions alone = two.options;
+  alone.further[0].transfer = transparent();
+  const Image first = makeGridsRenderer({&two.first, &two.second}, kCpu)->draw(alone);
+  alone.further.clear();
+  EXPECT_GE(imagePsnr(first, renderVolume(two.first, alone)), kSamePicture);
+  EXPECT_GT(largestDifference(clipped, first), 0.1);
+  two.options.clip = PlaceBox{{500, 500, 500}, {501, 501, 501}};
+  for (const float v : two.drawn().rgba) ASSERT_EQ(v, 0.0f);
+
+  two.options.clip.reset();
+  two.options.camera =
+      fitCamera({{0, 0, 0}, {79, 63, 59}},
+                {.eye = Vec3{33.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = 120.0},
+                two.options.resolution);
+  EXPECT_LE(largestDifference(two.drawn(), reference({&two.first, &two.second}, two.options)),
+            kMixing);
+}
+
+TEST(RenderGrids, FourGridsAreDrawn) {
+  TwoVolumes two;
+  RenderOptions four = two.options;
+  four.opacityLength *= 2.0;
+  four.further = {two.options.further[0], {two.options.transfer}, two.options.further[0]};
+  const Image drawn =
+      makeGridsRenderer({&two.first, &two.second, &two.first, &two.second}, kCpu)->draw(four);
+  EXPECT_LE(largestDifference(drawn, two.drawn()), 1e-4) << "each grid is there twice";
+}
+
+TEST(RenderGrids, AreTheSameForAnyNumberOfThreads) {
+  const TwoVolumes two;
+  const auto draw = [&] { return two.drawn().rgba; };
+  EXPECT_EQ(onThreads(1, draw), onThreads(3, draw));
+}
+
+TEST(RenderGrids, RefuseWhatTheyDoNotHave) {
+  const TwoVolumes two;
+  const auto renderer = makeGridsRenderer({&two.first, &two.second}, kCpu);
+  RenderOptions o = two.options;
+  o.further.clear();
+  EXPECT_THROW((void)renderer->draw(o), UsageError) << "a look is missing";
+  o = two.options, o.mode = RenderMode::kMaximum;
+  EXPECT_THROW((void)renderer->draw(o), UsageError);
+  o = two.options, o.shading = Shading{};
+  EXPECT_THROW((void)renderer->draw(o), UsageError);
+  EXPECT_THROW((void)renderVolume(two.first, two.options), UsageError) << "a look too many";
+  EXPECT_THROW((void)makeGridsRenderer({}, kCpu), UsageError);
+  EXPECT_THROW((void)makeGridsRenderer(std::vector<DrawnGrid>(5, &two.first), kCpu), UsageError);
+}
+
+}  // namespace
+}  // namespace esvr::test
