@@ -18,21 +18,16 @@ struct Asking {
   }
 };
 
-/// Marches the ray of a thread and writes its pixel if it ends. \return whether it ends
+/// Marches the ray of a pixel. \return whether it ends
 template <MarchCode kCode>
-__device__ bool marchRay(const BrickDrawArguments& a, std::uint32_t tile, int2 range,
+__device__ bool marchRay(const BrickDrawArguments& a, const TilePixel& pixel, int2 range,
                          RayProgress& ray) {
-  const TilePixel pixel(a.band, tile);
-  if (!pixel.within(a.band)) return true;
   const double side = LevelFrame{a.scene.bounds.last}.side();
   const SampleRange wanted{(a.band.firstSample + double(range.x)) * side,
                            (a.band.firstSample + double(range.y)) * side};
   Asking asking{a.demand, a.demand.ahead};
   ray.ray.first = 0;  // so that the code for parts of rays is left out
-  if (!marchLevels<kCode>(a.scene, a.slots, pixel.column, pixel.row, wanted, ray, asking))
-    return false;
-  pixel.set(a.band, finished(a.scene, ray));
-  return true;
+  return marchLevels<kCode>(a.scene, a.slots, pixel.column, pixel.row, wanted, ray, asking);
 }
 
 /// Blocks that run on a multiprocessor at the same time. More leave fewer registers to each: 16 were
@@ -44,21 +39,23 @@ constexpr int kBlocksOfOne = 16, kBlocksOfMany = 8;
 template <bool kHasOneLevel, bool kIsUsual, bool kIsShaded>
 __global__ void __launch_bounds__(kMarchTilePixels,
                                   kHasOneLevel && !kIsShaded ? kBlocksOfOne : kBlocksOfMany)
-    marchKernel(const BrickDrawArguments a, const WaitingTiles<RayProgress> w) {
-  const TileWork<RayProgress> work(w);
+    marchKernel(const BrickDrawArguments a, const WaitingTiles<KeptRay> w) {
+  const TileWork<KeptRay> work(w);
   const int2 range = a.band.ranges[work.tile];
   if (range.x > range.y) return;
-  RayProgress ray;
-  if (!work.isNew) ray = *work.kept;
-  const bool ended = ray.next < 0 || marchRay<MarchCode{kHasOneLevel, kIsUsual, kIsShaded}>(
-                                         a, work.tile, range, ray);
-  if (ended) ray.next = -1;
-  if (work.kept != nullptr) *work.kept = ray;
+  const auto march = [&](const TilePixel& pixel, RayProgress& ray) {
+    if (kIsShaded && !work.isNew) ray.shade = w.shades[work.ray()];
+    const bool ended = marchRay<MarchCode{kHasOneLevel, kIsUsual, kIsShaded}>(a, pixel, range, ray);
+    if (kIsShaded && work.keeps) w.shades[work.ray()] = ray.shade;
+    return ended;
+  };
+  const bool ended = goOn<RayProgress>(
+      a.band, w, work, march, [&](const RayProgress& ray) { return finished(a.scene, ray); });
   if (a.demand.slotOf != nullptr)
     listIfWaiting(ended, work.entry, &a.demand.counts->waiting, a.waiting);
 }
 
-using MarchKernel = void (*)(BrickDrawArguments, WaitingTiles<RayProgress>);
+using MarchKernel = void (*)(BrickDrawArguments, WaitingTiles<KeptRay>);
 
 MarchKernel kernelFor(const MarchCode& code) {
   if (code.isShaded)
@@ -70,8 +67,7 @@ MarchKernel kernelFor(const MarchCode& code) {
 
 }  // namespace
 
-void launchMarch(const BrickDrawArguments& a, const WaitingTiles<RayProgress>& w,
-                 cudaStream_t stream) {
+void launchMarch(const BrickDrawArguments& a, const WaitingTiles<KeptRay>& w, cudaStream_t stream) {
   const unsigned blocks = w.count == 0 ? unsigned(a.band.tiles()) : w.count;
   kernelFor(codeFor(a.scene))<<<blocks, kMarchTilePixels, 0, stream>>>(a, w);
   check(cudaGetLastError(), "marching bricks");

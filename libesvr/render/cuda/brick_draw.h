@@ -19,7 +19,7 @@ struct BrickDrawArguments {
 
 /// Marches the rays that wait. \param tiles  if there are none, the rays of the whole band are
 /// marched from their first samples, and rays that must wait are not kept
-void launchMarch(const BrickDrawArguments& arguments, const WaitingTiles<RayProgress>& tiles,
+void launchMarch(const BrickDrawArguments& arguments, const WaitingTiles<KeptRay>& tiles,
                  cudaStream_t stream);
 
 }  // namespace esvr::cuda

@@ -83,10 +83,11 @@ class CellRenderer final : public MarchRenderer {
     arguments.demand = cache.demand(0);
     launchMarch(arguments, {}, stream());
     auto counts = cache.counts();
+    WaitingTiles<KeptRay> tiles;
     for (int pass = 1; counts.waiting > 0; ++pass) {
       checkCancelled(o);
-      const auto tiles = pass == 1 ? waiting_.begin(counts.waiting)
-                                   : waiting_.next(0, counts.waiting, counts.waiting);
+      tiles = pass == 1 ? waiting_.begin(counts.waiting, arguments.scene.scene.isShaded)
+                        : waiting_.next(tiles, 0, counts.waiting, counts.waiting);
       cache.serve(counts, arguments.scene.bounds);
       arguments.slots = cache.slots();
       arguments.demand = cache.demand(pass);
@@ -107,12 +108,14 @@ class CellRenderer final : public MarchRenderer {
     return store_->bytes() + ranges_.bytes() + waiting_.bytes();
   }
   std::size_t bytesOfRow(Resolution r) const override {
-    return bytesOfTileRow<RayProgress>(r, store_->cache() != nullptr) / kMarchTileSide + 1;
+    return bytesOfTileRow<KeptRay>(r, store_->cache() != nullptr, scene_->scene.isShaded) /
+               kMarchTileSide +
+           1;
   }
 
   std::unique_ptr<CellStore> store_;
   std::optional<LevelScene> scene_;  ///< of the picture that is drawn
-  WaitingMemory<RayProgress> waiting_;
+  WaitingMemory<KeptRay> waiting_;
   DeviceBuffer<int2> ranges_;
 };
 

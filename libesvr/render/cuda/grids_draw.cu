@@ -18,42 +18,39 @@ struct AskingGrids {
   }
 };
 
-/// Marches the ray of a thread and writes its pixel if it ends. \return whether it ends
+/// Marches the ray of a pixel. \return whether it ends
 template <int kGrids>
-__device__ bool marchRay(const GridsDrawArguments& a, std::uint32_t tile, int2 range,
+__device__ bool marchRay(const GridsDrawArguments& a, const TilePixel& pixel, int2 range,
                          GridsProgress& ray) {
-  const TilePixel pixel(a.band, tile);
-  if (!pixel.within(a.band)) return true;
   const MarchSamples samples =
       samplesOf(a.scene.scene, pixel.column, pixel.row,
                 {a.band.firstSample + double(range.x), a.band.firstSample + double(range.y)});
   AskingGrids asking{a.demand, a.ahead};
-  if (!marchGrids<kGrids>(a.scene, a.slots, samples, ray, asking)) return false;
-  pixel.set(a.band, finished<kGrids>(a.scene, ray));
-  return true;
+  return marchGrids<kGrids>(a.scene, a.slots, samples, ray, asking);
 }
 
 template <int kGrids>
 __global__ void __launch_bounds__(kMarchTilePixels)
-    marchGridsKernel(const GridsDrawArguments a, const WaitingTiles<GridsProgress> w) {
-  const TileWork<GridsProgress> work(w);
+    marchGridsKernel(const GridsDrawArguments a, const WaitingTiles<KeptGridsRay> w) {
+  const TileWork<KeptGridsRay> work(w);
   const int2 range = a.band.ranges[work.tile];
   if (range.x > range.y) return;
-  GridsProgress ray;
-  if (!work.isNew) ray = *work.kept;
-  const bool ended = ray.next < 0 || marchRay<kGrids>(a, work.tile, range, ray);
-  if (ended) ray.next = -1;
-  if (work.kept != nullptr) *work.kept = ray;
+  const auto march = [&](const TilePixel& pixel, GridsProgress& ray) {
+    return marchRay<kGrids>(a, pixel, range, ray);
+  };
+  const bool ended = goOn<GridsProgress>(a.band, w, work, march, [&](const GridsProgress& ray) {
+    return finished<kGrids>(a.scene, ray);
+  });
   if (a.waitingCount != nullptr) listIfWaiting(ended, work.entry, a.waitingCount, a.waiting);
 }
 
-using GridsKernel = void (*)(GridsDrawArguments, WaitingTiles<GridsProgress>);
+using GridsKernel = void (*)(GridsDrawArguments, WaitingTiles<KeptGridsRay>);
 constexpr GridsKernel kKernels[kMostGrids] = {marchGridsKernel<1>, marchGridsKernel<2>,
                                               marchGridsKernel<3>, marchGridsKernel<4>};
 
 }  // namespace
 
-void launchMarch(const GridsDrawArguments& a, const WaitingTiles<GridsProgress>& w,
+void launchMarch(const GridsDrawArguments& a, const WaitingTiles<KeptGridsRay>& w,
                  cudaStream_t stream) {
   const unsigned blocks = w.count == 0 ? unsigned(a.band.tiles()) : w.count;
   kKernels[a.grids - 1]<<<blocks, kMarchTilePixels, 0, stream>>>(a, w);

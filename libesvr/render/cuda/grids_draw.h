@@ -20,7 +20,7 @@ struct GridsDrawArguments {
 };
 
 /// As launchMarch() for one grid.
-void launchMarch(const GridsDrawArguments& arguments, const WaitingTiles<GridsProgress>& tiles,
+void launchMarch(const GridsDrawArguments& arguments, const WaitingTiles<KeptGridsRay>& tiles,
                  cudaStream_t stream);
 
 }  // namespace esvr::cuda

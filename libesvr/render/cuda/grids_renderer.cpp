@@ -169,10 +169,11 @@ class GridsRenderer final : public MarchRenderer {
     caches_.demand(0, arguments);
     launchMarch(arguments, {}, stream());
     std::uint32_t count = caches_.serve(arguments), kept = 0;
+    WaitingTiles<KeptGridsRay> tiles;
     for (int pass = 1; count + kept > 0; ++pass) {
       checkCancelled(o);
-      const auto tiles =
-          pass == 1 ? waiting_.begin(count) : waiting_.next(kept, count, caches_.mostTiles());
+      tiles = pass == 1 ? waiting_.begin(count, false)
+                        : waiting_.next(tiles, kept, count, caches_.mostTiles());
       kept += count - tiles.count;
       caches_.demand(pass, arguments);
       launchMarch(arguments, tiles, stream());
@@ -196,13 +197,13 @@ class GridsRenderer final : public MarchRenderer {
     return bytes;
   }
   std::size_t bytesOfRow(Resolution r) const override {
-    return bytesOfTileRow<GridsProgress>(r, caches_.any() != nullptr) / kMarchTileSide + 1;
+    return bytesOfTileRow<KeptGridsRay>(r, caches_.any() != nullptr, false) / kMarchTileSide + 1;
   }
 
   Stores stores_;
   GridCaches caches_;
   std::optional<GridsScene> scene_;  ///< of the picture that is drawn; nothing without cells
-  WaitingMemory<GridsProgress> waiting_;
+  WaitingMemory<KeptGridsRay> waiting_;
   DeviceBuffer<int2> ranges_;
 };
 

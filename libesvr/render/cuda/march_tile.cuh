@@ -35,8 +35,16 @@ struct TilePixel {
     return column < band.resolution.width && row < band.resolution.height;
   }
   __device__ void set(const TileBand& band, const PixelColor& c) const {
-    band.pixels[std::size_t(rowOfBand) * std::size_t(band.resolution.width) + std::size_t(column)] =
-        make_float4(c.r, c.g, c.b, c.alpha);
+    band.pixels[place(band)] = make_float4(c.r, c.g, c.b, c.alpha);
+  }
+  [[nodiscard]] __device__ PixelColor get(const TileBand& band) const {
+    const float4 c = band.pixels[place(band)];
+    return {c.x, c.y, c.z, c.w};
+  }
+
+ private:
+  [[nodiscard]] __device__ std::size_t place(const TileBand& band) const {
+    return std::size_t(rowOfBand) * std::size_t(band.resolution.width) + std::size_t(column);
   }
 };
 
@@ -50,20 +58,43 @@ __device__ inline void listIfWaiting(bool ended, std::uint32_t number, std::uint
 }
 
 /// The work of a block.
-/// \tparam Progress  state of a ray that waits
-template <class Progress>
+template <class Kept>
 struct TileWork {
   std::uint32_t entry, tile;
-  Progress* kept;  ///< where the state of the thread's ray is kept; null: nowhere
-  bool isNew;      ///< whether the ray begins
+  bool keeps;  ///< whether rays that wait are kept
+  bool isNew;  ///< whether the rays begin
 
-  __device__ explicit TileWork(const WaitingTiles<Progress>& w) {
+  __device__ explicit TileWork(const WaitingTiles<Kept>& w) {
     const bool isFirst = w.count == 0;
     entry = isFirst || w.begin ? blockIdx.x : w.entries[blockIdx.x];
     tile = isFirst ? entry : w.tiles[entry];
-    kept = isFirst ? nullptr : w.rays + std::size_t(entry) * kMarchTilePixels + threadIdx.x;
-    isNew = isFirst || w.begin;
+    keeps = !isFirst, isNew = isFirst || w.begin;
+  }
+  /// The number of the thread's ray among those that are kept.
+  [[nodiscard]] __device__ std::size_t ray() const {
+    return std::size_t(entry) * kMarchTilePixels + threadIdx.x;
   }
 };
+
+/// Goes on with the ray of a thread.
+/// \param march   march(pixel, progress) adds samples. \return whether the ray has ended
+/// \param finish  finish(progress) returns the color of a ray that has ended
+/// \return whether the ray has ended
+template <class Progress, class Kept, class March, class Finish>
+__device__ bool goOn(const TileBand& band, const WaitingTiles<Kept>& w, const TileWork<Kept>& work,
+                     March&& march, Finish&& finish) {
+  const TilePixel pixel(band, work.tile);
+  if (!pixel.within(band)) return true;
+  Progress at;
+  if (!work.isNew) {
+    const Kept kept = w.rays[work.ray()];
+    if (kept.next < 0) return true;
+    at = kept.progress(pixel.get(band));
+  }
+  const bool ended = march(pixel, at);
+  if (ended || work.keeps) pixel.set(band, ended ? finish(at) : channelsOf(at));
+  if (work.keeps) w.rays[work.ray()] = ended ? Kept::ended() : Kept::of(at);
+  return ended;
+}
 
 }  // namespace esvr::cuda

@@ -5,22 +5,25 @@
 
 #include "core/cuda/growing_buffer.h"
 #include "render/cuda/tile_band.h"
+#include "render/kept_ray.h"
 
 namespace esvr::cuda {
 
 /// The tiles whose rays go on in a pass. All pointers are to device memory.
-template <class Progress>
+/// \tparam Kept  KeptRay or KeptGridsRay
+template <class Kept>
 struct WaitingTiles {
   std::uint32_t count = 0;                 ///< 0: the tiles are those of the whole band
   bool begin = false;                      ///< the entries are all tiles, and their rays begin now
   const std::uint32_t* entries = nullptr;  ///< numbers in `tiles` and `rays`
   const std::uint32_t* tiles = nullptr;    ///< by entry: number of the tile
-  Progress* rays = nullptr;  ///< by entry: kMarchTilePixels rays; next < 0: the ray has ended
+  Kept* rays = nullptr;                    ///< by entry: kMarchTilePixels rays
+  Shade* shades = nullptr;                 ///< shades of the rays; null: they are not shaded
 };
 
 /// Their memory, which grows with their number. The list of entries is a stack: a pass takes entries
 /// from its end, and those that wait again return to it.
-template <class Progress>
+template <class Kept>
 class WaitingMemory {
  public:
   explicit WaitingMemory(cudaStream_t stream)
@@ -30,21 +33,27 @@ class WaitingMemory {
   std::uint32_t* found(std::size_t tiles) { return found_.reserve(tiles); }
 
   /// Takes the tiles that were found after the first pass; their rays begin anew.
-  WaitingTiles<Progress> begin(std::uint32_t count) {
+  WaitingTiles<Kept> begin(std::uint32_t count, bool isShaded) {
     copy(tiles_.reserve(count), count);
     makeRoom(rays_, std::size_t(count) * kMarchTilePixels, stream_);
+    if (isShaded) makeRoom(shades_, std::size_t(count) * kMarchTilePixels, stream_);
     (void)entries_.reserve(count);
-    return {count, true, entries_.data(), tiles_.data(), rays_.data()};
+    return {count,         true,         entries_.data(),
+            tiles_.data(), rays_.data(), isShaded ? shades_.data() : nullptr};
   }
   /// Puts the entries that were found in a pass behind the first `kept` entries, and takes the last
   /// `most` of all.
-  WaitingTiles<Progress> next(std::uint32_t kept, std::uint32_t count, std::uint32_t most) {
+  /// \param tiles  those of an earlier pass
+  WaitingTiles<Kept> next(WaitingTiles<Kept> tiles, std::uint32_t kept, std::uint32_t count,
+                          std::uint32_t most) {
     copy(entries_.data() + kept, count);
-    const std::uint32_t taken = count + kept < most ? count + kept : most;
-    return {taken, false, entries_.data() + (kept + count - taken), tiles_.data(), rays_.data()};
+    tiles.begin = false;
+    tiles.count = count + kept < most ? count + kept : most;
+    tiles.entries = entries_.data() + (kept + count - tiles.count);
+    return tiles;
   }
   [[nodiscard]] std::size_t bytes() const {
-    return found_.bytes() + entries_.bytes() + tiles_.bytes() + rays_.bytes();
+    return found_.bytes() + entries_.bytes() + tiles_.bytes() + rays_.bytes() + shades_.bytes();
   }
 
  private:
@@ -57,14 +66,16 @@ class WaitingMemory {
 
   cudaStream_t stream_;
   GrowingBuffer<std::uint32_t> found_, entries_, tiles_;
-  DeviceBuffer<Progress> rays_;
+  DeviceBuffer<Kept> rays_;
+  DeviceBuffer<Shade> shades_;
 };
 
 /// Bytes of device memory that a row of tiles takes besides its pixels.
 /// \param waits  whether rays can wait
-template <class Progress>
-[[nodiscard]] std::size_t bytesOfTileRow(Resolution resolution, bool waits) {
-  const std::size_t ofWaiting = kMarchTilePixels * sizeof(Progress) + 3 * sizeof(std::uint32_t);
+template <class Kept>
+[[nodiscard]] std::size_t bytesOfTileRow(Resolution resolution, bool waits, bool isShaded) {
+  const std::size_t ofRay = sizeof(Kept) + (isShaded ? sizeof(Shade) : 0);
+  const std::size_t ofWaiting = kMarchTilePixels * ofRay + 3 * sizeof(std::uint32_t);
   return std::size_t(TileBand::tilesAlong(resolution.width)) *
          (sizeof(int2) + (waits ? ofWaiting : 0));
 }
