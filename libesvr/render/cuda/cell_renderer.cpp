@@ -96,6 +96,7 @@ class CellRenderer final : public MarchRenderer {
     }
   }
 
+  bool decodesBricks() const override { return store_->cache() != nullptr; }
   void shareMemory(std::uint64_t left) override {
     if (store_->cache() != nullptr) store_->cache()->limit(left);
   }

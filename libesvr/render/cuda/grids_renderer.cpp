@@ -181,6 +181,7 @@ class GridsRenderer final : public MarchRenderer {
     }
   }
 
+  bool decodesBricks() const override { return caches_.any() != nullptr; }
   void shareMemory(std::uint64_t left) override { caches_.limit(left, stores_); }
   std::size_t fixedBytes() const override {
     std::size_t bytes = ranges_.bytes();

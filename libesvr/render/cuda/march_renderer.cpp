@@ -8,6 +8,14 @@
 #include "render/picture.h"
 
 namespace esvr::cuda {
+namespace {
+
+/// A band takes at most this part of limited memory. The rest is for bricks, because decoding them
+/// again takes much longer than starting a further band: in 20 MB, aneurism with 59,000 ellipsoids was
+/// drawn at 112 frames a second while the band came first (H200).
+constexpr std::uint64_t kBandShare = 8;
+
+}  // namespace
 
 MarchRenderer::MarchRenderer(const Device& device, const RendererLimits& limits)
     : limits_(limits), stream_(streamOn(device)) {}
@@ -51,8 +59,10 @@ int MarchRenderer::rowsOfBand(Resolution r) {
     throw DeviceError("marching voxels on the GPU needs more than " +
                       std::to_string(limits_.maxBytes) + " bytes");
   const std::uint64_t room = limits_.maxBytes - fixed;
+  const std::uint64_t forBand = decodesBricks() ? room / kBandShare : room;
   const std::uint64_t rows =
-      std::min<std::uint64_t>(room / ofRow / kBandRows * kBandRows, std::uint64_t(r.height));
+      std::min(std::max<std::uint64_t>(forBand / ofRow / kBandRows * kBandRows, kBandRows),
+               std::uint64_t(r.height));
   shareMemory(room - std::min<std::uint64_t>(room, rows * ofRow));
   return int(rows);
 }

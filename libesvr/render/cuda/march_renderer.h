@@ -35,6 +35,8 @@ class MarchRenderer : public Renderer {
   [[nodiscard]] virtual std::size_t contentBytes() const = 0;
   /// The smallest number of these bytes with which a picture can be drawn.
   [[nodiscard]] virtual std::size_t fixedBytes() const { return contentBytes(); }
+  /// Whether memory that is left is used for bricks that are decoded when rays ask for them.
+  [[nodiscard]] virtual bool decodesBricks() const { return false; }
   /// Tells how many bytes of RendererLimits::maxBytes are left beside the fixed ones and a band.
   virtual void shareMemory(std::uint64_t /*left*/) {}
   /// Bytes that each row of pixels takes in addition to the pixels.
