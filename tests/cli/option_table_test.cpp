@@ -43,6 +43,7 @@ Table vdb2esvrTests() {
           {"--fit-for", "Vdb2EsvrOption.fitForDrawingIsStoredInTheFile"},
           {"--force", "Vdb2Esvr.keepsAnExistingFileUnlessForced"},
           {"--frames", "SequenceFiles.haveTheBytesOfSingleFilesOnAnyNumberOfThreads"},
+          {"--gop", "OneFile.hasTheFramesByTheirNumbers"},
           {"--grid", "Vdb2Esvr.fitsTheGridsThatAreNamedOnly"},
           {"--help", "Vdb2Esvr.listsTheKeysOfThePapersMethod"},
           {"--hits", "Vdb2Esvr.reportsWhatThePapersMethodUsed"},
