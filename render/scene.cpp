@@ -33,13 +33,7 @@ std::string unitOf(const GridDescriptor& grid) {
   return unit.empty() ? stringValue(grid.metadata, "units") : unit;
 }
 
-/// Reads a grid of an .esvr file. If the grid stores its voxels, they are drawn instead of the
-/// ellipsoids, because they are exact.
-Scene encoded(const SceneFile& from) {
-  ReadLimits limits{from.memory.maxBytes, from.memory.voxels};
-  limits.carriedBytes = false;
-  EsvrFile file = readEsvr(from.path, limits);
-  StoredGrid& grid = file.grids[placeOf(file, from.path, from.grid)];
+Scene outlineOf(const StoredGrid& grid) {
   Scene scene;
   scene.grid = grid.descriptor.name;
   scene.unit = unitOf(grid.descriptor);
@@ -47,6 +41,13 @@ Scene encoded(const SceneFile& from) {
   scene.data = {grid.valueMin, grid.valueMax};
   scene.background = float(grid.descriptor.background);
   scene.isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet;
+  return scene;
+}
+
+/// A grid with its content. If it stores its voxels, they are drawn instead of the ellipsoids,
+/// because they are exact.
+Scene complete(StoredGrid grid, const SceneFile& from) {
+  Scene scene = outlineOf(grid);
   if (grid.voxels)
     scene.content = VolumeGrid{
         grid.descriptor,
@@ -54,6 +55,21 @@ Scene encoded(const SceneFile& from) {
   else
     scene.content = grid.field, scene.encoded = std::move(grid);
   return scene;
+}
+
+/// Reads a grid of an .esvr file.
+Scene encoded(const SceneFile& from) {
+  ReadLimits limits{from.memory.maxBytes, from.memory.voxels};
+  limits.carriedBytes = false;
+  EsvrFile file = readEsvr(from.path, limits);
+  return complete(std::move(file.grids[placeOf(file, from.path, from.grid)]), from);
+}
+
+/// The grid of a frame; null if it has nothing active to draw, so that it may be carried.
+const StoredGrid* gridOf(const EsvrFile& frame, const SceneFile& file) {
+  if (frame.grids.empty()) return nullptr;
+  const StoredGrid& grid = frame.grids[placeOf(frame, file.path, file.grid)];
+  return grid.activeBox.empty() ? nullptr : &grid;
 }
 
 std::string firstDrawable(const std::filesystem::path& path) {
@@ -82,6 +98,26 @@ Scene readScene(const SceneFile& file) {
   Scene scene = file.path.extension() == ".esvr" ? encoded(file) : voxels(file);
   if (scene.box.empty()) throw BadInput(file.path.string() + ": nothing active to draw");
   return scene;
+}
+
+std::optional<Scene> sceneOf(const EsvrFile& frame, const SceneFile& file) {
+  const StoredGrid* grid = gridOf(frame, file);
+  return grid ? std::optional(complete(*grid, file)) : std::nullopt;
+}
+
+std::optional<Scene> outlineOf(const EsvrFile& frame, const SceneFile& file) {
+  const StoredGrid* grid = gridOf(frame, file);
+  if (!grid) return std::nullopt;
+  Scene scene = outlineOf(*grid);
+  Field field;  // its ellipsoids are not drawn
+  field.fitFor = grid->field.fitFor;
+  scene.content = std::move(field);
+  return scene;
+}
+
+void enclose(const Scene& other, Scene& scene) {
+  scene.box = {minCoord(scene.box.min, other.box.min), maxCoord(scene.box.max, other.box.max)};
+  scene.data.expand(other.data);
 }
 
 SceneRenderer::SceneRenderer(const Scene& scene, const DrawSettings& s) {

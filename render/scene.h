@@ -34,6 +34,20 @@ struct SceneFile {
 /// \throws MemoryExceeded  the grid needs more than SceneFile::maxMemory
 [[nodiscard]] Scene readScene(const SceneFile& file);
 
+/// The grid of a frame of a sequence.
+/// \param file  of the sequence
+/// \return nothing if the frame has nothing active to draw
+/// \throws BadInput  the frame has no such grid
+/// \throws MemoryExceeded  as for readScene
+[[nodiscard]] std::optional<Scene> sceneOf(const EsvrFile& frame, const SceneFile& file);
+
+/// The same without the voxels that the grid may store, which is enough for a camera and a transfer
+/// function.
+[[nodiscard]] std::optional<Scene> outlineOf(const EsvrFile& frame, const SceneFile& file);
+
+/// Widens a scene, so that its box and its range of values enclose those of another one.
+void enclose(const Scene& other, Scene& scene);
+
 struct DrawSettings {
   Device device;
   RendererLimits limits;

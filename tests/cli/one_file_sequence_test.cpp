@@ -298,6 +298,25 @@ TEST_F(OneFile, isCheckedFrameByFrame) {
   EXPECT_THAT(outputs(), ElementsAre("back.1.vdb", "back.2.vdb", "back.3.vdb", "out.esvr"));
 }
 
+TEST_F(OneFile, isDrawnFrameByFrame) {
+  writeFrames(-1, 2);
+  writeFrame(1, {{}});
+  ASSERT_EQ(convert().exitCode, 0);
+  const auto draw = [&](const std::string& output, Words more) {
+    more.insert(more.begin(),
+                {at("out.esvr"), at(output), "--resolution", "16x16", "--device", "cpu"});
+    return test::runProgram(ESVR_RENDER, more);
+  };
+  const auto run = draw("p.##.png", {"--frames", "-1-2x1"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(outputs(), ElementsAre("out.esvr", "p.-1.png", "p.00.png", "p.01.png", "p.02.png"));
+  EXPECT_FALSE(bytesOf("p.00.png") == bytesOf("p.02.png")) << "one range of values for all";
+  EXPECT_THAT(draw("p.png", {}).err, HasSubstr("needs a pattern"));
+  EXPECT_THAT(draw("q.##.png", {"--frames", "7"}).err, HasSubstr("there is no frame 7"));
+  EXPECT_THAT(draw("q.##.png", {"--turntable", "3"}).err,
+              HasSubstr("--turntable cannot be combined with a sequence"));
+}
+
 TEST_F(OneFile, needsASequenceForItsOptions) {
   writeFrames(1, 1);
   for (const std::string output : {"out.@.esvr", "out.esvr"}) {

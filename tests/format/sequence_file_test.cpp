@@ -73,6 +73,11 @@ std::uint64_t bytesOf(const SequenceReader& reader, std::size_t first, std::size
   return bytes;
 }
 
+TEST_F(SequenceFile, HasTheBytesOfTheGoldenOne) {
+  test::writeGoldenSequence(path());
+  EXPECT_EQ(bytesIn(path()), bytesIn(ESVR_GOLDEN_SEQUENCE));
+}
+
 TEST_F(SequenceFile, IsOpenedByReadingItsIndexAlone) {
   test::writeSequence(path(), kGroups);
   const SequenceReader reader(path());

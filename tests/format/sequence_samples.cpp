@@ -1,11 +1,13 @@
 #include "format/sequence_samples.h"
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 
 #include "esvr/frame_coding.h"
 #include "esvr/sequence_file.h"
 #include "format/checksum.h"
+#include "format/golden_files.h"
 #include "format/sample_files.h"
 #include "format/sequence_index.h"
 
@@ -33,7 +35,22 @@ void appendChain(std::vector<std::byte>& file, const std::vector<std::int64_t>& 
   groups.push_back(group);
 }
 
+std::vector<std::byte> goldenFrame(const std::string& name) {
+  const auto all = goldenFiles();
+  const auto golden = std::ranges::find(all, name, &GoldenFile::name);
+  return encodeFrame(golden->content, nullptr);
+}
+
 }  // namespace
+
+void writeGoldenSequence(const std::filesystem::path& path) {
+  SequenceWriter writer(path, {.overwrite = true});
+  writer.append(-2, goldenFrame("one_ellipsoid"));
+  writer.append(1, goldenFrame("no_grid"));
+  writer.endGroup();
+  writer.append(3, goldenFrame("voxels"));
+  (void)writer.finish();
+}
 
 EsvrFile sampleFrame(std::int64_t number) {
   if (number % kEmptyEvery == 0) return {};

@@ -22,6 +22,10 @@ void writeSequence(const std::filesystem::path& path,
 void writeChains(const std::filesystem::path& path,
                  const std::vector<std::vector<std::int64_t>>& groups);
 
+/// Writes the golden sequence: the frames -2 and 1 in one group, and frame 3 in another one. They
+/// are the golden files one_ellipsoid, no_grid and voxels.
+void writeGoldenSequence(const std::filesystem::path& path);
+
 [[nodiscard]] std::vector<std::byte> bytesIn(const std::filesystem::path& path);
 void writeBytes(const std::filesystem::path& path, const std::vector<std::byte>& bytes);
 
