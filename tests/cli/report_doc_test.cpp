@@ -164,6 +164,8 @@ TEST_F(ReportDoc, namesTheKeysOfASequence) {
       {at("in.@.vdb"), at("out.@.esvr"), "--frames", "1-2", "--count", "30", "--iterations", "60",
        "--device", "cpu"},
       3);
+  add(VDB2ESVR, {at("in.@.vdb"), at("all.esvr"), "--frames", "1", "--count", "30", "--iterations",
+                 "60", "--device", "cpu"});
   const Table report = tableAfter(document_, "## The report of a sequence");
   // The table names the words of the states for the frames.
   expectTable(all_, report, {"asked", "command_line", "frames", "states", "versions"}, "sequence");

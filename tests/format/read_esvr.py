@@ -503,18 +503,6 @@ def vectors(data):
     return name
 
 
-def content(name, data):
-    if name in PLANES:
-        n = len(data) // 4 // PLANES[name]
-        values = struct.unpack(f"<{n * PLANES[name]}f", data)
-        return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
-    readers = {"grid": grid, "chunks": chunks, "bricks": bricks, "ellipsoids": ellipsoids,
-               "voxels": voxels, "mask": voxels, "residual": voxels,
-               "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve,
-               "carried grid": carried, "vector grid": vectors}
-    return readers[name](data) if name in readers else data
-
-
 def aligned(at):
     return (at + 7) // 8 * 8
 
@@ -529,6 +517,18 @@ def sequence_index(data):
     groups = [frame_entries(r) for _ in range(r.get("I"))]
     r.end()
     return groups
+
+
+def content(name, data):
+    if name in PLANES:
+        n = len(data) // 4 // PLANES[name]
+        values = struct.unpack(f"<{n * PLANES[name]}f", data)
+        return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
+    readers = {"grid": grid, "chunks": chunks, "bricks": bricks, "ellipsoids": ellipsoids,
+               "voxels": voxels, "mask": voxels, "residual": voxels,
+               "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve,
+               "carried grid": carried, "vector grid": vectors, "sequence index": sequence_index}
+    return readers[name](data) if name in readers else data
 
 
 def read_group(data, entries, at, owned):
