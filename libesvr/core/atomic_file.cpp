@@ -12,7 +12,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr mode_t kNewFileMode = 0666;  // reduced by the process's umask
 constexpr mode_t kPermissionBits = 07777;
 
 /// The permissions of a file that exists.

@@ -15,8 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr mode_t kNewFileMode = 0666;  // reduced by the process's umask
-
 int openFlags(PartialStart start) {
   constexpr int kAlways = O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW;
   return start == PartialStart::kRefuse ? kAlways | O_EXCL : kAlways;

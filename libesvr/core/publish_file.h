@@ -1,11 +1,16 @@
 #pragma once
 /// Gives a complete file its final name.
 
+#include <sys/types.h>
+
 #include <cstddef>
 #include <filesystem>
 #include <span>
 
 namespace esvr {
+
+/// Permissions of a new file; the umask of the process reduces them.
+inline constexpr mode_t kNewFileMode = 0666;
 
 /// The file that a path leads to, so that a symbolic link is not replaced.
 [[nodiscard]] std::filesystem::path followLinks(const std::filesystem::path& path);

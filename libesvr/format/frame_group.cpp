@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::uint32_t kDepends = 1;  ///< the frame refers to the frame before it
 
-FrameEntry getEntry(ByteReader& in) {
+FrameEntry getFrame(ByteReader& in) {
   FrameEntry entry;
   entry.number = in.get<std::int64_t>();
   entry.bytes = in.get<std::uint64_t>();
@@ -19,7 +19,7 @@ FrameEntry getEntry(ByteReader& in) {
   return entry;
 }
 
-void checkEntry(const ByteReader& in, const FrameGroup& group, const FrameEntry& entry) {
+void checkFrame(const ByteReader& in, const FrameGroup& group, const FrameEntry& entry) {
   if (group.frames.empty() && entry.dependsOnPrevious)
     in.fail("the first frame of a group refers to another one");
   if (!group.frames.empty() && entry.number <= group.frames.back().number)
@@ -58,8 +58,8 @@ FrameGroup getFrames(ByteReader& in, std::uint64_t offset, std::uint64_t end) {
   if (count > in.left() / kFrameEntryBytes) in.fail("ends within the entries of frames");
   std::uint64_t at = alignUp(offset + directoryBytes(count));
   for (std::uint32_t i = 0; i < count; ++i) {
-    const FrameEntry entry = getEntry(in);
-    checkEntry(in, group, entry);
+    const FrameEntry entry = getFrame(in);
+    checkFrame(in, group, entry);
     if (at > end || entry.bytes > end - at) in.fail("a frame does not lie in the file");
     at = alignUp(at + entry.bytes);
     group.frames.push_back(entry);

@@ -214,6 +214,9 @@ TEST_F(ComparisonDoc, namesTheKeysOfACheck) {
   // NanoVDB has no place for some metadata, which gives differences.
   ASSERT_EQ(test::esvr2vdb({at("in.esvr"), at("back.nvdb")}).exitCode, 0);
   add(ESVR_COMPARE, {"check", at("in.vdb"), at("back.nvdb"), "--ssim"});
+  for (const std::string frame : {"1", "2"})
+    test::writeInput(at("s." + frame + ".vdb"), {{.voxels = test::softBall({})}});
+  add(ESVR_COMPARE, {"check", at("s.@.vdb"), at("s.@.vdb")});
   expectTable(all_, tableAfter(document_, "The report of `check`"), {}, "check");
 }
 

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <functional>
 #include <numeric>
@@ -210,6 +211,22 @@ TEST_F(SequenceFile, KeepsAnotherFileThatHasTheNameOfThePartialOne) {
   for (const auto start : {PartialSequence::kResume, PartialSequence::kRefuse})
     EXPECT_THROW(SequenceWriter(path(), {.partial = start}), Error);
   EXPECT_EQ(bytesIn(partial()).size(), 100u);
+}
+
+TEST_F(SequenceFile, HoldsOneGroupInTheMemoryOfItsWriter) {
+  // The writer keeps about 80 bytes for each frame, in vectors that may have twice the capacity and
+  // for a moment exist twice. A frame has about 900 bytes.
+  constexpr std::size_t kBytesPerFrame = 320;
+  constexpr std::int64_t kFrames = 800, kGroupFrames = 8;
+  const auto frame = encodeFrame(sampleFrame(1), nullptr);
+  ASSERT_GT(frame.size(), 2 * kBytesPerFrame);
+  SequenceWriter writer(path());
+  const std::size_t before = ::mallinfo2().uordblks;
+  for (std::int64_t number = 0; number < kFrames; ++number) {
+    writer.append(number, frame);
+    if (number % kGroupFrames == kGroupFrames - 1) writer.endGroup();
+  }
+  EXPECT_LT(::mallinfo2().uordblks, before + kFrames * kBytesPerFrame);
 }
 
 TEST_F(SequenceFile, TakesIncreasingNumbersOnly) {

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <cstdlib>
-#include <ranges>
 #include <span>
 
 #include "esvr/error.h"
@@ -30,8 +29,8 @@ void readAll(const std::filesystem::path& path) {
   try {
     SequenceReader reader(path, {kMaxContent});
     for (const SequenceFrame& frame : reader.frames()) read(reader, frame.number);
-    for (const SequenceFrame& frame : reader.frames() | std::views::reverse)
-      read(reader, frame.number);
+    for (auto frame = reader.frames().rbegin(); frame != reader.frames().rend(); ++frame)
+      read(reader, frame->number);
     (void)checkSequence(path, {kMaxContent});
   } catch (const BadInput&) {
   } catch (const MemoryExceeded&) {
