@@ -28,8 +28,10 @@ struct EncodedFrame {
 /// Converts the frames of one planned group, one after the other.
 class GroupConversion {
  public:
-  GroupConversion(FrameConversion& conversion, const PlannedGroup& group, int worker)
-      : conversion_(conversion), group_(group), worker_(worker) {}
+  /// \param limits  of the memory of a decoded frame
+  GroupConversion(FrameConversion& conversion, const PlannedGroup& group, int worker,
+                  ReadLimits limits)
+      : conversion_(conversion), group_(group), worker_(worker), limits_(std::move(limits)) {}
 
   /// \return false if frames are left, because the run was interrupted or stops after a failure
   bool run(const CancelToken& cancel, cli::OnFrameError onError) {
@@ -74,7 +76,7 @@ class GroupConversion {
     const EsvrFile* before = previous_ && !frame.gridsDiffer ? &*previous_ : nullptr;
     const std::string name = cli::textOf(frame.frame);
     last_ = {index, encodeFrame(file, before)};
-    decoded_ = decodeFrame(last_.bytes, name, {}, before);
+    decoded_ = decodeFrame(last_.bytes, name, limits_, before);
     return inspectEsvr(last_.bytes, name);
   }
 
@@ -87,6 +89,7 @@ class GroupConversion {
   FrameConversion& conversion_;
   const PlannedGroup& group_;
   const int worker_;
+  const ReadLimits limits_;
   bool isWell_ = true;
   std::vector<EncodedFrame> encoded_;
   std::optional<EsvrFile> previous_;  ///< the last frame of the group as a reader gets it
@@ -149,7 +152,8 @@ class FileOfGroups {
 
   /// Converts a group and appends it when it is its turn.
   bool convert(const cli::Task& task) try {
-    GroupConversion group(conversion_, groups_[first_ + task.index], task.worker);
+    GroupConversion group(conversion_, groups_[first_ + task.index], task.worker,
+                          {options_.read.maxBytes, options_.read.memory});
     const bool isComplete = group.run(cancel_, options_.sequence->onError);
     if (!turnstile_.await(task.index)) return group.isWell();
     if (isComplete) append(group.encoded()), turnstile_.pass();

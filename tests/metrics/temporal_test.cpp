@@ -21,20 +21,20 @@ constexpr double kRounding = 1e-9;
 
 const Box kCube{{-3, 2, 5}, {12, 9, 14}};
 
-SparseVolume constant(float value, const Box& box = kCube) {
+SparseVolume filled(float value, const Box& box = kCube) {
   return volumeOf(box, [&](Coord) { return value; });
 }
 
 TEST(TemporalPsnr, IsInfiniteWhereBothFramesHaveTheSameError) {
-  const SparseVolume before = constant(2), after = constant(4);
-  const SparseVolume worse = constant(2.5), worseAfter = constant(4.5);
+  const SparseVolume before = filled(2), after = filled(4);
+  const SparseVolume worse = filled(2.5), worseAfter = filled(4.5);
   EXPECT_TRUE(std::isinf(temporalPsnr({before, after}, {before, after})));
   EXPECT_TRUE(std::isinf(temporalPsnr({before, after}, {worse, worseAfter})));
 }
 
 TEST(TemporalPsnr, HasTheErrorOfTheChange) {
-  const SparseVolume before = constant(2), after = constant(4);
-  const SparseVolume low = constant(1.75), high = constant(4.25);
+  const SparseVolume before = filled(2), after = filled(4);
+  const SparseVolume low = filled(1.75), high = filled(4.25);
   // The change has an error of 0.5 everywhere, and the peak is 4.
   EXPECT_NEAR(temporalPsnr({before, after}, {low, high}), 20 * std::log10(4 / 0.5), kRounding);
   EXPECT_NEAR(temporalPsnr({before, after}, {low, high}, {.peak = 8.0}), 20 * std::log10(8 / 0.5),
@@ -44,13 +44,13 @@ TEST(TemporalPsnr, HasTheErrorOfTheChange) {
 TEST(TemporalPsnr, IsMeasuredOverTheVoxelsOfBothFrames) {
   // The reference moves from one cube to another of the same size; the candidate is not in the
   // second frame, so that half of the box has an error of 4.
-  const SparseVolume before = constant(4), after = constant(4, {{13, 2, 5}, {28, 9, 14}});
+  const SparseVolume before = filled(4), after = filled(4, {{13, 2, 5}, {28, 9, 14}});
   const SparseVolume gone{};
   EXPECT_NEAR(temporalPsnr({before, after}, {before, gone}), 10 * std::log10(2.0), kRounding);
 }
 
 TEST(TemporalPsnr, TakesAnEmptyFrame) {
-  const SparseVolume empty{}, full = constant(4), half = constant(2);
+  const SparseVolume empty{}, full = filled(4), half = filled(2);
   EXPECT_NEAR(temporalPsnr({empty, full}, {empty, half}), 20 * std::log10(2.0), kRounding);
   EXPECT_NEAR(temporalPsnr({full, empty}, {half, empty}), 20 * std::log10(2.0), kRounding);
   EXPECT_THROW((void)temporalPsnr({empty, empty}, {full, full}), BadInput);
