@@ -69,6 +69,7 @@ class SequenceWriter {
   /// \param frame  its bytes, from encodeFrame
   /// \throws UsageError  the number is not above that of the frame before it; the first frame of
   ///                     the group refers to another one
+  /// \throws BadInput  as for dependsOnPrevious
   void append(std::int64_t number, std::vector<std::byte> frame);
 
   /// Writes the group to the disk. A group without frames is not written.
