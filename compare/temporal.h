@@ -18,8 +18,8 @@ class TemporalComparison {
   /// Begins the next frame.
   void beginFrame();
 
-  /// The PSNR of the temporal difference of a grid, dB; nothing if the frame before did not have the
-  /// grid with an active voxel.
+  /// The PSNR of the temporal difference of a grid, dB; nothing if the frame before did not have
+  /// the grid with an active voxel.
   [[nodiscard]] std::optional<double> compare(const std::string& grid,
                                               const SparseVolume& reference,
                                               const SparseVolume& candidate);
