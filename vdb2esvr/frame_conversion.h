@@ -1,5 +1,6 @@
 #pragma once
-/// What runs over sequences have in common, whether they write a file for each frame or one for all.
+/// What runs over sequences have in common, whether they write a file for each frame or one for
+/// all.
 
 #include <cstdint>
 #include <functional>

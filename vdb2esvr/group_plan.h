@@ -13,8 +13,8 @@ namespace esvr::vdb2esvr {
 using PlannedGroup = std::vector<std::size_t>;
 
 /// Divides frames with increasing numbers into groups of `size` frames with an input each; the last
-/// one may have fewer. A frame that holds another one is in the group of that frame. Frames that are
-/// left out are in no group.
+/// one may have fewer. A frame that holds another one is in the group of that frame. Frames that
+/// are left out are in no group.
 [[nodiscard]] std::vector<PlannedGroup> planGroups(const std::vector<cli::Frame>& frames,
                                                    std::size_t size);
 

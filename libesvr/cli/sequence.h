@@ -1,6 +1,6 @@
 #pragma once
-/// Sequences in the options of the programs: patterns for files with one frame each, files that hold
-/// all frames, and the options --frames, --missing and --on-error.
+/// Sequences in the options of the programs: patterns for files with one frame each, files that
+/// hold all frames, and the options --frames, --missing and --on-error.
 
 #include <cstddef>
 #include <filesystem>
