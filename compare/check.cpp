@@ -1,7 +1,5 @@
 #include "compare/check.h"
 
-#include <algorithm>
-#include <array>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -11,21 +9,14 @@
 #include "cli/thread_limit.h"
 #include "compare/baseline.h"
 #include "compare/check_report.h"
-#include "compare/grid_file.h"
+#include "compare/check_sequence.h"
+#include "compare/compare_files.h"
 #include "compare/limits.h"
 #include "compare/program.h"
-#include "compare/unfitted.h"
 #include "esvr/error.h"
-#include "esvr/vector_metrics.h"
 
 namespace esvr::compare {
 namespace {
-
-/// Indices of a grid in the two files; nothing if the candidate does not have it.
-struct Pair {
-  std::size_t reference = 0;
-  std::optional<std::size_t> candidate;
-};
 
 void checkFiles(const CheckOptions& options) {
   std::vector<std::filesystem::path> files;
@@ -39,181 +30,6 @@ void checkFiles(const CheckOptions& options) {
   cli::requireDistinct(files);
   if (options.update) cli::checkOutput(*options.baseline, {".json"}, true);
 }
-
-std::optional<std::size_t> counterpart(const GridFile& file, const std::string& uniqueName) {
-  const auto& grids = file.grids();
-  const auto it = std::find_if(grids.begin(), grids.end(), [&](const ListedGrid& grid) {
-    return grid.uniqueName == uniqueName;
-  });
-  if (it == grids.end()) return std::nullopt;
-  return std::size_t(it - grids.begin());
-}
-
-/// Pairs all grids of the reference, and records the grids that only the candidate has.
-std::vector<Pair> pairAll(const CheckOptions& options, const GridFile& reference,
-                          const GridFile& candidate, CheckRecord& record) {
-  std::vector<Pair> pairs;
-  const auto isIgnored = [&](const ListedGrid& grid) {
-    return options.ignored.contains(grid.uniqueName);
-  };
-  for (std::size_t g = 0; g < reference.grids().size(); ++g)
-    if (const ListedGrid& grid = reference.grids()[g]; !isIgnored(grid))
-      pairs.push_back({g, counterpart(candidate, grid.uniqueName)});
-  for (const auto& grid : candidate.grids())
-    if (!isIgnored(grid) && !counterpart(reference, grid.uniqueName)) {
-      record.extra.push_back(grid.uniqueName);
-      record.failures.push_back("grid \"" + grid.uniqueName + "\" is not in the reference");
-    }
-  return pairs;
-}
-
-/// Pairs a grid by "NAME" or "NAME=OTHER". If a grid's name contains "=", the whole text is a name.
-Pair pairNamed(const GridFile& reference, const GridFile& candidate, const std::string& wanted) {
-  const std::size_t split = counterpart(reference, wanted) ? std::string::npos : wanted.find('=');
-  const std::string name = wanted.substr(0, split);
-  const std::string other = split == std::string::npos ? wanted : wanted.substr(split + 1);
-  return {reference.find(name), candidate.find(other)};
-}
-
-std::vector<Pair> choosePairs(const CheckOptions& options, const GridFile& reference,
-                              const GridFile& candidate, CheckRecord& record) {
-  if (options.grids.empty()) return pairAll(options, reference, candidate, record);
-  std::vector<Pair> pairs;
-  for (const auto& wanted : options.grids) pairs.push_back(pairNamed(reference, candidate, wanted));
-  return pairs;
-}
-
-std::string joinedNames(const GridFile& file) {
-  std::string list;
-  for (const auto& grid : file.grids())
-    list += (list.empty() ? "\"" : ", \"") + grid.uniqueName + '"';
-  return list.empty() ? "none" : list;
-}
-
-void requirePairs(const std::vector<Pair>& pairs, const GridFile& reference,
-                  const GridFile& candidate) {
-  if (pairs.empty()) throw BadInput(reference.path().string() + ": no grid can be compared");
-  if (std::none_of(pairs.begin(), pairs.end(), [](const Pair& p) { return p.candidate; }))
-    throw BadInput("no grid of " + reference.path().string() + " (" + joinedNames(reference) +
-                   ") is in " + candidate.path().string() + " (" + joinedNames(candidate) + ")");
-}
-
-/// \throws BadInput  nothing could be compared
-void requireResults(const GridFile& reference, const CheckRecord& record) {
-  if (!record.grids.empty() || !record.same.empty() || !record.failures.empty()) return;
-  std::string text = reference.path().string() + ": no grid can be compared";
-  for (const auto& line : record.skipped) text += "\n  " + line;
-  throw BadInput(text);
-}
-
-bool disjoint(const Box& a, const Box& b) {
-  const Box common{maxCoord(a.min, b.min), minCoord(a.max, b.max)};
-  return common.empty();
-}
-
-/// Compares one pair of grids after the other, so that only two volumes are in memory at a time.
-class Comparison {
- public:
-  Comparison(const CheckOptions& options, const GridFile& reference, const GridFile& candidate)
-      : options_(options), reference_(reference), candidate_(candidate) {
-    const bool limit = options.limits[std::size_t(FigureId::kSsim)].has_value();
-    ssim_ = options.ssim || limit || (options.baseline && baselineHasSsim(*options.baseline));
-  }
-
-  void run(const Pair& pair, CheckRecord& record) {
-    const ListedGrid& listed = reference_.grids()[pair.reference];
-    if (!pair.candidate) {
-      record.failures.push_back("grid \"" + listed.uniqueName + "\" is missing in " +
-                                candidate_.path().string());
-      return;
-    }
-    const GridPair both{reference_, pair.reference, candidate_, *pair.candidate};
-    if (isRetyped(both))
-      record.failures.push_back(retypedText(both));
-    else if (both.a().isVector && both.b().isVector && !haveSameBytes(both))
-      compareVectorGrids(pair, listed.uniqueName, record);
-    else if (!listed.comparable || (listed.empty && options_.grids.empty()))
-      compareUnfitted(options_, both, record);
-    else
-      record.grids.push_back(compare(pair, listed.uniqueName, record));
-  }
-  [[nodiscard]] const std::vector<double>& ranges() const { return ranges_; }
-
- private:
-  CheckedGrid compare(const Pair& pair, const std::string& name, CheckRecord& record) {
-    const VolumeGrid a = reference_.read(pair.reference);
-    const VolumeGrid b = candidate_.read(*pair.candidate);
-    CheckedGrid grid{.name = name, .candidateName = candidate_.grids()[*pair.candidate].uniqueName};
-    requireRange(a.volume, name);
-    requireOverlap(a.volume, b.volume, name, record);
-    grid.metrics = compareVolumes(a.volume, b.volume,
-                                  {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
-    grid.figures = figuresOf(grid.metrics);
-    grid.differences = compareDescriptors(a.descriptor, b.descriptor);
-    addRange(a.volume);
-    return grid;
-  }
-
-  /// Adds a row for the lengths of the vectors and one for each component.
-  void compareVectorGrids(const Pair& pair, const std::string& name, CheckRecord& record) {
-    const VectorGrid a = reference_.readVectors(pair.reference);
-    const VectorGrid b = candidate_.readVectors(*pair.candidate);
-    const std::string& other = candidate_.grids()[*pair.candidate].uniqueName;
-    const SparseVolume lengths = magnitudeOf(a.components);
-    requireRange(lengths, name);
-    requireOverlap(lengths, magnitudeOf(b.components), name, record);
-    const VectorMetrics metrics = compareVectors(
-        a.components, b.components, {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
-    record.grids.push_back({name, other, metrics.magnitude, figuresOf(metrics.magnitude),
-                            compareDescriptors(a.descriptor, b.descriptor)});
-    addRange(lengths);
-    for (std::size_t c = 0; c < kComponents; ++c) {
-      const VolumeMetrics& m = metrics.components[c];
-      record.grids.push_back({componentName(name, c), componentName(other, c), m, figuresOf(m),
-                              backgroundDifferences(a, b, c)});
-      addRange(a.components[c]);
-    }
-  }
-
-  /// The difference of the backgrounds of a component. That of x is one of the descriptors.
-  static std::vector<Difference> backgroundDifferences(const VectorGrid& a, const VectorGrid& b,
-                                                       std::size_t component) {
-    if (component == 0) return {};
-    GridDescriptor of, other;
-    of.background = a.background[component];
-    other.background = b.background[component];
-    return compareDescriptors(of, other);
-  }
-
-  void addRange(const SparseVolume& reference) {
-    const ValueRange range = activeRange(reference);
-    ranges_.push_back(double(range.max) - double(range.min));
-  }
-
-  static void requireOverlap(const SparseVolume& a, const SparseVolume& b, const std::string& name,
-                             CheckRecord& record) {
-    if (!disjoint(activeBox(a), activeBox(b))) return;
-    record.failures.push_back("grid \"" + name + "\": " +
-                              (activeVoxelCount(b) == 0
-                                   ? "the candidate has no active voxel"
-                                   : "the active voxels lie in boxes that do not meet"));
-  }
-
-  /// Checks that the reference has an active voxel and a peak, without which PSNR and SSIM are not
-  /// defined.
-  void requireRange(const SparseVolume& reference, const std::string& name) const {
-    const std::string grid = reference_.path().string() + ": grid \"" + name + "\": ";
-    if (activeVoxelCount(reference) == 0) throw BadInput(grid + "it has no active voxel");
-    const ValueRange range = activeRange(reference);
-    if (!options_.peak && range.min == 0.0f && range.max == 0.0f)
-      throw BadInput(grid + "every active voxel is 0, so PSNR has no peak; set it with --peak");
-  }
-
-  const CheckOptions& options_;
-  const GridFile &reference_, &candidate_;
-  bool ssim_ = false;
-  std::vector<double> ranges_;
-};
 
 void tell(const CheckOptions& options, const CheckRecord& record) {
   if (!options.report.empty())
@@ -229,29 +45,24 @@ void throwFailures(const CheckOptions& options, const CheckRecord& record) {
   throw TargetMissed(text);
 }
 
+/// Compares the files or the sequences, and judges the size.
+CheckRecord compared(const CheckOptions& options, const CancelToken& cancel) {
+  if (areSequences(options)) return checkSequence(options, cancel);
+  if (options.frames || options.limits[std::size_t(FigureId::kPsnrTemporal)])
+    throw UsageError("--frames and --min-psnr-temporal need sequences");
+  const GridFile reference(options.reference, options.memory),
+      candidate(options.candidate, options.memory);
+  return compareFiles(options, {reference, candidate, cancel}, nullptr);
+}
+
 }  // namespace
 
 void check(const CheckOptions& options) {
   const cli::ThreadLimit threads(options.threads);
   const cli::Interrupts interrupts;
   checkFiles(options);
-  const GridFile reference(options.reference, options.memory),
-      candidate(options.candidate, options.memory);
-
-  CheckRecord record;
-  record.candidateBytes = candidate.bytes();
-  const auto pairs = choosePairs(options, reference, candidate, record);
-  requirePairs(pairs, reference, candidate);
-  record.fileDifferences = compareMetadata(reference.metadata(), candidate.metadata(),
-                                           std::array<std::string, 1>{kWriterKey});
-  Comparison comparison(options, reference, candidate);
-  for (const Pair& pair : pairs) {
-    if (interrupts.token().cancelled()) throw Cancelled();
-    comparison.run(pair, record);
-  }
-  requireResults(reference, record);
-  judgeLimits(options, comparison.ranges(), record);
-  judgeDifferences(options, record);
+  CheckRecord record = compared(options, interrupts.token());
+  judgeBytes(options, record);
   if (options.baseline && !options.update) judgeBaseline(*options.baseline, record);
 
   tell(options, record);

@@ -36,6 +36,11 @@ cli::ProgramText programText() {
           "Grids that are not of floats or doubles are compared bit for bit. --ignore-grids\n"
           "excludes a grid from all of this.\n"
           "\n"
+          "REF and CAND may both be sequences: a pattern such as smoke.####.vdb, or an .esvr file\n"
+          "that holds a sequence. Each frame is compared, and 'temporal' is the PSNR of the "
+          "change\n"
+          "from the frame before it. A frame that only one of them has makes the check fail.\n"
+          "\n"
           "A baseline holds figures and their tolerances. --update writes the figures of this\n"
           "run and keeps the tolerances of the file.\n"
           "\n"
@@ -45,7 +50,8 @@ cli::ProgramText programText() {
           "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45 --min-iou 0.98\n"
           "  esvr-compare check smoke.vdb back.vdb --max-error 1% --fail-on transform,metadata\n"
           "  esvr-compare check ref.vdb new.vdb -g density=smoke --max-bytes 200KB\n"
-          "  esvr-compare check smoke.vdb smoke.esvr --baseline smoke.json --update"};
+          "  esvr-compare check smoke.vdb smoke.esvr --baseline smoke.json --update\n"
+          "  esvr-compare check 'smoke.####.vdb' smoke.esvr --min-psnr-temporal 45"};
 }
 
 cli::CommandLine makeCommandLine() {
@@ -64,6 +70,8 @@ cli::CommandLine makeCommandLine() {
     options.add_options()(figure.option, value<std::string>()->value_name("X"), figure.unit);
   // clang-format off
   options.add_options()
+    ("frames", value<std::string>()->value_name("RANGE"),
+     "of sequences: the frames to compare, for example 1-100x2 (default: all)")
     ("max-bytes", value<std::string>()->value_name("SIZE"),
      "largest size of the file CAND, for example 200KB")
     ("fail-on", value<std::string>()->value_name("KINDS"),
@@ -132,6 +140,8 @@ std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv)
   if (const auto names = a.find<std::vector<std::string>>("ignore-grids"))
     options.ignored = {names->begin(), names->end()};
   readLimits(a, options);
+  if (const auto range = a.find<std::string>("frames"))
+    options.frames = cli::parseFrames("frames", *range);
   options.baseline = a.find<std::string>("baseline");
   options.update = a.get<bool>("update");
   if (options.update && !options.baseline) throw UsageError("--update needs --baseline FILE.json");

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/error_bound.h"
+#include "cli/frame_range.h"
 #include "cli/host_memory.h"
 #include "cli/log.h"
 #include "compare/differences.h"
@@ -20,7 +21,8 @@ namespace esvr::compare {
 
 struct CheckOptions {
   std::filesystem::path reference, candidate;
-  std::vector<std::string> grids;  ///< NAME or NAME=NAME IN CAND; empty: all
+  std::optional<std::vector<cli::FrameNumber>> frames;  ///< of sequences; nothing: all
+  std::vector<std::string> grids;                       ///< NAME or NAME=NAME IN CAND; empty: all
   /// Grids that are not compared, and that only one of the files may have.
   std::set<std::string> ignored;
   std::array<std::optional<cli::ErrorBound>, kFigureCount> limits;

@@ -2,6 +2,7 @@
 /// The results of a check.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ struct CheckedGrid {
   VolumeMetrics metrics{};
   FigureValues figures{};
   std::vector<Difference> differences{};
+  std::optional<std::int64_t> frame{};  ///< number of its frame, if the files are sequences
 };
 
 struct CheckRecord {

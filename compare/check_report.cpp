@@ -1,5 +1,6 @@
 #include "compare/check_report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <ostream>
@@ -15,13 +16,21 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kCheckSchema = "esvr-check";
 constexpr int kCheckVersion = 1;
 
-/// The figures that all grids have.
+/// The figures that any grid has.
 std::vector<Figure> columns(const CheckRecord& record) {
   std::vector<Figure> shown;
   for (const Figure& figure : allFigures())
-    if (!record.grids.empty() && valueOf(record.grids.front().figures, figure))
+    if (std::ranges::any_of(record.grids, [&](const CheckedGrid& grid) {
+          return valueOf(grid.figures, figure).has_value();
+        }))
       shown.push_back(figure);
   return shown;
+}
+
+/// The figure of a grid as text; a grid of the first frame has no temporal difference.
+std::string cellOf(const CheckedGrid& grid, const Figure& figure) {
+  const auto value = valueOf(grid.figures, figure);
+  return value ? textOf(figure, *value) : "-";
 }
 
 void printFigures(const CheckRecord& record, std::ostream& out) {
@@ -32,8 +41,7 @@ void printFigures(const CheckRecord& record, std::ostream& out) {
   cli::Table table(header);
   for (const auto& grid : record.grids) {
     std::vector<std::string> row{grid.name};
-    for (const Figure& figure : shown)
-      row.push_back(textOf(figure, *valueOf(grid.figures, figure)));
+    for (const Figure& figure : shown) row.push_back(cellOf(grid, figure));
     table.add(row);
   }
   table.print(out);
@@ -81,6 +89,7 @@ Json toJson(const CheckedGrid& grid) {
     if (value) json[figure.key] = std::isfinite(*value) ? Json(*value) : Json();
   }
   const Coord at = grid.metrics.maxErrorAt;
+  json["frame"] = grid.frame ? Json(*grid.frame) : Json(nullptr);
   json["max_error_at"] = {at.x, at.y, at.z};
   json["peak"] = grid.metrics.peak;
   json["differences"] = toJson(grid.differences);

@@ -25,6 +25,15 @@ constexpr std::array<Figure, kFigureCount> kFigures{{
      true,
      false,
      {.absolute = 0.05}},
+    {FigureId::kPsnrTemporal,
+     "psnr_temporal",
+     "min-psnr-temporal",
+     "temporal",
+     "of sequences: smallest PSNR of the temporal difference, which is each frame minus the frame "
+     "before it, dB",
+     true,
+     false,
+     {.absolute = 0.05}},
     {FigureId::kMaxError,
      "max_error",
      "max-error",
@@ -68,7 +77,8 @@ constexpr std::array<Figure, kFigureCount> kFigures{{
 }};
 
 bool isPsnr(const Figure& figure) {
-  return figure.id == FigureId::kPsnrBox || figure.id == FigureId::kPsnrActive;
+  return figure.id == FigureId::kPsnrBox || figure.id == FigureId::kPsnrActive ||
+         figure.id == FigureId::kPsnrTemporal;
 }
 
 }  // namespace

@@ -10,8 +10,17 @@
 
 namespace esvr::compare {
 
-enum class FigureId { kPsnrBox, kPsnrActive, kMaxError, kP999Error, kIou, kSsim, kMassError };
-inline constexpr std::size_t kFigureCount = 7;
+enum class FigureId {
+  kPsnrBox,
+  kPsnrActive,
+  kPsnrTemporal,
+  kMaxError,
+  kP999Error,
+  kIou,
+  kSsim,
+  kMassError
+};
+inline constexpr std::size_t kFigureCount = 8;
 
 /// The default tolerance of a figure against a baseline.
 struct Slack {

@@ -50,15 +50,21 @@ ListedGrid listedGrid(const EsvrFile& file, const GridOfFile& grid) {
 
 GridFile::GridFile(std::filesystem::path path, cli::HostMemory memory)
     : path_(std::move(path)), memory_(std::move(memory)) {
-  if (path_.extension() == ".esvr")
-    listEsvr();
-  else
+  if (path_.extension() != ".esvr") {
     listVdb();
+    return;
+  }
+  esvr_ = std::make_unique<EsvrFile>(readEsvr(path_, {memory_.maxBytes, memory_.voxels}));
+  bytes_ = inspectEsvr(path_).fileBytes;
+  listEsvr();
+}
+
+GridFile::GridFile(std::filesystem::path path, const EsvrFile& frame, cli::HostMemory memory)
+    : path_(std::move(path)), memory_(std::move(memory)), esvr_(std::make_unique<EsvrFile>(frame)) {
+  listEsvr();
 }
 
 void GridFile::listEsvr() {
-  esvr_ = std::make_unique<EsvrFile>(readEsvr(path_, {memory_.maxBytes, memory_.voxels}));
-  bytes_ = inspectEsvr(path_).fileBytes;
   metadata_ = esvr_->metadata;
   for (const auto& grid : gridsInOrder(*esvr_)) {
     grids_.push_back(listedGrid(*esvr_, grid));

@@ -32,6 +32,9 @@ class GridFile {
   /// \param memory  memory that reading it may take
   GridFile(std::filesystem::path path, cli::HostMemory memory);
 
+  /// A frame of a sequence. \param path  of the file that holds it, for error texts
+  GridFile(std::filesystem::path path, const EsvrFile& frame, cli::HostMemory memory);
+
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] const std::vector<ListedGrid>& grids() const { return grids_; }

@@ -26,6 +26,9 @@ void judgeGrid(const CheckOptions& options, double range, const CheckedGrid& gri
 void judgeLimits(const CheckOptions& options, std::span<const double> ranges, CheckRecord& record) {
   for (std::size_t g = 0; g < record.grids.size(); ++g)
     judgeGrid(options, ranges[g], record.grids[g], record.failures);
+}
+
+void judgeBytes(const CheckOptions& options, CheckRecord& record) {
   if (options.maxBytes && record.candidateBytes > *options.maxBytes)
     record.failures.push_back(std::to_string(record.candidateBytes) + " bytes, --max-bytes " +
                               std::to_string(*options.maxBytes));

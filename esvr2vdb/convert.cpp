@@ -46,8 +46,7 @@ const char* whyNot(const GridOfFile& grid, const Options& options) {
 }
 
 EsvrFile read(const Options& options, const cli::Log& log) {
-  const ReadLimits limits{options.memory.maxBytes, options.memory.voxels,
-                          whyNoCarried(options) == nullptr};
+  const ReadLimits limits = limitsOf(options);
   if (readsAll(options)) return readEsvr(options.input, limits);
   ReadPart wanted = options.part;
   wanted.limits = limits;
@@ -79,22 +78,26 @@ std::vector<NamedGrid> writable(const std::vector<NamedGrid>& chosen, const Opti
   return kept;
 }
 
+/// True if a part of a grid's ellipsoids is wanted, which a frame of a sequence still has in full.
+bool isCut(const Options& options) { return options.maxEllipsoids || options.part.layers; }
+
 StoredGrid wantedPart(const StoredGrid& grid, const Options& options) {
-  return options.maxEllipsoids ? heaviest(grid, *options.maxEllipsoids) : grid;
+  const StoredGrid part = options.part.layers ? firstLayers(grid, *options.part.layers) : grid;
+  return options.maxEllipsoids ? heaviest(part, *options.maxEllipsoids) : part;
 }
 
 VolumeGrid decoded(const StoredGrid& grid, const Options& options, const DecodeOptions& decode) {
   VolumeGrid result;
   result.descriptor = grid.descriptor;
-  result.volume = options.maxEllipsoids ? decodeGrid(wantedPart(grid, options), decode)
-                                        : decodeGrid(grid, decode);
+  result.volume =
+      isCut(options) ? decodeGrid(wantedPart(grid, options), decode) : decodeGrid(grid, decode);
   return result;
 }
 
 VectorGrid decoded(const EsvrFile& file, const StoredVector& vector, const Options& options,
                    const DecodeOptions& decode) {
   const StoredComponents components = componentsOf(file, vector);
-  if (!options.maxEllipsoids) return decodeVector(vector.name, components, decode);
+  if (!isCut(options)) return decodeVector(vector.name, components, decode);
   std::vector<StoredGrid> parts;
   for (const StoredGrid& component : components) parts.push_back(wantedPart(component, options));
   return decodeVector(vector.name, std::span(parts).first<kComponents>(), decode);
@@ -202,6 +205,10 @@ std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<N
 
 }  // namespace
 
+ReadLimits limitsOf(const Options& options) {
+  return {options.memory.maxBytes, options.memory.voxels, whyNoCarried(options) == nullptr};
+}
+
 void convert(const Options& options) {
   const cli::Interrupts interrupts;  // Ctrl-C lets a file that is being written be completed
   checkFiles(options);
@@ -210,7 +217,11 @@ void convert(const Options& options) {
 
 void convertFile(const Options& options, const CancelToken& cancel, const cli::Log& log,
                  std::ostream& out) {
-  const EsvrFile file = read(options, log);
+  convertContent(options, read(options, log), cancel, log, out);
+}
+
+void convertContent(const Options& options, const EsvrFile& file, const CancelToken& cancel,
+                    const cli::Log& log, std::ostream& out) {
   const auto chosen = writable(chooseGrids(options.input, file, options.grids), options, log);
   std::vector<ComparedGrid> compared;
   if (options.reference) compared = counterparts(file, chosen, options);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <iostream>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <sstream>
@@ -16,10 +17,58 @@
 #include "cli/memory_gate.h"
 #include "cli/output.h"
 #include "esvr/error.h"
+#include "esvr/sequence_file.h"
 #include "esvr2vdb/jobs.h"
 
 namespace esvr::esvr2vdb {
 namespace {
+
+using FrameIndices = std::vector<std::size_t>;
+
+/// The groups of the frames in a file, by the number of the frame.
+std::map<cli::FrameNumber, std::size_t> groupsIn(const std::string& path) {
+  std::map<cli::FrameNumber, std::size_t> groups;
+  const SequenceReader reader(path);
+  for (const SequenceFrame& frame : reader.frames()) groups[frame.number] = frame.group;
+  return groups;
+}
+
+/// The frames that one thread decodes one after the other: each alone if it is a file, or those of
+/// a group by increasing numbers, because they may refer to each other.
+std::vector<FrameIndices> tasksFor(const cli::Sequence& sequence,
+                                   const std::vector<cli::Frame>& frames) {
+  const bool isOneFile = sequence.input.isWhole();
+  const auto groups =
+      isOneFile ? groupsIn(sequence.input.text()) : std::map<cli::FrameNumber, std::size_t>{};
+  std::map<std::size_t, std::map<cli::FrameNumber, std::size_t>> tasks;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (!frames[i].missing)
+      tasks[isOneFile ? groups.at(frames[i].number) : i][frames[i].number] = i;
+  std::vector<FrameIndices> lists;
+  for (const auto& task : tasks) {
+    FrameIndices& list = lists.emplace_back();
+    for (const auto& frame : task.second) list.push_back(frame.second);
+  }
+  return lists;
+}
+
+/// Reads frames of one file. The limit of the memory may change.
+class FileOfFrames {
+ public:
+  explicit FileOfFrames(std::filesystem::path path) : path_(std::move(path)) {}
+
+  const EsvrFile& read(cli::FrameNumber number, const ReadLimits& limits) {
+    if (!reader_ || maxBytes_ != limits.maxBytes)
+      reader_ = std::make_unique<SequenceReader>(path_, limits);
+    maxBytes_ = limits.maxBytes;
+    return reader_->read(number);
+  }
+
+ private:
+  std::filesystem::path path_;
+  std::unique_ptr<SequenceReader> reader_;
+  std::uint64_t maxBytes_ = 0;
+};
 
 /// Decodes the frames of a sequence on several threads.
 class SequenceDecoding {
@@ -30,14 +79,15 @@ class SequenceDecoding {
         frames_(frames),
         cancel_(cancel),
         holders_(cli::holdersOf(frames)),
-        workers_(cli::frameWorkers(options.threads, frames)),
+        tasks_(tasksFor(*options.sequence, frames)),
+        workers_(cli::taskWorkers(options.threads, tasks_.size())),
         gate_(options.memory.maxBytes),
         log_(kProgram, options.verbosity),
         done_(frames.size()) {}
 
   void run() {
-    cli::forEachFrame({frames_, workers_, options_.sequence->onError, cancel_},
-                      [&](const cli::FrameTask& task) { return decodeWithHolders(task.frame); });
+    cli::forEachTask({tasks_.size(), workers_, options_.sequence->onError, cancel_},
+                     [&](const cli::Task& task) { return decodeTask(tasks_[task.index]); });
     warnings_.tell(log_);
     for (std::size_t i = 0; i < frames_.size(); ++i) printTable(i);
     throwWhatIsAmiss();
@@ -50,10 +100,23 @@ class SequenceDecoding {
     std::optional<Error> failure{};
   };
 
+  /// Decodes the frames of a task one after the other.
+  /// \return false if one of them failed
+  bool decodeTask(const FrameIndices& frames) {
+    FileOfFrames file(options_.input);
+    bool isWell = true;
+    for (const std::size_t frame : frames) {
+      const bool stops = !isWell && options_.sequence->onError == cli::OnFrameError::kStop;
+      if (stops || cancel_.cancelled()) break;
+      isWell = decodeWithHolders(frame, file) && isWell;
+    }
+    return isWell;
+  }
+
   /// Decodes a frame and repeats its output for the frames that hold it.
   /// \return false if one of them failed
-  bool decodeWithHolders(std::size_t source) {
-    bool isWell = attempt(source, [&] { decode(source); });
+  bool decodeWithHolders(std::size_t source, FileOfFrames& file) {
+    bool isWell = attempt(source, [&] { decode(source, file); });
     const auto [begin, end] = holders_.equal_range(source);
     for (auto at = begin; at != end && !cancel_.cancelled(); ++at)
       isWell = attempt(at->second, [&] { hold(source, at->second); }) && isWell;
@@ -77,19 +140,19 @@ class SequenceDecoding {
   }
 
   /// Decodes a frame with its share of the memory. A frame that needs more is decoded alone.
-  void decode(std::size_t i) {
+  void decode(std::size_t i, FileOfFrames& file) {
     const std::uint64_t share = options_.memory.maxBytes / std::uint64_t(workers_);
     try {
       const auto part = gate_.take(share);
-      return decodeWithin(i, share);
+      return decodeWithin(i, share, file);
     } catch (const MemoryExceeded&) {
       if (workers_ == 1) throw;
     }
     const auto all = gate_.takeAll();
-    decodeWithin(i, options_.memory.maxBytes);
+    decodeWithin(i, options_.memory.maxBytes, file);
   }
 
-  void decodeWithin(std::size_t i, std::uint64_t maxBytes) {
+  void decodeWithin(std::size_t i, std::uint64_t maxBytes, FileOfFrames& file) {
     const cli::Frame& frame = frames_[i];
     Options own = options_;
     own.memory.maxBytes = maxBytes;
@@ -99,7 +162,10 @@ class SequenceDecoding {
     const cli::FrameFolder folder(own.output);
     const cli::Log log = warnings_.logOf(frame, kProgram, own.verbosity);
     std::ostringstream table;
-    convertFile(own, cancel_, log, table);
+    if (options_.sequence->input.isWhole())
+      convertContent(own, file.read(frame.number, limitsOf(own)), cancel_, log, table);
+    else
+      convertFile(own, cancel_, log, table);
     done_[i].table = table.str();
   }
 
@@ -133,6 +199,7 @@ class SequenceDecoding {
   const std::vector<cli::Frame>& frames_;
   const CancelToken& cancel_;
   const std::multimap<std::size_t, std::size_t> holders_;
+  const std::vector<FrameIndices> tasks_;
   const int workers_;
   cli::MemoryGate gate_;
   cli::FrameWarnings warnings_;

@@ -17,6 +17,14 @@ void convert(const Options& options);
 void convertFile(const Options& options, const CancelToken& cancel, const cli::Log& log,
                  std::ostream& out);
 
+/// The same for the content of a file, which may be a frame of a sequence.
+/// \throws Cancelled  nothing was written
+void convertContent(const Options& options, const EsvrFile& file, const CancelToken& cancel,
+                    const cli::Log& log, std::ostream& out);
+
+/// The limits with which the input is read.
+[[nodiscard]] ReadLimits limitsOf(const Options& options);
+
 /// Writes a VDB for each frame of the sequence, on several threads.
 /// \throws Error  the kind of the first frame that failed; RuntimeFailure if the run was
 ///                interrupted. Frames may have been written
@@ -25,10 +33,14 @@ void convertSequence(const Options& options);
 /// Prints the grids of a file and, for an .esvr file, its sections. It evaluates no voxel.
 void list(const Options& options);
 
+/// Prints the frames of a file that holds a sequence.
+void listSequence(const Options& options);
+
 /// Prints the grids of a .vdb or .nvdb file.
 void listVdb(const Options& options);
 
-/// Reads the whole file and prints OK. \throws BadInput  the file is damaged (the text says where)
+/// Reads the whole file and prints OK.
+/// \throws BadInput  the file is damaged (the text says where, and names each frame that is lost)
 void check(const Options& options);
 
 }  // namespace esvr::esvr2vdb

@@ -7,6 +7,7 @@
 #include "cli/table.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
+#include "esvr/sequence_file.h"
 #include "esvr/vdb_io.h"
 #include "esvr2vdb/choose_grids.h"
 #include "esvr2vdb/jobs.h"
@@ -221,6 +222,7 @@ void printDetails(const Listing& listing) {
 void list(const Options& options) {
   const auto extension = options.input.extension();
   if (extension == ".vdb" || extension == ".nvdb") return listVdb(options);
+  if (holdsSequence(options.input)) return listSequence(options);
   Listing listing{options,
                   readEsvr(options.input, {options.memory.maxBytes, options.memory.voxels}),
                   inspectEsvr(options.input),

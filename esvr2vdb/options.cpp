@@ -24,6 +24,7 @@ cli::ProgramText programText() {
           "all grids in their order. --list lists the contents of a file, --check verifies it.",
       .usage =
           "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
+          "  esvr2vdb IN.####.esvr|IN.esvr OUT.####.vdb [--frames 1-100] ...\n"
           "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
           "  esvr2vdb --check IN.esvr",
       .notes =
@@ -41,6 +42,10 @@ cli::ProgramText programText() {
           "--list counts bytes that several grids share for the first of them only. The table\n"
           "of sections names the grid with which a section is shared.\n"
           "\n"
+          "If IN.esvr holds a sequence, OUT needs a pattern such as #### for the number of the\n"
+          "frame. --list prints its frames and groups, and --check names each frame that is "
+          "lost.\n"
+          "\n"
           "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
           "be used, 5 not enough memory (--max-memory). A sequence has the code of its first\n"
           "frame that failed.",
@@ -50,6 +55,7 @@ cli::ProgramText programText() {
           "  esvr2vdb smoke.esvr density.nvdb -g density\n"
           "  esvr2vdb smoke.esvr coarse.vdb --lod 1               a preview\n"
           "  esvr2vdb smoke.esvr part.vdb --bbox 0,0,0,63,63,63   a part of the voxels\n"
+          "  esvr2vdb smoke.esvr 'back.####.vdb' --frames 10-20   frames of a sequence\n"
           "  esvr2vdb --list smoke.vdb"};
 }
 
@@ -139,10 +145,10 @@ void readConversion(const Arguments& a, Options& options) {
   options.reference = a.find<std::string>("reference");
   if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
   if (options.box && !options.reference) throw UsageError("--box says nothing without --reference");
-  options.sequence = cli::readSequence(a);
+  options.sequence = cli::readSequence(a, {.input = true});
   if (options.sequence && options.reference && !cli::FramePattern::in(options.reference->string()))
-    throw UsageError("--reference needs a pattern for the number of a frame, as '" +
-                     options.input.string() + "' has one");
+    throw UsageError("--reference needs a pattern for the number of a frame, because '" +
+                     options.input.string() + "' is a sequence");
 }
 
 }  // namespace

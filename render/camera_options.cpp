@@ -1,6 +1,8 @@
 #include "render/option_groups.h"
 
+#include "cli/frame_pattern.h"
 #include "cli/number_list.h"
+#include "cli/sequence.h"
 #include "render/camera_file.h"
 #include "render/vector_option.h"
 #include "report/video_file.h"
@@ -53,15 +55,32 @@ void readFps(const Arguments& a, Options& options) {
 /// \throws UsageError  options say something that a video cannot do
 void checkVideoOptions(const Arguments& a, const Options& options) {
   if (!report::isVideo(options.output)) return;
-  if (options.turntable == 0) throw UsageError("a video needs --turntable");
+  if (options.turntable == 0 && !options.frames)
+    throw UsageError("a video needs --turntable or a sequence");
   if (a.has("ref")) throw UsageError("--ref compares pictures; a video has no files for them");
   if (a.get<int>("bits") != 8) throw UsageError("a video has 8 bits per channel; leave --bits out");
 }
 
+/// Reads the frames of an input that holds a sequence.
+void readSequence(const Arguments& a, std::vector<cli::FrameNumber> stored, Options& options) {
+  for (const char* option : {"turntable", "ref", "bench", "report"})
+    if (a.has(option) && !a.values[option].defaulted())
+      throw UsageError("--" + std::string(option) + " cannot be combined with a sequence");
+  const auto range = a.find<std::string>("frames");
+  options.frames = range ? cli::parseFrames("frames", *range) : std::move(stored);
+  for (const auto& output : {options.output.string(), a.find<std::string>("depth").value_or("")})
+    if (!output.empty() && !report::isVideo(output) && !cli::FramePattern::in(output))
+      throw UsageError("'" + output +
+                       "' needs a pattern such as #### for the number of a frame, because '" +
+                       options.input.string() + "' holds a sequence");
+}
+
 void readFrames(const Arguments& a, Options& options) {
+  if (auto stored = cli::framesInFile(options.input))
+    return readSequence(a, std::move(*stored), options);
   const auto text = a.find<std::string>("frames");
   if (!text) return;
-  if (options.turntable == 0) throw UsageError("--frames needs --turntable");
+  if (options.turntable == 0) throw UsageError("--frames needs --turntable or a sequence");
   const auto dash = text->find('-');
   if (dash == std::string::npos || dash == 0)
     throw UsageError("--frames must be like 0-35, not '" + *text + "'");
@@ -93,7 +112,8 @@ void addCameraOptions(cli::po::options_description& options) {
     ("turntable", value<int>()->value_name("N"),
      "draw N pictures of a full turn about the up axis, see the notes for their files")
     ("frames", value<std::string>()->value_name("A-B"),
-     "draw only the pictures A to B of a turntable, counted from 0")
+     "draw only the pictures A to B of a turntable, counted from 0, or these frames of a sequence, "
+     "for example 1-100x2")
     ("fps", value<double>()->value_name("F"),
      "pictures per second of a video (default: 30)");
   // clang-format on

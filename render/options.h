@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/frame_range.h"
 #include "cli/host_memory.h"
 #include "cli/log.h"
 #include "esvr/renderer.h"
@@ -63,8 +64,10 @@ struct Options {
   int turntable = 0;             ///< number of pictures of a full turn; 0: one picture
   int firstFrame = 0;            ///< first picture of the turn to draw
   std::optional<int> lastFrame;  ///< last picture of the turn to draw; default: the turn's last
-  double fps = 30.0;             ///< pictures per second of a video
-  std::filesystem::path depth;   ///< file of distances; empty: none
+  /// The frames to draw, if the input holds a sequence.
+  std::optional<std::vector<cli::FrameNumber>> frames;
+  double fps = 30.0;            ///< pictures per second of a video
+  std::filesystem::path depth;  ///< file of distances; empty: none
   std::filesystem::path saveTransfer;
   std::string device = "auto";
   RendererLimits limits;

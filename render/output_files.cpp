@@ -4,6 +4,7 @@
 #include <regex>
 #include <system_error>
 
+#include "cli/frame_pattern.h"
 #include "cli/json_file.h"
 #include "cli/output.h"
 #include "report/video_file.h"
@@ -86,8 +87,23 @@ fs::path errorName(const fs::path& picture) {
   return name.replace_extension("error" + picture.extension().string());
 }
 
+PictureFiles filesOfFrame(const Options& options, cli::FrameNumber frame) {
+  const auto at = [&](const fs::path& path) {
+    const auto pattern = cli::FramePattern::in(path.string());
+    return pattern ? pattern->at(frame) : fs::path{};
+  };
+  return {
+      0, report::isVideo(options.output) ? fs::path{} : at(options.output), {}, at(options.depth)};
+}
+
 std::vector<PictureFiles> pictureFiles(const Options& options) {
   const bool video = report::isVideo(options.output);
+  if (options.frames) {
+    std::vector<PictureFiles> files;
+    for (const cli::FrameNumber frame : *options.frames)
+      files.push_back(filesOfFrame(options, frame));
+    return files;
+  }
   if (options.turntable == 0) return {{0, options.output, options.sheet, options.depth}};
   const auto named = [](const fs::path& path, int frame) {
     return path.empty() ? path : frameName(path, frame);

@@ -22,6 +22,9 @@ struct PictureFiles {
 /// The file of a picture's error map: "turn.0007.error.png" for "turn.0007.png".
 [[nodiscard]] std::filesystem::path errorName(const std::filesystem::path& picture);
 
+/// The files of a frame of a sequence, whose number replaces the pattern in the names.
+[[nodiscard]] PictureFiles filesOfFrame(const Options& options, cli::FrameNumber frame);
+
 /// The files of all pictures that the options ask for.
 [[nodiscard]] std::vector<PictureFiles> pictureFiles(const Options& options);
 

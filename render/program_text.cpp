@@ -45,6 +45,10 @@ std::string notes() {
          "must\n"
          "be in PATH, encodes a video. A video shows the background; the default is black.\n"
          "\n"
+         "If IN.esvr holds a sequence, each frame becomes a picture with the number of the frame\n"
+         "in place of the pattern in OUT, or a picture of the video. All have one camera and one\n"
+         "range of values, which are those of all frames together.\n"
+         "\n"
          "--legend shows the color of each value and, in a second column in front of a\n"
          "checkerboard, its opacity over --opacity-length. The unit is the text of the grid's\n"
          "metadata \"unit\" or \"units\". A fitted camera leaves room for the bar. It is not "
@@ -86,6 +90,7 @@ cli::ProgramText programText() {
           .usage =
               "  esvr-render IN.esvr OUT.png|OUT.exr [OPTION]...\n"
               "  esvr-render IN.vdb OUT.png|OUT.exr [OPTION]...\n"
+              "  esvr-render IN.esvr OUT.####.png|OUT.mp4 [--frames 1-100] [OPTION]...\n"
               "  esvr-render IN OUT.mp4|OUT.webm|FOLDER/ --turntable N [OPTION]...\n"
               "  esvr-render IN.esvr --bench [--ref IN.vdb] [--report FILE.json] [OPTION]...",
           .notes = notes(),
@@ -98,6 +103,7 @@ cli::ProgramText programText() {
               "              --with temperature:colors=black-body:emission\n"
               "  esvr-render smoke.esvr turn.png --turntable 36   turn.0000.png to turn.0035.png\n"
               "  esvr-render smoke.esvr turn.mp4 --turntable 120 --fps 24\n"
+              "  esvr-render smoke.esvr 'out.####.png' --frames 1-100   frames of a sequence\n"
               "  esvr-render smoke.esvr --bench --ref smoke.vdb   speed, memory, quality"};
 }
 

@@ -47,7 +47,8 @@ Framing framingOf(const Options& options) {
 /// A box around all grids.
 Box boxOf(const std::vector<Scene>& scenes) {
   Box box;
-  for (const Scene& scene : scenes) box.expand(scene.box.min), box.expand(scene.box.max);
+  for (const Scene& scene : scenes)
+    if (!scene.box.empty()) box.expand(scene.box.min), box.expand(scene.box.max);
   return box;
 }
 

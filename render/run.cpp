@@ -15,6 +15,7 @@
 #include "cli/version_text.h"
 #include "esvr/image_metrics.h"
 #include "esvr/memory_limit.h"
+#include "esvr/sequence_file.h"
 #include "render/bench.h"
 #include "render/exr_file.h"
 #include "render/output_files.h"
@@ -93,40 +94,54 @@ report::VideoForm videoForm(const Options& options, const std::string& comment) 
 /// Draws pictures and writes them to files or to a video.
 class Frames {
  public:
-  Frames(const Options& options, Drawing& drawing, Drawing* reference, const CancelToken& cancel)
+  /// \param scenes  grids of all pictures
+  Frames(const Options& options, const std::vector<Scene>& scenes, Drawing* reference,
+         const CancelToken& cancel)
       : options_(options),
         log_(kProgram, options.verbosity),
-        drawing_(drawing),
+        scenes_(scenes),
         reference_(reference),
-        bar_(barOf(options, drawing.scenes.front())) {
+        bar_(barOf(options, scenes.front())) {
     if (report::isVideo(options.output))
       video_.emplace(options.output, videoForm(options, commandText()), cancel);
   }
 
-  void draw(const RenderOptions& r, const PictureFiles& files) {
+  void draw(Drawing& drawing, const RenderOptions& r, const PictureFiles& files) {
     cli::Stopwatch watch;
-    const Image image = drawing_.renderer->draw(r);
-    const double seconds = watch.lap();
-    if (video_)
-      video_->add(withBar(image)), ++pictures_;
-    else
-      keep(image, r, files, seconds);
-    if (!files.depth.empty()) drawDepth(r, files.depth);
+    const Image image = drawing.renderer->draw(r);
+    show(image, r, files, watch.lap());
+    if (!files.depth.empty()) writeDepth(depthOf(drawing, r), files.depth);
   }
+
+  /// Draws a frame in which nothing is active: it is transparent, and has no file of distances.
+  void drawNothing(const RenderOptions& r, const PictureFiles& files) {
+    constexpr std::size_t kChannels = 4;
+    Image image{r.resolution.width, r.resolution.height, {}};
+    image.rgba.resize(std::size_t(image.width) * std::size_t(image.height) * kChannels);
+    show(image, r, files, 0.0);
+  }
+
   /// Completes a video.
   void finish() {
     if (!video_) return;
     video_->finish();
-    log_.info(summary(options_.output, drawing_.scenes, options_.resolution, watch_.lap()) + ", " +
+    log_.info(summary(options_.output, scenes_, options_.resolution, watch_.lap()) + ", " +
               std::to_string(pictures_) + " pictures, " +
               cli::shortNumber(pictures_ / options_.fps) + " s of video");
   }
   [[nodiscard]] const nlohmann::ordered_json& comparisons() const { return comparisons_; }
 
  private:
+  void show(const Image& image, const RenderOptions& r, const PictureFiles& files, double seconds) {
+    if (video_)
+      video_->add(withBar(image)), ++pictures_;
+    else
+      keep(image, r, files, seconds);
+  }
+
   void keep(const Image& image, const RenderOptions& r, const PictureFiles& files, double seconds) {
     write(files.picture, withBar(image), options_.background);
-    log_.info(summary(files.picture, drawing_.scenes, r.resolution, seconds));
+    log_.info(summary(files.picture, scenes_, r.resolution, seconds));
     if (reference_ != nullptr) compare(r, image, files);
   }
 
@@ -136,9 +151,13 @@ class Frames {
     return image;
   }
 
-  void drawDepth(RenderOptions r, const fs::path& file) {
+  static Image depthOf(Drawing& drawing, RenderOptions r) {
     r.mode = RenderMode::kDepth;
-    const auto bytes = encodeDepthExr(drawing_.renderer->draw(r), {software(), commandText()});
+    return drawing.renderer->draw(r);
+  }
+
+  void writeDepth(const Image& depth, const fs::path& file) {
+    const auto bytes = encodeDepthExr(depth, {software(), commandText()});
     cli::writeBytes(file, bytes, options_.overwrite);
     log_.info(file.string() + ": distances in voxels");
   }
@@ -180,7 +199,7 @@ class Frames {
 
   const Options& options_;
   const cli::Log log_;
-  Drawing& drawing_;
+  const std::vector<Scene>& scenes_;
   Drawing* reference_;
   const std::optional<report::ColorBar> bar_;
   std::optional<report::VideoFile> video_;
@@ -203,12 +222,12 @@ void writeReport(const Options& options, const nlohmann::ordered_json& report) {
   if (!options.report.empty()) cli::writeJson({options.report, options.overwrite}, report);
 }
 
-/// \param pivot  the point about which a turntable turns
-void drawFrames(const Options& options, RenderOptions r, const Vec3& pivot, Frames& frames) {
+void drawFrames(const Options& options, RenderOptions r, Drawing& drawing, Frames& frames) {
+  const Vec3 pivot = pivotOf(options, drawing.scenes);  // of a turntable
   const Camera first = r.camera;
   for (const PictureFiles& files : pictureFiles(options)) {
     if (files.frame > 0) r.camera = turned(first, 360.0 * files.frame / options.turntable, pivot);
-    frames.draw(r, files);
+    frames.draw(drawing, r, files);
   }
   frames.finish();
 }
@@ -219,6 +238,43 @@ void saveTransfer(const Options& options, const TransferFunction& transfer) {
   cli::writeBytes(options.saveTransfer, std::as_bytes(std::span(text)), options.overwrite);
 }
 
+/// Scenes that enclose those of all frames, so that camera and transfer functions do not change from
+/// frame to frame.
+std::vector<Scene> scenesOfAll(const Options& options, const SceneFile& file,
+                               SequenceReader& reader) {
+  std::optional<std::vector<Scene>> all;
+  for (const cli::FrameNumber frame : *options.frames) {
+    auto scenes = outlinesOf(reader.read(frame), file);
+    if (scenes && all) enclose(*scenes, *all);
+    if (!all) all = std::move(scenes);
+  }
+  if (!all) throw BadInput(options.input.string() + ": no frame has anything active to draw");
+  return std::move(*all);
+}
+
+void drawSequence(const Options& options, const DrawSettings& settings, const CancelToken& cancel) {
+  const SceneFile file = sceneFile(options, options.input);
+  ReadLimits limits{options.memory.maxBytes, options.memory.voxels};
+  limits.carriedBytes = false;
+  SequenceReader reader(options.input, limits);
+  const auto all = scenesOfAll(options, file, reader);
+  RenderOptions r = renderOptions(options, all);
+  r.cancel = &cancel;
+  saveTransfer(options, r.transfer);
+  Frames frames(options, all, nullptr, cancel);
+  for (const cli::FrameNumber frame : *options.frames) {
+    const PictureFiles files = filesOfFrame(options, frame);
+    auto scenes = scenesOf(reader.read(frame), file);
+    if (!scenes) {
+      frames.drawNothing(r, files);
+      continue;
+    }
+    Drawing drawing(std::move(*scenes), settings);
+    frames.draw(drawing, r, files);
+  }
+  frames.finish();
+}
+
 }  // namespace
 
 void run(const Options& options) {
@@ -227,6 +283,7 @@ void run(const Options& options) {
   checkPictureSize(options);
   const DrawSettings settings{selectDevice(options.device), options.limits, options.values,
                               options.shading.has_value(), options.memory};
+  if (options.frames) return drawSequence(options, settings, interrupts.token());
   auto scenes = readScenes(sceneFile(options, options.input));
   RenderOptions r = renderOptions(options, scenes);
   Drawing drawing(std::move(scenes), settings);
@@ -240,8 +297,8 @@ void run(const Options& options) {
         {*drawing.renderer, reference ? &*reference->renderer : nullptr, options.referenceSamples},
         r, options.turntable, log));
   } else {
-    Frames frames(options, drawing, reference.get(), interrupts.token());
-    drawFrames(options, r, pivotOf(options, drawing.scenes), frames);
+    Frames frames(options, drawing.scenes, reference.get(), interrupts.token());
+    drawFrames(options, r, drawing, frames);
     report["comparisons"] = frames.comparisons();
   }
   writeReport(options, report);

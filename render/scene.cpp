@@ -35,16 +35,31 @@ std::string unitOf(const GridDescriptor& grid) {
   return unit.empty() ? stringValue(grid.metadata, "units") : unit;
 }
 
-/// The scene of a stored grid. If the grid stores its voxels, they are drawn instead of the
-/// ellipsoids, because they are exact.
-Scene sceneOf(StoredGrid grid, const cli::HostMemory& memory) {
+/// \throws BadInput  grids that are drawn together differ in their transforms
+void requireOneTransform(const std::vector<Scene>& scenes, const std::filesystem::path& path) {
+  for (const Scene& scene : scenes)
+    if (scene.transform != scenes.front().transform)
+      throw BadInput(path.string() + ": " + scenes.front().grid + " and " + scene.grid +
+                     " have different transforms and cannot be drawn in one picture");
+}
+
+/// A grid without its content.
+Scene outlineOf(const StoredGrid& grid) {
   Scene scene;
   scene.grid = grid.descriptor.name;
   scene.unit = unitOf(grid.descriptor);
+  scene.transform = grid.descriptor.transform;
   scene.box = grid.activeBox;
   scene.data = {grid.valueMin, grid.valueMax};
   scene.background = float(grid.descriptor.background);
   scene.isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet;
+  return scene;
+}
+
+/// A grid with its content. If it stores its voxels, they are drawn instead of the ellipsoids,
+/// because they are exact.
+Scene complete(StoredGrid grid, const cli::HostMemory& memory) {
+  Scene scene = outlineOf(grid);
   if (grid.voxels)
     scene.content =
         VolumeGrid{grid.descriptor,
@@ -54,20 +69,38 @@ Scene sceneOf(StoredGrid grid, const cli::HostMemory& memory) {
   return scene;
 }
 
+/// The places of the grid and of the further grids of a file.
+std::vector<std::size_t> placesOf(const EsvrFile& file, const SceneFile& from) {
+  std::vector<std::size_t> places{placeOf(file, from.path, from.grid)};
+  for (const std::string& name : from.with) places.push_back(placeOf(file, from.path, name));
+  return places;
+}
+
 /// Reads grids of an .esvr file.
 std::vector<Scene> encoded(const SceneFile& from) {
   ReadLimits limits{from.memory.maxBytes, from.memory.voxels};
   limits.carriedBytes = false;
   EsvrFile file = readEsvr(from.path, limits);
-  std::vector<std::size_t> places{placeOf(file, from.path, from.grid)};
-  for (const std::string& name : from.with) places.push_back(placeOf(file, from.path, name));
+  const auto places = placesOf(file, from);
   std::vector<Scene> scenes;
   for (auto place = places.begin(); place != places.end(); ++place) {
     StoredGrid& grid = file.grids[*place];
     const bool isLast = std::find(place + 1, places.end(), *place) == places.end();
-    scenes.push_back(sceneOf(isLast ? std::move(grid) : grid, from.memory));
+    scenes.push_back(complete(isLast ? std::move(grid) : grid, from.memory));
   }
   return scenes;
+}
+
+/// Makes a scene of each grid of a frame.
+/// \return nothing if the first grid has nothing active to draw, so that it may be carried
+template <class Make>
+std::optional<std::vector<Scene>> scenesBy(const EsvrFile& frame, const SceneFile& file,
+                                           Make&& make) {
+  if (frame.grids.empty()) return std::nullopt;
+  std::vector<Scene> scenes;
+  for (const std::size_t place : placesOf(frame, file)) scenes.push_back(make(frame.grids[place]));
+  requireOneTransform(scenes, file.path);
+  return scenes.front().box.empty() ? std::nullopt : std::optional(std::move(scenes));
 }
 
 std::string firstDrawable(const std::filesystem::path& path) {
@@ -82,6 +115,7 @@ Scene voxels(const SceneFile& from, const std::string& name) {
   Scene scene;
   scene.grid = grid.descriptor.name;
   scene.unit = unitOf(grid.descriptor);
+  scene.transform = grid.descriptor.transform;
   scene.box = activeBox(grid.volume);
   scene.data = activeRange(grid.volume);
   scene.background = grid.volume.background;
@@ -96,23 +130,38 @@ std::vector<Scene> voxels(const SceneFile& from) {
   return scenes;
 }
 
-const Transform& transformOf(const Scene& scene) {
-  const auto* const grid = std::get_if<VolumeGrid>(&scene.content);
-  return grid ? grid->descriptor.transform : scene.encoded->descriptor.transform;
-}
-
 }  // namespace
 
 std::vector<Scene> readScenes(const SceneFile& file) {
   auto scenes = file.path.extension() == ".esvr" ? encoded(file) : voxels(file);
-  for (const Scene& scene : scenes) {
+  for (const Scene& scene : scenes)
     if (scene.box.empty())
       throw BadInput(file.path.string() + ", " + scene.grid + ": nothing active to draw");
-    if (transformOf(scene) != transformOf(scenes.front()))
-      throw BadInput(file.path.string() + ": " + scenes.front().grid + " and " + scene.grid +
-                     " have different transforms and cannot be drawn in one picture");
-  }
+  requireOneTransform(scenes, file.path);
   return scenes;
+}
+
+std::optional<std::vector<Scene>> scenesOf(const EsvrFile& frame, const SceneFile& file) {
+  return scenesBy(frame, file, [&](const StoredGrid& grid) { return complete(grid, file.memory); });
+}
+
+std::optional<std::vector<Scene>> outlinesOf(const EsvrFile& frame, const SceneFile& file) {
+  return scenesBy(frame, file, [](const StoredGrid& grid) {
+    Scene scene = outlineOf(grid);
+    Field field;  // its ellipsoids are not drawn
+    field.fitFor = grid.field.fitFor;
+    scene.content = std::move(field);
+    return scene;
+  });
+}
+
+void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes) {
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    const Scene& other = others[i];
+    if (other.box.empty()) continue;
+    scenes[i].box.expand(other.box.min), scenes[i].box.expand(other.box.max);
+    scenes[i].data.expand(other.data);
+  }
 }
 
 SceneRenderer::SceneRenderer(const std::vector<Scene>& scenes, const DrawSettings& s) {

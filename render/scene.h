@@ -20,8 +20,9 @@ struct Scene {
   std::variant<Field, VolumeGrid> content;
   std::string grid;  ///< name of the grid
   std::string unit;  ///< unit of the values; empty if the grid has none
-  Box box;           ///< bounding box of the active voxels
-  ValueRange data;   ///< range of the active voxels
+  Transform transform;
+  Box box;          ///< bounding box of the active voxels
+  ValueRange data;  ///< range of the active voxels
   float background = 0.0f;
   bool isLevelSet = false;
   std::optional<StoredGrid> encoded{};  ///< stored grid of the field; none for voxels
@@ -39,6 +40,22 @@ struct SceneFile {
 ///                         the grids differ in their transforms
 /// \throws MemoryExceeded  the grids need more than SceneFile::memory
 [[nodiscard]] std::vector<Scene> readScenes(const SceneFile& file);
+
+/// The grids of a frame of a sequence.
+/// \param file  of the sequence
+/// \return nothing if the first grid of SceneFile has nothing active to draw in this frame
+/// \throws BadInput  the frame has no such grid; as for readScenes
+/// \throws MemoryExceeded  as for readScenes
+[[nodiscard]] std::optional<std::vector<Scene>> scenesOf(const EsvrFile& frame,
+                                                         const SceneFile& file);
+
+/// The same without the voxels that the grids may store, which is enough for a camera and transfer
+/// functions.
+[[nodiscard]] std::optional<std::vector<Scene>> outlinesOf(const EsvrFile& frame,
+                                                           const SceneFile& file);
+
+/// Widens scenes, so that their boxes and their ranges of values enclose those of others.
+void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes);
 
 struct DrawSettings {
   Device device;

@@ -26,6 +26,7 @@ constexpr std::int64_t kMaxIterations = 10'000'000;
 constexpr double kHighestPsnr = 300.0;  // dB; float32 reaches about 150
 constexpr double kLongestRun = 1e9;     // seconds
 constexpr double kLargestRatio = 1e9;
+constexpr std::int64_t kMostGroupFrames = 1'000'000;
 constexpr double kMaxLoss = 20.0;                  // dB
 constexpr double kMinVram = 1e-3, kMaxVram = 1e6;  // GB
 constexpr float kLargestKappa = 1e4f;              // kernel.h
@@ -40,7 +41,8 @@ cli::ProgramText programText() {
           "exactly those of the source, and voxels have the chosen accuracy.",
       .usage =
           "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]\n"
-          "  vdb2esvr IN.####.vdb OUT.####.esvr [--frames 1-100x2] ...",
+          "  vdb2esvr IN.####.vdb OUT.####.esvr [--frames 1-100x2] ...\n"
+          "  vdb2esvr IN.####.vdb OUT.esvr [--frames 1-100x2] [--gop N] ...",
       .notes =
           "Without -g, all grids are converted. Grids of vectors are fitted by components, unless\n"
           "they take fewer bytes unchanged. Grids that are not fitted come back bit for bit: "
@@ -73,9 +75,13 @@ cli::ProgramText programText() {
           "result so far is written. A second Ctrl-C ends the program at once. OUT.esvr is never\n"
           "incomplete. With --resume, the same command continues a run that was interrupted.\n"
           "\n"
-          "Each frame of a sequence is converted as a file of its own, so that it does not depend "
-          "on\n"
-          "other frames. Without a goal, all frames have the PSNR of --preset, whatever their "
+          "If OUT has a pattern, each frame of a sequence is converted as a file of its own, "
+          "which\n"
+          "does not depend on other frames. Otherwise, OUT.esvr holds all frames, in groups of "
+          "--gop\n"
+          "frames. A frame whose grids differ from those of the frame before it begins a group.\n"
+          "Until it is complete, the file has the name OUT.esvr.partial. Without a goal, all "
+          "frames have the PSNR of --preset, whatever their "
           "size.\n"
           "In a pattern, #, #### and %04d are four digits, and @ is as many as needed. Frames are\n"
           "converted at the same time on the threads of --threads, or one on each GPU of "
@@ -84,7 +90,8 @@ cli::ProgramText programText() {
           "others\n"
           "(--on-error stop); the exit code is that of the first one. Ctrl-C keeps the frames "
           "that\n"
-          "are complete. With --resume, frames whose files are there are not converted again.\n"
+          "are complete, or the groups that are complete in one file. With --resume, they are not\n"
+          "converted again.\n"
           "\n"
           "mpirun -n N vdb2esvr ... fits the chunks of a volume on N processes, if the program "
           "was\n"
@@ -102,7 +109,8 @@ cli::ProgramText programText() {
           "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            every voxel within the bound\n"
           "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4 --resume\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255\n"
-          "  vdb2esvr 'smoke.####.vdb' 'smoke.####.esvr' --frames 1-100 --missing hold"};
+          "  vdb2esvr 'smoke.####.vdb' 'smoke.####.esvr' --frames 1-100 --missing hold\n"
+          "  vdb2esvr 'smoke.####.vdb' smoke.esvr                all frames in one file"};
 }
 
 void addGoalOptions(cli::po::options_description& options) {
@@ -194,12 +202,21 @@ void addFileOptions(cli::po::options_description& options) {
   // clang-format on
 }
 
+void addGroupOption(cli::po::options_description& options) {
+  options.add_options()(
+      "gop", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(kUsualGroupFrames)),
+      "with one file as output of a sequence: frames of a group; a reader needs at most one group "
+      "to "
+      "decode a frame, and --resume loses at most the groups that were not complete");
+}
+
 cli::CommandLine commandLine() {
   cli::CommandLine line(programText());
   line.argument("input", "IN.vdb");
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
   cli::addSequenceOptions(line.options());
+  addGroupOption(line.options());
   addGoalOptions(line.options());
   addFitOptions(line.options());
   addPartOptions(line.options());
@@ -358,9 +375,19 @@ OnCancel onCancel(const Arguments& a) {
                                {{"keep", OnCancel::kKeep}, {"discard", OnCancel::kDiscard}});
 }
 
-/// Reads the options of a sequence of files.
+/// Reads the size of the groups of a file that holds a sequence.
+void readGroups(const Arguments& a, Options& options) {
+  const auto frames = bounded<std::size_t>(a, "gop", std::int64_t{1}, kMostGroupFrames);
+  const bool isOneFile = options.sequence && options.sequence->output.isWhole();
+  if (frames && !isOneFile && !a.values["gop"].defaulted())
+    throw UsageError("--gop needs a sequence as input and one file, without a pattern, as output");
+  options.groupFrames = *frames;
+}
+
+/// Reads the options of a sequence.
 void readFrames(const Arguments& a, Options& options) {
-  options.sequence = cli::readSequence(a);
+  options.sequence = cli::readSequence(a, {.output = true});
+  readGroups(a, options);
   if (!options.sequence) return;
   for (const char* option : {"part", "merge"})
     if (a.has(option) && !a.values[option].defaulted())
@@ -368,7 +395,7 @@ void readFrames(const Arguments& a, Options& options) {
                        " is for one volume; give each job some frames of the sequence (--frames)");
   if (options.resume && a.get<bool>("force"))
     throw UsageError(
-        "--resume keeps the frames whose files are there, and --force replaces them; choose one");
+        "--resume keeps the frames that are there, and --force replaces them; choose one");
   if (auto* goal = std::get_if<PresetGoal>(&options.convert.goal)) goal->steady = true;
   // A frame that ended early would look as if it were complete.
   if (a.values["on-cancel"].defaulted()) options.onCancel = OnCancel::kDiscard;

@@ -8,6 +8,7 @@
 
 #include "cli/log.h"
 #include "cli/sequence.h"
+#include "esvr/container.h"
 #include "esvr/convert.h"
 #include "esvr/part_store.h"
 #include "esvr/vdb_io.h"
@@ -17,6 +18,7 @@
 namespace esvr::vdb2esvr {
 
 inline constexpr const char* kProgram = "vdb2esvr";
+inline constexpr std::size_t kUsualGroupFrames = 8;  ///< of a group in a file for all frames
 
 /// What a run does of a conversion: all of it; the share of one process in the fits; or all but the
 /// fits, from the parts that other processes have fitted.
@@ -27,8 +29,13 @@ enum class OnCancel { kKeep, kDiscard };
 
 struct Options {
   std::filesystem::path input, output;
-  /// The frames, if the input and the output are patterns.
+  /// The frames, if the input is a pattern. The output is a pattern, too, or one file for all
+  /// frames.
   std::optional<cli::Sequence> sequence;
+  std::size_t groupFrames =
+      kUsualGroupFrames;  ///< largest number of frames in a group of a file for all frames
+  /// For a frame of a group: the frame before it as a reader gets it; null for the first one.
+  const EsvrFile* previous = nullptr;
   WantedGrids grids;
   ConvertOptions convert;             ///< options of every grid; a size replaces the goal
   std::optional<double> psnr;         ///< PSNR that every grid should reach, dB over the box

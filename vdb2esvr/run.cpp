@@ -180,16 +180,21 @@ void placeCarried(const RunRecord& record, std::vector<CarriedGrid>& carried) {
   }
 }
 
-void write(const Options& options, std::vector<CarriedGrid> carried, RunRecord& record) {
-  cli::Stopwatch watch;
+/// The file of the converted and the carried grids.
+EsvrFile assemble(std::vector<CarriedGrid> carried, const RunRecord& record) {
   EsvrFile file;
   placeCarried(record, carried);
   file.carried = std::move(carried);
   file.metadata = record.input.metadata;
   for (const auto& grid : record.grids) file.grids.push_back(grid.stored());
   for (const auto& vector : record.vectors) file.vectors.push_back(vector.stored);
-  writeEsvr(options.output, file, {.overwrite = options.overwrite});
-  record.output = inspectEsvr(options.output);
+  return file;
+}
+
+void store(const Options& options, const EsvrFile& file, const StoreFile& store,
+           RunRecord& record) {
+  cli::Stopwatch watch;
+  record.output = store(file);
   record.secondsWrite = watch.lap();
   measureVectors(options, file, record);
 }
@@ -262,8 +267,17 @@ bool mayFit(const Options& options) {
          options.convert.representation != Representation::kVoxels;
 }
 
-RunRecord convertFile(const Options& options, Ranks* ranks, const CancelToken& cancel,
-                      const cli::Log& log) {
+StoreFile writingTo(const Options& options) {
+  return [&options](const EsvrFile& file) {
+    writeEsvr(options.output, file, {.overwrite = options.overwrite});
+    return inspectEsvr(options.output);
+  };
+}
+
+RunRecord convertFile(const Options& options, const FileRun& run) {
+  Ranks* const ranks = run.ranks;
+  const CancelToken& cancel = run.cancel;
+  const cli::Log& log = run.log;
   cli::Stopwatch watch;
   RunRecord record;
   auto devices = std::async(std::launch::async, [&] { return devicesFor(options, ranks); });
@@ -285,7 +299,7 @@ RunRecord convertFile(const Options& options, Ranks* ranks, const CancelToken& c
     return record;
   }
   carrySmallerVectors(options, record, carried);
-  write(options, std::move(carried), record);
+  store(options, assemble(std::move(carried), record), run.store, record);
   if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();
   return record;
@@ -296,7 +310,7 @@ namespace {
 /// Converts the file; if that fails, writes a report of the failure.
 RunRecord convertOrReport(const Options& options, Ranks* ranks, const cli::Interrupts& interrupts,
                           const cli::Log& log) try {
-  return convertFile(options, ranks, interrupts.token(), log);
+  return convertFile(options, {ranks, interrupts.token(), log, writingTo(options)});
 } catch (const Error& error) {
   if (!options.report.empty())
     cli::writeJson({options.report, options.overwrite}, makeFailureReport(options, error));

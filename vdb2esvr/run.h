@@ -1,7 +1,10 @@
 #pragma once
 /// The main function of vdb2esvr after its options are read.
 
+#include <functional>
+
 #include "cli/log.h"
+#include "esvr/container.h"
 #include "esvr/progress.h"
 #include "esvr/ranks.h"
 #include "vdb2esvr/options.h"
@@ -12,11 +15,23 @@ namespace esvr::vdb2esvr {
 /// False if the options exclude ellipsoids, so that no device is needed.
 [[nodiscard]] bool mayFit(const Options& options);
 
-/// Reads, fits and measures the grids of a file, and writes the output.
-/// \param ranks  the processes that fit the parts together; may be null
-/// \throws Error  any error of its parts; RuntimeFailure if it was cancelled and writes no file
-[[nodiscard]] RunRecord convertFile(const Options& options, Ranks* ranks, const CancelToken& cancel,
-                                    const cli::Log& log);
+/// Stores the converted file and returns a summary of its sections.
+using StoreFile = std::function<EsvrSummary(const EsvrFile&)>;
+
+/// Writes the file to Options::output. The options must outlive the result.
+[[nodiscard]] StoreFile writingTo(const Options& options);
+
+/// The surroundings of a conversion.
+struct FileRun {
+  Ranks* ranks = nullptr;  ///< the processes that fit the parts together; may be null
+  const CancelToken& cancel;
+  const cli::Log& log;
+  const StoreFile& store;
+};
+
+/// Reads, fits, stores and measures the grids of a file.
+/// \throws Error  any error of its parts; RuntimeFailure if it was cancelled and stores no file
+[[nodiscard]] RunRecord convertFile(const Options& options, const FileRun& run);
 
 /// Reads, fits and measures the grids, writes the file and the report, and prints the summary.
 /// \param ranks  the processes that fit the parts together; may be null

@@ -48,14 +48,23 @@ struct FrameRecord {
   std::vector<NotFittedName> carried{}, skipped{};
   double seconds = 0.0;
   bool missedPsnr = false;
+  std::optional<std::size_t> group{};  ///< index of its group in a file for all frames
+  bool gridsDiffer = false;            ///< it begins a group because its grids differ
   std::optional<Error> failure{};
   nlohmann::ordered_json report{};  ///< the frame's own report, if one is wanted
+};
+
+/// The figures of a file for all frames.
+struct FileFigures {
+  std::size_t groups = 0;
+  std::optional<std::uint64_t> bytes{};  ///< nothing if the file is not complete
 };
 
 struct SequenceRecord {
   std::vector<FrameRecord> frames;  ///< in the order in which they are named
   double seconds = 0.0;
   bool interrupted = false;
+  std::optional<FileFigures> file{};  ///< nothing if each frame is a file
 };
 
 /// Takes the figures of a converted frame. They are small, so that a sequence may be long.

@@ -27,6 +27,7 @@ Json entryOf(const SequenceRecord& record, const FrameRecord& frame) {
       frame.frame.holds ? Json(record.frames[*frame.frame.holds].frame.number) : Json(nullptr);
   entry["input"] = {{"path", frame.frame.input.string()}};
   entry["output"] = outputOf(frame);
+  entry["group"] = frame.group ? Json(*frame.group) : Json(nullptr);
   entry["error"] = nullptr;
   if (frame.report.is_object()) entry.update(frame.report);
   return entry;
@@ -46,6 +47,15 @@ Json rangesOf(const SequenceRecord& record) {
                      {"psnr_active", {range.lowestActive, range.highestActive}},
                      {"psnr_box", {range.lowestBox, range.highestBox}}});
   return grids;
+}
+
+/// The output of the whole run; a file of all frames has bytes and groups.
+Json outputOf(const Options& options, const SequenceRecord& record) {
+  Json output{{"path", options.output.string()}};
+  if (!record.file) return output;
+  output["bytes"] = record.file->bytes ? Json(*record.file->bytes) : Json(nullptr);
+  output["groups"] = record.file->groups;
+  return output;
 }
 
 Json countsOf(const SequenceRecord& record) {
@@ -68,7 +78,7 @@ Json makeSequenceReport(const Options& options, const SequenceRecord& record) {
   const auto amiss = whatIsAmiss(record);
   Json report = reportHead(options, kSequenceSchema);
   report.update({{"input", {{"path", options.input.string()}}},
-                 {"output", {{"path", options.output.string()}}},
+                 {"output", outputOf(options, record)},
                  {"states", countsOf(record)},
                  {"grids", rangesOf(record)},
                  {"frames", framesOf(record)},

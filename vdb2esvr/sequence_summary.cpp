@@ -72,11 +72,37 @@ void printNotFittedIn(const SequenceRecord& record, std::vector<NotFittedName> F
         << '\n';
 }
 
-void printBytes(const Options& options, const SequenceRecord& record, std::ostream& out) {
-  std::uint64_t bytesIn = 0, bytesOut = 0;
+/// Says how the frames are divided into the groups of one file.
+void printGroups(const Options& options, const SequenceRecord& record, std::ostream& out) {
+  if (!record.file) return;
+  std::vector<cli::FrameNumber> differing;
   for (const FrameRecord& frame : record.frames)
-    bytesIn += frame.bytesIn, bytesOut += hasFigures(frame) ? frame.bytesOut : 0;
-  if (bytesOut == 0) return;
+    if (frame.gridsDiffer) differing.push_back(frame.frame.number);
+  out << cli::printable(options.output.string()) << ": " << record.file->groups
+      << (record.file->groups == 1 ? " group" : " groups") << " of at most " << options.groupFrames
+      << " frames\n";
+  if (!differing.empty())
+    out << (differing.size() == 1 ? "frame " : "frames ") << cli::textOfFrames(differing)
+        << (differing.size() == 1 ? " begins a group, because its"
+                                  : " each begin a group, because their")
+        << " grids differ from those of the frame before\n";
+}
+
+/// The bytes of the output of the frames that this run converted.
+std::uint64_t bytesOutOf(const SequenceRecord& record) {
+  if (record.file) return record.file->bytes.value_or(0);
+  std::uint64_t bytes = 0;
+  for (const FrameRecord& frame : record.frames) bytes += hasFigures(frame) ? frame.bytesOut : 0;
+  return bytes;
+}
+
+void printBytes(const Options& options, const SequenceRecord& record, std::ostream& out) {
+  std::uint64_t bytesIn = 0;
+  for (const FrameRecord& frame : record.frames) bytesIn += frame.bytesIn;
+  const std::uint64_t bytesOut = bytesOutOf(record);
+  const bool hasKept = !framesIn(FrameState::kKept, record).empty();
+  // The file has the frames of an earlier run, too, whose input this run did not read.
+  if (bytesOut == 0 || (record.file && hasKept)) return;
   out << cli::printable(options.input.string()) << ' ' << bytesIn << " bytes -> "
       << cli::printable(options.output.string()) << ' ' << bytesOut
       << " bytes, 1 : " << cli::shortNumber(double(bytesIn) / double(bytesOut)) << '\n';
@@ -92,6 +118,7 @@ void printSequence(const Options& options, const SequenceRecord& record, std::os
   printRanges(record, out);
   printNotFittedIn(record, &FrameRecord::carried, "carried unchanged", out);
   printNotFittedIn(record, &FrameRecord::skipped, "left out", out);
+  printGroups(options, record, out);
   printBytes(options, record, out);
 }
 

@@ -71,6 +71,12 @@ std::optional<FramePattern> FramePattern::in(const std::string& path) {
   return made;
 }
 
+FramePattern FramePattern::whole(const std::string& path) {
+  FramePattern made;
+  made.text_ = made.before_ = path;
+  return made;
+}
+
 std::string FramePattern::digitsOf(FrameNumber frame) const {
   const std::string digits = std::to_string(frame < 0 ? -frame : frame);
   const std::string minus = frame < 0 ? "-" : "";
@@ -78,7 +84,9 @@ std::string FramePattern::digitsOf(FrameNumber frame) const {
   return minus + std::string(digits_ - std::min(digits_, taken), '0') + digits;
 }
 
-fs::path FramePattern::at(FrameNumber frame) const { return before_ + digitsOf(frame) + after_; }
+fs::path FramePattern::at(FrameNumber frame) const {
+  return isWhole() ? text_ : before_ + digitsOf(frame) + after_;
+}
 
 fs::path FramePattern::folder() const {
   const fs::path start = before_;  // its last part begins the name

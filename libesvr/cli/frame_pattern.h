@@ -31,6 +31,10 @@ class FramePattern {
   /// \throws UsageError  it asks for more than 32 digits
   [[nodiscard]] static std::optional<FramePattern> in(const std::string& path);
 
+  /// A path without a pattern, which all frames have in common.
+  [[nodiscard]] static FramePattern whole(const std::string& path);
+  [[nodiscard]] bool isWhole() const { return pattern_.empty(); }
+
   /// The path of a frame.
   [[nodiscard]] std::filesystem::path at(FrameNumber frame) const;
 
@@ -42,9 +46,9 @@ class FramePattern {
 
   /// The path with the pattern.
   [[nodiscard]] const std::string& text() const { return text_; }
-  /// The pattern alone, for example "####".
+  /// The pattern alone, for example "####"; empty for a whole path.
   [[nodiscard]] const std::string& pattern() const { return pattern_; }
-  /// The folder of the file or folder whose name has the pattern.
+  /// The folder of the file or folder whose name has the pattern, or of a whole path.
   [[nodiscard]] std::filesystem::path folder() const;
   /// True if the name of a folder has the pattern.
   [[nodiscard]] bool isInFolder() const { return after_.find('/') != std::string::npos; }

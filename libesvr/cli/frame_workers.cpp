@@ -9,10 +9,9 @@
 namespace esvr::cli {
 namespace {
 
-class FrameWorkers {
+class Workers {
  public:
-  FrameWorkers(const FrameRun& run, const std::function<bool(const FrameTask&)>& job)
-      : run_(run), job_(job) {}
+  Workers(const TaskRun& run, const std::function<bool(const Task&)>& job) : run_(run), job_(job) {}
 
   void run() {
     {
@@ -26,9 +25,8 @@ class FrameWorkers {
 
  private:
   void work(int worker) noexcept try {
-    for (std::size_t i; !stopped() && (i = next_++) < run_.frames.size();)
-      if (!run_.frames[i].missing && !job_({i, worker}) && run_.onError == OnFrameError::kStop)
-        stop_ = true;
+    for (std::size_t i; !stopped() && (i = next_++) < run_.tasks;)
+      if (!job_({i, worker}) && run_.onError == OnFrameError::kStop) stop_ = true;
   } catch (...) {
     const std::lock_guard lock(mutex_);
     if (!error_) error_ = std::current_exception();
@@ -37,25 +35,45 @@ class FrameWorkers {
 
   [[nodiscard]] bool stopped() const { return stop_ || run_.cancel.cancelled(); }
 
-  const FrameRun& run_;
-  const std::function<bool(const FrameTask&)>& job_;
+  const TaskRun& run_;
+  const std::function<bool(const Task&)>& job_;
   std::atomic<std::size_t> next_{0};
   std::atomic<bool> stop_{false};
   std::mutex mutex_;
   std::exception_ptr error_;
 };
 
+std::vector<std::size_t> framesWithInput(const std::vector<Frame>& frames) {
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (!frames[i].missing) indices.push_back(i);
+  return indices;
+}
+
 }  // namespace
 
+void forEachTask(const TaskRun& run, const std::function<bool(const Task&)>& job) {
+  Workers(run, job).run();
+}
+
 void forEachFrame(const FrameRun& run, const std::function<bool(const FrameTask&)>& job) {
-  FrameWorkers(run, job).run();
+  const auto frames = framesWithInput(run.frames);
+  forEachTask({frames.size(), run.workers, run.onError, run.cancel}, [&](const Task& task) {
+    return job({frames[task.index], task.worker});
+  });
+}
+
+int taskWorkers(int threads, std::size_t tasks) {
+  const int all = threads > 0 ? threads : int(std::max(std::thread::hardware_concurrency(), 1u));
+  return int(std::clamp<std::size_t>(tasks, 1, std::size_t(all)));
+}
+
+std::size_t countWithInput(const std::vector<Frame>& frames) {
+  return framesWithInput(frames).size();
 }
 
 int frameWorkers(int threads, const std::vector<Frame>& frames) {
-  const int all = threads > 0 ? threads : int(std::max(std::thread::hardware_concurrency(), 1u));
-  const auto inputs =
-      std::ranges::count_if(frames, [](const Frame& frame) { return !frame.missing; });
-  return int(std::clamp<std::ptrdiff_t>(inputs, 1, all));
+  return taskWorkers(threads, countWithInput(frames));
 }
 
 }  // namespace esvr::cli

@@ -8,6 +8,7 @@
 #include "cli/choice.h"
 #include "cli/output.h"
 #include "esvr/error.h"
+#include "esvr/sequence_file.h"
 
 namespace esvr::cli {
 namespace {
@@ -28,7 +29,8 @@ void refuseSequenceOptions(const Arguments& arguments) {
     if (arguments.has(option))
       throw UsageError("--" + std::string(option) + " needs a sequence as input: '" +
                        arguments.get<std::string>("input") +
-                       "' has no pattern such as #### or %04d for the number of a frame");
+                       "' is a file of one frame, without a pattern such as #### or %04d for the "
+                       "number of a frame");
 }
 
 /// A name like that of a path, with a pattern before its extension.
@@ -37,13 +39,17 @@ std::string withPattern(const fs::path& path, const std::string& pattern) {
   return (path.parent_path() / name).string();
 }
 
-FramePattern outputPattern(const Arguments& arguments, const FramePattern& input) {
+FramePattern outputPattern(const Arguments& arguments, const FramePattern& input,
+                           WholeFiles allowed) {
+  constexpr const char* kUsualPattern = "####";
   const auto& text = arguments.get<std::string>("output");
   const auto output = FramePattern::in(text);
   if (output) return *output;
+  if (allowed.output) return FramePattern::whole(text);
   throw UsageError("'" + text + "' has no pattern for the number of a frame, but '" + input.text() +
-                   "' has one; each frame needs a file of its own, for example '" +
-                   withPattern(text, input.pattern()) + "'");
+                   (input.isWhole() ? "' holds a sequence" : "' has one") +
+                   "; each frame needs a file of its own, for example '" +
+                   withPattern(text, input.isWhole() ? kUsualPattern : input.pattern()) + "'");
 }
 
 MissingFrame missingOf(const Arguments& arguments) {
@@ -67,6 +73,16 @@ std::vector<FrameNumber> framesOnDisk(const FramePattern& input) {
     text += "; " + other->string() +
             " has another number of digits (# and #### are 4 digits, @ is as many as needed)";
   throw BadInput(text);
+}
+
+std::vector<FrameNumber> wantedNumbers(const Sequence& sequence) {
+  if (sequence.frames) return *sequence.frames;
+  return sequence.stored ? *sequence.stored : framesOnDisk(sequence.input);
+}
+
+bool hasInput(const Sequence& sequence, FrameNumber number) {
+  if (sequence.stored) return std::ranges::binary_search(*sequence.stored, number);
+  return isThere(sequence.input.at(number));
 }
 
 std::vector<FrameNumber> missingNumbers(const std::vector<Frame>& frames) {
@@ -127,24 +143,35 @@ void addSequenceOptions(po::options_description& options) {
   // clang-format off
   options.add_options()
     (kFrames, po::value<std::string>()->value_name("RANGE"),
-     "with a pattern such as smoke.####.vdb as input: the frames to convert, for example 1-100, "
-     "1-100x2, 1-10,20-30 or -5--1 (default: all on the disk)")
+     "of a sequence: the frames to convert, for example 1-100, 1-100x2, 1-10,20-30 or -5--1 "
+     "(default: all that there are)")
     (kMissing, po::value<std::string>()->value_name("W"),
-     "frames of --frames that are not on the disk: error (nothing is converted; the default), hold "
+     "frames of --frames that are missing: error (nothing is converted; the default), hold "
      "(repeat the output of the frame before) or skip")
     (kOnError, po::value<std::string>()->value_name("W"),
      "continue (the default) or stop after a frame that could not be converted");
   // clang-format on
 }
 
-std::optional<Sequence> readSequence(const Arguments& arguments) {
+std::optional<std::vector<FrameNumber>> framesInFile(const fs::path& path) {
+  if (path.extension() != ".esvr" || !isThere(path) || !holdsSequence(path)) return std::nullopt;
+  std::vector<FrameNumber> numbers;
+  const SequenceReader reader(path);
+  for (const SequenceFrame& frame : reader.frames()) numbers.push_back(frame.number);
+  return numbers;
+}
+
+std::optional<Sequence> readSequence(const Arguments& arguments, WholeFiles allowed) {
   const auto& text = arguments.get<std::string>("input");
-  const auto input = isThere(text) ? std::nullopt : FramePattern::in(text);
+  auto stored = allowed.input ? framesInFile(text) : std::nullopt;
+  auto input = isThere(text) ? std::nullopt : FramePattern::in(text);
+  if (stored) input = FramePattern::whole(text);
   if (!input) {
     refuseSequenceOptions(arguments);
     return std::nullopt;
   }
-  Sequence sequence{.input = *input, .output = outputPattern(arguments, *input)};
+  Sequence sequence{.input = *input, .output = outputPattern(arguments, *input, allowed)};
+  sequence.stored = std::move(stored);
   if (const auto range = arguments.find<std::string>(kFrames))
     sequence.frames = parseFrames(kFrames, *range);
   sequence.missing = missingOf(arguments);
@@ -154,11 +181,13 @@ std::optional<Sequence> readSequence(const Arguments& arguments) {
 
 std::vector<Frame> planFrames(const Sequence& sequence) {
   std::vector<Frame> frames;
-  for (const FrameNumber number :
-       sequence.frames ? *sequence.frames : framesOnDisk(sequence.input)) {
-    const fs::path input = sequence.input.at(number);
-    frames.push_back({number, input, sequence.output.at(number), !isThere(input), {}});
-  }
+  for (const FrameNumber number : wantedNumbers(sequence))
+    frames.push_back({number,
+                      sequence.input.at(number),
+                      sequence.output.at(number),
+                      !hasInput(sequence, number),
+                      {}});
+  if (sequence.output.isWhole()) std::ranges::sort(frames, {}, &Frame::number);
   treatMissing(sequence, frames);
   return frames;
 }
@@ -173,6 +202,8 @@ std::multimap<std::size_t, std::size_t> holdersOf(const std::vector<Frame>& fram
 void checkFrameOutputs(const Sequence& sequence, const std::vector<Frame>& frames,
                        const FrameOutputRules& rules) {
   for (const Frame& frame : frames) requireDistinct({frame.input, frame.output});
+  if (sequence.output.isWhole())
+    return checkOutput(sequence.output.text(), rules.extensions, rules.mayExist);
   if (!rules.mayExist) refuseExisting(frames);
   requireExtension(frames.front().output, rules.extensions);
   if (!isThere(sequence.output.folder()))

@@ -1,6 +1,6 @@
 #pragma once
-/// Sequences of files, one for each frame, in the options of the converters: patterns as input and
-/// output, and the options --frames, --missing and --on-error.
+/// Sequences in the options of the programs: patterns for files with one frame each, files that
+/// hold all frames, and the options --frames, --missing and --on-error.
 
 #include <cstddef>
 #include <filesystem>
@@ -28,21 +28,34 @@ enum class MissingFrame {
 enum class OnFrameError { kContinue, kStop };
 
 struct Sequence {
-  FramePattern input, output;
-  std::optional<std::vector<FrameNumber>> frames{};  ///< nothing: all frames on the disk
+  FramePattern input, output;                        ///< a whole path is a file with all frames
+  std::optional<std::vector<FrameNumber>> frames{};  ///< nothing: all frames that there are
+  /// The frames of an input that holds them all, increasing; nothing: each is a file.
+  std::optional<std::vector<FrameNumber>> stored{};
   MissingFrame missing = MissingFrame::kError;
   OnFrameError onError = OnFrameError::kContinue;
+};
+
+/// The sides of a program that may be a file with all frames.
+struct WholeFiles {
+  bool input = false, output = false;
 };
 
 /// Adds the options.
 void addSequenceOptions(po::options_description& options);
 
+/// The numbers of the frames that a file holds; nothing if it is no .esvr file of a sequence.
+/// \throws BadInput  the file is damaged
+[[nodiscard]] std::optional<std::vector<FrameNumber>> framesInFile(
+    const std::filesystem::path& path);
+
 /// Reads the options and the arguments `input` and `output`, which were given. An input that exists
 /// under its very name is a file, even if the name has a pattern.
-/// \return nothing if the input is a file
-/// \throws UsageError  the output has no pattern, although the input has one; one of the options is
-///                     invalid, or was given for a file
-[[nodiscard]] std::optional<Sequence> readSequence(const Arguments& arguments);
+/// \return nothing if the input is a file of one frame
+/// \throws UsageError  the output needs a pattern and has none; one of the options is invalid, or
+///                     was given for a file of one frame
+/// \throws BadInput  as for framesInFile
+[[nodiscard]] std::optional<Sequence> readSequence(const Arguments& arguments, WholeFiles allowed);
 
 /// A frame of a sequence.
 struct Frame {
@@ -52,7 +65,8 @@ struct Frame {
   std::optional<std::size_t> holds{};  ///< index of the frame whose output this missing one repeats
 };
 
-/// The frames of a sequence in the order in which they are named.
+/// The frames of a sequence in the order in which they are named, or by increasing numbers if the
+/// output is one file.
 /// \throws BadInput  no frame exists; or frames are missing, and MissingFrame::kError is wanted, or
 ///                   there is no frame to hold. The text names them
 [[nodiscard]] std::vector<Frame> planFrames(const Sequence& sequence);

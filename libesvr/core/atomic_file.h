@@ -34,9 +34,6 @@ class AtomicFile {
   void commit();
 
  private:
-  [[noreturn]] void fail(const char* what, int error) const;
-  void rename();
-
   std::filesystem::path target_;
   TemporaryFile temporary_;
   bool overwrite_;

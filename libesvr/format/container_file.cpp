@@ -7,6 +7,21 @@
 #include "format/section_table.h"
 
 namespace esvr {
+namespace {
+
+EsvrSummary summaryOf(const format::SectionTable& table) {
+  EsvrSummary summary{table.versionMajor, table.versionMinor, table.fileBytes, {}};
+  std::map<format::Placement, std::size_t> first;
+  for (const auto& e : table.entries) {
+    const auto [same, isFirst] = first.emplace(format::placementOf(e), summary.sections.size());
+    summary.sections.push_back({format::nameOf(e.id.kind), format::nameOf(e.codec), e.id.grid,
+                                e.storedBytes, e.rawBytes,
+                                isFirst ? std::nullopt : std::optional(same->second)});
+  }
+  return summary;
+}
+
+}  // namespace
 
 EsvrFile readEsvr(const std::filesystem::path& path, const ReadLimits& limits) {
   return format::decode(format::FileSource(path), limits);
@@ -21,16 +36,11 @@ PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part)
 }
 
 EsvrSummary inspectEsvr(const std::filesystem::path& path) {
-  const auto table = format::readTable(format::FileSource(path));
-  EsvrSummary summary{table.versionMajor, table.versionMinor, table.fileBytes, {}};
-  std::map<format::Placement, std::size_t> first;
-  for (const auto& e : table.entries) {
-    const auto [same, isFirst] = first.emplace(format::placementOf(e), summary.sections.size());
-    summary.sections.push_back({format::nameOf(e.id.kind), format::nameOf(e.codec), e.id.grid,
-                                e.storedBytes, e.rawBytes,
-                                isFirst ? std::nullopt : std::optional(same->second)});
-  }
-  return summary;
+  return summaryOf(format::readTable(format::FileSource(path)));
+}
+
+EsvrSummary inspectEsvr(std::span<const std::byte> bytes, const std::string& nameForErrors) {
+  return summaryOf(format::readTable(format::MemorySource(bytes, nameForErrors)));
 }
 
 }  // namespace esvr

@@ -5,6 +5,7 @@
 
 #include "esvr/error.h"
 #include "format/large_section.h"
+#include "format/sequence_index.h"
 #include "format/table_check.h"
 
 namespace esvr::format {
@@ -23,6 +24,8 @@ double expansionOf(SectionKind kind) {
 
 SectionReader::SectionReader(const ByteSource& source, const ReadLimits& limits)
     : source_(source), table_(readTable(source)), budget_(limits.maxBytes, limits.memory) {
+  if (isSequence(table_))
+    throw BadInput(source.name() + ": holds a sequence, whose frames are read one at a time");
   for (std::size_t i = 0; i < table_.entries.size(); ++i) unread_[table_.entries[i].id] = i;
 }
 

@@ -73,6 +73,8 @@ Header readHeader(const ByteSource& source) {
 
 void checkSize(const ByteSource& source, const Header& h) {
   if (source.size() == h.fileBytes) return;
+  if (h.fileBytes == 0)
+    throw BadInput(source.name() + ": not complete: the program that wrote it was interrupted");
   const bool shorter = source.size() < h.fileBytes;
   throw BadInput(source.name() + (shorter ? ": truncated: " : ": has bytes after its end: ") +
                  std::to_string(source.size()) + " bytes where its header says " +

@@ -164,6 +164,8 @@ TEST_F(ReportDoc, namesTheKeysOfASequence) {
       {at("in.@.vdb"), at("out.@.esvr"), "--frames", "1-2", "--count", "30", "--iterations", "60",
        "--device", "cpu"},
       3);
+  add(VDB2ESVR, {at("in.@.vdb"), at("all.esvr"), "--frames", "1", "--count", "30", "--iterations",
+                 "60", "--device", "cpu"});
   const Table report = tableAfter(document_, "## The report of a sequence");
   // The table names the words of the states for the frames.
   expectTable(all_, report, {"asked", "command_line", "frames", "states", "versions"}, "sequence");
@@ -212,6 +214,9 @@ TEST_F(ComparisonDoc, namesTheKeysOfACheck) {
   // NanoVDB has no place for some metadata, which gives differences.
   ASSERT_EQ(test::esvr2vdb({at("in.esvr"), at("back.nvdb")}).exitCode, 0);
   add(ESVR_COMPARE, {"check", at("in.vdb"), at("back.nvdb"), "--ssim"});
+  for (const std::string frame : {"1", "2"})
+    test::writeInput(at("s." + frame + ".vdb"), {{.voxels = test::softBall({})}});
+  add(ESVR_COMPARE, {"check", at("s.@.vdb"), at("s.@.vdb")});
   expectTable(all_, tableAfter(document_, "The report of `check`"), {}, "check");
 }
 

@@ -306,7 +306,7 @@ TEST_P(RefusedSequence, saysWhy) {
 INSTANTIATE_TEST_SUITE_P(
     Options, RefusedSequence,
     testing::Values(
-        BadSequence{{"in.####.vdb", "out.esvr"}, 2, "out.####.esvr'"},
+        BadSequence{{"in.####.vdb", "out.png"}, 2, "must end in .esvr"},
         BadSequence{{"in.0001.vdb", "out.esvr", "--frames", "1"}, 2, "--frames needs a sequence"},
         BadSequence{{"in.0001.vdb", "out.esvr", "--missing", "skip"}, 2, "--missing needs"},
         BadSequence{{"in.0001.vdb", "out.esvr", "--on-error", "stop"}, 2, "--on-error needs"},

@@ -1,4 +1,4 @@
-// Writes the golden files: make_golden FOLDER. After a release it is used for new files only,
+// Writes the golden files: make_golden FOLDER SEQUENCE.esvr. After a release it is used for new files only,
 // because existing ones must not change within a version of the format.
 
 #include <filesystem>
@@ -6,10 +6,11 @@
 #include <iostream>
 
 #include "format/golden_files.h"
+#include "format/sequence_samples.h"
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::cerr << "usage: make_golden FOLDER\n";
+  if (argc != 3) {
+    std::cerr << "usage: make_golden FOLDER SEQUENCE.esvr\n";
     return 2;
   }
   for (const auto& golden : esvr::test::goldenFiles()) {
@@ -18,4 +19,5 @@ int main(int argc, char** argv) {
     out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
     if (!out.flush()) return 1;
   }
+  esvr::test::writeGoldenSequence(argv[2]);
 }

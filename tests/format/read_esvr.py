@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Reads .esvr files as docs/format.md specifies them. It shares no code with libesvr.
 
-usage: read_esvr.py FOLDER
+usage: read_esvr.py FOLDER SEQUENCE.esvr
 
-Reads every golden file in the folder: header, table and checksums of all, the content of sections
-that are stored raw, and compares what is known of them. Exits 1 where the page and a file disagree.
+Reads every golden file in the folder and the golden sequence: header, table and checksums of all,
+the content of sections that are stored raw, and compares what is known of them. Exits 1 where the
+page and a file disagree.
 """
 
 import math
@@ -19,7 +20,7 @@ NONE = 0xFFFFFFFF
 KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "bricks", 6: "layer errors",
          7: "curve", 8: "carried grid", 9: "vector grid", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
          20: "kappas", 32: "ellipsoids", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
-         37: "residual", 38: "carried bytes"}
+         37: "residual", 38: "carried bytes", 64: "sequence index"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
 
@@ -502,6 +503,22 @@ def vectors(data):
     return name
 
 
+def aligned(at):
+    return (at + 7) // 8 * 8
+
+
+def frame_entries(r):
+    """The frames of a group: numbers, bytes, checksums and flags."""
+    return [r.get("qQQI") for _ in range(r.get("I"))]
+
+
+def sequence_index(data):
+    r = Record(data)
+    groups = [frame_entries(r) for _ in range(r.get("I"))]
+    r.end()
+    return groups
+
+
 def content(name, data):
     if name in PLANES:
         n = len(data) // 4 // PLANES[name]
@@ -510,17 +527,47 @@ def content(name, data):
     readers = {"grid": grid, "chunks": chunks, "bricks": bricks, "ellipsoids": ellipsoids,
                "voxels": voxels, "mask": voxels, "residual": voxels,
                "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve,
-               "carried grid": carried, "vector grid": vectors}
+               "carried grid": carried, "vector grid": vectors, "sequence index": sequence_index}
     return readers[name](data) if name in readers else data
 
 
-def read(path):
-    """A dictionary {(kind, grid, chunk): content}; the content is None if it is compressed."""
-    data = path.read_bytes()
+def read_group(data, entries, at, owned):
+    """The frames of a group at an offset, as lists of number and bytes, and the end of the group."""
+    r = Record(data)
+    r.at = at
+    assert frame_entries(r) == entries, "directory of a group"
+    assert r.get("Q") == xxh64(data[at:r.at - 8]), "checksum of a directory"
+    owned[at:r.at] = b"\1" * (r.at - at)
+    frames, at = [], aligned(r.at)
+    for number, size, hashed, flags in entries:
+        assert flags in ((0, 1) if frames else (0,)), "flags of a frame"
+        frame = data[at:at + size]
+        assert len(frame) == size and xxh64(frame) == hashed, "checksum of a frame"
+        owned[at:at + size] = b"\1" * size
+        frames.append((number, frame))
+        at = aligned(at + size)
+    return frames, at
+
+
+def read_frames(data, groups, index_at, owned):
+    """The frames of a sequence, which belong to the file besides its sections."""
+    all_frames, at = [], 48
+    for entries in groups:
+        frames, at = read_group(data, entries, at, owned)
+        all_frames.append(frames)
+    assert at == index_at, "the index follows the last group"
+    numbers = [number for frames in all_frames for number, _ in frames]
+    assert numbers == sorted(set(numbers)), "numbers of frames"
+    return all_frames
+
+
+def read(data):
+    """A dictionary {(kind, grid, chunk): content}; the content is None if it is compressed. That of
+    a sequence index is the list of groups of frames."""
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
     assert magic == bytes.fromhex("89 45 53 56 52 0D 0A 0A"), "magic"
-    assert major == 1 and minor in (0, 1, 2) and size == len(data), "version or size"
+    assert major == 1 and minor in (0, 1, 2, 3) and size == len(data), "version or size"
     assert table % 8 == 0 and header_sum == xxh64(data[:40]), "header checksum"
     assert table_sum == xxh64(data[table:table + 56 * count]), "table checksum"
 
@@ -548,7 +595,10 @@ def read(path):
                             "vector grid")
         assert flags == (0 if optional else 1) and frame == layer == 0, "flags"
         assert codec in (0, 1) and (codec == 1 or raw == stored), "codec"
+        assert minor >= 3 or name != "sequence index", "a kind of version 1.3"
         sections[name, g, c] = content(name, part) if codec == 0 else None
+        if name == "sequence index":
+            sections[name, g, c] = read_frames(data, sections[name, g, c], at, owned)
     assert not any(b for b, o in zip(data, owned) if not o), "padding"
     return sections
 
@@ -741,6 +791,16 @@ def check_vector_grid(sections):
     assert names == [b"velocity.x", b"velocity.y", b"velocity.z"]
 
 
+def check_sequence(sections):
+    """Expects the frames one_ellipsoid and no_grid in a group, and voxels in another one."""
+    assert sections.keys() == {("sequence index", NONE, NONE)}
+    first, second = sections["sequence index", NONE, NONE]
+    assert [number for number, _ in first + second] == [-2, 1, 3]
+    check_one_ellipsoid(read(first[0][1]))
+    assert read(first[1][1]) == {}
+    check_voxels(read(second[0][1]))
+
+
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
           "voxels": check_voxels, "mask": check_mask, "residual": check_residual,
@@ -753,15 +813,16 @@ CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ell
 def main():
     assert xxh64(b"") == 0xEF46DB3751D8E999 and xxh64(b"abc") == 0x44BC2CF5AD770999
     files = sorted(Path(sys.argv[1]).glob("*.esvr"))
-    for path in files:
+    for path in [*files, Path(sys.argv[2])]:
         try:
-            CHECKS.get(path.stem, lambda sections: None)(read(path))
+            check = check_sequence if path not in files else CHECKS.get(path.stem, lambda _: None)
+            check(read(path.read_bytes()))
         except (AssertionError, struct.error) as error:
             sys.exit(f"{path}: {error!r}")
     missing = CHECKS.keys() - {path.stem for path in files}
     if missing:
         sys.exit(f"{sys.argv[1]}: no {', '.join(sorted(missing))}")
-    print(f"{len(files)} files read")
+    print(f"{len(files) + 1} files read")
 
 
 if __name__ == "__main__":

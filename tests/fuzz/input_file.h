@@ -24,6 +24,8 @@ class InputFile {
   InputFile(const InputFile&) = delete;
   InputFile& operator=(const InputFile&) = delete;
 
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
   const std::filesystem::path& write(const void* data, std::size_t size) {
     std::ofstream file(path_, std::ios::binary | std::ios::trunc);
     file.write(static_cast<const char*>(data), std::streamsize(size));

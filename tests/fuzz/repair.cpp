@@ -58,10 +58,43 @@ void repairLayered(std::span<std::byte> section) {
   store(section, size - kSumBytes, checksum(section.first(size - kSumBytes)));
 }
 
+/// Offsets and sizes in the index of a sequence, and in an entry of a frame.
+constexpr std::size_t kFrameBytesAt = 8, kFrameSumAt = 16, kFrameEntryBytes = 28;
+constexpr std::size_t kDirectorySize = sizeof(std::uint32_t) + sizeof(std::uint64_t);
+
+/// Corrects the checksums of the frames of a group in the index.
+/// \param at  offset of the group in the file
+/// \return offset of the next group
+std::uint64_t repairGroup(std::span<std::byte> file, std::span<std::byte> entries,
+                          std::uint64_t at) {
+  at = alignUp(at + kDirectorySize + entries.size());
+  for (std::size_t e = 0; e < entries.size(); e += kFrameEntryBytes) {
+    const auto entry = entries.subspan(e, kFrameEntryBytes);
+    const auto frame = part(file, at, load<std::uint64_t>(entry, kFrameBytesAt));
+    store(entry, kFrameSumAt, checksum(frame));
+    at = alignUp(at + frame.size());
+  }
+  return at;
+}
+
+void repairIndex(std::span<std::byte> file, std::span<std::byte> index) {
+  std::uint64_t group = kHeaderBytes;
+  std::size_t at = sizeof(std::uint32_t);
+  while (at + sizeof(std::uint32_t) <= index.size()) {
+    const std::size_t bytes = load<std::uint32_t>(index, at) * kFrameEntryBytes;
+    at += sizeof(std::uint32_t);
+    if (bytes > index.size() - at) return;
+    group = repairGroup(file, index.subspan(at, bytes), group);
+    at += bytes;
+  }
+}
+
 void repairEntry(std::span<std::byte> file, std::span<std::byte> entry) {
   const auto section = part(file, load<std::uint64_t>(entry, kEntryOffsetAt),
                             load<std::uint64_t>(entry, kEntryStoredAt));
   if (load<std::uint32_t>(entry, 0) == std::uint32_t(SectionKind::kLayered)) repairLayered(section);
+  if (load<std::uint32_t>(entry, 0) == std::uint32_t(SectionKind::kSequenceIndex))
+    repairIndex(file, section);
   store(entry, kEntryChecksumAt, checksum(section));
 }
 

@@ -155,7 +155,7 @@ struct ReadLimits {
 /// Reads a whole file. Every size is checked before memory is allocated, every section is checked
 /// against its checksum, and every parameter must be finite.
 /// \throws BadInput  the file is missing, not an .esvr file, of a newer major version, truncated or
-///                   damaged (the text says where)
+///                   damaged (the text says where); it holds a sequence (sequence_file.h)
 /// \throws MemoryExceeded  the content needs more memory than the limits allow
 [[nodiscard]] EsvrFile readEsvr(const std::filesystem::path& path, const ReadLimits& limits = {});
 
@@ -236,6 +236,9 @@ struct EsvrSummary {
 /// Reads the header and the section table of a file.
 /// \throws BadInput  as for readEsvr
 [[nodiscard]] EsvrSummary inspectEsvr(const std::filesystem::path& path);
+/// The same for a file in memory. \param nameForErrors  name of the file in error texts
+[[nodiscard]] EsvrSummary inspectEsvr(std::span<const std::byte> bytes,
+                                      const std::string& nameForErrors);
 
 /// Checks a file as readEsvr does, and also that decoding it twice gives the same content.
 /// \return remarks on a valid file, one line each: sections that this reader skips, a newer minor

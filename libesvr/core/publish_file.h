@@ -1,0 +1,35 @@
+#pragma once
+/// Gives a complete file its final name.
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+
+namespace esvr {
+
+/// Permissions of a new file; the umask of the process reduces them.
+inline constexpr mode_t kNewFileMode = 0666;
+
+/// The file that a path leads to, so that a symbolic link is not replaced.
+[[nodiscard]] std::filesystem::path followLinks(const std::filesystem::path& path);
+
+/// Refuses a target that exists (without `overwrite`) or is not a regular file.
+/// \return whether it exists
+/// \throws RuntimeFailure
+bool checkTarget(const std::filesystem::path& target, bool overwrite);
+
+/// Renames a file that was flushed, and flushes the folder.
+/// \throws RuntimeFailure  the target exists (without `overwrite`) or cannot be written
+void publishFile(const std::filesystem::path& file, const std::filesystem::path& target,
+                 bool overwrite);
+
+/// Throws a RuntimeFailure that has a verb phrase, a path and the text of a system error.
+[[noreturn]] void failAt(const char* what, const std::filesystem::path& path, int error);
+
+/// Writes all bytes to an open file. \param path  name of the file in error texts
+/// \throws RuntimeFailure
+void writeAll(int fd, std::span<const std::byte> bytes, const std::filesystem::path& path);
+
+}  // namespace esvr

@@ -1,0 +1,148 @@
+#include <algorithm>
+#include <utility>
+
+#include "core/partial_file.h"
+#include "esvr/error.h"
+#include "esvr/frame_coding.h"
+#include "esvr/sequence_file.h"
+#include "format/byte_writer.h"
+#include "format/checksum.h"
+#include "format/sequence_index.h"
+
+namespace esvr {
+namespace {
+
+using namespace format;
+
+PartialStart startOf(PartialSequence partial) {
+  switch (partial) {
+    case PartialSequence::kRefuse:
+      return PartialStart::kRefuse;
+    case PartialSequence::kReplace:
+      return PartialStart::kReplace;
+    case PartialSequence::kResume:
+      break;
+  }
+  return PartialStart::kContinue;
+}
+
+}  // namespace
+
+class SequenceWriter::File {
+ public:
+  File(const std::filesystem::path& path, const SequenceWriteOptions& options)
+      : name_(path.string()), file_(path, options.overwrite, startOf(options.partial)) {
+    if (file_.size() > kHeaderBytes) groups_ = findGroups(FileSource(file_.path()));
+    dropGroups(groups_.size());
+  }
+  ~File() {
+    if (groups_.empty() && !finished_) discard();
+  }
+
+  [[nodiscard]] const std::vector<SequenceFrame>& frames() const { return frames_; }
+  [[nodiscard]] std::size_t groupCount() const { return groups_.size(); }
+
+  /// Removes everything after the first n groups.
+  void dropGroups(std::size_t n) {
+    groups_.resize(std::min(n, groups_.size()));
+    frames_ = framesOf(groups_);
+    // The header comes first: a complete one must not stand before a shorter file.
+    file_.replaceStart(partialHeader());
+    file_.truncate(endOf(groups_));
+    file_.flush();
+  }
+
+  void append(std::int64_t number, std::vector<std::byte> bytes) {
+    const bool depends = dependsOnPrevious(bytes);
+    if (const auto last = lastNumber(); last && number <= *last)
+      refuse(number, "its number is not above " + std::to_string(*last));
+    if (depends && entries_.empty())
+      refuse(number, "it begins a group, but refers to another frame");
+    entries_.push_back({number, bytes.size(), checksum(bytes), depends});
+    contents_.push_back(std::move(bytes));
+  }
+
+  void endGroup() {
+    if (entries_.empty()) return;
+    FrameGroup group{endOf(groups_), std::exchange(entries_, {})};
+    write(group, std::exchange(contents_, {}));
+    groups_.push_back(std::move(group));
+    const auto added = framesOf({groups_.back()});
+    for (SequenceFrame frame : added) {
+      frame.group = groups_.size() - 1;
+      frames_.push_back(frame);
+    }
+  }
+
+  std::uint64_t finish() {
+    endGroup();
+    if (groups_.empty()) throw RuntimeFailure("cannot write " + name_ + ": there is no frame");
+    const SequenceEnd end = encodeEnd(groups_);
+    file_.append(end.bytes);
+    file_.flush();  // the header makes the file valid, and must not reach the disk before its end
+    file_.replaceStart(end.header);
+    const std::uint64_t bytes = file_.size();
+    file_.commit();
+    finished_ = true;
+    return bytes;
+  }
+
+ private:
+  [[noreturn]] void refuse(std::int64_t number, const std::string& why) const {
+    throw UsageError(frameName(name_, number) + " cannot be appended: " + why);
+  }
+
+  [[nodiscard]] std::optional<std::int64_t> lastNumber() const {
+    if (!entries_.empty()) return entries_.back().number;
+    return frames_.empty() ? std::nullopt : std::optional(frames_.back().number);
+  }
+
+  /// Writes frame by frame, so that no second copy of the group is in memory.
+  void write(const FrameGroup& group, const std::vector<std::vector<std::byte>>& contents) {
+    const auto offsets = frameOffsets(group);
+    const auto directory = encodeDirectory(group);
+    appendPadded(directory, offsets.front() - group.offset);
+    for (std::size_t i = 0; i < contents.size(); ++i)
+      appendPadded(contents[i], offsets[i + 1] - offsets[i]);
+    file_.flush();
+  }
+
+  void appendPadded(std::span<const std::byte> bytes, std::uint64_t size) {
+    file_.append(bytes);
+    file_.append(std::vector<std::byte>(size - bytes.size()));
+  }
+
+  /// Empties the file, so that nothing of it stays.
+  void discard() noexcept try {
+    file_.truncate(0);
+  } catch (const Error&) {  // a header without groups stays, which a later run may continue
+  }
+
+  std::string name_;
+  PartialFile file_;
+  std::vector<FrameGroup> groups_;
+  std::vector<SequenceFrame> frames_;
+  std::vector<FrameEntry> entries_;  ///< of the group that is not complete
+  std::vector<std::vector<std::byte>> contents_;
+  bool finished_ = false;
+};
+
+SequenceWriter::SequenceWriter(const std::filesystem::path& path,
+                               const SequenceWriteOptions& options)
+    : file_(std::make_unique<File>(path, options)) {}
+SequenceWriter::~SequenceWriter() = default;
+
+std::filesystem::path SequenceWriter::partialPath(const std::filesystem::path& path) {
+  return PartialFile::pathFor(path);
+}
+
+const std::vector<SequenceFrame>& SequenceWriter::frames() const { return file_->frames(); }
+std::size_t SequenceWriter::groupCount() const { return file_->groupCount(); }
+void SequenceWriter::dropGroups(std::size_t group) { file_->dropGroups(group); }
+void SequenceWriter::append(std::int64_t number, std::vector<std::byte> frame) {
+  file_->append(number, std::move(frame));
+}
+void SequenceWriter::endGroup() { file_->endGroup(); }
+std::uint64_t SequenceWriter::finish() { return file_->finish(); }
+
+}  // namespace esvr

@@ -1,0 +1,333 @@
+// Plan: sequences of small volumes are converted to one file and back as a user does. The file must
+// have the same bytes on any number of threads, and after it was interrupted, killed and continued.
+// Frames that are missing or damaged are treated as the options say.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "cli/converters.h"
+#include "cli/folder_test.h"
+#include "cli/vdb_inputs.h"
+#include "esvr/container.h"
+#include "esvr/grid_coding.h"
+#include "esvr/sequence_file.h"
+#include "esvr/vdb_io.h"
+
+namespace esvr {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using test::esvr2vdb;
+using test::readText;
+using test::runInterrupted;
+using test::vdb2esvr;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Words = std::vector<std::string>;
+
+class OneFile : public test::FolderTest {
+ protected:
+  void writeFrame(int number, const std::vector<test::InputGrid>& grids) const {
+    test::writeInput(at("in." + std::to_string(number) + ".vdb"), grids);
+  }
+  /// Balls of different values as the frames first to last.
+  void writeFrames(int first, int last) const {
+    for (int frame = first; frame <= last; ++frame)
+      writeFrame(frame, {{.voxels = test::softBall({frame, 0, 0}, float(20 + frame))}});
+  }
+  [[nodiscard]] Words wordsFor(const std::string& output, const Words& more) const {
+    Words words{at("in.@.vdb"), at(output), "--lossless", "--device", "cpu"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  [[nodiscard]] test::ProgramRun convert(const Words& more = {},
+                                         const std::string& output = "out.esvr") const {
+    return vdb2esvr(wordsFor(output, more));
+  }
+  [[nodiscard]] std::string bytesOf(const std::string& name) const { return readText(at(name)); }
+  /// The names of all files that are no inputs.
+  [[nodiscard]] Words outputs() const {
+    Words names = folder_.names();
+    std::erase_if(names, [](const std::string& name) { return name.starts_with("in."); });
+    return names;
+  }
+  [[nodiscard]] std::vector<std::int64_t> numbersIn(const std::string& name) const {
+    std::vector<std::int64_t> numbers;
+    const SequenceReader reader(at(name));
+    for (const SequenceFrame& frame : reader.frames()) numbers.push_back(frame.number);
+    return numbers;
+  }
+  [[nodiscard]] std::vector<std::size_t> groupsIn(const std::string& name) const {
+    std::vector<std::size_t> groups;
+    const SequenceReader reader(at(name));
+    for (const SequenceFrame& frame : reader.frames()) groups.push_back(frame.group);
+    return groups;
+  }
+  void expectVoxels(SequenceReader& reader, std::int64_t frame, std::int64_t source) const {
+    const auto in = readGrid(at("in." + std::to_string(source) + ".vdb"), "density").volume;
+    EXPECT_EQ(decodeGrid(reader.read(frame).grids.at(0)).values, in.values) << frame;
+  }
+  void damage(const std::string& name, std::uint64_t byte) const {
+    std::string bytes = bytesOf(name);
+    bytes[byte] = char(bytes[byte] ^ 1);
+    test::writeText(at(name), bytes);
+  }
+};
+
+TEST_F(OneFile, hasTheFramesByTheirNumbers) {
+  writeFrames(-3, 6);
+  const auto run = convert({"--gop", "4", "--report", at("r.json")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("out.esvr: 3 groups of at most 4 frames"));
+  EXPECT_THAT(outputs(), ElementsAre("out.esvr", "r.json"));
+  EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(-3, -2, -1, 0, 1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(groupsIn("out.esvr"), ElementsAre(0, 0, 0, 0, 1, 1, 1, 1, 2, 2));
+  SequenceReader reader(at("out.esvr"));
+  for (const std::int64_t frame : {6, -3, 0, 5}) expectVoxels(reader, frame, frame);
+  const Json report = Json::parse(bytesOf("r.json"));
+  EXPECT_EQ(report["output"]["bytes"], sizeOf("out.esvr"));
+  EXPECT_EQ(report["output"]["groups"], 3);
+  EXPECT_EQ(report["frames"][9]["group"], 2);
+  EXPECT_EQ(report["frames"][9]["output"]["bytes"], reader.frames()[9].bytes);
+}
+
+TEST_F(OneFile, hasTheSameBytesOnAnyNumberOfThreads) {
+  writeFrames(1, 9);
+  ASSERT_EQ(convert({"--gop", "2", "--threads", "1"}).exitCode, 0);
+  ASSERT_EQ(convert({"--gop", "2", "--threads", "4"}, "four.esvr").exitCode, 0);
+  EXPECT_TRUE(bytesOf("four.esvr") == bytesOf("out.esvr"));
+  ASSERT_EQ(convert({"--gop", "2", "--frames", "9-1"}, "down.esvr").exitCode, 0);
+  EXPECT_TRUE(bytesOf("down.esvr") == bytesOf("out.esvr")) << "frames are sorted";
+}
+
+TEST_F(OneFile, beginsAGroupWhereGridsDiffer) {
+  writeFrames(1, 5);
+  writeFrame(3, {{.voxels = test::softBall({}), .map = test::InputMap::kRotated}});
+  writeFrame(5, {{.voxels = test::softBall({})}, {.name = "heat", .voxels = test::softBall({})}});
+  const auto run = convert();
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(groupsIn("out.esvr"), ElementsAre(0, 0, 1, 2, 3));
+  EXPECT_THAT(run.out, HasSubstr("frames 3-5 each begin a group, because their grids differ"));
+}
+
+TEST_F(OneFile, hasAnEmptyFrameInTheMiddle) {
+  writeFrames(1, 3);
+  writeFrame(2, {{}});
+  ASSERT_EQ(convert().exitCode, 0);
+  EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(1, 2, 3));
+  ASSERT_EQ(esvr2vdb({at("out.esvr"), at("back.@.vdb")}).exitCode, 0);
+  EXPECT_EQ(inspectVdb(at("back.2.vdb")).grids.at(0).activeVoxels, 0u);
+  EXPECT_GT(inspectVdb(at("back.3.vdb")).grids.at(0).activeVoxels, 0u);
+}
+
+TEST_F(OneFile, holdsOrSkipsMissingFrames) {
+  writeFrames(1, 2);
+  writeFrames(5, 5);
+  EXPECT_EQ(convert({"--frames", "1-5"}).exitCode, 3);
+  EXPECT_THAT(outputs(), IsEmpty());
+  ASSERT_EQ(convert({"--frames", "1-5", "--missing", "skip"}).exitCode, 0);
+  EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(1, 2, 5));
+  const auto held = convert({"--frames", "1-5", "--missing", "hold", "--gop", "2"}, "held.esvr");
+  ASSERT_EQ(held.exitCode, 0) << held.err;
+  EXPECT_THAT(held.out, HasSubstr("held from 2"));
+  EXPECT_THAT(groupsIn("held.esvr"), ElementsAre(0, 0, 0, 0, 1));
+  SequenceReader reader(at("held.esvr"));
+  for (const std::int64_t frame : {3, 4}) expectVoxels(reader, frame, 2);
+}
+
+TEST_F(OneFile, lacksFramesThatAreDamaged) {
+  writeFrames(1, 4);
+  test::writeText(at("in.2.vdb"), "no volume");
+  const auto run = convert({"--gop", "2"});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, HasSubstr("1 of 4 frames failed: 2"));
+  EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(1, 3, 4));
+}
+
+TEST_F(OneFile, isContinuedAfterItStopped) {
+  writeFrames(1, 8);
+  ASSERT_EQ(convert({"--gop", "2"}, "whole.esvr").exitCode, 0);
+  fs::rename(at("in.6.vdb"), at("in.six"));
+  test::writeText(at("in.6.vdb"), "no volume");
+  const auto stopped = convert({"--gop", "2", "--on-error", "stop", "--threads", "1"});
+  EXPECT_EQ(stopped.exitCode, 3);
+  EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial", "whole.esvr"));
+  const auto refused = convert({"--gop", "2"});
+  EXPECT_EQ(refused.exitCode, 1);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("out.esvr.partial"), HasSubstr("--resume")));
+  const auto other = convert({"--gop", "3", "--resume"});
+  EXPECT_EQ(other.exitCode, 2);
+  EXPECT_THAT(other.err, HasSubstr("has other groups"));
+  const auto fewer = convert({"--gop", "2", "--resume", "--frames", "2-8"});
+  EXPECT_EQ(fewer.exitCode, 2);
+  EXPECT_THAT(fewer.err, HasSubstr("has frame 1"));
+
+  fs::rename(at("in.six"), at("in.6.vdb"));
+  const auto run = convert({"--gop", "2", "--resume"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("kept"));
+  EXPECT_TRUE(bytesOf("out.esvr") == bytesOf("whole.esvr"));
+  EXPECT_THAT(outputs(), ElementsAre("out.esvr", "whole.esvr"));
+}
+
+TEST_F(OneFile, isContinuedFromAnyByteOfItsPartialFile) {
+  writeFrames(1, 4);
+  ASSERT_EQ(convert({"--gop", "2"}, "whole.esvr").exitCode, 0);
+  const std::string whole = bytesOf("whole.esvr");
+  const SequenceReader reader(at("whole.esvr"));
+  const std::uint64_t second = reader.frames()[2].offset;
+  for (const std::uint64_t bytes : {std::uint64_t{0}, std::uint64_t{30}, second - 1, second + 9}) {
+    test::writeText(at("out.esvr.partial"), "");
+    std::string left = whole.substr(0, bytes);
+    // The header of a file that is not complete says that the file has no bytes and no sections.
+    if (left.size() >= 48) {
+      SequenceWriter empty(at("empty.esvr"));
+      left.replace(0, 48, bytesOf("empty.esvr.partial"));
+    }
+    test::writeText(at("out.esvr.partial"), left);
+    const auto run = convert({"--gop", "2", "--resume"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_TRUE(bytesOf("out.esvr") == whole) << bytes;
+    fs::remove(at("out.esvr"));
+  }
+}
+
+TEST_F(OneFile, isContinuedAfterTheProgramWasKilled) {
+  writeFrames(1, 4);
+  const Words words{"--gop",     "2", "--representation", "ellipsoids", "--preset", "draft",
+                    "--threads", "1", "--progress",       "json"};
+  const auto commandFor = [&](const std::string& output) {
+    Words all{at("in.@.vdb"), at(output), "--device", "cpu"};
+    all.insert(all.end(), words.begin(), words.end());
+    return all;
+  };
+  ASSERT_EQ(vdb2esvr(commandFor("whole.esvr")).exitCode, 0);
+  writeFrame(3, {{.voxels = test::cloud(30)}});  // it takes seconds
+  std::string command = std::string(VDB2ESVR);
+  for (const std::string& word : commandFor("out.esvr")) command += " '" + word + "'";
+  const std::string log = "'" + at("log") + "'";
+  const auto killed = test::runProgram(
+      "/bin/sh",
+      {"-c", "touch " + log + "; " + command + " 2>" + log + " & until grep -q 'frames_done\":2' " +
+                 log + "; do sleep 0.01; done; sleep 0.2; kill -9 $!; wait $!"});
+  EXPECT_EQ(killed.exitCode, 128 + 9);
+  EXPECT_TRUE(fs::exists(at("out.esvr.partial")));
+  writeFrames(3, 3);
+  Words again = commandFor("out.esvr");
+  again.emplace_back("--resume");
+  const auto run = vdb2esvr(again);
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_TRUE(bytesOf("out.esvr") == bytesOf("whole.esvr"));
+}
+
+TEST_F(OneFile, keepsItsCompleteGroupsAfterAnInterruption) {
+  writeFrames(1, 2);
+  writeFrame(3, {{.voxels = test::cloud(30)}});  // it takes seconds
+  Words words{at("in.@.vdb"),     at("out.esvr"), "--gop",      "2",
+              "--device",         "cpu",          "--threads",  "1",
+              "--representation", "ellipsoids",   "--progress", "json"};
+  const auto stopped = runInterrupted(VDB2ESVR, words, "\"frames_done\":2");
+  EXPECT_EQ(stopped.exitCode, 1);
+  EXPECT_THAT(stopped.err, HasSubstr("interrupted; 2 of 3 frames are complete, and --resume"));
+  EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial"));
+  writeFrames(3, 3);
+  words.emplace_back("--resume");
+  const auto run = vdb2esvr(words);
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("\"kept\""));
+  EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(1, 2, 3));
+}
+
+TEST_F(OneFile, isReplacedWhereForcedOnly) {
+  writeFrames(1, 2);
+  test::writeText(at("out.esvr"), "mine");
+  const auto refused = convert();
+  EXPECT_EQ(refused.exitCode, 1);
+  EXPECT_THAT(refused.err, HasSubstr("exists already"));
+  EXPECT_EQ(bytesOf("out.esvr"), "mine");
+  test::writeText(at("out.esvr.partial"), "left");
+  EXPECT_EQ(convert({"--force"}).exitCode, 0);
+  EXPECT_THAT(outputs(), ElementsAre("out.esvr"));
+}
+
+TEST_F(OneFile, comesBackByFrames) {
+  writeFrames(1, 6);
+  ASSERT_EQ(convert({"--gop", "2"}).exitCode, 0);
+  const auto run = esvr2vdb(
+      {at("out.esvr"), at("back.##.vdb"), "--frames", "5,2", "--reference", at("in.@.vdb")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("frame 5:"), HasSubstr("frame 2:")));
+  EXPECT_THAT(outputs(), ElementsAre("back.02.vdb", "back.05.vdb", "out.esvr"));
+  for (const std::string frame : {"2", "5"})
+    EXPECT_EQ(readGrid(at("back.0" + frame + ".vdb"), "density").volume.values,
+              readGrid(at("in." + frame + ".vdb"), "density").volume.values);
+  const auto missing = esvr2vdb({at("out.esvr"), at("x.@.vdb"), "--frames", "5-7"});
+  EXPECT_EQ(missing.exitCode, 3);
+  EXPECT_THAT(missing.err, HasSubstr("frame 7 is missing"));
+  const auto onePath = esvr2vdb({at("out.esvr"), at("x.vdb")});
+  EXPECT_EQ(onePath.exitCode, 2);
+  EXPECT_THAT(onePath.err, HasSubstr("x.####.vdb"));
+}
+
+TEST_F(OneFile, isListedByFrames) {
+  writeFrames(1, 3);
+  ASSERT_EQ(convert({"--gop", "2"}).exitCode, 0);
+  const auto run = esvr2vdb({"--list", at("out.esvr")});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("format 1.3"), HasSubstr("3 frames in 2 groups"),
+                             HasSubstr(std::to_string(sizeOf("out.esvr")) + " bytes")));
+}
+
+TEST_F(OneFile, isCheckedFrameByFrame) {
+  writeFrames(1, 4);
+  ASSERT_EQ(convert({"--gop", "2"}).exitCode, 0);
+  EXPECT_THAT(esvr2vdb({"--check", at("out.esvr")}).out, HasSubstr("out.esvr: OK"));
+  damage("out.esvr", SequenceReader(at("out.esvr")).frames()[3].offset + 60);
+  const auto run = esvr2vdb({"--check", at("out.esvr")});
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("1 of 4 frames are lost: 4"), HasSubstr("frame 4: ")));
+  const auto back = esvr2vdb({at("out.esvr"), at("back.@.vdb")});
+  EXPECT_EQ(back.exitCode, 3);
+  EXPECT_THAT(back.err, HasSubstr("1 of 4 frames failed: 4"));
+  EXPECT_THAT(outputs(), ElementsAre("back.1.vdb", "back.2.vdb", "back.3.vdb", "out.esvr"));
+}
+
+TEST_F(OneFile, isDrawnFrameByFrame) {
+  writeFrames(-1, 2);
+  writeFrame(1, {{}});
+  ASSERT_EQ(convert().exitCode, 0);
+  const auto draw = [&](const std::string& output, Words more) {
+    more.insert(more.begin(),
+                {at("out.esvr"), at(output), "--resolution", "16x16", "--device", "cpu"});
+    return test::runProgram(ESVR_RENDER, more);
+  };
+  const auto run = draw("p.##.png", {"--frames", "-1-2x1"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(outputs(), ElementsAre("out.esvr", "p.-1.png", "p.00.png", "p.01.png", "p.02.png"));
+  EXPECT_FALSE(bytesOf("p.00.png") == bytesOf("p.02.png")) << "one range of values for all";
+  EXPECT_THAT(draw("p.png", {}).err, HasSubstr("needs a pattern"));
+  EXPECT_THAT(draw("q.##.png", {"--frames", "7"}).err, HasSubstr("there is no frame 7"));
+  EXPECT_THAT(draw("q.##.png", {"--turntable", "3"}).err,
+              HasSubstr("--turntable cannot be combined with a sequence"));
+}
+
+TEST_F(OneFile, needsASequenceForItsOptions) {
+  writeFrames(1, 1);
+  for (const std::string output : {"out.@.esvr", "out.esvr"}) {
+    const auto run =
+        vdb2esvr({at(output == "out.esvr" ? "in.1.vdb" : "in.@.vdb"), at(output), "--gop", "4"});
+    EXPECT_EQ(run.exitCode, 2);
+    EXPECT_THAT(run.err, HasSubstr("--gop needs a sequence"));
+  }
+  EXPECT_EQ(convert({"--gop", "0"}).exitCode, 2);
+  EXPECT_THAT(outputs(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace esvr

@@ -1,0 +1,101 @@
+// Plan: a file grows, is left and continued, as a process does that is killed. The target must
+// appear with the whole content only, and no second writer may join.
+
+#include "core/partial_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <string>
+#include <string_view>
+
+#include "esvr/error.h"
+#include "support/temporary_folder.h"
+
+namespace esvr {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::ThrowsMessage;
+
+class PartialFileTest : public testing::Test {
+ protected:
+  [[nodiscard]] fs::path target() const { return folder_ / "out.esvr"; }
+  void leave(std::string_view text) const {
+    PartialFile file(target(), false, PartialStart::kContinue);
+    file.append(std::as_bytes(std::span(text)));
+  }
+  [[nodiscard]] std::string content(const fs::path& path) const {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  void expectRefused(bool overwrite, PartialStart start, const char* words) const {
+    EXPECT_THAT(std::function<void()>([&] { PartialFile(target(), overwrite, start); }),
+                ThrowsMessage<RuntimeFailure>(HasSubstr(words)));
+  }
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(PartialFileTest, IsContinuedUntilItIsComplete) {
+  leave("one ");
+  leave("two ");
+  EXPECT_THAT(folder_.names(), ElementsAre("out.esvr.partial"));
+  PartialFile file(target(), false, PartialStart::kContinue);
+  EXPECT_EQ(file.size(), 8u);
+  file.truncate(4);
+  file.append(std::as_bytes(std::span(std::string_view("three"))));
+  file.replaceStart(std::as_bytes(std::span(std::string_view("ONE"))));
+  file.commit();
+  EXPECT_THAT(folder_.names(), ElementsAre("out.esvr"));
+  EXPECT_EQ(content(target()), "ONE three");
+}
+
+TEST_F(PartialFileTest, LeavesNothingWithoutContent) {
+  leave("");
+  EXPECT_THAT(folder_.names(), IsEmpty());
+}
+
+TEST_F(PartialFileTest, IsRefusedOrReplacedAsWanted) {
+  leave("one");
+  expectRefused(false, PartialStart::kRefuse, "out.esvr.partial");
+  EXPECT_EQ(content(PartialFile::pathFor(target())), "one");
+  PartialFile file(target(), false, PartialStart::kReplace);
+  EXPECT_EQ(file.size(), 0u);
+}
+
+TEST_F(PartialFileTest, HasOneWriter) {
+  const PartialFile first(target(), false, PartialStart::kRefuse);
+  expectRefused(false, PartialStart::kContinue, "another process writes it");
+  expectRefused(false, PartialStart::kReplace, "another process writes it");
+}
+
+TEST_F(PartialFileTest, KeepsATargetThatExists) {
+  std::ofstream(target()) << "old";
+  expectRefused(false, PartialStart::kContinue, "exists already");
+  PartialFile file(target(), true, PartialStart::kContinue);
+  file.append(std::as_bytes(std::span(std::string_view("new"))));
+  EXPECT_EQ(content(target()), "old");
+  file.commit();
+  EXPECT_EQ(content(target()), "new");
+}
+
+TEST_F(PartialFileTest, FollowsALinkToTheTarget) {
+  fs::create_directory(folder_ / "elsewhere");
+  std::ofstream(folder_ / "elsewhere/real.esvr") << "old";
+  fs::create_symlink(folder_ / "elsewhere/real.esvr", target());
+  PartialFile file(target(), true, PartialStart::kRefuse);
+  file.append(std::as_bytes(std::span(std::string_view("new"))));
+  EXPECT_TRUE(fs::exists(folder_ / "elsewhere/real.esvr.partial"));
+  file.commit();
+  EXPECT_TRUE(fs::is_symlink(target()));
+  EXPECT_EQ(content(target()), "new");
+}
+
+}  // namespace
+}  // namespace esvr

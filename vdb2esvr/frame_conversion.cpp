@@ -1,0 +1,118 @@
+#include "vdb2esvr/frame_conversion.h"
+
+#include <utility>
+
+#include "cli/failure.h"
+#include "cli/frame_messages.h"
+#include "cli/frame_workers.h"
+#include "vdb2esvr/frame_memory.h"
+#include "vdb2esvr/report.h"
+#include "vdb2esvr/sequence_report.h"
+
+namespace esvr::vdb2esvr {
+namespace {
+
+/// The value of --device that selects one of several devices.
+std::string deviceOption(const Device& device) {
+  return device.kind == DeviceKind::kCpu ? "cpu" : "cuda:" + std::to_string(device.index);
+}
+
+/// Messages of frames: warnings unless --quiet was given, but no details, because frames that are
+/// converted at the same time would mix them.
+cli::Verbosity verbosityOfFrames(const Options& options) {
+  return options.verbosity == cli::Verbosity::kQuiet ? cli::Verbosity::kQuiet
+                                                     : cli::Verbosity::kNormal;
+}
+
+/// The memory that the conversion of a file may take, bytes.
+std::uint64_t memoryOf(const Options& options) {
+  const VdbSummary file = inspectVdb(options.input);
+  return conversionMemory(file, chooseGrids(options.input, file, options.grids));
+}
+
+}  // namespace
+
+FrameConversion::FrameConversion(const Options& options, const std::vector<cli::Frame>& frames,
+                                 const CancelToken& cancel)
+    : options_(options),
+      cancel_(cancel),
+      devices_(selectDevices(options.device)),
+      gate_(options.read.maxBytes),
+      bar_(options.input.string(), options.progress, options.verbosity),
+      log_(kProgram, options.verbosity) {
+  for (const cli::Frame& frame : frames) {
+    const bool isLeftOut = frame.missing && !frame.holds;
+    record_.frames.push_back(
+        {.frame = frame, .state = isLeftOut ? FrameState::kMissing : FrameState::kNotBegun});
+    if (!isLeftOut) ++progress_.frames;
+  }
+}
+
+int FrameConversion::workers(std::size_t tasks) const {
+  if (mayFit(options_) && devices_.front().kind == DeviceKind::kCuda) return int(devices_.size());
+  return cli::taskWorkers(options_.threads, tasks);
+}
+
+void FrameConversion::attempt(FrameRecord& frame, const std::function<void()>& action) {
+  try {
+    action();
+  } catch (...) {
+    fail(frame, cli::currentFailure());
+  }
+  tellEnd(frame);
+}
+
+void FrameConversion::fail(FrameRecord& frame, const Error& error) {
+  frame.state = cancel_.cancelled() ? FrameState::kInterrupted : FrameState::kFailed;
+  frame.failure = error;
+  if (!options_.report.empty())
+    frame.report = frameReport(makeFailureReport(optionsOf(frame.frame, 0), error));
+}
+
+Options FrameConversion::optionsOf(const cli::Frame& frame, int worker) const {
+  Options own = options_;
+  own.input = frame.input, own.output = frame.output;
+  if (devices_.size() > 1)
+    own.device = deviceOption(devices_[std::size_t(worker) % devices_.size()]);
+  own.progress = ProgressForm::kText;
+  own.verbosity = cli::Verbosity::kQuiet;
+  return own;
+}
+
+void FrameConversion::convert(const Options& own, FrameRecord& frame, const StoreFile& store) {
+  const auto memory = gate_.take(memoryOf(own));
+  const cli::Log log = warnings_.logOf(frame.frame, kProgram, verbosityOfFrames(options_));
+  const RunRecord run = convertFile(own, {nullptr, cancel_, log, store});
+  takeFigures(run, frame);
+  frame.state = run.interrupted ? FrameState::kInterrupted : FrameState::kConverted;
+  frame.missedPsnr = firstBelow(run, own.psnr) != nullptr;
+  if (!options_.report.empty()) frame.report = frameReport(makeReport(own, run));
+}
+
+void FrameConversion::tellEnd(const FrameRecord& frame) {
+  const std::lock_guard lock(mutex_);
+  ++progress_.done;
+  if (frame.state == FrameState::kFailed) {
+    ++progress_.failed;
+    bar_.hide();
+    log_.error(cli::textOf(frame.frame) + ": " + frame.failure->what());
+  }
+  progress_.frame = frame.frame.number;
+  progress_.state = nameOf(frame.state);
+  progress_.seconds = secondsSoFar();
+  bar_.show(progress_);
+}
+
+double FrameConversion::secondsSoFar() {
+  seconds_ += watch_.lap();
+  return seconds_;
+}
+
+SequenceRecord FrameConversion::finish() {
+  record_.interrupted = cancel_.cancelled();
+  record_.seconds = secondsSoFar();
+  warnings_.tell(log_);
+  return std::move(record_);
+}
+
+}  // namespace esvr::vdb2esvr
