@@ -14,6 +14,7 @@
 
 #include "convert/octave_search.h"
 #include "core/add_seconds.h"
+#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/voxel_layer.h"
 
@@ -44,7 +45,7 @@ constexpr int kMaxLevels = 24;  // coarser lattices than the first that are trie
 VoxelCandidate candidate(const Job& job, VoxelLayer layer, double psnr) {
   VoxelCandidate made;
   made.grid = makeStoredVoxels(job.input.descriptor, job.input.source, std::move(layer));
-  made.bytes = bytesAdded(made.grid);
+  made.bytes = bytesInFrame(made.grid, job.options.previous);
   made.psnr = psnr;
   return made;
 }
@@ -157,7 +158,13 @@ class VoxelSearch {
   [[nodiscard]] VoxelLayer layerAt(double bound, double price) const {
     const SparseVolume& source = job_.input.source;
     VoxelLayer layer = boundedLayer(source, bound, voxelActivity(job_));
-    return price > 0.0 ? thriftyLayer(source, std::move(layer), price) : layer;
+    return price > 0.0 ? thriftyLayer(source, std::move(layer), thriftOf(price)) : layer;
+  }
+
+  [[nodiscard]] ThriftOptions thriftOf(double price) const {
+    const StoredGrid* previous = job_.options.previous;
+    const VoxelLayer* layer = previous && previous->voxels ? &*previous->voxels : nullptr;
+    return {price, layer, job_.options.steadiness};
   }
 
   [[nodiscard]] Trial tryBound(double bound, double price) const {

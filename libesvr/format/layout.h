@@ -16,7 +16,7 @@ namespace esvr::format {
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
 
 inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
-inline constexpr std::uint16_t kVersionMinor = 2;
+inline constexpr std::uint16_t kVersionMinor = 3;
 
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
@@ -46,6 +46,7 @@ enum class SectionKind : std::uint32_t {
   kVoxels = 36,
   kResidual = 37,
   kCarriedBytes = 38,
+  kPredicted = 39,
 };
 
 enum class Codec : std::uint16_t {

@@ -95,6 +95,12 @@ struct ConvertOptions {
   /// its sum cannot be drawn: it means nothing outside the stored bricks.
   FitOptions fit;
   StorageOptions storage;
+  /// The same grid of the decoded previous frame of a sequence; null: the grid stands alone. Bytes
+  /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
+  const StoredGrid* previous = nullptr;
+  /// Weight of steady values against few bytes, from 0 to 1, if there is a previous frame: voxels
+  /// keep the values of the previous frame where the error of the frame hardly grows.
+  double steadiness = 0.5;
 };
 
 /// A volume and its other properties.
