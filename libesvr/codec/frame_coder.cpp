@@ -20,6 +20,15 @@ namespace {
 constexpr int kMotionBits = 4;
 constexpr std::uint32_t kMotionZero = kLargestMotion;
 
+// What is expected of a frame before its first voxel, so that the frames of small volumes need not
+// learn it (docs/lab-notes.md, "Frames of a sequence").
+/// Share of differences of 0 by context, in 1/256.
+constexpr std::array<std::uint8_t, FramePredictor::kContexts> kEqualShares{
+    252, 252, 252, 252, 250, 232, 224, 200, 125, 64, 38, 26, 26, 26, 26, 128};
+/// Share of positive differences by the part of the guess, in 1/256.
+constexpr std::array<std::uint8_t, FramePredictor::kParts> kPositiveShares{32, 56, 128, 200, 224};
+constexpr std::uint32_t kExpectations = 3;  // number of decisions that a share counts as
+
 template <class Side>
 class FrameCoder {
  public:
@@ -31,7 +40,13 @@ class FrameCoder {
         search_(past),
         errors_(layer.codes.size()),
         vacantCode_(codeOfValue(layer, layer.background)),
-        thrift_(thrift) {}
+        thrift_(thrift) {
+    for (std::size_t context = 0; context < FramePredictor::kContexts; ++context)
+      for (std::size_t part = 0; part < FramePredictor::kParts; ++part) {
+        differs_[context][part] = BitModel(kEqualShares[context], kExpectations);
+        sign_[context][part] = BitModel(kPositiveShares[part], kExpectations);
+      }
+  }
 
   void brick(Side& side, std::size_t b) {
     codeMotion(side, b);
@@ -39,6 +54,7 @@ class FrameCoder {
     if (codeCopy(side, b)) return;
     halo_.fill(layer_, index_, b, vacantCode_);
     fillErrors(b);
+    if (thrift_) setTargets(b);
     for (int v = 0; v < kBrickVoxels; ++v) {
       if (v % kVoxelsPerSolution == 0) predictor_.solve();
       voxel(side, b, v);
@@ -54,8 +70,8 @@ class FrameCoder {
   void codeMotion(Side& side, std::size_t b) {
     Coord wanted = motion_;
     if constexpr (!kReads)
-      wanted = search_.find(layer_.bricks[b], {&layer_.codes[b * kBrickVoxels], kBrickVoxels},
-                            motion_);
+      wanted =
+          search_.find(layer_.bricks[b], {&layer_.codes[b * kBrickVoxels], kBrickVoxels}, motion_);
     lastMoved_ = side.bit(moved_[lastMoved_], wanted != motion_);
     if (!lastMoved_) return;
     const auto component = [&](std::size_t axis, std::int32_t value) {
@@ -104,6 +120,33 @@ class FrameCoder {
     });
   }
 
+  /// Sets the values that chosen codes are to be near: the exact ones, with a share of the errors of
+  /// the previous frame.
+  void setTargets(std::size_t b) {
+    std::array<double, kBrickVoxels> apart;  // of the previous frame from the exact values
+    const double* exact = &thrift_->exact[b * kBrickVoxels];
+    for (int v = 0; v < kBrickVoxels; ++v)
+      apart[std::size_t(v)] = cube_.place[Cube::cell(voxelLocal(v))] - exact[v];
+    for (int v = 0; v < kBrickVoxels; ++v)
+      target_[std::size_t(v)] = exact[v] + thrift_->steadiness * pastError(apart, voxelLocal(v));
+  }
+
+  /// Estimates the error of a voxel of the previous frame. The previous frame is apart from the
+  /// frame by its error and by the change between the frames. The change is about the same for
+  /// neighbours, and the errors are independent. \return 0 if the change is too large to tell
+  static double pastError(const std::array<double, kBrickVoxels>& apart, Coord local) {
+    double sum = 0.0;
+    int count = 0;
+    for (int x = std::max(local.x - 1, 0); x <= std::min(local.x + 1, kBrickSide - 1); ++x)
+      for (int y = std::max(local.y - 1, 0); y <= std::min(local.y + 1, kBrickSide - 1); ++y)
+        for (int z = std::max(local.z - 1, 0); z <= std::min(local.z + 1, kBrickSide - 1); ++z) {
+          sum += apart[std::size_t(voxelOffset({x, y, z}))];
+          ++count;
+        }
+    const double error = apart[std::size_t(voxelOffset(local))] - sum / count;
+    return std::abs(error) < kLargestError ? error : 0.0;
+  }
+
   void voxel(Side& side, std::size_t b, int v) {
     const Coord local = voxelLocal(v);
     const auto cell = std::size_t(Halo::cell(local));
@@ -112,8 +155,7 @@ class FrameCoder {
     std::int32_t& code = layer_.codes[at_];
     const bool active = codeActive(side, cell, Cube::cell(local), layer_.active[b].test(v));
     if (active) layer_.active[b].set(v);
-    const bool vacant =
-        !active && side.bit(vacant_[lastVacant_], layer_.vacant[b].test(v));
+    const bool vacant = !active && side.bit(vacant_[lastVacant_], layer_.vacant[b].test(v));
     if (!active) lastVacant_ = vacant;
     if (vacant) layer_.vacant[b].set(v);
     code = vacant ? vacantCode_ : codeDistance(side, code);
@@ -144,37 +186,51 @@ class FrameCoder {
     const std::size_t context = predictor_.context(vacantCode_), part = predictor_.part();
     if (!side.bit(differs_[context][part], difference != 0)) return 0;
     const bool negative = side.bit(sign_[context][part], difference < 0);
-    const auto beyond = std::uint64_t(std::abs(difference)) - 1;
-    const std::uint64_t more = beyond_[context].code(side, beyond);
-    if (more > kMaxDifference) throw BadInput("a voxel is further off than can be");
-    const auto magnitude = std::int64_t(more) + 1;
-    return negative ? -magnitude : magnitude;
+    const std::uint64_t magnitude =
+        codeMagnitude(side, context, std::uint64_t(std::abs(difference)));
+    if (magnitude > kMaxDifference) throw BadInput("a voxel is further off than can be");
+    return negative ? -std::int64_t(magnitude) : std::int64_t(magnitude);
   }
 
-  /// The code with the least cost among the nearest one and those towards the prediction.
-  std::int32_t thriftyCode(std::int32_t nearest) {
-    std::int32_t best = nearest;
+  /// Codes a number above 0: whether it is above 1, above 2, ..., and the rest.
+  template <class AnySide>
+  std::uint64_t codeMagnitude(AnySide& side, std::size_t context, std::uint64_t magnitude) {
+    for (std::uint64_t n = 1; n <= kUnary; ++n)
+      if (!side.bit(above_[context][n - 1], magnitude > n)) return n;
+    return kUnary + 1 + rest_[context].code(side, magnitude - kUnary - 1);
+  }
+
+  /// The code with the least cost: the one nearest to the target, the next ones towards the
+  /// prediction, or the prediction itself if it is near.
+  std::int32_t thriftyCode(std::int32_t written) {
+    if (thrift_->bitPrice <= 0.0) return written;
+    const double target = target_[at_ % kBrickVoxels];
+    if (std::abs(target) > kLargestTarget) return written;
+    const auto nearest = std::int32_t(std::lround(target));
     const std::int64_t guess = predictor_.guess();
-    if (guess == nearest && thrift_->steadiness <= 0.0) return nearest;
-    double least = costOf(nearest);
-    for (std::int32_t code = nearest - kMaxSteps; code <= nearest + kMaxSteps; ++code) {
-      if (code == nearest) continue;
-      const double cost = costOf(code);
+    if (guess == nearest) return nearest;
+    const std::int32_t step = guess > nearest ? 1 : -1;
+    double least = costOf(target, nearest);
+    std::int32_t best = nearest;
+    for (int n = 1; n <= kMaxSteps && nearest + (n - 1) * step != guess; ++n) {
+      const std::int32_t code = nearest + n * step;
+      const double cost = costOf(target, code);
       if (cost < least) least = cost, best = code;
     }
     return best;
   }
 
-  double costOf(std::int32_t code) {
-    const double error = thrift_->exact[at_] - double(code);
-    const double change = predictor_.past() - double(code);
+  double costOf(double target, std::int32_t code) {
+    const double error = target - double(code);
     BitMeter meter;
     (void)codeDifference(meter, std::int64_t(code) - predictor_.guess());
-    return error * error + thrift_->bitPrice * meter.bits +
-           thrift_->steadiness * std::min(change * change, 1.0);
+    return error * error + thrift_->bitPrice * meter.bits;
   }
 
-  static constexpr int kMaxSteps = 1;
+  static constexpr double kLargestTarget = 0x1p30;
+  static constexpr double kLargestError = 1.0;  // estimated errors above it are changes
+  static constexpr int kMaxSteps = 2;
+  static constexpr std::uint64_t kUnary = 3;  // flags of a magnitude before its rest
   static constexpr std::uint64_t kMaxDifference = std::uint64_t{1} << 36;
 
   const PastVoxels& past_;
@@ -189,14 +245,16 @@ class FrameCoder {
   std::array<std::uint8_t, Halo::kCells> error_{};  ///< those of the halo
   std::int32_t vacantCode_;
   const FrameThrift* thrift_;
-  std::size_t at_ = 0;  ///< index of the voxel in the layer's codes
+  std::array<double, kBrickVoxels> target_{};  ///< values that codes of the brick are to be near
+  std::size_t at_ = 0;                         ///< index of the voxel in the layer's codes
   bool lastMoved_ = false, lastCopy_ = false, lastVacant_ = true;
   std::array<BitModel, 2> moved_, copy_, vacant_;
   std::array<TreeModel<kMotionBits>, 3> motions_;
   std::array<std::array<std::array<BitModel, 2>, 4>, FramePredictor::kDistances> active_;
   std::array<std::array<BitModel, FramePredictor::kParts>, FramePredictor::kContexts> differs_,
       sign_;
-  std::array<NumberModelOf<6>, FramePredictor::kContexts> beyond_;
+  std::array<std::array<BitModel, kUnary>, FramePredictor::kContexts> above_;
+  std::array<NumberModelOf<6>, FramePredictor::kContexts> rest_;
 };
 
 template <class Side>

@@ -25,7 +25,7 @@ inline constexpr int kFrameBrickBits = 21;
 struct FrameThrift {
   std::vector<double> exact;  ///< the voxels in units of the lattice, as the layer's codes
   double bitPrice = 0.0;      ///< squared error, in the same units, that a bit is worth
-  double steadiness = 0.0;    ///< weight of the squared distance from the previous frame
+  double steadiness = 0.0;    ///< share of the previous frame's errors that is kept
 };
 
 /// Codes the positions of the bricks of a frame. A reader sets `bricks`.

@@ -18,7 +18,7 @@ namespace esvr::codec {
 class FramePredictor {
  public:
   /// Numbers of contexts. The last context is that of a guess that equals the vacant code.
-  static constexpr std::size_t kContexts = 21, kParts = 5, kDistances = 12;
+  static constexpr std::size_t kContexts = 16, kParts = 5, kDistances = 12;
   static constexpr int kFractionBits = 4;  ///< predictions are rounded to 1/16 of a code
 
   /// Computes the prediction of a voxel.
@@ -35,23 +35,19 @@ class FramePredictor {
     fixed_ = std::int64_t(std::floor(std::clamp(guess, -0x1p40, 0x1p40) * kOne + 0.5));
     guess_ = (fixed_ + kOne / 2) >> kFractionBits;
     std::int64_t late = 0;
-    for (std::size_t k = 0; k < 6; ++k)
-      late += (k < 3 ? 2 : 1) * std::int64_t(errors[-kBefore[k]]);
+    for (std::size_t k = 0; k < 6; ++k) late += (k < 3 ? 2 : 1) * std::int64_t(errors[-kBefore[k]]);
     double change = 0.0;
     for (std::size_t k = 0; k < 3; ++k) change += std::abs(terms_[k] - terms_[7 + k]);
     expected_ = std::uint64_t(late) + std::uint64_t(std::min(change, 0x1p40) * 8.0) +
-        std::uint64_t(std::min(high_ - low_, 0x1p40) * 2.0);
+                std::uint64_t(std::min(high_ - low_, 0x1p40) * 4.0);
   }
 
   [[nodiscard]] std::int64_t guess() const { return guess_; }
-  [[nodiscard]] double past() const { return past_; }
 
-  /// The context of the difference from the guess.
+  /// The context of the difference from the guess: the octave of the errors and changes around.
   [[nodiscard]] std::size_t context(std::int32_t vacantCode) const {
     if (guess_ == vacantCode) return kContexts - 1;
-    const int width = int(std::bit_width(expected_));
-    const bool upper = width > 1 && ((expected_ >> (width - 2)) & 1u) != 0;
-    return std::min(std::size_t(2 * width + (upper ? 1 : 0)), kContexts - 2);
+    return std::min(std::size_t(std::bit_width(expected_)), kContexts - 2);
   }
 
   /// The part of a code by which the guess was rounded, from 0 (up) to kParts - 1 (down).

@@ -43,8 +43,7 @@ class LeastSquares {
   void solve() {
     std::array<Terms, kCount> lower{};
     for (std::size_t i = 0; i < kCount; ++i) {
-      for (std::size_t j = 0; j < i; ++j)
-        lower[i][j] = rest(lower, i, j) / lower[j][j];
+      for (std::size_t j = 0; j < i; ++j) lower[i][j] = rest(lower, i, j) / lower[j][j];
       const double pivot = rest(lower, i, i);
       if (!(pivot > kLeastPivot * products_[i][i] && std::isfinite(pivot))) return;
       lower[i][i] = std::sqrt(pivot);
@@ -61,7 +60,7 @@ class LeastSquares {
   }
 
  private:
-  static constexpr double kRidge = 4.0;  // weight of the first weights, in squared codes
+  static constexpr double kRidge = 1.0;  // weight of the first weights, in squared codes
   static constexpr double kFade = 0.98;
   static constexpr double kLeastPivot = 1e-12;
 

@@ -39,8 +39,8 @@ struct Halo {
             std::int32_t vacantCode) {
     forEachBefore(layer, index, b, [&](std::size_t at, std::uint32_t neighbour, int v) {
       const bool there = neighbour != BrickIndex::kNone;
-      code[at] = there ? layer.codes[neighbour * std::size_t(kBrickVoxels) + std::size_t(v)]
-                       : vacantCode;
+      code[at] =
+          there ? layer.codes[neighbour * std::size_t(kBrickVoxels) + std::size_t(v)] : vacantCode;
       active[at] = there && layer.active[neighbour].test(v);
     });
   }

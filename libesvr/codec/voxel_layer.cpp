@@ -150,8 +150,8 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
   tbb::parallel_for(std::size_t{0}, layer.bricks.size(), [&](std::size_t b) {
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
       const std::size_t i = b * kBrickVoxels + v;
-      volume.values[i] =
-          layer.vacant[b].test(int(v)) ? layer.background : codec::valueOfCode(layer, layer.codes[i]);
+      volume.values[i] = layer.vacant[b].test(int(v)) ? layer.background
+                                                      : codec::valueOfCode(layer, layer.codes[i]);
     }
   });
   return volume;

@@ -33,7 +33,10 @@ constexpr int kMaxTrials = 10;
 constexpr double kPrice = 0.08;
 constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
 constexpr double kThriftOctaves = 0.08;  // bound's octaves that make up for the loss by kPrice
-constexpr int kMaxThriftyTrials = 4;
+constexpr int kMaxThriftyTrials = 4, kMaxFrameTrials = 6;
+/// Bits of an active voxel of a frame from which on exact voxels are tried, which take 8 at least in
+/// all but constant volumes.
+constexpr double kBitsOfExact = 8.0;
 
 /// Share of the active voxels with the most frequent value from which on a lattice that has this
 /// value, so that these voxels are exact, is tried.
@@ -124,6 +127,7 @@ class VoxelSearch {
     auto plain = coarsestFor(psnr, psnr / kDbPerOctave - 1.0, 0.0, kMaxTrials);
     if (!plain) return exactVoxels(job_);
     const double bound = plain->bound;
+    if (job_.options.previous) return predictedFor(psnr, std::move(*plain));
     VoxelCandidate best;
     tbb::task_arena arena(trialsAtOnce());
     arena.execute([&] {
@@ -190,6 +194,18 @@ class VoxelSearch {
       if (best && best->psnr < psnr + kPsnrTolerance) break;
     }
     return best;
+  }
+
+  /// Thrifty voxels of a frame, or the trial if they do not reach the PSNR. Exact voxels are tried
+  /// only if these take so many bits that exact ones may take fewer.
+  [[nodiscard]] VoxelCandidate predictedFor(double psnr, Trial plain) const {
+    const double octave = octaveOf(plain.bound) + kThriftOctaves;
+    auto thrifty = coarsestFor(psnr, octave, kPrice, kMaxFrameTrials);
+    VoxelCandidate best = *candidateOf(std::move(thrifty ? *thrifty : plain));
+    const double bits = 8.0 * double(best.bytes) / double(activeVoxelCount(job_.input.source));
+    if (bits < kBitsOfExact) return best;
+    VoxelCandidate exact = exactVoxels(job_);
+    return isSmaller(best, exact) ? std::move(best) : std::move(exact);
   }
 
   /// Exact voxels, unless the trial is smaller.

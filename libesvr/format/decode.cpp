@@ -343,8 +343,8 @@ StoredGrid readPredicted(SectionReader& sections, std::uint32_t g, const EsvrFil
   const std::string where = sections.place(section);
   if (!previous) throw BadInput(where + ": it cannot be read without the frame before");
   if (g >= previous->grids.size())
-    throw BadInput(where + ": the frame before has only " +
-                   std::to_string(previous->grids.size()) + " grids");
+    throw BadInput(where + ": the frame before has only " + std::to_string(previous->grids.size()) +
+                   " grids");
   StoredGrid grid =
       getPredicted(sections.get(section), where, previous->grids[g], sections.budget());
   if (const auto fault = faultOf(grid)) throw BadInput(where + ": " + fault->text);

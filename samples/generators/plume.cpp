@@ -19,9 +19,9 @@ constexpr double kBillowDepth = 1.1;              // depth of eddies, in radii o
 constexpr double kWarpSize = 0.25, kWarp = 0.05;  // size and amplitude of the warp of eddies
 // Heights that the eddies, their warp and the bends of the axis rise in a frame.
 constexpr double kRise = 0.01, kWarpRise = 0.006, kBendRise = 0.004;
-constexpr double kFadeStart = 0.7;                // height at which the top begins to dissolve
-constexpr double kSmallestEddy = 4.0;             // voxels
-constexpr double kFaintestSmoke = 1.0 / 512.0;    // smallest value of a voxel that is not empty
+constexpr double kFadeStart = 0.7;              // height at which the top begins to dissolve
+constexpr double kSmallestEddy = 4.0;           // voxels
+constexpr double kFaintestSmoke = 1.0 / 512.0;  // smallest value of a voxel that is not empty
 
 /// Bound on the slope of (distance to the axis - kBillowDepth * radius of the envelope).
 constexpr double kAxisSlope = kSway * (1.0 + kNoiseSlope / kSwaySize);  // along x, and along z
@@ -72,9 +72,7 @@ double PlumeShape::distanceToAxis(Vec3 p) const {
   return std::sqrt(x * x + z * z);
 }
 
-Vec3 PlumeShape::before(Vec3 p, double rise) const {
-  return p - Vec3{0.0, rise * frame_, 0.0};
-}
+Vec3 PlumeShape::before(Vec3 p, double rise) const { return p - Vec3{0.0, rise * frame_, 0.0}; }
 
 Vec3 PlumeShape::warped(Vec3 p) const {
   const Vec3 q = before(p, kWarpRise) * (1.0 / kWarpSize);
