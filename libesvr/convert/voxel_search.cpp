@@ -31,9 +31,12 @@ constexpr int kMaxTrials = 10;
 /// docs/lab-notes.md, "Voxel coding": 0.05 gives files that are up to 1 % larger, 0.12 up to 5 %.
 /// Where the bound cannot be chosen freely, higher prices use up the PSNR that is left.
 constexpr double kPrice = 0.08;
+/// The same for frames that are predicted: with a steadiness of 0, and what steadiness adds. Voxels
+/// whose bits are not worth their price keep to the prediction, and so to the frame before.
+constexpr double kFramePrice = 0.14, kSteadyPrice = 0.12;
 constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
 constexpr double kThriftOctaves = 0.08;  // bound's octaves that make up for the loss by kPrice
-constexpr int kMaxThriftyTrials = 4, kMaxFrameTrials = 6;
+constexpr int kMaxThriftyTrials = 4, kMaxFrameTrials = 10;
 /// Bits of an active voxel of a frame from which on exact voxels are tried, which take 8 at least in
 /// all but constant volumes.
 constexpr double kBitsOfExact = 8.0;
@@ -196,11 +199,15 @@ class VoxelSearch {
     return best;
   }
 
+  [[nodiscard]] double framePrice() const {
+    return kFramePrice + kSteadyPrice * job_.options.steadiness;
+  }
+
   /// Thrifty voxels of a frame, or the trial if they do not reach the PSNR. Exact voxels are tried
   /// only if these take so many bits that exact ones may take fewer.
   [[nodiscard]] VoxelCandidate predictedFor(double psnr, Trial plain) const {
-    const double octave = octaveOf(plain.bound) + kThriftOctaves;
-    auto thrifty = coarsestFor(psnr, octave, kPrice, kMaxFrameTrials);
+    const double octave = octaveOf(plain.bound) + framePrice();
+    auto thrifty = coarsestFor(psnr, octave, framePrice(), kMaxFrameTrials);
     VoxelCandidate best = *candidateOf(std::move(thrifty ? *thrifty : plain));
     const double bits = 8.0 * double(best.bytes) / double(activeVoxelCount(job_.input.source));
     if (bits < kBitsOfExact) return best;
