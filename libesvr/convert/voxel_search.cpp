@@ -34,6 +34,7 @@ constexpr double kPrice = 0.08;
 /// The same for frames that are predicted: with a steadiness of 0, and what steadiness adds. Voxels
 /// whose bits are not worth their price keep to the prediction, and so to the frame before.
 constexpr double kFramePrice = 0.14, kSteadyPrice = 0.12;
+constexpr double kErrorsKept = 0.5;  // share of the errors of the frame before with steadiness 1
 constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
 constexpr double kThriftOctaves = 0.08;  // bound's octaves that make up for the loss by kPrice
 constexpr int kMaxThriftyTrials = 4, kMaxFrameTrials = 10;
@@ -171,7 +172,7 @@ class VoxelSearch {
   [[nodiscard]] ThriftOptions thriftOf(double price) const {
     const StoredGrid* previous = job_.options.previous;
     const VoxelLayer* layer = previous && previous->voxels ? &*previous->voxels : nullptr;
-    return {price, layer, job_.options.steadiness};
+    return {price, layer, kErrorsKept * job_.options.steadiness};
   }
 
   [[nodiscard]] Trial tryBound(double bound, double price) const {

@@ -16,7 +16,7 @@ namespace esvr::format {
 namespace {
 
 /// Whether a layer has the head of the previous frame's.
-enum class Lattice : std::uint8_t { kOwn = 0, kSame = 1 };
+enum class LayerHead : std::uint8_t { kOwn = 0, kSame = 1 };
 
 /// True if a grid is its record and its voxels.
 bool hasVoxelsOnly(const StoredGrid& grid) {
@@ -75,12 +75,12 @@ void putHead(ByteWriter& out, const VoxelLayer& layer, const VoxelLayer& previou
   putVoxelHead(head, layer);
   putVoxelHead(before, previous);
   const bool same = std::ranges::equal(head.bytes(), before.bytes());
-  out.put(std::uint8_t(same ? Lattice::kSame : Lattice::kOwn));
+  out.put(std::uint8_t(same ? LayerHead::kSame : LayerHead::kOwn));
   if (!same) out.putAll(head.bytes());
 }
 
 VoxelLayer getHead(ByteReader& in, const VoxelLayer& previous) {
-  if (in.getEnum(Lattice::kSame, "lattice") == Lattice::kOwn) return getVoxelHead(in);
+  if (in.getEnum(LayerHead::kSame, "head of voxels") == LayerHead::kOwn) return getVoxelHead(in);
   VoxelLayer layer;
   layer.form = previous.form;
   layer.divisor = previous.divisor;
@@ -90,7 +90,7 @@ VoxelLayer getHead(ByteReader& in, const VoxelLayer& previous) {
   return layer;
 }
 
-std::vector<std::byte> encodeStream(const VoxelLayer& layer, const codec::PastVoxels& past) {
+std::vector<std::byte> encodePredicted(const VoxelLayer& layer, const codec::PastVoxels& past) {
   codec::Writer writer;
   VoxelLayer written = layer;
   codec::codeFrameBricks(writer, past, written.bricks);
@@ -104,8 +104,8 @@ struct ReaderPlace {
   MemoryBudget& budget;
 };
 
-void decodeStream(ByteReader& in, const codec::PastVoxels& past, const ReaderPlace& place,
-                  VoxelLayer& layer) {
+void decodePredicted(ByteReader& in, const codec::PastVoxels& past, const ReaderPlace& place,
+                     VoxelLayer& layer) {
   const auto stream = in.getBytes(in.left());
   codec::Reader reader{codec::RangeDecoder(stream)};
   codec::codeFrameBricks(reader, past, maxBricksIn(stream.size()), layer.bricks);
@@ -128,7 +128,7 @@ std::optional<std::vector<std::byte>> putPredicted(const StoredGrid& grid,
   putRecord(out, recordOf(grid), recordOf(previous));
   putHead(out, *grid.voxels, *previous.voxels);
   const codec::PastVoxels past(*previous.voxels, *grid.voxels);
-  out.putAll(encodeStream(*grid.voxels, past));
+  out.putAll(encodePredicted(*grid.voxels, past));
   return out.take();
 }
 
@@ -143,7 +143,7 @@ StoredGrid getPredicted(std::span<const std::byte> content, const std::string& w
     in.fail("lies too far from the previous frame");
   try {
     const codec::PastVoxels past(*previous.voxels, layer);
-    decodeStream(in, past, {where, budget}, layer);
+    decodePredicted(in, past, {where, budget}, layer);
   } catch (const BadInput& error) {
     in.fail(error.what());
   }

@@ -98,8 +98,8 @@ struct ConvertOptions {
   /// The same grid of the decoded previous frame of a sequence; null: the grid stands alone. Bytes
   /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
   const StoredGrid* previous = nullptr;
-  /// Weight of steady values against few bytes, from 0 to 1, if there is a previous frame: voxels
-  /// keep the values of the previous frame where the error of the frame hardly grows.
+  /// Weight of the error of the change since the previous frame, from 0 (least bytes) to 1 (least
+  /// flicker), if there is one. Voxels then keep a part of the errors of the previous frame.
   double steadiness = 0.5;
 };
 

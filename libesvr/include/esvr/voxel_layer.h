@@ -60,8 +60,8 @@ struct ThriftOptions {
   /// The layer of the previous frame of a sequence. The bits are those of a frame that is predicted
   /// from it (frame_coding.h). Null: those of a volume of its own.
   const VoxelLayer* previous = nullptr;
-  /// Weight of the squared distance of a code from the previous frame, 0 or above. Distances above
-  /// one step count as one step. It is ignored without `previous`.
+  /// Share of the errors of the previous frame that the voxels keep, from 0 to 1. The errors are
+  /// estimated from the difference between neighbours. It is ignored without `previous`.
   double steadiness = 0.0;
 };
 
