@@ -29,7 +29,8 @@ struct FrameThrift {
 };
 
 /// Codes the positions of the bricks of a frame. A reader sets `bricks`.
-/// \throws BadInput  a reader finds more than `maxBricks`, or a brick twice
+/// \param maxNew  largest number of bricks that neither are in the previous frame nor touch it
+/// \throws BadInput  a reader finds more of these, or a brick twice
 void codeFrameBricks(Writer& side, const PastVoxels& past, std::vector<Coord>& bricks);
 void codeFrameBricks(Reader& side, const PastVoxels& past, std::uint64_t maxNew,
                      std::vector<Coord>& bricks);

@@ -33,7 +33,7 @@ class LeastSquares {
 
   void learn(const Terms& terms, double target) {
     for (std::size_t i = 0; i < kCount; ++i) {
-      for (std::size_t j = 0; j < kCount; ++j) products_[i][j] += terms[i] * terms[j];
+      for (std::size_t j = 0; j <= i; ++j) products_[i][j] += terms[i] * terms[j];
       targets_[i] += terms[i] * target;
     }
   }
@@ -85,7 +85,7 @@ class LeastSquares {
     }
   }
 
-  std::array<Terms, kCount> products_{};
+  std::array<Terms, kCount> products_{};  // symmetric; only the lower half is kept
   Terms targets_{}, weights_;
 };
 
