@@ -1,5 +1,6 @@
 #include "vdb2esvr/convert.h"
 
+#include <algorithm>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -7,6 +8,7 @@
 #include "cli/stopwatch.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "esvr/psnr_between.h"
 #include "vdb2esvr/source.h"
 
@@ -21,10 +23,21 @@ void convertByPaper(const Options& options, const VolumeGrid& source, ConvertedG
   grid.paper = std::move(made.record);
 }
 
+/// The same grid of the previous frame; null if there is none.
+const StoredGrid* previousOf(const Options& options, const std::string& uniqueName) {
+  if (!options.previous) return nullptr;
+  std::vector<std::string> names;
+  for (const StoredGrid& grid : options.previous->grids) names.push_back(grid.descriptor.name);
+  names = uniqueNames(names);
+  const auto at = std::ranges::find(names, uniqueName);
+  return at == names.end() ? nullptr : &options.previous->grids[std::size_t(at - names.begin())];
+}
+
 void convert(const Options& options, const VolumeGrid& source, std::optional<std::uint64_t> bytes,
              ConvertedGrid& grid) {
   if (options.paper) return convertByPaper(options, source, grid);
   ConvertOptions wanted = options.convert;
+  wanted.previous = previousOf(options, grid.uniqueName);
   if (bytes) wanted.goal = SizeGoal{*bytes};
   // The parts of a single fit do not depend on the storage, and compact storage takes time.
   if (options.job == Job::kPart && std::holds_alternative<FitGoal>(wanted.goal))

@@ -22,6 +22,14 @@ class BitModel {
   static constexpr int kBits = 22;
   static constexpr std::uint32_t kOne = 1u << kBits;
 
+  BitModel() = default;
+
+  /// A model that has a probability before the first decision.
+  /// \param zeros      share of zeros in units of 1/256, from 1 to 255
+  /// \param decisions  number of decisions that the share counts as, below kMemory
+  BitModel(std::uint32_t zeros, std::uint32_t decisions)
+      : state_(zeros << (kBits - 8) << kCountBits | decisions) {}
+
   /// The probability of a zero in units of 1/kOne. It is neither 0 nor 1.
   [[nodiscard]] std::uint32_t zero() const { return state_ >> kCountBits; }
 

@@ -2,22 +2,39 @@
 #include <cmath>
 
 #include "codec/brick_order.h"
+#include "codec/frame_coder.h"
 #include "codec/voxel_coder.h"
 #include "codec/voxel_model.h"
 #include "esvr/voxel_layer.h"
 
 namespace esvr {
 
-VoxelLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer, double bitPrice) {
-  if (layer.form != VoxelForm::kQuantised) return layer;
-  codec::Thrift thrift{std::vector<double>(layer.codes.size()), bitPrice};
+namespace {
+
+/// The voxels of a volume in units of the lattice, in the order of the layer's codes.
+std::vector<double> placesOf(const SparseVolume& volume, const VoxelLayer& layer) {
+  std::vector<double> places(layer.codes.size());
   for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
-    const auto at = findBrick(volume, layer.bricks[b]);
-    const auto values = volume.brickValues(*at);
-    double* exact = &thrift.exact[b * std::size_t(kBrickVoxels)];
-    for (std::size_t v = 0; v < kBrickVoxels; ++v) exact[v] = double(values[v]) * layer.divisor;
+    const auto values = volume.brickValues(*findBrick(volume, layer.bricks[b]));
+    double* place = &places[b * std::size_t(kBrickVoxels)];
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) place[v] = double(values[v]) * layer.divisor;
   }
-  codec::chooseCodes(codec::codingOrder(layer.bricks), codec::chooseModel(layer), thrift, layer);
+  return places;
+}
+
+}  // namespace
+
+VoxelLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
+                        const ThriftOptions& options) {
+  if (layer.form != VoxelForm::kQuantised) return layer;
+  const auto order = codec::codingOrder(layer.bricks);
+  if (options.previous && codec::isPredictable(layer, *options.previous)) {
+    const codec::FrameThrift thrift{placesOf(volume, layer), options.bitPrice, options.steadiness};
+    codec::chooseFrameCodes(order, codec::PastVoxels(*options.previous, layer), thrift, layer);
+    return layer;
+  }
+  const codec::Thrift thrift{placesOf(volume, layer), options.bitPrice};
+  codec::chooseCodes(order, codec::chooseModel(layer), thrift, layer);
   return layer;
 }
 

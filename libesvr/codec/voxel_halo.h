@@ -37,9 +37,23 @@ struct Halo {
   /// \param vacantCode  code for voxels that no brick has
   void fill(const VoxelLayer& layer, const BrickIndex& index, std::size_t b,
             std::int32_t vacantCode) {
+    forEachBefore(layer, index, b, [&](std::size_t at, std::uint32_t neighbour, int v) {
+      const bool there = neighbour != BrickIndex::kNone;
+      code[at] =
+          there ? layer.codes[neighbour * std::size_t(kBrickVoxels) + std::size_t(v)] : vacantCode;
+      active[at] = there && layer.active[neighbour].test(v);
+    });
+  }
+
+  /// Calls visit(cell, neighbour, offset) for the cells of the voxels that lie before brick b.
+  /// `neighbour` is the brick that has the voxel, or BrickIndex::kNone, and `offset` is the place
+  /// of the voxel in its brick.
+  template <class Visit>
+  static void forEachBefore(const VoxelLayer& layer, const BrickIndex& index, std::size_t b,
+                            const Visit& visit) {
     for (int corner = 0; corner < 7; ++corner) {  // corner 7 is the brick itself
       const Coord step{(corner >> 2 & 1) - 1, (corner >> 1 & 1) - 1, (corner & 1) - 1};
-      copyFrom(layer, index.find(layer.bricks[b] + step), step, vacantCode);
+      forEachOf(index.find(layer.bricks[b] + step), step, visit);
     }
   }
 
@@ -64,21 +78,15 @@ struct Halo {
   }
 
  private:
-  /// Copies the last slice of a neighbour along every axis on which the step is -1.
-  void copyFrom(const VoxelLayer& layer, std::uint32_t neighbour, Coord step,
-                std::int32_t vacantCode) {
+  /// Visits the last slice of a neighbour along every axis on which the step is -1.
+  template <class Visit>
+  static void forEachOf(std::uint32_t neighbour, Coord step, const Visit& visit) {
     const auto first = [](int s) { return s < 0 ? -1 : 0; };
     const auto last = [](int s) { return s < 0 ? -1 : kBrickSide - 1; };
     for (int x = first(step.x); x <= last(step.x); ++x)
       for (int y = first(step.y); y <= last(step.y); ++y)
-        for (int z = first(step.z); z <= last(step.z); ++z) {
-          const auto at = std::size_t(cell({x, y, z}));
-          const int v = voxelOffset(localOf({x, y, z}));
-          const bool there = neighbour != BrickIndex::kNone;
-          code[at] = there ? layer.codes[neighbour * std::size_t(kBrickVoxels) + std::size_t(v)]
-                           : vacantCode;
-          active[at] = there && layer.active[neighbour].test(v);
-        }
+        for (int z = first(step.z); z <= last(step.z); ++z)
+          visit(std::size_t(cell({x, y, z})), neighbour, voxelOffset(localOf({x, y, z})));
   }
 };
 

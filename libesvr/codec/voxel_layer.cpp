@@ -11,87 +11,17 @@
 #include <optional>
 #include <unordered_set>
 
+#include "codec/voxel_values.h"
 #include "esvr/error.h"
 
 namespace esvr {
 namespace {
 
-using Limits = std::numeric_limits<std::int32_t>;
-
 constexpr std::size_t kLargestPalette = 4096;
 constexpr double kMargin = 1.0 - 1e-6;  // factor of a bound, which leaves room for rounding
-constexpr double kLargestCode = 0x1p30;
-constexpr int kFloatMantissa = 23, kHalfMantissa = 10, kHalfLowest = -14, kHalfHighest = 15;
-constexpr std::int32_t kHalfOne = 1 << kHalfMantissa, kHalfSign = 0x8000, kHalfBits = 0x7fff;
 
 bool sameBits(float a, float b) {
   return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
-}
-
-/// The number of a float in increasing order. -0 comes before 0, so every bit pattern has its own.
-std::int32_t orderOf(std::int32_t magnitude, bool negative) {
-  return negative ? -1 - magnitude : magnitude;
-}
-
-float floatAt(std::int32_t n) {
-  const auto magnitude = std::uint32_t(n < 0 ? -1 - n : n);
-  return std::bit_cast<float>(n < 0 ? magnitude | 0x80000000u : magnitude);
-}
-std::int32_t orderOfFloat(float v) {
-  return orderOf(std::int32_t(std::bit_cast<std::uint32_t>(v) & 0x7fffffffu), std::signbit(v));
-}
-
-bool inOrder(float a, float b) { return orderOfFloat(a) < orderOfFloat(b); }
-
-/// The bits of a half, moved to those of a float, are the half times 2^-112, which is the
-/// difference of the exponents' offsets. The product is exact, also for subnormal halves.
-float halfAt(std::int32_t n) {
-  const std::int32_t bits = (n < 0 ? -1 - n : n) & kHalfBits;
-  const auto moved = std::bit_cast<float>(std::uint32_t(bits) << (kFloatMantissa - kHalfMantissa));
-  return std::copysign(moved * 0x1p112f, n < 0 ? -1.0f : 1.0f);
-}
-/// The number of the half that is nearest to v among those of no larger magnitude. v is a half if
-/// halfAt() of the result equals v.
-std::int32_t orderOfHalf(float v) {
-  const double magnitude = std::abs(double(v));
-  int exponent = magnitude > 0.0 ? std::ilogb(magnitude) : kHalfLowest;
-  exponent = std::clamp(exponent, kHalfLowest, kHalfHighest);
-  const double mantissa = std::floor(std::ldexp(magnitude, kHalfMantissa - exponent));
-  const auto steps = std::int32_t(std::min(mantissa, 2.0 * kHalfOne - 1.0));
-  const bool subnormal = steps < kHalfOne;
-  const std::int32_t bits =
-      subnormal ? steps : ((exponent + kHalfHighest) << kHalfMantissa) + steps - kHalfOne;
-  return orderOf(bits, std::signbit(v));
-}
-
-float valueAt(const VoxelLayer& layer, std::int32_t n) {
-  switch (layer.form) {
-    case VoxelForm::kQuantised:
-      return float(double(n) / layer.divisor);
-    case VoxelForm::kHalf:
-      return halfAt(n);
-    case VoxelForm::kPalette:
-      return layer.palette[std::size_t(n)];
-    case VoxelForm::kFloat:
-      break;
-  }
-  return floatAt(n);
-}
-
-std::int32_t codeOf(const VoxelLayer& layer, float v) {
-  switch (layer.form) {
-    case VoxelForm::kQuantised:
-      return std::int32_t(
-          std::lround(std::clamp(double(v) * layer.divisor, -kLargestCode, kLargestCode)));
-    case VoxelForm::kHalf:
-      return orderOfHalf(v);
-    case VoxelForm::kPalette:
-      return std::int32_t(std::lower_bound(layer.palette.begin(), layer.palette.end(), v, inOrder) -
-                          layer.palette.begin());
-    case VoxelForm::kFloat:
-      break;
-  }
-  return orderOfFloat(v);
 }
 
 /// The distinct values of a volume in increasing order; empty if there are too many for a palette.
@@ -99,20 +29,20 @@ std::vector<float> paletteOf(const SparseVolume& volume) {
   std::unordered_set<std::int32_t> orders;
   std::optional<std::int32_t> last;
   for (const float v : volume.values) {
-    const std::int32_t order = orderOfFloat(v);
+    const std::int32_t order = codec::orderOfFloat(v);
     if (last == order) continue;
     orders.insert(*(last = order));
     if (orders.size() > kLargestPalette) return {};
   }
   std::vector<float> values;
-  for (const std::int32_t order : orders) values.push_back(floatAt(order));
-  std::sort(values.begin(), values.end(), inOrder);
+  for (const std::int32_t order : orders) values.push_back(codec::floatAt(order));
+  std::sort(values.begin(), values.end(), codec::inOrder);
   return values;
 }
 
 bool allHalves(const SparseVolume& volume) {
   return std::all_of(volume.values.begin(), volume.values.end(),
-                     [](float v) { return sameBits(halfAt(orderOfHalf(v)), v); });
+                     [](float v) { return sameBits(codec::halfAt(codec::orderOfHalf(v)), v); });
 }
 
 void fill(const SparseVolume& volume, VoxelLayer& layer) {
@@ -127,7 +57,7 @@ void fill(const SparseVolume& volume, VoxelLayer& layer) {
     for (int v = 0; v < kBrickVoxels; ++v) {
       if (!volume.active[b].test(v) && sameBits(values[v], volume.background))
         layer.vacant[b].set(v);
-      layer.codes[b * kBrickVoxels + std::size_t(v)] = codeOf(layer, values[v]);
+      layer.codes[b * kBrickVoxels + std::size_t(v)] = codec::codeOfValue(layer, values[v]);
     }
   });
 }
@@ -167,7 +97,7 @@ void dropInactive(VoxelLayer& layer) {
 }
 
 void activateByValue(const SparseVolume& volume, double bound, VoxelLayer& layer) {
-  const std::int32_t background = codeOf(layer, volume.background);
+  const std::int32_t background = codec::codeOfValue(layer, volume.background);
   tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
     const auto values = volume.brickValues(b);
     layer.active[b] = {};
@@ -220,8 +150,8 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
   tbb::parallel_for(std::size_t{0}, layer.bricks.size(), [&](std::size_t b) {
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
       const std::size_t i = b * kBrickVoxels + v;
-      volume.values[i] =
-          layer.vacant[b].test(int(v)) ? layer.background : valueAt(layer, layer.codes[i]);
+      volume.values[i] = layer.vacant[b].test(int(v)) ? layer.background
+                                                      : codec::valueOfCode(layer, layer.codes[i]);
     }
   });
   return volume;
@@ -229,7 +159,7 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
 
 bool allFinite(const VoxelLayer& layer) {
   for (std::size_t i = 0; i < layer.codes.size(); ++i)
-    if (!std::isfinite(valueAt(layer, layer.codes[i])) &&
+    if (!std::isfinite(codec::valueOfCode(layer, layer.codes[i])) &&
         !layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels)))
       return false;
   return true;

@@ -108,6 +108,17 @@ std::optional<std::uint64_t> smallerExactBytes(const Job& job, const StoredGrid&
   return exact < bytesAdded(grid) ? std::optional(exact) : std::nullopt;
 }
 
+/// True if a grid should hold voxels because its predecessor does. The difference from it takes few
+/// bytes, so that no fit is made for comparison.
+bool keepsVoxels(const ConvertOptions& options) {
+  const bool hasQuality = std::holds_alternative<PresetGoal>(options.goal) ||
+                          std::holds_alternative<PsnrGoal>(options.goal) ||
+                          std::holds_alternative<BoundGoal>(options.goal);
+  return options.previous && options.previous->voxels && hasQuality &&
+         options.representation == Representation::kAuto &&
+         options.storage.form == Storage::kCompact && options.fit.fitFor == FitFor::kVoxels;
+}
+
 }  // namespace
 
 double presetPsnr(Preset preset) {
@@ -128,6 +139,7 @@ Conversion convertVolume(const ConvertInput& input, const ConvertOptions& option
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
   if (own.fit.narrowBand) own.fit.fitFor = FitFor::kVoxels;
   if (own.fit.fitFor == FitFor::kDrawing) own.representation = Representation::kEllipsoids;
+  if (keepsVoxels(own)) own.representation = Representation::kVoxels;
   Conversion conversion = std::visit(Converter({input, own}), options.goal);
   conversion.smallerExactBytes = smallerExactBytes({input, own}, conversion.grid);
   conversion.grid = throughTheFormat(std::move(conversion.grid), memoryOf(input.source));

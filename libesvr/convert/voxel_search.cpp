@@ -14,6 +14,7 @@
 
 #include "convert/octave_search.h"
 #include "core/add_seconds.h"
+#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/voxel_layer.h"
 
@@ -30,9 +31,16 @@ constexpr int kMaxTrials = 10;
 /// docs/lab-notes.md, "Voxel coding": 0.05 gives files that are up to 1 % larger, 0.12 up to 5 %.
 /// Where the bound cannot be chosen freely, higher prices use up the PSNR that is left.
 constexpr double kPrice = 0.08;
+/// The same for frames that are predicted: with a steadiness of 0, and what steadiness adds. Voxels
+/// whose bits are not worth their price keep to the prediction, and so to the frame before.
+constexpr double kFramePrice = 0.14, kSteadyPrice = 0.12;
+constexpr double kErrorsKept = 0.5;  // share of the errors of the frame before with steadiness 1
 constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
 constexpr double kThriftOctaves = 0.08;  // bound's octaves that make up for the loss by kPrice
-constexpr int kMaxThriftyTrials = 4;
+constexpr int kMaxThriftyTrials = 4, kMaxFrameTrials = 10;
+/// Bits of an active voxel of a frame from which on exact voxels are tried, which take 8 at least in
+/// all but constant volumes.
+constexpr double kBitsOfExact = 8.0;
 
 /// Share of the active voxels with the most frequent value from which on a lattice that has this
 /// value, so that these voxels are exact, is tried.
@@ -44,7 +52,7 @@ constexpr int kMaxLevels = 24;  // coarser lattices than the first that are trie
 VoxelCandidate candidate(const Job& job, VoxelLayer layer, double psnr) {
   VoxelCandidate made;
   made.grid = makeStoredVoxels(job.input.descriptor, job.input.source, std::move(layer));
-  made.bytes = bytesAdded(made.grid);
+  made.bytes = bytesInFrame(made.grid, job.options.previous);
   made.psnr = psnr;
   return made;
 }
@@ -123,6 +131,7 @@ class VoxelSearch {
     auto plain = coarsestFor(psnr, psnr / kDbPerOctave - 1.0, 0.0, kMaxTrials);
     if (!plain) return exactVoxels(job_);
     const double bound = plain->bound;
+    if (job_.options.previous) return predictedFor(psnr, std::move(*plain));
     VoxelCandidate best;
     tbb::task_arena arena(trialsAtOnce());
     arena.execute([&] {
@@ -157,7 +166,13 @@ class VoxelSearch {
   [[nodiscard]] VoxelLayer layerAt(double bound, double price) const {
     const SparseVolume& source = job_.input.source;
     VoxelLayer layer = boundedLayer(source, bound, voxelActivity(job_));
-    return price > 0.0 ? thriftyLayer(source, std::move(layer), price) : layer;
+    return price > 0.0 ? thriftyLayer(source, std::move(layer), thriftOf(price)) : layer;
+  }
+
+  [[nodiscard]] ThriftOptions thriftOf(double price) const {
+    const StoredGrid* previous = job_.options.previous;
+    const VoxelLayer* layer = previous && previous->voxels ? &*previous->voxels : nullptr;
+    return {price, layer, kErrorsKept * job_.options.steadiness};
   }
 
   [[nodiscard]] Trial tryBound(double bound, double price) const {
@@ -183,6 +198,22 @@ class VoxelSearch {
       if (best && best->psnr < psnr + kPsnrTolerance) break;
     }
     return best;
+  }
+
+  [[nodiscard]] double framePrice() const {
+    return kFramePrice + kSteadyPrice * job_.options.steadiness;
+  }
+
+  /// Thrifty voxels of a frame, or the trial if they do not reach the PSNR. Exact voxels are tried
+  /// only if these take so many bits that exact ones may take fewer.
+  [[nodiscard]] VoxelCandidate predictedFor(double psnr, Trial plain) const {
+    const double octave = octaveOf(plain.bound) + framePrice();
+    auto thrifty = coarsestFor(psnr, octave, framePrice(), kMaxFrameTrials);
+    VoxelCandidate best = *candidateOf(std::move(thrifty ? *thrifty : plain));
+    const double bits = 8.0 * double(best.bytes) / double(activeVoxelCount(job_.input.source));
+    if (bits < kBitsOfExact) return best;
+    VoxelCandidate exact = exactVoxels(job_);
+    return isSmaller(best, exact) ? std::move(best) : std::move(exact);
   }
 
   /// Exact voxels, unless the trial is smaller.

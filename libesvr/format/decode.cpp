@@ -16,6 +16,7 @@
 #include "format/layered_section.h"
 #include "format/mask_section.h"
 #include "format/planes.h"
+#include "format/predicted_grid.h"
 #include "format/section_reader.h"
 #include "format/validity.h"
 #include "format/voxel_section.h"
@@ -336,20 +337,43 @@ void checkOrder(const SectionReader& sections, const EsvrFile& file) try {
   throw BadInput(sections.place(place) + ": " + fault.what());
 }
 
-EsvrFile decodeGrids(SectionReader& sections, const ReadPart* part) {
+/// Reads a grid that refers to the grid of the same number in the previous frame.
+StoredGrid readPredicted(SectionReader& sections, std::uint32_t g, const EsvrFile* previous) {
+  const SectionId section{SectionKind::kPredicted, g};
+  const std::string where = sections.place(section);
+  if (!previous) throw BadInput(where + ": it cannot be read without the frame before");
+  if (g >= previous->grids.size())
+    throw BadInput(where + ": the frame before has only " + std::to_string(previous->grids.size()) +
+                   " grids");
+  StoredGrid grid =
+      getPredicted(sections.get(section), where, previous->grids[g], sections.budget());
+  if (const auto fault = faultOf(grid)) throw BadInput(where + ": " + fault->text);
+  return grid;
+}
+
+/// What is read of a source: a part or all of it, and the frame before.
+struct Reading {
+  const ReadPart* part = nullptr;
+  const EsvrFile* previous = nullptr;
+};
+
+EsvrFile decodeGrids(SectionReader& sections, const Reading& reading) {
   EsvrFile file;
   file.metadata = readFileMetadata(sections);
-  const std::uint32_t grids = sections.count(SectionKind::kGrid);
+  const std::uint32_t grids =
+      sections.count(SectionKind::kGrid) + sections.count(SectionKind::kPredicted);
   for (std::uint32_t g = 0; g < grids; ++g)
-    file.grids.push_back(GridDecoder(sections, g, part).decode());
+    file.grids.push_back(sections.has({SectionKind::kPredicted, g})
+                             ? readPredicted(sections, g, reading.previous)
+                             : GridDecoder(sections, g, reading.part).decode());
   return file;
 }
 
 }  // namespace
 
-EsvrFile decode(const ByteSource& source, const ReadLimits& limits) {
+EsvrFile decode(const ByteSource& source, const ReadLimits& limits, const EsvrFile* previous) {
   SectionReader sections(source, limits);
-  EsvrFile file = decodeGrids(sections, nullptr);
+  EsvrFile file = decodeGrids(sections, {.previous = previous});
   readCarriedGrids(sections, limits.carriedBytes ? CarriedBytes::kAll : CarriedBytes::kChecked,
                    file);
   readVectors(sections, file);
@@ -360,7 +384,7 @@ EsvrFile decode(const ByteSource& source, const ReadLimits& limits) {
 
 EsvrFile decodePart(const ByteSource& source, const ReadPart& part) {
   SectionReader sections(source, part.limits);
-  EsvrFile file = decodeGrids(sections, &part);
+  EsvrFile file = decodeGrids(sections, {.part = &part});
   readCarriedGrids(sections, CarriedBytes::kNothing, file);
   readVectors(sections, file);
   checkOrder(sections, file);

@@ -1,3 +1,5 @@
+#include "format/encode.h"
+
 #include <algorithm>
 #include <functional>
 #include <utility>
@@ -16,6 +18,7 @@
 #include "format/mask_section.h"
 #include "format/morton_order.h"
 #include "format/planes.h"
+#include "format/predicted_grid.h"
 #include "format/section_writer.h"
 #include "format/validity.h"
 
@@ -189,7 +192,19 @@ void checkVectors(const EsvrFile& file) {
       throw RuntimeFailure("cannot store grid '" + vector.name + "': " + fault->text);
 }
 
-SectionWriter sectionsOf(const EsvrFile& file) {
+/// The difference of a grid from that of the previous frame, if it takes fewer bytes than the grid.
+std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
+                                                   const StoredGrid& previous) {
+  auto content = putPredicted(grid, previous);
+  if (content && alignUp(content->size()) + kEntryBytes >= bytesAdded(grid)) content.reset();
+  return content;
+}
+
+}  // namespace
+
+namespace format {
+
+SectionWriter sectionsOf(const EsvrFile& file, const EsvrFile* previous) {
   (void)gridsInOrder(file);  // refuses places that are impossible
   checkVectors(file);
   std::vector<SortedGrid> grids;
@@ -201,11 +216,20 @@ SectionWriter sectionsOf(const EsvrFile& file) {
   // Records come first, so that one read at the beginning of the file is enough to list it.
   SectionWriter out;
   addFileMetadata(out, file);
-  for (std::uint32_t g = 0; g < grids.size(); ++g) addGrid(out, g, grids[g]);
+  std::vector<std::optional<std::vector<std::byte>>> differences(grids.size());
+  for (std::uint32_t g = 0; g < grids.size(); ++g) {
+    if (previous && g < previous->grids.size())
+      differences[g] = differenceOf(file.grids[g], previous->grids[g]);
+    if (differences[g])
+      out.addRaw({SectionKind::kPredicted, g}, kRequired, std::move(*differences[g]));
+    else
+      addGrid(out, g, grids[g]);
+  }
   addVectors(out, file.vectors);
   addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
+    if (differences[g]) continue;
     addChunks(out, g, grids[g]);
     addExtras(out, g, grids[g].grid);
   }
@@ -213,7 +237,7 @@ SectionWriter sectionsOf(const EsvrFile& file) {
   return out;
 }
 
-}  // namespace
+}  // namespace format
 
 std::vector<std::byte> encodeEsvr(const EsvrFile& file) { return sectionsOf(file).assemble(); }
 

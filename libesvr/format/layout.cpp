@@ -31,6 +31,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kVoxels, "voxels"},
     {SectionKind::kResidual, "residual"},
     {SectionKind::kCarriedBytes, "carried bytes"},
+    {SectionKind::kPredicted, "predicted grid"},
     {SectionKind::kSequenceIndex, "sequence index"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
@@ -62,6 +63,7 @@ std::uint16_t minorVersionOf(SectionKind kind) {
       return 1;
     case SectionKind::kVector:
       return 2;
+    case SectionKind::kPredicted:
     case SectionKind::kSequenceIndex:
       return 3;
     default:

@@ -46,6 +46,7 @@ enum class SectionKind : std::uint32_t {
   kVoxels = 36,
   kResidual = 37,
   kCarriedBytes = 38,
+  kPredicted = 39,
   kSequenceIndex = 64,
 };
 

@@ -9,8 +9,6 @@
 #include "codec/cell_tree.h"
 #include "codec/voxel_model.h"
 #include "esvr/error.h"
-#include "format/byte_reader.h"
-#include "format/byte_writer.h"
 
 namespace esvr::format {
 namespace {
@@ -39,33 +37,6 @@ int bitsOf(const std::vector<Coord>& bricks) {
   return bits;
 }
 
-void putHeader(ByteWriter& out, const VoxelLayer& layer) {
-  out.put(std::uint8_t(layer.form));
-  out.put(layer.divisor);
-  for (const auto at : {layer.origin.x, layer.origin.y, layer.origin.z}) out.put(at);
-  out.put(layer.background);
-  out.put(std::uint32_t(layer.palette.size()));
-  out.putAll(layer.palette);
-}
-
-VoxelLayer getHeader(ByteReader& in) {
-  VoxelLayer layer;
-  layer.form = in.getEnum(VoxelForm::kPalette, "form of voxels");
-  layer.divisor = in.get<double>();
-  if (!(std::isfinite(layer.divisor) && layer.divisor > 0.0)) in.fail("the divisor of voxels");
-  layer.origin.x = in.get<std::int32_t>();
-  layer.origin.y = in.get<std::int32_t>();
-  layer.origin.z = in.get<std::int32_t>();
-  if (localOf(layer.origin) != Coord{}) in.fail("the origin of voxels is not a brick's corner");
-  layer.background = in.get<float>();
-  if (!std::isfinite(layer.background)) in.fail("the background of voxels is not finite");
-  const auto values = in.get<std::uint32_t>();
-  if (values > in.left() / sizeof(float)) in.fail("ends within the palette of voxels");
-  layer.palette.resize(values);
-  for (float& value : layer.palette) value = in.get<float>();
-  return layer;
-}
-
 /// Refuses codes that have no value.
 void checkCodes(const VoxelLayer& layer, const ByteReader& in) {
   if (layer.form != VoxelForm::kPalette) return;
@@ -79,12 +50,7 @@ void setBricks(std::span<const std::uint64_t> keys, const ByteReader& in, VoxelL
   std::sort(layer.bricks.begin(), layer.bricks.end());
   if (std::adjacent_find(layer.bricks.begin(), layer.bricks.end()) != layer.bricks.end())
     in.fail("a brick of voxels is there twice");
-  const auto beyond = [](std::int32_t origin, std::int32_t brick) {
-    return std::int64_t(origin) + std::int64_t(brick + 1) * kBrickSide - 1 > Box::kMax;
-  };
-  for (const Coord b : layer.bricks)
-    if (beyond(layer.origin.x, b.x) || beyond(layer.origin.y, b.y) || beyond(layer.origin.z, b.z))
-      in.fail("a brick of voxels lies outside the index space");
+  checkBricks(layer, in);
 }
 
 void putModel(ByteWriter& out, const codec::VoxelModel& model) {
@@ -114,7 +80,7 @@ struct BrickCount {
 
 BrickCount getBrickCount(ByteReader& in, std::uint64_t bytes) {
   BrickCount count{in.get<std::uint64_t>(), 0};
-  if (count.bricks / kMaxBricksPerByte > bytes)
+  if (count.bricks > maxBricksIn(bytes))
     in.fail(std::to_string(bytes) + " bytes of content for " + std::to_string(count.bricks) +
             " bricks");
   count.bits = in.get<std::uint8_t>();
@@ -150,12 +116,56 @@ void decodeStream(ByteReader& in, const BrickCount& count, const codec::VoxelMod
   }
 }
 
-void checkValues(const VoxelLayer& layer, const ByteReader& in) {
+}  // namespace
+
+void putVoxelHead(ByteWriter& out, const VoxelLayer& layer) {
+  out.put(std::uint8_t(layer.form));
+  out.put(layer.divisor);
+  for (const auto at : {layer.origin.x, layer.origin.y, layer.origin.z}) out.put(at);
+  out.put(layer.background);
+  out.put(std::uint32_t(layer.palette.size()));
+  out.putAll(layer.palette);
+}
+
+VoxelLayer getVoxelHead(ByteReader& in) {
+  VoxelLayer layer;
+  layer.form = in.getEnum(VoxelForm::kPalette, "form of voxels");
+  layer.divisor = in.get<double>();
+  if (!(std::isfinite(layer.divisor) && layer.divisor > 0.0)) in.fail("the divisor of voxels");
+  layer.origin.x = in.get<std::int32_t>();
+  layer.origin.y = in.get<std::int32_t>();
+  layer.origin.z = in.get<std::int32_t>();
+  if (localOf(layer.origin) != Coord{}) in.fail("the origin of voxels is not a brick's corner");
+  layer.background = in.get<float>();
+  if (!std::isfinite(layer.background)) in.fail("the background of voxels is not finite");
+  const auto values = in.get<std::uint32_t>();
+  if (values > in.left() / sizeof(float)) in.fail("ends within the palette of voxels");
+  layer.palette.resize(values);
+  for (float& value : layer.palette) value = in.get<float>();
+  return layer;
+}
+
+std::uint64_t maxBricksIn(std::uint64_t bytes) {
+  return kMaxBricksPerByte * bytes + kMaxBricksPerByte - 1;
+}
+
+void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget) {
+  budget.take(double(bricks) * decodedBytesPerBrick(bricks, budget.voxels()), where);
+}
+
+void checkBricks(const VoxelLayer& layer, const ByteReader& in) {
+  const auto beyond = [](std::int32_t origin, std::int32_t brick) {
+    return std::int64_t(origin) + std::int64_t(brick + 1) * kBrickSide - 1 > Box::kMax;
+  };
+  for (const Coord b : layer.bricks)
+    if (beyond(layer.origin.x, b.x) || beyond(layer.origin.y, b.y) || beyond(layer.origin.z, b.z))
+      in.fail("a brick of voxels lies outside the index space");
+}
+
+void checkVoxels(const VoxelLayer& layer, const ByteReader& in) {
   checkCodes(layer, in);
   if (!allFinite(layer)) in.fail("a voxel is not finite");
 }
-
-}  // namespace
 
 std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   const int bits = bitsOf(layer.bricks);
@@ -167,7 +177,7 @@ std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
     if (other.size() < stream.size()) stream = std::move(other), model = plain;
   }
   ByteWriter out;
-  putHeader(out, layer);
+  putVoxelHead(out, layer);
   out.put(std::uint64_t(layer.bricks.size()));
   out.put(std::uint8_t(bits));
   putModel(out, model);
@@ -180,13 +190,13 @@ std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
 VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,
                      MemoryBudget& budget) {
   ByteReader in(content, where);
-  VoxelLayer layer = getHeader(in);
+  VoxelLayer layer = getVoxelHead(in);
   layer.codes = VoxelArray<std::int32_t>(budget.voxels());
   const BrickCount count = getBrickCount(in, content.size());
-  budget.take(double(count.bricks) * decodedBytesPerBrick(count.bricks, budget.voxels()), where);
+  takeBricks(count.bricks, where, budget);
   const codec::VoxelModel model = getModel(in);
   decodeStream(in, count, model, layer);
-  checkValues(layer, in);
+  checkVoxels(layer, in);
   return layer;
 }
 

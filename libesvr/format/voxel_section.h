@@ -8,6 +8,8 @@
 
 #include "core/memory_budget.h"
 #include "esvr/voxel_layer.h"
+#include "format/byte_reader.h"
+#include "format/byte_writer.h"
 
 namespace esvr::format {
 
@@ -17,5 +19,24 @@ namespace esvr::format {
 /// \throws MemoryExceeded  there are more bricks than the budget allows
 [[nodiscard]] VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,
                                    MemoryBudget& budget);
+
+// The parts of a section of voxels that a predicted grid has too.
+
+/// The form, the divisor, the origin, the background and the palette.
+void putVoxelHead(ByteWriter& out, const VoxelLayer& layer);
+[[nodiscard]] VoxelLayer getVoxelHead(ByteReader& in);
+
+/// Largest number of bricks that a section may have without a previous frame, so that a reader knows
+/// it before it allocates memory.
+[[nodiscard]] std::uint64_t maxBricksIn(std::uint64_t bytes);
+
+/// Takes the memory of bricks while they are read from a budget.
+void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget);
+
+/// Refuses bricks that reach out of the index space.
+void checkBricks(const VoxelLayer& layer, const ByteReader& in);
+
+/// Refuses codes without a value, and values that are not finite.
+void checkVoxels(const VoxelLayer& layer, const ByteReader& in);
 
 }  // namespace esvr::format

@@ -17,9 +17,11 @@ constexpr double kSwaySize = 0.4;                 // size of the axis's bends
 constexpr double kBillowSize = 0.12;              // size of the largest eddies
 constexpr double kBillowDepth = 1.1;              // depth of eddies, in radii of the envelope
 constexpr double kWarpSize = 0.25, kWarp = 0.05;  // size and amplitude of the warp of eddies
-constexpr double kFadeStart = 0.7;                // height at which the top begins to dissolve
-constexpr double kSmallestEddy = 4.0;             // voxels
-constexpr double kFaintestSmoke = 1.0 / 512.0;    // smallest value of a voxel that is not empty
+// Heights that the eddies, their warp and the bends of the axis rise in a frame.
+constexpr double kRise = 0.01, kWarpRise = 0.006, kBendRise = 0.004;
+constexpr double kFadeStart = 0.7;              // height at which the top begins to dissolve
+constexpr double kSmallestEddy = 4.0;           // voxels
+constexpr double kFaintestSmoke = 1.0 / 512.0;  // smallest value of a voxel that is not empty
 
 /// Bound on the slope of (distance to the axis - kBillowDepth * radius of the envelope).
 constexpr double kAxisSlope = kSway * (1.0 + kNoiseSlope / kSwaySize);  // along x, and along z
@@ -33,8 +35,8 @@ int octavesFor(int resolution) {
 
 }  // namespace
 
-PlumeShape::PlumeShape(std::uint64_t seed, int resolution)
-    : seed_(seed), resolution_(resolution), octaves_(octavesFor(resolution)) {}
+PlumeShape::PlumeShape(std::uint64_t seed, int resolution, int frame)
+    : seed_(seed), resolution_(resolution), octaves_(octavesFor(resolution)), frame_(frame) {}
 
 std::optional<PlumeShape> PlumeShape::within(const Ball& ball) const {
   const Vec3 p = place(ball.center);
@@ -64,28 +66,31 @@ double PlumeShape::envelopeRadius(double y) const {
 
 double PlumeShape::distanceToAxis(Vec3 p) const {
   const double height = std::clamp(p.y, 0.0, 1.0);
-  const Vec3 along{0.5, height / kSwaySize, 0.5};
+  const Vec3 along{0.5, before({0.0, height, 0.0}, kBendRise).y / kSwaySize, 0.5};
   const double x = p.x - kSway * height * noise(seed_, along);
   const double z = p.z - kSway * height * noise(seed_ + 1, along);
   return std::sqrt(x * x + z * z);
 }
 
+Vec3 PlumeShape::before(Vec3 p, double rise) const { return p - Vec3{0.0, rise * frame_, 0.0}; }
+
 Vec3 PlumeShape::warped(Vec3 p) const {
-  const Vec3 q = p * (1.0 / kWarpSize);
+  const Vec3 q = before(p, kWarpRise) * (1.0 / kWarpSize);
   return p + Vec3{noise(seed_ + 2, q), noise(seed_ + 3, q), noise(seed_ + 4, q)} * kWarp;
 }
 
 double PlumeShape::densityAt(Vec3 p) const {
   const double depth = kBillowDepth - distanceToAxis(p) / envelopeRadius(p.y);
   if (depth < kFaintestSmoke) return 0.0;
-  const double billows = fractalNoise(seed_ + 5, warped(p) * (1.0 / kBillowSize), octaves_);
+  const Vec3 eddy = before(warped(p), kRise) * (1.0 / kBillowSize);
+  const double billows = fractalNoise(seed_ + 5, eddy, octaves_);
   const double fade = std::min(1.0, (1.0 - p.y) / (1.0 - kFadeStart));
   return std::clamp(depth - kBillowDepth * std::abs(billows), 0.0, 1.0) * fade;
 }
 
 SparseVolume makePlume(const SampleOptions& options) {
   const int last = options.resolution - 1;
-  return voxelise(PlumeShape(options.seed, options.resolution),
+  return voxelise(PlumeShape(options.seed, options.resolution, options.frame),
                   {.box = {{0, 0, 0}, {last, last, last}},
                    .background = 0.0f,
                    .maxBricks = options.limits.maxBricks,

@@ -17,6 +17,7 @@ struct Limits {
 struct SampleOptions {
   int resolution = 128;  ///< voxels along the longest side of what the sample shows
   std::uint64_t seed = 1;
+  int frame = 0;  ///< frame of a sample that moves (SampleKind::moves), from 0
   Limits limits{};
 };
 

@@ -76,7 +76,7 @@ SampleFile twoGrids(const SampleOptions& options) {
 
 constexpr SampleKind kKinds[] = {
     {"tree", "branching vessels: sparse, soft-edged tubes", oneDensity<makeTree>},
-    {"plume", "a noisy smoke plume", oneDensity<makePlume>},
+    {"plume", "a noisy smoke plume, which rises from frame to frame", oneDensity<makePlume>, true},
     {"blobs", "diffuse blobs without an edge", oneDensity<blobsOnZero>},
     {"levelset", "a level set: signed distances in a narrow band", levelSet},
     {"two-grids", "density (half, turned) and temperature (background 0.25), with metadata",

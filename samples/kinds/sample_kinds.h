@@ -22,6 +22,7 @@ struct SampleKind {
   const char* name;
   const char* description;  ///< one line, for --help
   SampleFile (*make)(const SampleOptions& options);
+  bool moves = false;  ///< it has more frames than one (SampleOptions::frame)
 };
 
 /// All kinds, in the order of --help.

@@ -1,13 +1,17 @@
 // esvr-sample: writes a generated sample to a VDB file.
 
+#include <filesystem>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "cli/command_line.h"
+#include "cli/frame_pattern.h"
 #include "cli/interrupts.h"
 #include "cli/output.h"
 #include "cli/run_main.h"
 #include "cli/thread_limit.h"
+#include "esvr/error.h"
 #include "kinds/sample_kinds.h"
 #include "programs/memory_limit.h"
 #include "programs/write_output.h"
@@ -18,7 +22,7 @@ using namespace esvr;
 
 constexpr const char* kName = "esvr-sample";
 constexpr int kDefaultResolution = 256;
-constexpr int kLargestResolution = 1 << 16;
+constexpr int kLargestResolution = 1 << 16, kMostFrames = 100'000;
 
 std::string listOfKinds() {
   constexpr std::size_t kColumn = 16;
@@ -36,12 +40,14 @@ cli::CommandLine commandLine() {
       {.name = kName,
        .purpose = "Generates a sparse volume and writes it as VDB. The same kind, resolution and\n"
                   "seed give the same voxels on every machine.",
-       .usage = "  esvr-sample KIND OUT.vdb [--resolution N] [--seed N] [-f]",
+       .usage = "  esvr-sample KIND OUT.vdb [--resolution N] [--seed N] [-f]\n"
+                "  esvr-sample plume 'OUT.####.vdb' --frames N [--frame K]",
        .notes = "KIND is one of\n" + listOfKinds() +
                 "Time and memory are proportional to the active voxels, so resolutions of several\n"
                 "thousand are possible.",
        .examples = "  esvr-sample tree tree.vdb\n"
-                   "  esvr-sample plume smoke.vdb --resolution 512 --seed 7"});
+                   "  esvr-sample plume smoke.vdb --resolution 512 --seed 7\n"
+                   "  esvr-sample plume 'smoke.####.vdb' --resolution 128 --frames 48"});
   line.argument("kind", "KIND");
   line.argument("output", "OUT.vdb");
   // clang-format off
@@ -50,9 +56,39 @@ cli::CommandLine commandLine() {
      "voxels along the longest side")
     ("seed", cli::po::value<std::int64_t>()->value_name("N")->default_value(1),
      "seed of the random choices; each seed gives another volume of the kind")
+    ("frames", cli::po::value<int>()->value_name("N"),
+     "write the frames 1 to N of a sample that moves, which is the plume; OUT.vdb must have a\n"
+     "pattern for the number of the frame")
+    ("frame", cli::po::value<int>()->value_name("K"), "write only frame K of --frames")
     ("force,f", cli::po::bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
   return line;
+}
+
+/// The path of each frame; one path if there is no sequence.
+std::vector<std::filesystem::path> outputsOf(const cli::Arguments& arguments,
+                                             const samples::SampleKind& kind) {
+  const auto output = arguments.get<std::string>("output");
+  if (!arguments.has("frames")) {
+    if (arguments.has("frame")) throw UsageError("--frame needs --frames");
+    return {output};
+  }
+  const auto frames = arguments.get<int>("frames");
+  cli::requireRange("frames", frames, 1, kMostFrames);
+  const auto pattern = cli::FramePattern::in(output);
+  if (!kind.moves) throw UsageError(std::string("--frames: ") + kind.name + " does not move");
+  if (!pattern)
+    throw UsageError("--frames: " + output + " has no pattern for the frame, such as ####");
+  std::vector<std::filesystem::path> paths;
+  for (int frame = 1; frame <= frames; ++frame) paths.push_back(pattern->at(frame));
+  return paths;
+}
+
+/// Writes one frame.
+void write(const samples::Output& output, const samples::SampleKind& kind,
+           const samples::SampleOptions& options, const cli::Log& log) {
+  const samples::SampleFile file = kind.make(options);
+  samples::writeOutput(output, file.metadata, file.grids, log);
 }
 
 int run(int argc, char** argv) {
@@ -63,17 +99,26 @@ int run(int argc, char** argv) {
   const auto seed = arguments->get<std::int64_t>("seed");
   cli::requireRange("seed", seed, std::int64_t{0}, std::numeric_limits<std::int64_t>::max());
   const samples::SampleKind& kind = samples::sampleKind(arguments->get<std::string>("kind"));
-  const samples::Output output{arguments->get<std::string>("output"),
-                               arguments->get<bool>("force")};
-  cli::checkOutput(output.path, {".vdb", ".nvdb"}, output.overwrite);
+  const auto paths = outputsOf(*arguments, kind);
+  const bool overwrite = arguments->get<bool>("force");
+  std::size_t first = 0, last = paths.size() - 1;
+  if (arguments->has("frame")) {
+    const auto frame = arguments->get<int>("frame");
+    cli::requireRange("frame", frame, 1, int(paths.size()));
+    first = last = std::size_t(frame) - 1;
+  }
+  for (std::size_t f = first; f <= last; ++f)
+    cli::checkOutput(paths[f], {".vdb", ".nvdb"}, overwrite);
 
   const cli::ThreadLimit threads(arguments->threads);
   const cli::Interrupts interrupts;
-  const samples::SampleFile file =
-      kind.make({.resolution = resolution,
-                 .seed = std::uint64_t(seed),
-                 .limits = {.maxBricks = samples::bricksThatFit(), .cancel = &interrupts.token()}});
-  samples::writeOutput(output, file.metadata, file.grids, cli::Log(kName, arguments->verbosity));
+  for (std::size_t f = first; f <= last; ++f)
+    write({paths[f], overwrite}, kind,
+          {.resolution = resolution,
+           .seed = std::uint64_t(seed),
+           .frame = int(f),
+           .limits = {.maxBricks = samples::bricksThatFit(), .cancel = &interrupts.token()}},
+          cli::Log(kName, arguments->verbosity));
   return 0;
 }
 

@@ -41,12 +41,12 @@ class ThriftyLayer : public testing::TestWithParam<double> {
 
 TEST_P(ThriftyLayer, LowersErrorPlusPriceOfBits) {
   const double price = 0.1;  // near the theory's; far above it, the codes spoil later predictions
-  const VoxelLayer layer = thriftyLayer(volume_, nearest_, price);
+  const VoxelLayer layer = thriftyLayer(volume_, nearest_, {.bitPrice = price});
   EXPECT_LT(costOf(volume_, layer, price), costOf(volume_, nearest_, price));
 }
 
 TEST_P(ThriftyLayer, MovesCodesByTwoStepsAtMostAndNothingElse) {
-  VoxelLayer layer = thriftyLayer(volume_, nearest_, 0.3);
+  VoxelLayer layer = thriftyLayer(volume_, nearest_, {.bitPrice = 0.3});
   int moved = 0;
   for (std::size_t i = 0; i < layer.codes.size(); ++i) {
     const int steps = std::abs(layer.codes[i] - nearest_.codes[i]);
@@ -59,12 +59,12 @@ TEST_P(ThriftyLayer, MovesCodesByTwoStepsAtMostAndNothingElse) {
 }
 
 TEST_P(ThriftyLayer, OfFreeBitsIsTheNearest) {
-  EXPECT_EQ(thriftyLayer(volume_, nearest_, 0.0), nearest_);
+  EXPECT_EQ(thriftyLayer(volume_, nearest_, {.bitPrice = 0.0}), nearest_);
 }
 
 TEST_P(ThriftyLayer, LeavesExactValuesAlone) {
   const VoxelLayer exact = exactLayer(volume_);
-  EXPECT_EQ(thriftyLayer(volume_, exact, 0.3), exact);
+  EXPECT_EQ(thriftyLayer(volume_, exact, {.bitPrice = 0.3}), exact);
 }
 
 INSTANTIATE_TEST_SUITE_P(Noise, ThriftyLayer, testing::Values(0.0, 0.03, 0.3));

@@ -11,6 +11,7 @@
 
 #include "convert/volumes.h"
 #include "esvr/error.h"
+#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 
@@ -100,6 +101,26 @@ TEST(ConvertToPsnr, ReachesItAsFloat32WithoutQuantising) {
   EXPECT_TRUE(conversion.grid.quantised.empty());
   EXPECT_GE(psnrOf(volume, conversion.grid), 32.0);
   EXPECT_LT(psnrOf(volume, conversion.grid), 45.0) << "an ellipsoid more is worth a few dB here";
+}
+
+/// A frame that equals the one before, which is decoded, has its PSNR for the bytes of a few
+/// decisions, and a frame that differs reaches the PSNR too.
+TEST(ConvertToPsnr, ReachesItForFramesInFewerBytes) {
+  const SparseVolume first = test::tubeVolume();
+  SparseVolume second = first;
+  for (float& v : second.values) v *= 0.95f;
+  ConvertOptions options = optionsFor(PsnrGoal{35.0});
+  options.representation = Representation::kVoxels;
+  const StoredGrid before = convertVolume({kDescriptor, first}, options).grid;
+  for (const double steadiness : {0.0, 1.0}) {
+    options.steadiness = steadiness;
+    options.previous = nullptr;
+    const StoredGrid alone = convertVolume({kDescriptor, second}, options).grid;
+    options.previous = &before;
+    const StoredGrid frame = convertVolume({kDescriptor, second}, options).grid;
+    EXPECT_GE(psnrOf(second, frame), 35.0);
+    EXPECT_LT(bytesInFrame(frame, &before), bytesAdded(alone));
+  }
 }
 
 TEST(ConvertToPsnr, TakesNoMoreEllipsoidsThanAllowed) {

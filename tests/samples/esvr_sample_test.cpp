@@ -55,6 +55,39 @@ TEST(EsvrSample, isTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(readGrid(one, "density").volume.values, readGrid(many, "density").volume.values);
 }
 
+/// The first frame is the plume that does not move, and each frame is the same whether it is
+/// written alone or with others.
+TEST(EsvrSample, writesFramesOfAPlume) {
+  const TemporaryFolder folder;
+  const std::string still = folder / "still.vdb";
+  ASSERT_EQ(sample({"plume", still, "--resolution", "32"}).exitCode, 0);
+  const std::vector<std::string> frames{"plume", folder / "p.##.vdb", "--resolution",
+                                        "32",    "--frames",          "3"};
+  ASSERT_EQ(sample(frames).exitCode, 0);
+  EXPECT_THAT(folder.names(), ElementsAre("p.01.vdb", "p.02.vdb", "p.03.vdb", "still.vdb"));
+  const auto valuesOf = [](const std::string& path) {
+    return readGrid(path, "density").volume.values;
+  };
+  const auto third = valuesOf(folder / "p.03.vdb");
+  EXPECT_EQ(valuesOf(folder / "p.01.vdb"), valuesOf(still));
+  EXPECT_NE(third, valuesOf(still));
+  auto only = frames;
+  only.insert(only.end(), {"--frame", "3", "-f"});
+  ASSERT_EQ(sample(only).exitCode, 0);
+  EXPECT_EQ(valuesOf(folder / "p.03.vdb"), third);
+}
+
+TEST(EsvrSample, refusesFramesOfWhatDoesNotMove) {
+  const TemporaryFolder folder;
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"tree", folder / "t.##.vdb", "--frames", "3"},
+        {"plume", folder / "p.vdb", "--frames", "3"},
+        {"plume", folder / "p.##.vdb", "--frame", "3"},
+        {"plume", folder / "p.##.vdb", "--frames", "3", "--frame", "4"}})
+    EXPECT_EQ(sample(arguments).exitCode, 2) << arguments.back();
+  EXPECT_THAT(folder.names(), IsEmpty());
+}
+
 TEST(EsvrSample, isQuietWhenAsked) {
   const TemporaryFolder folder;
   const auto run = sample({"blobs", folder / "b.vdb", "--resolution", "8", "--quiet"});

@@ -95,6 +95,14 @@ struct ConvertOptions {
   /// its sum cannot be drawn: it means nothing outside the stored bricks.
   FitOptions fit;
   StorageOptions storage;
+  /// The same grid of the decoded previous frame of a sequence; null: the grid stands alone. Bytes
+  /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
+  /// If it holds voxels, Representation::kAuto stores voxels for a PresetGoal, a PsnrGoal and a
+  /// BoundGoal, so that only the first frame of a group takes the time of a fit.
+  const StoredGrid* previous = nullptr;
+  /// Weight of the error of the change since the previous frame, from 0 (least bytes) to 1 (least
+  /// flicker), if there is one. Voxels then keep a part of the errors of the previous frame.
+  double steadiness = 0.5;
 };
 
 /// A volume and its other properties.

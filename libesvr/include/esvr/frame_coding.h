@@ -1,7 +1,9 @@
 #pragma once
-/// Encodes and decodes a file as a frame of a sequence (sequence_file.h).
+/// Encodes the frames of a sequence. The voxels of a frame may refer to those of the frame before
+/// it, which usually takes fewer bytes. docs/format.md, "Frames", specifies every byte.
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,21 +12,31 @@
 
 namespace esvr {
 
-/// Encodes a file as a frame of a sequence.
-/// \param previous  the decoded frame before it, to which the bytes may refer; null: they refer to
-///                  no other frame
+/// Encodes a file as a frame. Each grid that holds voxels, and whose predecessor has the same number
+/// in `previous` and holds voxels too, is stored as its difference from its predecessor if that
+/// takes fewer bytes. All other grids are stored as encodeEsvr() stores them. The bytes are those of
+/// an .esvr file, and encodeEsvr()'s if no grid refers to the previous frame.
+/// \param previous  the frame before as decodeFrame() returned it; null: the frame stands alone
 /// \throws RuntimeFailure  as for encodeEsvr
 [[nodiscard]] std::vector<std::byte> encodeFrame(const EsvrFile& frame, const EsvrFile* previous);
 
 /// Decodes a frame.
-/// \param nameForErrors  name of the file and the frame in error texts
-/// \param previous  the decoded frame before it; null if the bytes refer to no other frame
-/// \throws BadInput, MemoryExceeded  as for decodeEsvr
+/// \param nameForErrors  name of the file and number of the frame in error texts
+/// \param previous  the frame that encodeFrame() was given; ignored if the frame stands alone
+/// \throws BadInput  as for decodeEsvr; the frame refers to the previous one, and `previous` is null
+///                   or has not the grids that it refers to
+/// \throws MemoryExceeded  as for readEsvr
 [[nodiscard]] EsvrFile decodeFrame(std::span<const std::byte> bytes,
                                    const std::string& nameForErrors, const ReadLimits& limits,
                                    const EsvrFile* previous);
 
-/// True if decodeFrame needs `previous`. \throws BadInput  the bytes are not those of a frame
+/// True if decodeFrame() needs the previous frame. Only the section table is read.
+/// \throws BadInput  the header or the section table is damaged
 [[nodiscard]] bool dependsOnPrevious(std::span<const std::byte> bytes);
+
+/// Largest number of bytes that a grid adds to a frame, like bytesAdded() for a file.
+/// \param previous  the same grid of the previous frame; null: the grid is stored on its own
+/// \throws RuntimeFailure  as for encodeEsvr
+[[nodiscard]] std::uint64_t bytesInFrame(const StoredGrid& grid, const StoredGrid* previous);
 
 }  // namespace esvr

@@ -51,17 +51,28 @@ enum class Activity {
 /// \throws UsageError  the bound is not positive and finite
 [[nodiscard]] VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity);
 
+/// What thriftyLayer() weighs. All errors are in squared steps of the quantisation lattice.
+struct ThriftOptions {
+  /// Squared error that may be added to save a bit. By the theory of fine quantisation it is
+  /// ln(2) / 6 = 0.1155 (6.02 dB for each bit); with much larger values, the predictions of later
+  /// voxels become worse.
+  double bitPrice = 0.0;
+  /// The layer of the previous frame of a sequence. The bits are those of a frame that is predicted
+  /// from it (frame_coding.h). Null: those of a volume of its own.
+  const VoxelLayer* previous = nullptr;
+  /// Share of the errors of the previous frame that the voxels keep, from 0 to 1. The errors are
+  /// estimated from the difference between neighbours. It is ignored without `previous`.
+  double steadiness = 0.0;
+};
+
 /// Makes a layer smaller by rate-distortion optimised quantisation. A voxel gets a code at most
 /// two steps away that takes fewer bits, if its squared error grows by less than the saved bits
-/// times `bitPrice`. The error of a voxel is then at most 2.5 steps of the quantisation lattice,
-/// and errors are correlated with the coder's predictions. Vacant voxels remain vacant.
-/// \param layer     a layer that boundedLayer made from `volume`; other forms than kQuantised are
-///                  returned unchanged
-/// \param bitPrice  squared error that may be added to save a bit, in squared steps of the lattice.
-///                  By the theory of fine quantisation it is ln(2) / 6 = 0.1155 (6.02 dB for each
-///                  bit); with much larger values, the predictions of later voxels become worse
+/// times the price of a bit. The error of a voxel is then at most 2.5 steps of the quantisation
+/// lattice, and errors are correlated with the coder's predictions. Vacant voxels remain vacant.
+/// \param layer  a layer that boundedLayer made from `volume`; other forms than kQuantised are
+///               returned unchanged
 [[nodiscard]] VoxelLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
-                                      double bitPrice);
+                                      const ThriftOptions& options);
 
 [[nodiscard]] SparseVolume volumeOf(const VoxelLayer& layer);
 

@@ -1,0 +1,80 @@
+#include "codec/past_voxels.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "codec/voxel_values.h"
+
+namespace esvr::codec {
+namespace {
+
+/// Largest distance of two origins along an axis, in bricks.
+constexpr std::int64_t kLargestShift = 1 << 24;
+
+bool sameLattice(const VoxelLayer& a, const VoxelLayer& b) {
+  return a.form == b.form && a.divisor == b.divisor && a.palette == b.palette;
+}
+
+double placeOf(const VoxelLayer& now, float value) {
+  if (now.form == VoxelForm::kQuantised) return double(value) * now.divisor;
+  return double(codeOfValue(now, value));
+}
+
+bool isNear(std::int32_t a, std::int32_t b) {
+  return std::abs(std::int64_t(a) - b) <= kLargestShift * kBrickSide;
+}
+
+Coord shiftOf(const VoxelLayer& past, const VoxelLayer& now) {
+  return brickOf(past.origin - now.origin);
+}
+
+}  // namespace
+
+bool isPredictable(const VoxelLayer& now, const VoxelLayer& past) {
+  if (!isNear(now.origin.x, past.origin.x) || !isNear(now.origin.y, past.origin.y) ||
+      !isNear(now.origin.z, past.origin.z))
+    return false;
+  const std::int32_t vacant = codeOfValue(now, now.background);
+  for (std::size_t i = 0; i < now.codes.size(); ++i)
+    if (now.codes[i] != vacant && now.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels)))
+      return false;
+  return true;
+}
+
+PastVoxels::PastVoxels(const VoxelLayer& past, const VoxelLayer& now)
+    : past_(past),
+      index_(past.bricks),
+      shift_(shiftOf(past, now)),
+      vacantPlace_(double(codeOfValue(now, now.background))),
+      places_(past.codes.size(), past.codes.get_allocator()) {
+  const bool same = sameLattice(past, now);
+  tbb::parallel_for(std::size_t{0}, past.bricks.size(), [&](std::size_t b) {
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+      const std::size_t i = b * kBrickVoxels + v;
+      if (past.vacant[b].test(int(v)))
+        places_[i] = vacantPlace_;
+      else
+        places_[i] = same ? double(past.codes[i]) : placeOf(now, valueOfCode(past, past.codes[i]));
+    }
+  });
+}
+
+void PastVoxels::fillLine(Coord voxel, int count, double* place, bool* active) const {
+  for (int done = 0; done < count;) {
+    const int z = localOf(voxel).z, now = std::min(count - done, kBrickSide - z);
+    const std::uint32_t b = find(brickOf(voxel));
+    const int first = voxelOffset(localOf(voxel));
+    for (int n = 0; n < now; ++n) {
+      const bool there = b != BrickIndex::kNone;
+      place[done + n] =
+          there ? places_[std::size_t(b) * kBrickVoxels + std::size_t(first + n)] : vacantPlace_;
+      active[done + n] = there && past_.active[b].test(first + n);
+    }
+    done += now;
+    voxel.z += now;
+  }
+}
+
+}  // namespace esvr::codec

@@ -1,0 +1,82 @@
+#include "codec/voxel_values.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace esvr::codec {
+namespace {
+
+constexpr double kLargestCode = 0x1p30;
+constexpr int kFloatMantissa = 23, kHalfMantissa = 10, kHalfLowest = -14, kHalfHighest = 15;
+constexpr std::int32_t kHalfOne = 1 << kHalfMantissa, kHalfBits = 0x7fff;
+
+/// The number of a float in increasing order. -0 comes before 0, so every bit pattern has its own.
+std::int32_t orderOf(std::int32_t magnitude, bool negative) {
+  return negative ? -1 - magnitude : magnitude;
+}
+
+}  // namespace
+
+float floatAt(std::int32_t n) {
+  const auto magnitude = std::uint32_t(n < 0 ? -1 - n : n);
+  return std::bit_cast<float>(n < 0 ? magnitude | 0x80000000u : magnitude);
+}
+std::int32_t orderOfFloat(float v) {
+  return orderOf(std::int32_t(std::bit_cast<std::uint32_t>(v) & 0x7fffffffu), std::signbit(v));
+}
+
+bool inOrder(float a, float b) { return orderOfFloat(a) < orderOfFloat(b); }
+
+/// The bits of a half, moved to those of a float, are the half times 2^-112, which is the
+/// difference of the exponents' offsets. The product is exact, also for subnormal halves.
+float halfAt(std::int32_t n) {
+  const std::int32_t bits = (n < 0 ? -1 - n : n) & kHalfBits;
+  const auto moved = std::bit_cast<float>(std::uint32_t(bits) << (kFloatMantissa - kHalfMantissa));
+  return std::copysign(moved * 0x1p112f, n < 0 ? -1.0f : 1.0f);
+}
+/// The number of the half that is nearest to v among those of no larger magnitude. v is a half if
+/// halfAt() of the result equals v.
+std::int32_t orderOfHalf(float v) {
+  const double magnitude = std::abs(double(v));
+  int exponent = magnitude > 0.0 ? std::ilogb(magnitude) : kHalfLowest;
+  exponent = std::clamp(exponent, kHalfLowest, kHalfHighest);
+  const double mantissa = std::floor(std::ldexp(magnitude, kHalfMantissa - exponent));
+  const auto steps = std::int32_t(std::min(mantissa, 2.0 * kHalfOne - 1.0));
+  const bool subnormal = steps < kHalfOne;
+  const std::int32_t bits =
+      subnormal ? steps : ((exponent + kHalfHighest) << kHalfMantissa) + steps - kHalfOne;
+  return orderOf(bits, std::signbit(v));
+}
+
+float valueOfCode(const VoxelLayer& layer, std::int32_t n) {
+  switch (layer.form) {
+    case VoxelForm::kQuantised:
+      return float(double(n) / layer.divisor);
+    case VoxelForm::kHalf:
+      return halfAt(n);
+    case VoxelForm::kPalette:
+      return layer.palette[std::size_t(n)];
+    case VoxelForm::kFloat:
+      break;
+  }
+  return floatAt(n);
+}
+
+std::int32_t codeOfValue(const VoxelLayer& layer, float v) {
+  switch (layer.form) {
+    case VoxelForm::kQuantised:
+      return std::int32_t(
+          std::lround(std::clamp(double(v) * layer.divisor, -kLargestCode, kLargestCode)));
+    case VoxelForm::kHalf:
+      return orderOfHalf(v);
+    case VoxelForm::kPalette:
+      return std::int32_t(std::lower_bound(layer.palette.begin(), layer.palette.end(), v, inOrder) -
+                          layer.palette.begin());
+    case VoxelForm::kFloat:
+      break;
+  }
+  return orderOfFloat(v);
+}
+
+}  // namespace esvr::codec

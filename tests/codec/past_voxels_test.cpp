@@ -1,0 +1,84 @@
+// Plan: a cube of the previous frame has the voxels of its layer at their places, moved by a motion
+// and by the origins, with the background where there is no brick. Values on another lattice are
+// converted to units of the frame's. Frames that cannot be predicted are recognised.
+
+#include "codec/past_voxels.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "../fit/volumes.h"
+
+namespace esvr::codec {
+namespace {
+
+constexpr double kStep = 2.0 * 0.01 * (1.0 - 1e-6);  // of a layer with the bound 0.01
+
+/// Values that tell every voxel of 16^3 from the others.
+SparseVolume numbered() {
+  return test::volumeOf({}, 2, 0.0f,
+                        [](Coord v) { return float(1.0 + v.x + 0.1 * v.y + 20.0 * v.z); });
+}
+
+VoxelLayer layerOf(const SparseVolume& volume, double bound) {
+  return boundedLayer(volume, bound, Activity::kByValue);
+}
+
+void expectMoved(const SparseVolume& volume, const PastVoxels& past, Coord motion,
+                 double tolerance) {
+  const auto cube = std::make_unique<PastCube<1>>();
+  past.fill({}, motion, *cube);
+  for (int v = 0; v < kBrickVoxels; ++v) {
+    const double value = valueAt(volume, voxelLocal(v) - motion);
+    EXPECT_NEAR(cube->place[PastCube<1>::cell(voxelLocal(v))] * kStep, value, tolerance);
+    EXPECT_EQ(cube->active[PastCube<1>::cell(voxelLocal(v))], value != 0.0);
+  }
+}
+
+TEST(PastVoxels, AreTheCodesOfTheSameLattice) {
+  const VoxelLayer layer = layerOf(numbered(), 0.01);
+  const PastVoxels past(layer, layer);
+  const auto cube = std::make_unique<PastCube<1>>();
+  past.fill({}, {}, *cube);
+  for (int v = 0; v < kBrickVoxels; ++v)
+    EXPECT_EQ(cube->place[PastCube<1>::cell(voxelLocal(v))], double(layer.codes[std::size_t(v)]));
+}
+
+TEST(PastVoxels, AreMovedAndEmptyOutsideOfBricks) {
+  const SparseVolume volume = numbered();
+  const VoxelLayer layer = layerOf(volume, 0.01);
+  // Half a step, and the rounding of values up to 400 to float32.
+  for (const Coord motion : {Coord{}, Coord{4, -4, 2}, Coord{-1, 3, -4}})
+    expectMoved(volume, PastVoxels(layer, layer), motion, 0.01 + 400 * 0x1p-24);
+}
+
+TEST(PastVoxels, OfAnotherLatticeAreInUnitsOfTheFrame) {
+  const SparseVolume volume = numbered();
+  const VoxelLayer now = layerOf(volume, 0.01), before = layerOf(volume, 0.3);
+  expectMoved(volume, PastVoxels(before, now), {1, 0, 0}, 0.3 + 400 * 0x1p-24);
+}
+
+TEST(PastVoxels, AreFoundFromAnotherOrigin) {
+  VoxelLayer before = layerOf(numbered(), 0.01), now = before;
+  now.origin = {8, -16, 0};
+  const PastVoxels past(before, now);
+  EXPECT_EQ(past.brickAt(0), (Coord{-1, 2, 0}));
+  EXPECT_EQ(past.find({-1, 2, 0}), 0u);
+  EXPECT_EQ(past.find({1, 2, 0}), BrickIndex::kNone);
+}
+
+TEST(PastVoxels, CannotPredictFarOriginsAndStrangeVacantCodes) {
+  const VoxelLayer layer = layerOf(numbered(), 0.01);
+  EXPECT_TRUE(isPredictable(layer, layer));
+  VoxelLayer far = layer;
+  far.origin.y = 1 << 30;
+  EXPECT_FALSE(isPredictable(layer, far));
+  VoxelLayer strange = layer;
+  strange.vacant[0].set(0);
+  strange.codes[0] = 17;
+  EXPECT_FALSE(isPredictable(strange, layer));
+}
+
+}  // namespace
+}  // namespace esvr::codec
