@@ -4,6 +4,7 @@
 #include "esvr/container.h"
 #include "format/byte_source.h"
 #include "format/decode.h"
+#include "format/frame_table.h"
 #include "format/section_table.h"
 
 namespace esvr {
@@ -40,7 +41,9 @@ EsvrSummary inspectEsvr(const std::filesystem::path& path) {
 }
 
 EsvrSummary inspectEsvr(std::span<const std::byte> bytes, const std::string& nameForErrors) {
-  return summaryOf(format::readTable(format::MemorySource(bytes, nameForErrors)));
+  return summaryOf(format::isShortFrame(bytes)
+                       ? format::getFrame(bytes, nameForErrors).sections
+                       : format::readTable(format::MemorySource(bytes, nameForErrors)));
 }
 
 }  // namespace esvr

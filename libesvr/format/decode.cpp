@@ -11,6 +11,7 @@
 #include "format/chunk_box.h"
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
+#include "format/frame_table.h"
 #include "format/grid_record.h"
 #include "format/layer_errors_stream.h"
 #include "format/layered_section.h"
@@ -338,45 +339,65 @@ void checkOrder(const SectionReader& sections, const EsvrFile& file) try {
 }
 
 /// Reads a grid that refers to the grid of the same number in the previous frame.
-StoredGrid readPredicted(SectionReader& sections, std::uint32_t g, const EsvrFile* previous) {
+StoredGrid readPredicted(SectionReader& sections, std::uint32_t g, const EsvrFile& previous) {
   const SectionId section{SectionKind::kPredicted, g};
   const std::string where = sections.place(section);
-  if (!previous) throw BadInput(where + ": it cannot be read without the frame before");
-  if (g >= previous->grids.size())
-    throw BadInput(where + ": the frame before has only " + std::to_string(previous->grids.size()) +
+  if (g >= previous.grids.size())
+    throw BadInput(where + ": the frame before has only " + std::to_string(previous.grids.size()) +
                    " grids");
   StoredGrid grid =
-      getPredicted(sections.get(section), where, previous->grids[g], sections.budget());
+      getPredicted(sections.get(section), where, previous.grids[g], sections.budget());
   if (const auto fault = faultOf(grid)) throw BadInput(where + ": " + fault->text);
   return grid;
 }
 
-/// What is read of a source: a part or all of it, and the frame before.
-struct Reading {
-  const ReadPart* part = nullptr;
-  const EsvrFile* previous = nullptr;
-};
+std::vector<StoredGrid> readGrids(SectionReader& sections, const ReadPart* part) {
+  std::vector<StoredGrid> grids;
+  const std::uint32_t count = sections.count(SectionKind::kGrid);
+  for (std::uint32_t g = 0; g < count; ++g)
+    grids.push_back(GridDecoder(sections, g, part).decode());
+  return grids;
+}
 
-EsvrFile decodeGrids(SectionReader& sections, const Reading& reading) {
-  EsvrFile file;
-  file.metadata = readFileMetadata(sections);
-  const std::uint32_t grids =
+/// Reads the grids of a frame that refers to the previous one.
+std::vector<StoredGrid> readGridsAfter(SectionReader& sections, const EsvrFile& previous) {
+  std::vector<StoredGrid> grids;
+  const std::uint32_t count =
       sections.count(SectionKind::kGrid) + sections.count(SectionKind::kPredicted);
-  for (std::uint32_t g = 0; g < grids; ++g)
-    file.grids.push_back(sections.has({SectionKind::kPredicted, g})
-                             ? readPredicted(sections, g, reading.previous)
-                             : GridDecoder(sections, g, reading.part).decode());
-  return file;
+  for (std::uint32_t g = 0; g < count; ++g)
+    grids.push_back(sections.has({SectionKind::kPredicted, g})
+                        ? readPredicted(sections, g, previous)
+                        : GridDecoder(sections, g, nullptr).decode());
+  return grids;
+}
+
+CarriedBytes carriedBytesOf(const ReadLimits& limits) {
+  return limits.carriedBytes ? CarriedBytes::kAll : CarriedBytes::kChecked;
 }
 
 }  // namespace
 
-EsvrFile decode(const ByteSource& source, const ReadLimits& limits, const EsvrFile* previous) {
+EsvrFile decode(const ByteSource& source, const ReadLimits& limits) {
   SectionReader sections(source, limits);
-  EsvrFile file = decodeGrids(sections, {.previous = previous});
-  readCarriedGrids(sections, limits.carriedBytes ? CarriedBytes::kAll : CarriedBytes::kChecked,
-                   file);
+  EsvrFile file{readFileMetadata(sections), readGrids(sections, nullptr)};
+  readCarriedGrids(sections, carriedBytesOf(limits), file);
   readVectors(sections, file);
+  checkOrder(sections, file);
+  sections.finish();
+  return file;
+}
+
+EsvrFile decodeShort(std::span<const std::byte> bytes, const std::string& name,
+                     const ReadLimits& limits, const EsvrFile& previous) {
+  const MemorySource source(bytes, name);
+  FrameTable table = getFrame(bytes, name);
+  SectionReader sections(source, std::move(table.sections), limits);
+  EsvrFile file{readFileMetadata(sections), readGridsAfter(sections, previous)};
+  readCarriedGrids(sections, carriedBytesOf(limits), file);
+  readVectors(sections, file);
+  if (table.inherited.metadata) file.metadata = previous.metadata;
+  if (table.inherited.carried) file.carried = previous.carried;
+  if (table.inherited.vectors) file.vectors = previous.vectors;
   checkOrder(sections, file);
   sections.finish();
   return file;
@@ -384,7 +405,7 @@ EsvrFile decode(const ByteSource& source, const ReadLimits& limits, const EsvrFi
 
 EsvrFile decodePart(const ByteSource& source, const ReadPart& part) {
   SectionReader sections(source, part.limits);
-  EsvrFile file = decodeGrids(sections, {.part = &part});
+  EsvrFile file{readFileMetadata(sections), readGrids(sections, &part)};
   readCarriedGrids(sections, CarriedBytes::kNothing, file);
   readVectors(sections, file);
   checkOrder(sections, file);

@@ -192,19 +192,17 @@ void checkVectors(const EsvrFile& file) {
       throw RuntimeFailure("cannot store grid '" + vector.name + "': " + fault->text);
 }
 
-/// The difference of a grid from that of the previous frame, if it takes fewer bytes than the grid.
-std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
-                                                   const StoredGrid& previous) {
-  auto content = putPredicted(grid, previous);
-  if (content && alignUp(content->size()) + kEntryBytes >= bytesAdded(grid)) content.reset();
-  return content;
+/// What a frame need not store, because the previous one has it too.
+Inherited inheritedFrom(const EsvrFile& previous, const EsvrFile& frame) {
+  return {previous.metadata == frame.metadata, previous.vectors == frame.vectors,
+          previous.carried == frame.carried};
 }
 
-}  // namespace
+using Differences = std::vector<std::optional<std::vector<std::byte>>>;
 
-namespace format {
-
-SectionWriter sectionsOf(const EsvrFile& file, const EsvrFile* previous) {
+/// Checks a file and collects its sections.
+/// \param differences  for each grid: its difference from the previous frame, which replaces it
+SectionWriter collect(const EsvrFile& file, Differences differences, const Inherited& inherited) {
   (void)gridsInOrder(file);  // refuses places that are impossible
   checkVectors(file);
   std::vector<SortedGrid> grids;
@@ -215,26 +213,49 @@ SectionWriter sectionsOf(const EsvrFile& file, const EsvrFile* previous) {
 
   // Records come first, so that one read at the beginning of the file is enough to list it.
   SectionWriter out;
-  addFileMetadata(out, file);
-  std::vector<std::optional<std::vector<std::byte>>> differences(grids.size());
-  for (std::uint32_t g = 0; g < grids.size(); ++g) {
-    if (previous && g < previous->grids.size())
-      differences[g] = differenceOf(file.grids[g], previous->grids[g]);
+  if (!inherited.metadata) addFileMetadata(out, file);
+  for (std::uint32_t g = 0; g < grids.size(); ++g)
     if (differences[g])
       out.addRaw({SectionKind::kPredicted, g}, kRequired, std::move(*differences[g]));
     else
       addGrid(out, g, grids[g]);
-  }
-  addVectors(out, file.vectors);
-  addCarriedRecords(out, file.carried, grids.size());
+  if (!inherited.vectors) addVectors(out, file.vectors);
+  if (!inherited.carried) addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
     if (differences[g]) continue;
     addChunks(out, g, grids[g]);
     addExtras(out, g, grids[g].grid);
   }
-  addCarriedBytes(out, file.carried, grids.size());
+  if (!inherited.carried) addCarriedBytes(out, file.carried, grids.size());
   return out;
+}
+
+}  // namespace
+
+namespace format {
+
+SectionWriter sectionsOf(const EsvrFile& file) {
+  return collect(file, Differences(file.grids.size()), {});
+}
+
+std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
+                                                   const StoredGrid& previous) {
+  auto content = putPredicted(grid, previous);
+  if (content && content->size() + kFrameRowBytes >= bytesAdded(grid)) content.reset();
+  return content;
+}
+
+std::optional<FrameSections> differencesOf(const EsvrFile& frame, const EsvrFile& previous) {
+  Differences differences(frame.grids.size());
+  bool any = false;
+  for (std::size_t g = 0; g < std::min(frame.grids.size(), previous.grids.size()); ++g) {
+    differences[g] = differenceOf(frame.grids[g], previous.grids[g]);
+    any = any || differences[g];
+  }
+  if (!any) return std::nullopt;
+  const Inherited inherited = inheritedFrom(previous, frame);
+  return FrameSections{collect(frame, std::move(differences), inherited), inherited};
 }
 
 }  // namespace format

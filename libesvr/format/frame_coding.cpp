@@ -1,31 +1,37 @@
 #include "esvr/frame_coding.h"
 
-#include <algorithm>
-
+#include "esvr/error.h"
 #include "format/decode.h"
 #include "format/encode.h"
-#include "format/section_reader.h"
+#include "format/frame_table.h"
 
 namespace esvr {
 
 std::vector<std::byte> encodeFrame(const EsvrFile& frame, const EsvrFile* previous) {
-  return format::sectionsOf(frame, previous).assemble();
+  if (previous)
+    if (auto differences = format::differencesOf(frame, *previous))
+      return differences->sections.assembleFrame(differences->inherited);
+  return encodeEsvr(frame);
 }
 
 EsvrFile decodeFrame(std::span<const std::byte> bytes, const std::string& nameForErrors,
                      const ReadLimits& limits, const EsvrFile* previous) {
-  return format::decode(format::MemorySource(bytes, nameForErrors), limits, previous);
+  if (!format::isShortFrame(bytes)) return decodeEsvr(bytes, nameForErrors, limits);
+  if (!previous) throw BadInput(nameForErrors + ": it cannot be read without the frame before");
+  return format::decodeShort(bytes, nameForErrors, limits, *previous);
 }
 
 bool dependsOnPrevious(std::span<const std::byte> bytes) {
-  const format::MemorySource source(bytes, "frame");
-  return format::SectionReader(source).count(format::SectionKind::kPredicted) > 0;
+  if (format::isShortFrame(bytes)) return true;
+  (void)format::readTable(format::MemorySource(bytes, "frame"));
+  return false;
 }
 
 std::uint64_t bytesInFrame(const StoredGrid& grid, const StoredGrid* previous) {
-  if (!previous) return bytesAdded(grid);
-  const EsvrFile frame{{}, {grid}}, before{{}, {*previous}};
-  return format::sectionsOf(frame, &before).bytesUnshared();
+  if (previous)
+    if (const auto difference = format::differenceOf(grid, *previous))
+      return difference->size() + format::kFrameRowBytes;
+  return bytesAdded(grid);
 }
 
 }  // namespace esvr

@@ -23,7 +23,10 @@ double expansionOf(SectionKind kind) {
 }  // namespace
 
 SectionReader::SectionReader(const ByteSource& source, const ReadLimits& limits)
-    : source_(source), table_(readTable(source)), budget_(limits.maxBytes, limits.memory) {
+    : SectionReader(source, readTable(source), limits) {}
+
+SectionReader::SectionReader(const ByteSource& source, SectionTable table, const ReadLimits& limits)
+    : source_(source), table_(std::move(table)), budget_(limits.maxBytes, limits.memory) {
   if (isSequence(table_))
     throw BadInput(source.name() + ": holds a sequence, whose frames are read one at a time");
   for (std::size_t i = 0; i < table_.entries.size(); ++i) unread_[table_.entries[i].id] = i;
@@ -79,7 +82,7 @@ std::unique_ptr<ByteSource> SectionReader::open(const SectionId& id, bool whole)
 }
 
 void SectionReader::finish() {
-  checkGaps(source_, table_);
+  if (!table_.isFrame) checkGaps(source_, table_);
   std::set<Placement> read;  // shared bytes are read once, however many sections share them
   for (const auto& [id, entry] : unread_) {
     if (known(id.kind))

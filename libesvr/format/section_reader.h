@@ -18,6 +18,8 @@ class SectionReader {
   /// \param limits  limits on the memory of the content
   /// \throws BadInput  the header or the section table is damaged
   explicit SectionReader(const ByteSource& source, const ReadLimits& limits = {});
+  /// \param table  that of the source, which was checked
+  SectionReader(const ByteSource& source, SectionTable table, const ReadLimits& limits);
 
   [[nodiscard]] const SectionTable& table() const { return table_; }
 

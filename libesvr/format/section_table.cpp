@@ -142,7 +142,7 @@ SectionTable readTable(const ByteSource& source) {
   ByteReader in(rows, source.name() + ": section table");
   if (checksum(rows) != h.tableChecksum) in.fail("checksum does not match");
 
-  SectionTable table{h.versionMajor, h.versionMinor, h.fileBytes, h.tableOffset, {}};
+  SectionTable table{h.versionMajor, h.versionMinor, h.fileBytes, h.tableOffset, {}, false};
   for (std::uint32_t i = 0; i < h.sections; ++i) table.entries.push_back(getEntry(in));
   checkTable(source.name(), table);
   return table;

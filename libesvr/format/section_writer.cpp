@@ -74,6 +74,12 @@ std::vector<std::byte> SectionWriter::assemble() {
   return file.take();
 }
 
+std::vector<std::byte> SectionWriter::assembleFrame(const Inherited& inherited) const {
+  FrameContents contents{{}, contentOf_};
+  for (const Content& content : contents_) contents.contents.push_back(content.bytes());
+  return putFrame({inherited, table_}, contents);
+}
+
 std::uint64_t SectionWriter::bytesUnshared() const {
   std::uint64_t bytes = 0;
   for (const auto& entry : table_.entries) bytes += kEntryBytes + alignUp(entry.storedBytes);

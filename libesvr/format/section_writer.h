@@ -11,6 +11,7 @@
 #include "esvr/voxel_layer.h"
 #include "esvr/voxel_memory.h"
 #include "format/codec.h"
+#include "format/frame_table.h"
 #include "format/section_table.h"
 
 namespace esvr::format {
@@ -39,6 +40,8 @@ class SectionWriter {
 
   /// The file in memory.
   [[nodiscard]] std::vector<std::byte> assemble();
+  /// The short form of a frame in memory.
+  [[nodiscard]] std::vector<std::byte> assembleFrame(const Inherited& inherited) const;
 
   /// Bytes of the sections with their padding and their rows of the table, if none shared bytes.
   [[nodiscard]] std::uint64_t bytesUnshared() const;

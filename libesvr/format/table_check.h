@@ -14,6 +14,9 @@ namespace esvr::format {
 /// \throws BadInput
 void checkTable(const std::string& file, const SectionTable& table);
 
+/// Refuses what checkTable() refuses besides the places of the sections. \throws BadInput
+void checkRows(const std::string& file, const SectionTable& table);
+
 /// Refuses bytes that belong to no section and are not zero. \throws BadInput
 void checkGaps(const ByteSource& source, const SectionTable& table);
 

@@ -1,9 +1,9 @@
 /// Compares frames that are predicted from the frame before with files of their own.
 ///
-///     bench_frames GRID PSNR STEADINESS FILE...
+///     bench_frames GRID PSNR STEADINESS GOP FILE...
 ///
 /// The files are those of a sequence, in its order. The grid of each is converted to voxels of a
-/// PSNR (dB) twice: alone, and as a frame of a group of 8 frames of which the first one stands
+/// PSNR (dB) twice: alone, and as a frame of a group of GOP frames of which the first one stands
 /// alone. For both ways a line of JSON is printed: the bytes of all files and frames, the least and
 /// the mean PSNR of a frame, the PSNR of the change from one frame to the next, of which the peak is
 /// that of the frame, and the seconds of the conversions and of encoding.
@@ -26,11 +26,10 @@
 namespace esvr {
 namespace {
 
-constexpr std::size_t kFramesOfGroup = 8;
-
 struct Settings {
   std::string grid;
   double psnr = 0.0, steadiness = 0.0;
+  std::size_t framesOfGroup = 1;
   bool predicted = false;
 };
 
@@ -69,7 +68,7 @@ class Run {
   explicit Run(const Settings& settings) : settings_(settings) {}
 
   void add(const VolumeGrid& source, std::size_t number) {
-    const bool alone = !settings_.predicted || number % kFramesOfGroup == 0;
+    const bool alone = !settings_.predicted || number % settings_.framesOfGroup == 0;
     const auto start = std::chrono::steady_clock::now();
     const EsvrFile* previous = alone ? nullptr : &before_;
     ConvertOptions options{.goal = PsnrGoal{settings_.psnr},
@@ -134,12 +133,13 @@ void compare(Settings settings, const std::vector<std::string>& files) {
 }  // namespace esvr
 
 int main(int count, char** arguments) try {
-  if (count < 6) {
-    std::cerr << "usage: bench_frames GRID PSNR STEADINESS FILE FILE...\n";
+  if (count < 7) {
+    std::cerr << "usage: bench_frames GRID PSNR STEADINESS GOP FILE FILE...\n";
     return EXIT_FAILURE;
   }
-  esvr::compare({arguments[1], std::atof(arguments[2]), std::atof(arguments[3])},
-                {arguments + 4, arguments + count});
+  const auto framesOfGroup = std::size_t(std::max(std::atoi(arguments[4]), 1));
+  esvr::compare({arguments[1], std::atof(arguments[2]), std::atof(arguments[3]), framesOfGroup},
+                {arguments + 5, arguments + count});
   return EXIT_SUCCESS;
 } catch (const esvr::Error& error) {
   std::cerr << "bench_frames: " << error.what() << "\n";

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "format/checksum.h"
+#include "format/frame_table.h"
 #include "format/layout.h"
 
 namespace esvr::fuzz {
@@ -106,10 +107,20 @@ void repairTable(std::span<std::byte> file) {
   store(file, kTableChecksumAt, checksum(table));
 }
 
+/// Corrects the checksum at the end of a frame in the short form.
+void repairFrame(std::span<std::byte> frame) {
+  const std::size_t size = frame.size() - kSumBytes;
+  store(frame, size, checksum(frame.first(size)));
+}
+
 }  // namespace
 
 std::vector<std::byte> repaired(std::span<const std::byte> bytes) {
   std::vector<std::byte> file(bytes.begin(), bytes.end());
+  if (isShortFrame(bytes) && file.size() > kSumBytes) {
+    repairFrame(file);
+    return file;
+  }
   if (file.size() < kHeaderBytes) return file;
   const auto magic = std::as_bytes(std::span(kMagic));
   std::copy(magic.begin(), magic.end(), file.begin());

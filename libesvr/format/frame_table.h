@@ -1,0 +1,53 @@
+#pragma once
+/// The short form of a frame that refers to the previous one (docs/format.md, "Frames"). It has the
+/// sections of a file, but a table of a few bytes for each of them, and one checksum.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "format/byte_source.h"
+#include "format/section_table.h"
+
+namespace esvr::format {
+
+/// The first byte; no file begins with it.
+inline constexpr std::byte kFrameMark{0x46};
+
+/// Largest number of bytes of the short form besides the contents of its sections and their rows.
+inline constexpr std::uint64_t kFrameHeadBytes = 20;
+/// Largest number of bytes that a section takes besides its content if numbers of grids, chunks and
+/// contents are below 2^14.
+inline constexpr std::uint64_t kFrameRowBytes = 24;
+
+/// What a frame has in common with the previous one, so that it is not stored.
+struct Inherited {
+  bool metadata = false, vectors = false, carried = false;
+  friend bool operator==(const Inherited&, const Inherited&) = default;
+};
+
+/// The sections of a frame.
+struct FrameTable {
+  Inherited inherited;
+  SectionTable sections;  ///< rows with the same placement share their bytes
+};
+
+/// The content of each row of a table.
+struct FrameContents {
+  std::vector<std::span<const std::byte>> contents;  ///< without repetitions
+  std::vector<std::size_t> contentOf;                ///< by row: index in `contents`
+};
+
+/// Encodes a frame. \param table  its offsets and checksums are not used
+[[nodiscard]] std::vector<std::byte> putFrame(const FrameTable& table,
+                                              const FrameContents& contents);
+
+[[nodiscard]] bool isShortFrame(std::span<const std::byte> bytes);
+
+/// Reads the table of a frame in the short form, and checks the frame's checksum.
+/// \param name  start of error texts
+/// \throws BadInput
+[[nodiscard]] FrameTable getFrame(std::span<const std::byte> bytes, const std::string& name);
+
+}  // namespace esvr::format
