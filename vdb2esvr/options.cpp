@@ -202,12 +202,16 @@ void addFileOptions(cli::po::options_description& options) {
   // clang-format on
 }
 
-void addGroupOption(cli::po::options_description& options) {
-  options.add_options()(
-      "gop", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(kUsualGroupFrames)),
-      "with one file as output of a sequence: frames of a group; a reader needs at most one group "
-      "to "
-      "decode a frame, and --resume loses at most the groups that were not complete");
+void addGroupOptions(cli::po::options_description& options) {
+  // clang-format off
+  options.add_options()
+    ("gop", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(kUsualGroupFrames)),
+     "with one file as output of a sequence: frames of a group; a reader needs at most one group to "
+     "decode a frame, and --resume loses at most the groups that were not complete")
+    ("steadiness", value<double>()->value_name("S")->default_value(ConvertOptions{}.steadiness),
+     "with one file as output of a sequence: weight of flicker, from 0 (least bytes) to 1 (least "
+     "flicker), in the choice of voxels");
+  // clang-format on
 }
 
 cli::CommandLine commandLine() {
@@ -216,7 +220,7 @@ cli::CommandLine commandLine() {
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
   cli::addSequenceOptions(line.options());
-  addGroupOption(line.options());
+  addGroupOptions(line.options());
   addGoalOptions(line.options());
   addFitOptions(line.options());
   addPartOptions(line.options());
@@ -375,13 +379,16 @@ OnCancel onCancel(const Arguments& a) {
                                {{"keep", OnCancel::kKeep}, {"discard", OnCancel::kDiscard}});
 }
 
-/// Reads the size of the groups of a file that holds a sequence.
+/// Reads the options of the groups of a file that holds a sequence.
 void readGroups(const Arguments& a, Options& options) {
-  const auto frames = bounded<std::size_t>(a, "gop", std::int64_t{1}, kMostGroupFrames);
   const bool isOneFile = options.sequence && options.sequence->output.isWhole();
-  if (frames && !isOneFile && !a.values["gop"].defaulted())
-    throw UsageError("--gop needs a sequence as input and one file, without a pattern, as output");
-  options.groupFrames = *frames;
+  for (const char* option : {"gop", "steadiness"})
+    if (!isOneFile && !a.values[option].defaulted())
+      throw UsageError("--" + std::string(option) +
+                       " needs a sequence as input and one file, without a pattern, as output");
+  options.groupFrames = *bounded<std::size_t>(a, "gop", std::int64_t{1}, kMostGroupFrames);
+  options.convert.steadiness = a.get<double>("steadiness");
+  cli::requireRange("steadiness", options.convert.steadiness, 0.0, 1.0);
 }
 
 /// Reads the options of a sequence.

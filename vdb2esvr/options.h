@@ -18,7 +18,7 @@
 namespace esvr::vdb2esvr {
 
 inline constexpr const char* kProgram = "vdb2esvr";
-inline constexpr std::size_t kUsualGroupFrames = 8;  ///< of a group in a file for all frames
+inline constexpr std::size_t kUsualGroupFrames = 16;  ///< of a group in a file for all frames
 
 /// What a run does of a conversion: all of it; the share of one process in the fits; or all but the
 /// fits, from the parts that other processes have fitted.

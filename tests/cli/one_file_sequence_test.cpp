@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -14,6 +15,7 @@
 #include "esvr/container.h"
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
+#include "esvr/temporal_metrics.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr {
@@ -317,6 +319,59 @@ TEST_F(OneFile, isDrawnFrameByFrame) {
               HasSubstr("--turntable cannot be combined with a sequence"));
 }
 
+/// A cloud whose waves move by a third of a voxel a frame, in 6 frames.
+class MovingCloud : public OneFile {
+ protected:
+  MovingCloud() {
+    for (int frame = 1; frame <= 6; ++frame) {
+      auto voxels = test::cloud(14);
+      for (test::InputVoxel& v : voxels)
+        v.value *= 1.0f + 0.3f * std::sin(0.9f * (float(v.at.x) - float(frame) / 3.0f)) *
+                              std::cos(0.7f * float(v.at.y + v.at.z));
+      writeFrame(frame, {{.voxels = voxels}});
+    }
+  }
+  [[nodiscard]] test::ProgramRun convertTo(const std::string& output, const Words& more) const {
+    Words words{at("in.@.vdb"), at(output), "--device",         "cpu",
+                "--psnr",       "40",       "--representation", "voxels"};
+    words.insert(words.end(), more.begin(), more.end());
+    return vdb2esvr(words);
+  }
+  /// The mean PSNR of the changes between frames.
+  [[nodiscard]] double temporalPsnrOf(const std::string& name) const {
+    SequenceReader reader(at(name));
+    SparseVolume before, beforeIn;
+    double sum = 0.0;
+    for (const SequenceFrame& frame : reader.frames()) {
+      SparseVolume in =
+          readGrid(at("in." + std::to_string(frame.number) + ".vdb"), "density").volume;
+      SparseVolume out = decodeGrid(reader.read(frame.number).grids.at(0));
+      if (frame.number > 1) sum += temporalPsnr({beforeIn, in}, {before, out});
+      before = std::move(out), beforeIn = std::move(in);
+    }
+    return sum / double(reader.frames().size() - 1);
+  }
+};
+
+TEST_F(MovingCloud, takesFewerBytesThanFramesOfTheirOwn) {
+  ASSERT_EQ(convertTo("alone.esvr", {"--gop", "1"}).exitCode, 0);
+  ASSERT_EQ(convertTo("out.esvr", {"--report", at("r.json")}).exitCode, 0);
+  EXPECT_LT(1.5 * double(sizeOf("out.esvr")), double(sizeOf("alone.esvr")));
+  SequenceReader reader(at("out.esvr"));
+  for (const SequenceFrame& frame : reader.frames())
+    EXPECT_EQ(frame.dependsOnPrevious, frame.number > 1) << frame.number;
+  for (const Json& frame : Json::parse(bytesOf("r.json"))["frames"])
+    EXPECT_GE(frame["grids"][0]["psnr_box"].get<double>(), 40.0);
+}
+
+TEST_F(MovingCloud, isSteadierWhereAsked) {
+  ASSERT_EQ(convertTo("0.esvr", {"--steadiness", "0"}).exitCode, 0);
+  ASSERT_EQ(convertTo("1.esvr", {"--steadiness", "1"}).exitCode, 0);
+  EXPECT_LT(sizeOf("0.esvr"), sizeOf("1.esvr"));
+  EXPECT_LT(temporalPsnrOf("0.esvr"), temporalPsnrOf("1.esvr"));
+  EXPECT_EQ(convertTo("2.esvr", {"--steadiness", "1.5"}).exitCode, 2);
+}
+
 TEST_F(OneFile, needsASequenceForItsOptions) {
   writeFrames(1, 1);
   for (const std::string output : {"out.@.esvr", "out.esvr"}) {
@@ -325,6 +380,8 @@ TEST_F(OneFile, needsASequenceForItsOptions) {
     EXPECT_EQ(run.exitCode, 2);
     EXPECT_THAT(run.err, HasSubstr("--gop needs a sequence"));
   }
+  EXPECT_THAT(vdb2esvr({at("in.1.vdb"), at("out.esvr"), "--steadiness", "0"}).err,
+              HasSubstr("--steadiness needs a sequence"));
   EXPECT_EQ(convert({"--gop", "0"}).exitCode, 2);
   EXPECT_THAT(outputs(), IsEmpty());
 }

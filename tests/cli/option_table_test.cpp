@@ -73,6 +73,7 @@ Table vdb2esvrTests() {
           {"--seed", "Vdb2EsvrOption.seedsGiveOtherFiles"},
           {"--size", "Vdb2Esvr.keepsToTheSizeAskedFor"},
           {"--skip", "CarriedFile.LeavesOutTheGridsThatAreNamedBySkip"},
+          {"--steadiness", "MovingCloud.isSteadierWhereAsked"},
           {"--storage", "Vdb2EsvrOption.storageIsCompactOrFloat32"},
           {"--storage-loss", "Vdb2EsvrOption.storageLossBuysBytes"},
           {"--threads", "Vdb2Esvr.givesTheSameBytesInEveryRunOnAnyNumberOfThreads"},
