@@ -1,12 +1,16 @@
-"""Renders VDB files with Cycles on the CPU and writes OpenEXR pictures of 32-bit floats.
+"""Renders VDB files with Cycles on the CPU and compares the pictures with the first one.
 
-    blender --background --factory-startup --python render_pictures.py -- GRID A.vdb A.exr ...
+    blender --background --factory-startup --python render_pictures.py -- \\
+        OUT.json GRID A.vdb A.exr B.vdb B.exr ...
 
-The pictures have 256 x 256 pixels with 64 samples each and no denoiser. If GRID is `density`, the
-sun shines on the smoke of this grid. Otherwise, the smoke glows in the colors (v + 1) / 2 of the
-vectors v of GRID. The camera and the opacity follow from the bounds of the first file, and are the
-same for all files.
+The pictures have 256 x 256 pixels with 64 samples each and no denoiser, and are written as OpenEXR
+with 32-bit floats. If GRID is `density`, the sun shines on the smoke of this grid. Otherwise, the
+smoke glows in the colors (v + 1) / 2 of the vectors v of GRID. The camera and the opacity follow
+from the bounds of the first file, and are the same for all files. OUT.json has the PSNR in dB, with
+a peak of 1, of the other pictures (`psnr`) and of a black picture (`psnr_of_black`).
 """
+import json
+import math
 import sys
 
 import bpy
@@ -130,21 +134,34 @@ def set_up_scene(scene, first, grid):
 
 
 def render(scene, material, path, picture):
+    """Returns the numbers of all pixels."""
     volume = import_volume(path)
     volume.data.materials.append(material)
     scene.render.filepath = picture
     bpy.ops.render.render(write_still=True)
     bpy.data.objects.remove(volume)
+    return list(bpy.data.images.load(picture).pixels)
+
+
+def psnr(a, b):
+    """Leaves out alpha, which is the last of four numbers, and is at most 120 dB."""
+    squares = [(x - y) ** 2 for i, (x, y) in enumerate(zip(a, b)) if i % 4 != 3]
+    return -10 * math.log10(max(sum(squares) / len(squares), 1e-12))
 
 
 def main():
-    grid, *paths = sys.argv[sys.argv.index("--") + 1:]
+    report, grid, *paths = sys.argv[sys.argv.index("--") + 1:]
     scene = bpy.context.scene
     set_up_cycles(scene)
     set_up_picture(scene)
     material = set_up_scene(scene, paths[0], grid)
-    for path, picture in zip(paths[::2], paths[1::2]):
-        render(scene, material, path, picture)
+    first, *others = [render(scene, material, *pair) for pair in zip(paths[::2], paths[1::2])]
+    figures = {
+        "psnr": [psnr(first, other) for other in others],
+        "psnr_of_black": psnr(first, [0.0] * len(first)),
+    }
+    with open(report, "w", encoding="utf-8") as file:
+        json.dump(figures, file, indent=1)
 
 
 main()
