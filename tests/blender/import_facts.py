@@ -34,23 +34,23 @@ def import_volume(path):
     return bpy.context.object
 
 
-def surface_vertices(volume, grid_name, threshold):
-    """Vertices, in world space, of the surface on which a grid has the value `threshold`."""
+def surface_vertices(volume, grid_name):
+    """Vertices, in world space, of the surface on which a grid has the value SURFACE_VALUE."""
     mesh = bpy.data.objects.new("surface", bpy.data.meshes.new("surface"))
     bpy.context.scene.collection.objects.link(mesh)
     modifier = mesh.modifiers.new("surface", "VOLUME_TO_MESH")
     modifier.object = volume
     modifier.grid_name = grid_name
     modifier.resolution_mode = "GRID"
-    modifier.threshold = threshold
+    modifier.threshold = SURFACE_VALUE
     evaluated = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
     vertices = [tuple(vertex.co) for vertex in evaluated.data.vertices]
     bpy.data.objects.remove(mesh)
     return vertices
 
 
-def surface_facts(volume, grid, threshold):
-    vertices = surface_vertices(volume, grid.name, threshold)
+def surface_facts(volume, grid_name):
+    vertices = surface_vertices(volume, grid_name)
     if not vertices:
         return None
     axes = list(zip(*vertices))
@@ -62,14 +62,14 @@ def surface_facts(volume, grid, threshold):
     }
 
 
-def grid_facts(volume, grid, threshold):
+def grid_facts(volume, grid):
     return {
         "name": grid.name,
         "data_type": grid.data_type,
         "channels": grid.channels,
         "matrix_object": matrix_rows(grid.matrix_object),
         "loads": grid.load(),
-        "surface": surface_facts(volume, grid, threshold) if grid.channels == 1 else None,
+        "surface": surface_facts(volume, grid.name) if grid.channels == 1 else None,
     }
 
 
@@ -98,7 +98,7 @@ def sequence_facts(volume):
     }
 
 
-def volume_facts(path, threshold=SURFACE_VALUE):
+def volume_facts(path):
     volume = import_volume(path)
     volume.data.grids.load()
     bpy.context.view_layer.update()
@@ -106,7 +106,7 @@ def volume_facts(path, threshold=SURFACE_VALUE):
     return {
         "error": grids.error_message,
         "is_loaded": grids.is_loaded,
-        "grids": [grid_facts(volume, grid, threshold) for grid in grids],
+        "grids": [grid_facts(volume, grid) for grid in grids],
         "matrix_world": matrix_rows(volume.matrix_world),
         "bound_box": [list(corner) for corner in volume.bound_box],
         "dimensions": list(volume.dimensions),
