@@ -1,5 +1,6 @@
 #include "vdb/archive_writer.h"
 
+#include <openvdb/io/Compression.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/io.h>
 
@@ -13,6 +14,19 @@ namespace {
 
 constexpr bool kSeekable = true;
 
+/// Writes the metadata of a grid with its statistics.
+void writeMetadata(const openvdb::GridBase& grid, std::ostream& stream) {
+  using openvdb::GridBase;
+  const auto copy = openvdb::ConstPtrCast<GridBase>(grid.copyGrid());  // shares the tree
+  copy->addStatsMetadata();
+  // The copy does not know how many bytes the voxels of a StreamedGrid take.
+  copy->insertMeta(GridBase::META_FILE_MEM_BYTES,
+                   openvdb::Int64Metadata(openvdb::Int64(grid.memUsage())));
+  const auto packing = openvdb::io::compressionToString(openvdb::io::getDataCompression(stream));
+  copy->insertMeta(GridBase::META_FILE_COMPRESSION, openvdb::StringMetadata(packing));
+  copy->writeMeta(stream);
+}
+
 }  // namespace
 
 ArchiveWriter::ArchiveWriter(std::ostream& stream, std::uint32_t compression,
@@ -23,7 +37,6 @@ ArchiveWriter::ArchiveWriter(std::ostream& stream, std::uint32_t compression,
   setCompression(compression);
   openvdb::io::setStreamMetadataPtr(stream_, state_, /*transfer=*/false);
   openvdb::io::setDataCompression(stream_, compression);
-  openvdb::io::setWriteGridStatsMetadata(stream_, isGridStatsMetadataEnabled());
   writeHeader(stream_, kSeekable);
   metadata.writeMeta(stream_);
   const auto count = std::int32_t(names_.size());
@@ -32,7 +45,20 @@ ArchiveWriter::ArchiveWriter(std::ostream& stream, std::uint32_t compression,
 
 void ArchiveWriter::add(const openvdb::GridBase::ConstPtr& grid) {
   openvdb::io::GridDescriptor row(nextName(), grid->type(), grid->saveFloatAsHalf());
-  writeGrid(row, grid, stream_, kSeekable);
+  row.writeHeader(stream_);
+  const auto positions = stream_.tellp();
+  row.writeStreamPos(stream_);
+  row.setGridPos(stream_.tellp());
+  setGridCompression(stream_, *grid);
+  writeMetadata(*grid, stream_);
+  grid->writeTransform(stream_);
+  grid->writeTopology(stream_);
+  row.setBlockPos(stream_.tellp());
+  grid->writeBuffers(stream_);
+  row.setEndPos(stream_.tellp());
+  stream_.seekp(positions);
+  row.writeStreamPos(stream_);
+  row.seekToEnd(stream_);
   // Some flags of the compression depend on the grid.
   openvdb::io::setDataCompression(stream_, compression());
 }

@@ -16,8 +16,13 @@
 
 namespace esvr::vdb {
 
-/// OpenVDB's own functions write the header and the grids of OpenVDB. They write to a stream that
+/// OpenVDB's own functions write the header and the parts of a grid. They write to a stream that
 /// throws, unlike OpenVDB's class File.
+///
+/// Archive::writeGrid() is not used: it compresses all voxels a first time, to store the bytes of
+/// each leaf in the metadata item `file_delayed_load`. A StreamedGrid holds no voxels then, so that
+/// the item would be wrong, and applications that load voxels when they need them, such as Blender,
+/// would crash. Without the item, they find the bytes of each leaf in front of its voxels.
 class ArchiveWriter : private openvdb::io::Archive {
  public:
   /// Writes the header.

@@ -60,6 +60,12 @@ class StreamedGrid : public openvdb::Grid<Tree> {
     if (constantTiles) mergeTiles();
   }
 
+  /// The bytes that the grid takes where it is read again, with its voxels.
+  [[nodiscard]] openvdb::Index64 memUsage() const override {
+    const openvdb::Index64 leaves = this->tree().leafCount();
+    return openvdb::Grid<Tree>::memUsage() + leaves * Leaf::SIZE * sizeof(Value);
+  }
+
   void writeBuffers(std::ostream& stream) const override {
     for (auto leaf = this->tree().cbeginLeaf(); leaf; ++leaf) {
       const Coord corner{leaf->origin().x(), leaf->origin().y(), leaf->origin().z()};

@@ -1,10 +1,13 @@
-/// Plan: OpenVDB's own reader reads the written files: values, states, tiles, types and half
-/// floats. Writing can fail in several ways, each of which leaves no file.
+/// Plan: OpenVDB's own reader reads the written files, at once and later when voxels are needed:
+/// values, states, tiles, types, half floats and statistics. Writing can fail in several ways, each
+/// of which leaves no file.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <unistd.h>
+
+#include <cmath>
 
 #include "esvr/error.h"
 #include "support/file_size_limit.h"
@@ -154,6 +157,39 @@ TEST_F(Write, IsPackedByBloscAndActiveMask) {
       back->getMetadata<openvdb::StringMetadata>(openvdb::GridBase::META_FILE_COMPRESSION);
   ASSERT_TRUE(packing);
   EXPECT_EQ(packing->value(), "blosc + active values");
+}
+
+/// Voxels in many leaves whose compressed bytes differ.
+std::vector<test::VoxelValue> leavesOfManySizes() {
+  std::vector<test::VoxelValue> voxels;
+  for (int leaf = 0; leaf < 64; ++leaf)
+    for (int i = 0; i <= 8 * leaf; ++i)
+      voxels.push_back({Coord{8 * leaf, 0, 0} + voxelLocal(i), std::sin(float(i * leaf))});
+  return voxels;
+}
+
+TEST_F(Write, VoxelsAreTheSameWhereTheyAreLoadedLater) {
+  // Blender and Houdini load voxels when they need them. Only OpenVDB 13 has no such loading.
+  for (const HalfMode half : {HalfMode::kOff, HalfMode::kOn}) {
+    const auto grid = test::gridOf("density", leavesOfManySizes());
+    const auto now = writeAndLoad(grid, {.half = half, .overwrite = true});
+    openvdb::io::File file(path().string());
+    file.open(/*delayLoad=*/true);
+    const auto later = openvdb::gridPtrCast<FloatGrid>(file.readGrid("density"));
+    ASSERT_TRUE(later->tree().hasSameTopology(now->tree()));
+    for (auto voxel = later->cbeginValueOn(); voxel; ++voxel)
+      ASSERT_EQ(*voxel, now->tree().getValue(voxel.getCoord())) << voxel.getCoord();
+  }
+}
+
+TEST_F(Write, StatisticsAreThoseOfTheGridThatIsReadAgain) {
+  const auto back = writeAndLoad(test::gridOf("density", leavesOfManySizes()));
+  const auto item = [&](const char* name) { return back->metaValue<openvdb::Int64>(name); };
+  EXPECT_EQ(item(FloatGrid::META_FILE_MEM_BYTES), openvdb::Int64(back->memUsage()));
+  EXPECT_EQ(item(FloatGrid::META_FILE_VOXEL_COUNT), openvdb::Int64(back->activeVoxelCount()));
+  const openvdb::CoordBBox box = back->evalActiveVoxelBoundingBox();
+  EXPECT_EQ(back->metaValue<openvdb::Vec3i>(FloatGrid::META_FILE_BBOX_MIN), box.min().asVec3i());
+  EXPECT_EQ(back->metaValue<openvdb::Vec3i>(FloatGrid::META_FILE_BBOX_MAX), box.max().asVec3i());
 }
 
 TEST_F(Write, AnExistingFileStaysUnlessOverwriteIsGiven) {
