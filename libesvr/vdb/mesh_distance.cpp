@@ -84,11 +84,9 @@ class NearestPoints {
     std::optional<Pair> nearest;
     const auto quads = quads_->getConstAccessor();
     const openvdb::Coord low = openvdb::Coord::floor(from);
-    for (int corner = 0; corner < 8; ++corner) {
-      const openvdb::Coord voxel = low.offsetBy(corner >> 2, corner >> 1 & 1, corner & 1);
-      if (quads.isValueOn(voxel))
-        approach(mesh_, std::size_t(quads.getValue(voxel)), from, nearest);
-    }
+    for (auto voxel = openvdb::CoordBBox(low.offsetBy(-1), low.offsetBy(2)).begin(); voxel; ++voxel)
+      if (quads.isValueOn(*voxel))
+        approach(mesh_, std::size_t(quads.getValue(*voxel)), from, nearest);
     for (std::size_t q = 0; !quads.isValueOn(low) && q < mesh_.quads.size(); ++q) {
       if (nearest && nearest->squared() <= enough) break;
       approach(mesh_, q, from, nearest);
