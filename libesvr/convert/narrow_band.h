@@ -7,10 +7,10 @@
 
 namespace esvr::convert {
 
-/// Converts a narrow band with the function that converts other grids. With Representation::kAuto,
-/// voxels are stored for all goals but a FitGoal, unless the volume is large: ellipsoids would need
-/// a residual for their signs. Ellipsoids get one (withSigns) where a sign is wrong. For a SizeGoal,
-/// they are converted again so that the residual fits in.
+/// Converts a narrow band with the function that converts other grids. Ellipsoids get a residual
+/// (withSigns) where a sign is wrong. For a SizeGoal, they are then converted again with fewer bytes,
+/// so that the residual fits in. With Representation::kAuto, voxels are stored if the residual makes
+/// ellipsoids larger than them or too large.
 /// \throws UsageError  ellipsoids and their residual do not fit into the size
 /// Other exceptions are those of `convertTo`.
 [[nodiscard]] Conversion convertNarrowBand(const Job& job,

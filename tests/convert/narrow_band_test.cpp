@@ -95,7 +95,7 @@ TEST_P(NarrowBand, KeepsTheSignsOfVoxels) {
        {Goal{PsnrGoal{20.0}}, Goal{PsnrGoal{30.0}}, Goal{PsnrGoal{40.0}}, Goal{PsnrGoal{50.0}},
         Goal{PresetGoal{}}, Goal{BoundGoal{0.4 * voxel_}}, Goal{BoundGoal{0.02, true}},
         Goal{SizeGoal{2500}}, Goal{LosslessGoal{}}}) {
-    const Conversion conversion = converted(volume_, goal);
+    const Conversion conversion = converted(volume_, goal, Representation::kVoxels);
     EXPECT_TRUE(conversion.grid.voxels);
     expectSameSigns(volume_, conversion.grid);
   }
@@ -118,6 +118,18 @@ INSTANTIATE_TEST_SUITE_P(Shapes, NarrowBand,
                                           testing::Values(Band{}, Band{1.5, 1.5}, Band{3.0, 1.5},
                                                           Band{3.0, 3.0, 0.01},
                                                           Band{3.0, 3.0, 100.0})));
+
+TEST(NarrowBandChoice, SlowKeepsTheSignsOfWhatIsStored) {
+  const SparseVolume volume = levelSetOf(toBall, {});
+  for (const Goal& goal :
+       {Goal{PsnrGoal{35.0}}, Goal{PresetGoal{}}, Goal{SizeGoal{1200}}, Goal{SizeGoal{6000}}}) {
+    const Conversion conversion = converted(volume, goal);
+    expectSameSigns(volume, conversion.grid);
+    if (const auto* size = std::get_if<SizeGoal>(&goal)) {
+      EXPECT_LE(bytesAdded(conversion.grid), size->bytes);
+    }
+  }
+}
 
 TEST(NarrowBandBound, IsKeptNearTheSurface) {
   const SparseVolume volume = levelSetOf(toBall, {});

@@ -69,7 +69,6 @@ enum class Representation {
   /// more bytes. If the bricks of the volume have more than 2^25 voxels, goals other than a
   /// BoundGoal store either exact voxels or ellipsoids. Coding voxels takes long then, so that it
   /// is done only if an estimate from a sample says that they may be small enough.
-  /// Of a narrow band whose bricks do not have more voxels, goals other than a FitGoal store voxels.
   kAuto,
   /// Ellipsoids. For a BoundGoal they have a residual, which a narrow band has only together with
   /// Activity::kExact. For the other goals, those of a narrow band have one where the sign of a voxel
