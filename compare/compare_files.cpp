@@ -8,6 +8,7 @@
 #include "compare/limits.h"
 #include "compare/unfitted.h"
 #include "esvr/error.h"
+#include "esvr/mesh_distance.h"
 #include "esvr/vector_metrics.h"
 
 namespace esvr::compare {
@@ -131,6 +132,7 @@ class Comparison {
     grid.metrics = compareVolumes(a.volume, b.volume,
                                   {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
     grid.figures = figuresOf(grid.metrics);
+    addMeshDistance(grid, a, b);
     grid.differences = compareDescriptors(a.descriptor, b.descriptor);
     addRange(a.volume);
     addTemporal(grid, a.volume, b.volume);
@@ -168,6 +170,14 @@ class Comparison {
     of.background = a.background[component];
     other.background = b.background[component];
     return compareDescriptors(of, other);
+  }
+
+  /// Adds the distance of the surfaces of level sets if there is a limit for it. It takes longer
+  /// than all other figures.
+  void addMeshDistance(CheckedGrid& grid, const VolumeGrid& a, const VolumeGrid& b) const {
+    const auto figure = std::size_t(FigureId::kMeshDistance);
+    if (options_.limits[figure] && a.descriptor.gridClass == GridClass::kLevelSet)
+      grid.figures[figure] = meshDistance(a, b).voxels;
   }
 
   void addTemporal(CheckedGrid& grid, const SparseVolume& a, const SparseVolume& b) const {

@@ -74,6 +74,14 @@ constexpr std::array<Figure, kFigureCount> kFigures{{
      false,
      false,
      {.absolute = 0.001}},
+    {FigureId::kMeshDistance,
+     "mesh_distance",
+     "max-mesh-distance",
+     "mesh distance",
+     "of level sets: largest Hausdorff distance of the meshes of the zero crossings, in voxels",
+     false,
+     false,
+     {.absolute = 0.01}},
 }};
 
 bool isPsnr(const Figure& figure) {

@@ -18,9 +18,10 @@ enum class FigureId {
   kP999Error,
   kIou,
   kSsim,
-  kMassError
+  kMassError,
+  kMeshDistance
 };
-inline constexpr std::size_t kFigureCount = 8;
+inline constexpr std::size_t kFigureCount = 9;
 
 /// The default tolerance of a figure against a baseline.
 struct Slack {

@@ -62,6 +62,18 @@ std::optional<double> errorBetween(const SparseVolume& source, const StoredGrid&
       {.box = fit.box, .range = rule.range, .narrowBand = rule.narrowBand, .peak = fit.peak});
 }
 
+/// Largest number of voxels in bricks up to which the meshes of a level set are compared without
+/// being asked for. Comparing them takes about 2 s per million of these voxels.
+constexpr std::size_t kMaxMeshedVoxels = std::size_t{1} << 19;
+
+std::optional<SurfaceErrors> surfaceErrors(const VolumeGrid& source, const VolumeGrid& decoded) {
+  if (!isNarrowBand(source.descriptor, source.volume)) return std::nullopt;
+  SurfaceErrors errors{compareSigns(source.volume, decoded.volume)};
+  if (source.volume.values.size() <= kMaxMeshedVoxels)
+    errors.distance = meshDistance(source, decoded);
+  return errors;
+}
+
 /// A converted grid that has its names only.
 ConvertedGrid named(const FittedGrid& fitted) {
   ConvertedGrid grid;
@@ -92,9 +104,13 @@ ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
   if (options.job == Job::kPart) return grid;
 
-  grid.metrics =
-      compareVolumes(source.volume, decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)}),
-                     {.box = fit.box, .peak = fit.peak});
+  const VolumeGrid decoded{
+      .descriptor = source.descriptor,
+      .volume = decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)})};
+  grid.metrics = compareVolumes(source.volume, decoded.volume, {.box = fit.box, .peak = fit.peak});
+  grid.surface = surfaceErrors(source, decoded);
+  if (source.descriptor.gridClass == GridClass::kLevelSet)
+    grid.whyNoNarrowBand = whyNoNarrowBand(source.descriptor, source.volume);
   grid.psnrBetween = errorBetween(source.volume, grid.stored(), fit);
   grid.seconds.measure = watch.lap();
   if (options.countHits) countHits(source.volume, grid);

@@ -6,7 +6,9 @@
 #include <string>
 
 #include "esvr/convert.h"
+#include "esvr/mesh_distance.h"
 #include "esvr/metrics.h"
+#include "esvr/sign_errors.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/twins.h"
 
@@ -18,14 +20,22 @@ struct PhaseSeconds {
   [[nodiscard]] double total() const { return read + seed + optimise + encode + measure; }
 };
 
+/// Errors of the surface of a narrow band.
+struct SurfaceErrors {
+  SignErrors signs;
+  std::optional<MeshDistance> distance{};  ///< nothing if the volume is large
+};
+
 struct ConvertedGrid {
   std::string uniqueName;                ///< FittedGrid::uniqueName()
   std::string sourceName;                ///< GridSummary::uniqueName of the grid of the input
   std::optional<std::size_t> component;  ///< of vectors
   Conversion conversion;
-  VolumeMetrics metrics;              ///< errors of the decoded grid
-  std::optional<double> psnrBetween;  ///< of ellipsoids that were fitted for drawing, dB
-  std::size_t bricks = 0;             ///< bricks of the source
+  VolumeMetrics metrics;                 ///< errors of the decoded grid
+  std::optional<SurfaceErrors> surface;  ///< of a narrow band
+  std::string whyNoNarrowBand;           ///< of a level set that is none (whyNoNarrowBand())
+  std::optional<double> psnrBetween;     ///< of ellipsoids that were fitted for drawing, dB
+  std::size_t bricks = 0;                ///< bricks of the source
   std::uint64_t nonFiniteReplaced = 0;
   std::string device;                       ///< name of the device that fitted the grid
   std::optional<double> hits;               ///< averageHits, with --hits

@@ -202,6 +202,15 @@ Json layersOf(const StoredGrid& grid) {
   return layers;
 }
 
+/// The errors of the surface of a narrow band; other grids have none.
+Json surfaceOf(const std::optional<SurfaceErrors>& surface) {
+  Json distance = nullptr;
+  if (surface && surface->distance)
+    distance = {{"voxels", surface->distance->voxels}, {"world", surface->distance->world}};
+  return {{"sign_errors", surface ? Json(surface->signs.voxels) : Json(nullptr)},
+          {"mesh_distance", std::move(distance)}};
+}
+
 /// \param between  PSNR between voxels
 Json metricsOf(const VolumeMetrics& m, const std::optional<double>& between) {
   return {{"peak", m.peak},
@@ -266,6 +275,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"representation", choiceOf(grid)},
           {"layers", layersOf(grid.stored())},
           {"metrics", metricsOf(grid.metrics, grid.psnrBetween)},
+          {"surface", surfaceOf(grid.surface)},
           {"seconds", secondsOf(grid.seconds)},
           {"left_out", leftOutJson(leftOut(record, g))},
           {"curve", curveOf(grid.conversion.fit.curve)}};

@@ -40,6 +40,17 @@ void printRemark(const ConvertedGrid& grid, std::ostream& out) {
         << *bytes << '\n';
 }
 
+/// Says how far the surface of a level set has moved, or why the grid is stored like other grids.
+void printSurface(const ConvertedGrid& grid, std::ostream& out) {
+  if (!grid.whyNoNarrowBand.empty())
+    out << cli::printable(grid.uniqueName)
+        << ": this level set is stored like other grids, because " << grid.whyNoNarrowBand << '\n';
+  if (!grid.surface || !grid.surface->distance) return;
+  out << cli::printable(grid.uniqueName) << ": the surface moves by at most "
+      << cli::shortNumber(grid.surface->distance->voxels) << " voxels, and "
+      << grid.surface->signs.voxels << " voxels change sign\n";
+}
+
 /// Says how the data of a grid were made.
 void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& out) {
   const bool forDrawing = options.convert.fit.fitFor == FitFor::kDrawing;
@@ -47,6 +58,7 @@ void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& 
   if (forDrawing && levelSet && grid.stored().field.fitFor == FitFor::kVoxels)
     out << cli::printable(grid.uniqueName)
         << ": fitted for voxels, because the sum of a level set cannot be drawn\n";
+  printSurface(grid, out);
   if (grid.psnrBetween)
     out << cli::printable(grid.uniqueName) << ": the sum between voxels has "
         << cli::decibels(*grid.psnrBetween) << " dB\n";

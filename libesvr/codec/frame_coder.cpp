@@ -206,7 +206,8 @@ class FrameCoder {
     if (thrift_->bitPrice <= 0.0) return written;
     const double target = target_[at_ % kBrickVoxels];
     if (std::abs(target) > kLargestTarget) return written;
-    const auto nearest = std::int32_t(std::lround(target));
+    const bool keeps = thrift_->signs == RoundedSigns::kKept;
+    const auto nearest = signedLike(written, std::int32_t(std::lround(target)), keeps);
     const std::int64_t guess = predictor_.guess();
     if (guess == nearest) return nearest;
     const std::int32_t step = guess > nearest ? 1 : -1;
@@ -214,10 +215,17 @@ class FrameCoder {
     std::int32_t best = nearest;
     for (int n = 1; n <= kMaxSteps && nearest + (n - 1) * step != guess; ++n) {
       const std::int32_t code = nearest + n * step;
+      if (keeps && (code < 0) != (written < 0)) break;
       const double cost = costOf(target, code);
       if (cost < least) least = cost, best = code;
     }
     return best;
+  }
+
+  /// The code, or if its sign has to be kept and is another, the nearest code with the sign.
+  static std::int32_t signedLike(std::int32_t written, std::int32_t code, bool keeps) {
+    if (!keeps) return code;
+    return written < 0 ? std::min(code, -1) : std::max(code, 0);
   }
 
   double costOf(double target, std::int32_t code) {

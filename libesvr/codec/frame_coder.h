@@ -26,6 +26,7 @@ struct FrameThrift {
   std::vector<double> exact;  ///< the voxels in units of the lattice, as the layer's codes
   double bitPrice = 0.0;      ///< squared error, in the same units, that a bit is worth
   double steadiness = 0.0;    ///< share of the previous frame's errors that is kept
+  RoundedSigns signs = RoundedSigns::kMayChange;  ///< kKept: a code keeps its sign
 };
 
 /// Codes the positions of the bricks of a frame. A reader sets `bricks`.

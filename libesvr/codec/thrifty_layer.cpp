@@ -29,11 +29,12 @@ VoxelLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
   if (layer.form != VoxelForm::kQuantised) return layer;
   const auto order = codec::codingOrder(layer.bricks);
   if (options.previous && codec::isPredictable(layer, *options.previous)) {
-    const codec::FrameThrift thrift{placesOf(volume, layer), options.bitPrice, options.steadiness};
+    const codec::FrameThrift thrift{placesOf(volume, layer), options.bitPrice, options.steadiness,
+                                    options.signs};
     codec::chooseFrameCodes(order, codec::PastVoxels(*options.previous, layer), thrift, layer);
     return layer;
   }
-  const codec::Thrift thrift{placesOf(volume, layer), options.bitPrice};
+  const codec::Thrift thrift{placesOf(volume, layer), options.bitPrice, options.signs};
   codec::chooseCodes(order, codec::chooseModel(layer), thrift, layer);
   return layer;
 }

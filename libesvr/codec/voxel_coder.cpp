@@ -186,6 +186,7 @@ class VoxelCoder {
     std::int32_t best = nearest;
     for (int n = 1; n <= Thrift::kMaxSteps && nearest + (n - 1) * step != guess; ++n) {
       const std::int32_t code = nearest + n * step;
+      if (thrift_->signs == RoundedSigns::kKept && (code < 0) != (nearest < 0)) break;
       const double cost = costOf(context, code);
       if (cost < least) least = cost, best = code;
     }

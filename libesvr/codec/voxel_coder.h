@@ -29,6 +29,7 @@ struct Thrift {
   static constexpr int kMaxSteps = 2;  ///< largest distance of a code from the nearest one
   std::vector<double> exact;           ///< the voxels in units of the lattice, as the layer's codes
   double bitPrice = 0.0;               ///< squared error, in the same units, that a bit is worth
+  RoundedSigns signs = RoundedSigns::kMayChange;  ///< kKept: a code keeps its sign
 };
 
 /// Replaces the code of a voxel that is not vacant by a code near it that takes fewer bits, if the

@@ -45,7 +45,13 @@ bool allHalves(const SparseVolume& volume) {
                      [](float v) { return sameBits(codec::halfAt(codec::orderOfHalf(v)), v); });
 }
 
-void fill(const SparseVolume& volume, VoxelLayer& layer) {
+/// The code of a value. With kKept, the code of a negative value is negative.
+std::int32_t roundedCode(const VoxelLayer& layer, float value, RoundedSigns signs) {
+  const std::int32_t code = codec::codeOfValue(layer, value);
+  return signs == RoundedSigns::kKept && value < 0.0f ? std::min(code, -1) : code;
+}
+
+void fill(const SparseVolume& volume, RoundedSigns signs, VoxelLayer& layer) {
   layer.origin = volume.origin;
   layer.background = volume.background;
   layer.bricks = volume.bricks;
@@ -57,7 +63,7 @@ void fill(const SparseVolume& volume, VoxelLayer& layer) {
     for (int v = 0; v < kBrickVoxels; ++v) {
       if (!volume.active[b].test(v) && sameBits(values[v], volume.background))
         layer.vacant[b].set(v);
-      layer.codes[b * kBrickVoxels + std::size_t(v)] = codec::codeOfValue(layer, values[v]);
+      layer.codes[b * kBrickVoxels + std::size_t(v)] = roundedCode(layer, values[v], signs);
     }
   });
 }
@@ -70,11 +76,11 @@ double roundingError(const SparseVolume& volume, double bound) {
 }
 
 /// The voxels of a volume, rounded to multiples of two half steps.
-VoxelLayer quantised(const SparseVolume& volume, double halfStep) {
+VoxelLayer quantised(const SparseVolume& volume, double halfStep, RoundedSigns signs) {
   VoxelLayer layer;
   layer.form = VoxelForm::kQuantised;
   layer.divisor = 0.5 / halfStep;
-  fill(volume, layer);
+  fill(volume, signs, layer);
   return layer;
 }
 
@@ -121,19 +127,21 @@ VoxelLayer exactLayer(const SparseVolume& volume) {
   layer.form = !layer.palette.empty() ? VoxelForm::kPalette
                : allHalves(volume)    ? VoxelForm::kHalf
                                       : VoxelForm::kFloat;
-  fill(volume, layer);
+  fill(volume, RoundedSigns::kMayChange, layer);
   return layer;
 }
 
-VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity) {
+VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
+                        RoundedSigns signs) {
   if (!(std::isfinite(bound) && bound > 0.0))
     throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
   // Multiples of twice the bound are nearly exact on the first lattice. Its values may miss the
   // bound where they are rounded to float32; the second lattice is finer and leaves room for that.
-  const double halfStep = bound * kMargin;
+  // A negative value near 0 that keeps its sign is up to a whole step off.
+  const double halfStep = (signs == RoundedSigns::kKept ? 0.5 : 1.0) * bound * kMargin;
   for (const double h : {halfStep, halfStep - roundingError(volume, bound)}) {
     if (!(h > 0.0)) break;
-    VoxelLayer layer = quantised(volume, h);
+    VoxelLayer layer = quantised(volume, h, signs);
     if (activity == Activity::kByValue) activateByValue(volume, halfStep, layer);
     if (largestError(volume, layer) <= bound) return layer;
   }

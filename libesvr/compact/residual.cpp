@@ -1,24 +1,20 @@
 #include "esvr/residual.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <utility>
 
+#include "compact/residual_layer.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
-#include "field/evaluate_plan.h"
 #include "format/residual_value.h"
 
 namespace esvr {
 namespace {
 
-/// Largest difference of evaluateBricks between two machines, as a share of the sum of |I|: twice
-/// the error that field.h states, for aspect ratios up to 100 and up to 1000.
-constexpr double kDifference = 2.0 * 4e-6, kDifferenceStretched = 2.0 * 2e-4;
-constexpr double kStretchedLog = 4.6;  // natural logarithm of an aspect ratio of 100
+using compact::BrickCodes;
+
 /// Largest margin, as a share of the bound; with more, voxels alone take fewer bytes.
 constexpr double kMaxMarginShare = 1.0 / 6.0;
 
@@ -32,25 +28,6 @@ constexpr double kRoundingFactor = 0.99;
 double stepOf(bool byValue, double bound, double margin) {
   return kRoundingFactor *
          (byValue ? (2.0 - kThresholdShare) * bound - 3.0 * margin : 2.0 * bound - 2.0 * margin);
-}
-
-/// The largest difference between two machines' evaluations of each brick.
-std::vector<double> marginsOf(const Field& field, std::span<const Coord> corners) {
-  std::vector<double> differences;
-  for (const Chunk& chunk : field.chunks) {
-    const Ellipsoids& e = chunk.ellipsoids;
-    for (std::size_t i = 0; i < e.size(); ++i) {
-      const auto [low, high] = std::minmax({e.logScale[0][i], e.logScale[1][i], e.logScale[2][i]});
-      differences.push_back(std::abs(double(e.intensity[i])) *
-                            (high - low < kStretchedLog ? kDifference : kDifferenceStretched));
-    }
-  }
-  const BrickPairs pairs = planEvaluation(field, corners).pairs;
-  std::vector<double> margins(corners.size(), kDifference * std::abs(double(field.background)));
-  for (std::size_t b = 0; b < corners.size(); ++b)
-    for (std::uint32_t p = pairs.brickBegin[b]; p < pairs.brickBegin[b + 1]; ++p)
-      margins[b] += differences[pairs.ellipsoid[p]];
-  return margins;
 }
 
 std::vector<Coord> cornersOf(const SparseVolume& volume) {
@@ -109,11 +86,6 @@ class Bounded {
   double threshold_, divisor_;
 };
 
-struct BrickCodes {
-  Coord corner;
-  std::array<std::int32_t, kBrickVoxels> codes{};
-};
-
 /// Fills the codes of one brick. \return false if a voxel has no code that keeps the bound
 bool fillCodes(const Bounded& bounded, std::span<const float> wanted, const BrickMask* mask,
                std::span<const float> sum, double margin, BrickCodes& out) {
@@ -126,40 +98,16 @@ bool fillCodes(const Bounded& bounded, std::span<const float> wanted, const Bric
   return true;
 }
 
-VoxelLayer layerOf(const std::vector<BrickCodes>& bricks, double divisor) {
-  VoxelLayer layer;
-  layer.form = VoxelForm::kQuantised;
-  layer.divisor = divisor;
-  if (!bricks.empty()) layer.origin = bricks.front().corner;
-  for (const BrickCodes& brick : bricks) layer.origin = minCoord(layer.origin, brick.corner);
-  for (const BrickCodes& brick : bricks) {
-    layer.bricks.push_back(brickOf(brick.corner - layer.origin));
-    layer.codes.insert(layer.codes.end(), brick.codes.begin(), brick.codes.end());
-  }
-  layer.active.resize(bricks.size());
-  layer.vacant.resize(bricks.size());
-  for (BrickMask& mask : layer.active) mask.setAll();
-  return layer;
-}
-
-/// The sum in the given bricks, with all voxels active.
-SparseVolume sumIn(const StoredGrid& grid, std::span<const Coord> corners) {
-  return revoxelise(grid.field, {.threshold = -std::numeric_limits<float>::max(),
-                                 .range = voxelRule(grid).range,
-                                 .bricks = corners,
-                                 .restrictToBricks = true});
-}
-
 }  // namespace
 
 std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& source, double bound) {
   if (grid.topology == TopologyKind::kBricks) return std::nullopt;
   const auto corners = bricksOfEither(grid, source);
-  const auto margins = marginsOf(grid.field, corners);
+  const auto margins = compact::marginsOf(grid.field, corners);
   const double margin = margins.empty() ? 0.0 : *std::max_element(margins.begin(), margins.end());
   if (margin > kMaxMarginShare * bound) return std::nullopt;
   const Bounded bounded(grid, bound, margin);
-  const SparseVolume sum = sumIn(grid, corners);
+  const SparseVolume sum = compact::sumIn(grid, corners);
   const std::vector<float> emptyBrick(kBrickVoxels, source.background);
   std::vector<BrickCodes> bricks;
   for (std::size_t b = 0; b < corners.size(); ++b) {
@@ -172,7 +120,7 @@ std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& sour
     if (std::any_of(brick.codes.begin(), brick.codes.end(), [](auto code) { return code != 0; }))
       bricks.push_back(brick);
   }
-  grid.residual = layerOf(bricks, bounded.divisor());
+  grid.residual = compact::layerOf(bricks, bounded.divisor());
   if (grid.topology == TopologyKind::kThreshold) grid.activeThreshold = bounded.threshold();
   return grid;
 }

@@ -95,6 +95,10 @@ Activity voxelActivity(const Job& job) {
   return levelSet ? Activity::kExact : job.options.storage.activity;
 }
 
+RoundedSigns voxelSigns(const Job& job) {
+  return job.options.fit.narrowBand ? RoundedSigns::kKept : RoundedSigns::kMayChange;
+}
+
 double psnrOf(const Job& job, const SparseVolume& volume) {
   return psnrOverBox(job.input.source, volume,
                      {.box = job.options.fit.box, .peak = job.options.fit.peak});

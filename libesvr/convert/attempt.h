@@ -35,6 +35,9 @@ struct Job {
 /// because the width of its band is part of its shape.
 [[nodiscard]] Activity voxelActivity(const Job& job);
 
+/// How voxels are rounded: with their signs if the grid is a narrow band.
+[[nodiscard]] RoundedSigns voxelSigns(const Job& job);
+
 /// The target of a search.
 struct PsnrTarget {
   double psnr = 0.0;  ///< dB over the box

@@ -127,7 +127,8 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   const SparseVolume& source = job.input.source;
   const double bound = absoluteBound(goal, source);
   if (bound == 0.0) return asVoxels(job, exactLayer(source));
-  Conversion voxels = asVoxels(job, boundedLayer(source, bound, voxelActivity(job)));
+  Conversion voxels =
+      asVoxels(job, boundedLayer(source, bound, voxelActivity(job), voxelSigns(job)));
   const bool insists = job.options.representation == Representation::kEllipsoids;
   if (isNarrowBand(job.input.descriptor, source) && !insists) return voxels;
   Smaller best{std::move(voxels), {}, insists};

@@ -7,6 +7,7 @@
 #include "convert/bounded.h"
 #include "convert/choice.h"
 #include "convert/exact_voxels.h"
+#include "convert/narrow_band.h"
 #include "convert/preset.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
@@ -76,12 +77,21 @@ StoredGrid throughTheFormat(StoredGrid grid, const VoxelMemory& memory) {
 }
 
 /// Checks the decoded grid against the bound.
-void requireBound(const ConvertInput& input, const StoredGrid& grid, double bound) {
-  const double error =
-      largestDifference(input.source, decodeGrid(grid, {.memory = memoryOf(input.source)}));
+void requireBound(const ConvertInput& input, const SparseVolume& decoded, double bound) {
+  const double error = largestDifference(input.source, decoded);
   if (error > bound)
     throw RuntimeFailure("grid '" + input.descriptor.name + "': an error of " +
                          std::to_string(error) + " exceeds the bound of " + std::to_string(bound));
+}
+
+/// Checks the decoded grid against all that it promises.
+void requirePromises(const Job& job, const StoredGrid& grid) {
+  const SparseVolume& source = job.input.source;
+  const auto bound = convert::boundOf(job.options.goal, source);
+  if (!bound && !job.options.fit.narrowBand) return;
+  const SparseVolume decoded = decodeGrid(grid, {.memory = memoryOf(source)});
+  if (bound) requireBound(job.input, decoded, *bound);
+  if (job.options.fit.narrowBand) convert::requireSigns(job.input, decoded);
 }
 
 void requirePossible(const ConvertOptions& options) {
@@ -140,11 +150,14 @@ Conversion convertVolume(const ConvertInput& input, const ConvertOptions& option
   if (own.fit.narrowBand) own.fit.fitFor = FitFor::kVoxels;
   if (own.fit.fitFor == FitFor::kDrawing) own.representation = Representation::kEllipsoids;
   if (keepsVoxels(own)) own.representation = Representation::kVoxels;
-  Conversion conversion = std::visit(Converter({input, own}), options.goal);
+  const auto convertTo = [](const Job& job) {
+    return std::visit(Converter(job), job.options.goal);
+  };
+  Conversion conversion = own.fit.narrowBand ? convert::convertNarrowBand({input, own}, convertTo)
+                                             : convertTo({input, own});
   conversion.smallerExactBytes = smallerExactBytes({input, own}, conversion.grid);
   conversion.grid = throughTheFormat(std::move(conversion.grid), memoryOf(input.source));
-  if (const auto bound = convert::boundOf(options.goal, input.source))
-    requireBound(input, conversion.grid, *bound);
+  requirePromises({input, own}, conversion.grid);
   return conversion;
 }
 

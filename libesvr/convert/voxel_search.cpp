@@ -165,14 +165,14 @@ class VoxelSearch {
 
   [[nodiscard]] VoxelLayer layerAt(double bound, double price) const {
     const SparseVolume& source = job_.input.source;
-    VoxelLayer layer = boundedLayer(source, bound, voxelActivity(job_));
+    VoxelLayer layer = boundedLayer(source, bound, voxelActivity(job_), voxelSigns(job_));
     return price > 0.0 ? thriftyLayer(source, std::move(layer), thriftOf(price)) : layer;
   }
 
   [[nodiscard]] ThriftOptions thriftOf(double price) const {
     const StoredGrid* previous = job_.options.previous;
     const VoxelLayer* layer = previous && previous->voxels ? &*previous->voxels : nullptr;
-    return {price, layer, kErrorsKept * job_.options.steadiness};
+    return {price, layer, kErrorsKept * job_.options.steadiness, voxelSigns(job_)};
   }
 
   [[nodiscard]] Trial tryBound(double bound, double price) const {

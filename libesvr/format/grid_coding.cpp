@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "esvr/empty_signs.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "format/active_threshold.h"
@@ -86,9 +87,20 @@ bool followsFromEllipsoids(const StoredGrid& grid) {
   return !grid.voxels && !grid.residual && grid.topology != TopologyKind::kMask;
 }
 
+std::string whyNoNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) {
+  if (descriptor.gridClass != GridClass::kLevelSet) return "it is no level set";
+  if (!(source.background > 0.0f))
+    return "its background, the half width of a band, is not above 0";
+  const ValueRange range = activeRange(source);
+  if (!withinBand(range, source.background))
+    return "an active voxel is farther from the surface than its background, the half width";
+  if (!(range.min < 0.0f)) return "no active voxel is negative, so that nothing is inside";
+  if (!EmptySigns(source).agree()) return "its surface has holes, so that no side of it is inside";
+  return {};
+}
+
 bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) {
-  return isLevelSet(descriptor, source.background) &&
-         withinBand(activeRange(source), source.background);
+  return whyNoNarrowBand(descriptor, source).empty();
 }
 
 namespace {

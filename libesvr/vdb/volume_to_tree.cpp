@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+#include "esvr/empty_signs.h"
 #include "esvr/error.h"
 #include "vdb/metadata.h"
 #include "vdb/streamed_grid.h"
@@ -54,7 +55,8 @@ typename openvdb::Grid<Tree>::Ptr makeGrid(const VolumeGrid& source, const Write
   Tree& tree = grid->tree();
   addLeaves(source.volume, tree);
   // The flood fill overwrites active tiles, so it runs before there are any.
-  if (levelSet && background > 0) openvdb::tools::signedFloodFill(tree);
+  if (levelSet && background > 0 && EmptySigns(source.volume).agree())
+    openvdb::tools::signedFloodFill(tree);
   if (options.constantTiles) openvdb::tools::prune(tree);
   return grid;
 }

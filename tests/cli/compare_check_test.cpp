@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -139,6 +140,28 @@ TEST_F(CompareCheck, boundsTheFilesBytes) {
   const auto run = check("ref.vdb", {"--max-bytes", "100"});
   EXPECT_EQ(run.exitCode, 4);
   EXPECT_THAT(run.err, HasSubstr("--max-bytes 100"));
+}
+
+/// The level set of a ball, with all values inside active.
+InputGrid surfaceOf(float radius) {
+  InputGrid grid{.background = 3.0f, .levelSet = true};
+  for (int x = -6; x <= 6; ++x)
+    for (int y = -6; y <= 6; ++y)
+      for (int z = -6; z <= 6; ++z) {
+        const auto distance = float(std::hypot(x, y, z)) - radius;
+        if (distance < grid.background) grid.voxels.push_back({{x, y, z}, distance});
+      }
+  return grid;
+}
+
+TEST_F(CompareCheck, boundsTheDistanceOfTheSurfacesOfLevelSets) {
+  write("ref.vdb", {surfaceOf(2.5f)});
+  write("moved.vdb", {surfaceOf(2.75f)});
+  EXPECT_EQ(check("moved.vdb", {"--max-mesh-distance", "0.4"}).exitCode, 0);
+  const auto run = check("moved.vdb", {"--max-mesh-distance", "0.15"});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("--max-mesh-distance 0.15"));
+  EXPECT_FALSE(reportOf("moved.vdb")["grids"][0].contains("mesh_distance"));
 }
 
 TEST_F(CompareCheck, failsWhereAGridIsMissing) {

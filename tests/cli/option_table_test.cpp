@@ -164,6 +164,7 @@ Table checkTests() {
           {"--max-error", "CompareLimit.passesOrFailsWithTheFigure"},
           {"--max-mass-error", "CompareLimit.passesOrFailsWithTheFigure"},
           {"--max-p999-error", "CompareLimit.passesOrFailsWithTheFigure"},
+          {"--max-mesh-distance", "CompareCheck.boundsTheDistanceOfTheSurfacesOfLevelSets"},
           {"--max-memory", "CompareCheck.refusesWhatTakesMoreMemoryThanAllowed"},
           {"--min-iou", "CompareLimit.passesOrFailsWithTheFigure"},
           {"--min-psnr", "CompareLimit.passesOrFailsWithTheFigure"},

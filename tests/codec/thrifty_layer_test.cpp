@@ -1,6 +1,6 @@
 // Plan: thriftyLayer lowers the sum of squared error and price of bits, as counted in the encoded
 // file, on smooth and on noisy values. It moves codes by two steps at most, towards fewer bits, and
-// changes nothing else. A price of 0 and other forms than a lattice change nothing.
+// changes nothing else. No code changes sign if signs are to be kept. A price of 0 and other forms than a lattice change nothing.
 
 #include <gtest/gtest.h>
 
@@ -56,6 +56,21 @@ TEST_P(ThriftyLayer, MovesCodesByTwoStepsAtMostAndNothingElse) {
   EXPECT_GT(moved, 0);
   layer.codes = nearest_.codes;
   EXPECT_EQ(layer, nearest_);
+}
+
+TEST(ThriftyLayerOfALevelSet, KeepsSignsIfAsked) {
+  SparseVolume wave = noisyWave(0.03);
+  for (float& v : wave.values) v -= 1.0f;
+  const VoxelLayer nearest = boundedLayer(wave, kBound, Activity::kExact, RoundedSigns::kKept);
+  const auto changed = [&](RoundedSigns signs) {
+    const VoxelLayer layer = thriftyLayer(wave, nearest, {.bitPrice = 0.3, .signs = signs});
+    int voxels = 0;
+    for (std::size_t i = 0; i < layer.codes.size(); ++i)
+      voxels += (layer.codes[i] < 0) != (wave.values[i] < 0.0f);
+    return voxels;
+  };
+  EXPECT_EQ(changed(RoundedSigns::kKept), 0);
+  EXPECT_GT(changed(RoundedSigns::kMayChange), 0);
 }
 
 TEST_P(ThriftyLayer, OfFreeBitsIsTheNearest) {

@@ -111,6 +111,20 @@ TEST(ExactLayer, KeepsActiveBackgroundAndInactiveValues) {
   expectExact(volume, VoxelForm::kPalette);
 }
 
+TEST(BoundedLayer, KeepsSignsWithinItsBoundIfAsked) {
+  const SparseVolume band = test::levelSetVolume();
+  const auto changed = [&](RoundedSigns signs) {
+    const VoxelLayer layer = boundedLayer(band, 0.4, Activity::kExact, signs);
+    EXPECT_LE(largestError(band, layer), 0.4);
+    int voxels = 0;
+    for (std::size_t i = 0; i < layer.codes.size(); ++i)
+      voxels += (layer.codes[i] < 0) != (band.values[i] < 0.0f);
+    return voxels;
+  };
+  EXPECT_EQ(changed(RoundedSigns::kKept), 0);
+  EXPECT_GT(changed(RoundedSigns::kMayChange), 0);
+}
+
 TEST(BoundedLayer, KeepsItsBoundAtAnyScale) {
   for (const double scale : {1e-30, 1.0, 1e4, 1e30})
     for (const double share : {0.1, 0.01, 1e-4})

@@ -70,7 +70,9 @@ enum class Representation {
   /// BoundGoal store either exact voxels or ellipsoids. Coding voxels takes long then, so that it
   /// is done only if an estimate from a sample says that they may be small enough.
   kAuto,
-  /// Ellipsoids. For a BoundGoal they have a residual, which a narrow band cannot have.
+  /// Ellipsoids. For a BoundGoal they have a residual, which a narrow band has only together with
+  /// Activity::kExact. For the other goals, those of a narrow band have one where the sign of a voxel
+  /// would be wrong.
   kEllipsoids,
   kVoxels
 };
@@ -180,8 +182,10 @@ struct Conversion {
 /// \throws UsageError  the grid does not fit into the size; the source of a LosslessGoal has
 ///                     doubles; a SizeGoal is combined with kFloat32; the goal and the
 ///                     representation exclude each other; kEllipsoids is requested for a BoundGoal
-///                     that ellipsoids with a residual cannot reach
-/// \throws RuntimeFailure  the stored grid exceeds its bound
+///                     that ellipsoids with a residual cannot reach; a SizeGoal is too small for
+///                     the ellipsoids of a narrow band and the residual of their signs
+/// \throws RuntimeFailure  the stored grid exceeds its bound; a voxel of a narrow band has another
+///                         sign than in the source (the text names the grid and the voxel)
 /// Other exceptions are those of fit and compactGrid.
 [[nodiscard]] Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options);
 

@@ -29,11 +29,16 @@ namespace esvr {
                                         const SparseVolume& source, Field field,
                                         Activity activity = Activity::kByValue);
 
-/// True for a level set whose background (the half width of its band) is above 0 and not exceeded
-/// by an active voxel. makeStoredGrid stores such a grid as a narrow band, and
+/// True for a closed level set: its background (the half width of its band) is above 0 and not
+/// exceeded by an active voxel, an active voxel is negative, and the signs around its empty space
+/// agree (EmptySigns::agree). makeStoredGrid stores such a grid as a narrow band, and
 /// FitOptions::narrowBand is intended for it. Any other level set is fitted and stored like other
 /// grids.
 [[nodiscard]] bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source);
+
+/// Why a grid is no narrow band, as the part of a sentence after "because"; empty if it is one.
+[[nodiscard]] std::string whyNoNarrowBand(const GridDescriptor& descriptor,
+                                          const SparseVolume& source);
 
 /// Makes a stored grid that holds voxels and no ellipsoids.
 /// \param layer  the voxels of `source` (voxel_layer.h)

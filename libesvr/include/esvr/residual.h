@@ -1,6 +1,6 @@
 #pragma once
-/// A residual bounds the error of every voxel: it corrects the sum of ellipsoids wherever the error
-/// of the sum exceeds the bound.
+/// A residual corrects the sum of ellipsoids voxel by voxel: where its error exceeds a bound, or
+/// where its sign is wrong.
 
 #include <cstdint>
 #include <optional>
@@ -19,5 +19,11 @@ namespace esvr {
 /// \return nothing if the grid is a narrow band, or if the margin exceeds a sixth of the bound
 [[nodiscard]] std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& source,
                                                      double bound);
+
+/// Corrects the sign of every voxel of a narrow band where the sum has another one than the source,
+/// by a residual. A reader on any machine then finds the signs of the source, as above.
+/// \param grid  a narrow band without a residual that makeStoredGrid made from `source`
+/// \return the grid without a residual if no sign is wrong
+[[nodiscard]] StoredGrid withSigns(StoredGrid grid, const SparseVolume& source);
 
 }  // namespace esvr

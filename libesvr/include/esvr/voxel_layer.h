@@ -46,10 +46,19 @@ enum class Activity {
   kByValue  ///< a voxel is active if its value differs from the background by more than the bound
 };
 
+/// Whether rounding keeps the signs of values. The surface of a level set is where they change.
+enum class RoundedSigns {
+  kMayChange,  ///< values are rounded to the nearest code
+  /// A negative value never becomes 0, and no other value becomes negative. The quantisation steps
+  /// are half as wide as without it, so that the values nearest to 0 keep the bound, too.
+  kKept
+};
+
 /// Makes a layer whose voxels are within `bound` of the volume's. If float32 is too coarse for the
 /// bound, the layer is exactLayer().
 /// \throws UsageError  the bound is not positive and finite
-[[nodiscard]] VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity);
+[[nodiscard]] VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
+                                      RoundedSigns signs = RoundedSigns::kMayChange);
 
 /// What thriftyLayer() weighs. All errors are in squared steps of the quantisation lattice.
 struct ThriftOptions {
@@ -63,6 +72,8 @@ struct ThriftOptions {
   /// Share of the errors of the previous frame that the voxels keep, from 0 to 1. The errors are
   /// estimated from the difference between neighbours. It is ignored without `previous`.
   double steadiness = 0.0;
+  /// With kKept, no code gets another sign (negative or not) than the voxel has in the volume.
+  RoundedSigns signs = RoundedSigns::kMayChange;
 };
 
 /// Makes a layer smaller by rate-distortion optimised quantisation. A voxel gets a code at most

@@ -1,0 +1,23 @@
+#pragma once
+/// Conversions of narrow bands, which keep the sign of every voxel.
+
+#include <functional>
+
+#include "convert/attempt.h"
+
+namespace esvr::convert {
+
+/// Converts a narrow band with the function that converts other grids. Ellipsoids get a residual
+/// (withSigns) where a sign is wrong. For a SizeGoal, they are then converted again with fewer bytes,
+/// so that the residual fits in. With Representation::kAuto, voxels are stored if the residual makes
+/// ellipsoids larger than them or too large.
+/// \throws UsageError  ellipsoids and their residual do not fit into the size
+/// Other exceptions are those of `convertTo`.
+[[nodiscard]] Conversion convertNarrowBand(const Job& job,
+                                           const std::function<Conversion(const Job&)>& convertTo);
+
+/// Checks that a decoded narrow band has the signs of its source, in its bricks and elsewhere.
+/// \throws RuntimeFailure  a sign differs; the text names the grid and the voxel
+void requireSigns(const ConvertInput& input, const SparseVolume& decoded);
+
+}  // namespace esvr::convert
