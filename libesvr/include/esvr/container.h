@@ -236,7 +236,8 @@ struct EsvrSummary {
 /// Reads the header and the section table of a file.
 /// \throws BadInput  as for readEsvr
 [[nodiscard]] EsvrSummary inspectEsvr(const std::filesystem::path& path);
-/// The same for a file in memory. \param nameForErrors  name of the file in error texts
+/// The same for a file or a frame (frame_coding.h) in memory.
+/// \param nameForErrors  its name in error texts
 [[nodiscard]] EsvrSummary inspectEsvr(std::span<const std::byte> bytes,
                                       const std::string& nameForErrors);
 

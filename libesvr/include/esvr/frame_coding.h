@@ -15,7 +15,8 @@ namespace esvr {
 /// Encodes a file as a frame. Each grid that holds voxels, and whose predecessor has the same number
 /// in `previous` and holds voxels too, is stored as its difference from its predecessor if that
 /// takes fewer bytes. All other grids are stored as encodeEsvr() stores them. The bytes are those of
-/// an .esvr file, and encodeEsvr()'s if no grid refers to the previous frame.
+/// encodeEsvr() if no grid refers to the previous frame. Otherwise they have a short form, without
+/// the metadata, the vectors and the carried grids that are those of the previous frame.
 /// \param previous  the frame before as decodeFrame() returned it; null: the frame stands alone
 /// \throws RuntimeFailure  as for encodeEsvr
 [[nodiscard]] std::vector<std::byte> encodeFrame(const EsvrFile& frame, const EsvrFile* previous);
@@ -30,8 +31,8 @@ namespace esvr {
                                    const std::string& nameForErrors, const ReadLimits& limits,
                                    const EsvrFile* previous);
 
-/// True if decodeFrame() needs the previous frame. Only the section table is read.
-/// \throws BadInput  the header or the section table is damaged
+/// True if decodeFrame() needs the previous frame.
+/// \throws BadInput  the header or the section table of a frame that stands alone is damaged
 [[nodiscard]] bool dependsOnPrevious(std::span<const std::byte> bytes);
 
 /// Largest number of bytes that a grid adds to a frame, like bytesAdded() for a file.
