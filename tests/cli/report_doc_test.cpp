@@ -140,6 +140,9 @@ TEST_F(ReportDoc, namesTheKeysOfAConversion) {
   };
   convert("in.vdb", {"--count", "30"});
   convert("cloud.vdb", {"--max-error", "5%"});
+  test::writeInput(at("surface.vdb"),
+                   {{.voxels = test::distances(10), .background = 20.0f, .levelSet = true}});
+  convert("surface.vdb", {"--max-error", "5%"});
   test::writeVectorInput(at("wind.vdb"), {.voxels = test::softBall({})});
   convert("wind.vdb", {"--count", "30", "--representation", "ellipsoids"});
   add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--paper", "epochs=28,points=60", "--count", "40",
