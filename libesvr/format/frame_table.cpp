@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint8_t kMetadata = 1, kVectors = 2, kCarried = 4, kAll = 7;
 constexpr std::uint16_t kMinorVersion = 3;
-constexpr std::size_t kChecksumBytes = sizeof(std::uint64_t);
+constexpr std::size_t kFrameSumBytes = sizeof(std::uint64_t);
 
 std::uint8_t bitsOf(const Inherited& inherited) {
   return std::uint8_t((inherited.metadata ? kMetadata : 0) | (inherited.vectors ? kVectors : 0) |
@@ -53,7 +53,7 @@ void putSizes(ByteWriter& out, const SectionEntry& row) {
 class FrameReader {
  public:
   FrameReader(std::span<const std::byte> bytes, const std::string& name)
-      : name_(name), bytes_(bytes), in_(bytes.first(bytes.size() - kChecksumBytes), name) {}
+      : name_(name), bytes_(bytes), in_(bytes.first(bytes.size() - kFrameSumBytes), name) {}
 
   FrameTable read() {
     (void)in_.get<std::uint8_t>();
@@ -95,7 +95,7 @@ class FrameReader {
   }
   void placeContents() {
     for (SectionEntry& content : contents_) {
-      content.offset = bytes_.size() - kChecksumBytes - in_.left();
+      content.offset = bytes_.size() - kFrameSumBytes - in_.left();
       if (content.storedBytes > in_.left()) in_.fail("sections do not lie in the frame");
       content.checksum = checksum(in_.getBytes(content.storedBytes));
     }
@@ -140,9 +140,9 @@ bool isShortFrame(std::span<const std::byte> bytes) {
 }
 
 FrameTable getFrame(std::span<const std::byte> bytes, const std::string& name) {
-  if (bytes.size() < kChecksumBytes + 2) throw BadInput(name + ": the frame is truncated");
-  ByteReader end(bytes.last(kChecksumBytes), name);
-  if (checksum(bytes.first(bytes.size() - kChecksumBytes)) != end.get<std::uint64_t>())
+  if (bytes.size() < kFrameSumBytes + 2) throw BadInput(name + ": the frame is truncated");
+  ByteReader end(bytes.last(kFrameSumBytes), name);
+  if (checksum(bytes.first(bytes.size() - kFrameSumBytes)) != end.get<std::uint64_t>())
     throw BadInput(name + ": the checksum of the frame does not match");
   return FrameReader(bytes, name).read();
 }

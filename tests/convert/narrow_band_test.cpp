@@ -62,8 +62,8 @@ GridDescriptor levelSet(const SparseVolume& volume) {
   return descriptor;
 }
 
-Conversion converted(const SparseVolume& volume, const Goal& goal,
-                     Representation representation = Representation::kAuto) {
+Conversion bandOf(const SparseVolume& volume, const Goal& goal,
+                  Representation representation = Representation::kAuto) {
   ConvertOptions options;
   options.goal = goal;
   options.representation = representation;
@@ -95,7 +95,7 @@ TEST_P(NarrowBand, KeepsTheSignsOfVoxels) {
        {Goal{PsnrGoal{20.0}}, Goal{PsnrGoal{30.0}}, Goal{PsnrGoal{40.0}}, Goal{PsnrGoal{50.0}},
         Goal{PresetGoal{}}, Goal{BoundGoal{0.4 * voxel_}}, Goal{BoundGoal{0.02, true}},
         Goal{SizeGoal{2500}}, Goal{LosslessGoal{}}}) {
-    const Conversion conversion = converted(volume_, goal, Representation::kVoxels);
+    const Conversion conversion = bandOf(volume_, goal, Representation::kVoxels);
     EXPECT_TRUE(conversion.grid.voxels);
     expectSameSigns(volume_, conversion.grid);
   }
@@ -103,7 +103,7 @@ TEST_P(NarrowBand, KeepsTheSignsOfVoxels) {
 
 TEST_P(NarrowBand, SlowKeepsTheSignsOfEllipsoids) {
   for (const Goal& goal : {Goal{FitGoal{}}, Goal{SizeGoal{8000}}}) {
-    const Conversion conversion = converted(volume_, goal, Representation::kEllipsoids);
+    const Conversion conversion = bandOf(volume_, goal, Representation::kEllipsoids);
     EXPECT_FALSE(conversion.grid.voxels);
     EXPECT_TRUE(conversion.grid.residual) << "no sign had to be corrected";
     expectSameSigns(volume_, conversion.grid);
@@ -123,7 +123,7 @@ TEST(NarrowBandChoice, SlowKeepsTheSignsOfWhatIsStored) {
   const SparseVolume volume = levelSetOf(toBall, {});
   for (const Goal& goal :
        {Goal{PsnrGoal{35.0}}, Goal{PresetGoal{}}, Goal{SizeGoal{1200}}, Goal{SizeGoal{6000}}}) {
-    const Conversion conversion = converted(volume, goal);
+    const Conversion conversion = bandOf(volume, goal);
     expectSameSigns(volume, conversion.grid);
     if (const auto* size = std::get_if<SizeGoal>(&goal)) {
       EXPECT_LE(bytesAdded(conversion.grid), size->bytes);
@@ -134,8 +134,7 @@ TEST(NarrowBandChoice, SlowKeepsTheSignsOfWhatIsStored) {
 TEST(NarrowBandBound, IsKeptNearTheSurface) {
   const SparseVolume volume = levelSetOf(toBall, {});
   for (const double bound : {0.5, 0.1, 0.01})
-    EXPECT_LE(largestDifference(volume, decodeGrid(converted(volume, BoundGoal{bound}).grid)),
-              bound);
+    EXPECT_LE(largestDifference(volume, decodeGrid(bandOf(volume, BoundGoal{bound}).grid)), bound);
 }
 
 TEST(OtherLevelSets, AreConvertedLikeOtherGrids) {
@@ -157,7 +156,7 @@ TEST(OtherLevelSets, AreConvertedLikeOtherGrids) {
        std::array<const SparseVolume*, 3>{&hole, &unsignedBand, &wide}) {
     EXPECT_FALSE(isNarrowBand(levelSet(*volume), *volume));
     EXPECT_FALSE(whyNoNarrowBand(levelSet(*volume), *volume).empty());
-    const Conversion conversion = converted(*volume, PsnrGoal{30.0}, Representation::kVoxels);
+    const Conversion conversion = bandOf(*volume, PsnrGoal{30.0}, Representation::kVoxels);
     EXPECT_TRUE(conversion.grid.voxels);
   }
 }
