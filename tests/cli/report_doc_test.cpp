@@ -220,6 +220,9 @@ TEST_F(ComparisonDoc, namesTheKeysOfACheck) {
   for (const std::string frame : {"1", "2"})
     test::writeInput(at("s." + frame + ".vdb"), {{.voxels = test::softBall({})}});
   add(ESVR_COMPARE, {"check", at("s.@.vdb"), at("s.@.vdb")});
+  test::writeInput(at("surface.vdb"),
+                   {{.voxels = test::distances(10), .background = 20.0f, .levelSet = true}});
+  add(ESVR_COMPARE, {"check", at("surface.vdb"), at("surface.vdb"), "--max-mesh-distance", "1"});
   expectTable(all_, tableAfter(document_, "The report of `check`"), {}, "check");
 }
 
