@@ -24,7 +24,11 @@ void append(double v, int bits, std::vector<png_byte>& to) {
 
 /// The alpha of a transparent pixel. Light of a grid that emits but does not absorb can exceed the
 /// alpha of the picture, and a PNG could not hold it.
-double alphaFor(const float* pixel) { return *std::max_element(pixel, pixel + kPngChannels); }
+double alphaFor(const float* pixel) {
+  constexpr float kRounding = 1e-6f;  // of an alpha that is 1 less a transmittance
+  const float alpha = pixel[3], most = *std::max_element(pixel, pixel + 3);
+  return most > alpha + kRounding ? most : alpha;
+}
 
 void appendPixel(const float* from, const PngForm& form, std::vector<png_byte>& to) {
   const double alpha = form.background ? from[3] : alphaFor(from), behind = 1.0 - alpha;
