@@ -10,6 +10,7 @@
 #include "cli/error_bound.h"
 #include "cli/host_memory.h"
 #include "cli/table.h"
+#include "vdb2esvr/frame_options.h"
 #include "vdb2esvr/paper_options.h"
 #include "vdb2esvr/part_options.h"
 #include "vdb2esvr/refuse_with.h"
@@ -26,7 +27,6 @@ constexpr std::int64_t kMaxIterations = 10'000'000;
 constexpr double kHighestPsnr = 300.0;  // dB; float32 reaches about 150
 constexpr double kLongestRun = 1e9;     // seconds
 constexpr double kLargestRatio = 1e9;
-constexpr std::int64_t kMostGroupFrames = 1'000'000;
 constexpr double kMaxLoss = 20.0;                  // dB
 constexpr double kMinVram = 1e-3, kMaxVram = 1e6;  // GB
 constexpr float kLargestKappa = 1e4f;              // kernel.h
@@ -202,25 +202,12 @@ void addFileOptions(cli::po::options_description& options) {
   // clang-format on
 }
 
-void addGroupOptions(cli::po::options_description& options) {
-  // clang-format off
-  options.add_options()
-    ("gop", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(kUsualGroupFrames)),
-     "with one file as output of a sequence: frames of a group; a reader needs at most one group to "
-     "decode a frame, and --resume loses at most the groups that were not complete")
-    ("steadiness", value<double>()->value_name("S")->default_value(ConvertOptions{}.steadiness),
-     "with one file as output of a sequence: weight of flicker, from 0 (least bytes) to 1 (least "
-     "flicker), in the choice of voxels");
-  // clang-format on
-}
-
 cli::CommandLine commandLine() {
   cli::CommandLine line(programText());
   line.argument("input", "IN.vdb");
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
-  cli::addSequenceOptions(line.options());
-  addGroupOptions(line.options());
+  addFrameOptions(line.options());
   addGoalOptions(line.options());
   addFitOptions(line.options());
   addPartOptions(line.options());
@@ -377,35 +364,6 @@ ProgressForm progressForm(const Arguments& a) {
 OnCancel onCancel(const Arguments& a) {
   return cli::choose<OnCancel>("on-cancel", a.get<std::string>("on-cancel"),
                                {{"keep", OnCancel::kKeep}, {"discard", OnCancel::kDiscard}});
-}
-
-/// Reads the options of the groups of a file that holds a sequence.
-void readGroups(const Arguments& a, Options& options) {
-  const bool isOneFile = options.sequence && options.sequence->output.isWhole();
-  for (const char* option : {"gop", "steadiness"})
-    if (!isOneFile && !a.values[option].defaulted())
-      throw UsageError("--" + std::string(option) +
-                       " needs a sequence as input and one file, without a pattern, as output");
-  options.groupFrames = *bounded<std::size_t>(a, "gop", std::int64_t{1}, kMostGroupFrames);
-  options.convert.steadiness = a.get<double>("steadiness");
-  cli::requireRange("steadiness", options.convert.steadiness, 0.0, 1.0);
-}
-
-/// Reads the options of a sequence.
-void readFrames(const Arguments& a, Options& options) {
-  options.sequence = cli::readSequence(a, {.output = true});
-  readGroups(a, options);
-  if (!options.sequence) return;
-  for (const char* option : {"part", "merge"})
-    if (a.has(option) && !a.values[option].defaulted())
-      throw UsageError("--" + std::string(option) +
-                       " is for one volume; give each job some frames of the sequence (--frames)");
-  if (options.resume && a.get<bool>("force"))
-    throw UsageError(
-        "--resume keeps the frames that are there, and --force replaces them; choose one");
-  if (auto* goal = std::get_if<PresetGoal>(&options.convert.goal)) goal->steady = true;
-  // A frame that ended early would look as if it were complete.
-  if (a.values["on-cancel"].defaulted()) options.onCancel = OnCancel::kDiscard;
 }
 
 void readMemory(const Arguments& a, Options& options) {

@@ -123,7 +123,8 @@ class FrameCoder {
   /// Sets the values that chosen codes are to be near: the exact ones, with a share of the errors of
   /// the previous frame.
   void setTargets(std::size_t b) {
-    std::array<double, kBrickVoxels> apart;  // of the previous frame from the exact values
+    // How far the values of the previous frame are from the exact values.
+    std::array<double, kBrickVoxels> apart;
     const double* exact = &thrift_->exact[b * kBrickVoxels];
     for (int v = 0; v < kBrickVoxels; ++v)
       apart[std::size_t(v)] = cube_.place[Cube::cell(voxelLocal(v))] - exact[v];

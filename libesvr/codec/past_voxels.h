@@ -17,7 +17,7 @@ struct PastCube {
   static constexpr int kStepX = kSide * kSide, kStepY = kSide, kStepZ = 1;
   static constexpr std::size_t kCells = std::size_t(kSide) * kSide * kSide;
 
-  std::array<double, kCells> place;  ///< in units of the codes
+  std::array<double, kCells> place;  ///< values in units of the codes
   std::array<bool, kCells> active;
 
   static std::size_t cell(Coord local) {
@@ -61,9 +61,9 @@ class PastVoxels {
 
   const VoxelLayer& past_;
   BrickIndex index_;
-  Coord shift_;                ///< in bricks, from the previous frame to the frame
-  double vacantPlace_ = 0.0;   ///< of voxels that are vacant or have no brick
-  VoxelArray<double> places_;  ///< of all voxels of the previous frame
+  Coord shift_;                ///< what is added to places in the previous frame, in bricks
+  double vacantPlace_ = 0.0;   ///< place of voxels that are vacant or have no brick
+  VoxelArray<double> places_;  ///< places of all voxels of the previous frame
 };
 
 }  // namespace esvr::codec

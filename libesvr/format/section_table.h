@@ -46,7 +46,7 @@ struct SectionTable {
   std::uint64_t fileBytes = 0;
   std::uint64_t tableOffset = kHeaderBytes;
   std::vector<SectionEntry> entries{};
-  bool isFrame = false;  ///< of a frame in the short form (frame_table.h)
+  bool isFrame = false;  ///< the table is that of a frame in the short form (frame_table.h)
 };
 
 /// A name for error texts, for example "centers of grid 0, chunk 2".

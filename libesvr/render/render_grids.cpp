@@ -9,27 +9,30 @@
 namespace esvr {
 namespace {
 
-std::vector<TransferTable> tablesOf(const RenderOptions& options, std::size_t grids) {
+/// The tables of the grids after the first one, whose table the picture has.
+std::vector<TransferTable> furtherTables(const RenderOptions& options) {
   std::vector<TransferTable> tables;
-  for (std::size_t g = 0; g < grids; ++g)
-    tables.emplace_back(lookOf(options, g).transfer, samplingOf(options));
+  for (const GridLook& look : options.further)
+    tables.emplace_back(look.transfer, samplingOf(options));
   return tables;
 }
 
 GridsScene sceneOf(const std::vector<GridCells>& grids, const RenderOptions& options,
-                   const std::vector<TransferTable>& transfers) {
+                   const TransferTable& first, const std::vector<TransferTable>& further) {
   std::vector<GridTable> tables;
   for (std::size_t g = 0; g < grids.size(); ++g)
-    tables.push_back({grids[g].table().view(), cellsOf(grids[g].table()), transfers[g].view(),
-                      grids[g].background()});
+    tables.push_back({grids[g].table().view(), cellsOf(grids[g].table()),
+                      g == 0 ? first.view() : further[g - 1].view(), grids[g].background()});
   return gridsScene(options, tables);
 }
 
 class GridsPicture {
  public:
-  GridsPicture(const std::vector<GridCells>& grids, const RenderOptions& options)
-      : transfers_(tablesOf(options, grids.size())),
-        scene_(sceneOf(grids, options, transfers_)),
+  /// \param first  table of the first grid; must outlive the object
+  GridsPicture(const std::vector<GridCells>& grids, const RenderOptions& options,
+               const TransferTable& first)
+      : further_(furtherTables(options)),
+        scene_(sceneOf(grids, options, first, further_)),
         firstSample_(firstSampleOf(scene_)),
         ranges_(options.resolution) {
     for (std::size_t g = 0; g < grids.size(); ++g) {
@@ -51,7 +54,7 @@ class GridsPicture {
   }
 
  private:
-  std::vector<TransferTable> transfers_;
+  std::vector<TransferTable> further_;
   GridsScene scene_;
   double firstSample_;
   std::array<GridSlots, kMostGrids> slots_{};
@@ -88,7 +91,7 @@ Image renderGrids(const std::vector<GridCells>& grids, const RenderOptions& opti
   Picture picture(options, grids.size());
   if (std::ranges::all_of(grids, [](const GridCells& g) { return g.table().bricks.empty(); }))
     return picture.take();
-  kDrawGrids[grids.size() - 1](GridsPicture(grids, options), options, picture);
+  kDrawGrids[grids.size() - 1](GridsPicture(grids, options, picture.table), options, picture);
   return picture.take();
 }
 

@@ -73,7 +73,7 @@ TEST_F(GridsOnGpu, HaveTheSameBitsWhateverWasDecodedBefore) {
   EXPECT_EQ(other->draw(optionsForTwo(70.0)).rgba, fresh.rgba);
 }
 
-/// Each grid gets a page of 256 bricks at least. The grids have about 600 and 400.
+/// Each grid keeps a page of 256 bricks at least.
 TEST_F(GridsOnGpu, HaveTheSameBitsInMemoryForAPartOfTheBricks) {
   for (const auto& grids : {fields_, mixed_}) {
     const auto unlimited = renderer(grids);
