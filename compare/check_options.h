@@ -21,8 +21,9 @@ namespace esvr::compare {
 
 struct CheckOptions {
   std::filesystem::path reference, candidate;
-  std::optional<std::vector<cli::FrameNumber>> frames;  ///< of sequences; nothing: all
-  std::vector<std::string> grids;                       ///< NAME or NAME=NAME IN CAND; empty: all
+  std::optional<std::vector<cli::FrameNumber>>
+      frames;                      ///< frames that are compared, of sequences; nothing: all
+  std::vector<std::string> grids;  ///< NAME or NAME=NAME IN CAND; empty: all
   /// Grids that are not compared, and that only one of the files may have.
   std::set<std::string> ignored;
   std::array<std::optional<cli::ErrorBound>, kFigureCount> limits;

@@ -22,7 +22,7 @@ struct FrameEntry {
 inline constexpr std::uint64_t kFrameEntryBytes = 28;
 
 struct FrameGroup {
-  std::uint64_t offset = 0;  ///< of its directory in the file
+  std::uint64_t offset = 0;  ///< where its directory begins in the file
   std::vector<FrameEntry> frames;
 };
 

@@ -105,7 +105,7 @@ std::vector<FrameGroup> findGroups(const ByteSource& source) {
   try {
     for (;;) groups.push_back(completeGroup(source, endOf(groups)));
   } catch (const BadInput&) {
-    return groups;  // what follows the last complete group was not completed
+    return groups;  // the bytes behind them are not a complete group
   }
 }
 
