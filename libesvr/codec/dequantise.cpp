@@ -1,10 +1,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
+#include "codec/code_values.h"
 #include "codec/lattice_bits.h"
 #include "esvr/quantised.h"
 
@@ -13,41 +10,26 @@ namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
 
-/// The middle of the interval that a code stands for, with 2^bits intervals in a unit.
-double middle(double code, int bits) { return std::ldexp(code + 0.5, -bits); }
-
 void putScales(const QuantisedEllipsoids& q, std::size_t i, Ellipsoids& e) {
-  const int bits = scaleBits(q.lattice, q.precision[i]);
-  double log = double(q.lattice.lowestScale);
-  for (std::size_t a = 0; a < 3; ++a) {
-    log += middle(q.scale[a][i], bits);
-    e.logScale[2 - a][i] = float(log * q.lattice.scaleStep);
-  }
+  const auto logs = logScalesOf(q.lattice, scaleBits(q.lattice, q.precision[i]), scaleCodes(q, i));
+  for (std::size_t a = 0; a < 3; ++a) e.logScale[a][i] = float(logs[a]);
 }
 
 void putCenter(const QuantisedEllipsoids& q, std::size_t i, const AxisBits& bits, Ellipsoids& e) {
   const Coord& low = q.lattice.lowestCell;
   const double lowest[] = {double(low.x), double(low.y), double(low.z)};
   for (std::size_t a = 0; a < 3; ++a)
-    e.center[a][i] = float((lowest[a] + middle(q.position[a][i], bits[a])) * q.lattice.cell);
+    e.center[a][i] = float((lowest[a] + middleOfCode(q.position[a][i], bits[a])) * q.lattice.cell);
 }
 
 void putRotation(const QuantisedEllipsoids& q, std::size_t i, const AxisBits& bits, Ellipsoids& e) {
-  std::array<double, 4> r{1.0, 0.0, 0.0, 0.0};
-  double norm2 = 0.0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const int unused = Lattice::kMaxRotationBits - bits[a];
-    r[a + 1] = (middle(q.rotation[a][i] >> unused, bits[a]) - 0.5) * kRotationSide;
-    norm2 = norm2 + r[a + 1] * r[a + 1];
-  }
-  r[0] = std::sqrt(std::max(0.0, 1.0 - norm2));
-  const double norm = std::sqrt(norm2 + r[0] * r[0]);
-  for (std::size_t a = 0; a < 4; ++a) e.rotation[a][i] = float(r[a] / norm);
+  const Quaternion r = quaternionOf(rotationCodes(q, i), bits);
+  for (std::size_t a = 0; a < 4; ++a) e.rotation[a][i] = float(r[a]);
 }
 
 void putIntensity(const QuantisedEllipsoids& q, std::size_t i, int shift, Ellipsoids& e) {
   const std::int32_t code = q.intensity[i];
-  const double magnitude = middle(code < 0 ? -1 - code : code, shift) * q.lattice.intensityStep;
+  const double magnitude = middleOfCode(code < 0 ? -1 - code : code, shift) * q.lattice.intensityStep;
   e.intensity[i] = float(code < 0 ? -magnitude : magnitude);
 }
 

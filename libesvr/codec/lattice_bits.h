@@ -62,10 +62,19 @@ inline int intensityShift(const Lattice& lattice, const CoarseScales& s) {
   return std::clamp(shift, 0, Lattice::kMaxIntensityShift);
 }
 
+/// The codes of the scales of ellipsoid i, the smallest scale first.
+inline std::array<std::uint32_t, 3> scaleCodes(const QuantisedEllipsoids& q, std::size_t i) {
+  return {q.scale[0][i], q.scale[1][i], q.scale[2][i]};
+}
+
+/// The coarse part of the codes of scales that have this number of finer bits.
+inline CoarseScales coarseOf(const std::array<std::uint32_t, 3>& codes, int bits) {
+  return {codes[0] >> bits, codes[1] >> bits, codes[2] >> bits};
+}
+
 /// The coarse scales of ellipsoid i.
 inline CoarseScales coarseScales(const QuantisedEllipsoids& q, std::size_t i) {
-  const int bits = scaleBits(q.lattice, q.precision[i]);
-  return {q.scale[0][i] >> bits, q.scale[1][i] >> bits, q.scale[2][i] >> bits};
+  return coarseOf(scaleCodes(q, i), scaleBits(q.lattice, q.precision[i]));
 }
 
 inline RotationCodes rotationCodes(const QuantisedEllipsoids& q, std::size_t i) {

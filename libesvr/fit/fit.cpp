@@ -1,6 +1,9 @@
 #include "esvr/fit.h"
 
+#include <cstdlib>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "esvr/error.h"
 #include "fit/chunks/chunks_for.h"
@@ -30,10 +33,33 @@ RunPlan planFor(const FitTarget& target, const FitOptions& options, const Tuning
   return plan;
 }
 
+/// The ellipsoids of the start that are still there, or kNoStart.
+/// \param all   the state at the end of the run: ellipsoids of the start keep their places, and those
+///              that were replaced have taken fewer steps
+/// \param kept  some of its ellipsoids, in the same order
+std::vector<std::uint32_t> startsOf(const FitState& all, std::size_t starts, std::uint32_t steps,
+                                    std::span<const Ellipsoid> kept) {
+  std::vector<std::uint32_t> startOf;
+  std::size_t i = 0;
+  for (const Ellipsoid& p : kept) {
+    while (all.ellipsoids[i].center != p.center) ++i;
+    const bool isStart = i < starts && all.adam[i].steps == steps;
+    startOf.push_back(isStart ? std::uint32_t(i) : kNoStart);
+    ++i;
+  }
+  return startOf;
+}
+
 /// Fits all bricks together.
 FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
                    const TargetScale& scale) {
-  const Tuning tuning;
+  Tuning tuning;
+  if (options.start) {
+    if (const char* t = std::getenv("RELOC")) tuning.relocateShare = std::atof(t);
+    if (const char* t = std::getenv("STEP")) tuning.steps = tuning.steps.scaled(std::atof(t));
+    if (const char* t = std::getenv("FINAL")) tuning.finalStep = std::atof(t);
+    if (const char* t = std::getenv("BETA2")) tuning.adam.beta2 = std::atof(t);
+  }
   FitTarget target = makeTarget(volume, boxOf(volume, options.box), scale);
   applyOptions(options, target);
   Recorder recorder(target, options);
@@ -44,6 +70,7 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
   const auto optimiser = makeOptimiser(target, optimiserOptions, tuning);
   const RunEnd end = run(*optimiser, target, recorder, plan, tuning);
   if (end.end == FitEnd::kCancelled && optimiser->ellipsoidCount() == 0) throw Cancelled();
+  const FitState all = options.start ? optimiser->state() : FitState{};
   optimiser->dropUnseen();
   recorder.record(*optimiser, end.iterations);
 
@@ -52,6 +79,8 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
   result.field = exportField(ellipsoids,
                              {volume.origin, target.scale, volume.background, optimiser->kernel()});
   result.field.fitFor = options.fitFor;
+  if (options.start && result.field.chunks.size() == 1)
+    result.startOf = startsOf(all, options.start->ellipsoidCount(), end.iterations, ellipsoids);
   result.range = rangeOf(volume.background, target);
   result.kappaLearned = plan.learnKappa;
   result.end = end.end;

@@ -27,9 +27,6 @@ namespace {
 
 using namespace format;
 
-/// Bytes that a quantised ellipsoid takes in memory, as integers and as floats.
-constexpr double kDecodedBytesPerEllipsoid = 128.0;
-
 bool meet(const Box& a, const Box& b) {
   const Coord low = maxCoord(a.min, b.min), high = minCoord(a.max, b.max);
   return low.x <= high.x && low.y <= high.y && low.z <= high.z;

@@ -30,6 +30,9 @@ using BlockBytes = std::array<std::span<const std::byte>, kStreams>;
   return blockRuns(q.size(), q.layerEnds);
 }
 
+/// Bytes that a quantised ellipsoid takes in memory, as integers and as floats.
+inline constexpr double kDecodedBytesPerEllipsoid = 128.0;
+
 /// Limit on the number of ellipsoids in a byte, so that a reader knows it before it allocates
 /// memory. Equal ellipsoids could take fewer bytes; the writer then adds zeros.
 inline constexpr std::uint64_t kMaxEllipsoidsPerByte = 64;

@@ -64,6 +64,12 @@ struct QuantisedEllipsoids {
   /// End index of each importance layer, increasing; the last one is size(). Empty: there is one
   /// layer only.
   std::vector<std::size_t> layerEnds;
+  /// Of the frame of a sequence: for each of the first ellipsoids, the index of the ellipsoid of the
+  /// previous frame that it continues, increasing. The ellipsoids after them are new, and there are
+  /// no layers. Empty if no ellipsoid continues another one.
+  std::vector<std::uint32_t> continues{};
+  /// The motion of each of these ellipsoids since the previous frame, in 1/256 of a cell.
+  std::array<std::vector<std::int32_t>, 3> motion{};
 
   [[nodiscard]] std::size_t size() const { return precision.size(); }
   void resize(std::size_t n);

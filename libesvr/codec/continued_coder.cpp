@@ -1,0 +1,543 @@
+#include "codec/continued_coder.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "codec/code_values.h"
+#include "codec/difference_model.h"
+#include "codec/lattice_bits.h"
+#include "codec/least_squares.h"
+#include "codec/motion_map.h"
+#include "codec/nearest_axes.h"
+#include "codec/rounding.h"
+#include "esvr/error.h"
+
+namespace esvr::codec {
+namespace {
+
+/// Places are integers in units of 2^-kUnitBits cells, so that the middle of every code is one.
+constexpr int kUnitBits = Lattice::kMaxPositionBits + 1;
+constexpr int kMotionBits = 8;  // motions are in units of 2^-kMotionBits cells
+
+/// Magnitudes for ExpectedMagnitude have this number of bits below a cell, a coarse step of scale,
+/// the interval of a rotation's component, and the magnitude of an intensity.
+constexpr int kMagnitudeBits = Lattice::kMaxPositionBits;
+constexpr std::uint64_t kFirstExpected = std::uint64_t{1} << (kMagnitudeBits - 2);
+
+/// Twice the place in a lattice of 2^bits codes in a cell, as an odd number of half codes.
+std::int64_t placeOf(std::uint32_t code, int bits) {
+  return (2 * std::int64_t(code) + 1) << (Lattice::kMaxPositionBits - bits);
+}
+
+std::array<std::int64_t, 3> lowestOf(const Lattice& lattice) {
+  return {lattice.lowestCell.x, lattice.lowestCell.y, lattice.lowestCell.z};
+}
+
+/// The places of ellipsoids relative to the lowest cell of another lattice.
+std::vector<Vector64> placesOf(const QuantisedEllipsoids& q, const Lattice& lattice) {
+  const auto own = lowestOf(q.lattice), other = lowestOf(lattice);
+  std::vector<Vector64> places(q.size());
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    const AxisBits bits = shapeBits(q, i).position;
+    for (std::size_t a = 0; a < 3; ++a)
+      places[i][a] = placeOf(q.position[a][i], bits[a]) + ((own[a] - other[a]) << kUnitBits);
+  }
+  return places;
+}
+
+void require(bool holds, const char* what) {
+  if (!holds) throw BadInput(std::string(what) + " lies outside the lattice");
+}
+
+/// The codes of an ellipsoid's shape.
+struct Shape {
+  std::array<std::uint32_t, 3> scale{};
+  RotationCodes rotation{};
+};
+
+/// Predicts motions from the motions around.
+class MotionPredictor {
+ public:
+  explicit MotionPredictor(std::span<const Vector64> places) : map_(places) {}
+
+  /// \param own  the motion of the ellipsoid to the previous frame, in units of motions
+  void look(const Vector64& place, const std::array<std::int32_t, 3>& own) {
+    own_ = own;
+    sum_ = map_.around(place);
+    const MotionSum& from = sum_.count > 0 ? sum_ : all_;
+    const double count = double(std::max<std::int64_t>(from.count, 1));
+    for (std::size_t a = 0; a < 3; ++a)
+      terms_[a] = {double(from.now[a]) / count * kScale, double(from.before[a]) / count * kScale,
+                   double(own[a]) * kScale};
+    expected_ = std::uint64_t(from.count > 0 ? from.error / from.count : 1 << kMotionBits);
+  }
+
+  /// The predicted motion along an axis in units of places.
+  [[nodiscard]] std::int64_t motion(std::size_t axis) const {
+    const double steps = sums_[axis].predict(terms_[axis]) / kScale;
+    constexpr double kLargest = 0x1p30;
+    return std::int64_t(std::floor(std::clamp(steps, -kLargest, kLargest) + 0.5)) *
+           (std::int64_t{1} << (kUnitBits - kMotionBits));
+  }
+
+  /// Expected magnitude of the error along an axis, with kMagnitudeBits bits below a cell.
+  [[nodiscard]] std::uint64_t expected() const {
+    return expected_ << (kMagnitudeBits - kMotionBits);
+  }
+
+  void learn(const Vector64& place, const std::array<std::int32_t, 3>& motion) {
+    MotionSum one{1, {}, {}, 0};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double target = double(motion[a]) * kScale;
+      one.now[a] = motion[a];
+      one.before[a] = own_[a];
+      one.error +=
+          std::int64_t(std::min(std::abs(sums_[a].predict(terms_[a]) - target) / kScale, 0x1p30)) / 3;
+      sums_[a].learn(terms_[a], target);
+      sums_[a].solve();
+    }
+    map_.add(place, one);
+    all_.add(one);
+  }
+
+ private:
+  static constexpr std::size_t kTerms = 3;
+  static constexpr double kScale = 1.0 / (1 << 4);  // to sixteenths of a cell
+  /// The motion around, and a part of what the motion before differs from those around.
+  using Sums = LeastSquares<kTerms>;
+  std::array<Sums, 3> sums_{Sums({1.0, -0.3, 0.3}), Sums({1.0, -0.3, 0.3}), Sums({1.0, -0.3, 0.3})};
+  std::array<Sums::Terms, 3> terms_{};
+  std::array<std::int32_t, 3> own_{};
+  MotionMap map_;
+  MotionSum sum_, all_;
+  std::uint64_t expected_ = 0;
+};
+
+template <class Side>
+class ContinuedCoder {
+ public:
+  ContinuedCoder(const QuantisedEllipsoids& before, QuantisedEllipsoids& now,
+                 const ContinuedThrift* thrift = nullptr)
+      : before_(before),
+        now_(now),
+        places_(placesOf(before, now.lattice)),
+        motion_(places_),
+        thrift_(thrift) {}
+
+  void code(Side& side) {
+    for (auto& motion : now_.motion) motion.resize(kReads ? 0 : now_.continues.size());
+    std::size_t i = 0;
+    for (std::size_t p = 0; p < before_.size(); ++p) {
+      const bool goesOn = !kReads && i < now_.continues.size() && now_.continues[i] == p;
+      auto& model = goesOn_[std::min<std::size_t>(before_.precision[p], kPrecisions - 1)];
+      if (!side.bit(model, goesOn)) continue;
+      if constexpr (kReads) append(p);
+      ellipsoid(side, p, i++);
+    }
+  }
+
+ private:
+  static constexpr bool kReads = std::is_same_v<Side, Reader>;
+  static constexpr std::size_t kPrecisions = Lattice::kMaxPrecision + 1;
+
+  void append(std::size_t p) {
+    now_.continues.push_back(std::uint32_t(p));
+    for (auto& motion : now_.motion) motion.push_back(0);
+    now_.resize(now_.continues.size());
+  }
+
+  void ellipsoid(Side& side, std::size_t p, std::size_t i) {
+    p_ = p;
+    now_.precision[i] = before_.precision[p];
+    shape(side, i);
+    position(side, i);
+    intensity(side, i);
+  }
+
+  // ---- Shapes
+
+  void shape(Side& side, std::size_t i) {
+    Shape wanted;
+    if (thrift_ && thrift_->shapes)
+      wanted = cheapestShape(i);
+    else if constexpr (!kReads)
+      wanted = {scaleCodes(now_, i), rotationCodes(now_, i)};
+    active_ = 0;
+    const Shape coded = codeShape(side, wanted);
+    learnShape(coded);
+    for (std::size_t a = 0; a < 3; ++a) {
+      now_.scale[a][i] = coded.scale[a];
+      now_.rotation[a][i] = coded.rotation[a];
+    }
+  }
+
+  [[nodiscard]] int finerScaleBits() const {
+    return scaleBits(before_.lattice, before_.precision[p_]);
+  }
+  [[nodiscard]] Shape shapeBefore() const {
+    return {scaleCodes(before_, p_), rotationCodes(before_, p_)};
+  }
+
+  /// The predicted rotation: the middles of the intervals before, as codes with all bits.
+  [[nodiscard]] std::array<std::int32_t, 3> rotationMiddle() const {
+    const AxisBits bits = shapeBits(before_, p_).rotation;
+    std::array<std::int32_t, 3> middle{};
+    for (std::size_t a = 0; a < 3; ++a)
+      middle[a] = std::int32_t(before_.rotation[a][p_]) +
+                  ((1 << (Lattice::kMaxRotationBits - bits[a])) >> 1);
+    return middle;
+  }
+
+  template <class AnySide>
+  Shape codeShape(AnySide& side, const Shape& wanted) {
+    Shape coded;
+    std::size_t activity = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      coded.scale[a] = codeScale(side, a, activity, wanted.scale[a]);
+      if (coded.scale[a] != before_.scale[a][p_]) ++activity;
+    }
+    coded.rotation = codeRotation(side, activity, coded, wanted.rotation);
+    return coded;
+  }
+
+  template <class AnySide>
+  std::uint32_t codeScale(AnySide& side, std::size_t a, std::size_t activity,
+                          std::uint32_t wanted) {
+    const int bits = finerScaleBits();
+    const auto before = std::int64_t(before_.scale[a][p_]);
+    const auto context = DifferenceModel::contextOf(expectedScale_[a].mean() >>
+                                                    (kMagnitudeBits - 2 - bits));
+    const std::int64_t code =
+        before + scales_[a].code(side, context, activity, std::int64_t(wanted) - before);
+    require(code >= 0 && (code >> bits) <= std::int64_t(Lattice::kMaxCoarseScale), "a scale");
+    return std::uint32_t(code);
+  }
+
+  /// \param shape  its scales are known
+  template <class AnySide>
+  RotationCodes codeRotation(AnySide& side, std::size_t activity, const Shape& shape,
+                             const RotationCodes& wanted) {
+    constexpr int kTop = Lattice::kMaxRotationBits;
+    const Lattice& lattice = before_.lattice;
+    const int precision = before_.precision[p_];
+    const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
+    const int coarse = coarseRotationBits(lattice, precision, s);
+    const auto middle = rotationMiddle();
+    RotationCodes known{};
+    bool same = true;
+    for (std::size_t a = 0; a < 3; ++a) {
+      known[a] = std::uint16_t((middle[a] >> (kTop - coarse)) << (kTop - coarse));
+      same = same && (wanted[a] >> (kTop - coarse)) == (known[a] >> (kTop - coarse));
+    }
+    same = !side.bit(turns_[activity], !same);
+    if (!same)
+      for (std::size_t a = 0; a < 3; ++a)
+        known[a] = std::uint16_t(side.raw(wanted[a] >> (kTop - coarse), coarse) << (kTop - coarse));
+    const AxisBits bits = rotationBits(lattice, precision, s, known);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const int rest = bits[a] - coarse, below = kTop - bits[a];
+      const std::uint32_t mask = (1u << rest) - 1u;
+      const std::uint32_t code = (std::uint32_t(wanted[a]) >> below) & mask;
+      if (!same) {
+        known[a] = std::uint16_t(known[a] | side.raw(code, rest) << below);
+        continue;
+      }
+      const auto guess = std::int64_t((std::uint32_t(middle[a]) >> below) & mask);
+      const auto context = DifferenceModel::contextOf(expectedTurn_[a].mean() >>
+                                                      (kMagnitudeBits - 2 - bits[a]));
+      const std::int64_t found =
+          guess + turn_[a].code(side, context, activity, std::int64_t(code) - guess);
+      require(found >= 0 && found <= std::int64_t(mask), "a rotation");
+      if (found != guess && activity + 1 < DifferenceModel::kActivities) ++activity;
+      known[a] = std::uint16_t(known[a] | std::uint32_t(found) << below);
+    }
+    return known;
+  }
+
+  void learnShape(const Shape& shape) {
+    const auto middle = rotationMiddle();
+    const int bits = finerScaleBits();
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto change = std::abs(std::int64_t(shape.scale[a]) - std::int64_t(before_.scale[a][p_]));
+      if (change != 0) ++active_;
+      expectedScale_[a].learn(std::uint64_t(change) << (kMagnitudeBits - bits));
+      const auto turned = std::abs(std::int64_t(shape.rotation[a]) - std::int64_t(middle[a]));
+      expectedTurn_[a].learn(std::uint64_t(turned)
+                             << (kMagnitudeBits - Lattice::kMaxRotationBits));
+    }
+  }
+
+  // ---- The choice of shapes
+
+  [[nodiscard]] Shape cheapestShape(std::size_t i) {
+    const NearestAxes exact(*thrift_->shapes, i, quaternionBefore());
+    const double stepLog = before_.lattice.scaleStep * std::ldexp(1.0, -finerScaleBits());
+    Shape best;
+    double least = HUGE_VAL;
+    const auto consider = [&](const Shape& shape) {
+      BitMeter meter;
+      (void)codeShape(meter, shape);
+      const double cost =
+          errorOf(exact, shape) / (stepLog * stepLog) + thrift_->bitPrice * meter.bits;
+      if (cost < least) least = cost, best = shape;
+    };
+    consider(shapeBefore());
+    consider(withRotationBefore(exact));
+    consider(nearestShape(exact));
+    return best;
+  }
+
+  [[nodiscard]] Quaternion quaternionBefore() const {
+    return quaternionOf(rotationCodes(before_, p_), shapeBits(before_, p_).rotation);
+  }
+
+  /// The squared error of a shape, as the sum of squares of the errors of logarithms of scales.
+  [[nodiscard]] double errorOf(const NearestAxes& exact, const Shape& shape) const {
+    const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
+    const AxisBits bits =
+        rotationBits(before_.lattice, before_.precision[p_], s, shape.rotation);
+    return exact.squaredError(logScalesOf(before_.lattice, finerScaleBits(), shape.scale),
+                              quaternionOf(shape.rotation, bits));
+  }
+
+  /// Rounds scales, the smallest first, each relative to the rounded one before.
+  [[nodiscard]] std::array<std::uint32_t, 3> roundedScales(const std::array<double, 3>& logs) {
+    const int bits = finerScaleBits();
+    std::array<std::uint32_t, 3> codes{};
+    double below = double(before_.lattice.lowestScale);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double steps = (logs[2 - a] / before_.lattice.scaleStep - below) * std::ldexp(1.0, bits);
+      codes[a] = thriftyScale(a, steps - 0.5);
+      below += middleOfCode(codes[a], bits);
+    }
+    return codes;
+  }
+
+  [[nodiscard]] std::uint32_t thriftyScale(std::size_t a, double exact) {
+    const double last = std::ldexp(double(Lattice::kMaxCoarseScale) + 1.0, finerScaleBits()) - 1.0;
+    if (!(exact <= last))
+      throw RuntimeFailure("cannot quantise: a scale lies outside the lattice");
+    return std::uint32_t(thrifty(std::max(exact, 0.0), std::int64_t(before_.scale[a][p_]),
+                                 [&](auto& meter, std::int64_t code) {
+                                   (void)codeScale(meter, a, 0, std::uint32_t(code));
+                                 }));
+  }
+
+  [[nodiscard]] Shape withRotationBefore(const NearestAxes& exact) {
+    Shape shape = shapeBefore();
+    shape.scale = roundedScales(exact.logScalesAlong(quaternionBefore()));
+    return shape;
+  }
+
+  [[nodiscard]] Shape nearestShape(const NearestAxes& exact) {
+    constexpr int kTop = Lattice::kMaxRotationBits;
+    Shape shape;
+    shape.scale = roundedScales(exact.axes().logScale);
+    const Lattice& lattice = before_.lattice;
+    const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
+    const int coarse = coarseRotationBits(lattice, before_.precision[p_], s);
+    const auto codeOf = [&](std::size_t a) {
+      return std::clamp(std::ldexp(exact.axes().rotation[a + 1] / kRotationSide + 0.5, kTop), 0.0,
+                        std::ldexp(1.0, kTop) - 1.0);
+    };
+    for (std::size_t a = 0; a < 3; ++a)
+      shape.rotation[a] =
+          std::uint16_t((std::uint32_t(codeOf(a)) >> (kTop - coarse)) << (kTop - coarse));
+    const AxisBits bits = rotationBits(lattice, before_.precision[p_], s, shape.rotation);
+    const CoupledErrors errors = rotationErrors(exact.axes());
+    const auto middle = rotationMiddle();
+    std::array<double, 3> error{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const int below = kTop - bits[a];
+      const auto first = std::int64_t(shape.rotation[a]) >> below;
+      const std::int64_t last = first + (std::int64_t{1} << (bits[a] - coarse)) - 1;
+      const double place = codeOf(a), wanted = place + errors.shift(a, error);
+      const auto nearest = std::int64_t(std::floor(std::ldexp(wanted, -below)));
+      const std::int64_t code = std::clamp(nearest, first, last);
+      shape.rotation[a] = std::uint16_t(code << below);
+      error[a] = std::ldexp(double(code) + 0.5, below) - place;
+    }
+    (void)middle;
+    return shape;
+  }
+
+  /// The code with the least cost: the one nearest to the exact value, the ones next to it towards
+  /// the guess, or the guess itself.
+  template <class CodeIt>
+  [[nodiscard]] std::int64_t thrifty(double exact, std::int64_t guess, const CodeIt& codeIt) {
+    const auto nearest = std::int64_t(std::llround(exact));
+    if (thrift_->bitPrice <= 0.0 || guess == nearest) return nearest;
+    std::int64_t best = nearest;
+    double least = HUGE_VAL;
+    const auto consider = [&](std::int64_t code) {
+      BitMeter meter;
+      codeIt(meter, code);
+      const double error = double(code) - exact;
+      const double cost = error * error + thrift_->bitPrice * meter.bits;
+      if (cost < least) least = cost, best = code;
+    };
+    const std::int64_t step = guess > nearest ? 1 : -1;
+    consider(nearest);
+    if (nearest + step != guess) consider(nearest + step);
+    if (std::abs(double(guess) - exact) < kFarthestGuess) consider(guess);
+    return best;
+  }
+
+  // ---- Positions
+
+  void position(Side& side, std::size_t i) {
+    const AxisBits bits = shapeBits(now_, i).position;
+    const Vector64& from = places_[p_];
+    std::array<std::int32_t, 3> own{}, moved{};
+    if (!before_.motion[0].empty() && p_ < before_.motion[0].size())
+      for (std::size_t a = 0; a < 3; ++a) own[a] = before_.motion[a][p_];
+    motion_.look(from, own);
+    std::optional<Rounding> rounding;
+    if (thrift_ && thrift_->shapes) rounding.emplace(*thrift_->shapes, i, now_.lattice);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const int below = kUnitBits - bits[a];
+      const std::int64_t guess = (from[a] + motion_.motion(a)) >> below;
+      std::int64_t wanted = std::int64_t(now_.position[a][i]);
+      const auto codeIt = [&](auto& any, std::int64_t code) {
+        const auto context =
+            DifferenceModel::contextOf(motion_.expected() >> (kMagnitudeBits - 2 - bits[a]));
+        return guess + positions_[a].code(any, context, std::min<std::size_t>(active_, 3),
+                                          code - guess);
+      };
+      const std::int64_t last = (std::int64_t{1} << (now_.lattice.cellBits + bits[a])) - 1;
+      if (rounding) {
+        const double exact = rounding->wanted(a, bits[a]);
+        wanted = std::clamp<std::int64_t>(thrifty(exact, std::clamp<std::int64_t>(guess, 0, last), codeIt), 0, last);
+        rounding->rounded(a, bits[a], wanted);
+      }
+      const std::int64_t code = codeIt(side, wanted);
+      require(code >= 0 && code <= last, "a center");
+      now_.position[a][i] = std::uint32_t(code);
+      moved[a] = std::int32_t((placeOf(std::uint32_t(code), bits[a]) - from[a]) >>
+                              (kUnitBits - kMotionBits));
+      now_.motion[a][i] = moved[a];
+    }
+    motion_.learn(from, moved);
+  }
+
+  /// Rounds the coordinates of a center one after the other (rounding.h).
+  class Rounding {
+   public:
+    Rounding(const Ellipsoids& e, std::size_t i, const Lattice& lattice)
+        : errors_(centerErrors(sortedAxes(e, i))) {
+      const auto low = lowestOf(lattice);
+      for (std::size_t a = 0; a < 3; ++a)
+        cells_[a] = e.center[a][i] / lattice.cell - double(low[a]);
+    }
+    /// The place between codes that a coordinate is to be near.
+    [[nodiscard]] double wanted(std::size_t a, int bits) const {
+      return std::ldexp(cells_[a] + errors_.shift(a, error_), bits) - 0.5;
+    }
+    void rounded(std::size_t a, int bits, std::int64_t code) {
+      error_[a] = std::ldexp(double(code) + 0.5, -bits) - cells_[a];
+    }
+
+   private:
+    CoupledErrors errors_;
+    std::array<double, 3> cells_{}, error_{};
+  };
+
+  // ---- Intensities
+
+  [[nodiscard]] static std::uint32_t magnitudeOf(std::int32_t code) {
+    return std::uint32_t(code < 0 ? -1 - code : code);
+  }
+
+  void intensity(Side& side, std::size_t i) {
+    const int shift = intensityShift(now_.lattice, coarseScales(now_, i));
+    const int shiftBefore = intensityShift(before_.lattice, coarseScales(before_, p_));
+    const std::int32_t before = before_.intensity[p_];
+    const auto guess = std::int64_t(((2 * std::uint64_t(magnitudeOf(before)) + 1) << shift) >>
+                                    (shiftBefore + 1));
+    const auto context = DifferenceModel::contextOf(
+        (expectedIntensity_.mean() * std::uint64_t(guess + 1)) >> (kMagnitudeBits - 2));
+    const auto codeIt = [&](auto& any, std::int64_t code) {
+      return guess + intensities_.code(any, context, std::min<std::size_t>(active_, 3), code - guess);
+    };
+    std::int32_t wanted = now_.intensity[i];
+    if (thrift_) wanted = chosenIntensity(thrift_->intensities[i], shift, guess, codeIt);
+    bool negative = wanted < 0;
+    if (now_.lattice.signedIntensity)
+      negative = side.bit(changesSign_, negative != (before < 0)) != (before < 0);
+    const std::int64_t code = codeIt(side, std::int64_t(magnitudeOf(wanted)));
+    require(code >= 0 && code <= std::int64_t(Lattice::kMaxIntensity), "an intensity");
+    now_.intensity[i] = negative ? -1 - std::int32_t(code) : std::int32_t(code);
+    expectedIntensity_.learn((std::uint64_t(std::abs(code - guess)) << kMagnitudeBits) /
+                             std::uint64_t(guess + 1));
+  }
+
+  template <class CodeIt>
+  [[nodiscard]] std::int32_t chosenIntensity(float exact, int shift, std::int64_t guess,
+                                             const CodeIt& codeIt) {
+    const bool negative = now_.lattice.signedIntensity && exact < 0.0f;
+    const double magnitude = (negative || exact > 0.0f ? std::abs(double(exact)) : 0.0) /
+                             now_.lattice.intensityStep;
+    const double steps =
+        std::clamp(std::ldexp(magnitude, shift) - 0.5, 0.0, double(Lattice::kMaxIntensity));
+    const auto code = std::int32_t(std::min(thrifty(steps, guess, codeIt),
+                                            std::int64_t(Lattice::kMaxIntensity)));
+    return negative ? -1 - code : code;
+  }
+
+  static constexpr double kFarthestGuess = 4.0;  // steps up to which the guess itself is considered
+
+  const QuantisedEllipsoids& before_;
+  QuantisedEllipsoids& now_;
+  std::vector<Vector64> places_;  ///< those of the previous frame, on the lattice of this one
+  MotionPredictor motion_;
+  const ContinuedThrift* thrift_;
+  std::size_t p_ = 0;       ///< the ellipsoid of the previous frame that is continued
+  std::size_t active_ = 0;  ///< number of its scales that changed
+  std::array<BitModel, kPrecisions> goesOn_;
+  std::array<DifferenceModel, 3> scales_, turn_, positions_;
+  DifferenceModel intensities_;
+  std::array<BitModel, DifferenceModel::kActivities> turns_;
+  BitModel changesSign_;
+  std::array<ExpectedMagnitude, 3> expectedScale_{ExpectedMagnitude(kFirstExpected),
+                                                  ExpectedMagnitude(kFirstExpected),
+                                                  ExpectedMagnitude(kFirstExpected)},
+      expectedTurn_{expectedScale_};
+  ExpectedMagnitude expectedIntensity_{kFirstExpected};
+};
+
+template <class Side>
+void code(Side& side, const QuantisedEllipsoids& before, QuantisedEllipsoids& now,
+          const ContinuedThrift* thrift = nullptr) {
+  std::make_unique<ContinuedCoder<Side>>(before, now, thrift)->code(side);
+}
+
+}  // namespace
+
+bool continues(const Lattice& lattice, const Lattice& before) {
+  Lattice same = lattice;
+  same.lowestCell = before.lowestCell;
+  same.cellBits = before.cellBits;
+  return same == before;
+}
+
+void codeContinued(Writer& side, const QuantisedEllipsoids& before, QuantisedEllipsoids& now) {
+  code(side, before, now);
+}
+
+void codeContinued(Reader& side, const QuantisedEllipsoids& before, QuantisedEllipsoids& now) {
+  code(side, before, now);
+}
+
+void chooseContinued(const QuantisedEllipsoids& before, const ContinuedThrift& thrift,
+                     QuantisedEllipsoids& now) {
+  Writer writer;
+  code(writer, before, now, &thrift);
+}
+
+}  // namespace esvr::codec
