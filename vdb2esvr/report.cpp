@@ -394,7 +394,7 @@ Json makeReport(const Options& options, const RunRecord& record) {
                  {"peak_memory_bytes", cli::peakMemory()},
                  {"interrupted", record.interrupted},
                  {"error", nullptr},
-                 {"exit_code", exitCodeOf(record, options.psnr)}});
+                 {"exit_code", exitCodeOf(record)}});
   return report;
 }
 
