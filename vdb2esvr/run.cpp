@@ -313,6 +313,7 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   EsvrFile file = assemble(std::move(carried), record);
   shareGrids(optionsOfFits(options, cancel, selected), choice.fitted, file, record);
   store(options, file, run.store, record);
+  if (file.layout == FileLayout::kCompact) record.bytesSeparate = bytesWithoutSharing(file, record);
   if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();
   return record;

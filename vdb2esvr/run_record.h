@@ -30,6 +30,7 @@ struct RunRecord {
   std::vector<ConvertedGrid> grids;
   std::vector<ConvertedVector> vectors;
   EsvrSummary output;
+  std::uint64_t bytesSeparate = 0;  ///< of the file without sharing; 0: not known
   bool interrupted = false;
   double secondsWrite = 0.0, secondsTotal = 0.0;
 };

@@ -125,7 +125,42 @@ class Sharing {
   RunRecord& record_;
 };
 
+constexpr std::uint64_t kHeaderBytes = 48, kAlignment = 8;  // docs/format.md
+
+/// Bytes of a section with its row and its padding.
+std::uint64_t bytesOf(const SectionSummary& section) {
+  const std::uint64_t padded = (section.storedBytes + kAlignment - 1) / kAlignment * kAlignment;
+  return kSectionRowBytes + (section.sharedWith ? 0 : padded);
+}
+
+/// Bytes that the record of a grid adds.
+std::uint64_t bytesOfRecord(const StoredGrid& grid) {
+  StoredGrid record;
+  record.descriptor = grid.descriptor;
+  record.field.chunks.resize(std::min<std::size_t>(grid.field.chunks.size(), 1));
+  record.activeThreshold = grid.activeThreshold;
+  record.activeBox = grid.activeBox;
+  record.activeVoxels = grid.activeVoxels;
+  record.valueMin = grid.valueMin, record.valueMax = grid.valueMax;
+  return bytesAdded(record);
+}
+
 }  // namespace
+
+std::uint64_t bytesWithoutSharing(const EsvrFile& file, const RunRecord& record) {
+  std::uint64_t bytes = kHeaderBytes;
+  bool areJoined = false;
+  for (const SectionSummary& section : record.output.sections) {
+    const bool isJoined = section.kind == "grid records";
+    areJoined = areJoined || isJoined;
+    if (!isJoined && section.kind != "packed sections") bytes += bytesOf(section);
+  }
+  if (areJoined)
+    for (const StoredGrid& grid : file.grids) bytes += bytesOfRecord(grid);
+  for (const ConvertedGrid& grid : record.grids)
+    if (grid.shared && !grid.sameAs) bytes += grid.shared->bytesWithout - grid.shared->bytesWith;
+  return bytes;
+}
 
 void shareGrids(const Options& options, const std::vector<FittedGrid>& fitted, EsvrFile& file,
                 RunRecord& record) {

@@ -1,7 +1,7 @@
 #pragma once
 /// Lets the grids of a file share what they have in common.
 
-#include <string>
+#include <cstdint>
 #include <vector>
 
 #include "esvr/container.h"
@@ -18,5 +18,9 @@ namespace esvr::vdb2esvr {
 /// \param file    the file of the record
 void shareGrids(const Options& options, const std::vector<FittedGrid>& fitted, EsvrFile& file,
                 RunRecord& record);
+
+/// Bytes that the written file would take if its grids shared nothing but equal sections: each
+/// section would have a row of the table, and each grid a record and voxels of its own.
+[[nodiscard]] std::uint64_t bytesWithoutSharing(const EsvrFile& file, const RunRecord& record);
 
 }  // namespace esvr::vdb2esvr

@@ -18,8 +18,8 @@ bool sameLattice(const VoxelLayer& a, const VoxelLayer& b) {
   return a.form == b.form && a.divisor == b.divisor && a.palette == b.palette;
 }
 
-/// Largest place of a value that a lattice has no code for. Sums of a few squares stay finite.
-constexpr double kLargestPlace = 0x1p60;
+/// Largest place of a value that a lattice has no code for. A code is at most 2^36 from it.
+constexpr double kLargestPlace = 0x1p35;
 constexpr double kLargestFloat = std::numeric_limits<float>::max();
 
 double placeOf(const VoxelLayer& now, double value) {
