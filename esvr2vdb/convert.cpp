@@ -69,8 +69,10 @@ EsvrFile read(const Options& options, const cli::Log& log) {
   if (!options.grids.empty()) wanted.grids = namedNumbers(options);
   if (readsAll(options) && !wanted.grids) return readEsvr(options.input, wanted.limits);
   PartOfFile part = readEsvrPart(options.input, wanted);
-  log.info("read " + std::to_string(part.bytesRead) + " of " +
-           std::to_string(std::filesystem::file_size(options.input)) + " bytes");
+  // Small files are read once for the names of the grids, and once more for the grids.
+  const std::uint64_t bytes = std::filesystem::file_size(options.input);
+  if (part.bytesRead < bytes)
+    log.info("read " + std::to_string(part.bytesRead) + " of " + std::to_string(bytes) + " bytes");
   return std::move(part.file);
 }
 

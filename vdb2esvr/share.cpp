@@ -54,11 +54,11 @@ class Sharing {
   void share(std::size_t g) {
     cli::Stopwatch watch;
     SharedBytes shared{.bytesWithout = bytesAdded(file_, g)};
-    const StoredGrid own = file_.grids[g];
     const VoxelReference reference = chooseReference(file_.grids, g, candidatesFor(g));
     file_.grids[g].reference = reference;
     shared.bytesWith = bytesAdded(file_, g);
-    if (shared.bytesWith >= shared.bytesWithout) file_.grids[g] = own;
+    if (shared.bytesWith >= shared.bytesWithout) file_.grids[g].reference.reset();
+    if (options_.previous) return copyToTwins(g);  // each grid is encoded with the better context
     chooseAgain(g, reference, shared);
     shared.seconds = watch.lap();
     if (!file_.grids[g].reference) return;
@@ -165,7 +165,7 @@ std::uint64_t bytesWithoutSharing(const EsvrFile& file, const RunRecord& record)
 void shareGrids(const Options& options, const std::vector<FittedGrid>& fitted, EsvrFile& file,
                 RunRecord& record) {
   if (!options.sharing.isOn || record.grids.size() < 2) return;
-  if (!options.previous) Sharing(options, fitted, file, record).run();
+  Sharing(options, fitted, file, record).run();
   file.layout = FileLayout::kCompact;
 }
 

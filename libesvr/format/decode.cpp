@@ -401,16 +401,15 @@ void readGrids(SectionReader& sections, const ReadPart* part, EsvrFile& file) {
   }
 }
 
-/// Reads the grids of a frame that refers to the previous one.
-std::vector<StoredGrid> readGridsAfter(SectionReader& sections, const EsvrFile& previous) {
-  std::vector<StoredGrid> grids;
+/// Reads the grids of a frame that refers to the previous one, and its layout.
+void readGridsAfter(SectionReader& sections, const EsvrFile& previous, EsvrFile& file) {
+  if (sections.has({SectionKind::kGridRecords})) file.layout = FileLayout::kCompact;
   GridRecords records(sections);
   const std::uint32_t count = records.count() + sections.count(SectionKind::kPredicted);
   for (std::uint32_t g = 0; g < count; ++g)
-    grids.push_back(sections.has({SectionKind::kPredicted, g})
-                        ? readPredicted(sections, g, previous)
-                        : GridDecoder({sections, records}, g).decode(grids));
-  return grids;
+    file.grids.push_back(sections.has({SectionKind::kPredicted, g})
+                             ? readPredicted(sections, g, previous)
+                             : GridDecoder({sections, records}, g).decode(file.grids));
 }
 
 CarriedBytes carriedBytesOf(const ReadLimits& limits) {
@@ -435,7 +434,8 @@ EsvrFile decodeShort(std::span<const std::byte> bytes, const std::string& name,
   const MemorySource source(bytes, name);
   FrameTable table = getFrame(bytes, name);
   SectionReader sections(source, std::move(table.sections), limits);
-  EsvrFile file{readFileMetadata(sections), readGridsAfter(sections, previous)};
+  EsvrFile file{readFileMetadata(sections), {}};
+  readGridsAfter(sections, previous, file);
   readCarriedGrids(sections, carriedBytesOf(limits), file);
   readVectors(sections, file);
   if (table.inherited.metadata) file.metadata = previous.metadata;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include "core/atomic_file.h"
@@ -102,17 +103,6 @@ std::vector<std::byte> recordOf(const SortedGrid& grid) {
 
 void addGrid(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
   out.add({SectionKind::kGrid, g}, kRequired, recordOf(grid), kByteSize);
-}
-
-/// Adds the records of all grids in one section.
-/// \return false if a reader would refuse so many records in so few bytes; nothing is added then
-bool addJoinedRecords(SectionWriter& out, const std::vector<SortedGrid>& grids) {
-  std::vector<std::vector<std::byte>> records;
-  for (const auto& grid : grids) records.push_back(recordOf(grid));
-  Packed packed = pack(putRecords(records), kByteSize);
-  if (packed.bytes.size() < records.size()) return false;
-  out.addPacked({SectionKind::kGridRecords}, kRequired, std::move(packed));
-  return true;
 }
 
 /// Adds the chunk records of a grid with several chunks; the record of a single chunk is in the
@@ -234,22 +224,31 @@ Inherited inheritedFrom(const EsvrFile& previous, const EsvrFile& frame) {
 
 using Differences = std::vector<std::optional<std::vector<std::byte>>>;
 
-/// Adds the records of the grids, or their differences, which contain a record.
+/// Adds encoded grid records in one section.
+/// \return false if a reader would refuse so many records in so few bytes; nothing is added then
+bool addJoined(SectionWriter& out, const std::vector<std::vector<std::byte>>& records) {
+  Packed packed = pack(putRecords(records), kByteSize);
+  if (packed.bytes.size() < records.size()) return false;
+  out.addPacked({SectionKind::kGridRecords}, kRequired, std::move(packed));
+  return true;
+}
+
+/// Adds the records of the grids that have no difference.
 void addRecords(SectionWriter& out, const std::vector<SortedGrid>& grids,
-                Differences& differences) {
-  const bool stands = std::ranges::none_of(differences, [](const auto& d) { return bool(d); });
-  const bool joins = out.layout() == FileLayout::kCompact && stands && grids.size() > 1;
-  if (joins && addJoinedRecords(out, grids)) return;
+                const Differences& differences) {
+  std::vector<std::vector<std::byte>> records;
+  for (std::size_t g = 0; g < grids.size(); ++g)
+    if (!differences[g]) records.push_back(recordOf(grids[g]));
+  const bool joins = out.layout() == FileLayout::kCompact && records.size() > 1;
+  if (joins && addJoined(out, records)) return;
   for (std::uint32_t g = 0; g < grids.size(); ++g)
-    if (differences[g])
-      out.addRaw({SectionKind::kPredicted, g}, kRequired, std::move(*differences[g]));
-    else
-      addGrid(out, g, grids[g]);
+    if (!differences[g]) addGrid(out, g, grids[g]);
 }
 
 /// Checks a file and collects its sections.
 /// \param differences  for each grid: its difference from the previous frame, which replaces it
-SectionWriter collect(const EsvrFile& file, Differences differences, const Inherited& inherited) {
+SectionWriter collect(const EsvrFile& file, const Differences& differences,
+                      const Inherited& inherited) {
   (void)gridsInOrder(file);  // refuses places that are impossible
   checkVectors(file);
   std::vector<SortedGrid> grids;
@@ -263,6 +262,9 @@ SectionWriter collect(const EsvrFile& file, Differences differences, const Inher
   out.setLayout(file.layout);
   if (!inherited.metadata) addFileMetadata(out, file);
   addRecords(out, grids, differences);
+  for (std::uint32_t g = 0; g < grids.size(); ++g)
+    if (differences[g])
+      out.addRaw({SectionKind::kPredicted, g}, kRequired, std::vector(*differences[g]));
   if (!inherited.vectors) addVectors(out, file.vectors);
   if (!inherited.carried) addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
@@ -291,16 +293,49 @@ std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
   return content;
 }
 
-std::optional<FrameSections> differencesOf(const EsvrFile& frame, const EsvrFile& previous) {
+namespace {
+
+/// Bytes of a grid in a frame if it is not stored as a difference. The record of a grid that refers
+/// to another one is estimated, because it is compressed together with others.
+std::uint64_t bytesOfOwn(const EsvrFile& frame, std::size_t g) {
+  constexpr std::uint64_t kJoinedRecordBytes = 64;
+  if (!frame.grids[g].reference) return bytesAdded(frame, g);
+  SectionWriter out;
+  addRelated(out, std::uint32_t(g), frame.grids);
+  return out.bytesUnshared() - kEntryBytes + kFrameRowBytes + kJoinedRecordBytes;
+}
+
+std::optional<FrameSections> collectDifferences(const EsvrFile& frame, const EsvrFile& previous) {
   Differences differences(frame.grids.size());
   bool any = false;
   for (std::size_t g = 0; g < std::min(frame.grids.size(), previous.grids.size()); ++g) {
-    differences[g] = differenceOf(frame.grids[g], previous.grids[g], bytesAdded(frame, g));
+    differences[g] = differenceOf(frame.grids[g], previous.grids[g], bytesOfOwn(frame, g));
     any = any || differences[g];
   }
   if (!any) return std::nullopt;
   const Inherited inherited = inheritedFrom(previous, frame);
-  return FrameSections{collect(frame, std::move(differences), inherited), inherited};
+  return FrameSections{collect(frame, differences, inherited), inherited};
+}
+
+std::uint64_t bytesOf(const std::optional<FrameSections>& frame) {
+  return frame ? frame->sections.assembleFrame(frame->inherited).size()
+               : std::numeric_limits<std::uint64_t>::max();
+}
+
+EsvrFile withoutReferences(EsvrFile frame) {
+  for (StoredGrid& grid : frame.grids) grid.reference.reset();
+  return frame;
+}
+
+}  // namespace
+
+std::optional<FrameSections> differencesOf(const EsvrFile& frame, const EsvrFile& previous) {
+  const bool refers = std::ranges::any_of(
+      frame.grids, [](const StoredGrid& grid) { return grid.reference.has_value(); });
+  auto found = collectDifferences(frame, previous);
+  if (!refers) return found;
+  auto plain = collectDifferences(withoutReferences(frame), previous);
+  return bytesOf(plain) < bytesOf(found) ? std::move(plain) : std::move(found);
 }
 
 }  // namespace format

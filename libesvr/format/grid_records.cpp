@@ -42,8 +42,8 @@ std::uint32_t GridRecords::count() const {
 
 std::vector<std::byte> GridRecords::take(std::uint32_t grid) {
   if (!isJoined_) return sections_.get({SectionKind::kGrid, grid});
-  if (grid >= joined_.size()) throw BadInput(place(grid) + ": there is no record of it");
-  return std::move(joined_[grid]);
+  if (next_ == joined_.size()) throw BadInput(place(grid) + ": there is no record of it");
+  return std::move(joined_[next_++]);
 }
 
 std::string GridRecords::place(std::uint32_t grid) const {

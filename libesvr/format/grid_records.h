@@ -25,7 +25,8 @@ class GridRecords {
   /// Number of grids that have a record.
   [[nodiscard]] std::uint32_t count() const;
 
-  /// The record of a grid. It can be called once for each grid. \throws BadInput
+  /// The record of a grid. It is called once for each grid that has a record, in their order.
+  /// \throws BadInput
   [[nodiscard]] std::vector<std::byte> take(std::uint32_t grid);
 
   /// Start of the text of an error about a record.
@@ -35,6 +36,7 @@ class GridRecords {
   SectionReader& sections_;
   bool isJoined_ = false;
   std::vector<std::vector<std::byte>> joined_;
+  std::size_t next_ = 0;  ///< index of the next one of them
 };
 
 }  // namespace esvr::format
