@@ -192,8 +192,8 @@ void addFileOptions(cli::po::options_description& options) {
      "leave this grid out; may be repeated")
     ("share", value<std::string>()->value_name("W")->default_value("auto"),
      "auto: grids of one transform refer to each other where that makes the file smaller, and small "
-     "parts of the file are stored together; off: each grid is stored on its own; or the names of "
-     "the grids that may share, as density,temperature")
+     "parts of the file are stored together; off: each grid is stored on its own, as with --size and "
+     "--ratio; or the names of the grids that may share, as density,temperature")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
      "refuse: fail on NaN or infinite voxels; zero: replace them by 0")
     ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
@@ -382,6 +382,7 @@ OnCancel onCancel(const Arguments& a) {
 
 WantedSharing sharing(const Arguments& a) {
   const auto given = a.get<std::string>("share");
+  if (given != "auto" && given != "off") refuseWith(a, "share " + given, {"size", "ratio"});
   if (given == "auto" || given == "off") return {.isOn = given == "auto", .names = {}};
   return {.isOn = true, .names = cli::splitText(given, ',')};
 }

@@ -73,8 +73,7 @@ class Sharing {
     const Goal& goal = goalOf(options_, fittedOf(g));
     const std::size_t voxels = file_.grids[g].voxels->codes.size();
     return (std::holds_alternative<PresetGoal>(goal) || std::holds_alternative<PsnrGoal>(goal)) &&
-           !options_.size && !options_.ratio && voxels <= kMostChosenAgain &&
-           voxels <= kMostVoxelsPerByte * shared.bytesWithout;
+           voxels <= kMostChosenAgain && voxels <= kMostVoxelsPerByte * shared.bytesWithout;
   }
 
   /// Chooses voxels that take few bytes with a reference, and takes them if they do.
@@ -164,7 +163,9 @@ std::uint64_t bytesWithoutSharing(const EsvrFile& file, const RunRecord& record)
 
 void shareGrids(const Options& options, const std::vector<FittedGrid>& fitted, EsvrFile& file,
                 RunRecord& record) {
-  if (!options.sharing.isOn || record.grids.size() < 2) return;
+  // The bytes of a wanted size are divided among grids that are stored on their own.
+  const bool isSized = options.size || options.ratio;
+  if (!options.sharing.isOn || isSized || record.grids.size() < 2) return;
   Sharing(options, fitted, file, record).run();
   file.layout = FileLayout::kCompact;
 }
