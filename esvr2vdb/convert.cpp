@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <span>
 #include <utility>
 #include <variant>
@@ -45,14 +46,33 @@ const char* whyNot(const GridOfFile& grid, const Options& options) {
   return nullptr;
 }
 
+/// The numbers of the named grids, to which only the records of the file are read. Nothing: one of
+/// them is carried, so that the whole file is read.
+std::optional<std::vector<std::size_t>> namedNumbers(const Options& options) {
+  ReadPart records;
+  records.grids.emplace();
+  records.limits = limitsOf(options);
+  const EsvrFile file = readEsvrPart(options.input, records).file;
+  std::vector<std::size_t> numbers;
+  for (const auto& [grid, name] : chooseGrids(options.input, file, options.grids)) {
+    if (grid.isCarried) return std::nullopt;
+    const std::size_t first = grid.isVector ? file.vectors[grid.index].first : grid.index;
+    for (std::size_t c = 0; c < (grid.isVector ? kComponents : 1); ++c)
+      numbers.push_back(first + c);
+  }
+  return numbers;
+}
+
 EsvrFile read(const Options& options, const cli::Log& log) {
-  const ReadLimits limits = limitsOf(options);
-  if (readsAll(options)) return readEsvr(options.input, limits);
   ReadPart wanted = options.part;
-  wanted.limits = limits;
+  wanted.limits = limitsOf(options);
+  if (!options.grids.empty()) wanted.grids = namedNumbers(options);
+  if (readsAll(options) && !wanted.grids) return readEsvr(options.input, wanted.limits);
   PartOfFile part = readEsvrPart(options.input, wanted);
-  log.info("read " + std::to_string(part.bytesRead) + " of " +
-           std::to_string(std::filesystem::file_size(options.input)) + " bytes");
+  // Small files are read once for the names of the grids, and once more for the grids.
+  const std::uint64_t bytes = std::filesystem::file_size(options.input);
+  if (part.bytesRead < bytes)
+    log.info("read " + std::to_string(part.bytesRead) + " of " + std::to_string(bytes) + " bytes");
   return std::move(part.file);
 }
 

@@ -33,12 +33,18 @@ const StoredGrid* previousOf(const Options& options, const std::string& uniqueNa
   return at == names.end() ? nullptr : &options.previous->grids[std::size_t(at - names.begin())];
 }
 
-void convert(const Options& options, const VolumeGrid& source, std::optional<std::uint64_t> bytes,
+/// What a grid is converted to.
+struct Wish {
+  std::optional<std::uint64_t> bytes;  ///< that it may add
+  const StoredGrid* previous;          ///< ConvertOptions::previous
+};
+
+void convert(const Options& options, const VolumeGrid& source, const Wish& wish,
              ConvertedGrid& grid) {
   if (options.paper) return convertByPaper(options, source, grid);
   ConvertOptions wanted = options.convert;
-  wanted.previous = previousOf(options, grid.uniqueName);
-  if (bytes) wanted.goal = SizeGoal{*bytes};
+  wanted.previous = wish.previous;
+  if (wish.bytes) wanted.goal = SizeGoal{*wish.bytes};
   // The parts of a single fit do not depend on the storage, and compact storage takes time.
   if (options.job == Job::kPart && std::holds_alternative<FitGoal>(wanted.goal))
     wanted.storage.form = Storage::kFloat32;
@@ -86,11 +92,13 @@ ConvertedGrid named(const FittedGrid& fitted) {
 }  // namespace
 
 ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
-                          std::optional<std::uint64_t> bytes) {
+                          std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
   Options options = given;
+  options.convert.goal = goalOf(given, fitted);
   CommonFitOptions& fit = options.convert.fit;
   fit.peak = fitted.peak;
   ConvertedGrid grid = named(fitted);
+  grid.wantedPsnr = wantedPsnrOf(given, fitted);
   cli::Stopwatch watch;
   const VolumeGrid source = readSource(options, fitted);
   grid.bricks = source.volume.brickCount();
@@ -98,7 +106,8 @@ ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
   grid.seconds.read = watch.lap();
 
   grid.device = deviceName(fit.device);
-  convert(options, source, bytes, grid);
+  convert(options, source, {bytes, expected ? expected : previousOf(options, grid.uniqueName)},
+          grid);
   grid.seconds.seed = grid.conversion.fit.secondsSeed;
   grid.seconds.optimise = grid.conversion.fit.secondsOptimise;
   grid.seconds.encode = watch.lap() - grid.seconds.fit();

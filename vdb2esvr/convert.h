@@ -26,12 +26,20 @@ struct SurfaceErrors {
   std::optional<MeshDistance> distance{};  ///< nothing if the volume is large
 };
 
+/// What a grid of voxels gains by the other grids of the file.
+struct SharedBytes {
+  std::string with{};  ///< unique name of the grid that it refers to; empty: it refers to none
+  std::uint64_t bytesWith = 0, bytesWithout = 0;  ///< bytesAdded
+  double seconds = 0.0;                           ///< that the search for it took
+};
+
 struct ConvertedGrid {
   std::string uniqueName;                ///< FittedGrid::uniqueName()
   std::string sourceName;                ///< GridSummary::uniqueName of the grid of the input
   std::optional<std::size_t> component;  ///< of vectors
   Conversion conversion;
   VolumeMetrics metrics;                 ///< errors of the decoded grid
+  std::optional<double> wantedPsnr;      ///< PSNR over the box that the grid should reach, dB
   std::optional<SurfaceErrors> surface;  ///< of a narrow band
   std::string whyNoNarrowBand;           ///< of a level set that is none (whyNoNarrowBand())
   std::optional<double> psnrBetween;     ///< of ellipsoids that were fitted for drawing, dB
@@ -41,6 +49,7 @@ struct ConvertedGrid {
   std::optional<double> hits;               ///< averageHits, with --hits
   std::optional<std::uint64_t> voxelPairs;  ///< those of countHits in the source's bricks, --hits
   std::optional<PaperRecord> paper;         ///< record of the paper's method, with --paper
+  std::optional<SharedBytes> shared;        ///< nothing if it shares nothing
   std::optional<std::string> sameAs;        ///< unique name of the grid that this one is a twin of
   PhaseSeconds seconds;
 
@@ -49,8 +58,11 @@ struct ConvertedGrid {
 
 /// Reads, converts and measures a grid. A run with Job::kPart does not measure it.
 /// \param bytes  bytes that the grid may add to the file, if a size is wanted
+/// \param expected  a grid that is like this one and that its voxels are to refer to; null: the same
+///                  grid of the previous frame, if there is one
 [[nodiscard]] ConvertedGrid convertGrid(const Options& options, const FittedGrid& fitted,
-                                        std::optional<std::uint64_t> bytes);
+                                        std::optional<std::uint64_t> bytes,
+                                        const StoredGrid* expected = nullptr);
 
 /// A twin of a converted grid, which takes the time of reading it only.
 [[nodiscard]] ConvertedGrid twinOf(const ConvertedGrid& grid, const FittedGrid& fitted,

@@ -85,7 +85,7 @@ void FrameConversion::convert(const Options& own, FrameRecord& frame, const Stor
   const RunRecord run = convertFile(own, {nullptr, cancel_, log, store});
   takeFigures(run, frame);
   frame.state = run.interrupted ? FrameState::kInterrupted : FrameState::kConverted;
-  frame.missedPsnr = firstBelow(run, own.psnr) != nullptr;
+  frame.missedPsnr = firstBelow(run) != nullptr;
   if (!options_.report.empty()) frame.report = frameReport(makeReport(own, run));
 }
 

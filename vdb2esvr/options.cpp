@@ -9,6 +9,7 @@
 #include "cli/device_option.h"
 #include "cli/error_bound.h"
 #include "cli/host_memory.h"
+#include "cli/number.h"
 #include "cli/table.h"
 #include "vdb2esvr/frame_options.h"
 #include "vdb2esvr/paper_options.h"
@@ -24,8 +25,7 @@ using cli::po::bool_switch;
 using cli::po::value;
 
 constexpr std::int64_t kMaxIterations = 10'000'000;
-constexpr double kHighestPsnr = 300.0;  // dB; float32 reaches about 150
-constexpr double kLongestRun = 1e9;     // seconds
+constexpr double kLongestRun = 1e9;  // seconds
 constexpr double kLargestRatio = 1e9;
 constexpr double kMaxLoss = 20.0;                  // dB
 constexpr double kMinVram = 1e-3, kMaxVram = 1e6;  // GB
@@ -122,12 +122,14 @@ void addGoalOptions(cli::po::options_description& options) {
      "write the best file of at most this size: 50000, 50KB, 2.6MB")
     ("ratio", value<double>()->value_name("R"),
      "write the best file of at most the size of IN.vdb divided by R")
-    ("psnr", value<double>()->value_name("DB"),
-     "write the smallest file that reaches this PSNR over the box")
+    ("psnr", value<std::string>()->value_name("DB"),
+     "write the smallest file that reaches this PSNR over the box; NAME=DB is that of one grid: "
+     "density=50,temperature=40, or 40,density=50 with 40 for all others")
     ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
     ("max-error", value<std::string>()->value_name("E"),
-     "keep the error of every voxel within E, or within E% of the range of values; if ellipsoids "
-     "are stored, they have a residual; a sample of the grid shows whether they may be smaller")
+     "keep the error of every voxel within E, or within E% of the range of values; NAME=E is the "
+     "bound of one grid, as with --psnr; if ellipsoids are stored, they have a residual; a sample of "
+     "the grid shows whether they may be smaller")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
      "ellipsoids, voxels, or auto (whichever are better or smaller)")
     ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
@@ -188,6 +190,10 @@ void addFileOptions(cli::po::options_description& options) {
      "grids that -g names")
     ("skip", value<std::vector<std::string>>()->value_name("NAME")->composing(),
      "leave this grid out; may be repeated")
+    ("share", value<std::string>()->value_name("W")->default_value("auto"),
+     "auto: grids of one transform refer to each other where that makes the file smaller, and small "
+     "parts of the file are stored together; off: each grid is stored on its own, as with --size and "
+     "--ratio; or the names of the grids that may share, as density,temperature")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
      "refuse: fail on NaN or infinite voxels; zero: replace them by 0")
     ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
@@ -283,10 +289,17 @@ Goal losslessGoal(const Arguments& a) {
   return LosslessGoal{};
 }
 
-Goal boundGoal(const Arguments& a) {
-  refuseWith(a, "max-error", {"count", "psnr", "seconds", "size", "ratio", "paper"});
-  const cli::ErrorBound bound = cli::parseErrorBound("max-error", a.get<std::string>("max-error"));
-  return BoundGoal{bound.amount, bound.relative};
+Goal boundGoal(const Arguments& a, const Options& options) {
+  refuseWith(a, "max-error", {"count", "seconds", "size", "ratio", "paper"});
+  if (options.psnr) throw UsageError("--max-error cannot be combined with --psnr");
+  return *options.maxError;
+}
+
+/// Refuses goals of single grids beside options that determine how all grids are converted.
+void requireGridGoals(const Arguments& a, const Options& options) {
+  if (options.gridGoals.empty()) return;
+  refuseWith(a, "psnr NAME=DB and --max-error NAME=E",
+             {"count", "seconds", "iterations", "storage-loss", "size", "ratio", "paper"});
 }
 
 /// True if an option was given that determines a single fit.
@@ -298,7 +311,8 @@ bool isSingleFit(const Arguments& a) {
 /// The goal of each grid; a size replaces it later.
 Goal goalOf(const Arguments& a, const Options& options) {
   if (a.get<bool>("lossless")) return losslessGoal(a);
-  if (a.has("max-error")) return boundGoal(a);
+  requireGridGoals(a, options);
+  if (options.maxError) return boundGoal(a, options);
   if (options.psnr && !options.convert.fit.seconds && !options.paper)
     return PsnrGoal{*options.psnr};
   return isSingleFit(a) ? Goal(FitGoal{}) : PresetGoal{};
@@ -366,6 +380,13 @@ OnCancel onCancel(const Arguments& a) {
                                {{"keep", OnCancel::kKeep}, {"discard", OnCancel::kDiscard}});
 }
 
+WantedSharing sharing(const Arguments& a) {
+  const auto given = a.get<std::string>("share");
+  if (given != "auto" && given != "off") refuseWith(a, "share " + given, {"size", "ratio"});
+  if (given == "auto" || given == "off") return {.isOn = given == "auto", .names = {}};
+  return {.isOn = true, .names = cli::splitText(given, ',')};
+}
+
 void readMemory(const Arguments& a, Options& options) {
   constexpr std::uint64_t kFitsShare = 2;  // one of two; the rest is for the volume and its copy
   const cli::HostMemory memory = cli::hostMemoryOf(a);
@@ -384,7 +405,8 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.input = a.get<std::string>("input");
   options.output = a.get<std::string>("output");
   options.grids = {namesIn(a, "grid"), namesIn(a, "keep"), namesIn(a, "skip"), false};
-  options.psnr = bounded<double>(a, "psnr", 0.0, kHighestPsnr);
+  options.sharing = sharing(a);
+  readGridGoals(a, options);
   options.convert.fit = fitOptions(a);
   options.convert.fit.psnr = options.psnr;
   options.convert.storage = storageOptions(a);

@@ -13,6 +13,7 @@
 #include "esvr/part_store.h"
 #include "esvr/vdb_io.h"
 #include "vdb2esvr/choose_grids.h"
+#include "vdb2esvr/grid_goals.h"
 #include "vdb2esvr/progress_bar.h"
 
 namespace esvr::vdb2esvr {
@@ -27,6 +28,12 @@ enum class Job { kWhole, kPart, kMerge };
 /// Whether an interrupted run writes its best state.
 enum class OnCancel { kKeep, kDiscard };
 
+/// Which grids of a file may share what they have in common.
+struct WantedSharing {
+  bool isOn = true;
+  std::vector<std::string> names;  ///< empty: all grids
+};
+
 struct Options {
   std::filesystem::path input, output;
   /// The frames, if the input is a pattern. The output is a pattern, too, or one file for all
@@ -37,8 +44,11 @@ struct Options {
   /// For a frame of a group: the frame before it as a reader gets it; null for the first one.
   const EsvrFile* previous = nullptr;
   WantedGrids grids;
+  WantedSharing sharing;
   ConvertOptions convert;             ///< options of every grid; a size replaces the goal
-  std::optional<double> psnr;         ///< PSNR that every grid should reach, dB over the box
+  std::vector<GridGoal> gridGoals;    ///< goals of single grids instead of that in `convert`
+  std::optional<double> psnr;         ///< PSNR that all other grids should reach, dB over the box
+  std::optional<BoundGoal> maxError;  ///< largest error of all other grids
   std::optional<std::uint64_t> size;  ///< largest size of the file, bytes
   std::optional<double> ratio;        ///< size of the input relative to that of the file
   std::optional<PaperMethod> paper;   ///< the paper's method, if it replaces ours

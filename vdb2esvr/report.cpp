@@ -78,6 +78,24 @@ bool isShare(const Goal& goal) {
   return within && within->relative;
 }
 
+/// The goals of single grids.
+Json goalsOf(const std::vector<GridGoal>& goals) {
+  Json list = Json::array();
+  for (const GridGoal& own : goals) {
+    const auto* psnr = std::get_if<PsnrGoal>(&own.goal);
+    list.push_back({{"grid", own.grid},
+                    {"psnr", psnr ? Json(psnr->psnr) : Json(nullptr)},
+                    {"max_error", maxErrorOf(own.goal)},
+                    {"max_error_is_share", isShare(own.goal)}});
+  }
+  return list;
+}
+
+Json shareOf(const WantedSharing& sharing) {
+  if (!sharing.names.empty()) return sharing.names;
+  return sharing.isOn ? "auto" : "off";
+}
+
 }  // namespace
 
 Json askedJson(const Options& options) {
@@ -91,6 +109,8 @@ Json askedJson(const Options& options) {
           {"max_error", maxErrorOf(options.convert.goal)},
           {"max_error_is_share", isShare(options.convert.goal)},
           {"representation", nameOf(options.convert.representation)},
+          {"goals", goalsOf(options.gridGoals)},
+          {"share", shareOf(options.sharing)},
           {"seconds", orNull(fit.seconds)},
           {"iterations", orNull(fit.iterations)},
           {"method", options.paper ? "paper" : "default"},
@@ -258,11 +278,22 @@ Json curveOf(const std::vector<TimedCurvePoint>& curve) {
   return points;
 }
 
+/// What a grid gains by other grids of the file.
+Json sharedOf(const ConvertedGrid& grid) {
+  if (!grid.shared) return nullptr;
+  const SharedBytes& shared = *grid.shared;
+  return {{"with", shared.with.empty() ? Json(nullptr) : Json(shared.with)},
+          {"bytes_with", shared.bytesWith},
+          {"bytes_without", shared.bytesWithout},
+          {"seconds", shared.seconds}};
+}
+
 Json gridOf(const RunRecord& record, std::size_t g) {
   const ConvertedGrid& grid = record.grids[g];
   return {{"name", grid.uniqueName},
           {"component_of", grid.component ? Json(grid.sourceName) : Json(nullptr)},
           {"same_as", orNull(grid.sameAs)},
+          {"shared", sharedOf(grid)},
           {"source", sourceOf(grid)},
           {"ellipsoids", grid.stored().field.ellipsoidCount()},
           {"bytes", cli::ownBytes(record.output, g)},
@@ -384,7 +415,11 @@ Json makeReport(const Options& options, const RunRecord& record) {
                    {"format", record.input.format},
                    {"bytes", record.input.fileBytes},
                    {"bytes_converted", ratio.bytesIn}}},
-                 {"output", {{"path", options.output.string()}, {"bytes", ratio.bytesOut}}},
+                 {"output",
+                  {{"path", options.output.string()},
+                   {"bytes", ratio.bytesOut},
+                   {"bytes_separate",
+                    record.bytesSeparate > 0 ? Json(record.bytesSeparate) : Json(nullptr)}}},
                  {"ratio", ratio.value()},
                  {"grids", gridsOf(record)},
                  {"vectors", vectorsOf(record)},
@@ -394,7 +429,7 @@ Json makeReport(const Options& options, const RunRecord& record) {
                  {"peak_memory_bytes", cli::peakMemory()},
                  {"interrupted", record.interrupted},
                  {"error", nullptr},
-                 {"exit_code", exitCodeOf(record, options.psnr)}});
+                 {"exit_code", exitCodeOf(record)}});
   return report;
 }
 

@@ -21,6 +21,7 @@
 #include "vdb2esvr/report.h"
 #include "vdb2esvr/run_record.h"
 #include "vdb2esvr/run_sequence.h"
+#include "vdb2esvr/share.h"
 #include "vdb2esvr/source.h"
 #include "vdb2esvr/summary.h"
 #include "vdb2esvr/twins.h"
@@ -214,10 +215,10 @@ void throwWhatIsAmiss(const Options& options, const RunRecord& record) {
     for (const auto& name : record.notFitted) text += ", without grid \"" + name + "\"";
     throw RuntimeFailure(text);
   }
-  if (const ConvertedGrid* grid = firstBelow(record, options.psnr))
+  if (const ConvertedGrid* grid = firstBelow(record))
     throw TargetMissed("grid \"" + grid->uniqueName + "\" reached " +
                        cli::decibels(grid->metrics.psnrBox) + " dB instead of " +
-                       cli::decibels(*options.psnr) + " dB; " + options.output.string() +
+                       cli::decibels(*grid->wantedPsnr) + " dB; " + options.output.string() +
                        " was written");
 }
 
@@ -260,6 +261,14 @@ Options besides(const std::vector<CarriedGrid>& carried, Options options) {
   return options;
 }
 
+/// The options of conversions after the fits.
+Options optionsOfFits(Options options, const CancelToken& cancel,
+                      const std::vector<Device>& devices) {
+  options.convert.fit.cancel = &cancel;
+  options.convert.fit.device = devices.front();
+  return options;
+}
+
 }  // namespace
 
 bool mayFit(const Options& options) {
@@ -274,14 +283,16 @@ StoreFile writingTo(const Options& options) {
   };
 }
 
-RunRecord convertFile(const Options& options, const FileRun& run) {
+RunRecord convertFile(const Options& given, const FileRun& run) {
   Ranks* const ranks = run.ranks;
   const CancelToken& cancel = run.cancel;
   const cli::Log& log = run.log;
   cli::Stopwatch watch;
   RunRecord record;
-  auto devices = std::async(std::launch::async, [&] { return devicesFor(options, ranks); });
-  record.input = inspectVdb(options.input);
+  auto devices = std::async(std::launch::async, [&] { return devicesFor(given, ranks); });
+  record.input = inspectVdb(given.input);
+  Options options = given;
+  resolveNames(record.input, options);
   GridChoice choice = chooseGrids(options.input, record.input, options.grids);
   tellNothingFitted(choice, log);
   std::vector<CarriedGrid> carried = readUnchanged(options, choice.carried);
@@ -299,7 +310,10 @@ RunRecord convertFile(const Options& options, const FileRun& run) {
     return record;
   }
   carrySmallerVectors(options, record, carried);
-  store(options, assemble(std::move(carried), record), run.store, record);
+  EsvrFile file = assemble(std::move(carried), record);
+  shareGrids(optionsOfFits(options, cancel, selected), choice.fitted, file, record);
+  store(options, file, run.store, record);
+  if (file.layout == FileLayout::kCompact) record.bytesSeparate = bytesWithoutSharing(file, record);
   if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();
   return record;

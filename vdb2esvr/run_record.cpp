@@ -41,17 +41,16 @@ Ratio ratioOf(const RunRecord& record) {
   return ratio;
 }
 
-const ConvertedGrid* firstBelow(const RunRecord& record, std::optional<double> psnr) {
-  if (!psnr) return nullptr;
-  const auto below = std::find_if(record.grids.begin(), record.grids.end(), [&](const auto& grid) {
-    return !(grid.metrics.psnrBox >= *psnr);
+const ConvertedGrid* firstBelow(const RunRecord& record) {
+  const auto below = std::ranges::find_if(record.grids, [](const ConvertedGrid& grid) {
+    return grid.wantedPsnr && !(grid.metrics.psnrBox >= *grid.wantedPsnr);
   });
   return below == record.grids.end() ? nullptr : &*below;
 }
 
-int exitCodeOf(const RunRecord& record, std::optional<double> psnr) {
+int exitCodeOf(const RunRecord& record) {
   if (record.interrupted) return int(ErrorKind::kRuntime);
-  return firstBelow(record, psnr) ? int(ErrorKind::kTargetMissed) : 0;
+  return firstBelow(record) ? int(ErrorKind::kTargetMissed) : 0;
 }
 
 }  // namespace esvr::vdb2esvr

@@ -30,6 +30,7 @@ struct RunRecord {
   std::vector<ConvertedGrid> grids;
   std::vector<ConvertedVector> vectors;
   EsvrSummary output;
+  std::uint64_t bytesSeparate = 0;  ///< of the file without sharing; 0: not known
   bool interrupted = false;
   double secondsWrite = 0.0, secondsTotal = 0.0;
 };
@@ -54,10 +55,10 @@ struct Ratio {
 /// True where the file holds a section of this kind for the grid.
 [[nodiscard]] bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& kind);
 
-/// The first grid below the wanted PSNR; null if all grids reach it.
-[[nodiscard]] const ConvertedGrid* firstBelow(const RunRecord& record, std::optional<double> psnr);
+/// The first grid below its wanted PSNR; null if all grids reach it.
+[[nodiscard]] const ConvertedGrid* firstBelow(const RunRecord& record);
 
 /// The exit code of the run.
-[[nodiscard]] int exitCodeOf(const RunRecord& record, std::optional<double> psnr);
+[[nodiscard]] int exitCodeOf(const RunRecord& record);
 
 }  // namespace esvr::vdb2esvr

@@ -70,6 +70,20 @@ void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& 
       << ", which has the same voxels\n";
 }
 
+/// Says which grids the voxels of others refer to, and what that saved.
+void printShared(const RunRecord& record, std::ostream& out) {
+  for (const ConvertedGrid& grid : record.grids)
+    if (grid.shared && !grid.shared->with.empty() && !grid.sameAs)
+      out << cli::printable(grid.uniqueName) << ": refers to " << cli::printable(grid.shared->with)
+          << ", with " << grid.shared->bytesWith << " bytes rather than "
+          << grid.shared->bytesWithout << '\n';
+  if (record.bytesSeparate > record.output.fileBytes)
+    out << "Sharing between grids made the file " << record.bytesSeparate - record.output.fileBytes
+        << " bytes smaller ("
+        << cli::shortNumber(double(record.bytesSeparate) / double(record.output.fileBytes))
+        << " times)\n";
+}
+
 void printFitted(const Options& options, const RunRecord& record, std::ostream& out) {
   if (record.grids.empty()) return;
   cli::Table table({"grid", "ellipsoids", "bytes", "PSNR box", "active", "max error", "seconds"});
@@ -120,6 +134,7 @@ void printSummary(const Options& options, const RunRecord& record, std::ostream&
   printFitted(options, record, out);
   printVectors(record, out);
   printNotFitted(record, out);
+  printShared(record, out);
   const Ratio ratio = ratioOf(record);
   out << cli::printable(options.input.string());
   if (!ratio.wholeInput()) out << ", " << ratio.grids << " of " << ratio.gridsOfInput << " grids:";

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "cli/stopwatch.h"
@@ -31,7 +32,7 @@ class TwinSearch {
   void read(std::size_t index, const FittedGrid& fitted) {
     cli::Stopwatch watch;
     VolumeGrid grid = readSource(options_, fitted);
-    const std::pair key(keyOf({grid.descriptor, grid.volume}), fitted.peak);
+    const Key key{keyOf({grid.descriptor, grid.volume}), fitted.peak, ownGoalOf(options_, fitted)};
     const auto [first, isNew] = firstBy_.emplace(key, index);
     if (isNew) return;
     twins_[index] = {first->second, std::move(grid.descriptor), grid.nonFiniteReplaced,
@@ -41,8 +42,11 @@ class TwinSearch {
   [[nodiscard]] Twins take() { return std::move(twins_); }
 
  private:
+  /// Volume, peak, and index of the goal.
+  using Key = std::tuple<InputKey, std::optional<double>, std::optional<std::size_t>>;
+
   const Options& options_;
-  std::map<std::pair<InputKey, std::optional<double>>, std::size_t> firstBy_;
+  std::map<Key, std::size_t> firstBy_;
   Twins twins_;
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <limits>
 
 #include "codec/voxel_values.h"
 
@@ -17,9 +18,14 @@ bool sameLattice(const VoxelLayer& a, const VoxelLayer& b) {
   return a.form == b.form && a.divisor == b.divisor && a.palette == b.palette;
 }
 
-double placeOf(const VoxelLayer& now, float value) {
-  if (now.form == VoxelForm::kQuantised) return double(value) * now.divisor;
-  return double(codeOfValue(now, value));
+/// Largest place of a value that a lattice has no code for. A code is at most 2^36 from it.
+constexpr double kLargestPlace = 0x1p35;
+constexpr double kLargestFloat = std::numeric_limits<float>::max();
+
+double placeOf(const VoxelLayer& now, double value) {
+  if (now.form == VoxelForm::kQuantised)
+    return std::clamp(value * now.divisor, -kLargestPlace, kLargestPlace);
+  return double(codeOfValue(now, float(std::clamp(value, -kLargestFloat, kLargestFloat))));
 }
 
 bool isNear(std::int32_t a, std::int32_t b) {
@@ -43,20 +49,22 @@ bool isPredictable(const VoxelLayer& now, const VoxelLayer& past) {
   return true;
 }
 
-PastVoxels::PastVoxels(const VoxelLayer& past, const VoxelLayer& now)
+PastVoxels::PastVoxels(const VoxelLayer& past, const VoxelLayer& now, const ValueMap& map)
     : past_(past),
       index_(past.bricks),
       shift_(shiftOf(past, now)),
       vacantPlace_(double(codeOfValue(now, now.background))),
       places_(past.codes.size(), past.codes.get_allocator()) {
-  const bool same = sameLattice(past, now);
+  const bool same = map == ValueMap{} && sameLattice(past, now);
   tbb::parallel_for(std::size_t{0}, past.bricks.size(), [&](std::size_t b) {
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
       const std::size_t i = b * kBrickVoxels + v;
       if (past.vacant[b].test(int(v)))
         places_[i] = vacantPlace_;
       else
-        places_[i] = same ? double(past.codes[i]) : placeOf(now, valueOfCode(past, past.codes[i]));
+        places_[i] =
+            same ? double(past.codes[i])
+                 : placeOf(now, map.gain * double(valueOfCode(past, past.codes[i])) + map.offset);
     }
   });
 }

@@ -1,5 +1,6 @@
 #pragma once
-/// The voxels of the previous frame, as numbers on the lattice of the frame that is coded.
+/// The voxels that a frame refers to, as numbers on the lattice of the frame that is coded. They are
+/// those of the previous frame, or those of another grid whose values are mapped.
 
 #include <array>
 #include <cstddef>
@@ -30,11 +31,18 @@ struct PastCube {
 /// vacant voxels of `now` have the code of the background.
 [[nodiscard]] bool isPredictable(const VoxelLayer& now, const VoxelLayer& past);
 
+/// The value gain * v + offset in place of v. The default changes nothing.
+struct ValueMap {
+  double gain = 1.0, offset = 0.0;
+  friend bool operator==(const ValueMap&, const ValueMap&) = default;
+};
+
 class PastVoxels {
  public:
   /// \param past  the layer of the previous frame, which must outlive this object
   /// \param now   the frame that is coded: its form, divisor, palette, background and origin
-  PastVoxels(const VoxelLayer& past, const VoxelLayer& now);
+  /// \param map   of the values of `past`
+  PastVoxels(const VoxelLayer& past, const VoxelLayer& now, const ValueMap& map = {});
 
   [[nodiscard]] const VoxelLayer& layer() const { return past_; }
   /// Position of the bricks of the previous frame relative to the origin of the frame.

@@ -3,7 +3,7 @@
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "format/byte_source.h"
-#include "format/section_table.h"
+#include "format/packed_sections.h"
 
 namespace esvr {
 namespace {
@@ -46,7 +46,7 @@ std::vector<std::byte> encodedWithoutCarried(EsvrFile file) {
 std::vector<std::string> checkEsvr(const std::filesystem::path& path, const ReadLimits& allowed) {
   ReadLimits limits = allowed;
   limits.carriedBytes = false;  // they are checked, but not kept
-  const auto table = readTable(FileSource(path));
+  const auto table = readAllRows(FileSource(path));
   const EsvrFile file = readEsvr(path, limits);
   if (encodedWithoutCarried(file) != encodedWithoutCarried(readEsvr(path, limits)))
     throw BadInput(path.string() + ": decoding it twice gives two contents");

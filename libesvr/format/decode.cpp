@@ -13,11 +13,13 @@
 #include "format/ellipsoids_section.h"
 #include "format/frame_table.h"
 #include "format/grid_record.h"
+#include "format/grid_records.h"
 #include "format/layer_errors_stream.h"
 #include "format/layered_section.h"
 #include "format/mask_section.h"
 #include "format/planes.h"
 #include "format/predicted_grid.h"
+#include "format/related_voxels.h"
 #include "format/section_reader.h"
 #include "format/validity.h"
 #include "format/voxel_section.h"
@@ -42,14 +44,24 @@ struct OpenChunk {
   BlockDirectory directory;
 };
 
+/// The file that grids are read from.
+struct GridsOfFile {
+  SectionReader& sections;
+  GridRecords& records;
+  const ReadPart* part = nullptr;  ///< the part to read; null: all of it
+};
+
 /// Reads one grid of a file.
-/// \param part  the part to read; null: all of it
 class GridDecoder {
  public:
-  GridDecoder(SectionReader& sections, std::uint32_t grid, const ReadPart* part)
-      : sections_(sections), g_(grid), part_(part) {}
+  GridDecoder(const GridsOfFile& file, std::uint32_t grid)
+      : sections_(file.sections), records_(file.records), g_(grid), part_(file.part) {}
 
-  StoredGrid decode() {
+  /// The record alone.
+  StoredGrid decodeRecord() { return readRecord().grid; }
+
+  /// \param before  the grids before this one
+  StoredGrid decode(std::span<const StoredGrid> before) {
     GridRecord record = readRecord();
     StoredGrid grid = std::move(record.grid);
     if (record.chunkCount > 1) record.chunks = readChunkTable(record.chunkCount);
@@ -57,6 +69,7 @@ class GridDecoder {
     if (grid.topology == TopologyKind::kBricks) readBricks(grid);
     if (grid.topology == TopologyKind::kMask) readMask(grid);
     readVoxels(grid);
+    readRelated(before, grid);
     readResidual(grid);
     readLayerErrors(grid);
     readCurve(grid);
@@ -83,8 +96,8 @@ class GridDecoder {
   }
 
   GridRecord readRecord() {
-    const auto content = sections_.get(id(SectionKind::kGrid));
-    ByteReader in(content, sections_.place(id(SectionKind::kGrid)));
+    const auto content = records_.take(g_);
+    ByteReader in(content, records_.place(g_));
     GridRecord record = getGrid(in);
     in.finish();
     refuse(faultOf(record.grid));
@@ -241,6 +254,13 @@ class GridDecoder {
       grid.voxels = getVoxels(sections_.get(section), sections_.place(section), sections_.budget());
   }
 
+  void readRelated(std::span<const StoredGrid> before, StoredGrid& grid) {
+    const auto section = id(SectionKind::kRelated);
+    if (!sections_.has(section)) return;
+    if (grid.voxels) throw BadInput(sections_.place(section) + ": the grid has two sets of voxels");
+    getRelated(sections_.get(section), sections_.place(section), before, sections_.budget(), grid);
+  }
+
   /// Reads the residual, unless only some of the layers are read: it corrects the sum of all
   /// layers.
   void readResidual(StoredGrid& grid) {
@@ -268,6 +288,7 @@ class GridDecoder {
   static constexpr std::size_t kAllLayers = std::numeric_limits<std::size_t>::max();
 
   SectionReader& sections_;
+  GridRecords& records_;
   std::uint32_t g_;
   const ReadPart* part_;
   std::size_t layers_ = kAllLayers;  ///< number of layers to read
@@ -348,24 +369,44 @@ StoredGrid readPredicted(SectionReader& sections, std::uint32_t g, const EsvrFil
   return grid;
 }
 
-std::vector<StoredGrid> readGrids(SectionReader& sections, const ReadPart* part) {
-  std::vector<StoredGrid> grids;
-  const std::uint32_t count = sections.count(SectionKind::kGrid);
-  for (std::uint32_t g = 0; g < count; ++g)
-    grids.push_back(GridDecoder(sections, g, part).decode());
-  return grids;
+/// For each grid: whether it is wanted, or a wanted grid refers to it.
+std::vector<bool> neededGrids(const SectionReader& sections, std::size_t count,
+                              const ReadPart* part) {
+  std::vector<bool> needed(count, !part || !part->grids);
+  if (!part || !part->grids) return needed;
+  for (const std::size_t g : *part->grids)
+    if (g < count) needed[g] = true;
+  for (std::size_t g = count; g-- > 0;) {
+    const SectionId related{SectionKind::kRelated, std::uint32_t(g)};
+    if (!needed[g] || !sections.has(related)) continue;
+    const auto reference =
+        referenceIn(sections.peek(related, kReferenceBytes), sections.place(related));
+    if (reference && *reference < g) needed[*reference] = true;
+  }
+  return needed;
 }
 
-/// Reads the grids of a frame that refers to the previous one.
-std::vector<StoredGrid> readGridsAfter(SectionReader& sections, const EsvrFile& previous) {
-  std::vector<StoredGrid> grids;
-  const std::uint32_t count =
-      sections.count(SectionKind::kGrid) + sections.count(SectionKind::kPredicted);
+/// Reads the grids of a file that stands alone, and its layout.
+void readGrids(SectionReader& sections, const ReadPart* part, EsvrFile& file) {
+  if (sections.count(SectionKind::kGridRecords) + sections.count(SectionKind::kPacked) > 0)
+    file.layout = FileLayout::kCompact;
+  GridRecords records(sections);
+  const auto needed = neededGrids(sections, records.count(), part);
+  for (std::uint32_t g = 0; g < needed.size(); ++g) {
+    GridDecoder decoder({sections, records, part}, g);
+    file.grids.push_back(needed[g] ? decoder.decode(file.grids) : decoder.decodeRecord());
+  }
+}
+
+/// Reads the grids of a frame that refers to the previous one, and its layout.
+void readGridsAfter(SectionReader& sections, const EsvrFile& previous, EsvrFile& file) {
+  if (sections.has({SectionKind::kGridRecords})) file.layout = FileLayout::kCompact;
+  GridRecords records(sections);
+  const std::uint32_t count = records.count() + sections.count(SectionKind::kPredicted);
   for (std::uint32_t g = 0; g < count; ++g)
-    grids.push_back(sections.has({SectionKind::kPredicted, g})
-                        ? readPredicted(sections, g, previous)
-                        : GridDecoder(sections, g, nullptr).decode());
-  return grids;
+    file.grids.push_back(sections.has({SectionKind::kPredicted, g})
+                             ? readPredicted(sections, g, previous)
+                             : GridDecoder({sections, records}, g).decode(file.grids));
 }
 
 CarriedBytes carriedBytesOf(const ReadLimits& limits) {
@@ -376,7 +417,8 @@ CarriedBytes carriedBytesOf(const ReadLimits& limits) {
 
 EsvrFile decode(const ByteSource& source, const ReadLimits& limits) {
   SectionReader sections(source, limits);
-  EsvrFile file{readFileMetadata(sections), readGrids(sections, nullptr)};
+  EsvrFile file{readFileMetadata(sections), {}};
+  readGrids(sections, nullptr, file);
   readCarriedGrids(sections, carriedBytesOf(limits), file);
   readVectors(sections, file);
   checkOrder(sections, file);
@@ -389,7 +431,8 @@ EsvrFile decodeShort(std::span<const std::byte> bytes, const std::string& name,
   const MemorySource source(bytes, name);
   FrameTable table = getFrame(bytes, name);
   SectionReader sections(source, std::move(table.sections), limits);
-  EsvrFile file{readFileMetadata(sections), readGridsAfter(sections, previous)};
+  EsvrFile file{readFileMetadata(sections), {}};
+  readGridsAfter(sections, previous, file);
   readCarriedGrids(sections, carriedBytesOf(limits), file);
   readVectors(sections, file);
   if (table.inherited.metadata) file.metadata = previous.metadata;
@@ -402,7 +445,8 @@ EsvrFile decodeShort(std::span<const std::byte> bytes, const std::string& name,
 
 EsvrFile decodePart(const ByteSource& source, const ReadPart& part) {
   SectionReader sections(source, part.limits);
-  EsvrFile file{readFileMetadata(sections), readGrids(sections, &part)};
+  EsvrFile file{readFileMetadata(sections), {}};
+  readGrids(sections, &part, file);
   readCarriedGrids(sections, CarriedBytes::kNothing, file);
   readVectors(sections, file);
   checkOrder(sections, file);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include "core/atomic_file.h"
@@ -13,12 +14,14 @@
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
 #include "format/grid_record.h"
+#include "format/grid_records.h"
 #include "format/layer_errors_stream.h"
 #include "format/layered_section.h"
 #include "format/mask_section.h"
 #include "format/morton_order.h"
 #include "format/planes.h"
 #include "format/predicted_grid.h"
+#include "format/related_voxels.h"
 #include "format/section_writer.h"
 #include "format/validity.h"
 
@@ -59,6 +62,7 @@ void checkGrid(const StoredGrid& grid) {
     refuse(grid, "it has bricks, but a topology without");
   if (grid.mask.size() != (grid.topology == TopologyKind::kMask ? grid.bricks.size() : 0))
     refuse(grid, "its mask is not that of its topology");
+  if (grid.reference && !grid.voxels) refuse(grid, "it has a reference, but no voxels");
   if (!grid.quantised.empty() && grid.quantised.size() != grid.field.chunks.size())
     refuse(grid, "its quantised chunks are not those of its field");
   checkLayers(grid);
@@ -91,10 +95,14 @@ void addFileMetadata(SectionWriter& out, const EsvrFile& file) {
   out.add({SectionKind::kFileMetadata}, kRequired, content.take(), kByteSize);
 }
 
-void addGrid(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
+std::vector<std::byte> recordOf(const SortedGrid& grid) {
   ByteWriter content;
   putGrid(content, grid.grid, grid.records);
-  out.add({SectionKind::kGrid, g}, kRequired, content.take(), kByteSize);
+  return content.take();
+}
+
+void addGrid(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
+  out.add({SectionKind::kGrid, g}, kRequired, recordOf(grid), kByteSize);
 }
 
 /// Adds the chunk records of a grid with several chunks; the record of a single chunk is in the
@@ -145,13 +153,29 @@ void addChunks(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
       addChunk(out, g, c, grid.chunks[c].ellipsoids);
 }
 
-void addExtras(SectionWriter& out, std::uint32_t g, const StoredGrid& grid) {
+void addRelated(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> grids) {
+  const StoredGrid& grid = grids[g];
+  const VoxelReference& reference = *grid.reference;
+  const bool isThere = !reference.grid || (*reference.grid < g && grids[*reference.grid].voxels);
+  if (!isThere) refuse(grid, "it refers to a grid that is not before it or has no voxels");
+  auto content = putRelated(*grid.voxels, reference,
+                            reference.grid ? &*grids[*reference.grid].voxels : nullptr);
+  if (!content) refuse(grid, "its voxels cannot be coded with those of the grid it refers to");
+  out.addRaw({SectionKind::kRelated, g}, kRequired, std::move(*content));
+}
+
+/// \param grids  those of the file
+void addExtras(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> grids) {
+  const StoredGrid& grid = grids[g];
   if (grid.topology == TopologyKind::kMask)
     out.addRaw({SectionKind::kMask, g}, kRequired, putMask(grid.bricks, grid.mask));
   else if (!grid.bricks.empty())
     out.add({SectionKind::kBricks, g}, kRequired, putBricks(grid.bricks), kFloatSize);
   if (grid.residual) out.addVoxels({SectionKind::kResidual, g}, *grid.residual);
-  if (grid.voxels) out.addVoxels({SectionKind::kVoxels, g}, *grid.voxels);
+  if (grid.reference)
+    addRelated(out, g, grids);
+  else if (grid.voxels)
+    out.addVoxels({SectionKind::kVoxels, g}, *grid.voxels);
   if (!grid.layerErrors.empty())
     out.addRaw({SectionKind::kLayerErrors, g}, kOptional, putLayerErrors(grid.layerErrors));
   if (!grid.curve.empty())
@@ -200,9 +224,31 @@ Inherited inheritedFrom(const EsvrFile& previous, const EsvrFile& frame) {
 
 using Differences = std::vector<std::optional<std::vector<std::byte>>>;
 
+/// Adds encoded grid records in one section.
+/// \return false if a reader would refuse so many records in so few bytes; nothing is added then
+bool addJoined(SectionWriter& out, const std::vector<std::vector<std::byte>>& records) {
+  Packed packed = pack(putRecords(records), kByteSize);
+  if (packed.bytes.size() < records.size()) return false;
+  out.addPacked({SectionKind::kGridRecords}, kRequired, std::move(packed));
+  return true;
+}
+
+/// Adds the records of the grids that have no difference.
+void addRecords(SectionWriter& out, const std::vector<SortedGrid>& grids,
+                const Differences& differences) {
+  std::vector<std::vector<std::byte>> records;
+  for (std::size_t g = 0; g < grids.size(); ++g)
+    if (!differences[g]) records.push_back(recordOf(grids[g]));
+  const bool joins = out.layout() == FileLayout::kCompact && records.size() > 1;
+  if (joins && addJoined(out, records)) return;
+  for (std::uint32_t g = 0; g < grids.size(); ++g)
+    if (!differences[g]) addGrid(out, g, grids[g]);
+}
+
 /// Checks a file and collects its sections.
 /// \param differences  for each grid: its difference from the previous frame, which replaces it
-SectionWriter collect(const EsvrFile& file, Differences differences, const Inherited& inherited) {
+SectionWriter collect(const EsvrFile& file, const Differences& differences,
+                      const Inherited& inherited) {
   (void)gridsInOrder(file);  // refuses places that are impossible
   checkVectors(file);
   std::vector<SortedGrid> grids;
@@ -213,19 +259,19 @@ SectionWriter collect(const EsvrFile& file, Differences differences, const Inher
 
   // Records come first, so that one read at the beginning of the file is enough to list it.
   SectionWriter out;
+  out.setLayout(file.layout);
   if (!inherited.metadata) addFileMetadata(out, file);
+  addRecords(out, grids, differences);
   for (std::uint32_t g = 0; g < grids.size(); ++g)
     if (differences[g])
-      out.addRaw({SectionKind::kPredicted, g}, kRequired, std::move(*differences[g]));
-    else
-      addGrid(out, g, grids[g]);
+      out.addRaw({SectionKind::kPredicted, g}, kRequired, std::vector(*differences[g]));
   if (!inherited.vectors) addVectors(out, file.vectors);
   if (!inherited.carried) addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
     if (differences[g]) continue;
     addChunks(out, g, grids[g]);
-    addExtras(out, g, grids[g].grid);
+    addExtras(out, g, file.grids);
   }
   if (!inherited.carried) addCarriedBytes(out, file.carried, grids.size());
   return out;
@@ -240,22 +286,56 @@ SectionWriter sectionsOf(const EsvrFile& file) {
 }
 
 std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
-                                                   const StoredGrid& previous) {
+                                                   const StoredGrid& previous,
+                                                   std::uint64_t ownBytes) {
   auto content = putPredicted(grid, previous);
-  if (content && content->size() + kFrameRowBytes >= bytesAdded(grid)) content.reset();
+  if (content && content->size() + kFrameRowBytes >= ownBytes) content.reset();
   return content;
 }
 
-std::optional<FrameSections> differencesOf(const EsvrFile& frame, const EsvrFile& previous) {
+namespace {
+
+/// Bytes of a grid in a frame if it is not stored as a difference. The record of a grid that refers
+/// to another one is estimated, because it is compressed together with others.
+std::uint64_t bytesOfOwn(const EsvrFile& frame, std::size_t g) {
+  constexpr std::uint64_t kJoinedRecordBytes = 64;
+  if (!frame.grids[g].reference) return bytesAdded(frame, g);
+  SectionWriter out;
+  addRelated(out, std::uint32_t(g), frame.grids);
+  return out.bytesUnshared() - kEntryBytes + kFrameRowBytes + kJoinedRecordBytes;
+}
+
+std::optional<FrameSections> collectDifferences(const EsvrFile& frame, const EsvrFile& previous) {
   Differences differences(frame.grids.size());
   bool any = false;
   for (std::size_t g = 0; g < std::min(frame.grids.size(), previous.grids.size()); ++g) {
-    differences[g] = differenceOf(frame.grids[g], previous.grids[g]);
+    differences[g] = differenceOf(frame.grids[g], previous.grids[g], bytesOfOwn(frame, g));
     any = any || differences[g];
   }
   if (!any) return std::nullopt;
   const Inherited inherited = inheritedFrom(previous, frame);
-  return FrameSections{collect(frame, std::move(differences), inherited), inherited};
+  return FrameSections{collect(frame, differences, inherited), inherited};
+}
+
+std::uint64_t bytesOf(const std::optional<FrameSections>& frame) {
+  return frame ? frame->sections.assembleFrame(frame->inherited).size()
+               : std::numeric_limits<std::uint64_t>::max();
+}
+
+EsvrFile withoutReferences(EsvrFile frame) {
+  for (StoredGrid& grid : frame.grids) grid.reference.reset();
+  return frame;
+}
+
+}  // namespace
+
+std::optional<FrameSections> differencesOf(const EsvrFile& frame, const EsvrFile& previous) {
+  const bool refers = std::ranges::any_of(
+      frame.grids, [](const StoredGrid& grid) { return grid.reference.has_value(); });
+  auto found = collectDifferences(frame, previous);
+  if (!refers) return found;
+  auto plain = collectDifferences(withoutReferences(frame), previous);
+  return bytesOf(plain) < bytesOf(found) ? std::move(plain) : std::move(found);
 }
 
 }  // namespace format
@@ -277,6 +357,17 @@ std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata) {
 std::uint64_t bytesAdded(const StoredGrid& grid) {
   const EsvrFile file{{}, {grid}};
   return sectionsOf(file).bytesUnshared();
+}
+
+std::uint64_t bytesAdded(const EsvrFile& file, std::size_t grid) {
+  const SortedGrid own = sorted(file.grids[grid]);
+  const auto g = std::uint32_t(grid);
+  SectionWriter out;
+  addGrid(out, g, own);
+  addChunkTable(out, g, own);
+  addChunks(out, g, own);
+  addExtras(out, g, file.grids);
+  return out.bytesUnshared();
 }
 
 std::uint64_t bytesOfCarried(const std::vector<CarriedGrid>& grids) {

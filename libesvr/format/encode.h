@@ -25,7 +25,9 @@ struct FrameSections {
 
 /// The difference of a grid from that of the previous frame, if it takes fewer bytes in a frame than
 /// the grid.
+/// \param ownBytes  bytes of the grid without a previous frame
 [[nodiscard]] std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
-                                                                 const StoredGrid& previous);
+                                                                 const StoredGrid& previous,
+                                                                 std::uint64_t ownBytes);
 
 }  // namespace esvr::format

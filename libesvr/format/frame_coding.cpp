@@ -28,10 +28,11 @@ bool dependsOnPrevious(std::span<const std::byte> bytes) {
 }
 
 std::uint64_t bytesInFrame(const StoredGrid& grid, const StoredGrid* previous) {
+  const std::uint64_t own = bytesAdded(grid);
   if (previous)
-    if (const auto difference = format::differenceOf(grid, *previous))
+    if (const auto difference = format::differenceOf(grid, *previous, own))
       return difference->size() + format::kFrameRowBytes;
-  return bytesAdded(grid);
+  return own;
 }
 
 }  // namespace esvr

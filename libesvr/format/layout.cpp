@@ -19,6 +19,8 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kCurve, "curve"},
     {SectionKind::kCarried, "carried grid"},
     {SectionKind::kVector, "vector grid"},
+    {SectionKind::kGridRecords, "grid records"},
+    {SectionKind::kPacked, "packed sections"},
     {SectionKind::kLayerErrors, "layer errors"},
     {SectionKind::kCenters, "centers"},
     {SectionKind::kScales, "scales"},
@@ -32,6 +34,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kResidual, "residual"},
     {SectionKind::kCarriedBytes, "carried bytes"},
     {SectionKind::kPredicted, "predicted grid"},
+    {SectionKind::kRelated, "related voxels"},
     {SectionKind::kSequenceIndex, "sequence index"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
@@ -66,6 +69,10 @@ std::uint16_t minorVersionOf(SectionKind kind) {
     case SectionKind::kPredicted:
     case SectionKind::kSequenceIndex:
       return 3;
+    case SectionKind::kGridRecords:
+    case SectionKind::kPacked:
+    case SectionKind::kRelated:
+      return 4;
     default:
       return 0;
   }

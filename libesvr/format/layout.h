@@ -16,7 +16,7 @@ namespace esvr::format {
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
 
 inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
-inline constexpr std::uint16_t kVersionMinor = 3;
+inline constexpr std::uint16_t kVersionMinor = 4;
 
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
@@ -35,6 +35,8 @@ enum class SectionKind : std::uint32_t {
   kCurve = 7,
   kCarried = 8,
   kVector = 9,
+  kGridRecords = 11,
+  kPacked = 12,
   kCenters = 16,
   kScales = 17,
   kRotations = 18,
@@ -47,6 +49,7 @@ enum class SectionKind : std::uint32_t {
   kResidual = 37,
   kCarriedBytes = 38,
   kPredicted = 39,
+  kRelated = 41,
   kSequenceIndex = 64,
 };
 

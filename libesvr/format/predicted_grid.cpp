@@ -4,12 +4,11 @@
 #include <limits>
 #include <utility>
 
-#include "codec/brick_order.h"
-#include "codec/frame_coder.h"
 #include "esvr/error.h"
 #include "format/byte_reader.h"
 #include "format/byte_writer.h"
 #include "format/grid_record.h"
+#include "format/predicted_stream.h"
 #include "format/voxel_section.h"
 
 namespace esvr::format {
@@ -90,32 +89,8 @@ VoxelLayer getHead(ByteReader& in, const VoxelLayer& previous) {
   return layer;
 }
 
-std::vector<std::byte> encodePredicted(const VoxelLayer& layer, const codec::PastVoxels& past) {
-  codec::Writer writer;
-  VoxelLayer written = layer;
-  codec::codeFrameBricks(writer, past, written.bricks);
-  codec::codeFrameVoxels(writer, codec::codingOrder(written.bricks), past, written);
-  return writer.coder.finish();
-}
-
-/// Where the memory of a reader comes from, and the start of its error texts.
-struct ReaderPlace {
-  const std::string& where;
-  MemoryBudget& budget;
-};
-
-void decodePredicted(ByteReader& in, const codec::PastVoxels& past, const ReaderPlace& place,
-                     VoxelLayer& layer) {
-  const auto stream = in.getBytes(in.left());
-  codec::Reader reader{codec::RangeDecoder(stream)};
-  codec::codeFrameBricks(reader, past, maxBricksIn(stream.size()), layer.bricks);
-  checkBricks(layer, in);
-  takeBricks(layer.bricks.size(), place.where, place.budget);
-  layer.codes.resize(layer.bricks.size() * kBrickVoxels);
-  layer.active.resize(layer.bricks.size());
-  layer.vacant.resize(layer.bricks.size());
-  codec::codeFrameVoxels(reader, codec::codingOrder(layer.bricks), past, layer);
-}
+/// Largest number of bricks of a frame: the previous frame, its neighbours and the stream limit it.
+constexpr auto kAnyBricks = std::numeric_limits<std::uint64_t>::max();
 
 }  // namespace
 
@@ -143,7 +118,7 @@ StoredGrid getPredicted(std::span<const std::byte> content, const std::string& w
     in.fail("lies too far from the previous frame");
   try {
     const codec::PastVoxels past(*previous.voxels, layer);
-    decodePredicted(in, past, {where, budget}, layer);
+    decodePredicted(in, past, kAnyBricks, {where, budget}, layer);
   } catch (const BadInput& error) {
     in.fail(error.what());
   }

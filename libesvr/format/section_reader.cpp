@@ -5,6 +5,7 @@
 
 #include "esvr/error.h"
 #include "format/large_section.h"
+#include "format/packed_sections.h"
 #include "format/sequence_index.h"
 #include "format/table_check.h"
 
@@ -16,7 +17,8 @@ namespace {
 /// three lengths of four bytes each, and becomes three containers.
 double expansionOf(SectionKind kind) {
   constexpr double kOfMetadata = 32.0, kOfArrays = 4.0;
-  const bool hasMetadata = kind == SectionKind::kFileMetadata || kind == SectionKind::kGrid;
+  const bool hasMetadata = kind == SectionKind::kFileMetadata || kind == SectionKind::kGrid ||
+                           kind == SectionKind::kGridRecords;
   return hasMetadata ? kOfMetadata : kOfArrays;
 }
 
@@ -26,10 +28,15 @@ SectionReader::SectionReader(const ByteSource& source, const ReadLimits& limits)
     : SectionReader(source, readTable(source), limits) {}
 
 SectionReader::SectionReader(const ByteSource& source, SectionTable table, const ReadLimits& limits)
-    : source_(source), table_(std::move(table)), budget_(limits.maxBytes, limits.memory) {
+    : source_(source),
+      table_(std::move(table)),
+      ownRows_(table_.entries.size()),
+      budget_(limits.maxBytes, limits.memory) {
   if (isSequence(table_))
     throw BadInput(source.name() + ": holds a sequence, whose frames are read one at a time");
+  addPackedRows(source, table_);
   for (std::size_t i = 0; i < table_.entries.size(); ++i) unread_[table_.entries[i].id] = i;
+  if (ownRows_ < table_.entries.size()) unread_.erase({SectionKind::kPacked});
 }
 
 std::uint32_t SectionReader::count(SectionKind kind) const {
@@ -43,6 +50,21 @@ std::string SectionReader::place(const SectionId& id) const {
       std::find_if(entries.begin(), entries.end(), [&](const auto& e) { return e.id == id; });
   if (it == entries.end()) return source_.name() + ": " + describe(id);
   return placeOf(source_.name(), table_, std::size_t(it - entries.begin()));
+}
+
+const SectionEntry& SectionReader::entryOf(const SectionId& id) const {
+  const auto at = unread_.find(id);
+  if (at == unread_.end()) throw BadInput(source_.name() + ": there is no " + describe(id));
+  return table_.entries[at->second];
+}
+
+std::uint64_t SectionReader::storedBytes(const SectionId& id) const {
+  return entryOf(id).storedBytes;
+}
+
+std::vector<std::byte> SectionReader::peek(const SectionId& id, std::uint64_t bytes) const {
+  const SectionEntry& entry = entryOf(id);
+  return source_.read(entry.offset, std::min(bytes, entry.storedBytes));
 }
 
 std::size_t SectionReader::take(const SectionId& id) {
@@ -81,8 +103,14 @@ std::unique_ptr<ByteSource> SectionReader::open(const SectionId& id, bool whole)
   return std::make_unique<PartSource>(source_, entry.offset, entry.storedBytes, name);
 }
 
+SectionTable SectionReader::ownTable() const {
+  SectionTable own = table_;
+  own.entries.resize(ownRows_);
+  return own;
+}
+
 void SectionReader::finish() {
-  if (!table_.isFrame) checkGaps(source_, table_);
+  if (!table_.isFrame) checkGaps(source_, ownTable());
   std::set<Placement> read;  // shared bytes are read once, however many sections share them
   for (const auto& [id, entry] : unread_) {
     if (known(id.kind))

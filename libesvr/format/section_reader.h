@@ -21,6 +21,7 @@ class SectionReader {
   /// \param table  that of the source, which was checked
   SectionReader(const ByteSource& source, SectionTable table, const ReadLimits& limits);
 
+  /// The table, with the rows of packed sections.
   [[nodiscard]] const SectionTable& table() const { return table_; }
 
   /// Number of sections of a kind.
@@ -30,6 +31,9 @@ class SectionReader {
   [[nodiscard]] std::string place(const SectionId& id) const;
 
   [[nodiscard]] bool has(const SectionId& id) const { return unread_.contains(id); }
+
+  /// Bytes that a section takes in the file. It must exist.
+  [[nodiscard]] std::uint64_t storedBytes(const SectionId& id) const;
 
   /// The memory that is left for content; get() takes from it. Bytes that sections share count for
   /// each of them, because each has a content of its own in memory.
@@ -47,6 +51,10 @@ class SectionReader {
   /// \throws BadInput  the section is damaged or does not exist
   void check(const SectionId& id);
 
+  /// The first bytes of a section that is stored raw, at most `bytes`. Their checksum is not verified,
+  /// which get() does. \throws BadInput  the section does not exist
+  [[nodiscard]] std::vector<std::byte> peek(const SectionId& id, std::uint64_t bytes) const;
+
   /// Opens a section that is to be read piece by piece. It is called instead of get(), and once.
   /// \param whole  true: the whole section is read and checked now; false: nothing is checked yet
   /// \throws BadInput  the section is damaged, does not exist, or is compressed
@@ -61,8 +69,13 @@ class SectionReader {
  private:
   [[nodiscard]] std::size_t take(const SectionId& id);
 
+  /// The table without the rows of packed sections.
+  [[nodiscard]] SectionTable ownTable() const;
+  [[nodiscard]] const SectionEntry& entryOf(const SectionId& id) const;
+
   const ByteSource& source_;
   SectionTable table_;
+  std::size_t ownRows_;  ///< rows of the table that are not those of packed sections
   MemoryBudget budget_;
   std::map<SectionId, std::size_t> unread_;
 };

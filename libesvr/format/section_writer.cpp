@@ -5,6 +5,7 @@
 
 #include "format/byte_writer.h"
 #include "format/checksum.h"
+#include "format/packed_sections.h"
 #include "format/voxel_section.h"
 
 namespace esvr::format {
@@ -46,29 +47,87 @@ void SectionWriter::addLarge(const SectionId& id, const VoxelArray<std::byte>& c
   addContent(entry, {{}, std::move(packed.bytes)});
 }
 
-std::uint64_t SectionWriter::writeTo(const Sink& sink) {
-  std::uint64_t end = kHeaderBytes + table_.entries.size() * kEntryBytes;
-  std::vector<std::uint64_t> offsets;
-  for (const auto& content : contents_) {
-    offsets.push_back(alignUp(end));
-    end = offsets.back() + content.bytes().size();
+void SectionWriter::Arrangement::add(const SectionEntry& row, std::span<const std::byte> content,
+                                     std::size_t number) {
+  const auto same = std::ranges::find(numbers, number);
+  contentOf.push_back(std::size_t(same - numbers.begin()));
+  if (same == numbers.end()) {
+    numbers.push_back(number);
+    contents.push_back(content);
   }
-  table_.fileBytes = end;
-  for (std::size_t i = 0; i < contentOf_.size(); ++i)
-    table_.entries[i].offset = offsets[contentOf_[i]];
+  table.versionMinor = std::max(table.versionMinor, minorVersionOf(row.id.kind));
+  table.entries.push_back(row);
+}
 
-  const auto head = encodeTable(table_);
+std::uint64_t SectionWriter::Arrangement::bytes() const {
+  std::uint64_t end = kHeaderBytes + table.entries.size() * kEntryBytes;
+  for (const auto& content : contents) end = alignUp(end) + content.size();
+  return end;
+}
+
+std::span<const std::byte> SectionWriter::contentOfRow(std::size_t row) const {
+  return contents_[contentOf_[row]].bytes();
+}
+
+SectionWriter::Arrangement SectionWriter::plain() const {
+  Arrangement all{{.versionMinor = 0}};
+  for (std::size_t i = 0; i < table_.entries.size(); ++i)
+    all.add(table_.entries[i], contentOfRow(i), contentOf_[i]);
+  return all;
+}
+
+SectionWriter::Arrangement SectionWriter::packed() const {
+  Arrangement small{{.versionMinor = 0}}, large{{.versionMinor = 0}};
+  for (std::size_t i = 0; i < table_.entries.size(); ++i) {
+    const auto content = contentOfRow(i);
+    auto& part = content.size() <= kLargestPacked ? small : large;
+    part.add(table_.entries[i], content, contentOf_[i]);
+  }
+  Arrangement all{{.versionMinor = small.table.versionMinor}};
+  all.packed = putFrame({{}, small.table}, {small.contents, small.contentOf});
+  SectionEntry row{{SectionKind::kPacked}, Codec::kRaw, kRequired};
+  row.storedBytes = row.rawBytes = all.packed.size();
+  row.checksum = checksum(all.packed);
+  all.add(row, all.packed, contents_.size());
+  for (std::size_t i = 0; i < large.table.entries.size(); ++i) {
+    const std::size_t content = large.contentOf[i];
+    all.add(large.table.entries[i], large.contents[content], large.numbers[content]);
+  }
+  return all;
+}
+
+SectionWriter::Arrangement SectionWriter::arranged() const {
+  Arrangement all = plain();
+  if (layout_ == FileLayout::kPlain) return all;
+  Arrangement smaller = packed();
+  return smaller.bytes() < all.bytes() ? std::move(smaller) : std::move(all);
+}
+
+std::uint64_t SectionWriter::writeTo(const Sink& sink) const {
+  Arrangement all = arranged();
+  const std::uint64_t end = all.bytes();
+  std::vector<std::uint64_t> offsets;
+  std::uint64_t at = kHeaderBytes + all.table.entries.size() * kEntryBytes;
+  for (const auto& content : all.contents) {
+    offsets.push_back(alignUp(at));
+    at = offsets.back() + content.size();
+  }
+  all.table.fileBytes = end;
+  for (std::size_t i = 0; i < all.contentOf.size(); ++i)
+    all.table.entries[i].offset = offsets[all.contentOf[i]];
+
+  const auto head = encodeTable(all.table);
   sink(head);
-  std::uint64_t at = head.size();
-  for (std::size_t c = 0; c < contents_.size(); ++c) {
+  at = head.size();
+  for (std::size_t c = 0; c < all.contents.size(); ++c) {
     sink(std::vector<std::byte>(offsets[c] - at));
-    sink(contents_[c].bytes());
-    at = offsets[c] + contents_[c].bytes().size();
+    sink(all.contents[c]);
+    at = offsets[c] + all.contents[c].size();
   }
   return end;
 }
 
-std::vector<std::byte> SectionWriter::assemble() {
+std::vector<std::byte> SectionWriter::assemble() const {
   ByteWriter file;
   writeTo([&](auto piece) { file.putAll(piece); });
   return file.take();

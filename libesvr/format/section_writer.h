@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "esvr/container.h"
 #include "esvr/voxel_layer.h"
 #include "esvr/voxel_memory.h"
 #include "format/codec.h"
@@ -25,6 +26,9 @@ class SectionWriter {
   /// Adds a section whose content is coded already.
   void addRaw(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content);
 
+  /// Adds a section whose content is coded or compressed already.
+  void addPacked(const SectionId& id, std::uint16_t flags, Packed packed);
+
   /// Codes voxels and adds their section. Voxels that equal those of an earlier call, bit for bit,
   /// are not coded again, because coding takes long.
   /// \param layer  must outlive the writer
@@ -33,13 +37,17 @@ class SectionWriter {
   /// Adds a section of bytes that may be too large for the heap, without flags.
   void addLarge(const SectionId& id, const VoxelArray<std::byte>& content);
 
+  /// kCompact: small sections are packed (packed_sections.h) if that makes the file smaller.
+  void setLayout(FileLayout layout) { layout_ = layout; }
+  [[nodiscard]] FileLayout layout() const { return layout_; }
+
   using Sink = std::function<void(std::span<const std::byte>)>;
   /// Passes the file to the sink, piece by piece. Sections that are stored alike share their bytes.
   /// \return the size of the file
-  std::uint64_t writeTo(const Sink& sink);
+  std::uint64_t writeTo(const Sink& sink) const;
 
   /// The file in memory.
-  [[nodiscard]] std::vector<std::byte> assemble();
+  [[nodiscard]] std::vector<std::byte> assemble() const;
   /// The short form of a frame in memory.
   [[nodiscard]] std::vector<std::byte> assembleFrame(const Inherited& inherited) const;
 
@@ -47,6 +55,19 @@ class SectionWriter {
   [[nodiscard]] std::uint64_t bytesUnshared() const;
 
  private:
+  /// Rows, and the contents that they refer to.
+  struct Arrangement {
+    SectionTable table;
+    std::vector<std::byte> packed{};  ///< content of the first row, if sections are packed
+    std::vector<std::span<const std::byte>> contents{};
+    std::vector<std::size_t> numbers{};    ///< by content: number of the caller
+    std::vector<std::size_t> contentOf{};  ///< by row: index in `contents`
+
+    /// \param number  that of the content; equal for rows that share it
+    void add(const SectionEntry& row, std::span<const std::byte> content, std::size_t number);
+    [[nodiscard]] std::uint64_t bytes() const;
+  };
+
   /// Stored bytes, in one of two kinds of memory.
   struct Content {
     std::vector<std::byte> heap;
@@ -54,11 +75,16 @@ class SectionWriter {
     [[nodiscard]] std::span<const std::byte> bytes() const;
   };
 
-  void addPacked(const SectionId& id, std::uint16_t flags, Packed packed);
   /// \param entry  without its size and its checksum
   void addContent(SectionEntry entry, Content content);
   [[nodiscard]] std::size_t indexOf(const SectionEntry& entry, Content content);
+  [[nodiscard]] std::span<const std::byte> contentOfRow(std::size_t row) const;
+  [[nodiscard]] Arrangement plain() const;
+  [[nodiscard]] Arrangement packed() const;
+  /// The arrangement of the layout.
+  [[nodiscard]] Arrangement arranged() const;
 
+  FileLayout layout_ = FileLayout::kPlain;
   SectionTable table_{.versionMinor = 0};             ///< the lowest version that has all kinds
   std::vector<Content> contents_;                     ///< stored bytes without repetitions
   std::vector<std::size_t> contentOf_;                ///< index in contents_ of each entry

@@ -127,11 +127,16 @@ void putVoxelHead(ByteWriter& out, const VoxelLayer& layer) {
   out.putAll(layer.palette);
 }
 
+double getDivisor(ByteReader& in) {
+  const auto divisor = in.get<double>();
+  if (!(std::isfinite(divisor) && divisor > 0.0)) in.fail("the divisor of voxels");
+  return divisor;
+}
+
 VoxelLayer getVoxelHead(ByteReader& in) {
   VoxelLayer layer;
   layer.form = in.getEnum(VoxelForm::kPalette, "form of voxels");
-  layer.divisor = in.get<double>();
-  if (!(std::isfinite(layer.divisor) && layer.divisor > 0.0)) in.fail("the divisor of voxels");
+  layer.divisor = getDivisor(in);
   layer.origin.x = in.get<std::int32_t>();
   layer.origin.y = in.get<std::int32_t>();
   layer.origin.z = in.get<std::int32_t>();
@@ -147,6 +152,10 @@ VoxelLayer getVoxelHead(ByteReader& in) {
 
 std::uint64_t maxBricksIn(std::uint64_t bytes) {
   return kMaxBricksPerByte * bytes + kMaxBricksPerByte - 1;
+}
+
+std::uint64_t bytesForBricks(std::uint64_t bricks) {
+  return (bricks + kMaxBricksPerByte - 1) / kMaxBricksPerByte;
 }
 
 void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget) {
@@ -182,8 +191,7 @@ std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   out.put(std::uint8_t(bits));
   putModel(out, model);
   out.putAll(stream);
-  out.padTo(std::max<std::uint64_t>(
-      out.size(), (layer.bricks.size() + kMaxBricksPerByte - 1) / kMaxBricksPerByte));
+  out.padTo(std::max<std::uint64_t>(out.size(), bytesForBricks(layer.bricks.size())));
   return out.take();
 }
 

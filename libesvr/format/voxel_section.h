@@ -25,10 +25,14 @@ namespace esvr::format {
 /// The form, the divisor, the origin, the background and the palette.
 void putVoxelHead(ByteWriter& out, const VoxelLayer& layer);
 [[nodiscard]] VoxelLayer getVoxelHead(ByteReader& in);
+/// The divisor alone.
+[[nodiscard]] double getDivisor(ByteReader& in);
 
 /// Largest number of bricks that a section may have without a previous frame, so that a reader knows
 /// it before it allocates memory.
 [[nodiscard]] std::uint64_t maxBricksIn(std::uint64_t bytes);
+/// The number of bytes that a section needs for bricks that the previous frame has not.
+[[nodiscard]] std::uint64_t bytesForBricks(std::uint64_t bricks);
 
 /// Takes the memory of bricks while they are read from a budget.
 void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget);

@@ -150,7 +150,7 @@ TEST_F(CarriedFile, WithDamagedBytesIsRefused) {
   test::writeText(out(), bytes);
   const auto run = test::esvr2vdb({out(), back()});
   EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err, AllOf(HasSubstr("carried bytes"), HasSubstr("checksum does not match")));
+  EXPECT_THAT(run.err, AllOf(HasSubstr("section"), HasSubstr("checksum does not match")));
 }
 
 TEST_F(CarriedFile, OfFiveHundredGridsComesBack) {

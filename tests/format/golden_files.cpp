@@ -127,6 +127,41 @@ StoredGrid corrected() {
   return grid;
 }
 
+/// Twice the few values plus a half, with the few values as reference, and other values without one.
+EsvrFile related() {
+  EsvrFile file{{}, {fewValues(), fewValues(), fewValues()}};
+  for (float& value : file.grids[1].voxels->palette) value = 2.0f * value + 0.5f;
+  file.grids[1].voxels->background = 0.75f;
+  file.grids[1].reference = VoxelReference{0, 2.0f, 0.5f};
+  file.grids[2].reference = VoxelReference{};
+  return file;
+}
+
+/// A grid whose record has few bytes in common with that of another one, so that compressing both
+/// together saves too little.
+StoredGrid unlike(const std::string& name, std::int32_t n) {
+  StoredGrid grid = oneEllipsoid();
+  grid.descriptor.name = name;
+  grid.descriptor.transform.mapType = "map of " + name;
+  auto& rows = grid.descriptor.transform.affine.emplace();
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = 1.0 / (n + 2.0 * double(i));
+  grid.descriptor.background = 1.0 / n;
+  grid.activeBox = {{n * 65537, n * 91193, n * 77417}, {n * 165533, n * 191189, n * 177421}};
+  grid.activeVoxels = std::uint64_t(n) * 0x123456789abcdef;
+  grid.valueMin = -1.0f / float(n), grid.valueMax = 7.0f / float(n);
+  grid.activeThreshold = 0.01f / float(n);
+  grid.field.background = 3.0f / float(n);
+  grid.field.kernel.kappa = 5.0f / float(n);
+  return grid;
+}
+
+/// Two grids in the compact layout.
+EsvrFile packed() {
+  EsvrFile file{{}, {unlike("density", 3), unlike("temperature", 101)}};
+  file.layout = FileLayout::kCompact;
+  return file;
+}
+
 }  // namespace
 
 std::vector<GoldenFile> goldenFiles() {
@@ -148,6 +183,8 @@ std::vector<GoldenFile> goldenFiles() {
       {"carried",
        {{}, {oneEllipsoid()}, {carriedGrid(0, "vectors"), carriedGrid(2, "more vectors")}}},
       {"vector_grid", vectors()},
+      {"related_voxels", related()},
+      {"packed", packed()},
       {"unknown_section", fileOf(oneEllipsoid()), true},
   };
 }

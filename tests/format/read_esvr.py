@@ -18,9 +18,10 @@ PRIMES = (11400714785074694791, 14029467366897019727, 1609587929392839161, 96500
           2870177450012600261)
 NONE = 0xFFFFFFFF
 KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "bricks", 6: "layer errors",
-         7: "curve", 8: "carried grid", 9: "vector grid", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
+         7: "curve", 8: "carried grid", 9: "vector grid", 11: "grid records",
+         12: "packed sections", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
          20: "kappas", 32: "ellipsoids", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
-         37: "residual", 38: "carried bytes", 64: "sequence index"}
+         37: "residual", 38: "carried bytes", 41: "related voxels", 64: "sequence index"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
 
@@ -79,6 +80,15 @@ class Record:
 
     def sized(self):
         return self.get(f"{self.get('I')}s")
+
+    def varint(self):
+        value, shift = 0, 0
+        while True:
+            byte = self.get("B")
+            value |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                return value
 
     def metadata(self):
         return [(self.sized(), self.sized(), self.sized()) for _ in range(self.get("I"))]
@@ -503,6 +513,49 @@ def vectors(data):
     return name
 
 
+def grid_records(data):
+    r = Record(data)
+    records = []
+    while r.at < len(data):
+        records.append(grid(r.sized()))
+    return records
+
+
+def related(data):
+    """The reference and the head of related voxels. Their stream is not decoded here."""
+    r = Record(data)
+    number = r.varint()
+    reference = (number - 1, *r.get("2f")) if number else None
+    if r.get("B") == 1:
+        assert reference, "a reference"
+        return reference, {"divisor": r.get("d")}
+    head = {key: r.get(form) for key, form in (
+        ("form", "B"), ("divisor", "d"), ("origin", "3i"), ("background", "f"))}
+    head["palette"] = [r.get("f") for _ in range(r.get("I"))]
+    return reference, head
+
+
+def packed(data):
+    """The rows of packed sections (kind, grid, chunk, flags, codec, stored, raw, bytes)."""
+    assert xxh64(data[:-8]) == struct.unpack("<Q", data[-8:])[0], "checksum of packed sections"
+    r = Record(data[:-8])
+    assert r.get("BB") == (0x46, 0), "packed sections begin like a frame without a predecessor"
+    rows = [[r.varint() for _ in range(5)] for _ in range(r.varint())]
+    contents = []
+    for row in rows:
+        assert row[4] <= len(contents), "number of a content"
+        if row[4] == len(contents):
+            contents.append(None)
+    for i in range(len(contents)):
+        codec, stored = r.varint(), r.varint()
+        contents[i] = codec, stored, r.varint() if codec else stored
+    for i, (codec, stored, raw) in enumerate(contents):
+        contents[i] = codec, stored, raw, r.get(f"{stored}s")
+    r.end()
+    return [(kind, g - 1 & NONE, c - 1 & NONE, flags, *contents[n])
+            for kind, g, c, flags, n in rows]
+
+
 def aligned(at):
     return (at + 7) // 8 * 8
 
@@ -527,7 +580,8 @@ def content(name, data):
     readers = {"grid": grid, "chunks": chunks, "bricks": bricks, "ellipsoids": ellipsoids,
                "voxels": voxels, "mask": voxels, "residual": voxels,
                "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve,
-               "carried grid": carried, "vector grid": vectors, "sequence index": sequence_index}
+               "carried grid": carried, "vector grid": vectors, "grid records": grid_records,
+               "related voxels": related, "packed sections": packed, "sequence index": sequence_index}
     return readers[name](data) if name in readers else data
 
 
@@ -561,13 +615,30 @@ def read_frames(data, groups, index_at, owned):
     return all_frames
 
 
+def add(sections, minor, row):
+    """Adds a section and returns the name of its kind; None if it is unknown."""
+    kind, g, c, flags, codec, stored, raw, part = row
+    name = KINDS.get(kind)
+    if name is None:
+        assert flags == 0, "an unknown kind is optional here"
+        return None
+    since = {8: 1, 38: 1, 9: 2, 64: 3, 11: 4, 12: 4, 41: 4}.get(kind, 0)
+    assert minor >= since, f"a kind of version 1.{since}"
+    optional = name in ("curve", "layer errors", "carried grid", "carried bytes", "vector grid")
+    assert flags == (0 if optional else 1), "flags"
+    assert codec in (0, 1) and (codec == 1 or raw == stored), "codec"
+    assert (name, g, c) not in sections, "a section is there twice"
+    sections[name, g, c] = content(name, part) if codec == 0 else None
+    return name
+
+
 def read(data):
     """A dictionary {(kind, grid, chunk): content}; the content is None if it is compressed. That of
     a sequence index is the list of groups of frames."""
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
     assert magic == bytes.fromhex("89 45 53 56 52 0D 0A 0A"), "magic"
-    assert major == 1 and minor in (0, 1, 2, 3) and size == len(data), "version or size"
+    assert major == 1 and minor in (0, 1, 2, 3, 4) and size == len(data), "version or size"
     assert table % 8 == 0 and header_sum == xxh64(data[:40]), "header checksum"
     assert table_sum == xxh64(data[table:table + 56 * count]), "table checksum"
 
@@ -585,18 +656,11 @@ def read(data):
         rows.add(row)
         owned[at:at + stored] = b"\1" * stored
         assert hashed == xxh64(part), "section checksum"
-        name = KINDS.get(kind)
-        if name is None:
-            assert flags == 0, "an unknown kind is optional here"
-            continue
-        assert minor >= 1 or not name.startswith("carried"), "a kind of version 1.1"
-        assert minor >= 2 or name != "vector grid", "a kind of version 1.2"
-        optional = name in ("curve", "layer errors", "carried grid", "carried bytes",
-                            "vector grid")
-        assert flags == (0 if optional else 1) and frame == layer == 0, "flags"
-        assert codec in (0, 1) and (codec == 1 or raw == stored), "codec"
-        assert minor >= 3 or name != "sequence index", "a kind of version 1.3"
-        sections[name, g, c] = content(name, part) if codec == 0 else None
+        assert frame == layer == 0, "frame and layer"
+        name = add(sections, minor, (kind, g, c, flags, codec, stored, raw, part))
+        if name == "packed sections":
+            for packed_row in sections.pop((name, g, c)):
+                assert add(sections, minor, packed_row) != name, "packed twice"
         if name == "sequence index":
             sections[name, g, c] = read_frames(data, sections[name, g, c], at, owned)
     assert not any(b for b, o in zip(data, owned) if not o), "padding"
@@ -791,6 +855,26 @@ def check_vector_grid(sections):
     assert names == [b"velocity.x", b"velocity.y", b"velocity.z"]
 
 
+def check_related_voxels(sections):
+    """Expects that the second grid refers to the first one, and the third one to none."""
+    head = sections["voxels", 0, NONE][0]
+    reference, own = sections["related voxels", 1, NONE]
+    assert reference == (0, 2.0, 0.5) and own["form"] == 3 and own["origin"] == head["origin"]
+    assert own["palette"] == [2 * value + 0.5 for value in head["palette"]]
+    reference, own = sections["related voxels", 2, NONE]
+    assert reference is None and own["palette"] == head["palette"]
+
+
+def check_packed(sections):
+    """Expects two grids whose records are in one section, and whose ellipsoids are the same."""
+    records = sections["grid records", NONE, NONE]
+    assert [r["name"] for r in records] == [b"density", b"temperature"]
+    assert [r["affine"][1] for r in records] == [1 / 5, 1 / 103]
+    for g in (0, 1):
+        assert sections["centers", g, 0] == [(1.5,), (-2.25,), (1000.0,)]
+        assert sections["intensities", g, 0] == [(0.75,)]
+
+
 def check_sequence(sections):
     """Expects the frames one_ellipsoid and no_grid in a group, and voxels in another one."""
     assert sections.keys() == {("sequence index", NONE, NONE)}
@@ -806,7 +890,8 @@ CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ell
           "voxels": check_voxels, "mask": check_mask, "residual": check_residual,
           "mirrored_voxels": check_mirrored, "copied_voxels": check_copied,
           "two_grids": check_two_grids, "twins": check_twins, "carried": check_carried,
-          "vector_grid": check_vector_grid,
+          "vector_grid": check_vector_grid, "related_voxels": check_related_voxels,
+          "packed": check_packed,
           "kappas_and_chunks": check_kappas_and_chunks}
 
 

@@ -42,6 +42,16 @@ struct LayerError {
   friend bool operator==(const LayerError&, const LayerError&) = default;
 };
 
+/// The grid whose voxels are the context of another grid's voxels in a file (docs/format.md, "Related
+/// voxels"). A value v of it is expected to be about gain * v + offset in the other grid.
+struct VoxelReference {
+  /// Index in EsvrFile::grids, below that of the grid that has the reference. Nothing: the context
+  /// is empty. The coding is nevertheless another one than without a reference.
+  std::optional<std::size_t> grid{};
+  float gain = 1.0f, offset = 0.0f;
+  friend bool operator==(const VoxelReference&, const VoxelReference&) = default;
+};
+
 /// One grid of a file.
 struct StoredGrid {
   GridDescriptor descriptor;
@@ -66,6 +76,8 @@ struct StoredGrid {
   std::optional<VoxelLayer> residual;
   /// The voxels themselves, exact or within a bound. If present, decodeGrid() returns them.
   std::optional<VoxelLayer> voxels;
+  /// How the voxels are coded. A reader gets the same voxels with and without it.
+  std::optional<VoxelReference> reference;
 };
 
 /// Bytes of each stream of a grid's quantised ellipsoids.
@@ -93,6 +105,12 @@ struct StoredVector {
   friend bool operator==(const StoredVector&, const StoredVector&) = default;
 };
 
+/// How the sections of a file are arranged. Readers get the same grids from both.
+enum class FileLayout {
+  kPlain,   ///< each section has a row of the section table
+  kCompact  ///< grid records are compressed together, and small sections share a row
+};
+
 struct EsvrFile {
   std::vector<MetaItem> metadata;  ///< the source's file-level metadata, verbatim
   std::vector<StoredGrid> grids;   ///< grids that were converted, in their order
@@ -101,6 +119,7 @@ struct EsvrFile {
   std::vector<CarriedGrid> carried{};
   /// Grids of vectors, by increasing indices of their components. No two share a component.
   std::vector<StoredVector> vectors{};
+  FileLayout layout = FileLayout::kPlain;
 };
 
 using StoredComponents = std::span<const StoredGrid, kComponents>;
@@ -168,6 +187,10 @@ struct ReadPart {
   std::optional<std::size_t> layers{};  ///< largest number of importance layers, from the first
   /// Selects the smallest number of these layers that hold at least this many ellipsoids together.
   std::optional<std::size_t> ellipsoids{};
+  /// Indices in EsvrFile::grids of the grids that are wanted. These and the grids that they refer to
+  /// are read; of other grids, everything but their ellipsoids, voxels and masks is read. Nothing:
+  /// all grids are wanted.
+  std::optional<std::vector<std::size_t>> grids{};
   ReadLimits limits{};
 };
 
@@ -185,6 +208,9 @@ struct PartOfFile {
 /// over its grids. It is smaller where sections are the same, because they are stored once.
 /// \throws RuntimeFailure  as for encodeEsvr
 [[nodiscard]] std::uint64_t bytesAdded(const StoredGrid& grid);
+
+/// The same for a grid of a file, which may refer to grids before it.
+[[nodiscard]] std::uint64_t bytesAdded(const EsvrFile& file, std::size_t grid);
 
 /// Largest number of bytes that several grids add to a file together. Sections that several of them
 /// have count once.

@@ -1,0 +1,427 @@
+// Plan: voxels that refer to another grid of the file come back bit for bit, for every form of
+// voxels and every map of values, and take fewer bytes where the grids are alike. The compact layout
+// changes no content. References that a reader cannot follow, packed sections that are not those of
+// a file, and damage to any bit are refused. One grid of a file is read with the grid that it refers
+// to, and without the others.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "../fit/volumes.h"
+#include "esvr/container.h"
+#include "esvr/error.h"
+#include "esvr/frame_coding.h"
+#include "esvr/grid_coding.h"
+#include "esvr/voxel_reference.h"
+#include "format/byte_writer.h"
+#include "format/crafted_file.h"
+#include "format/frame_table.h"
+#include "format/related_voxels.h"
+#include "format/sample_files.h"
+#include "format/section_writer.h"
+#include "format/varint.h"
+#include "support/temporary_folder.h"
+
+namespace esvr {
+namespace {
+
+using format::SectionKind;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+using Bytes = std::vector<std::byte>;
+
+constexpr std::size_t kMinorVersionAt = 10;
+
+/// A ball with soft values, times a gain, plus an offset, which is the background.
+SparseVolume ball(float gain, float offset, int bricks = 3) {
+  return test::volumeOf({8, -16, 0}, bricks, offset, [&](Coord v) {
+    const double x = v.x - 18.0, y = v.y + 5.0, z = v.z - 12.0;
+    const double value = 1.2 - std::sqrt(x * x + y * y + z * z) / 9.0;
+    return float(std::max(value, 0.0)) * gain + offset;
+  });
+}
+
+StoredGrid gridOf(const std::string& name, const SparseVolume& volume, VoxelLayer layer) {
+  GridDescriptor descriptor;
+  descriptor.name = name;
+  return makeStoredVoxels(descriptor, volume, std::move(layer));
+}
+
+StoredGrid boundedGrid(const std::string& name, float gain, float offset) {
+  const SparseVolume volume = ball(gain, offset);
+  return gridOf(name, volume, boundedLayer(volume, 0.01 * std::abs(gain), Activity::kByValue));
+}
+
+/// Density, and a temperature that is 40 times the density plus 300.
+EsvrFile twoAlike() {
+  EsvrFile file{{}, {boundedGrid("density", 1.0f, 0.0f), boundedGrid("heat", 40.0f, 300.0f)}};
+  file.grids[1].reference = VoxelReference{0, 40.0f, 300.0f};
+  return file;
+}
+
+void expectComesBack(const EsvrFile& file) {
+  const Bytes bytes = encodeEsvr(file);
+  const EsvrFile read = decodeEsvr(bytes, "shared.esvr");
+  EXPECT_EQ(test::difference(read, file), "");
+  for (std::size_t g = 0; g < file.grids.size(); ++g)
+    EXPECT_EQ(read.grids[g].reference, file.grids[g].reference) << g;
+  EXPECT_EQ(encodeEsvr(read), bytes);
+}
+
+void decode(const Bytes& bytes) { (void)decodeEsvr(bytes, "lie.esvr"); }
+
+// ---- related voxels
+
+std::vector<VoxelLayer> layersOfAllForms() {
+  const SparseVolume volume = ball(1.0f, 0.0f);
+  SparseVolume palette = volume, halves = volume;
+  for (float& v : palette.values) v = std::floor(v * 32.0f) / 32.0f;
+  for (float& v : halves.values) v = std::floor(v * 1024.0f) / 1024.0f;
+  return {boundedLayer(volume, 0.01, Activity::kByValue),
+          boundedLayer(volume, 0.02, Activity::kExact), exactLayer(palette), exactLayer(halves),
+          exactLayer(volume)};
+}
+
+TEST(RelatedVoxels, ComeBackInEveryFormAfterEveryForm) {
+  const SparseVolume volume = ball(1.0f, 0.0f);
+  for (const VoxelLayer& first : layersOfAllForms())
+    for (const VoxelLayer& second : layersOfAllForms()) {
+      EsvrFile file{{}, {gridOf("a", volume, first), gridOf("b", volume, second)}};
+      for (const auto& reference : {VoxelReference{0}, VoxelReference{0, -2.5f, 0.125f},
+                                    VoxelReference{0, 3e38f, -3e38f}, VoxelReference{}}) {
+        file.grids[1].reference = reference;
+        expectComesBack(file);
+      }
+    }
+}
+
+TEST(RelatedVoxels, TakeFewBytesWhereTheMapIsThatOfTheGrids) {
+  EsvrFile file = twoAlike();
+  const std::uint64_t mapped = bytesAdded(file, 1);
+  file.grids[1].reference = VoxelReference{0};
+  const std::uint64_t unmapped = bytesAdded(file, 1);
+  file.grids[1].reference.reset();
+  const std::uint64_t alone = bytesAdded(file, 1);
+  EXPECT_EQ(alone, bytesAdded(file.grids[1]));
+  EXPECT_LT(3 * mapped, 2 * alone);
+  EXPECT_LT(mapped, unmapped);
+}
+
+TEST(RelatedVoxels, MayReferToARelatedGrid) {
+  EsvrFile file = twoAlike();
+  file.grids.push_back(boundedGrid("flame", -7.0f, 1.0f));
+  file.grids[2].reference = VoxelReference{1, -7.0f / 40.0f, 53.5f};
+  expectComesBack(file);
+}
+
+TEST(RelatedVoxels, NeedTheVersionThatHasThem) {
+  EsvrFile file = twoAlike();
+  EXPECT_EQ(encodeEsvr(file)[kMinorVersionAt], std::byte{4});
+  file.grids[1].reference.reset();
+  EXPECT_EQ(encodeEsvr(file)[kMinorVersionAt], std::byte{0});
+}
+
+// A constant grid takes a few bytes, and a reader limits the bricks in them.
+TEST(RelatedVoxels, OfManyEqualBricksAreReadAgain) {
+  const SparseVolume small = ball(1.0f, 0.0f, 1);
+  const SparseVolume large = test::volumeOf({}, 12, 0.0f, [](Coord) { return 5.0f; });
+  EsvrFile file{
+      {}, {gridOf("small", small, exactLayer(small)), gridOf("large", large, exactLayer(large))}};
+  for (const auto& reference : {VoxelReference{0}, VoxelReference{}}) {
+    file.grids[1].reference = reference;
+    expectComesBack(file);
+  }
+}
+
+TEST(RelatedVoxels, WhoseReferenceCannotBeFollowedAreNotWritten) {
+  for (const std::size_t number : {std::size_t{1}, std::size_t{2}, std::size_t(-1)}) {
+    EsvrFile file = twoAlike();
+    file.grids[1].reference->grid = number;
+    EXPECT_THAT(
+        [&] { (void)encodeEsvr(file); },
+        ThrowsMessage<RuntimeFailure>(AllOf(HasSubstr("heat"), HasSubstr("not before it"))));
+  }
+  EsvrFile ellipsoids{{}, {test::fogGrid(2), boundedGrid("heat", 1.0f, 0.0f)}};
+  ellipsoids.grids[1].reference = VoxelReference{0};
+  EXPECT_THROW((void)encodeEsvr(ellipsoids), RuntimeFailure);
+  ellipsoids.grids[0].reference = VoxelReference{};
+  EXPECT_THAT([&] { (void)encodeEsvr(ellipsoids); },
+              ThrowsMessage<RuntimeFailure>(HasSubstr("a reference, but no voxels")));
+}
+
+/// The file of two grids with another beginning of the section of related voxels.
+Bytes withReference(std::uint64_t number, float gain, float offset) {
+  test::CraftedFile crafted(encodeEsvr(twoAlike()));
+  const Bytes content = crafted.content(SectionKind::kRelated);
+  format::ByteWriter out;
+  format::putVarint(out, number);
+  out.put(gain);
+  out.put(offset);
+  out.putAll(std::span(content).subspan(1 + 2 * sizeof(float)));
+  crafted.setContent(SectionKind::kRelated, out.take());
+  return crafted.assemble();
+}
+
+TEST(RelatedVoxels, ThatReferToThemselvesOrALaterGridAreNotRead) {
+  ASSERT_NO_THROW(decode(withReference(1, 40.0f, 300.0f)));
+  for (const std::uint64_t number : {2ull, 3ull, 0x80000000ull})
+    EXPECT_THAT(
+        [&] { decode(withReference(number, 1.0f, 0.0f)); },
+        ThrowsMessage<BadInput>(AllOf(HasSubstr("lie.esvr"), HasSubstr("related voxels of grid 1"),
+                                      HasSubstr("which is not before it"))))
+        << number;
+}
+
+TEST(RelatedVoxels, WithAMapThatIsNotFiniteAreNotRead) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  for (const auto& [gain, offset] : {std::pair(kNan, 0.0f), std::pair(1.0f, HUGE_VALF)})
+    EXPECT_THAT([&] { decode(withReference(1, gain, offset)); },
+                ThrowsMessage<BadInput>(HasSubstr("not finite")));
+}
+
+TEST(RelatedVoxels, OfAGridWithoutVoxelsAreNotRead) {
+  test::CraftedFile crafted(encodeEsvr(twoAlike()));
+  crafted.erase(SectionKind::kVoxels);
+  EXPECT_THAT([&] { decode(crafted.assemble()); },
+              ThrowsMessage<BadInput>(HasSubstr("grid 0, which has no voxels")));
+}
+
+TEST(RelatedVoxels, BesideOtherVoxelsAreNotRead) {
+  test::CraftedFile crafted(encodeEsvr(twoAlike()));
+  crafted.add({SectionKind::kVoxels, 1}, format::kRequired, crafted.content(SectionKind::kVoxels));
+  EXPECT_THAT([&] { decode(crafted.assemble()); },
+              ThrowsMessage<BadInput>(HasSubstr("two sets of voxels")));
+}
+
+TEST(RelatedVoxels, WithoutAReferenceHaveAHeadOfTheirOwn) {
+  test::CraftedFile crafted(encodeEsvr(twoAlike()));
+  crafted.setContent(SectionKind::kRelated, {std::byte{0}, std::byte{1}});
+  EXPECT_THAT([&] { decode(crafted.assemble()); },
+              ThrowsMessage<BadInput>(HasSubstr("without a reference")));
+}
+
+TEST(RelatedVoxels, CountTowardsTheMemoryThatAReaderMayTake) {
+  const Bytes bytes = encodeEsvr(twoAlike());
+  const std::uint64_t voxels = twoAlike().grids[0].voxels->codes.size();
+  constexpr std::uint64_t kLeastBytesPerVoxel = 8;  // a code and a value
+  EXPECT_THROW((void)decodeEsvr(bytes, "f", {kLeastBytesPerVoxel * voxels}), MemoryExceeded);
+  EXPECT_NO_THROW((void)decodeEsvr(bytes, "f", {std::uint64_t{64} << 20}));
+}
+
+// ---- frames
+
+TEST(RelatedVoxels, ComeBackInAFrameAfterAnother) {
+  const EsvrFile first = twoAlike();
+  EsvrFile second = twoAlike();
+  second.grids[0] = boundedGrid("density", 1.25f, 0.5f);
+  const Bytes bytes = encodeFrame(second, &first);
+  const EsvrFile read = decodeFrame(bytes, "frame", {}, &first);
+  for (std::size_t g = 0; g < 2; ++g) EXPECT_EQ(read.grids[g].voxels, second.grids[g].voxels) << g;
+  EXPECT_EQ(encodeFrame(read, &first), bytes);
+}
+
+// ---- the compact layout
+
+EsvrFile compact(EsvrFile file) {
+  file.layout = FileLayout::kCompact;
+  return file;
+}
+
+TEST(CompactLayout, BringsBackTheSameContentInFewerBytes) {
+  for (const EsvrFile& file : {test::everything(3), twoAlike(), test::fileOf(test::layeredGrid(20)),
+                               EsvrFile{{}, {test::levelSetGrid(2)}}}) {
+    const Bytes bytes = encodeEsvr(compact(file));
+    EXPECT_EQ(test::difference(decodeEsvr(bytes, "f"), file), "");
+    EXPECT_LT(bytes.size(), encodeEsvr(file).size());
+    EXPECT_EQ(bytes[kMinorVersionAt], std::byte{4});
+    EXPECT_EQ(encodeEsvr(decodeEsvr(bytes, "f")), bytes);
+  }
+}
+
+TEST(CompactLayout, IsThePlainOneWhereThatIsNotLarger) {
+  EXPECT_EQ(encodeEsvr(compact({})), encodeEsvr({}));
+  const EsvrFile one = test::fileOf(test::emptyGrid());
+  EXPECT_EQ(encodeEsvr(compact(one)), encodeEsvr(one));
+}
+
+/// Grids that differ in their names.
+EsvrFile manyGrids(std::size_t count) {
+  EsvrFile file;
+  for (std::size_t g = 0; g < count; ++g) {
+    file.grids.push_back(test::fogGrid(1));
+    file.grids.back().descriptor.name = "grid " + std::to_string(g);
+  }
+  return file;
+}
+
+// Each of the grids has sections of its own only where they differ, but a record and rows.
+TEST(CompactLayout, OfManyGridsTakesFewBytesForEach) {
+  constexpr std::size_t kGrids = 500, kBytesEach = 100;
+  const EsvrFile file = manyGrids(kGrids);
+  const Bytes bytes = encodeEsvr(compact(file));
+  EXPECT_LT(bytes.size(), kGrids * kBytesEach);
+  EXPECT_EQ(test::difference(decodeEsvr(bytes, "f"), file), "");
+}
+
+// A reader limits the records by the bytes of their section.
+TEST(CompactLayout, OfManyEqualRecordsIsReadAgain) {
+  EsvrFile file;
+  file.grids.assign(3000, test::emptyGrid());
+  EXPECT_EQ(test::difference(decodeEsvr(encodeEsvr(compact(file)), "f"), file), "");
+}
+
+TEST(CompactLayout, KeepsLargeSectionsApart) {
+  const EsvrFile file{{}, {test::fogGrid(2), test::quantisedGrid(2000)}};
+  const Bytes bytes = encodeEsvr(compact(file));
+  const auto table = format::readTable(format::MemorySource(bytes, "f"));
+  EXPECT_THAT(table.entries,
+              testing::Contains(testing::Field(
+                  &format::SectionEntry::id,
+                  testing::Field(&format::SectionId::kind, SectionKind::kEllipsoids))));
+  EXPECT_EQ(table.entries.front().id.kind, SectionKind::kPacked);
+  EXPECT_EQ(test::difference(decodeEsvr(bytes, "f"), file), "");
+}
+
+TEST(CompactLayout, IsListedWithTheBytesOfEachSection) {
+  const Bytes bytes = encodeEsvr(compact(test::everything(3)));
+  const EsvrSummary summary = inspectEsvr(bytes, "f");
+  std::uint64_t sum = 0;
+  bool hasRecords = false;
+  for (const SectionSummary& section : summary.sections) {
+    if (!section.sharedWith) sum += section.storedBytes;
+    hasRecords = hasRecords || section.kind == "grid records";
+  }
+  EXPECT_TRUE(hasRecords);
+  EXPECT_EQ(summary.sections.front().kind, "packed sections");
+  EXPECT_LT(summary.sections.front().storedBytes, 24 * summary.sections.size());
+  EXPECT_LE(sum, summary.fileBytes);
+}
+
+bool isRefused(const Bytes& bytes) {
+  try {
+    (void)decodeEsvr(bytes, "damaged");
+    return false;
+  } catch (const BadInput&) {
+    return true;
+  }
+}
+
+TEST(CompactLayout, WithAFlippedBitOrATruncatedEndIsRefused) {
+  EsvrFile file = compact(twoAlike());
+  file.grids.push_back(test::quantisedGrid(400));  // a section with a row of its own
+  Bytes bytes = encodeEsvr(file);
+  ASSERT_FALSE(isRefused(bytes));
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const std::byte bit{std::uint8_t(1u << (i % 8))};
+    bytes[i] ^= bit;
+    EXPECT_TRUE(isRefused(bytes)) << "byte " << i;
+    bytes[i] ^= bit;
+  }
+  for (std::size_t n = 0; n < bytes.size(); n += 7)
+    EXPECT_TRUE(isRefused({bytes.begin(), bytes.begin() + std::ptrdiff_t(n)})) << n;
+}
+
+/// The file with other packed sections.
+Bytes withPacked(const format::FrameTable& table, const format::FrameContents& contents) {
+  test::CraftedFile crafted(encodeEsvr(compact(twoAlike())));
+  crafted.setContent(SectionKind::kPacked, format::putFrame(table, contents));
+  return crafted.assemble();
+}
+
+TEST(CompactLayout, WithPackedSectionsOfAFrameIsRefused) {
+  EXPECT_THAT(
+      [&] {
+        decode(withPacked({{.metadata = true}, {}}, {}));
+      },
+      ThrowsMessage<BadInput>(AllOf(HasSubstr("lie.esvr"), HasSubstr("another frame"))));
+}
+
+TEST(CompactLayout, WithPackedSectionsInPackedSectionsIsRefused) {
+  format::FrameTable table;
+  table.sections.entries = {{{SectionKind::kPacked}, format::Codec::kRaw, format::kRequired}};
+  EXPECT_THAT(
+      [&] {
+        decode(withPacked(table, {{Bytes{}}, {0}}));
+      },
+      ThrowsMessage<BadInput>(HasSubstr("two sections are packed sections")));
+}
+
+TEST(CompactLayout, WithMoreRecordsThanStoredBytesIsRefused) {
+  constexpr std::size_t kZeros = 1 << 16;  // records without bytes
+  format::SectionWriter out;
+  out.add({SectionKind::kGridRecords}, format::kRequired, Bytes(kZeros), 1);
+  EXPECT_THAT([&] { decode(out.assemble()); },
+              ThrowsMessage<BadInput>(HasSubstr("more records than it has stored bytes")));
+}
+
+// ---- a part of the grids
+
+TEST(ReadPart, OfAGridHasTheGridsThatItRefersTo) {
+  test::TemporaryFolder folder;
+  EsvrFile file = twoAlike();
+  file.grids.push_back(test::quantisedGrid(2000));
+  file.grids.push_back(boundedGrid("flame", 2.0f, 0.0f));
+  for (const auto layout : {FileLayout::kPlain, FileLayout::kCompact}) {
+    file.layout = layout;
+    const std::string path = folder / "f.esvr";
+    const std::uint64_t bytes = writeEsvr(path, file, {.overwrite = true});
+    const PartOfFile part = readEsvrPart(path, {.grids = std::vector<std::size_t>{1}});
+    ASSERT_EQ(part.file.grids.size(), 4u);
+    EXPECT_EQ(part.file.grids[0].voxels, file.grids[0].voxels);
+    EXPECT_EQ(part.file.grids[1].voxels, file.grids[1].voxels);
+    EXPECT_EQ(part.file.grids[2].field.ellipsoidCount(), 0u);
+    EXPECT_EQ(part.file.grids[2].descriptor, file.grids[2].descriptor);
+    EXPECT_FALSE(part.file.grids[3].voxels);
+    EXPECT_LT(2 * part.bytesRead, bytes);  // the ellipsoids take most of the file
+  }
+}
+
+TEST(ReadPart, OfNoGridHasTheRecords) {
+  test::TemporaryFolder folder;
+  const std::string path = folder / "f.esvr";
+  writeEsvr(path, twoAlike());
+  const EsvrFile file = readEsvrPart(path, {.grids = std::vector<std::size_t>{}}).file;
+  EXPECT_EQ(namesInOrder(file), (std::vector<std::string>{"density", "heat"}));
+  EXPECT_FALSE(file.grids[0].voxels || file.grids[1].voxels);
+}
+
+// ---- the choice of a reference
+
+TEST(ChooseReference, FindsTheGridAndTheMap) {
+  EsvrFile file = twoAlike();
+  file.grids[1].reference.reset();
+  const SparseVolume other = test::tubeVolume();
+  file.grids.insert(file.grids.begin(),
+                    gridOf("other", other, boundedLayer(other, 0.01, Activity::kByValue)));
+  const std::vector<std::size_t> candidates{0, 1};
+  const VoxelReference found = chooseReference(file.grids, 2, candidates);
+  EXPECT_EQ(found.grid, std::size_t{1});
+  // The values of both grids are rounded to steps of a fiftieth of their range.
+  EXPECT_NEAR(found.gain, 40.0f, 1.0f);
+  EXPECT_NEAR(found.offset, 300.0f, 1.0f);
+}
+
+TEST(ChooseReference, IsEmptyWithoutCandidates) {
+  const EsvrFile file = twoAlike();
+  EXPECT_EQ(chooseReference(file.grids, 1, {}), VoxelReference{});
+}
+
+TEST(ExpectedFrom, HasTheMappedValuesOfTheReference) {
+  const EsvrFile file = twoAlike();
+  const StoredGrid expected = expectedFrom(file.grids, 1, *file.grids[1].reference);
+  const SparseVolume of = volumeOf(*file.grids[0].voxels), mapped = volumeOf(*expected.voxels);
+  ASSERT_EQ(mapped.bricks, of.bricks);
+  for (std::size_t i = 0; i < of.values.size(); ++i) {
+    const bool isActive = of.active[i / kBrickVoxels].test(int(i % kBrickVoxels));
+    const float wanted = isActive ? float(40.0 * double(of.values[i]) + 300.0) : mapped.values[i];
+    EXPECT_EQ(mapped.values[i], wanted) << i;
+  }
+  EXPECT_TRUE(expectedFrom(file.grids, 1, {}).voxels->bricks.empty());
+}
+
+}  // namespace
+}  // namespace esvr
