@@ -111,6 +111,7 @@ ContinuedMaker::ContinuedMaker(const ContinuedFit& fit, const TrialTarget& targe
       problem_(target_, target.device),
       before_(fit.previous.quantised[0]),
       field_(ordered(fit, continues_)) {
+  if (!anyContinues()) return;
   auto intensities = intensitiesOf(field_);
   problem_.setShapes(field_);
   (void)problem_.solve(intensities, kFirstIterations);

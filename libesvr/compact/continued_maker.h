@@ -24,6 +24,9 @@ class ContinuedMaker {
   ContinuedMaker(const ContinuedMaker&) = delete;
   ContinuedMaker& operator=(const ContinuedMaker&) = delete;
 
+  /// False if no ellipsoid continues one of the previous frame; there is no trial then.
+  [[nodiscard]] bool anyContinues() const { return !continues_.empty(); }
+
   /// Chooses codes near the exact values, solves for the intensities with the chosen shapes, and
   /// chooses codes of these.
   /// \param bitPrice  as in ContinuedThrift

@@ -10,6 +10,7 @@
 #include "convert/narrow_band.h"
 #include "convert/preset.h"
 #include "esvr/error.h"
+#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 
@@ -69,11 +70,15 @@ class Converter {
 };
 
 /// Encodes and decodes a grid, so that the caller gets the same grid as a reader of the file.
-StoredGrid throughTheFormat(StoredGrid grid, const VoxelMemory& memory) {
-  EsvrFile file;
+/// \param previous  the grid of the previous frame; null: the grid stands alone
+StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
+                            const VoxelMemory& memory) {
+  EsvrFile file, before;
   file.grids.push_back(std::move(grid));
-  const auto bytes = encodeEsvr(file);
-  return std::move(decodeEsvr(bytes, "the stored grid", {.memory = memory}).grids.front());
+  if (previous) before.grids.push_back(*previous);
+  const EsvrFile* const frame = previous ? &before : nullptr;
+  const auto bytes = encodeFrame(file, frame);
+  return std::move(decodeFrame(bytes, "the stored grid", {.memory = memory}, frame).grids.front());
 }
 
 /// Checks the decoded grid against the bound.
@@ -156,7 +161,8 @@ Conversion convertVolume(const ConvertInput& input, const ConvertOptions& option
   Conversion conversion = own.fit.narrowBand ? convert::convertNarrowBand({input, own}, convertTo)
                                              : convertTo({input, own});
   conversion.smallerExactBytes = smallerExactBytes({input, own}, conversion.grid);
-  conversion.grid = throughTheFormat(std::move(conversion.grid), memoryOf(input.source));
+  conversion.grid = throughTheFormat(std::move(conversion.grid), own.previous,
+                                     memoryOf(input.source));
   requirePromises({input, own}, conversion.grid);
   return conversion;
 }
@@ -173,7 +179,7 @@ PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions&
         "that a narrow band does not fill");
   PaperFitResult made = fitByPaper(input.source, options);
   Conversion conversion = stored(input, std::move(made.fit), options, storage);
-  conversion.grid = throughTheFormat(std::move(conversion.grid), memoryOf(input.source));
+  conversion.grid = throughTheFormat(std::move(conversion.grid), nullptr, memoryOf(input.source));
   return {std::move(conversion), std::move(made.record)};
 }
 

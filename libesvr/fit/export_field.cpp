@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <vector>
@@ -22,15 +23,24 @@ void append(Ellipsoids& e, const Ellipsoid& p, const PrincipalAxes& axes, Coord 
   e.intensity.push_back(float(p.intensity / scale));
 }
 
+/// True if one frame holds all centers with their full precision. A center may lie before the origin.
+bool fitInOneFrame(std::span<const Ellipsoid> ellipsoids) {
+  return std::all_of(ellipsoids.begin(), ellipsoids.end(), [](const Ellipsoid& p) {
+    return std::all_of(p.center.begin(), p.center.end(),
+                       [](double c) { return std::abs(c) < double(kChunkExtent); });
+  });
+}
+
 }  // namespace
 
 Field exportField(std::span<const Ellipsoid> ellipsoids, const ExportFrame& frame) {
   std::vector<PrincipalAxes> axes(ellipsoids.size());
   tbb::parallel_for(std::size_t{0}, axes.size(),
                     [&](std::size_t i) { axes[i] = principalAxes(ellipsoids[i].L); });
+  const bool inOne = fitInOneFrame(ellipsoids);
   std::map<Coord, Ellipsoids> byChunk;
   for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
-    const Coord chunk = frameOf(ellipsoids[i].center);
+    const Coord chunk = inOne ? Coord{} : frameOf(ellipsoids[i].center);
     Ellipsoids& stored = byChunk[chunk];
     append(stored, ellipsoids[i], axes[i], chunk, frame.scale);
     if (!frame.kappas.empty()) stored.kappa.push_back(float(frame.kappas[i]));

@@ -1,6 +1,5 @@
 #include "esvr/fit.h"
 
-#include <cstdlib>
 #include <span>
 #include <string>
 #include <vector>
@@ -54,12 +53,7 @@ std::vector<std::uint32_t> startsOf(const FitState& all, std::size_t starts, std
 FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
                    const TargetScale& scale) {
   Tuning tuning;
-  if (options.start) {
-    if (const char* t = std::getenv("RELOC")) tuning.relocateShare = std::atof(t);
-    if (const char* t = std::getenv("STEP")) tuning.steps = tuning.steps.scaled(std::atof(t));
-    if (const char* t = std::getenv("FINAL")) tuning.finalStep = std::atof(t);
-    if (const char* t = std::getenv("BETA2")) tuning.adam.beta2 = std::atof(t);
-  }
+  if (options.keepsStart) tuning.relocateShare = tuning.keptRelocateShare;
   FitTarget target = makeTarget(volume, boxOf(volume, options.box), scale);
   applyOptions(options, target);
   Recorder recorder(target, options);

@@ -18,6 +18,7 @@ struct Tuning {
   double growUntil = 0.5;       ///< fraction of the run at which growth ends
   double relocateUntil = 0.7;   ///< fraction of the run at which relocation ends
   double relocateShare = 0.05;  ///< share of the ellipsoids that an event relocates
+  double keptRelocateShare = 0.01;  ///< the same for FitOptions::keepsStart
   double eventEvery = 0.01;     ///< fraction of the run between events
   int eventSpacing = 15;        ///< smallest number of iterations between events
   int graceSteps = 14;          ///< steps of a new ellipsoid before it can be relocated

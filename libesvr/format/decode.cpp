@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "esvr/error.h"
 #include "format/bricks_stream.h"
 #include "format/carried_record.h"
 #include "format/chunk_box.h"
+#include "format/continued_grid.h"
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
 #include "format/frame_table.h"
@@ -356,15 +358,22 @@ void checkOrder(const SectionReader& sections, const EsvrFile& file) try {
   throw BadInput(sections.place(place) + ": " + fault.what());
 }
 
-/// Reads a grid that refers to the grid of the same number in the previous frame.
-StoredGrid readPredicted(SectionReader& sections, std::uint32_t g, const EsvrFile& previous) {
-  const SectionId section{SectionKind::kPredicted, g};
+/// The kind of the section of a grid that refers to the grid of the same number in the previous
+/// frame; nothing if the grid does not.
+std::optional<SectionKind> kindAfter(const SectionReader& sections, std::uint32_t g) {
+  for (const auto kind : {SectionKind::kPredicted, SectionKind::kContinued})
+    if (sections.has({kind, g})) return kind;
+  return std::nullopt;
+}
+
+StoredGrid readAfter(SectionReader& sections, const SectionId& section, const EsvrFile& previous) {
   const std::string where = sections.place(section);
-  if (g >= previous.grids.size())
+  if (section.grid >= previous.grids.size())
     throw BadInput(where + ": the frame before has only " + std::to_string(previous.grids.size()) +
                    " grids");
+  const auto get = section.kind == SectionKind::kPredicted ? getPredicted : getContinuedGrid;
   StoredGrid grid =
-      getPredicted(sections.get(section), where, previous.grids[g], sections.budget());
+      get(sections.get(section), where, previous.grids[section.grid], sections.budget());
   if (const auto fault = faultOf(grid)) throw BadInput(where + ": " + fault->text);
   return grid;
 }
@@ -402,11 +411,13 @@ void readGrids(SectionReader& sections, const ReadPart* part, EsvrFile& file) {
 void readGridsAfter(SectionReader& sections, const EsvrFile& previous, EsvrFile& file) {
   if (sections.has({SectionKind::kGridRecords})) file.layout = FileLayout::kCompact;
   GridRecords records(sections);
-  const std::uint32_t count = records.count() + sections.count(SectionKind::kPredicted);
+  const std::uint32_t count = records.count() + sections.count(SectionKind::kPredicted) +
+                              sections.count(SectionKind::kContinued);
   for (std::uint32_t g = 0; g < count; ++g)
-    file.grids.push_back(sections.has({SectionKind::kPredicted, g})
-                             ? readPredicted(sections, g, previous)
-                             : GridDecoder({sections, records}, g).decode(file.grids));
+    if (const auto kind = kindAfter(sections, g))
+      file.grids.push_back(readAfter(sections, {*kind, g}, previous));
+    else
+      file.grids.push_back(GridDecoder({sections, records}, g).decode(file.grids));
 }
 
 CarriedBytes carriedBytesOf(const ReadLimits& limits) {

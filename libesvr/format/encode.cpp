@@ -11,6 +11,7 @@
 #include "format/byte_writer.h"
 #include "format/carried_record.h"
 #include "format/chunk_box.h"
+#include "format/continued_grid.h"
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
 #include "format/grid_record.h"
@@ -137,7 +138,8 @@ void addQuantised(SectionWriter& out, std::uint32_t g, std::uint32_t c, const So
   const QuantisedEllipsoids& q = grid.grid.quantised[c];
   if (q.size() == 0) return;
   if (q.layerEnds.empty())
-    out.addRaw({SectionKind::kEllipsoids, g, c}, kRequired, putEllipsoids(q));
+    out.addRaw({SectionKind::kEllipsoids, g, c}, kRequired,
+               putEllipsoids(q.continues.empty() ? q : standingAlone(q)));
   else
     out.addRaw(
         {SectionKind::kLayered, g, c}, kRequired,
@@ -264,7 +266,8 @@ SectionWriter collect(const EsvrFile& file, const Differences& differences,
   addRecords(out, grids, differences);
   for (std::uint32_t g = 0; g < grids.size(); ++g)
     if (differences[g])
-      out.addRaw({SectionKind::kPredicted, g}, kRequired, std::vector(*differences[g]));
+      out.addRaw({grids[g].grid.voxels ? SectionKind::kPredicted : SectionKind::kContinued, g},
+                 kRequired, std::vector(*differences[g]));
   if (!inherited.vectors) addVectors(out, file.vectors);
   if (!inherited.carried) addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
@@ -288,7 +291,7 @@ SectionWriter sectionsOf(const EsvrFile& file) {
 std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
                                                    const StoredGrid& previous,
                                                    std::uint64_t ownBytes) {
-  auto content = putPredicted(grid, previous);
+  auto content = grid.voxels ? putPredicted(grid, previous) : putContinuedGrid(grid, previous);
   if (content && content->size() + kFrameRowBytes >= ownBytes) content.reset();
   return content;
 }

@@ -35,6 +35,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kCarriedBytes, "carried bytes"},
     {SectionKind::kPredicted, "predicted grid"},
     {SectionKind::kRelated, "related voxels"},
+    {SectionKind::kContinued, "continued ellipsoids"},
     {SectionKind::kSequenceIndex, "sequence index"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
@@ -72,6 +73,7 @@ std::uint16_t minorVersionOf(SectionKind kind) {
     case SectionKind::kGridRecords:
     case SectionKind::kPacked:
     case SectionKind::kRelated:
+    case SectionKind::kContinued:
       return 4;
     default:
       return 0;

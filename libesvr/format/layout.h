@@ -50,6 +50,7 @@ enum class SectionKind : std::uint32_t {
   kCarriedBytes = 38,
   kPredicted = 39,
   kRelated = 41,
+  kContinued = 42,
   kSequenceIndex = 64,
 };
 

@@ -82,6 +82,9 @@ struct FitOptions : CommonFitOptions {
   /// edge, and adds ellipsoids until there are `count`. The field must outlive the call. Null: the
   /// fit begins with seeds.
   const Field* start = nullptr;
+  /// Few ellipsoids of the start are replaced by seeds: a fifth of the usual number. The frames of a
+  /// sequence then have most of their ellipsoids in common.
+  bool keepsStart = false;
 };
 
 /// Stands for no ellipsoid of FitOptions::start.

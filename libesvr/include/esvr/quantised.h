@@ -106,6 +106,9 @@ struct LatticeChoice {
 [[nodiscard]] QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
                                            std::vector<std::size_t>& order);
 
+/// The same ellipsoids as those of a file without frames: in the order of the file, in one layer.
+[[nodiscard]] QuantisedEllipsoids standingAlone(QuantisedEllipsoids q);
+
 /// Replaces the intensities by new ones, rounded to the existing quantisation lattice.
 /// \param intensities  one for each ellipsoid, in the file's order
 void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids& q);

@@ -1,0 +1,215 @@
+#include "convert/continued_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "compact/continued_maker.h"
+#include "convert/motion_estimate.h"
+#include "convert/psnr_slope.h"
+#include "esvr/frame_coding.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr::convert {
+namespace {
+
+// docs/lab-notes.md, "Ellipsoids of a sequence", has what was tried instead.
+/// Iterations of a fit. They are few, so that ellipsoids move no further than they have to.
+constexpr std::uint32_t kIterations = 60;
+/// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
+/// nothing is changed.
+constexpr double kAim = 1.8, kMin = 1.2, kMax = 4.0;
+constexpr int kMaxFits = 4;
+/// Largest growth of the number of ellipsoids in a frame; with more, a fit from seeds is better.
+constexpr double kMaxGrowth = 1.5;
+
+/// The largest price of a bit, in squares of a quantisation step, and the number of trials that find
+/// the largest one at which the PSNR is reached.
+constexpr double kMaxPrice = 0.5;
+constexpr int kTrials = 5;
+
+Field withoutWeakest(const Field& field, std::size_t count, std::vector<std::uint32_t>& kept) {
+  const Ellipsoids& e = field.chunks[0].ellipsoids;
+  std::vector<double> weight(e.size());
+  for (std::size_t i = 0; i < e.size(); ++i)
+    weight[i] = std::log(std::max(std::abs(double(e.intensity[i])), 1e-300)) +
+                0.5 * (double(e.logScale[0][i]) + e.logScale[1][i] + e.logScale[2][i]);
+  kept.resize(e.size());
+  std::iota(kept.begin(), kept.end(), 0u);
+  std::ranges::stable_sort(kept, std::ranges::greater(), [&](auto i) { return weight[i]; });
+  kept.resize(count);
+  std::ranges::sort(kept);
+  Field result = field;
+  Ellipsoids& some = result.chunks[0].ellipsoids;
+  some.resize(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      some.center[a][k] = e.center[a][kept[k]];
+      some.logScale[a][k] = e.logScale[a][kept[k]];
+    }
+    for (std::size_t a = 0; a < 4; ++a) some.rotation[a][k] = e.rotation[a][kept[k]];
+    some.intensity[k] = e.intensity[kept[k]];
+  }
+  return result;
+}
+
+class ContinuedSearch {
+ public:
+  ContinuedSearch(const Job& job, double psnr)
+      : job_(job), psnr_(psnr), previous_(*job.options.previous), field_(startField()) {
+    from_.resize(field_.ellipsoidCount());
+    std::iota(from_.begin(), from_.end(), 0u);
+  }
+
+  std::optional<Conversion> run() {
+    for (int n = 0; n < kMaxFits; ++n) {
+      fitOnce();
+      if (fit_.end == FitEnd::kCancelled) return std::nullopt;
+      if (field_.chunks.size() != 1) return std::nullopt;
+      if (isNear() || !mayChange()) break;
+    }
+    if (over() < 0.0) return std::nullopt;
+    return quantised();
+  }
+
+ private:
+  /// The ellipsoids of the previous frame, moved if that makes them more like the frame.
+  [[nodiscard]] Field startField() const {
+    const SparseVolume before = decodeGrid(previous_, {.memory = memoryOf(job_.input.source)});
+    StoredGrid start = previous_;
+    start.field = moved(previous_.field, estimateMotion(before, job_.input.source));
+    start.quantised.clear();
+    return psnrOf(job_, start) > psnrOf(job_, before) ? start.field : previous_.field;
+  }
+
+  void fitOnce() {
+    FitOptions options = job_.options.fit;
+    options.count = std::max(wanted_, field_.ellipsoidCount());
+    options.iterations = std::min(plannedIterations(options), kIterations);
+    options.start = &field_;
+    options.keepsStart = true;
+    options.kappa = previous_.field.kernel.kappa;
+    options.bothSigns = previous_.quantised[0].lattice.signedIntensity;
+    options.psnr.reset();
+    options.seconds.reset();
+    FitResult result = fit(job_.input.source, options);
+    std::vector<std::uint32_t> from;
+    for (const std::uint32_t i : result.startOf) from.push_back(i == kNoStart ? i : from_[i]);
+    from_ = std::move(from);
+    field_ = std::move(result.field);
+    fit_ = std::move(result);
+  }
+
+  /// dB of the sum over the PSNR, as the device of the fit measures it.
+  [[nodiscard]] double over() const { return fit_.curve.back().psnrBox - psnr_; }
+  [[nodiscard]] bool isNear() const { return over() >= kMin && over() <= kMax; }
+
+  /// Chooses the number of ellipsoids of the next fit. \return false if none promises to do
+  [[nodiscard]] bool mayChange() {
+    const auto count = double(field_.ellipsoidCount());
+    const double next = countFor({count, over()}, kAim, kDbPerDoubling);
+    if (over() > kMax) {
+      wanted_ = std::size_t(std::max(next, count / kMaxGrowth));
+      if (wanted_ >= field_.ellipsoidCount()) return false;
+      std::vector<std::uint32_t> kept;
+      field_ = withoutWeakest(field_, wanted_, kept);
+      std::vector<std::uint32_t> from;
+      for (const std::uint32_t i : kept) from.push_back(from_[i]);
+      from_ = std::move(from);
+      return true;
+    }
+    const auto most = std::min(kMaxGrowth * double(previous_.field.ellipsoidCount()),
+                               double(maxCount()));
+    if (count >= most) return false;
+    wanted_ = std::size_t(std::ceil(std::clamp(next, count + 1.0, most)));
+    return true;
+  }
+
+  [[nodiscard]] std::uint64_t maxCount() const {
+    const std::uint64_t voxels = activeVoxelCount(job_.input.source);
+    return std::min<std::uint64_t>(job_.options.fit.count.value_or(voxels), voxels);
+  }
+
+  [[nodiscard]] Box box() const {
+    return job_.options.fit.box.value_or(activeBox(job_.input.source));
+  }
+
+  /// The sum of squares at which a reader surely finds the PSNR.
+  [[nodiscard]] double allowedSquares() const {
+    constexpr double kMargin = 5e-4;  // dB; a reader's sums have another order
+    const double peak = job_.options.fit.peak.value_or(peakOf(job_.input.source));
+    return peak * peak * box().volume() * std::pow(10.0, -(psnr_ + kMargin) / 10.0);
+  }
+
+  [[nodiscard]] std::optional<Conversion> quantised() {
+    StoredGrid grid = makeStoredGrid(job_.input.descriptor, job_.input.source, field_,
+                                     job_.options.storage.activity);
+    const SparseVolume& source = job_.input.source;
+    ContinuedMaker maker({grid, from_, previous_},
+                         {.source = source,
+                          .box = box(),
+                          .device = rateControlDevice(fit_, job_.options.fit.device),
+                          .peak = job_.options.fit.peak});
+    if (!maker.anyContinues()) return std::nullopt;
+    auto trial = cheapest(maker);
+    if (!trial) return std::nullopt;
+    grid.field = std::move(trial->field);
+    grid.quantised = std::move(trial->quantised);
+    if (psnrOf(job_, grid) < psnr_ || bytesInFrame(grid, &previous_) >= bytesAdded(grid))
+      return std::nullopt;
+    Conversion conversion;
+    conversion.grid = std::move(grid);
+    conversion.compact = CompactRecord{over(), {}};
+    conversion.fit = std::move(fit_);
+    conversion.fit.end = FitEnd::kPsnrReached;
+    return conversion;
+  }
+
+  /// The trial with the highest price that reaches the PSNR; nothing if none does.
+  [[nodiscard]] std::optional<Trial> cheapest(ContinuedMaker& maker) const {
+    const double allowed = allowedSquares();
+    std::optional<Trial> best;
+    double low = 0.0, high = kMaxPrice, price = 0.1;
+    for (int n = 0; n < kTrials; ++n) {
+      Trial trial = maker.make(price);
+      const bool reached = trial.error <= allowed;
+      (reached ? low : high) = price;
+      if (reached) best = std::move(trial);
+      if (!best && n == 1) price = 0.0;  // the last chance
+      else price = 0.5 * (low + high);
+      if (!best && n == 2) return std::nullopt;
+    }
+    return best;
+  }
+
+  const Job& job_;
+  double psnr_;
+  const StoredGrid& previous_;
+  Field field_;                      ///< the ellipsoids so far
+  std::vector<std::uint32_t> from_;  ///< those of the previous frame that they continue
+  std::size_t wanted_ = 0;           ///< number of ellipsoids of the next fit
+  FitResult fit_;                    ///< the last fit
+};
+
+}  // namespace
+
+bool mayContinue(const Job& job) {
+  const StoredGrid* previous = job.options.previous;
+  return previous && previous->quantised.size() == 1 && previous->quantised[0].size() > 0 &&
+         !previous->residual && !previous->voxels &&
+         previous->field.fitFor == FitFor::kVoxels &&
+         job.options.fit.fitFor == FitFor::kVoxels && !job.options.fit.narrowBand &&
+         !job.options.fit.kappa && job.options.storage.form == Storage::kCompact &&
+         job.options.representation != Representation::kVoxels &&
+         activeVoxelCount(job.input.source) > 0;
+}
+
+std::optional<Conversion> continueTo(const Job& job, double psnr) {
+  return ContinuedSearch(job, psnr).run();
+}
+
+}  // namespace esvr::convert
