@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -19,11 +20,16 @@ namespace {
 
 // docs/lab-notes.md, "Ellipsoids of a sequence", has what was tried instead.
 /// Iterations of a fit. They are few, so that ellipsoids move no further than they have to.
-constexpr std::uint32_t kIterations = 60;
+double env(const char* n, double d) { return std::getenv(n) ? std::atof(std::getenv(n)) : d; }
+#define kIterations std::uint32_t(env("KIT", 60))
 /// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
 /// nothing is changed.
-constexpr double kAim = 1.8, kMin = 1.2, kMax = 4.0;
-constexpr int kMaxFits = 4;
+#define kAim env("AIM", 1.8)
+#define kMin env("MIN", 1.2)
+constexpr double kMax = 4.0;
+/// dB by which all of these increase if the rounded ellipsoids do not reach the PSNR.
+constexpr double kFurther = 0.6;
+constexpr int kMaxFits = 5;
 /// Largest growth of the number of ellipsoids in a frame; with more, a fit from seeds is better.
 constexpr double kMaxGrowth = 1.5;
 
@@ -68,12 +74,15 @@ class ContinuedSearch {
   std::optional<Conversion> run() {
     for (int n = 0; n < kMaxFits; ++n) {
       fitOnce();
-      if (fit_.end == FitEnd::kCancelled) return std::nullopt;
-      if (field_.chunks.size() != 1) return std::nullopt;
-      if (isNear() || !mayChange()) break;
+      if (fit_.end == FitEnd::kCancelled || field_.chunks.size() != 1) return std::nullopt;
+      const bool isLast = n + 1 == kMaxFits;
+      if (!isNear() && !isLast && mayChange()) continue;
+      if (over() > 0.0)
+        if (auto found = quantised()) return found;
+      margin_ += kFurther;
+      if (!mayChange()) break;
     }
-    if (over() < 0.0) return std::nullopt;
-    return quantised();
+    return std::nullopt;
   }
 
  private:
@@ -106,13 +115,15 @@ class ContinuedSearch {
 
   /// dB of the sum over the PSNR, as the device of the fit measures it.
   [[nodiscard]] double over() const { return fit_.curve.back().psnrBox - psnr_; }
-  [[nodiscard]] bool isNear() const { return over() >= kMin && over() <= kMax; }
+  [[nodiscard]] bool isNear() const {
+    return over() >= kMin + margin_ && over() <= kMax + margin_;
+  }
 
   /// Chooses the number of ellipsoids of the next fit. \return false if none promises to do
   [[nodiscard]] bool mayChange() {
     const auto count = double(field_.ellipsoidCount());
-    const double next = countFor({count, over()}, kAim, kDbPerDoubling);
-    if (over() > kMax) {
+    const double next = countFor({count, over()}, kAim + margin_, kDbPerDoubling);
+    if (over() > kMax + margin_) {
       wanted_ = std::size_t(std::max(next, count / kMaxGrowth));
       if (wanted_ >= field_.ellipsoidCount()) return false;
       std::vector<std::uint32_t> kept;
@@ -192,6 +203,7 @@ class ContinuedSearch {
   Field field_;                      ///< the ellipsoids so far
   std::vector<std::uint32_t> from_;  ///< those of the previous frame that they continue
   std::size_t wanted_ = 0;           ///< number of ellipsoids of the next fit
+  double margin_ = 0.0;              ///< dB that are added to kAim, kMin and kMax
   FitResult fit_;                    ///< the last fit
 };
 

@@ -18,7 +18,7 @@ constexpr int kIterations = 3;  // of a level
 constexpr double kLargestChange = 1.0;
 /// Share of the mean curvature of all windows that is added to that of a window, so that motions
 /// change little where there is nothing to see.
-constexpr double kDamping = 0.01;
+constexpr double kDamping = 0.1;
 
 Coord halfOf(Coord c) { return {c.x >> 1, c.y >> 1, c.z >> 1}; }
 
