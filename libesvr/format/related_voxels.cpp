@@ -131,6 +131,8 @@ void getRelated(std::span<const std::byte> content, const std::string& where,
     in.fail(error.what());
   }
   checkVoxels(layer, in);
+  // Copies of a grid with another background could have such voxels; no writer makes them.
+  if (!codec::isPredictable(layer, context)) in.fail("a vacant voxel is not the background");
   grid.voxels = std::move(layer);
   grid.reference = reference;
 }
