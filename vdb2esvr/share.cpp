@@ -10,6 +10,8 @@
 namespace esvr::vdb2esvr {
 namespace {
 
+/// Largest number of voxels in bricks of a grid that shares. Coding them once takes about 10 s.
+constexpr std::size_t kMostShared = std::size_t{1} << 25;
 /// Largest number of voxels in bricks for which voxels are chosen again. It takes about ten times as
 /// long as coding them.
 constexpr std::size_t kMostChosenAgain = std::size_t{1} << 21;
@@ -39,7 +41,8 @@ class Sharing {
     const auto& names = options_.sharing.names;
     const ConvertedGrid& grid = record_.grids[g];
     const bool isNamed = names.empty() || std::ranges::count(names, grid.sourceName) > 0;
-    return isNamed && !grid.sameAs && file_.grids[g].voxels;
+    const auto& voxels = file_.grids[g].voxels;
+    return isNamed && !grid.sameAs && voxels && voxels->codes.size() <= kMostShared;
   }
 
   [[nodiscard]] std::vector<std::size_t> candidatesFor(std::size_t g) const {

@@ -1,6 +1,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -186,7 +187,8 @@ VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t gr
 
 StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,
                         const VoxelReference& reference) {
-  StoredGrid expected = grids[grid];
+  StoredGrid expected;
+  expected.descriptor = grids[grid].descriptor;
   if (!reference.grid) {
     expected.voxels = partOf(*grids[grid].voxels, {});
     return expected;

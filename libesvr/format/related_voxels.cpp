@@ -99,7 +99,8 @@ const VoxelLayer* layerOf(const VoxelReference& reference, std::span<const Store
 std::optional<std::vector<std::byte>> putRelated(const VoxelLayer& layer,
                                                  const VoxelReference& reference,
                                                  const VoxelLayer* of) {
-  const VoxelLayer context = of ? *of : emptyAt(layer);
+  const VoxelLayer empty = emptyAt(layer);
+  const VoxelLayer& context = of ? *of : empty;
   if (!codec::isPredictable(layer, context)) return std::nullopt;
   ByteWriter out;
   putReference(out, reference);
