@@ -12,6 +12,7 @@
 #include "cli/converters.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
+#include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr {
@@ -94,6 +95,7 @@ TEST_F(SharingGrids, areReadOneByOne) {
   EXPECT_EQ(test::esvr2vdb({"--check", out()}).exitCode, 0);
   EXPECT_THAT(test::esvr2vdb({"--list", out()}).out,
               AllOf(HasSubstr("related voxels"), HasSubstr("grid records")));
+  EXPECT_THAT(test::esvr2vdb({"--list", "-v", out()}).out, HasSubstr("voxels refer to density"));
 }
 
 TEST_F(SharingGrids, thatDoNotExistAreRefused) {
@@ -111,6 +113,29 @@ TEST_F(SharingGrids, keepToASizeApart) {
   EXPECT_LE(outBytes(), 2000u);
   EXPECT_TRUE(report["output"]["bytes_separate"].is_null());
   EXPECT_EQ(run({"--size", "2000", "--share", "density"}).exitCode, 2);
+}
+
+TEST_F(SharingGrids, takeFewerBytesInTheFramesOfAFile) {
+  for (int frame = 1; frame <= 3; ++frame)
+    test::writeInput(folder_ / ("in.000" + std::to_string(frame) + ".vdb"),
+                     {{.name = "density", .voxels = softBall({frame, 0, 0})},
+                      {.name = "heat", .voxels = softBall({frame, 0, 0}, 40.0f)}});
+  const Arguments command{
+      folder_ / "in.####.vdb", out(),    "--frames", "1-3",    "--device", "cpu",
+      "--representation",      "voxels", "--force",  "--share"};
+  std::vector<std::uint64_t> bytes;
+  for (const char* share : {"off", "auto"}) {
+    Arguments arguments = command;
+    arguments.emplace_back(share);
+    const auto run = test::vdb2esvr(arguments);
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    bytes.push_back(outBytes());
+  }
+  EXPECT_LT(bytes[1], bytes[0]);
+  ASSERT_EQ(test::esvr2vdb({out(), folder_ / "back.####.vdb"}).exitCode, 0);
+  const VolumeGrid source = readGrid(folder_ / "in.0003.vdb", "heat"),
+                   found = readGrid(folder_ / "back.0003.vdb", "heat");
+  EXPECT_GE(compareVolumes(source.volume, found.volume).psnrActive, kStandardPsnr);
 }
 
 TEST_F(SharingGrids, mayHaveGoalsOfTheirOwn) {
