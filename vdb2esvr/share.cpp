@@ -130,7 +130,7 @@ class Sharing {
 constexpr std::uint64_t kHeaderBytes = 48, kAlignment = 8;  // docs/format.md
 
 /// Bytes of a section with its row and its padding.
-std::uint64_t bytesOf(const SectionSummary& section) {
+std::uint64_t bytesOfSection(const SectionSummary& section) {
   const std::uint64_t padded = (section.storedBytes + kAlignment - 1) / kAlignment * kAlignment;
   return kSectionRowBytes + (section.sharedWith ? 0 : padded);
 }
@@ -155,7 +155,7 @@ std::uint64_t bytesWithoutSharing(const EsvrFile& file, const RunRecord& record)
   for (const SectionSummary& section : record.output.sections) {
     const bool isJoined = section.kind == "grid records";
     areJoined = areJoined || isJoined;
-    if (!isJoined && section.kind != "packed sections") bytes += bytesOf(section);
+    if (!isJoined && section.kind != "packed sections") bytes += bytesOfSection(section);
   }
   if (areJoined)
     for (const StoredGrid& grid : file.grids) bytes += bytesOfRecord(grid);
