@@ -193,12 +193,23 @@ void printLayers(const Listing& listing) {
   table.print(std::cout);
 }
 
-void printStoredDetails(const std::string& name, const StoredGrid& grid) {
+/// The name of the grid whose voxels those of a grid refer to; empty if there is none.
+std::string referenceOf(const Listing& listing, const StoredGrid& grid) {
+  if (!grid.reference || !grid.reference->grid) return "";
+  const GridOfFile wanted{false, *grid.reference->grid};
+  const auto at = std::ranges::find(listing.parts, wanted, &NamedGrid::grid);
+  return at == listing.parts.end() ? "" : at->name;
+}
+
+void printStoredDetails(const Listing& listing, const std::string& name, const StoredGrid& grid) {
   std::cout << cli::printable(name) << ": " << cli::printable(grid.descriptor.transform.mapType)
             << ", background " << cli::shortNumber(grid.descriptor.background) << ", values "
             << cli::shortNumber(grid.valueMin) << " to " << cli::shortNumber(grid.valueMax)
             << ", threshold " << cli::shortNumber(grid.activeThreshold) << ", active box "
-            << cli::textOf(grid.activeBox) << ", chunks " << grid.field.chunks.size() << '\n';
+            << cli::textOf(grid.activeBox) << ", chunks " << grid.field.chunks.size();
+  if (const std::string reference = referenceOf(listing, grid); !reference.empty())
+    std::cout << ", voxels refer to " << cli::printable(reference);
+  std::cout << '\n';
   cli::printMetadata(name + " metadata", grid.descriptor.metadata, std::cout);
 }
 
@@ -214,7 +225,7 @@ void printDetails(const Listing& listing) {
     if (grid.isCarried)
       printCarriedDetails(listing.options, name, listing.file.carried[grid.index]);
     else
-      printStoredDetails(name, listing.file.grids[grid.index]);
+      printStoredDetails(listing, name, listing.file.grids[grid.index]);
 }
 
 }  // namespace

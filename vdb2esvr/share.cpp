@@ -10,6 +10,8 @@
 namespace esvr::vdb2esvr {
 namespace {
 
+/// Largest number of voxels in bricks of a grid that shares. Coding them once takes about 10 s.
+constexpr std::size_t kMostShared = std::size_t{1} << 25;
 /// Largest number of voxels in bricks for which voxels are chosen again. It takes about ten times as
 /// long as coding them.
 constexpr std::size_t kMostChosenAgain = std::size_t{1} << 21;
@@ -39,7 +41,8 @@ class Sharing {
     const auto& names = options_.sharing.names;
     const ConvertedGrid& grid = record_.grids[g];
     const bool isNamed = names.empty() || std::ranges::count(names, grid.sourceName) > 0;
-    return isNamed && !grid.sameAs && file_.grids[g].voxels;
+    const auto& voxels = file_.grids[g].voxels;
+    return isNamed && !grid.sameAs && voxels && voxels->codes.size() <= kMostShared;
   }
 
   [[nodiscard]] std::vector<std::size_t> candidatesFor(std::size_t g) const {
@@ -127,7 +130,7 @@ class Sharing {
 constexpr std::uint64_t kHeaderBytes = 48, kAlignment = 8;  // docs/format.md
 
 /// Bytes of a section with its row and its padding.
-std::uint64_t bytesOf(const SectionSummary& section) {
+std::uint64_t bytesOfSection(const SectionSummary& section) {
   const std::uint64_t padded = (section.storedBytes + kAlignment - 1) / kAlignment * kAlignment;
   return kSectionRowBytes + (section.sharedWith ? 0 : padded);
 }
@@ -152,7 +155,7 @@ std::uint64_t bytesWithoutSharing(const EsvrFile& file, const RunRecord& record)
   for (const SectionSummary& section : record.output.sections) {
     const bool isJoined = section.kind == "grid records";
     areJoined = areJoined || isJoined;
-    if (!isJoined && section.kind != "packed sections") bytes += bytesOf(section);
+    if (!isJoined && section.kind != "packed sections") bytes += bytesOfSection(section);
   }
   if (areJoined)
     for (const StoredGrid& grid : file.grids) bytes += bytesOfRecord(grid);

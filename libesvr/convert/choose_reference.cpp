@@ -1,6 +1,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -39,7 +40,7 @@ VoxelLayer partOf(const VoxelLayer& layer, const std::vector<std::size_t>& brick
 }
 
 /// The bricks in the middle of the coding order.
-VoxelLayer sampleOf(const VoxelLayer& layer) {
+VoxelLayer middleOf(const VoxelLayer& layer) {
   auto order = codec::codingOrder(layer.bricks);
   if (order.size() <= kSampleBricks) return layer;
   const auto first = order.begin() + std::ptrdiff_t((order.size() - kSampleBricks) / 2);
@@ -137,7 +138,7 @@ class Likeness {
   double inBoth_ = 0.0, inEither_ = 0.0;
 };
 
-struct Candidate {
+struct AlikeGrid {
   VoxelLayer part;
   std::vector<VoxelReference> maps;
   double score = 0.0;
@@ -150,9 +151,9 @@ struct Trial {
   std::size_t bytes = std::numeric_limits<std::size_t>::max();
 };
 
-std::vector<Candidate> mostAlike(std::span<const StoredGrid> grids, const VoxelLayer& sample,
+std::vector<AlikeGrid> mostAlike(std::span<const StoredGrid> grids, const VoxelLayer& sample,
                                  std::span<const std::size_t> candidates) {
-  std::vector<Candidate> found(candidates.size());
+  std::vector<AlikeGrid> found(candidates.size());
   const SparseVolume volume = volumeOf(sample);
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t c) {
     const auto& voxels = grids[candidates[c]].voxels;
@@ -162,8 +163,8 @@ std::vector<Candidate> mostAlike(std::span<const StoredGrid> grids, const VoxelL
     found[c].maps = likeness.maps(candidates[c]);
     found[c].score = likeness.score();
   });
-  std::erase_if(found, [](const Candidate& candidate) { return candidate.maps.empty(); });
-  std::ranges::stable_sort(found, std::ranges::greater(), &Candidate::score);
+  std::erase_if(found, [](const AlikeGrid& candidate) { return candidate.maps.empty(); });
+  std::ranges::stable_sort(found, std::ranges::greater(), &AlikeGrid::score);
   found.resize(std::min(found.size(), kMostTried));
   return found;
 }
@@ -172,10 +173,10 @@ std::vector<Candidate> mostAlike(std::span<const StoredGrid> grids, const VoxelL
 
 VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t grid,
                                std::span<const std::size_t> candidates) {
-  const VoxelLayer sample = sampleOf(*grids[grid].voxels);
+  const VoxelLayer sample = middleOf(*grids[grid].voxels);
   const auto alike = mostAlike(grids, sample, candidates);
   std::vector<Trial> trials(1);
-  for (const Candidate& candidate : alike)
+  for (const AlikeGrid& candidate : alike)
     for (const VoxelReference& map : candidate.maps) trials.push_back({map, &candidate.part});
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t t) {
     if (const auto content = format::putRelated(sample, trials[t].reference, trials[t].of))
@@ -186,7 +187,8 @@ VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t gr
 
 StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,
                         const VoxelReference& reference) {
-  StoredGrid expected = grids[grid];
+  StoredGrid expected;
+  expected.descriptor = grids[grid].descriptor;
   if (!reference.grid) {
     expected.voxels = partOf(*grids[grid].voxels, {});
     return expected;

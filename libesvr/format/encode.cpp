@@ -320,7 +320,7 @@ std::optional<FrameSections> collectDifferences(const EsvrFile& frame, const Esv
   return FrameSections{collect(frame, differences, inherited), inherited};
 }
 
-std::uint64_t bytesOf(const std::optional<FrameSections>& frame) {
+std::uint64_t frameBytesOf(const std::optional<FrameSections>& frame) {
   return frame ? frame->sections.assembleFrame(frame->inherited).size()
                : std::numeric_limits<std::uint64_t>::max();
 }
@@ -338,7 +338,7 @@ std::optional<FrameSections> differencesOf(const EsvrFile& frame, const EsvrFile
   auto found = collectDifferences(frame, previous);
   if (!refers) return found;
   auto plain = collectDifferences(withoutReferences(frame), previous);
-  return bytesOf(plain) < bytesOf(found) ? std::move(plain) : std::move(found);
+  return frameBytesOf(plain) < frameBytesOf(found) ? std::move(plain) : std::move(found);
 }
 
 }  // namespace format

@@ -62,7 +62,7 @@ VoxelReference getReference(ByteReader& in) {
   return reference;
 }
 
-void putHead(ByteWriter& out, const VoxelLayer& layer, const VoxelLayer* of) {
+void putRelatedHead(ByteWriter& out, const VoxelLayer& layer, const VoxelLayer* of) {
   const bool shares = of && sharesHead(layer, *of);
   out.put(std::uint8_t(shares ? RelatedHead::kDivisor : RelatedHead::kOwn));
   if (shares)
@@ -71,7 +71,7 @@ void putHead(ByteWriter& out, const VoxelLayer& layer, const VoxelLayer* of) {
     putVoxelHead(out, layer);
 }
 
-VoxelLayer getHead(ByteReader& in, const VoxelLayer* of) {
+VoxelLayer getRelatedHead(ByteReader& in, const VoxelLayer* of) {
   if (in.getEnum(RelatedHead::kDivisor, "head of voxels") == RelatedHead::kOwn)
     return getVoxelHead(in);
   if (!of) in.fail("a head of voxels without a reference");
@@ -84,8 +84,8 @@ VoxelLayer getHead(ByteReader& in, const VoxelLayer* of) {
 }
 
 /// The layer that a reference names; null if it names none.
-const VoxelLayer* layerOf(const VoxelReference& reference, std::span<const StoredGrid> before,
-                          const ByteReader& in) {
+const VoxelLayer* referencedLayer(const VoxelReference& reference,
+                                  std::span<const StoredGrid> before, const ByteReader& in) {
   if (!reference.grid) return nullptr;
   const std::string name = "it refers to grid " + std::to_string(*reference.grid);
   if (*reference.grid >= before.size()) in.fail(name + ", which is not before it");
@@ -99,11 +99,12 @@ const VoxelLayer* layerOf(const VoxelReference& reference, std::span<const Store
 std::optional<std::vector<std::byte>> putRelated(const VoxelLayer& layer,
                                                  const VoxelReference& reference,
                                                  const VoxelLayer* of) {
-  const VoxelLayer context = of ? *of : emptyAt(layer);
+  const VoxelLayer empty = emptyAt(layer);
+  const VoxelLayer& context = of ? *of : empty;
   if (!codec::isPredictable(layer, context)) return std::nullopt;
   ByteWriter out;
   putReference(out, reference);
-  putHead(out, layer, of);
+  putRelatedHead(out, layer, of);
   out.putAll(encodePredicted(layer, codec::PastVoxels(context, layer, mapOf(reference))));
   return out.take();
 }
@@ -117,8 +118,8 @@ void getRelated(std::span<const std::byte> content, const std::string& where,
                 std::span<const StoredGrid> before, MemoryBudget& budget, StoredGrid& grid) {
   ByteReader in(content, where);
   const VoxelReference reference = getReference(in);
-  const VoxelLayer* of = layerOf(reference, before, in);
-  VoxelLayer layer = getHead(in, of);
+  const VoxelLayer* of = referencedLayer(reference, before, in);
+  VoxelLayer layer = getRelatedHead(in, of);
   layer.codes = VoxelArray<std::int32_t>(budget.voxels());
   const VoxelLayer empty = emptyAt(layer);
   const VoxelLayer& context = of ? *of : empty;
@@ -131,6 +132,8 @@ void getRelated(std::span<const std::byte> content, const std::string& where,
     in.fail(error.what());
   }
   checkVoxels(layer, in);
+  // Copies of a grid with another background could have such voxels; no writer makes them.
+  if (!codec::isPredictable(layer, context)) in.fail("a vacant voxel is not the background");
   grid.voxels = std::move(layer);
   grid.reference = reference;
 }

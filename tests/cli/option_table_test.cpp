@@ -71,6 +71,7 @@ Table vdb2esvrTests() {
           {"--scratch", "Scratch.HoldsVoxelsAndChangesNoBit"},
           {"--seconds", "Vdb2EsvrOption.secondsEndTheFit"},
           {"--seed", "Vdb2EsvrOption.seedsGiveOtherFiles"},
+          {"--share", "SharingGrids.areThoseThatAreNamed"},
           {"--size", "Vdb2Esvr.keepsToTheSizeAskedFor"},
           {"--skip", "CarriedFile.LeavesOutTheGridsThatAreNamedBySkip"},
           {"--steadiness", "MovingCloud.isSteadierWhereAsked"},

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 
 #include "../fit/volumes.h"
@@ -57,6 +58,31 @@ TEST(PastVoxels, OfAnotherLatticeAreInUnitsOfTheFrame) {
   const SparseVolume volume = numbered();
   const VoxelLayer now = layerOf(volume, 0.01), before = layerOf(volume, 0.3);
   expectMoved(volume, PastVoxels(before, now), {1, 0, 0}, 0.3 + 400 * 0x1p-24);
+}
+
+TEST(PastVoxels, AreMappedFromValuesInOtherUnits) {
+  const VoxelLayer past = layerOf(numbered(), 0.01);
+  VoxelLayer now = past;
+  now.divisor = 0.75;
+  const PastVoxels mapped(past, now, {-2.5, 8.0});
+  const SparseVolume values = volumeOf(past);
+  const auto cube = std::make_unique<PastCube<1>>();
+  mapped.fill({}, {}, *cube);
+  for (int v = 0; v < kBrickVoxels; ++v) {
+    const bool isVacant = past.vacant[0].test(v);  // vacant voxels have the background of `now`
+    const double value = -2.5 * double(values.brickValues(0)[std::size_t(v)]) + 8.0;
+    EXPECT_EQ(cube->place[PastCube<1>::cell(voxelLocal(v))], isVacant ? 0.0 : value * 0.75) << v;
+  }
+}
+
+TEST(PastVoxels, AreLimitedWhereTheirLatticeIsTooFine) {
+  const VoxelLayer past = layerOf(numbered(), 0.01);
+  VoxelLayer now = past;
+  now.divisor = 1e300;
+  const PastVoxels fine(past, now);
+  const auto cube = std::make_unique<PastCube<1>>();
+  fine.fill({}, {}, *cube);
+  for (const double place : cube->place) EXPECT_LE(std::abs(place), 0x1p35);
 }
 
 TEST(PastVoxels, AreFoundFromAnotherOrigin) {

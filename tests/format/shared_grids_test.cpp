@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -15,7 +16,6 @@
 #include "esvr/error.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
-#include "esvr/voxel_reference.h"
 #include "format/byte_writer.h"
 #include "format/crafted_file.h"
 #include "format/frame_table.h"
@@ -224,6 +224,35 @@ TEST(RelatedVoxels, ComeBackInAFrameAfterAnother) {
   EXPECT_EQ(encodeFrame(read, &first), bytes);
 }
 
+// Some grids are differences from the frame before, and the others have their records in one section.
+TEST(RelatedVoxels, OfSeveralGridsComeBackInAFrame) {
+  EsvrFile first = twoAlike(), second;
+  second.layout = FileLayout::kCompact;
+  second.grids = {first.grids[0], first.grids[1], first.grids[1],
+                  boundedGrid("flame", -7.0f, 1.0f)};
+  first.grids = {first.grids[0], boundedGrid("heat", 3.0f, 2.0f), boundedGrid("heat", 5.0f, 1.0f),
+                 boundedGrid("flame", 2.0f, 0.0f)};
+  second.grids[3].reference = VoxelReference{1, -7.0f / 40.0f, 53.5f};
+  const Bytes bytes = encodeFrame(second, &first);
+  const EsvrSummary summary = inspectEsvr(bytes, "frame");
+  const auto has = [&](const char* kind) {
+    return std::ranges::count(summary.sections, kind, &SectionSummary::kind) > 0;
+  };
+  EXPECT_TRUE(has("predicted grid") && has("related voxels") && has("grid records"));
+  const EsvrFile read = decodeFrame(bytes, "frame", {}, &first);
+  for (std::size_t g = 0; g < 4; ++g) EXPECT_EQ(read.grids[g].voxels, second.grids[g].voxels) << g;
+  EXPECT_EQ(read.layout, FileLayout::kCompact);
+  EXPECT_EQ(encodeFrame(read, &first), bytes);
+}
+
+// A reference that is worse than the frame before takes no bytes.
+TEST(RelatedVoxels, AreNotUsedInAFrameWhereTheFrameBeforeIsBetter) {
+  const EsvrFile first = twoAlike();
+  EsvrFile second = twoAlike();
+  second.grids[1].reference = VoxelReference{};
+  EXPECT_EQ(encodeFrame(second, &first), encodeFrame(twoAlike(), &first));
+}
+
 // ---- the compact layout
 
 EsvrFile compact(EsvrFile file) {
@@ -387,40 +416,6 @@ TEST(ReadPart, OfNoGridHasTheRecords) {
   const EsvrFile file = readEsvrPart(path, {.grids = std::vector<std::size_t>{}}).file;
   EXPECT_EQ(namesInOrder(file), (std::vector<std::string>{"density", "heat"}));
   EXPECT_FALSE(file.grids[0].voxels || file.grids[1].voxels);
-}
-
-// ---- the choice of a reference
-
-TEST(ChooseReference, FindsTheGridAndTheMap) {
-  EsvrFile file = twoAlike();
-  file.grids[1].reference.reset();
-  const SparseVolume other = test::tubeVolume();
-  file.grids.insert(file.grids.begin(),
-                    gridOf("other", other, boundedLayer(other, 0.01, Activity::kByValue)));
-  const std::vector<std::size_t> candidates{0, 1};
-  const VoxelReference found = chooseReference(file.grids, 2, candidates);
-  EXPECT_EQ(found.grid, std::size_t{1});
-  // The values of both grids are rounded to steps of a fiftieth of their range.
-  EXPECT_NEAR(found.gain, 40.0f, 1.0f);
-  EXPECT_NEAR(found.offset, 300.0f, 1.0f);
-}
-
-TEST(ChooseReference, IsEmptyWithoutCandidates) {
-  const EsvrFile file = twoAlike();
-  EXPECT_EQ(chooseReference(file.grids, 1, {}), VoxelReference{});
-}
-
-TEST(ExpectedFrom, HasTheMappedValuesOfTheReference) {
-  const EsvrFile file = twoAlike();
-  const StoredGrid expected = expectedFrom(file.grids, 1, *file.grids[1].reference);
-  const SparseVolume of = volumeOf(*file.grids[0].voxels), mapped = volumeOf(*expected.voxels);
-  ASSERT_EQ(mapped.bricks, of.bricks);
-  for (std::size_t i = 0; i < of.values.size(); ++i) {
-    const bool isActive = of.active[i / kBrickVoxels].test(int(i % kBrickVoxels));
-    const float wanted = isActive ? float(40.0 * double(of.values[i]) + 300.0) : mapped.values[i];
-    EXPECT_EQ(mapped.values[i], wanted) << i;
-  }
-  EXPECT_TRUE(expectedFrom(file.grids, 1, {}).voxels->bricks.empty());
 }
 
 }  // namespace

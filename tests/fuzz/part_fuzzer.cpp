@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "esvr/container.h"
 #include "esvr/error.h"
@@ -30,6 +31,7 @@ ReadPart partFrom(const std::uint8_t* choice) {
   if (choice[0] & 1) part.layers = 1 + choice[1] % 4;
   if (choice[0] & 2) part.ellipsoids = 1 + choice[2];
   if (choice[0] & 4) part.box = boxFrom(choice);
+  if (choice[0] & 8) part.grids = std::vector<std::size_t>{choice[1] % std::size_t{4}};
   return part;
 }
 

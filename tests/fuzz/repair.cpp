@@ -90,12 +90,21 @@ void repairIndex(std::span<std::byte> file, std::span<std::byte> index) {
   }
 }
 
+/// Corrects the checksum at the end of a frame in the short form.
+void repairFrame(std::span<std::byte> frame) {
+  const std::size_t size = frame.size() - kSumBytes;
+  store(frame, size, checksum(frame.first(size)));
+}
+
 void repairEntry(std::span<std::byte> file, std::span<std::byte> entry) {
   const auto section = part(file, load<std::uint64_t>(entry, kEntryOffsetAt),
                             load<std::uint64_t>(entry, kEntryStoredAt));
   if (load<std::uint32_t>(entry, 0) == std::uint32_t(SectionKind::kLayered)) repairLayered(section);
   if (load<std::uint32_t>(entry, 0) == std::uint32_t(SectionKind::kSequenceIndex))
     repairIndex(file, section);
+  if (load<std::uint32_t>(entry, 0) == std::uint32_t(SectionKind::kPacked) &&
+      section.size() > kSumBytes)
+    repairFrame(section);
   store(entry, kEntryChecksumAt, checksum(section));
 }
 
@@ -105,12 +114,6 @@ void repairTable(std::span<std::byte> file) {
   for (std::size_t at = 0; at < table.size(); at += kEntryBytes)
     repairEntry(file, table.subspan(at, kEntryBytes));
   store(file, kTableChecksumAt, checksum(table));
-}
-
-/// Corrects the checksum at the end of a frame in the short form.
-void repairFrame(std::span<std::byte> frame) {
-  const std::size_t size = frame.size() - kSumBytes;
-  store(frame, size, checksum(frame.first(size)));
 }
 
 }  // namespace

@@ -99,6 +99,7 @@ struct ConvertOptions {
   StorageOptions storage;
   /// The same grid of the decoded previous frame of a sequence; null: the grid stands alone. Bytes
   /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
+  /// Another grid that this one refers to in its file may take its place (voxel_reference.h).
   /// If it holds voxels, Representation::kAuto stores voxels for a PresetGoal, a PsnrGoal and a
   /// BoundGoal, so that only the first frame of a group takes the time of a fit. If it holds
   /// quantised ellipsoids, a PresetGoal and a PsnrGoal fit these to the frame, which takes a
