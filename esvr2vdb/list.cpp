@@ -197,8 +197,11 @@ void printStoredDetails(const std::string& name, const StoredGrid& grid) {
   std::cout << cli::printable(name) << ": " << cli::printable(grid.descriptor.transform.mapType)
             << ", background " << cli::shortNumber(grid.descriptor.background) << ", values "
             << cli::shortNumber(grid.valueMin) << " to " << cli::shortNumber(grid.valueMax)
-            << ", threshold " << cli::shortNumber(grid.activeThreshold) << ", active box "
-            << cli::textOf(grid.activeBox) << ", chunks " << grid.field.chunks.size() << '\n';
+            << (grid.topology == TopologyKind::kMask
+                    ? ", a mask"
+                    : ", threshold " + cli::shortNumber(grid.activeThreshold))
+            << ", active box " << cli::textOf(grid.activeBox) << ", chunks "
+            << grid.field.chunks.size() << '\n';
   cli::printMetadata(name + " metadata", grid.descriptor.metadata, std::cout);
 }
 
