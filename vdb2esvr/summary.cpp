@@ -33,13 +33,14 @@ void printChoice(const ConvertedGrid& grid, std::ostream& out) {
   out << '\n';
 }
 
-/// Says that the overlap of active voxels was given up for a size.
+/// Says that the overlap of active voxels was given up for a size or for the memory.
 void printOverlap(const Options& options, const ConvertedGrid& grid, std::ostream& out) {
   const bool isBand = grid.stored().topology == TopologyKind::kBricks;
   if (options.convert.storage.activity != Activity::kAuto || isBand) return;
   if (grid.metrics.iou > kMinOverlap) return;
   out << cli::printable(grid.uniqueName)
-      << ": a mask of active voxels would take too much of the size; their overlap is "
+      << ": a mask of active voxels would take too much of the size or of the memory; their "
+         "overlap is "
       << cli::shortNumber(grid.metrics.iou) << '\n';
 }
 

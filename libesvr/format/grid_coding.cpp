@@ -77,13 +77,19 @@ void storeSimplifiedMask(const SparseVolume& source, double squares,
   storeMask(source, (simplified ? *simplified : own).forError(error), grid);
 }
 
+/// True if the volume's values are in memory. Coding a mask takes as much memory as they do.
+bool fitsIntoMemory(const SparseVolume& source) {
+  return !memoryOf(source).isInFile(source.values.size() * sizeof(float));
+}
+
 void chooseTopology(const SparseVolume& source, Activity activity,
                     const SimplifiedMasks* simplified, StoredGrid& grid) {
   const bool isBand = grid.topology == TopologyKind::kBricks;
   if (isBand) grid.bricks = brickCorners(source);
   const ThresholdChoice choice = chooseThreshold(source, grid);
   grid.activeThreshold = choice.threshold;
-  if (activity == Activity::kAuto && !isBand && !(choice.iou > kMinOverlap))
+  const bool mayHaveMask = activity == Activity::kAuto && !isBand && fitsIntoMemory(source);
+  if (mayHaveMask && !(choice.iou > kMinOverlap))
     storeSimplifiedMask(source, choice.squares, simplified, grid);
   else if (!(choice.iou > 0.0))
     storeMask(source, source.active, grid);

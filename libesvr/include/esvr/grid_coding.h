@@ -22,8 +22,8 @@ namespace esvr {
 /// which a reader determines the active voxels:
 ///  - a threshold. Among the thresholds that increase the squared error by at most 0.004 dB, it is
 ///    the one whose active voxels have the largest intersection over union with the source's;
-///  - the source's simplified mask, if `activity` is kAuto and the overlap of the threshold does not
-///    suffice (MaskOverlap, simplified_mask.h);
+///  - the source's simplified mask, if `activity` is kAuto, the overlap of the threshold does not
+///    suffice (MaskOverlap, simplified_mask.h) and the source's values are not in a file;
 ///  - the source's active mask, if `activity` is kExact, or if no threshold restores a voxel
 ///    because all values equal the background;
 ///  - for a narrow band, the rule of kBricks (container.h) with the source's bricks, unless
