@@ -205,8 +205,11 @@ void printStoredDetails(const Listing& listing, const std::string& name, const S
   std::cout << cli::printable(name) << ": " << cli::printable(grid.descriptor.transform.mapType)
             << ", background " << cli::shortNumber(grid.descriptor.background) << ", values "
             << cli::shortNumber(grid.valueMin) << " to " << cli::shortNumber(grid.valueMax)
-            << ", threshold " << cli::shortNumber(grid.activeThreshold) << ", active box "
-            << cli::textOf(grid.activeBox) << ", chunks " << grid.field.chunks.size();
+            << (grid.topology == TopologyKind::kMask
+                    ? ", a mask"
+                    : ", threshold " + cli::shortNumber(grid.activeThreshold))
+            << ", active box " << cli::textOf(grid.activeBox) << ", chunks "
+            << grid.field.chunks.size();
   if (const std::string reference = referenceOf(listing, grid); !reference.empty())
     std::cout << ", voxels refer to " << cli::printable(reference);
   std::cout << '\n';

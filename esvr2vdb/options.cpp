@@ -36,8 +36,9 @@ cli::ProgramText programText() {
           "error.\n"
           "\n"
           "A voxel is active where it differs from the background by more than a threshold,\n"
-          "which was chosen when the file was made. In a level set, the voxels of the narrow\n"
-          "band are active. A file made with --topology exact stores the active mask.\n"
+          "which was chosen when the file was made, or where the file has a mask that says so.\n"
+          "No voxel outside the bounds of the source's active voxels is active. In a level set,\n"
+          "the voxels of the narrow band are active.\n"
           "\n"
           "--list counts bytes that several grids share for the first of them only. The table\n"
           "of sections names the grid with which a section is shared.\n"
@@ -72,7 +73,7 @@ cli::CommandLine commandLine() {
      "write this grid only; may be repeated; 'density[1]' is the second grid of that name")
     ("threshold", value<float>()->value_name("T"),
      "make the voxels active that differ from the background by more than T (default: the stored "
-     "threshold)")
+     "threshold or mask)")
     ("lod", value<std::int64_t>()->value_name("N"),
      "use only the first N importance layers; --list -v prints the error of each layer")
     ("max-ellipsoids", value<std::int64_t>()->value_name("N"),

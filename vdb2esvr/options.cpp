@@ -133,8 +133,10 @@ void addGoalOptions(cli::po::options_description& options) {
      "the grid shows whether they may be smaller")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
      "ellipsoids, voxels, or auto (whichever are better or smaller)")
-    ("topology", value<std::string>()->value_name("T")->default_value("threshold"),
-     "threshold: a voxel's value determines whether it is active; exact: store the active mask");
+    ("topology", value<std::string>()->value_name("T")->default_value("auto"),
+     "how active voxels are stored. threshold: by their values; exact: by their mask; auto: by "
+     "their values if the overlap with those of IN.vdb is then above 0.95, otherwise by a "
+     "simplified mask with which it is, unless that takes more than a quarter of --size");
   // clang-format on
 }
 
@@ -268,8 +270,9 @@ Storage storage(const Arguments& a) {
 }
 
 Activity activity(const Arguments& a) {
-  return cli::choose<Activity>("topology", a.get<std::string>("topology"),
-                               {{"threshold", Activity::kByValue}, {"exact", Activity::kExact}});
+  return cli::choose<Activity>(
+      "topology", a.get<std::string>("topology"),
+      {{"auto", Activity::kAuto}, {"threshold", Activity::kByValue}, {"exact", Activity::kExact}});
 }
 
 StorageOptions storageOptions(const Arguments& a) {

@@ -45,6 +45,18 @@ const char* nameOf(Preset preset) {
   return "standard";
 }
 
+const char* nameOf(Activity activity) {
+  switch (activity) {
+    case Activity::kExact:
+      return "exact";
+    case Activity::kByValue:
+      return "threshold";
+    case Activity::kAuto:
+      break;
+  }
+  return "auto";
+}
+
 const char* nameOf(Representation representation) {
   switch (representation) {
     case Representation::kEllipsoids:
@@ -121,7 +133,7 @@ Json askedJson(const Options& options) {
           {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
           {"storage", storage.form == Storage::kCompact ? "compact" : "float32"},
           {"storage_loss", storage.loss},
-          {"topology", storage.activity == Activity::kExact ? "exact" : "threshold"},
+          {"topology", nameOf(storage.activity)},
           {"keep", options.grids.keep},
           {"skip", options.grids.skip},
           {"seed", fit.seed},
@@ -150,10 +162,14 @@ Json kernelOf(const Kernel& kernel) {
   return {{"form", cli::nameOf(kernel.form)}, {"kappa", kernel.kappa}, {"epsilon", kernel.epsilon}};
 }
 
-Json topologyOf(const StoredGrid& grid) {
-  return {{"kind", cli::nameOf(grid.topology)},
-          {"threshold", grid.activeThreshold},
-          {"bricks", grid.bricks.size()}};
+/// How the file says which voxels are active. A threshold without bound has no meaning.
+Json topologyOf(const RunRecord& record, std::size_t g) {
+  const StoredGrid& grid = record.grids[g].stored();
+  const bool byThreshold = !grid.voxels && grid.topology != TopologyKind::kMask;
+  return {{"kind", grid.voxels ? "voxels" : cli::nameOf(grid.topology)},
+          {"threshold", byThreshold ? Json(grid.activeThreshold) : Json(nullptr)},
+          {"bricks", grid.bricks.size()},
+          {"mask_bytes", maskBytes(record.output, g)}};
 }
 
 Json fitOf(const ConvertedGrid& grid) {
@@ -299,7 +315,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"bytes", cli::ownBytes(record.output, g)},
           {"sections", sectionsOf(record.output, g)},
           {"kernel", kernelOf(grid.stored().field.kernel)},
-          {"topology", topologyOf(grid.stored())},
+          {"topology", topologyOf(record, g)},
           {"fit", fitOf(grid)},
           {"paper", grid.paper ? paperJson(*grid.paper) : Json(nullptr)},
           {"compact", compactOf(grid)},

@@ -66,9 +66,11 @@ void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
                 std::to_string(grid.stored().field.ellipsoidCount()) + " ellipsoids instead of " +
                     std::to_string(fit.wanted));
   log.detail("grid \"" + grid.uniqueName + "\": kappa " +
-             cli::shortNumber(grid.stored().field.kernel.kappa) + ", threshold " +
-             cli::shortNumber(grid.stored().activeThreshold) + ", overlap of active voxels " +
-             cli::shortNumber(grid.metrics.iou));
+             cli::shortNumber(grid.stored().field.kernel.kappa) + ", " +
+             (grid.stored().topology == TopologyKind::kMask
+                  ? "a mask"
+                  : "threshold " + cli::shortNumber(grid.stored().activeThreshold)) +
+             ", overlap of active voxels " + cli::shortNumber(grid.metrics.iou));
 }
 
 /// Converts one grid after the other until all are done or the run is interrupted. Grids with the

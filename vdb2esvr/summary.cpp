@@ -33,6 +33,28 @@ void printChoice(const ConvertedGrid& grid, std::ostream& out) {
   out << '\n';
 }
 
+/// Says that the overlap of active voxels was given up for a size or for the memory.
+void printOverlap(const Options& options, const ConvertedGrid& grid, std::ostream& out) {
+  const bool isBand = grid.stored().topology == TopologyKind::kBricks;
+  if (options.convert.storage.activity != Activity::kAuto || isBand) return;
+  if (grid.metrics.iou > kMinOverlap) return;
+  out << cli::printable(grid.uniqueName)
+      << ": a mask of active voxels would take too much of the size or of the memory; their "
+         "overlap is "
+      << cli::shortNumber(grid.metrics.iou) << '\n';
+}
+
+/// Says what the mask of active voxels takes, if there is one.
+void printMask(const RunRecord& record, std::size_t g, std::ostream& out) {
+  const ConvertedGrid& grid = record.grids[g];
+  if (grid.stored().voxels || grid.stored().topology != TopologyKind::kMask) return;
+  out << cli::printable(grid.uniqueName) << ": "
+      << (grid.metrics.iou < 1.0 ? "a simplified mask of active voxels"
+                                 : "the mask of active voxels")
+      << " takes " << maskBytes(record.output, g) << " bytes, with an overlap of "
+      << cli::shortNumber(grid.metrics.iou) << '\n';
+}
+
 /// Says that ellipsoids, on which the user insisted, take more bytes than exact voxels.
 void printRemark(const ConvertedGrid& grid, std::ostream& out) {
   if (const auto bytes = grid.conversion.smallerExactBytes)
@@ -95,7 +117,13 @@ void printFitted(const Options& options, const RunRecord& record, std::ostream& 
                cli::seconds(grid.seconds.total())});
   }
   table.print(out);
-  for (const ConvertedGrid& grid : record.grids) printNote(options, grid, out);
+  for (std::size_t g = 0; g < record.grids.size(); ++g) {
+    if (!record.grids[g].sameAs) {
+      printMask(record, g, out);
+      printOverlap(options, record.grids[g], out);
+    }
+    printNote(options, record.grids[g], out);
+  }
 }
 
 /// Lists the errors of the vectors. The table of fitted grids has their components.

@@ -18,7 +18,8 @@ namespace esvr {
 namespace {
 
 constexpr std::size_t kLargestPalette = 4096;
-constexpr double kMargin = 1.0 - 1e-6;  // factor of a bound, which leaves room for rounding
+constexpr double kErrorOfBound = 0.577;  // error of rounding: 1 / sqrt(3) of the bound
+constexpr double kMargin = 1.0 - 1e-6;   // factor of a bound, which leaves room for rounding
 
 bool sameBits(float a, float b) {
   return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
@@ -84,11 +85,15 @@ VoxelLayer quantised(const SparseVolume& volume, double halfStep, RoundedSigns s
   return layer;
 }
 
-/// Removes the bricks without an active voxel.
-void dropInactive(VoxelLayer& layer) {
+bool isVacant(const VoxelLayer& layer, std::size_t b) {
+  return layer.vacant[b].count() == kBrickVoxels;
+}
+
+/// Removes the bricks that hold nothing but the background.
+void dropVacant(VoxelLayer& layer) {
   std::size_t kept = 0;
   for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
-    if (layer.active[b].count() == 0) continue;
+    if (isVacant(layer, b)) continue;
     layer.bricks[kept] = layer.bricks[b];
     layer.active[kept] = layer.active[b];
     layer.vacant[kept] = layer.vacant[b];
@@ -102,21 +107,65 @@ void dropInactive(VoxelLayer& layer) {
   layer.codes.resize(kept * kBrickVoxels);
 }
 
-void activateByValue(const SparseVolume& volume, double bound, VoxelLayer& layer) {
-  const std::int32_t background = codec::codeOfValue(layer, volume.background);
+/// The voxels that differ from the background by more than a bound.
+std::vector<BrickMask> differing(const SparseVolume& volume, double bound) {
+  std::vector<BrickMask> masks(volume.brickCount());
   tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
     const auto values = volume.brickValues(b);
-    layer.active[b] = {};
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (std::abs(double(values[v]) - volume.background) > bound) masks[b].set(v);
+  });
+  return masks;
+}
+
+/// Makes all voxels outside a box inactive.
+void clip(const SparseVolume& volume, const Box& box, std::vector<BrickMask>& masks) {
+  for (std::size_t b = 0; b < masks.size(); ++b) {
+    const BrickMask all = masks[b];
+    masks[b] = {};
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (all.test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v))) masks[b].set(v);
+  }
+}
+
+/// The simplified mask and those of the volume's active voxels that differ.
+std::vector<BrickMask> withDiffering(const SparseVolume& volume, std::span<const BrickMask> mask,
+                                     const std::vector<BrickMask>& differing) {
+  std::vector<BrickMask> masks(mask.begin(), mask.end());
+  for (std::size_t b = 0; b < masks.size(); ++b)
+    for (std::size_t w = 0; w < masks[b].words.size(); ++w)
+      masks[b].words[w] |= volume.active[b].words[w] & differing[b].words[w];
+  return masks;
+}
+
+/// Gives a layer these active voxels. Of the others, those that do not differ from the background
+/// become vacant.
+void activate(const SparseVolume& volume, const std::vector<BrickMask>& active,
+              const std::vector<BrickMask>& differing, VoxelLayer& layer) {
+  const std::int32_t background = codec::codeOfValue(layer, volume.background);
+  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    layer.active[b] = active[b];
+    layer.vacant[b] = {};
     for (int v = 0; v < kBrickVoxels; ++v) {
-      if (std::abs(double(values[v]) - volume.background) > bound) {
-        layer.active[b].set(v);
-        continue;
-      }
+      if (active[b].test(v) || differing[b].test(v)) continue;
       layer.vacant[b].set(v);
       layer.codes[b * kBrickVoxels + std::size_t(v)] = background;
     }
   });
-  dropInactive(layer);
+  dropVacant(layer);
+}
+
+void activateByValue(const SparseVolume& volume, double bound, Activity activity,
+                     const SimplifiedMasks* simplified, VoxelLayer& layer) {
+  const auto differs = differing(volume, bound);
+  auto active = differs;
+  clip(volume, activeBox(volume), active);
+  if (activity == Activity::kAuto && !overlapOf(volume.active, active).suffices()) {
+    const SimplifiedMasks own(volume);
+    const auto mask = (simplified ? *simplified : own).forError(kErrorOfBound * bound);
+    active = withDiffering(volume, mask, differs);
+  }
+  activate(volume, active, differs, layer);
 }
 
 }  // namespace
@@ -132,7 +181,7 @@ VoxelLayer exactLayer(const SparseVolume& volume) {
 }
 
 VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
-                        RoundedSigns signs) {
+                        RoundedSigns signs, const SimplifiedMasks* simplified) {
   if (!(std::isfinite(bound) && bound > 0.0))
     throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
   // Multiples of twice the bound are nearly exact on the first lattice. Its values may miss the
@@ -142,7 +191,8 @@ VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activ
   for (const double h : {halfStep, halfStep - roundingError(volume, bound)}) {
     if (!(h > 0.0)) break;
     VoxelLayer layer = quantised(volume, h, signs);
-    if (activity == Activity::kByValue) activateByValue(volume, halfStep, layer);
+    if (activity != Activity::kExact)
+      activateByValue(volume, halfStep, activity, simplified, layer);
     if (largestError(volume, layer) <= bound) return layer;
   }
   return exactLayer(volume);

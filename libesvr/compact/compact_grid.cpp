@@ -29,14 +29,26 @@ Trial choose(TrialMaker& maker, const CompactOptions& options) {
   return chooseStepsWithin(maker, allowedError(maker, options));
 }
 
+/// With a mask, a reader's PSNR differs from that of the trials, which sum ellipsoids at all voxels
+/// of the mask's bricks. The PSNR of the trials is corrected by what the result misses or exceeds,
+/// at most kMaxCorrections times, unless it exceeds the wanted PSNR by kSmallExcess, dB, at most.
+constexpr int kMaxCorrections = 2;
+constexpr double kSmallExcess = 0.05;
+
+/// What the PSNR of a result exceeds the wanted one by, dB.
+double excessOf(const StoredGrid& grid, const SparseVolume& source, const CompactOptions& options) {
+  return psnrOverBox(source, decodeGrid(grid, {.memory = memoryOf(source)}),
+                     {.box = options.box, .peak = options.peak}) -
+         *options.psnr;
+}
+
 /// True if a reader does not get the wanted PSNR from the result of a GPU. This may happen near the
 /// precision of float32 only.
 bool missedByReader(const StoredGrid& grid, const SparseVolume& source,
                     const CompactOptions& options) {
   if (!options.psnr || *options.psnr < kMaxPsnrOfMargin || options.device.kind == DeviceKind::kCpu)
     return false;
-  return psnrOverBox(source, decodeGrid(grid, {.memory = memoryOf(source)}),
-                     {.box = options.box, .peak = options.peak}) < *options.psnr;
+  return excessOf(grid, source, options) < 0.0;
 }
 
 void requireOneKappa(const StoredGrid& grid) {
@@ -55,9 +67,10 @@ std::optional<SparseVolume> ownVoxels(const StoredGrid& grid, const VoxelMemory&
 
 }  // namespace
 
-CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
+namespace {
+
+CompactResult compactOnce(const StoredGrid& grid, const SparseVolume& source,
                           const CompactOptions& options) {
-  requireOneKappa(grid);
   CompactResult result{grid, {}, 0.0, 0};
   if (grid.field.ellipsoidCount() == 0) return result;
   const Box box = options.box.value_or(activeBox(source));
@@ -68,8 +81,8 @@ CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                           .solvedFor = own ? &*own : nullptr,
                           .peak = options.peak});
   Trial chosen = choose(maker, options);
-  // with a mask, the layers' errors depend on more than the trial's values
-  const bool byValues = grid.topology != TopologyKind::kMask;
+  // the trials know no mask, and no voxels outside the active box that become the background
+  const bool byValues = grid.topology != TopologyKind::kMask && common(box, grid.activeBox) == box;
   if (byValues) result.grid.layerErrors = maker.layerErrors(chosen);
   result.grid.field = std::move(chosen.field);
   result.grid.quantised = std::move(chosen.quantised);
@@ -79,12 +92,37 @@ CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
   if (missedByReader(result.grid, source, options)) {
     CompactOptions again = options;
     again.device = {};
-    return compactGrid(grid, source, again);
+    return compactOnce(grid, source, again);
   }
   result.steps = chosen.steps;
   result.bytes = chosen.bytes;
   result.loss = maker.error() > 0.0 ? 10.0 * std::log10(chosen.error / maker.error()) : 0.0;
   return result;
+}
+
+/// The smallest result found for a grid with a mask that reaches the wanted PSNR.
+CompactResult compactMasked(const StoredGrid& grid, const SparseVolume& source,
+                            const CompactOptions& options) {
+  CompactOptions aimed = options;
+  CompactResult best = compactOnce(grid, source, aimed);
+  double excess = excessOf(best.grid, source, options), last = excess;
+  for (int n = 0; n < kMaxCorrections && !(excess >= 0.0 && excess <= kSmallExcess); ++n) {
+    *aimed.psnr += 0.5 * kSmallExcess - last;
+    CompactResult now = compactOnce(grid, source, aimed);
+    last = excessOf(now.grid, source, options);
+    const bool better = excess < 0.0 ? last > excess : last >= 0.0 && now.bytes < best.bytes;
+    if (better) best = std::move(now), excess = last;
+  }
+  return best;
+}
+
+}  // namespace
+
+CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
+                          const CompactOptions& options) {
+  requireOneKappa(grid);
+  const bool masked = options.psnr && grid.topology == TopologyKind::kMask;
+  return masked ? compactMasked(grid, source, options) : compactOnce(grid, source, options);
 }
 
 }  // namespace esvr

@@ -8,6 +8,7 @@
 #include "compact/residual_layer.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
+#include "field/active_region.h"
 #include "format/residual_value.h"
 
 namespace esvr {
@@ -59,6 +60,10 @@ class Bounded {
   [[nodiscard]] float threshold() const { return float(threshold_); }
   [[nodiscard]] double divisor() const { return divisor_; }
 
+  [[nodiscard]] bool mayBeBackground(float wanted) const {
+    return std::abs(double(wanted) - background_) <= bound_;
+  }
+
   /// A code that keeps the bound, 0 if possible; nothing if there is none.
   /// \param sum  value of the voxel without a residual
   [[nodiscard]] std::optional<std::int32_t> codeFor(float wanted, float sum, double margin) const {
@@ -77,7 +82,7 @@ class Bounded {
     const bool mayStay = !byValue_ || activity > threshold_ - margin;
     const bool mayGo = byValue_ && activity <= threshold_ + margin;
     return (!mayStay || std::abs(double(wanted) - value) <= bound_ - margin) &&
-           (!mayGo || std::abs(double(wanted) - background_) <= bound_);
+           (!mayGo || mayBeBackground(wanted));
   }
 
   double bound_;
@@ -87,10 +92,14 @@ class Bounded {
 };
 
 /// Fills the codes of one brick. \return false if a voxel has no code that keeps the bound
-bool fillCodes(const Bounded& bounded, std::span<const float> wanted, const BrickMask* mask,
+/// \param region  the other voxels become the background
+bool fillCodes(const Bounded& bounded, std::span<const float> wanted, const BrickMask& region,
                std::span<const float> sum, double margin, BrickCodes& out) {
   for (std::size_t v = 0; v < kBrickVoxels; ++v) {
-    if (mask && !mask->test(int(v))) continue;
+    if (!region.test(int(v))) {
+      if (!bounded.mayBeBackground(wanted[v])) return false;
+      continue;
+    }
     const auto code = bounded.codeFor(wanted[v], sum[v], margin);
     if (!code) return false;
     out.codes[v] = *code;
@@ -108,14 +117,15 @@ std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& sour
   if (margin > kMaxMarginShare * bound) return std::nullopt;
   const Bounded bounded(grid, bound, margin);
   const SparseVolume sum = compact::sumIn(grid, corners);
+  const RevoxeliseOptions rule = voxelRule(grid);
   const std::vector<float> emptyBrick(kBrickVoxels, source.background);
   std::vector<BrickCodes> bricks;
   for (std::size_t b = 0; b < corners.size(); ++b) {
     const auto at = findBrick(source, brickOf(corners[b]) - brickOf(source.origin));
     BrickCodes brick{corners[b], {}};
-    const BrickMask* mask = grid.mask.empty() ? nullptr : &grid.mask[b];
-    if (!fillCodes(bounded, at ? source.brickValues(*at) : std::span<const float>(emptyBrick), mask,
-                   sum.brickValues(b), margins[b], brick))
+    const BrickMask region = regionIn(rule, corners[b]).within;
+    if (!fillCodes(bounded, at ? source.brickValues(*at) : std::span<const float>(emptyBrick),
+                   region, sum.brickValues(b), margins[b], brick))
       return std::nullopt;
     if (std::any_of(brick.codes.begin(), brick.codes.end(), [](auto code) { return code != 0; }))
       bricks.push_back(brick);

@@ -9,6 +9,7 @@
 #include "core/add_seconds.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "format/mask_section.h"
 
 namespace esvr::convert {
 namespace {
@@ -34,7 +35,7 @@ Attempt attempted(const Job& job, const FitOptions& options) {
   result.asked = *options.count;
   result.fit = fit(source, options);
   result.grid = makeStoredGrid(job.input.descriptor, source, std::move(result.fit.field),
-                               job.options.storage.activity);
+                               job.options.storage.activity, job.input.simplified);
   result.psnr = psnrOf(job, result.grid);
   return result;
 }
@@ -72,6 +73,22 @@ std::optional<Attempt> betterSigned(const Job& job, double count, const Attempt&
   return found;
 }
 
+/// Largest share of a size that a mask may take.
+constexpr double kMaxMaskShare = 0.25;
+/// Error of the values for which the bytes of a mask are measured, as a share of their peak: 40 dB.
+constexpr double kErrorOfMask = 0.01;
+
+/// Bytes of the section of a simplified mask.
+std::uint64_t maskBytes(const Job& job) {
+  const SparseVolume& source = job.input.source;
+  const SimplifiedMasks own(source);
+  const SimplifiedMasks& kept = job.input.simplified ? *job.input.simplified : own;
+  const auto masks = kept.forError(kErrorOfMask * job.options.fit.peak.value_or(peakOf(source)));
+  std::vector<Coord> corners;
+  for (std::size_t b = 0; b < masks.size(); ++b) corners.push_back(source.brickCorner(b));
+  return format::putMask(corners, masks).size();
+}
+
 /// Share of the active voxels with the largest or the smallest value of the volume, other than the
 /// background, from which on it saturates.
 constexpr double kSaturatedShare = 0.05;
@@ -93,6 +110,12 @@ bool saturates(const SparseVolume& volume) {
 Activity voxelActivity(const Job& job) {
   const bool levelSet = job.input.descriptor.gridClass == GridClass::kLevelSet;
   return levelSet ? Activity::kExact : job.options.storage.activity;
+}
+
+Activity activityForSize(const Job& job, std::uint64_t bytes) {
+  const Activity wanted = job.options.storage.activity;
+  if (wanted != Activity::kAuto || job.options.fit.narrowBand) return wanted;
+  return kMaxMaskShare * double(bytes) < double(maskBytes(job)) ? Activity::kByValue : wanted;
 }
 
 RoundedSigns voxelSigns(const Job& job) {

@@ -35,6 +35,11 @@ struct Job {
 /// because the width of its band is part of its shape.
 [[nodiscard]] Activity voxelActivity(const Job& job);
 
+/// How active voxels are stored in a grid of a size: as StorageOptions say, but by value for
+/// Activity::kAuto if a simplified mask would take more than a quarter of the size, because too
+/// little would be left for the values.
+[[nodiscard]] Activity activityForSize(const Job& job, std::uint64_t bytes);
+
 /// How voxels are rounded: with their signs if the grid is a narrow band.
 [[nodiscard]] RoundedSigns voxelSigns(const Job& job);
 

@@ -1,5 +1,6 @@
 #include "convert/bounded.h"
 
+#include <span>
 #include <string>
 #include <utility>
 
@@ -36,12 +37,46 @@ Conversion asVoxels(const Job& job, VoxelLayer layer) {
   return conversion;
 }
 
+/// True if the active voxels of a decoded grid are nearly those of the source.
+bool overlaps(const Job& job, const StoredGrid& grid) {
+  const SparseVolume& source = job.input.source;
+  return compareVolumes(source, decodeGrid(grid, {.memory = memoryOf(source)})).iou > kMinOverlap;
+}
+
+/// The simplified mask that leaves out no voxel which differs from the background by more than the
+/// bound.
+std::span<const BrickMask> maskWithin(double bound, const SimplifiedMasks& masks) {
+  constexpr double kErrorsInBound = 8.0;  // twice what may differ, since the error is rounded
+  return masks.forError(bound / kErrorsInBound);
+}
+
+/// A residual that keeps the bound. With kAuto, active voxels are found by value, unless the overlap
+/// does not suffice.
+std::optional<StoredGrid> withActiveResidual(const Job& job, const StoredGrid& grid, double bound) {
+  const SparseVolume& source = job.input.source;
+  auto found = withResidual(grid, source, bound);
+  if (job.options.storage.activity != Activity::kAuto || (found && overlaps(job, *found)))
+    return found;
+  const SimplifiedMasks own(source);
+  StoredGrid masked = grid;
+  storeMask(source, maskWithin(bound, job.input.simplified ? *job.input.simplified : own), masked);
+  return withResidual(std::move(masked), source, bound);
+}
+
+/// The job with active voxels by value where it leaves the choice to the conversion.
+ConvertOptions byValue(const Job& job) {
+  ConvertOptions options = job.options;
+  if (options.storage.activity == Activity::kAuto) options.storage.activity = Activity::kByValue;
+  return options;
+}
+
 /// A grid of ellipsoids with a residual; nothing if no grid is small enough or there is no residual
 /// that keeps the bound.
 std::optional<Conversion> withEllipsoids(const Job& job, double bound, std::uint64_t bytes) {
-  auto conversion = searchSize(job, bytes).conversion;
+  const ConvertOptions options = byValue(job);
+  auto conversion = searchSize({job.input, options, job.limits}, bytes).conversion;
   if (!conversion) return std::nullopt;
-  auto grid = withResidual(std::move(conversion->grid), job.input.source, bound);
+  auto grid = withActiveResidual(job, conversion->grid, bound);
   if (!grid) return std::nullopt;
   conversion->grid = std::move(*grid);
   const Box box = job.options.fit.box.value_or(activeBox(job.input.source));
@@ -127,8 +162,8 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   const SparseVolume& source = job.input.source;
   const double bound = absoluteBound(goal, source);
   if (bound == 0.0) return asVoxels(job, exactLayer(source));
-  Conversion voxels =
-      asVoxels(job, boundedLayer(source, bound, voxelActivity(job), voxelSigns(job)));
+  Conversion voxels = asVoxels(
+      job, boundedLayer(source, bound, voxelActivity(job), voxelSigns(job), job.input.simplified));
   const bool insists = job.options.representation == Representation::kEllipsoids;
   if (isNarrowBand(job.input.descriptor, source) && !insists) return voxels;
   Smaller best{std::move(voxels), {}, insists};

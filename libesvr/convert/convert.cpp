@@ -22,8 +22,8 @@ using convert::Job;
 /// Stores a fit in the form that `storage` determines.
 Conversion stored(const ConvertInput& input, FitResult fit, const CommonFitOptions& options,
                   const StorageOptions& storage) {
-  StoredGrid grid =
-      makeStoredGrid(input.descriptor, input.source, std::move(fit.field), storage.activity);
+  StoredGrid grid = makeStoredGrid(input.descriptor, input.source, std::move(fit.field),
+                                   storage.activity, input.simplified);
   grid.curve = withoutTimes(fit.curve);
   Conversion conversion;
   if (storage.form == Storage::kFloat32) {
@@ -57,7 +57,9 @@ class Converter {
   Conversion operator()(const SizeGoal& goal) const {
     if (job_.options.storage.form != Storage::kCompact)
       throw UsageError("a size needs compact storage; the size of float32 storage is fixed");
-    return convert::convertToSize(job_, goal.bytes);
+    ConvertOptions options = job_.options;
+    options.storage.activity = convert::activityForSize(job_, goal.bytes);
+    return convert::convertToSize({job_.input, options, job_.limits}, goal.bytes);
   }
   Conversion operator()(const PsnrGoal& goal) const {
     return convert::convertToPsnr(job_, {goal.psnr});
@@ -148,8 +150,11 @@ double presetPsnr(Preset preset) {
   return 40.0;
 }
 
-Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options) {
+Conversion convertVolume(const ConvertInput& given, const ConvertOptions& options) {
   requirePossible(options);
+  const SimplifiedMasks masks(given.source);  // all attempts share them
+  const ConvertInput input{given.descriptor, given.source,
+                           given.simplified ? given.simplified : &masks};
   ConvertOptions own = options;
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
   if (own.fit.narrowBand) own.fit.fitFor = FitFor::kVoxels;

@@ -55,9 +55,12 @@ class PsnrSearch {
     bothSigns_ = draft.bothSigns;
     std::uint64_t expected = 0;
     if (below_ && !draft.cancelled()) {
-      const double price = priceOf(draft, compacted(job_, draft, {})) / kShortFitPrice;
-      expected = std::uint64_t(price * neededCount(draft, aim() - kShortFitBehind));
-      if (price * neededCount(draft, aim() - kShortFitBehind - kUncertainty) > double(*below_))
+      const CompactResult compact = compacted(job_, draft, {});
+      const double price = priceOf(draft, compact) / kShortFitPrice;
+      const double besides = double(bytesAdded(compact.grid) - compact.bytes);
+      expected = std::uint64_t(besides + price * neededCount(draft, aim() - kShortFitBehind));
+      if (besides + price * neededCount(draft, aim() - kShortFitBehind - kUncertainty) >
+          double(*below_))
         return {std::nullopt, expected};
     }
     if (!draft.cancelled()) fitUntilReached(scaledCount(draft, aim() - kShortFitBehind));

@@ -165,7 +165,8 @@ class VoxelSearch {
 
   [[nodiscard]] VoxelLayer layerAt(double bound, double price) const {
     const SparseVolume& source = job_.input.source;
-    VoxelLayer layer = boundedLayer(source, bound, voxelActivity(job_), voxelSigns(job_));
+    VoxelLayer layer =
+        boundedLayer(source, bound, voxelActivity(job_), voxelSigns(job_), job_.input.simplified);
     return price > 0.0 ? thriftyLayer(source, std::move(layer), thriftOf(price)) : layer;
   }
 

@@ -6,24 +6,12 @@
 
 #include "esvr/error.h"
 #include "esvr/field.h"
+#include "field/active_region.h"
 #include "field/brick_batches.h"
 #include "field/voxel_rule.h"
 
 namespace esvr {
 namespace {
-
-/// Turns the sums of one brick into voxels. \return the mask of its active voxels
-BrickMask settle(const VoxelRule& rule, std::span<float> values) {
-  BrickMask mask;
-  for (int v = 0; v < kBrickVoxels; ++v) {
-    values[v] = rule.settled(values[v]);
-    if (rule.isActive(values[v]))
-      mask.set(v);
-    else
-      values[v] = rule.inactiveValue(values[v]);
-  }
-  return mask;
-}
 
 Coord smallest(std::span<const Coord> corners) {
   Coord low = corners.front();
@@ -54,8 +42,9 @@ SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
   std::vector<BrickMask> masks(std::min(kBatchBricks, corners.size()));
   volume.values.reserve(corners.size() * kBrickVoxels);
   forEachBatch(field, corners, [&](const BrickBatch& batch) {
-    tbb::parallel_for(std::size_t{0}, batch.size(),
-                      [&](std::size_t b) { masks[b] = settle(rule, batch.values(b)); });
+    tbb::parallel_for(std::size_t{0}, batch.size(), [&](std::size_t b) {
+      masks[b] = settle(rule, regionIn(options, batch.corners[b]), batch.values(b));
+    });
     for (std::size_t b = 0; b < batch.size(); ++b) {
       if (masks[b].count() == 0) continue;
       const auto values = batch.values(b);
@@ -72,7 +61,7 @@ SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
 
 SparseVolume revoxelise(const Field& field, const RevoxeliseOptions& options) {
   if (options.restrictToBricks) return settledBricks(field, options.bricks, options);
-  return settledBricks(field, reachedBricks(field), options);
+  return settledBricks(field, reachedBricks(field, options.box), options);
 }
 
 }  // namespace esvr

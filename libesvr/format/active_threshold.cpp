@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "field/active_region.h"
 #include "field/brick_batches.h"
 
 namespace esvr::format {
@@ -75,7 +76,7 @@ class Histogram {
       kept.inactive -= bins_[k].inactive;
       cost += bins_[k].cost;
     }
-    return {thresholdBelow((first + last) / 2), bestIou};
+    return {thresholdBelow((first + last) / 2), bestIou, error_};
   }
 
  private:
@@ -92,10 +93,13 @@ class Histogram {
   std::vector<Tally> bins_ = std::vector<Tally>(kBins);
 };
 
-void addBrick(const SparseVolume& source, const VoxelRule& rule, Coord corner,
+/// Adds the voxels of a brick that lie in a box.
+void addBrick(const SparseVolume& source, const VoxelRule& rule, const Box& box, Coord corner,
               std::span<const float> values, Histogram& histogram) {
   const auto b = findBrick(source, brickOf(corner - source.origin));
+  const BrickMask inBox = maskOf(box, corner);
   for (int v = 0; v < kBrickVoxels; ++v) {
+    if (!inBox.test(v)) continue;
     const float wanted = b ? source.brickValues(*b)[v] : source.background;
     histogram.add(rule, values[v], wanted, b && source.active[*b].test(v));
   }
@@ -107,15 +111,15 @@ constexpr std::size_t kBricksOfPart = 1024;
 }  // namespace
 
 ThresholdChoice chooseThreshold(const SparseVolume& source, const Field& field,
-                                const VoxelRule& rule, std::span<const Coord> bricks) {
+                                const VoxelRule& rule, const ThresholdPlace& place) {
   // The bricks of a part do not depend on the number of threads, so that sums are the same for any.
-  const std::size_t batch = std::min(kBatchBricks, bricks.size());
+  const std::size_t batch = std::min(kBatchBricks, place.bricks.size());
   std::vector<Histogram> parts((batch + kBricksOfPart - 1) / kBricksOfPart);
-  forEachBatch(field, bricks, [&](const BrickBatch& sums) {
+  forEachBatch(field, place.bricks, [&](const BrickBatch& sums) {
     tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
       const std::size_t end = std::min((p + 1) * kBricksOfPart, sums.size());
       for (std::size_t b = p * kBricksOfPart; b < end; ++b)
-        addBrick(source, rule, sums.corners[b], sums.values(b), parts[p]);
+        addBrick(source, rule, place.box, sums.corners[b], sums.values(b), parts[p]);
     });
   });
   Histogram whole;

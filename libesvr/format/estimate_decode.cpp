@@ -13,7 +13,7 @@ Box boxAround(const std::vector<Coord>& corners) {
 }
 
 EstimateOptions optionsFor(const StoredGrid& grid, const DecodeOptions& options) {
-  EstimateOptions estimate{.within = options.box.value_or(Box::whole()),
+  EstimateOptions estimate{.within = common(grid.activeBox, options.box.value_or(Box::whole())),
                            .enough = double(options.maxBytes),
                            .memory = options.memory};
   if (grid.topology == TopologyKind::kThreshold) return estimate;

@@ -10,6 +10,7 @@
 #include "esvr/empty_signs.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
+#include "field/active_region.h"
 #include "format/active_threshold.h"
 #include "format/grid_rule.h"
 #include "format/residual_value.h"
@@ -17,10 +18,26 @@
 namespace esvr {
 namespace {
 
+constexpr float kAlwaysActive = -std::numeric_limits<float>::max();  // below every activity
+
+}  // namespace
+
+void storeMask(const SparseVolume& source, std::span<const BrickMask> masks, StoredGrid& grid) {
+  grid.topology = TopologyKind::kMask;
+  grid.activeThreshold = kAlwaysActive;
+  grid.bricks.clear();
+  grid.mask.clear();
+  for (std::size_t b = 0; b < masks.size(); ++b) {
+    if (masks[b].count() == 0) continue;
+    grid.bricks.push_back(source.brickCorner(b));
+    grid.mask.push_back(masks[b]);
+  }
+}
+
+namespace {
+
 using format::ruleOf;
 using format::ThresholdChoice;
-
-constexpr float kAlwaysActive = -std::numeric_limits<float>::max();  // below every activity
 
 bool isLevelSet(const GridDescriptor& descriptor, float background) {
   return descriptor.gridClass == GridClass::kLevelSet && background > 0.0f;
@@ -44,23 +61,38 @@ ValueRange rangeOf(const StoredGrid& grid) {
   return {std::min(grid.valueMin, background), std::max(grid.valueMax, background)};
 }
 
-void storeMask(const SparseVolume& source, StoredGrid& grid) {
-  grid.topology = TopologyKind::kMask;
-  grid.bricks = brickCorners(source);
-  grid.mask = source.active;
-  grid.activeThreshold = kAlwaysActive;
+ThresholdChoice chooseThreshold(const SparseVolume& source, const StoredGrid& grid) {
+  const format::ThresholdPlace place{grid.topology == TopologyKind::kBricks
+                                         ? grid.bricks
+                                         : reachedBricks(grid.field, grid.activeBox),
+                                     grid.activeBox};
+  return format::chooseThreshold(source, grid.field, ruleOf(grid), place);
 }
 
-void chooseTopology(const SparseVolume& source, StoredGrid& grid) {
-  const auto fitsBest = [&](std::span<const Coord> bricks) {
-    return format::chooseThreshold(source, grid.field, ruleOf(grid), bricks);
-  };
-  if (grid.topology == TopologyKind::kBricks) grid.bricks = brickCorners(source);
-  const ThresholdChoice choice = grid.topology == TopologyKind::kBricks
-                                     ? fitsBest(grid.bricks)
-                                     : fitsBest(reachedBricks(grid.field));
+/// Stores a simplified mask of the source. \param squares  squared error of the active voxels
+void storeSimplifiedMask(const SparseVolume& source, double squares,
+                         const SimplifiedMasks* simplified, StoredGrid& grid) {
+  const SimplifiedMasks own(source);
+  const double error = std::sqrt(squares / double(grid.activeVoxels));
+  storeMask(source, (simplified ? *simplified : own).forError(error), grid);
+}
+
+/// True if the volume's values are in memory. Coding a mask takes as much memory as they do.
+bool fitsIntoMemory(const SparseVolume& source) {
+  return !memoryOf(source).isInFile(source.values.size() * sizeof(float));
+}
+
+void chooseTopology(const SparseVolume& source, Activity activity,
+                    const SimplifiedMasks* simplified, StoredGrid& grid) {
+  const bool isBand = grid.topology == TopologyKind::kBricks;
+  if (isBand) grid.bricks = brickCorners(source);
+  const ThresholdChoice choice = chooseThreshold(source, grid);
   grid.activeThreshold = choice.threshold;
-  if (!(choice.iou > 0.0)) storeMask(source, grid);
+  const bool mayHaveMask = activity == Activity::kAuto && !isBand && fitsIntoMemory(source);
+  if (mayHaveMask && !(choice.iou > kMinOverlap))
+    storeSimplifiedMask(source, choice.squares, simplified, grid);
+  else if (!(choice.iou > 0.0))
+    storeMask(source, source.active, grid);
 }
 
 }  // namespace
@@ -80,12 +112,12 @@ RevoxeliseOptions voxelRule(const StoredGrid& grid) {
                        isLevelSet(grid.descriptor, grid.field.background);
   options.bricks = grid.bricks;
   options.restrictToBricks = grid.topology != TopologyKind::kThreshold;
+  options.masks = grid.mask;
+  options.box = grid.activeBox;
   return options;
 }
 
-bool followsFromEllipsoids(const StoredGrid& grid) {
-  return !grid.voxels && !grid.residual && grid.topology != TopologyKind::kMask;
-}
+bool followsFromEllipsoids(const StoredGrid& grid) { return !grid.voxels && !grid.residual; }
 
 std::string whyNoNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) {
   if (descriptor.gridClass != GridClass::kLevelSet) return "it is no level set";
@@ -128,7 +160,7 @@ StoredGrid makeStoredVoxels(const GridDescriptor& descriptor, const SparseVolume
 }
 
 StoredGrid makeStoredGrid(const GridDescriptor& descriptor, const SparseVolume& source, Field field,
-                          Activity activity) {
+                          Activity activity, const SimplifiedMasks* simplified) {
   StoredGrid grid = describe(descriptor, source);
   grid.field = std::move(field);
   if (isNarrowBand(descriptor, source)) {
@@ -136,9 +168,9 @@ StoredGrid makeStoredGrid(const GridDescriptor& descriptor, const SparseVolume& 
     grid.withinRange = false;  // values beyond the band's ends tell its sides apart
   }
   if (activity == Activity::kExact)
-    storeMask(source, grid);
+    storeMask(source, source.active, grid);
   else
-    chooseTopology(source, grid);
+    chooseTopology(source, activity, simplified, grid);
   return grid;
 }
 
@@ -150,27 +182,51 @@ bool meets(const Box& box, Coord corner) {
          last.x >= box.min.x && last.y >= box.min.y && last.z >= box.min.z;
 }
 
-/// The bricks on which the field is evaluated; nothing if these are all that supports reach.
-std::optional<std::vector<Coord>> bricksWanted(const StoredGrid& grid,
-                                               const DecodeOptions& options) {
-  const bool stored = grid.topology != TopologyKind::kThreshold;
-  if (!stored && !options.box) return std::nullopt;
-  if (!stored) return reachedBricks(grid.field, *options.box);
-  std::vector<Coord> bricks = grid.bricks;
-  if (options.box)
-    std::erase_if(bricks, [&](Coord corner) { return !meets(*options.box, corner); });
-  return bricks;
+/// The place of a decoding: that of the grid's active voxels, or a part of it.
+Box placeOf(const StoredGrid& grid, const DecodeOptions& options) {
+  return options.box ? common(grid.activeBox, *options.box) : grid.activeBox;
 }
 
-/// The given bricks and those of the residual, in order.
-std::vector<Coord> withResidualBricks(const VoxelLayer& residual, std::span<const Coord> bricks,
-                                      const DecodeOptions& options) {
+/// The grid's rule within the wanted box, and the lists that it refers to.
+struct WantedVoxels {
+  RevoxeliseOptions rule;
+  std::vector<Coord> bricks{};
+  std::vector<BrickMask> masks{};
+
+  WantedVoxels(const StoredGrid& grid, const DecodeOptions& options) : rule(voxelRule(grid)) {
+    rule.threshold = options.threshold.value_or(rule.threshold);
+    if (options.threshold) rule.masks = {};
+    rule.box = placeOf(grid, options);
+    rule.memory = options.memory;
+    if (rule.restrictToBricks && options.box) takeThose();
+  }
+  WantedVoxels(const WantedVoxels&) = delete;
+  WantedVoxels& operator=(const WantedVoxels&) = delete;
+
+ private:
+  /// Leaves out the bricks outside the box.
+  void takeThose() {
+    for (std::size_t b = 0; b < rule.bricks.size(); ++b) {
+      if (!meets(rule.box, rule.bricks[b])) continue;
+      bricks.push_back(rule.bricks[b]);
+      if (!rule.masks.empty()) masks.push_back(rule.masks[b]);
+    }
+    rule.bricks = bricks;
+    rule.masks = masks;
+  }
+};
+
+/// The bricks of the sum that may have an active voxel, and those of the residual, in order.
+std::vector<Coord> withResidualBricks(const StoredGrid& grid, const RevoxeliseOptions& rule) {
+  const VoxelLayer& residual = *grid.residual;
+  if (rule.restrictToBricks) return {rule.bricks.begin(), rule.bricks.end()};
   std::vector<Coord> own, all;
   for (const Coord brick : residual.bricks) {
     const Coord corner = residual.origin + brick * kBrickSide;
-    if (!options.box || meets(*options.box, corner)) own.push_back(corner);
+    if (meets(rule.box, corner)) own.push_back(corner);
   }
-  std::set_union(bricks.begin(), bricks.end(), own.begin(), own.end(), std::back_inserter(all));
+  const auto reached = reachedBricks(grid.field, rule.box);
+  std::set_union(reached.begin(), reached.end(), own.begin(), own.end(), std::back_inserter(all));
   return all;
 }
 
@@ -187,58 +243,31 @@ void addResidual(const VoxelLayer& residual, SparseVolume& volume) {
 }
 
 /// Determines the active voxels of values that are not clamped again, by the rule of revoxelise().
-void activate(const VoxelRule& rule, SparseVolume& volume) {
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    volume.active[b] = {};
-    const auto values = volume.brickValues(b);
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if (rule.isActive(values[v]))
-        volume.active[b].set(v);
-      else
-        values[v] = rule.inactiveValue(values[v]);
-  }
+void activate(VoxelRule rule, const RevoxeliseOptions& options, SparseVolume& volume) {
+  rule.low = -std::numeric_limits<float>::infinity();
+  rule.high = std::numeric_limits<float>::infinity();
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    volume.active[b] =
+        settle(rule, regionIn(options, volume.brickCorner(b)), volume.brickValues(b));
   dropInactiveBricks(volume);
 }
 
-SparseVolume evaluatedWithResidual(const StoredGrid& grid, const DecodeOptions& options) {
-  auto wanted = bricksWanted(grid, options);
-  if (!wanted) wanted = reachedBricks(grid.field);
-  const auto bricks = withResidualBricks(*grid.residual, *wanted, options);
+SparseVolume evaluatedWithResidual(const StoredGrid& grid, const RevoxeliseOptions& options) {
+  const auto bricks = withResidualBricks(grid, options);
   SparseVolume volume = revoxelise(grid.field, {.threshold = kAlwaysActive,
-                                                .range = voxelRule(grid).range,
+                                                .range = options.range,
                                                 .bricks = bricks,
                                                 .restrictToBricks = true,
                                                 .memory = options.memory});
   addResidual(*grid.residual, volume);
-  VoxelRule rule = ruleOf(grid);
-  rule.threshold = options.threshold.value_or(rule.threshold);
-  activate(rule, volume);
+  activate(makeVoxelRule(grid.field.background, options), options, volume);
   return volume;
 }
 
 SparseVolume evaluated(const StoredGrid& grid, const DecodeOptions& options) {
-  if (grid.residual) return evaluatedWithResidual(grid, options);
-  RevoxeliseOptions revoxel = voxelRule(grid);
-  revoxel.threshold = options.threshold.value_or(revoxel.threshold);
-  const auto bricks = bricksWanted(grid, options);
-  if (bricks) revoxel.bricks = *bricks;
-  revoxel.restrictToBricks = bricks.has_value();
-  revoxel.memory = options.memory;
-  return revoxelise(grid.field, revoxel);
-}
-
-/// Makes all voxels inactive that are not in the mask.
-void applyMask(const StoredGrid& grid, SparseVolume& volume) {
-  const VoxelRule rule = ruleOf(grid);
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    const auto place =
-        std::lower_bound(grid.bricks.begin(), grid.bricks.end(), volume.brickCorner(b));
-    const bool stored = place != grid.bricks.end() && *place == volume.brickCorner(b);
-    volume.active[b] = stored ? grid.mask[std::size_t(place - grid.bricks.begin())] : BrickMask{};
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if (!volume.active[b].test(v))
-        volume.brickValues(b)[v] = rule.inactiveValue(volume.brickValues(b)[v]);
-  }
+  const WantedVoxels wanted(grid, options);
+  return grid.residual ? evaluatedWithResidual(grid, wanted.rule)
+                       : revoxelise(grid.field, wanted.rule);
 }
 
 /// Makes voxels outside a box inactive and drops bricks without an active voxel.
@@ -261,15 +290,15 @@ void clip(const Box& box, const VoxelRule& rule, SparseVolume& volume) {
 SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
   if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
-  if (options.threshold && (grid.voxels || grid.topology == TopologyKind::kMask))
+  if (options.threshold && grid.voxels)
     throw UsageError("grid '" + grid.descriptor.name +
                      "' says itself which voxels are active: it takes no threshold");
   if (options.box && options.box->empty()) throw UsageError("the box of voxels is empty");
   if (options.maxBytes != kNoMemoryLimit)
     requireWithinMemory(estimateDecode(grid, options).bytes(options.memory), options.maxBytes,
                         "grid '" + grid.descriptor.name + "'");
-  SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
-  if (!grid.voxels && grid.topology == TopologyKind::kMask) applyMask(grid, volume);
+  if (!grid.voxels) return evaluated(grid, options);
+  SparseVolume volume = volumeOf(*grid.voxels);
   if (options.box) clip(*options.box, ruleOf(grid), volume);
   return volume;
 }

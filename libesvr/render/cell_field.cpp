@@ -45,6 +45,20 @@ std::vector<Coord> withCornersIn(const BrickIndex& given, const std::vector<Coor
   return kept;
 }
 
+/// The bricks of cells of which a corner may lie in a box of voxels.
+Box cellBricksOf(const Box& voxels) {
+  const Box bricks = bricksOf(voxels);
+  return voxels.empty() ? voxels : Box{bricks.min - Coord{1, 1, 1}, bricks.max};
+}
+
+/// Finds the masks of the voxels at the corners of the bricks.
+void numberMasks(CellField& cells, const BrickIndex& given, std::span<const BrickMask> masks) {
+  cells.masks.assign(masks.begin(), masks.end());
+  for (std::size_t i = 0; i < cells.table.bricks.size(); ++i)
+    for (int c = 0; c < kCellCorners; ++c)
+      cells.maskOf.push_back(given.find(cells.table.place(i) + stepToCorner(c)));
+}
+
 /// Numbers the bricks that supports reach.
 void numberBricks(CellField& cells, std::vector<Coord> reached, const RevoxeliseOptions& voxels) {
   const BrickIndex given(bricksAt(voxels.bricks));
@@ -53,6 +67,7 @@ void numberBricks(CellField& cells, std::vector<Coord> reached, const Revoxelise
   if (!voxels.restrictToBricks) return;
   for (std::size_t i = 0; i < cells.table.bricks.size(); ++i)
     cells.corners.push_back(cornersIn(given, cells.table.place(i)));
+  if (!voxels.masks.empty()) numberMasks(cells, given, voxels.masks);
 }
 
 }  // namespace
@@ -65,13 +80,16 @@ CellField makeCellField(const Field& field, const RevoxeliseOptions& voxels) {
   std::ranges::transform(reach, reach.begin(), reachOfCells);
   requireListable(reach, bricksOf(Box::whole()));
   const SupportOf supportOf = [&](std::size_t i) { return reach[i]; };
-  numberBricks(cells, missingBricks(BrickIndex(std::span<const Coord>{}), reach.size(), supportOf),
+  numberBricks(cells,
+               missingBricks(BrickIndex(std::span<const Coord>{}), reach.size(), supportOf,
+                             cellBricksOf(voxels.box)),
                voxels);
   BrickPairs pairs = pairsWithin(BrickIndex(placesOf(cells.table)), reach.size(), supportOf);
   cells.begin = std::move(pairs.brickBegin);
   cells.ellipsoid = std::move(pairs.ellipsoid);
   cells.kernels = std::move(gathered.kernels);
   cells.origins = std::move(gathered.origins);
+  cells.box = voxels.box;
   cells.rule = makeVoxelRule(field.background, voxels);
   return cells;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "esvr/field.h"
+#include "esvr/sparse_volume.h"
 #include "field/voxel_rule.h"
 #include "render/brick_table.h"
 #include "render/cell_form.h"
@@ -21,6 +22,11 @@ struct CellField {
   /// By brick: bit c is set if voxels in the brick of corner c (core/cell_corner.h) may differ from
   /// the background. Empty: all may.
   std::vector<std::uint8_t> corners;
+  /// If voxels are active by masks: the masks, and for each brick and corner the number of the mask
+  /// of the voxels there, or BrickIndex::kNone. Otherwise empty.
+  std::vector<BrickMask> masks;
+  std::vector<std::uint32_t> maskOf;
+  Box box;  ///< no voxel outside it is active
   VoxelRule rule;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "field/active_region.h"
 #include "render/cell_bricks.h"
 #include "render/cell_corners.h"
 #include "render/voxel_levels.h"
@@ -10,7 +11,7 @@ namespace esvr {
 namespace {
 
 std::vector<Coord> voxelCorners(const Field& field, const RevoxeliseOptions& voxels) {
-  std::vector<Coord> reached = reachedBricks(field);
+  std::vector<Coord> reached = reachedBricks(field, voxels.box);
   if (!voxels.restrictToBricks) return reached;
   std::vector<Coord> both;
   std::ranges::set_intersection(reached, voxels.bricks, std::back_inserter(both));
@@ -31,6 +32,7 @@ LazyCells::Level::Level(std::span<const Coord> bricks, std::uint32_t firstCells)
 
 LazyCells::LazyCells(const Field& field, const RevoxeliseOptions& voxels)
     : field_(field),
+      voxels_(voxels),
       rule_(makeVoxelRule(field.background, voxels)),
       corners_(voxelCorners(field, voxels)),
       evaluator_(field_, corners_) {
@@ -73,7 +75,7 @@ const float* LazyCells::voxelsOf(int level, Coord brick) const {
 
 bool LazyCells::decode(std::uint32_t number, std::span<float, kBrickVoxels> values) const {
   evaluator_.evaluate(number, values);
-  for (float& value : values) value = rule_(value);
+  (void)settle(rule_, regionIn(voxels_, corners_[number]), values);
   return differs(values, rule_.background);
 }
 

@@ -64,8 +64,8 @@ class LazyArrays {
 class LazyCells {
  public:
   /// \param field   must outlive the object
-  /// \param voxels  rule by which sums become voxels. If its bricks are restricted, voxels elsewhere
-  ///                are the background
+  /// \param voxels  rule by which sums become voxels; its bricks and masks must outlive the object. If
+  ///                its bricks are restricted, voxels elsewhere are the background
   /// \throws MemoryExceeded  as for reachedBricks
   /// \throws UsageError      as for makeBrickTable
   LazyCells(const Field& field, const RevoxeliseOptions& voxels);
@@ -101,6 +101,7 @@ class LazyCells {
                           std::span<float, kCellBrickVoxels> values) const;
 
   PreparedField field_;
+  RevoxeliseOptions voxels_;
   VoxelRule rule_;
   std::vector<Coord> corners_;  ///< index corners of the bricks of voxels of level 0
   BrickEvaluator evaluator_;

@@ -182,7 +182,7 @@ void writeHugeScale(const std::string& path) {
   StoredGrid grid;
   grid.descriptor.name = "smoke";
   grid.descriptor.transform = uniformTransform(1.0);
-  grid.activeBox = {{0, 0, 0}, {7, 7, 7}};
+  grid.activeBox = {{-10'000, -10'000, -10'000}, {10'000, 10'000, 10'000}};
   grid.valueMax = 1.0f;
   grid.field.chunks.resize(1);
   Ellipsoids& e = grid.field.chunks[0].ellipsoids;

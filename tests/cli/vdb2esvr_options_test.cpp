@@ -50,7 +50,8 @@ TEST_F(Vdb2EsvrOption, countIsTheNumberOfEllipsoids) {
 }
 
 TEST_F(Vdb2EsvrOption, iterationsEndTheFit) {
-  const Json grid = convert({"--count", "5", "--iterations", "33"})["grids"][0];
+  const Json grid =
+      convert({"--count", "5", "--iterations", "33", "--representation", "ellipsoids"})["grids"][0];
   EXPECT_EQ(grid["curve"].back()["iteration"], 33);
 }
 

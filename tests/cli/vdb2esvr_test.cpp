@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -41,7 +42,7 @@ TEST_F(Vdb2Esvr, saysWhereExactVoxelsWouldTakeFewerBytes) {
   test::writeInput(in(), {{.voxels = test::cloud(8)}});
   const auto summaryOf = [&](const char* count) {
     return vdb2esvr({in(), out(), "--force", "--iterations", "5", "--count", count, "--storage",
-                     "float32"})
+                     "float32", "--topology", "threshold"})
         .out;
   };
   EXPECT_THAT(summaryOf("10"), Not(HasSubstr("exact voxels")));
@@ -96,6 +97,35 @@ TEST_F(Vdb2Esvr, storesTheMaskWhereAsked) {
   const SparseVolume back = decodeGrid(grid);
   EXPECT_EQ(back.bricks, source.bricks);
   EXPECT_EQ(back.active, source.active);
+}
+
+/// A ball in a cloud with a rough boundary, which is too faint for a threshold.
+std::vector<test::InputVoxel> ballInACloud() {
+  std::vector<test::InputVoxel> voxels;
+  for (Coord v; v.x < 40; ++v.x)
+    for (v.y = 0; v.y < 40; ++v.y)
+      for (v.z = 0; v.z < 40; ++v.z) {
+        const double r = std::hypot(v.x - 20.0, v.y - 20.0, v.z - 20.0);
+        if (r < 6.0)
+          voxels.push_back({v, float(7.0 - r)});
+        else if (r < 16.0 + std::sin(2.0 * v.x) + std::sin(3.0 * v.y + v.z))
+          voxels.push_back({v, 1e-4f});
+      }
+  return voxels;
+}
+
+TEST_F(Vdb2Esvr, saysWhatAMaskTakesAndWhereASizeHasNoRoomForIt) {
+  test::writeInput(in(), {{.voxels = ballInACloud()}});
+  const std::string report = folder_ / "report.json";
+  const auto run = fitQuickly({"--report", report});
+  EXPECT_THAT(run.out, HasSubstr("density: a simplified mask of active voxels takes "));
+  const Json topology = Json::parse(test::readText(report))["grids"][0]["topology"];
+  EXPECT_EQ(topology["kind"], "mask");
+  EXPECT_GT(topology["mask_bytes"].get<int>(), 0);
+  EXPECT_TRUE(topology["threshold"].is_null());
+  const auto small = vdb2esvr({in(), out(), "--force", "--size", "1500", "--iterations", "20"});
+  EXPECT_THAT(small.out, HasSubstr("a mask of active voxels would take too much of the size"))
+      << small.err;
 }
 
 TEST_F(Vdb2Esvr, givesTheSameBytesInEveryRunOnAnyNumberOfThreads) {

@@ -128,7 +128,7 @@ TEST(BoundedLayer, KeepsSignsWithinItsBoundIfAsked) {
 TEST(BoundedLayer, KeepsItsBoundAtAnyScale) {
   for (const double scale : {1e-30, 1.0, 1e4, 1e30})
     for (const double share : {0.1, 0.01, 1e-4})
-      for (const Activity activity : {Activity::kExact, Activity::kByValue}) {
+      for (const Activity activity : {Activity::kAuto, Activity::kExact, Activity::kByValue}) {
         const SparseVolume volume = made([&](double r) { return float(r * scale); });
         const VoxelLayer layer = boundedLayer(volume, share * scale, activity);
         EXPECT_LE(largestError(volume, layer), share * scale);
@@ -154,6 +154,32 @@ TEST(BoundedLayer, ByValueMakesTheBackgroundInactive) {
   for (std::size_t b = 0; b < back.brickCount(); ++b)
     for (int v = 0; v < kBrickVoxels; ++v)
       EXPECT_EQ(back.active[b].test(v), back.brickValues(b)[std::size_t(v)] != 0.0f);
+}
+
+// Nine tenths of the voxels are within the bound of the background.
+TEST(BoundedLayer, KeepsTheOverlapUnlessItGoesByValue) {
+  const SparseVolume volume = made([](double r) { return float(0.25 + std::pow(r, 9.0)); });
+  for (const double bound : {0.3, 0.01, 1e-4}) {
+    const VoxelLayer layer = boundedLayer(volume, bound, Activity::kAuto);
+    ASSERT_EQ(layer.bricks, volume.bricks) << bound;
+    EXPECT_TRUE(overlapOf(layer.active, volume.active).suffices()) << bound;
+    EXPECT_LE(largestError(volume, layer), bound);
+  }
+  const VoxelLayer byValue = boundedLayer(volume, 0.3, Activity::kByValue);
+  EXPECT_FALSE(overlapOf(byValue.active, volume.active).suffices());
+}
+
+// Inactive voxels have values, too. Those beyond the bound are kept, and stay inactive outside the
+// box of the active voxels.
+TEST(BoundedLayer, MakesNoVoxelOutsideTheActiveBoxActive) {
+  SparseVolume volume = made([](double r) { return float(2.0 + r); });
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (std::size_t x = 0; x < 5; ++x) volume.active[b].words[x] = 0;
+  for (const Activity activity : {Activity::kAuto, Activity::kExact, Activity::kByValue}) {
+    const VoxelLayer layer = boundedLayer(volume, 0.01, activity);
+    EXPECT_EQ(activeBox(volumeOf(layer)), activeBox(volume));
+    EXPECT_LE(largestError(volume, layer), 0.01);
+  }
 }
 
 TEST(BoundedLayer, IsExactWhereFloat32IsNoFinerThanTheBound) {

@@ -113,7 +113,7 @@ TEST(GridCoding, AFieldThatFitsGivesItsSourceBack) {
 TEST(GridCoding, TheThresholdOverlapsAsWellAsTheBestOfManyThatCostNoError) {
   const Field truth = positiveField(3);
   const SparseVolume source = revoxelise(truth, {.threshold = 0.2f});
-  const StoredGrid grid = makeStoredGrid(kFog, source, perturbed(truth));
+  const StoredGrid grid = makeStoredGrid(kFog, source, perturbed(truth), Activity::kByValue);
   const double mseOfAll = decodedAt(grid, source, 0.0f).mseBox;
 
   double bestIou = 0.0;
@@ -137,7 +137,8 @@ TEST(GridCoding, TheThresholdIsTheSameElsewhereAndScalesWithTheValues) {
   for (float& i : faint.chunks[0].ellipsoids.intensity) i *= scale;
 
   const auto thresholdOf = [](const Field& field, float cut) {
-    return makeStoredGrid(kFog, revoxelise(field, {.threshold = cut}), perturbed(field))
+    return makeStoredGrid(kFog, revoxelise(field, {.threshold = cut}), perturbed(field),
+                          Activity::kByValue)
         .activeThreshold;
   };
   const float threshold = thresholdOf(here, 0.1f);
@@ -239,7 +240,72 @@ TEST(GridCoding, TheMaskComesBackBitForBitWhereItIsStored) {
   const SparseVolume decoded = decodeGrid(stored.grids[0]);
   EXPECT_EQ(decoded.bricks, source.bricks);
   EXPECT_EQ(decoded.active, source.active);
-  EXPECT_THROW((void)decodeGrid(grid, {.threshold = 0.1f}), UsageError);
+  EXPECT_EQ(decodeGrid(grid, {.threshold = 0.1f}).active,
+            revoxelise(field, {.threshold = 0.1f, .box = grid.activeBox}).active);
+}
+
+/// True if no voxel of `a` is active outside the active box of `b`.
+bool staysWithin(const SparseVolume& a, const SparseVolume& b) {
+  const Box box = activeBox(b), all = activeBox(a);
+  return all.empty() || (box.contains(all.min) && box.contains(all.max));
+}
+
+// The ellipsoids reach beyond the voxels of the source, whose upper half is cut off.
+TEST(GridCoding, NoVoxelOutsideTheActiveBoxIsActive) {
+  for (const Coord origin : {Coord{}, Coord{10'000'000, -10'000'000, 8}}) {
+    const Field field = positiveField(7, origin);
+    SparseVolume source = revoxelise(field, {.threshold = 0.05f});
+    const Box all = activeBox(source);
+    const Coord half{all.max.x, all.max.y, (all.min.z + all.max.z) / 2};
+    source = revoxelise(field, {.threshold = 0.05f, .box = {all.min, half}});
+    ASSERT_EQ(activeBox(source).max.z, half.z);
+    ASSERT_FALSE(staysWithin(revoxelise(field, {.threshold = 0.05f}), source));
+    for (const auto activity : {Activity::kAuto, Activity::kByValue, Activity::kExact}) {
+      const StoredGrid grid = makeStoredGrid(kFog, source, field, activity);
+      expectSame(decodeGrid(grid), source);
+    }
+  }
+}
+
+TEST(GridCoding, TheOverlapSufficesWhateverTheFit) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const Field truth = positiveField(seed);
+    for (const float threshold : {0.0f, 0.003f, 0.2f}) {
+      const SparseVolume source = revoxelise(truth, {.threshold = threshold});
+      const StoredGrid grid = makeStoredGrid(kFog, source, perturbed(truth));
+      const EsvrFile stored = decodeEsvr(encodeEsvr({{}, {grid}}), "memory");
+      const SparseVolume decoded = decodeGrid(stored.grids[0]);
+      EXPECT_GT(compareVolumes(source, decoded).iou, kMinOverlap) << seed << ", " << threshold;
+      EXPECT_TRUE(staysWithin(decoded, source)) << seed << ", " << threshold;
+    }
+  }
+}
+
+TEST(GridCoding, ASimplifiedMaskTakesFewerBytesThanTheExactOne) {
+  const Field field = positiveField(3);
+  const SparseVolume source = revoxelise(field, {.threshold = 0.001f});
+  const auto bytesOf = [&](Activity activity) {
+    return bytesAdded(makeStoredGrid(kFog, source, perturbed(field), activity));
+  };
+  EXPECT_LT(bytesOf(Activity::kAuto), bytesOf(Activity::kExact));
+}
+
+TEST(GridCoding, ASimplifiedMaskOfOneVoxelIsThatVoxel) {
+  Field nothing;
+  const SparseVolume source = oneBrick(2.0f, firstVoxels(1));
+  const SparseVolume decoded = decodeGrid(makeStoredGrid(kFog, source, nothing));
+  EXPECT_EQ(decoded.bricks, source.bricks);
+  EXPECT_EQ(decoded.active, source.active);
+}
+
+TEST(GridCoding, APartOfAMaskIsDecodedAsInTheWhole) {
+  const Field field = positiveField(5);
+  const StoredGrid grid = makeStoredGrid(kFog, revoxelise(field, {}), perturbed(field));
+  ASSERT_EQ(grid.topology, TopologyKind::kMask);
+  const Box all = grid.activeBox, box{all.min + Coord{3, 3, 3}, all.max - Coord{9, 5, 3}};
+  RevoxeliseOptions rule = voxelRule(grid);
+  rule.box = box;
+  expectSame(decodeGrid(grid, {.box = box}), revoxelise(grid.field, rule));
 }
 
 TEST(GridCoding, ALevelSetsMaskComesBackWithItsInside) {
@@ -255,7 +321,7 @@ TEST(GridCoding, ABoxLeavesTheVoxelsOutsideInactive) {
   const SparseVolume source = revoxelise(field, {.threshold = 0.01f});
   const Box all = activeBox(source);
   const Box box{all.min, {all.max.x, (all.min.y + all.max.y) / 2, all.max.z}};
-  for (const auto activity : {Activity::kByValue, Activity::kExact}) {
+  for (const auto activity : {Activity::kAuto, Activity::kByValue, Activity::kExact}) {
     const StoredGrid grid = makeStoredGrid(kFog, source, field, activity);
     const SparseVolume whole = decodeGrid(grid), part = decodeGrid(grid, {.box = box});
     EXPECT_LT(activeVoxelCount(part), activeVoxelCount(whole));
@@ -265,16 +331,17 @@ TEST(GridCoding, ABoxLeavesTheVoxelsOutsideInactive) {
 }
 
 TEST(GridCoding, TheRuleOfTheVoxelsIsWhatDecodingGoesBy) {
-  const auto expectDecoded = [](const GridDescriptor& descriptor, const Field& field) {
-    const StoredGrid grid = makeStoredGrid(descriptor, revoxelise(field, {}), perturbed(field));
-    EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
-    const SparseVolume decoded = decodeGrid(grid), byRule = revoxelise(grid.field, voxelRule(grid));
-    EXPECT_EQ(byRule.bricks, decoded.bricks);
-    EXPECT_EQ(byRule.active, decoded.active);
-    EXPECT_EQ(byRule.values, decoded.values);
+  const auto expectDecoded = [](const Field& field, Activity activity, TopologyKind kind) {
+    const StoredGrid grid = makeStoredGrid(kFog, revoxelise(field, {}), perturbed(field), activity);
+    EXPECT_EQ(grid.topology, kind);
+    expectSame(decodeGrid(grid), revoxelise(grid.field, voxelRule(grid)));
   };
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) expectDecoded(kFog, positiveField(seed));
-  expectDecoded(kFog, test::randomField({.count = 20, .extent = 30.0}));
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    expectDecoded(positiveField(seed), Activity::kByValue, TopologyKind::kThreshold);
+    expectDecoded(positiveField(seed), Activity::kAuto, TopologyKind::kMask);
+  }
+  expectDecoded(test::randomField({.count = 20, .extent = 30.0}), Activity::kByValue,
+                TopologyKind::kThreshold);
   const StoredGrid band = makeStoredGrid(
       kLevelSet, revoxelise(ball(), {.threshold = 0.01f, .narrowBand = true}), ball());
   EXPECT_TRUE(voxelRule(band).narrowBand);

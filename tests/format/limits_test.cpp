@@ -29,6 +29,7 @@ StoredGrid gridOfScale(float logScale) {
   StoredGrid grid = test::emptyGrid();
   grid.descriptor.name = "smoke";
   grid.withinRange = false;
+  grid.activeBox = {{-100'000, -100'000, -100'000}, {100'000, 100'000, 100'000}};
   grid.field.chunks = {{{}, test::sampleEllipsoids(4, 1)}};
   grid.field.chunks[0].ellipsoids.logScale[1][2] = logScale;
   return grid;

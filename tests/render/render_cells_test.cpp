@@ -128,6 +128,29 @@ TEST(RenderCells, DrawsByTheRuleOfTheVoxels) {
   EXPECT_GE(agreement(field, optionsFor(), {.range = ValueRange{-0.3f, 0.4f}}), kAsked);
 }
 
+// Half of the voxels of each brick are in its mask, and the box cuts through bricks. All voxels of
+// the mask are active, so that rounding decides about none.
+TEST(RenderCells, DrawsTheVoxelsOfMasksWithinABox) {
+  const Field field = randomField({.count = 200});
+  const Box box{{3, 0, 0}, {30, 22, 39}};
+  const auto bricks = reachedBricks(field, {{0, 0, 0}, {23, 39, 39}});
+  std::vector<BrickMask> masks(bricks.size());
+  for (std::size_t b = 0; b < masks.size(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if ((v + int(b)) % 16 < 8) masks[b].set(v);
+  const RevoxeliseOptions boxed{.box = box},
+      masked{.bricks = bricks, .restrictToBricks = true, .masks = masks, .box = box};
+  RenderOptions far = optionsFor();
+  far.resolution = {20, 15};
+  far.camera = fitCamera({{-20, -20, -20}, {60, 60, 60}}, {}, far.resolution);
+  for (const RevoxeliseOptions& rule : {boxed, masked}) {
+    EXPECT_GE(agreement(field, optionsFor(), rule), kAsked);
+    EXPECT_GE(agreement(field, far, rule), kAsked) << "means of coarser levels";
+    EXPECT_LT(imagePsnr(renderField(field, optionsFor(), rule), renderField(field, optionsFor())),
+              40.0);
+  }
+}
+
 TEST(RenderCells, IsTheSameForAnyNumberOfThreads) {
   const Field field = randomField({.count = 300});
   const RenderOptions o = optionsFor({}, {130, 70});

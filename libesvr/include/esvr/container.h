@@ -25,7 +25,8 @@ namespace esvr {
 inline constexpr std::uint16_t kFormatVersion = 1;
 inline constexpr std::uint64_t kSectionRowBytes = 56;  ///< a row of a file's section table
 
-/// The rule that determines the active voxels when a grid is revoxelised.
+/// The rule that determines the active voxels when a grid is revoxelised. No voxel outside
+/// StoredGrid::activeBox is active.
 enum class TopologyKind {
   kThreshold = 0,  ///< a voxel is active if |V - background| > activeThreshold
   /// The rule of kThreshold, within the stored bricks only. If the grid is a narrow band, a voxel

@@ -14,6 +14,7 @@
 #include "esvr/fit.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/paper_method.h"
+#include "esvr/simplified_mask.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/voxel_layer.h"
 
@@ -87,7 +88,10 @@ struct StorageOptions {
   Storage form = Storage::kCompact;
   /// PSNR over the box, in dB, that kCompact may lose for a FitGoal. The other goals ignore it.
   double loss = CompactOptions::kDefaultLoss;
-  Activity activity = Activity::kByValue;  ///< storage of the active mask
+  /// How active voxels are stored. For Activity::kAuto, a SizeGoal takes kByValue where a simplified
+  /// mask would take more than a quarter of the size. Level sets that are stored as voxels always
+  /// take kExact.
+  Activity activity = Activity::kAuto;
 };
 
 struct ConvertOptions {
@@ -114,6 +118,7 @@ struct ConvertOptions {
 struct ConvertInput {
   const GridDescriptor& descriptor;
   const SparseVolume& source;
+  const SimplifiedMasks* simplified = nullptr;  ///< those of `source`, if they are kept
 };
 
 /// A hash of all that a conversion depends on besides its options: the volume bit for bit, whether

@@ -53,7 +53,11 @@ struct RevoxeliseOptions {
   /// otherwise all bricks that ellipsoids reach.
   std::span<const Coord> bricks{};
   bool restrictToBricks = false;
-  VoxelMemory memory{};  ///< holds the voxels
+  /// If this is not empty, the voxels of these masks, one for each of `bricks`, are active whatever
+  /// their values, and no others. It needs `restrictToBricks`.
+  std::span<const BrickMask> masks{};
+  Box box = Box::whole();  ///< no voxel outside this box is active
+  VoxelMemory memory{};    ///< holds the voxels
 };
 
 /// Converts a field to voxels. Inactive voxels hold the background (with a sign if `narrowBand` is

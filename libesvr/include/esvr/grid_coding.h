@@ -2,6 +2,7 @@
 /// Turns a fitted field into a stored grid, and a stored grid back into voxels.
 
 #include <optional>
+#include <span>
 #include <string>
 
 #include "esvr/container.h"
@@ -9,6 +10,7 @@
 #include "esvr/field.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/memory_limit.h"
+#include "esvr/simplified_mask.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/vector_grid.h"
 #include "esvr/voxel_layer.h"
@@ -18,16 +20,24 @@ namespace esvr {
 
 /// Makes a stored grid from a fitted field and the properties of its source. It chooses the rule by
 /// which a reader determines the active voxels:
-///  - usually a threshold. Among the thresholds that increase the squared error by at most
-///    0.004 dB, it is the one whose active voxels have the largest intersection over union with the
-///    source's;
-///  - for a narrow band, the rule of kBricks (container.h) with the source's bricks;
+///  - a threshold. Among the thresholds that increase the squared error by at most 0.004 dB, it is
+///    the one whose active voxels have the largest intersection over union with the source's;
+///  - the source's simplified mask, if `activity` is kAuto, the overlap of the threshold does not
+///    suffice (MaskOverlap, simplified_mask.h) and the source's values are not in a file;
 ///  - the source's active mask, if `activity` is kExact, or if no threshold restores a voxel
-///    because all values equal the background.
+///    because all values equal the background;
+///  - for a narrow band, the rule of kBricks (container.h) with the source's bricks, unless
+///    `activity` is kExact.
 /// The curve is left empty.
+/// \param simplified  the simplified masks of `source`, if they are kept; null: one is made if needed
 [[nodiscard]] StoredGrid makeStoredGrid(const GridDescriptor& descriptor,
                                         const SparseVolume& source, Field field,
-                                        Activity activity = Activity::kByValue);
+                                        Activity activity = Activity::kAuto,
+                                        const SimplifiedMasks* simplified = nullptr);
+
+/// Gives a grid of ellipsoids a mask of active voxels instead of its own rule.
+/// \param masks  those of the bricks of `source`
+void storeMask(const SparseVolume& source, std::span<const BrickMask> masks, StoredGrid& grid);
 
 /// True for a closed level set: its background (the half width of its band) is above 0 and not
 /// exceeded by an active voxel, an active voxel is negative, and the signs around its empty space
@@ -45,16 +55,18 @@ namespace esvr {
 [[nodiscard]] StoredGrid makeStoredVoxels(const GridDescriptor& descriptor,
                                           const SparseVolume& source, VoxelLayer layer);
 
-/// The rule by which decodeGrid() makes voxels from the sum: the grid's threshold, range, band and
-/// bricks, without its mask and residual. It refers to the bricks of `grid`.
+/// The rule by which decodeGrid() makes voxels from the sum: the grid's threshold, range, band,
+/// bricks, mask and active box, without its residual. It refers to the bricks and the mask of
+/// `grid`.
 [[nodiscard]] RevoxeliseOptions voxelRule(const StoredGrid& grid);
 
 /// True if the voxels of a grid follow from its ellipsoids by voxelRule() alone. This is not so if
-/// it stores voxels, a residual or a mask.
+/// it stores voxels or a residual.
 [[nodiscard]] bool followsFromEllipsoids(const StoredGrid& grid);
 
 struct DecodeOptions {
-  std::optional<float> threshold{};  ///< replaces the grid's own threshold; 0 or above
+  /// Replaces the grid's own threshold, or its mask within the mask's bricks; 0 or above.
+  std::optional<float> threshold{};
   /// Voxels outside the box come back inactive, and bricks outside are not evaluated.
   std::optional<Box> box{};
   /// Limit on the memory of the evaluation and its result. Voxels in a file do not count.
@@ -67,7 +79,8 @@ struct DecodeOptions {
                                           const DecodeOptions& options = {});
 
 /// The voxels that a stored grid represents.
-/// \throws UsageError  the threshold is negative or not finite
+/// \throws UsageError  the threshold is negative or not finite, or the grid stores voxels, which say
+///                     themselves whether they are active
 /// \throws MemoryExceeded  the estimate is above options.maxBytes; nothing was evaluated
 [[nodiscard]] SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options = {});
 

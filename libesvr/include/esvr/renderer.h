@@ -45,8 +45,8 @@ struct RendererLimits {
 
 /// A renderer is used from one thread at a time. Renderers can be made and used on several threads at
 /// the same time, also for the same field, volume and device; each has data of its own on the device.
-/// The field or volume that it draws must outlive it and not change, and so must the bricks of
-/// RevoxeliseOptions.
+/// The field or volume that it draws must outlive it and not change, and so must the bricks and
+/// masks of RevoxeliseOptions.
 class Renderer {
  public:
   Renderer() = default;

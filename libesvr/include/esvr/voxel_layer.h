@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "esvr/coord.h"
+#include "esvr/simplified_mask.h"
 #include "esvr/sparse_volume.h"
 
 namespace esvr {
@@ -40,9 +41,13 @@ struct VoxelLayer {
 /// floats can hold all values, else kFloat.
 [[nodiscard]] VoxelLayer exactLayer(const SparseVolume& volume);
 
-/// Storage of the active mask.
+/// How a stored grid says which voxels are active. No voxel outside the active bounding box of the
+/// source ever becomes active.
 enum class Activity {
-  kExact,   ///< the exact active mask
+  /// By value if the overlap with the mask of the source then suffices (MaskOverlap,
+  /// simplified_mask.h). Otherwise a simplified mask is stored, with which it does.
+  kAuto,
+  kExact,   ///< the exact active mask is stored
   kByValue  ///< a voxel is active if its value differs from the background by more than the bound
 };
 
@@ -55,10 +60,13 @@ enum class RoundedSigns {
 };
 
 /// Makes a layer whose voxels are within `bound` of the volume's. If float32 is too coarse for the
-/// bound, the layer is exactLayer().
+/// bound, the layer is exactLayer(). With a simplified mask, voxels of the source that differ from
+/// the background by more than the bound are active too.
+/// \param simplified  the volume's simplified masks for kAuto, if they are kept; null: one is made
 /// \throws UsageError  the bound is not positive and finite
 [[nodiscard]] VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
-                                      RoundedSigns signs = RoundedSigns::kMayChange);
+                                      RoundedSigns signs = RoundedSigns::kMayChange,
+                                      const SimplifiedMasks* simplified = nullptr);
 
 /// What thriftyLayer() weighs. All errors are in squared steps of the quantisation lattice.
 struct ThriftOptions {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 
+#include "core/brick_index.h"
 #include "core/cuda/copy.h"
 #include "render/oldest_slots.h"
 
@@ -14,6 +15,8 @@ namespace {
 /// asks for four times as many.
 constexpr int kAhead = 16, kMostPasses = 4;
 
+static_assert(CellFieldView::kNoMask == BrickIndex::kNone, "masks are numbered by brick");
+
 LevelBricks bricksOf(const DeviceLevel& level) {
   return {level.table().origin, level.first(), level.count(), level.bricks()};
 }
@@ -22,12 +25,15 @@ LevelBricks bricksOf(const DeviceLevel& level) {
 
 DeviceCells::DeviceCells(const CellField& field, cudaStream_t stream)
     : rule_(field.rule),
+      box_(field.box),
       forms_(field.forms, stream),
       kernels_(field.kernels, stream),
       origins_(field.origins, stream),
       begin_(field.begin, stream),
       ellipsoid_(field.ellipsoid, stream),
-      corners_(field.corners, stream) {
+      corners_(field.corners, stream),
+      masks_(field.masks, stream),
+      maskOf_(field.maskOf, stream) {
   add(DeviceLevel(field.table, stream));
 }
 
@@ -41,6 +47,9 @@ CellFieldView DeviceCells::view() const {
                      .begin = begin_.data(),
                      .ellipsoid = ellipsoid_.data(),
                      .corners = corners_.data(),
+                     .masks = masks_.data(),
+                     .maskOf = maskOf_.data(),
+                     .box = box_,
                      .rule = rule_};
   for (int l = 0; l < levelCount(); ++l) view.levels[l] = bricksOf(level(l));
   return view;
@@ -48,7 +57,7 @@ CellFieldView DeviceCells::view() const {
 
 std::size_t DeviceCells::bytes() const {
   std::size_t bytes = forms_.bytes() + kernels_.bytes() + origins_.bytes() + begin_.bytes() +
-                      ellipsoid_.bytes() + corners_.bytes();
+                      ellipsoid_.bytes() + corners_.bytes() + masks_.bytes() + maskOf_.bytes();
   for (const DeviceLevel& level : levels_) bytes += level.bytes();
   return bytes;
 }

@@ -34,12 +34,15 @@ class DeviceCells {
 
  private:
   VoxelRule rule_;
+  Box box_;
   std::vector<DeviceLevel> levels_;
   DeviceBuffer<CellForm> forms_;
   DeviceBuffer<KernelConstants<float>> kernels_;
   DeviceBuffer<Coord> origins_;
   DeviceBuffer<std::uint32_t> begin_, ellipsoid_;
   DeviceBuffer<std::uint8_t> corners_;
+  DeviceBuffer<BrickMask> masks_;
+  DeviceBuffer<std::uint32_t> maskOf_;
 };
 
 class BrickCache {

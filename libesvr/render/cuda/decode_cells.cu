@@ -5,6 +5,7 @@
 #include "core/cuda/reduce.cuh"
 #include "core/cuda/thread_number.cuh"
 #include "field/line_math.h"
+#include "field/local_box.h"
 #include "render/cuda/decode_cells.h"
 
 namespace esvr::cuda {
@@ -137,12 +138,32 @@ __device__ float sumBrick(const CellFieldView& field, const BlockBrick& brick, S
   return ldexpf(1.0f, -exponent);
 }
 
+/// The corner of a brick at which the brick of a voxel lies.
+__device__ int cornerOf(const Coord& voxel) {
+  return cornerAt({voxel.x >> kBrickLog2, voxel.y >> kBrickLog2, voxel.z >> kBrickLog2});
+}
+
 /// True if a voxel lies in a brick whose voxels may differ from the background.
-__device__ bool mayDiffer(const CellFieldView& field, std::uint32_t brick, const Coord& voxel) {
-  if (field.corners == nullptr) return true;
-  const int corner =
-      cornerAt({voxel.x >> kBrickLog2, voxel.y >> kBrickLog2, voxel.z >> kBrickLog2});
-  return (field.corners[brick] >> corner) & 1u;
+__device__ bool mayDiffer(const CellFieldView& field, std::uint32_t brick, int corner) {
+  return field.corners == nullptr || (field.corners[brick] >> corner & 1u) != 0;
+}
+
+/// Whether a voxel of this settled value is active, apart from the box.
+__device__ bool isActive(const CellFieldView& field, std::uint32_t brick, const Coord& voxel,
+                         float settled) {
+  if (field.masks == nullptr) return field.rule.isActive(settled);
+  const std::uint32_t mask = field.maskOf[brick * kCellCorners + cornerOf(voxel)];
+  return mask != CellFieldView::kNoMask && field.masks[mask].test(voxelOffset(localOf(voxel)));
+}
+
+/// The voxel that a sum becomes. \param local  its place in the brick
+__device__ float voxelOf(const CellFieldView& field, std::uint32_t brick, const LocalBox& box,
+                         const Coord& local, float sum) {
+  if (!mayDiffer(field, brick, cornerOf(local))) return field.rule.background;
+  const float settled = field.rule.settled(sum);
+  const bool active =
+      box.contains(local.x, local.y, local.z) && isActive(field, brick, local, settled);
+  return active ? settled : field.rule.inactiveValue(settled);
 }
 
 /// Decodes a brick into memory of any kind. \return whether one of this thread's voxels is not the
@@ -151,11 +172,11 @@ template <int kSide, class Sum>
 __device__ bool decodeAs(const CellFieldView& field, const BlockBrick& brick, Sum* sums,
                          float* out) {
   const float unit = sumBrick<kSide>(field, brick, sums);
+  const LocalBox box = localBox(field.box, brick.corner, kSide - 1);
   bool any = false;
   for (int v = int(threadIdx.x); v < Cube<kSide>::kVoxels; v += kThreads) {
-    const float value = mayDiffer(field, brick.number, Cube<kSide>::place(v))
-                            ? field.rule(field.rule.background + float(sums[v]) * unit)
-                            : field.rule.background;
+    const float value = voxelOf(field, brick.number, box, Cube<kSide>::place(v),
+                                field.rule.background + float(sums[v]) * unit);
     any |= value != field.rule.background;
     out[v] = value;
   }

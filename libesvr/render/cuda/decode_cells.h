@@ -5,6 +5,7 @@
 
 #include <cuda_runtime_api.h>
 
+#include "esvr/sparse_volume.h"
 #include "field/voxel_rule.h"
 #include "render/brick_march.h"
 #include "render/cell_form.h"
@@ -30,6 +31,12 @@ struct CellFieldView {
   const Coord* origins;
   const std::uint32_t *begin, *ellipsoid;
   const std::uint8_t* corners;  ///< null: all voxels may differ from the background
+  /// Masks of active voxels, and their numbers (or kNoMask) by brick and corner; null: voxels are
+  /// active by value.
+  static constexpr std::uint32_t kNoMask = 0xffffffffu;
+  const BrickMask* masks;
+  const std::uint32_t* maskOf;
+  Box box;  ///< no voxel outside it is active
   VoxelRule rule;
 };
 

@@ -59,6 +59,23 @@ TEST_F(CellsOnGpu, DrawTheDecodedVolume) {
   }
 }
 
+/// Bricks with masks of which half of the voxels are active, and a box that cuts through bricks.
+struct MasksInABox {
+  Box box{{11, 0, 0}, {150, 187, 131}};
+  std::vector<Coord> bricks;
+  std::vector<BrickMask> masks;
+
+  explicit MasksInABox(const Field& field) : bricks(reachedBricks(field, {{0, 0, 0}, kBox.max})) {
+    masks.resize(bricks.size());
+    for (std::size_t b = 0; b < masks.size(); ++b)
+      for (int v = 0; v < kBrickVoxels; ++v)
+        if ((v + int(b)) % 16 < 8) masks[b].set(v);
+  }
+  [[nodiscard]] RevoxeliseOptions rule() const {
+    return {.bricks = bricks, .restrictToBricks = true, .masks = masks, .box = box};
+  }
+};
+
 /// A camera among the blobs whose pixels grow from a part of a voxel to 30 voxels.
 RenderOptions manyLevels() {
   RenderOptions o = options();
@@ -80,6 +97,30 @@ TEST_F(CellsOnGpu, DrawTheLevelsOfTheDecodedVolume) {
   }
   expectClose(drawn->draw(manyLevels()), renderVolume(volume, manyLevels()), 1000);
   expectClose(ofVolume->draw(manyLevels()), renderVolume(volume, manyLevels()), 1000);
+}
+
+TEST_F(CellsOnGpu, DrawTheVoxelsOfMasksWithinABox) {
+  const Field field = manyBlobs();
+  const MasksInABox masked(field);
+  const RevoxeliseOptions boxed{.threshold = 0.05f, .box = masked.box};
+  for (const RevoxeliseOptions& rule : {masked.rule(), boxed}) {
+    const SparseVolume volume = revoxelise(field, rule);
+    const auto drawn = makeFieldRenderer(field, device_, {}, rule);
+    const Image image = drawn->draw(options(70.0));
+    expectClose(image, renderVolume(volume, options(70.0)), 1000);
+    expectClose(drawn->draw(manyLevels()), renderVolume(volume, manyLevels()), 1000);
+    EXPECT_EQ(drawn->draw(options(70.0)).rgba, image.rgba);
+    EXPECT_NE(image.rgba, renderer(field)->draw(options(70.0)).rgba);
+  }
+}
+
+TEST_F(CellsOnGpu, DrawBricksOfWhichNoMaskHasAVoxel) {
+  const Field field = manyBlobs();
+  MasksInABox masked(field);
+  masked.masks.assign(masked.bricks.size(), {});
+  const Image image = makeFieldRenderer(field, device_, {}, masked.rule())->draw(options());
+  EXPECT_EQ(std::count(image.rgba.begin(), image.rgba.end(), 0.0f),
+            std::ptrdiff_t(image.rgba.size()));
 }
 
 TEST_F(CellsOnGpu, AreShadedAsOnTheCpu) {
