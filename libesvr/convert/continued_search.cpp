@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -20,23 +19,21 @@ namespace {
 
 // docs/lab-notes.md, "Ellipsoids of a sequence", has what was tried instead.
 /// Iterations of a fit. They are few, so that ellipsoids move no further than they have to.
-double env(const char* n, double d) { return std::getenv(n) ? std::atof(std::getenv(n)) : d; }
-#define kIterations std::uint32_t(env("KIT", 60))
+constexpr std::uint32_t kIterations = 60;
 /// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
 /// nothing is changed.
-#define kAim env("AIM", 1.8)
-#define kMin env("MIN", 1.2)
-constexpr double kMax = 4.0;
+constexpr double kAim = 2.2, kMin = 1.6, kMax = 4.5;
 /// dB by which all of these increase if the rounded ellipsoids do not reach the PSNR.
 constexpr double kFurther = 0.6;
 constexpr int kMaxFits = 5;
 /// Largest growth of the number of ellipsoids in a frame; with more, a fit from seeds is better.
 constexpr double kMaxGrowth = 1.5;
 
-/// The largest price of a bit, in squares of a quantisation step, and the number of trials that find
-/// the largest one at which the PSNR is reached.
-constexpr double kMaxPrice = 0.5;
-constexpr int kTrials = 5;
+/// Prices of a bit, in squares of a quantisation step: the largest one, the first that is tried, and
+/// the distance of two prices between which none is tried.
+constexpr double kMaxPrice = 0.4, kFirstPrice = 0.1, kPriceBracket = 0.04;
+/// dB by which the PSNR of a trial must exceed the wanted one: a reader's sums have another order.
+constexpr double kReaderMargin = 5e-4;
 
 Field withoutWeakest(const Field& field, std::size_t count, std::vector<std::uint32_t>& kept) {
   const Ellipsoids& e = field.chunks[0].ellipsoids;
@@ -149,16 +146,15 @@ class ContinuedSearch {
     return job_.options.fit.box.value_or(activeBox(job_.input.source));
   }
 
-  /// The sum of squares at which a reader surely finds the PSNR.
-  [[nodiscard]] double allowedSquares() const {
-    constexpr double kMargin = 5e-4;  // dB; a reader's sums have another order
+  /// The sum of squares over the box at a PSNR.
+  [[nodiscard]] double squaresAt(double psnr) const {
     const double peak = job_.options.fit.peak.value_or(peakOf(job_.input.source));
-    return peak * peak * box().volume() * std::pow(10.0, -(psnr_ + kMargin) / 10.0);
+    return peak * peak * box().volume() * std::pow(10.0, -psnr / 10.0);
   }
 
   [[nodiscard]] std::optional<Conversion> quantised() {
     StoredGrid grid = makeStoredGrid(job_.input.descriptor, job_.input.source, field_,
-                                     job_.options.storage.activity);
+                                     job_.options.storage.activity, job_.input.simplified);
     const SparseVolume& source = job_.input.source;
     ContinuedMaker maker({grid, from_, previous_},
                          {.source = source,
@@ -166,7 +162,7 @@ class ContinuedSearch {
                           .device = rateControlDevice(fit_, job_.options.fit.device),
                           .peak = job_.options.fit.peak});
     if (!maker.anyContinues()) return std::nullopt;
-    auto trial = cheapest(maker);
+    auto trial = cheapest(grid, maker);
     if (!trial) return std::nullopt;
     grid.field = std::move(trial->field);
     grid.quantised = std::move(trial->quantised);
@@ -180,19 +176,28 @@ class ContinuedSearch {
     return conversion;
   }
 
+  /// Squared error of the grid that a reader gets from a trial, relative to that of its sum. A mask
+  /// removes the errors outside of it.
+  [[nodiscard]] double shareOfError(const StoredGrid& grid, const Trial& trial) const {
+    if (grid.topology != TopologyKind::kMask || !(trial.error > 0.0)) return 1.0;
+    StoredGrid decoded = grid;
+    decoded.field = trial.field;
+    decoded.quantised.clear();
+    return squaresAt(psnrOf(job_, decoded)) / trial.error;
+  }
+
   /// The trial with the highest price that reaches the PSNR; nothing if none does.
-  [[nodiscard]] std::optional<Trial> cheapest(ContinuedMaker& maker) const {
-    const double allowed = allowedSquares();
-    std::optional<Trial> best;
-    double low = 0.0, high = kMaxPrice, price = 0.1;
-    for (int n = 0; n < kTrials; ++n) {
+  [[nodiscard]] std::optional<Trial> cheapest(const StoredGrid& grid, ContinuedMaker& maker) const {
+    Trial first = maker.make(0.0);
+    const double allowed = squaresAt(psnr_ + kReaderMargin) / shareOfError(grid, first);
+    if (first.error > allowed) return std::nullopt;
+    std::optional<Trial> best = std::move(first);
+    double low = 0.0, high = kMaxPrice;
+    for (double price = kFirstPrice; high - low > kPriceBracket; price = 0.5 * (low + high)) {
       Trial trial = maker.make(price);
       const bool reached = trial.error <= allowed;
       (reached ? low : high) = price;
       if (reached) best = std::move(trial);
-      if (!best && n == 1) price = 0.0;  // the last chance
-      else price = 0.5 * (low + high);
-      if (!best && n == 2) return std::nullopt;
     }
     return best;
   }

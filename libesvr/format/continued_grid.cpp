@@ -40,14 +40,22 @@ QuantisedEllipsoids continuing(const QuantisedEllipsoids& q, const QuantisedElli
   return result;
 }
 
-void putMaskOf(ByteWriter& out, const StoredGrid& grid) {
-  if (grid.topology == TopologyKind::kMask) out.putSized(putMask(grid.bricks, grid.mask));
+/// The mask of a grid; without bricks if it has none.
+Mask maskOf(const StoredGrid& grid) {
+  if (grid.topology != TopologyKind::kMask) return {};
+  return {grid.bricks, grid.mask};
 }
 
-void getMaskOf(ByteReader& in, const std::string& where, MemoryBudget& budget, StoredGrid& grid) {
+void putMaskOf(ByteWriter& out, const StoredGrid& grid, const StoredGrid& previous) {
+  if (grid.topology == TopologyKind::kMask)
+    out.putSized(putMaskAfter(grid.bricks, grid.mask, maskOf(previous)));
+}
+
+void getMaskOf(ByteReader& in, const std::string& where, const StoredGrid& previous,
+               MemoryBudget& budget, StoredGrid& grid) {
   if (grid.topology == TopologyKind::kBricks) in.fail("a narrow band continues no ellipsoids");
   if (grid.topology != TopologyKind::kMask) return;
-  Mask mask = getMask(in.getSized(), where, budget);
+  Mask mask = getMaskAfter(in.getSized(), where, maskOf(previous), budget);
   grid.bricks = std::move(mask.bricks);
   grid.mask = std::move(mask.active);
 }
@@ -64,7 +72,7 @@ std::optional<std::vector<std::byte>> putContinuedGrid(const StoredGrid& grid,
   if (!canContinue(q, before)) return std::nullopt;
   ByteWriter out;
   putRecordAfter(out, grid, previous);
-  putMaskOf(out, grid);
+  putMaskOf(out, grid, previous);
   out.putAll(putContinued(q, before));
   return out.take();
 }
@@ -75,7 +83,7 @@ StoredGrid getContinuedGrid(std::span<const std::byte> content, const std::strin
     throw BadInput(where + ": the grid of the previous frame has no ellipsoids that go on");
   ByteReader in(content, where);
   StoredGrid grid = getRecordAfter(in, previous, where);
-  getMaskOf(in, where, budget, grid);
+  getMaskOf(in, where, previous, budget, grid);
   grid.quantised.push_back(
       getContinued(in.getBytes(in.left()), where, previous.quantised[0], budget));
   grid.field.chunks.push_back(

@@ -1,9 +1,13 @@
 #include "format/mask_section.h"
 
 #include <algorithm>
+#include <limits>
+#include <utility>
 
 #include "esvr/error.h"
+#include "codec/frame_coder.h"
 #include "format/bricks_stream.h"
+#include "format/predicted_stream.h"
 #include "format/voxel_section.h"
 
 namespace esvr::format {
@@ -21,6 +25,33 @@ BrickMask inverse(BrickMask mask) {
   for (auto& word : mask.words) word = ~word;
   return mask;
 }
+
+/// A mask as a layer with the codes 1 for active voxels and 0 for others, so that a frame is searched
+/// for its motion.
+VoxelLayer layerOf(std::span<const Coord> bricks, std::span<const BrickMask> active) {
+  VoxelLayer layer;
+  layer.form = VoxelForm::kQuantised;
+  layer.divisor = 1.0;
+  layer.origin = bricks.empty() ? Coord{} : bricks.front();
+  for (const Coord brick : bricks) layer.origin = minCoord(layer.origin, brick);
+  layer.bricks = bricksFrom(layer.origin, bricks);
+  layer.codes.resize(bricks.size() * kBrickVoxels);
+  layer.active.assign(active.begin(), active.end());
+  for (std::size_t i = 0; i < layer.codes.size(); ++i)
+    layer.codes[i] = active[i / kBrickVoxels].test(int(i % kBrickVoxels)) ? 1 : 0;
+  for (const BrickMask& mask : active) layer.vacant.push_back(inverse(mask));
+  return layer;
+}
+
+Mask maskOf(VoxelLayer layer) {
+  Mask mask;
+  for (const Coord brick : layer.bricks) mask.bricks.push_back(layer.origin + brick * kBrickSide);
+  mask.active = std::move(layer.active);
+  return mask;
+}
+
+/// Largest number of bricks: the previous mask, its neighbours and the stream limit it.
+constexpr auto kAnyBricks = std::numeric_limits<std::uint64_t>::max();
 
 }  // namespace
 
@@ -45,10 +76,39 @@ Mask getMask(std::span<const std::byte> content, const std::string& where, Memor
   VoxelLayer layer = getVoxels(content, where, budget);
   if (layer.form != VoxelForm::kPalette || layer.palette.size() != 1)
     throw BadInput(where + ": a mask of voxels with values");
-  Mask mask;
-  for (const Coord brick : layer.bricks) mask.bricks.push_back(layer.origin + brick * kBrickSide);
-  mask.active = std::move(layer.active);
-  return mask;
+  return maskOf(std::move(layer));
+}
+
+std::vector<std::byte> putMaskAfter(std::span<const Coord> bricks,
+                                    std::span<const BrickMask> active, const Mask& previous) {
+  requireBricks(bricks);
+  const VoxelLayer layer = layerOf(bricks, active);
+  const VoxelLayer before = layerOf(previous.bricks, previous.active);
+  if (!codec::isPredictable(layer, before))
+    throw RuntimeFailure("a mask lies too far from that of the previous frame");
+  ByteWriter out;
+  for (const auto start : {layer.origin.x, layer.origin.y, layer.origin.z}) out.put(start);
+  out.putAll(encodePredicted(layer, codec::PastVoxels(before, layer)));
+  return out.take();
+}
+
+Mask getMaskAfter(std::span<const std::byte> content, const std::string& where,
+                  const Mask& previous, MemoryBudget& budget) {
+  ByteReader in(content, where);
+  VoxelLayer layer = layerOf({}, {});
+  layer.origin.x = in.get<std::int32_t>();
+  layer.origin.y = in.get<std::int32_t>();
+  layer.origin.z = in.get<std::int32_t>();
+  if (localOf(layer.origin) != Coord{}) in.fail("a mask begins within a brick");
+  layer.codes = VoxelArray<std::int32_t>(budget.voxels());
+  const VoxelLayer before = layerOf(previous.bricks, previous.active);
+  if (!codec::isPredictable(layer, before)) in.fail("lies too far from the previous frame");
+  try {
+    decodePredicted(in, codec::PastVoxels(before, layer), kAnyBricks, {where, budget}, layer);
+  } catch (const BadInput& error) {
+    in.fail(error.what());
+  }
+  return maskOf(std::move(layer));
 }
 
 }  // namespace esvr::format

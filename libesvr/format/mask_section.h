@@ -1,5 +1,5 @@
 #pragma once
-/// The exact mask of active voxels as the content of a section.
+/// A mask of active voxels as the content of a section.
 
 #include <cstddef>
 #include <span>
@@ -24,5 +24,16 @@ struct Mask {
 /// \throws MemoryExceeded  there are more bricks than the budget allows
 [[nodiscard]] Mask getMask(std::span<const std::byte> content, const std::string& where,
                            MemoryBudget& budget);
+
+/// A mask as its difference from that of the previous frame, which usually takes fewer bytes.
+/// \param previous  the previous mask; without bricks if there is none
+/// \throws RuntimeFailure  as for putMask
+[[nodiscard]] std::vector<std::byte> putMaskAfter(std::span<const Coord> bricks,
+                                                  std::span<const BrickMask> active,
+                                                  const Mask& previous);
+
+/// \throws BadInput, MemoryExceeded  as for getMask
+[[nodiscard]] Mask getMaskAfter(std::span<const std::byte> content, const std::string& where,
+                                const Mask& previous, MemoryBudget& budget);
 
 }  // namespace esvr::format
