@@ -619,6 +619,7 @@ def add(sections, minor, row):
     """Adds a section and returns the name of its kind; None if it is unknown."""
     kind, g, c, flags, codec, stored, raw, part = row
     name = KINDS.get(kind)
+    assert kind not in (39, 42), "a kind of frames in the short form, which this reader refuses"
     if name is None:
         assert flags == 0, "an unknown kind is optional here"
         return None
