@@ -1,11 +1,12 @@
-// Decodes any bytes as a frame after a small frame, within a memory limit, unchanged and with
-// corrected checksums. A frame that is accepted must be encoded to bytes that decode to the same
-// content.
+// Decodes any bytes as a frame after a small frame of voxels and after one of ellipsoids with a mask,
+// within a memory limit, unchanged and with corrected checksums. A frame that is accepted must be
+// encoded to bytes that decode to the same content.
 
 #include <cstdint>
 #include <cstdlib>
 #include <span>
 
+#include "codec/continued_frames.h"
 #include "esvr/error.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
@@ -16,17 +17,25 @@ namespace {
 
 constexpr std::uint64_t kMaxContent = std::uint64_t{256} << 20;
 
-const esvr::EsvrFile& previousFrame() {
-  static const esvr::EsvrFile frame = [] {
-    const esvr::SparseVolume volume = esvr::test::tubeVolume();
-    auto layer = esvr::boundedLayer(volume, 0.02, esvr::Activity::kByValue);
-    return esvr::EsvrFile{{}, {esvr::makeStoredVoxels({}, volume, std::move(layer))}};
-  }();
-  return frame;
+esvr::SparseVolume volume() { return esvr::test::tubeVolume(); }
+
+esvr::EsvrFile frameOfVoxels() {
+  auto layer = esvr::boundedLayer(volume(), 0.02, esvr::Activity::kByValue);
+  return {{}, {esvr::makeStoredVoxels({}, volume(), std::move(layer))}};
 }
 
-void decodeAndEncode(std::span<const std::byte> bytes) {
-  const esvr::EsvrFile& previous = previousFrame();
+esvr::EsvrFile frameOfEllipsoids() {
+  const esvr::SparseVolume mask = volume();
+  esvr::StoredGrid grid;
+  grid.quantised.push_back(esvr::test::firstFrame(40));
+  grid.field.chunks.push_back({{}, esvr::dequantise(grid.quantised[0])});
+  grid.topology = esvr::TopologyKind::kMask;
+  grid.mask = mask.active;
+  for (std::size_t b = 0; b < mask.brickCount(); ++b) grid.bricks.push_back(mask.brickCorner(b));
+  return {{}, {std::move(grid)}};
+}
+
+void decodeAndEncode(std::span<const std::byte> bytes, const esvr::EsvrFile& previous) {
   try {
     const auto frame = esvr::decodeFrame(bytes, "fuzz", {kMaxContent}, &previous);
     const auto once = esvr::encodeFrame(frame, &previous);
@@ -41,7 +50,10 @@ void decodeAndEncode(std::span<const std::byte> bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto bytes = std::as_bytes(std::span(data, size));
-  decodeAndEncode(bytes);
-  decodeAndEncode(esvr::fuzz::repaired(bytes));
+  static const esvr::EsvrFile frames[] = {frameOfVoxels(), frameOfEllipsoids()};
+  for (const esvr::EsvrFile& previous : frames) {
+    decodeAndEncode(bytes, previous);
+    decodeAndEncode(esvr::fuzz::repaired(bytes), previous);
+  }
   return 0;
 }
