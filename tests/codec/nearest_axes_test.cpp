@@ -29,7 +29,7 @@ Quaternion turnAbout(std::size_t axis, double angle) {
   return q;
 }
 
-Ellipsoids sample() {
+Ellipsoids randomSample() {
   return test::randomField({.count = 100, .smallest = 0.5, .aspect = 8.0, .seed = 4})
       .chunks[0]
       .ellipsoids;
@@ -43,7 +43,7 @@ NearestAxes axesOf(const Ellipsoids& e, std::size_t i) { return {e, i, sortedAxe
 constexpr double kNoError = 1e-10;
 
 TEST(NearestAxes, HasNoErrorInItsOwnShapeAndUnderHalfTurns) {
-  const Ellipsoids e = sample();
+  const Ellipsoids e = randomSample();
   for (std::size_t i = 0; i < e.size(); ++i) {
     const NearestAxes exact = axesOf(e, i);
     const auto& [logs, rotation] = exact.axes();
@@ -55,7 +55,7 @@ TEST(NearestAxes, HasNoErrorInItsOwnShapeAndUnderHalfTurns) {
 }
 
 TEST(NearestAxes, HasNoErrorWithExchangedAxes) {
-  const Ellipsoids e = sample();
+  const Ellipsoids e = randomSample();
   for (std::size_t i = 0; i < e.size(); ++i) {
     const NearestAxes exact = axesOf(e, i);
     for (std::size_t a = 0; a < 3; ++a) {
@@ -68,7 +68,7 @@ TEST(NearestAxes, HasNoErrorWithExchangedAxes) {
 }
 
 TEST(NearestAxes, HasTheSquaredErrorOfTheLogarithmOfOneScale) {
-  const Ellipsoids e = sample();
+  const Ellipsoids e = randomSample();
   for (const double d : {0.001, -0.001, 0.02, -0.02})
     for (std::size_t a = 0; a < 3; ++a) {
       const NearestAxes exact = axesOf(e, a);
@@ -98,7 +98,7 @@ TEST(NearestAxes, HasTheErrorOfASmallTurn) {
 }
 
 TEST(NearestAxes, FitsItsOwnScalesAlongItsOwnRotation) {
-  const Ellipsoids e = sample();
+  const Ellipsoids e = randomSample();
   for (std::size_t i = 0; i < e.size(); ++i) {
     const NearestAxes exact = axesOf(e, i);
     const Logs logs = exact.logScalesAlong(exact.axes().rotation);
@@ -108,7 +108,7 @@ TEST(NearestAxes, FitsItsOwnScalesAlongItsOwnRotation) {
 }
 
 TEST(NearestAxes, FitsScalesAlongAnotherRotationThatDecrease) {
-  const Ellipsoids e = sample();
+  const Ellipsoids e = randomSample();
   for (std::size_t i = 0; i < e.size(); ++i) {
     const NearestAxes exact = axesOf(e, i);
     const Quaternion turned = product(exact.axes().rotation, turnAbout(2, std::numbers::pi / 2.0));

@@ -7,17 +7,21 @@
 
 #include <algorithm>
 #include <array>
-#include <tuple>
+#include <optional>
+#include <span>
 
 #include "codec/continued_frames.h"
 #include "esvr/error.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
+#include "esvr/sequence_file.h"
 #include "fit/volumes.h"
 #include "format/checksum.h"
+#include "format/continued_samples.h"
 #include "format/continued_section.h"
 #include "format/layout.h"
 #include "format/mask_section.h"
+#include "format/sequence_samples.h"
 
 namespace esvr {
 namespace {
@@ -25,46 +29,16 @@ namespace {
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// A grid of one chunk.
-StoredGrid gridOf(QuantisedEllipsoids q) {
-  StoredGrid grid;
-  grid.descriptor.name = "density";
-  grid.activeBox = {{0, 0, 0}, {63, 63, 63}};
-  grid.activeVoxels = 1000;
-  grid.valueMax = 1.0f;
-  grid.field.chunks.push_back({{-8, 0, 16}, dequantise(q)});
-  grid.quantised.push_back(std::move(q));
-  return grid;
+using test::frameOf;
+using test::gridOf;
+using test::withMask;
+using test::withNew;
+
+constexpr std::size_t kFirstCount = 300;
+
+EsvrFile firstFile(std::size_t count = kFirstCount) {
+  return frameOf(gridOf(test::firstFrame(count)));
 }
-
-EsvrFile frameOf(StoredGrid grid) { return {{}, {std::move(grid)}}; }
-
-/// Appends ellipsoids that continue none.
-QuantisedEllipsoids withNew(QuantisedEllipsoids q, std::size_t count) {
-  test::Change far{.motion = 20.0};
-  std::vector<std::uint32_t> models(count);
-  for (std::size_t i = 0; i < count; ++i) models[i] = std::uint32_t(i % q.size());
-  QuantisedEllipsoids before = q;
-  before.motion = {};
-  LatticeChoice choice{q.lattice, std::vector<std::uint8_t>(count, q.precision[0])};
-  std::vector<std::size_t> order;
-  const QuantisedEllipsoids added = quantise(test::movedFrom(before, models, far), choice, order);
-  const auto append = [](const auto& from, auto& to) {
-    to.insert(to.end(), from.begin(), from.end());
-  };
-  for (std::size_t a = 0; a < 3; ++a) {
-    append(added.position[a], q.position[a]);
-    append(added.scale[a], q.scale[a]);
-    append(added.rotation[a], q.rotation[a]);
-  }
-  append(added.precision, q.precision);
-  append(added.intensity, q.intensity);
-  return q;
-}
-
-constexpr std::size_t kCount = 300;
-
-EsvrFile firstFile(std::size_t count = kCount) { return frameOf(gridOf(test::firstFrame(count))); }
 
 /// Most ellipsoids of the first frame, and some new ones.
 EsvrFile nextFile(const EsvrFile& previous, std::size_t added = 20) {
@@ -80,7 +54,7 @@ QuantisedEllipsoids codesOf(QuantisedEllipsoids q) {
   return q;
 }
 
-void expectSame(const StoredGrid& a, const StoredGrid& b) {
+void expectSameGrid(const StoredGrid& a, const StoredGrid& b) {
   ASSERT_EQ(a.quantised.size(), 1u);
   ASSERT_EQ(b.quantised.size(), 1u);
   EXPECT_EQ(codesOf(a.quantised[0]), codesOf(b.quantised[0]));
@@ -102,7 +76,8 @@ std::vector<std::byte> expectContinues(const EsvrFile& frame, const EsvrFile& pr
   EXPECT_LT(bytes.size(), encodeEsvr(frame).size());
   const EsvrFile back = decodeFrame(bytes, "frame", {}, &previous);
   EXPECT_EQ(back.grids.size(), frame.grids.size());
-  for (std::size_t g = 0; g < frame.grids.size(); ++g) expectSame(back.grids[g], frame.grids[g]);
+  for (std::size_t g = 0; g < frame.grids.size(); ++g)
+    expectSameGrid(back.grids[g], frame.grids[g]);
   EXPECT_EQ(encodeFrame(back, &previous), bytes);
   return bytes;
 }
@@ -196,17 +171,6 @@ TEST(ContinuedFrame, StandsAloneWhereTheLatticeOrTheOriginIsAnother) {
 
 // ---- Masks
 
-/// The mask of a ball that moves along z by a voxel a frame.
-StoredGrid withMask(StoredGrid grid, int frame) {
-  const SparseVolume ball = test::volumeOf({-8, 0, 0}, 4, 0.0f, [&](Coord v) {
-    return std::hypot(v.x - 6.0, v.y - 15.0, v.z - 12.0 - frame) < 9.0 ? 1.0f : 0.0f;
-  });
-  grid.topology = TopologyKind::kMask;
-  for (std::size_t b = 0; b < ball.brickCount(); ++b) grid.bricks.push_back(ball.brickCorner(b));
-  grid.mask = ball.active;
-  return grid;
-}
-
 TEST(ContinuedFrame, HasAMaskAfterAMaskOrNone) {
   const EsvrFile plain = firstFile(), masked = frameOf(withMask(plain.grids[0], 0));
   const EsvrFile next = nextFile(plain), nextMasked = frameOf(withMask(next.grids[0], 1));
@@ -236,6 +200,42 @@ TEST(MaskAfter, BringsBackMasksThatGrowShrinkAndVanish) {
       EXPECT_EQ(back.bricks, now.bricks);
       EXPECT_EQ(back.active, now.active);
     }
+}
+
+// ---- The golden sequence
+
+/// A checksum of all codes of the ellipsoids and of the mask, which are integers.
+std::uint64_t checksumOf(const StoredGrid& grid) {
+  const QuantisedEllipsoids& q = grid.quantised[0];
+  format::RunningChecksum sum;
+  for (std::size_t a = 0; a < 3; ++a) {
+    sum.add(std::as_bytes(std::span(q.position[a])));
+    sum.add(std::as_bytes(std::span(q.scale[a])));
+    sum.add(std::as_bytes(std::span(q.rotation[a])));
+  }
+  sum.add(std::as_bytes(std::span(q.precision)));
+  sum.add(std::as_bytes(std::span(q.intensity)));
+  sum.add(std::as_bytes(std::span(grid.mask)));
+  return sum.value();
+}
+
+/// A sequence that was written once. It must give the same codes and bytes forever.
+TEST(ContinuedFrame, HasTheCodesAndBytesOfTheGoldenSequence) {
+  const auto whole = test::bytesIn(ESVR_GOLDEN_CONTINUED);
+  SequenceReader reader(ESVR_GOLDEN_CONTINUED);
+  ASSERT_EQ(reader.frames().size(), 4u);
+  const std::array<std::uint64_t, 4> codes{9878378402168221528u, 4055967756162408075u,
+                                           2190701112065579476u, 14011637269432485736u};
+  std::optional<EsvrFile> previous;
+  for (std::size_t f = 0; f < 4; ++f) {
+    const auto stored =
+        std::span(whole).subspan(reader.frames()[f].offset, reader.frames()[f].bytes);
+    EsvrFile now = reader.read(reader.frames()[f].number);
+    EXPECT_EQ(dependsOnPrevious(stored), f > 0);
+    EXPECT_EQ(checksumOf(now.grids[0]), codes[f]) << f;
+    EXPECT_TRUE(std::ranges::equal(encodeFrame(now, previous ? &*previous : nullptr), stored));
+    previous = std::move(now);
+  }
 }
 
 // ---- Refusals
@@ -294,7 +294,7 @@ TEST(ContinuedFrame, RefusesEveryChangedBitAndEveryTruncation) {
 }
 
 /// Corrects the checksum at the end of a frame.
-void repair(std::vector<std::byte>& bytes) {
+void correctChecksum(std::vector<std::byte>& bytes) {
   const auto content = std::span(bytes).first(bytes.size() - sizeof(std::uint64_t));
   const std::uint64_t sum = format::checksum(content);
   std::ranges::copy(std::as_bytes(std::span(&sum, 1)), bytes.end() - sizeof sum);
@@ -311,7 +311,7 @@ TEST(ContinuedFrame, ReadsOrRefusesChangedBytesWithACorrectChecksum) {
   for (std::size_t at = 0; at + sizeof(std::uint64_t) < whole.size(); ++at) {
     auto bytes = whole;
     bytes[at] ^= std::byte(at % 2 ? 1 << at % 8 : 0xff);
-    repair(bytes);
+    correctChecksum(bytes);
     try {
       const EsvrFile back = decodeFrame(bytes, "frame", {.maxBytes = 64 << 20}, &previous);
       const auto once = encodeFrame(back, &previous);
