@@ -105,13 +105,15 @@ TEST_F(ContainerFile, InspectionListsTheSections) {
   EXPECT_EQ(summary.sections[2].rawBytes, 50u * 3 * sizeof(float));
 }
 
+constexpr auto kUnknownKindOfSection = format::SectionKind(0x1234);
+
 TEST_F(ContainerFile, InspectionNamesWhatItDoesNotKnow) {
   test::CraftedFile crafted(encodeEsvr({}));
-  crafted.add({format::SectionKind(0x2a)}, 0, test::bytesOf("?"));
+  crafted.add({kUnknownKindOfSection}, 0, test::bytesOf("?"));
   put(crafted.assemble());
   const EsvrSummary summary = inspectEsvr(path());
   ASSERT_EQ(summary.sections.size(), 1u);
-  EXPECT_EQ(summary.sections[0].kind, "unknown 0x2a");
+  EXPECT_EQ(summary.sections[0].kind, "unknown 0x1234");
   EXPECT_EQ(summary.sections[0].grid, 0xffffffffu);
 }
 
@@ -134,10 +136,10 @@ TEST_F(ContainerFile, CheckNotesWhatAReaderPassesOver) {
   odd.field.background = 2.0f;
   test::CraftedFile crafted(encodeEsvr(test::fileOf(odd)));
   crafted.versionMinor = 7;
-  crafted.add({format::SectionKind(0x2a), 0}, 0, test::bytesOf("?"));
+  crafted.add({kUnknownKindOfSection, 0}, 0, test::bytesOf("?"));
   put(crafted.assemble());
   EXPECT_THAT(checkEsvr(path()),
-              ElementsAre(HasSubstr("format 1.7"), HasSubstr("unknown 0x2a of grid 0, 1 bytes"),
+              ElementsAre(HasSubstr("format 1.7"), HasSubstr("unknown 0x1234 of grid 0, 1 bytes"),
                           HasSubstr("no ellipsoids"), HasSubstr("another in its field")));
 }
 
