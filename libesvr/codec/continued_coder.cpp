@@ -98,7 +98,8 @@ class MotionPredictor {
       one.now[a] = motion[a];
       one.before[a] = own_[a];
       one.error +=
-          std::int64_t(std::min(std::abs(sums_[a].predict(terms_[a]) - target) / kScale, 0x1p30)) / 3;
+          std::int64_t(std::min(std::abs(sums_[a].predict(terms_[a]) - target) / kScale, 0x1p30)) /
+          3;
       sums_[a].learn(terms_[a], target);
       sums_[a].solve();
     }
@@ -178,10 +179,39 @@ class ContinuedCoder {
   }
 
   [[nodiscard]] int finerScaleBits() const {
-    return scaleBits(before_.lattice, before_.precision[p_]);
+    return scaleBits(now_.lattice, before_.precision[p_]);
   }
+
+  /// The code of a scale of the previous frame on the lattice of this one: the middle of its
+  /// interval, rounded down.
+  [[nodiscard]] std::uint32_t scaleBefore(std::size_t a) const {
+    const int more = finerScaleBits() - scaleBits(before_.lattice, before_.precision[p_]);
+    const std::uint32_t code = before_.scale[a][p_];
+    if (more <= 0) return code >> -more;
+    return (code << more) + (1u << (more - 1));
+  }
+
+  /// The shape of the previous frame on the lattice of this one.
   [[nodiscard]] Shape shapeBefore() const {
-    return {scaleCodes(before_, p_), rotationCodes(before_, p_)};
+    Shape shape;
+    for (std::size_t a = 0; a < 3; ++a) shape.scale[a] = scaleBefore(a);
+    shape.rotation = onLattice(shape);
+    return shape;
+  }
+
+  /// The predicted rotation, as codes with the bits that they have for the scales of a shape.
+  [[nodiscard]] RotationCodes onLattice(const Shape& shape) const {
+    const auto middle = rotationMiddle();
+    const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
+    const int precision = before_.precision[p_];
+    RotationCodes codes{};
+    for (std::size_t a = 0; a < 3; ++a) codes[a] = std::uint16_t(middle[a]);
+    const AxisBits bits = rotationBits(now_.lattice, precision, s, codes);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const int below = Lattice::kMaxRotationBits - bits[a];
+      codes[a] = std::uint16_t((codes[a] >> below) << below);
+    }
+    return codes;
   }
 
   /// The predicted rotation: the middles of the intervals before, as codes with all bits.
@@ -200,7 +230,7 @@ class ContinuedCoder {
     std::size_t activity = 0;
     for (std::size_t a = 0; a < 3; ++a) {
       coded.scale[a] = codeScale(side, a, activity, wanted.scale[a]);
-      if (coded.scale[a] != before_.scale[a][p_]) ++activity;
+      if (coded.scale[a] != scaleBefore(a)) ++activity;
     }
     coded.rotation = codeRotation(side, activity, coded, wanted.rotation);
     return coded;
@@ -210,9 +240,9 @@ class ContinuedCoder {
   std::uint32_t codeScale(AnySide& side, std::size_t a, std::size_t activity,
                           std::uint32_t wanted) {
     const int bits = finerScaleBits();
-    const auto before = std::int64_t(before_.scale[a][p_]);
-    const auto context = DifferenceModel::contextOf(expectedScale_[a].mean() >>
-                                                    (kMagnitudeBits - 2 - bits));
+    const auto before = std::int64_t(scaleBefore(a));
+    const auto context =
+        DifferenceModel::contextOf(expectedScale_[a].mean() >> (kMagnitudeBits - 2 - bits));
     const std::int64_t code =
         before + scales_[a].code(side, context, activity, std::int64_t(wanted) - before);
     require(code >= 0 && (code >> bits) <= std::int64_t(Lattice::kMaxCoarseScale), "a scale");
@@ -224,7 +254,7 @@ class ContinuedCoder {
   RotationCodes codeRotation(AnySide& side, std::size_t activity, const Shape& shape,
                              const RotationCodes& wanted) {
     constexpr int kTop = Lattice::kMaxRotationBits;
-    const Lattice& lattice = before_.lattice;
+    const Lattice& lattice = now_.lattice;
     const int precision = before_.precision[p_];
     const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
     const int coarse = coarseRotationBits(lattice, precision, s);
@@ -249,8 +279,8 @@ class ContinuedCoder {
         continue;
       }
       const auto guess = std::int64_t((std::uint32_t(middle[a]) >> below) & mask);
-      const auto context = DifferenceModel::contextOf(expectedTurn_[a].mean() >>
-                                                      (kMagnitudeBits - 2 - bits[a]));
+      const auto context =
+          DifferenceModel::contextOf(expectedTurn_[a].mean() >> (kMagnitudeBits - 2 - bits[a]));
       const std::int64_t found =
           guess + turn_[a].code(side, context, activity, std::int64_t(code) - guess);
       require(found >= 0 && found <= std::int64_t(mask), "a rotation");
@@ -264,12 +294,11 @@ class ContinuedCoder {
     const auto middle = rotationMiddle();
     const int bits = finerScaleBits();
     for (std::size_t a = 0; a < 3; ++a) {
-      const auto change = std::abs(std::int64_t(shape.scale[a]) - std::int64_t(before_.scale[a][p_]));
+      const auto change = std::abs(std::int64_t(shape.scale[a]) - std::int64_t(scaleBefore(a)));
       if (change != 0) ++active_;
       expectedScale_[a].learn(std::uint64_t(change) << (kMagnitudeBits - bits));
       const auto turned = std::abs(std::int64_t(shape.rotation[a]) - std::int64_t(middle[a]));
-      expectedTurn_[a].learn(std::uint64_t(turned)
-                             << (kMagnitudeBits - Lattice::kMaxRotationBits));
+      expectedTurn_[a].learn(std::uint64_t(turned) << (kMagnitudeBits - Lattice::kMaxRotationBits));
     }
   }
 
@@ -277,7 +306,7 @@ class ContinuedCoder {
 
   [[nodiscard]] Shape cheapestShape(std::size_t i) {
     const NearestAxes exact(*thrift_->shapes, i, quaternionBefore());
-    const double stepLog = before_.lattice.scaleStep * std::ldexp(1.0, -finerScaleBits());
+    const double stepLog = now_.lattice.scaleStep * std::ldexp(1.0, -finerScaleBits());
     Shape best;
     double least = HUGE_VAL;
     const auto consider = [&](const Shape& shape) {
@@ -300,9 +329,8 @@ class ContinuedCoder {
   /// The squared error of a shape, as the sum of squares of the errors of logarithms of scales.
   [[nodiscard]] double errorOf(const NearestAxes& exact, const Shape& shape) const {
     const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
-    const AxisBits bits =
-        rotationBits(before_.lattice, before_.precision[p_], s, shape.rotation);
-    return exact.squaredError(logScalesOf(before_.lattice, finerScaleBits(), shape.scale),
+    const AxisBits bits = rotationBits(now_.lattice, before_.precision[p_], s, shape.rotation);
+    return exact.squaredError(logScalesOf(now_.lattice, finerScaleBits(), shape.scale),
                               quaternionOf(shape.rotation, bits));
   }
 
@@ -310,9 +338,9 @@ class ContinuedCoder {
   [[nodiscard]] std::array<std::uint32_t, 3> roundedScales(const std::array<double, 3>& logs) {
     const int bits = finerScaleBits();
     std::array<std::uint32_t, 3> codes{};
-    double below = double(before_.lattice.lowestScale);
+    double below = double(now_.lattice.lowestScale);
     for (std::size_t a = 0; a < 3; ++a) {
-      const double steps = (logs[2 - a] / before_.lattice.scaleStep - below) * std::ldexp(1.0, bits);
+      const double steps = (logs[2 - a] / now_.lattice.scaleStep - below) * std::ldexp(1.0, bits);
       codes[a] = thriftyScale(a, steps - 0.5);
       below += middleOfCode(codes[a], bits);
     }
@@ -321,17 +349,17 @@ class ContinuedCoder {
 
   [[nodiscard]] std::uint32_t thriftyScale(std::size_t a, double exact) {
     const double last = std::ldexp(double(Lattice::kMaxCoarseScale) + 1.0, finerScaleBits()) - 1.0;
-    if (!(exact <= last))
-      throw RuntimeFailure("cannot quantise: a scale lies outside the lattice");
-    return std::uint32_t(thrifty(std::max(exact, 0.0), std::int64_t(before_.scale[a][p_]),
+    if (!(exact <= last)) throw RuntimeFailure("cannot quantise: a scale lies outside the lattice");
+    return std::uint32_t(thrifty(std::max(exact, 0.0), std::int64_t(scaleBefore(a)),
                                  [&](auto& meter, std::int64_t code) {
                                    (void)codeScale(meter, a, 0, std::uint32_t(code));
                                  }));
   }
 
   [[nodiscard]] Shape withRotationBefore(const NearestAxes& exact) {
-    Shape shape = shapeBefore();
+    Shape shape;
     shape.scale = roundedScales(exact.logScalesAlong(quaternionBefore()));
+    shape.rotation = onLattice(shape);
     return shape;
   }
 
@@ -339,7 +367,7 @@ class ContinuedCoder {
     constexpr int kTop = Lattice::kMaxRotationBits;
     Shape shape;
     shape.scale = roundedScales(exact.axes().logScale);
-    const Lattice& lattice = before_.lattice;
+    const Lattice& lattice = now_.lattice;
     const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
     const int coarse = coarseRotationBits(lattice, before_.precision[p_], s);
     const auto codeOf = [&](std::size_t a) {
@@ -351,7 +379,6 @@ class ContinuedCoder {
           std::uint16_t((std::uint32_t(codeOf(a)) >> (kTop - coarse)) << (kTop - coarse));
     const AxisBits bits = rotationBits(lattice, before_.precision[p_], s, shape.rotation);
     const CoupledErrors errors = rotationErrors(exact.axes());
-    const auto middle = rotationMiddle();
     std::array<double, 3> error{};
     for (std::size_t a = 0; a < 3; ++a) {
       const int below = kTop - bits[a];
@@ -363,7 +390,6 @@ class ContinuedCoder {
       shape.rotation[a] = std::uint16_t(code << below);
       error[a] = std::ldexp(double(code) + 0.5, below) - place;
     }
-    (void)middle;
     return shape;
   }
 
@@ -407,13 +433,14 @@ class ContinuedCoder {
       const auto codeIt = [&](auto& any, std::int64_t code) {
         const auto context =
             DifferenceModel::contextOf(motion_.expected() >> (kMagnitudeBits - 2 - bits[a]));
-        return guess + positions_[a].code(any, context, std::min<std::size_t>(active_, 3),
-                                          code - guess);
+        return guess +
+               positions_[a].code(any, context, std::min<std::size_t>(active_, 3), code - guess);
       };
       const std::int64_t last = (std::int64_t{1} << (now_.lattice.cellBits + bits[a])) - 1;
       if (rounding) {
         const double exact = rounding->wanted(a, bits[a]);
-        wanted = std::clamp<std::int64_t>(thrifty(exact, std::clamp<std::int64_t>(guess, 0, last), codeIt), 0, last);
+        wanted = std::clamp<std::int64_t>(
+            thrifty(exact, std::clamp<std::int64_t>(guess, 0, last), codeIt), 0, last);
         rounding->rounded(a, bits[a], wanted);
       }
       const std::int64_t code = codeIt(side, wanted);
@@ -458,12 +485,13 @@ class ContinuedCoder {
     const int shift = intensityShift(now_.lattice, coarseScales(now_, i));
     const int shiftBefore = intensityShift(before_.lattice, coarseScales(before_, p_));
     const std::int32_t before = before_.intensity[p_];
-    const auto guess = std::int64_t(((2 * std::uint64_t(magnitudeOf(before)) + 1) << shift) >>
-                                    (shiftBefore + 1));
+    const auto guess =
+        std::int64_t(((2 * std::uint64_t(magnitudeOf(before)) + 1) << shift) >> (shiftBefore + 1));
     const auto context = DifferenceModel::contextOf(
         (expectedIntensity_.mean() * std::uint64_t(guess + 1)) >> (kMagnitudeBits - 2));
     const auto codeIt = [&](auto& any, std::int64_t code) {
-      return guess + intensities_.code(any, context, std::min<std::size_t>(active_, 3), code - guess);
+      return guess +
+             intensities_.code(any, context, std::min<std::size_t>(active_, 3), code - guess);
     };
     std::int32_t wanted = now_.intensity[i];
     if (thrift_) wanted = chosenIntensity(thrift_->intensities[i], shift, guess, codeIt);
@@ -481,12 +509,12 @@ class ContinuedCoder {
   [[nodiscard]] std::int32_t chosenIntensity(float exact, int shift, std::int64_t guess,
                                              const CodeIt& codeIt) {
     const bool negative = now_.lattice.signedIntensity && exact < 0.0f;
-    const double magnitude = (negative || exact > 0.0f ? std::abs(double(exact)) : 0.0) /
-                             now_.lattice.intensityStep;
+    const double magnitude =
+        (negative || exact > 0.0f ? std::abs(double(exact)) : 0.0) / now_.lattice.intensityStep;
     const double steps =
         std::clamp(std::ldexp(magnitude, shift) - 0.5, 0.0, double(Lattice::kMaxIntensity));
-    const auto code = std::int32_t(std::min(thrifty(steps, guess, codeIt),
-                                            std::int64_t(Lattice::kMaxIntensity)));
+    const auto code =
+        std::int32_t(std::min(thrifty(steps, guess, codeIt), std::int64_t(Lattice::kMaxIntensity)));
     return negative ? -1 - code : code;
   }
 
@@ -519,11 +547,23 @@ void code(Side& side, const QuantisedEllipsoids& before, QuantisedEllipsoids& no
 
 }  // namespace
 
-bool continues(const Lattice& lattice, const Lattice& before) {
-  Lattice same = lattice;
-  same.lowestCell = before.lowestCell;
-  same.cellBits = before.cellBits;
-  return same == before;
+Lattice refined(const Lattice& lattice, int octaves) {
+  constexpr int kOctave = 256;  // bases are in units of 1/256
+  Lattice result = lattice;
+  result.scaleOffset -= octaves;
+  result.rotationOffset += octaves;
+  result.positionBase += kOctave * octaves;
+  result.intensityBase += kOctave * octaves;
+  return result;
+}
+
+std::optional<int> refinementOf(const Lattice& lattice, const Lattice& before) {
+  const int octaves = before.scaleOffset - lattice.scaleOffset;
+  if (std::abs(octaves) > kMaxRefinement) return std::nullopt;
+  Lattice expected = refined(before, octaves);
+  expected.lowestCell = lattice.lowestCell;
+  expected.cellBits = lattice.cellBits;
+  return lattice == expected ? std::optional(octaves) : std::nullopt;
 }
 
 void codeContinued(Writer& side, const QuantisedEllipsoids& before, QuantisedEllipsoids& now) {
