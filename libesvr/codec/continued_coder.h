@@ -16,8 +16,11 @@ inline constexpr int kMaxRefinement = 3;
 /// The lattice with all steps smaller by a number of octaves; negative: with larger steps.
 [[nodiscard]] Lattice refined(const Lattice& lattice, int octaves);
 
-/// The number of octaves by which a lattice is a refinement of another one, whatever its cells;
-/// nothing if it is none, so that ellipsoids of one cannot continue those of the other.
+/// Largest distance of the lowest cells of two frames along an axis.
+inline constexpr std::int64_t kMaxCellShift = std::int64_t{1} << 21;
+
+/// The number of octaves by which a lattice is a refinement of another one, whatever the number
+/// of its cells; nothing if it is none or its cells lie further away than kMaxCellShift, so that ellipsoids of one cannot continue those of the other.
 [[nodiscard]] std::optional<int> refinementOf(const Lattice& lattice, const Lattice& before);
 
 /// Codes which ellipsoids of `before` are continued, and their codes in `now`.

@@ -41,6 +41,7 @@ Lattice getLattice(ByteReader& in, const Lattice& before) {
   lattice.lowestCell.z = in.get<std::int32_t>();
   lattice.cellBits = in.get<std::uint8_t>();
   if (lattice.cellBits > Lattice::kMaxCellBits) in.fail("the lattice has too many cells");
+  if (!codec::refinementOf(lattice, before)) in.fail("the cells lie too far from those before");
   return lattice;
 }
 

@@ -4,10 +4,11 @@
 ///
 /// The files are those of a sequence, in its order. KIND is "voxels" or "ellipsoids", or
 /// "ellipsoids-by-value", which stores no mask of active voxels. The grid of each file is converted
-/// to a PSNR (dB) over the active voxels twice, on DEVICE ("cpu", "cuda"): alone, and as a frame of a group of GOP frames of which the first one stands
-/// alone. For both ways a line of JSON is printed: the bytes of all files and frames, the least and
-/// the mean PSNR of a frame, the PSNR of the change from one frame to the next, of which the peak is
-/// that of the frame, and the seconds of the conversions and of encoding.
+/// to a PSNR (dB) over the box twice, on DEVICE ("cpu", "cuda"): alone, and as a frame of a group of
+/// GOP frames of which the first one stands alone. For both ways a line of JSON is printed: the
+/// bytes of all files and frames, the least and the mean PSNR of a frame, the PSNR of the change
+/// from one frame to the next, of which the peak is that of the frame, and the seconds of the
+/// conversions and of encoding.
 
 #include <algorithm>
 #include <chrono>
@@ -60,11 +61,6 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// The PSNR over the box less that over the active voxels, for one sum of squares.
-double activeToBox(const SparseVolume& volume) {
-  return 10.0 * std::log10(activeBox(volume).volume() / double(activeVoxelCount(volume)));
-}
-
 /// The sum of the squared difference of two changes over the box, divided by the voxels of the box
 /// and by the squared peak.
 double changeError(const SparseVolume& before, const SparseVolume& after,
@@ -93,7 +89,7 @@ class Run {
     const bool alone = !settings_.predicted || number % settings_.framesOfGroup == 0;
     const auto start = std::chrono::steady_clock::now();
     const EsvrFile* previous = alone ? nullptr : &before_;
-    ConvertOptions options{.goal = PsnrGoal{settings_.psnr + activeToBox(source.volume)},
+    ConvertOptions options{.goal = PsnrGoal{settings_.psnr},
                            .representation = settings_.kind.representation,
                            .fit = {},
                            .storage = {.activity = settings_.kind.activity},
@@ -116,7 +112,7 @@ class Run {
 
  private:
   void measure(const SparseVolume& source, SparseVolume decoded) {
-    const double now = psnrOverBox(source, decoded) - activeToBox(source);
+    const double now = psnrOverBox(source, decoded);
     totals_.least = std::min(totals_.least, now);
     totals_.sum += now;
     if (!source_.bricks.empty()) totals_.changes += changeError(source_, source, decoded_, decoded);
