@@ -12,8 +12,7 @@
 #include "codec/code_values.h"
 #include "codec/difference_model.h"
 #include "codec/lattice_bits.h"
-#include "codec/least_squares.h"
-#include "codec/motion_map.h"
+#include "codec/motion_predictor.h"
 #include "codec/nearest_axes.h"
 #include "codec/rounding.h"
 #include "esvr/error.h"
@@ -21,13 +20,7 @@
 namespace esvr::codec {
 namespace {
 
-/// Places are integers in units of 2^-kUnitBits cells, so that the middle of every code is one.
-constexpr int kUnitBits = Lattice::kMaxPositionBits + 1;
-constexpr int kMotionBits = 8;  // motions are in units of 2^-kMotionBits cells
-
-/// Magnitudes for ExpectedMagnitude have this number of bits below a cell, a coarse step of scale,
-/// the interval of a rotation's component, and the magnitude of an intensity.
-constexpr int kMagnitudeBits = Lattice::kMaxPositionBits;
+/// Expected magnitude before the first difference.
 constexpr std::uint64_t kFirstExpected = std::uint64_t{1} << (kMagnitudeBits - 2);
 
 /// Twice the place in a lattice of 2^bits codes in a cell, as an odd number of half codes.
@@ -59,64 +52,6 @@ void require(bool holds, const char* what) {
 struct Shape {
   std::array<std::uint32_t, 3> scale{};
   RotationCodes rotation{};
-};
-
-/// Predicts motions from the motions around.
-class MotionPredictor {
- public:
-  explicit MotionPredictor(std::span<const Vector64> places) : map_(places) {}
-
-  /// \param own  the motion of the ellipsoid to the previous frame, in units of motions
-  void look(const Vector64& place, const std::array<std::int32_t, 3>& own) {
-    own_ = own;
-    sum_ = map_.around(place);
-    const MotionSum& from = sum_.count > 0 ? sum_ : all_;
-    const double count = double(std::max<std::int64_t>(from.count, 1));
-    for (std::size_t a = 0; a < 3; ++a)
-      terms_[a] = {double(from.now[a]) / count * kScale, double(from.before[a]) / count * kScale,
-                   double(own[a]) * kScale};
-    expected_ = std::uint64_t(from.count > 0 ? from.error / from.count : 1 << kMotionBits);
-  }
-
-  /// The predicted motion along an axis in units of places.
-  [[nodiscard]] std::int64_t motion(std::size_t axis) const {
-    const double steps = sums_[axis].predict(terms_[axis]) / kScale;
-    constexpr double kLargest = 0x1p30;
-    return std::int64_t(std::floor(std::clamp(steps, -kLargest, kLargest) + 0.5)) *
-           (std::int64_t{1} << (kUnitBits - kMotionBits));
-  }
-
-  /// Expected magnitude of the error along an axis, with kMagnitudeBits bits below a cell.
-  [[nodiscard]] std::uint64_t expected() const {
-    return expected_ << (kMagnitudeBits - kMotionBits);
-  }
-
-  void learn(const Vector64& place, const std::array<std::int32_t, 3>& motion) {
-    MotionSum one{1, {}, {}, 0};
-    for (std::size_t a = 0; a < 3; ++a) {
-      const double target = double(motion[a]) * kScale;
-      one.now[a] = motion[a];
-      one.before[a] = own_[a];
-      one.error +=
-          std::int64_t(std::min(std::abs(sums_[a].predict(terms_[a]) - target) / kScale, 0x1p30)) / 3;
-      sums_[a].learn(terms_[a], target);
-      sums_[a].solve();
-    }
-    map_.add(place, one);
-    all_.add(one);
-  }
-
- private:
-  static constexpr std::size_t kTerms = 3;
-  static constexpr double kScale = 1.0 / (1 << 4);  // to sixteenths of a cell
-  /// The motion around, and a part of what the motion before differs from those around.
-  using Sums = LeastSquares<kTerms>;
-  std::array<Sums, 3> sums_{Sums({1.0, -0.3, 0.3}), Sums({1.0, -0.3, 0.3}), Sums({1.0, -0.3, 0.3})};
-  std::array<Sums::Terms, 3> terms_{};
-  std::array<std::int32_t, 3> own_{};
-  MotionMap map_;
-  MotionSum sum_, all_;
-  std::uint64_t expected_ = 0;
 };
 
 template <class Side>
@@ -178,10 +113,36 @@ class ContinuedCoder {
   }
 
   [[nodiscard]] int finerScaleBits() const {
-    return scaleBits(before_.lattice, before_.precision[p_]);
+    return scaleBits(now_.lattice, before_.precision[p_]);
   }
+
+  /// The code of a scale of the previous frame on the lattice of this one: the middle of its
+  /// interval, rounded down.
+  [[nodiscard]] std::uint32_t scaleBefore(std::size_t a) const {
+    const int more = finerScaleBits() - scaleBits(before_.lattice, before_.precision[p_]);
+    const std::uint32_t code = before_.scale[a][p_];
+    if (more <= 0) return code >> -more;
+    return (code << more) + (1u << (more - 1));
+  }
+
+  /// The shape of the previous frame on the lattice of this one.
   [[nodiscard]] Shape shapeBefore() const {
-    return {scaleCodes(before_, p_), rotationCodes(before_, p_)};
+    Shape shape;
+    for (std::size_t a = 0; a < 3; ++a) shape.scale[a] = scaleBefore(a);
+    shape.rotation = onLattice(shape);
+    return shape;
+  }
+
+  /// The predicted rotation, as codes with the bits that they have for the scales of a shape.
+  [[nodiscard]] RotationCodes onLattice(const Shape& shape) const {
+    const auto middle = rotationMiddle();
+    const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
+    const int precision = before_.precision[p_];
+    RotationCodes codes{};
+    for (std::size_t a = 0; a < 3; ++a) codes[a] = std::uint16_t(middle[a]);
+    const AxisBits bits = rotationBits(now_.lattice, precision, s, codes);
+    for (std::size_t a = 0; a < 3; ++a) codes[a] = truncated(codes[a], bits[a]);
+    return codes;
   }
 
   /// The predicted rotation: the middles of the intervals before, as codes with all bits.
@@ -200,7 +161,7 @@ class ContinuedCoder {
     std::size_t activity = 0;
     for (std::size_t a = 0; a < 3; ++a) {
       coded.scale[a] = codeScale(side, a, activity, wanted.scale[a]);
-      if (coded.scale[a] != before_.scale[a][p_]) ++activity;
+      if (coded.scale[a] != scaleBefore(a)) ++activity;
     }
     coded.rotation = codeRotation(side, activity, coded, wanted.rotation);
     return coded;
@@ -210,9 +171,9 @@ class ContinuedCoder {
   std::uint32_t codeScale(AnySide& side, std::size_t a, std::size_t activity,
                           std::uint32_t wanted) {
     const int bits = finerScaleBits();
-    const auto before = std::int64_t(before_.scale[a][p_]);
-    const auto context = DifferenceModel::contextOf(expectedScale_[a].mean() >>
-                                                    (kMagnitudeBits - 2 - bits));
+    const auto before = std::int64_t(scaleBefore(a));
+    const auto context =
+        DifferenceModel::contextOf(expectedScale_[a].mean() >> (kMagnitudeBits - 2 - bits));
     const std::int64_t code =
         before + scales_[a].code(side, context, activity, std::int64_t(wanted) - before);
     require(code >= 0 && (code >> bits) <= std::int64_t(Lattice::kMaxCoarseScale), "a scale");
@@ -223,53 +184,67 @@ class ContinuedCoder {
   template <class AnySide>
   RotationCodes codeRotation(AnySide& side, std::size_t activity, const Shape& shape,
                              const RotationCodes& wanted) {
-    constexpr int kTop = Lattice::kMaxRotationBits;
-    const Lattice& lattice = before_.lattice;
     const int precision = before_.precision[p_];
     const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
-    const int coarse = coarseRotationBits(lattice, precision, s);
+    const int coarse = coarseRotationBits(now_.lattice, precision, s);
     const auto middle = rotationMiddle();
+    const auto coarsely = [&](std::int32_t code) { return code >> (kRotationBits - coarse); };
     RotationCodes known{};
     bool same = true;
-    for (std::size_t a = 0; a < 3; ++a) {
-      known[a] = std::uint16_t((middle[a] >> (kTop - coarse)) << (kTop - coarse));
-      same = same && (wanted[a] >> (kTop - coarse)) == (known[a] >> (kTop - coarse));
-    }
+    for (std::size_t a = 0; a < 3; ++a) same = same && coarsely(wanted[a]) == coarsely(middle[a]);
     same = !side.bit(turns_[activity], !same);
-    if (!same)
-      for (std::size_t a = 0; a < 3; ++a)
-        known[a] = std::uint16_t(side.raw(wanted[a] >> (kTop - coarse), coarse) << (kTop - coarse));
-    const AxisBits bits = rotationBits(lattice, precision, s, known);
     for (std::size_t a = 0; a < 3; ++a) {
-      const int rest = bits[a] - coarse, below = kTop - bits[a];
-      const std::uint32_t mask = (1u << rest) - 1u;
-      const std::uint32_t code = (std::uint32_t(wanted[a]) >> below) & mask;
-      if (!same) {
-        known[a] = std::uint16_t(known[a] | side.raw(code, rest) << below);
-        continue;
-      }
-      const auto guess = std::int64_t((std::uint32_t(middle[a]) >> below) & mask);
-      const auto context = DifferenceModel::contextOf(expectedTurn_[a].mean() >>
-                                                      (kMagnitudeBits - 2 - bits[a]));
-      const std::int64_t found =
-          guess + turn_[a].code(side, context, activity, std::int64_t(code) - guess);
-      require(found >= 0 && found <= std::int64_t(mask), "a rotation");
-      if (found != guess && activity + 1 < DifferenceModel::kActivities) ++activity;
-      known[a] = std::uint16_t(known[a] | std::uint32_t(found) << below);
+      const auto guess = std::uint32_t(coarsely(middle[a]));
+      const std::uint32_t code = same ? guess : side.raw(coarsely(wanted[a]), coarse);
+      known[a] = std::uint16_t(code << (kRotationBits - coarse));
+    }
+    const AxisBits bits = rotationBits(now_.lattice, precision, s, known);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const FinerTurn turn{a, bits[a], bits[a] - coarse, std::uint32_t(middle[a])};
+      const std::uint32_t rest = same ? codeFinerTurn(side, activity, turn, wanted[a])
+                                      : side.raw(turn.restOf(wanted[a]), turn.rest);
+      known[a] = std::uint16_t(known[a] | rest << turn.below());
     }
     return known;
+  }
+
+  static constexpr int kRotationBits = Lattice::kMaxRotationBits;
+
+  /// The bits of a rotation's component below its coarse bits.
+  struct FinerTurn {
+    std::size_t axis;
+    int bits, rest;        ///< number of all bits, and of these
+    std::uint32_t middle;  ///< the predicted code
+
+    [[nodiscard]] int below() const { return kRotationBits - bits; }
+    [[nodiscard]] std::uint32_t restOf(std::uint32_t code) const {
+      return (code >> below()) & ((1u << rest) - 1u);
+    }
+  };
+
+  template <class AnySide>
+  std::uint32_t codeFinerTurn(AnySide& side, std::size_t& activity, const FinerTurn& turn,
+                              std::uint32_t wanted) {
+    const auto guess = std::int64_t(turn.restOf(turn.middle));
+    const auto context = DifferenceModel::contextOf(expectedTurn_[turn.axis].mean() >>
+                                                    (kMagnitudeBits - 2 - turn.bits));
+    const std::int64_t found =
+        guess +
+        turn_[turn.axis].code(side, context, activity, std::int64_t(turn.restOf(wanted)) - guess);
+    require(found >= 0 && found < (std::int64_t{1} << turn.rest), "a rotation");
+    if (found != guess && activity + 1 < DifferenceModel::kActivities) ++activity;
+    return std::uint32_t(found);
   }
 
   void learnShape(const Shape& shape) {
     const auto middle = rotationMiddle();
     const int bits = finerScaleBits();
     for (std::size_t a = 0; a < 3; ++a) {
-      const auto change = std::abs(std::int64_t(shape.scale[a]) - std::int64_t(before_.scale[a][p_]));
+      const auto change = std::abs(std::int64_t(shape.scale[a]) - std::int64_t(scaleBefore(a)));
       if (change != 0) ++active_;
       expectedScale_[a].learn(std::uint64_t(change) << (kMagnitudeBits - bits));
       const auto turned = std::abs(std::int64_t(shape.rotation[a]) - std::int64_t(middle[a]));
-      expectedTurn_[a].learn(std::uint64_t(turned)
-                             << (kMagnitudeBits - Lattice::kMaxRotationBits));
+      expectedTurn_[a].learn(std::uint64_t(turned) << (kMagnitudeBits - Lattice::kMaxRotationBits));
     }
   }
 
@@ -277,7 +252,7 @@ class ContinuedCoder {
 
   [[nodiscard]] Shape cheapestShape(std::size_t i) {
     const NearestAxes exact(*thrift_->shapes, i, quaternionBefore());
-    const double stepLog = before_.lattice.scaleStep * std::ldexp(1.0, -finerScaleBits());
+    const double stepLog = now_.lattice.scaleStep * std::ldexp(1.0, -finerScaleBits());
     Shape best;
     double least = HUGE_VAL;
     const auto consider = [&](const Shape& shape) {
@@ -300,9 +275,8 @@ class ContinuedCoder {
   /// The squared error of a shape, as the sum of squares of the errors of logarithms of scales.
   [[nodiscard]] double errorOf(const NearestAxes& exact, const Shape& shape) const {
     const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
-    const AxisBits bits =
-        rotationBits(before_.lattice, before_.precision[p_], s, shape.rotation);
-    return exact.squaredError(logScalesOf(before_.lattice, finerScaleBits(), shape.scale),
+    const AxisBits bits = rotationBits(now_.lattice, before_.precision[p_], s, shape.rotation);
+    return exact.squaredError(logScalesOf(now_.lattice, finerScaleBits(), shape.scale),
                               quaternionOf(shape.rotation, bits));
   }
 
@@ -310,9 +284,9 @@ class ContinuedCoder {
   [[nodiscard]] std::array<std::uint32_t, 3> roundedScales(const std::array<double, 3>& logs) {
     const int bits = finerScaleBits();
     std::array<std::uint32_t, 3> codes{};
-    double below = double(before_.lattice.lowestScale);
+    double below = double(now_.lattice.lowestScale);
     for (std::size_t a = 0; a < 3; ++a) {
-      const double steps = (logs[2 - a] / before_.lattice.scaleStep - below) * std::ldexp(1.0, bits);
+      const double steps = (logs[2 - a] / now_.lattice.scaleStep - below) * std::ldexp(1.0, bits);
       codes[a] = thriftyScale(a, steps - 0.5);
       below += middleOfCode(codes[a], bits);
     }
@@ -321,50 +295,60 @@ class ContinuedCoder {
 
   [[nodiscard]] std::uint32_t thriftyScale(std::size_t a, double exact) {
     const double last = std::ldexp(double(Lattice::kMaxCoarseScale) + 1.0, finerScaleBits()) - 1.0;
-    if (!(exact <= last))
-      throw RuntimeFailure("cannot quantise: a scale lies outside the lattice");
-    return std::uint32_t(thrifty(std::max(exact, 0.0), std::int64_t(before_.scale[a][p_]),
+    if (!(exact <= last)) throw RuntimeFailure("cannot quantise: a scale lies outside the lattice");
+    return std::uint32_t(thrifty(std::max(exact, 0.0), std::int64_t(scaleBefore(a)),
                                  [&](auto& meter, std::int64_t code) {
                                    (void)codeScale(meter, a, 0, std::uint32_t(code));
                                  }));
   }
 
   [[nodiscard]] Shape withRotationBefore(const NearestAxes& exact) {
-    Shape shape = shapeBefore();
+    Shape shape;
     shape.scale = roundedScales(exact.logScalesAlong(quaternionBefore()));
+    shape.rotation = onLattice(shape);
     return shape;
   }
 
+  /// The shape with the rounded exact rotation. As in quantise(), the coarse bits of a component are
+  /// rounded down, and the others are rounded one component after the other (rounding.h).
   [[nodiscard]] Shape nearestShape(const NearestAxes& exact) {
-    constexpr int kTop = Lattice::kMaxRotationBits;
     Shape shape;
     shape.scale = roundedScales(exact.axes().logScale);
-    const Lattice& lattice = before_.lattice;
     const CoarseScales s = coarseOf(shape.scale, finerScaleBits());
-    const int coarse = coarseRotationBits(lattice, before_.precision[p_], s);
-    const auto codeOf = [&](std::size_t a) {
-      return std::clamp(std::ldexp(exact.axes().rotation[a + 1] / kRotationSide + 0.5, kTop), 0.0,
-                        std::ldexp(1.0, kTop) - 1.0);
-    };
+    const int precision = before_.precision[p_];
+    const int coarse = coarseRotationBits(now_.lattice, precision, s);
+    const auto places = rotationPlaces(exact.axes());
     for (std::size_t a = 0; a < 3; ++a)
-      shape.rotation[a] =
-          std::uint16_t((std::uint32_t(codeOf(a)) >> (kTop - coarse)) << (kTop - coarse));
-    const AxisBits bits = rotationBits(lattice, before_.precision[p_], s, shape.rotation);
+      shape.rotation[a] = truncated(std::uint32_t(places[a]), coarse);
+    const AxisBits bits = rotationBits(now_.lattice, precision, s, shape.rotation);
     const CoupledErrors errors = rotationErrors(exact.axes());
-    const auto middle = rotationMiddle();
     std::array<double, 3> error{};
     for (std::size_t a = 0; a < 3; ++a) {
-      const int below = kTop - bits[a];
+      const int below = kRotationBits - bits[a];
       const auto first = std::int64_t(shape.rotation[a]) >> below;
       const std::int64_t last = first + (std::int64_t{1} << (bits[a] - coarse)) - 1;
-      const double place = codeOf(a), wanted = place + errors.shift(a, error);
+      const double wanted = places[a] + errors.shift(a, error);
       const auto nearest = std::int64_t(std::floor(std::ldexp(wanted, -below)));
       const std::int64_t code = std::clamp(nearest, first, last);
       shape.rotation[a] = std::uint16_t(code << below);
-      error[a] = std::ldexp(double(code) + 0.5, below) - place;
+      error[a] = std::ldexp(double(code) + 0.5, below) - places[a];
     }
-    (void)middle;
     return shape;
+  }
+
+  /// The components of a rotation in units of the last bit of a code.
+  static std::array<double, 3> rotationPlaces(const SortedAxes& axes) {
+    const double end = std::ldexp(1.0, kRotationBits);
+    std::array<double, 3> places{};
+    for (std::size_t a = 0; a < 3; ++a)
+      places[a] = std::clamp((axes.rotation[a + 1] / kRotationSide + 0.5) * end, 0.0, end - 1.0);
+    return places;
+  }
+
+  /// The first bits of a code of a rotation's component; the others are 0.
+  static std::uint16_t truncated(std::uint32_t code, int bits) {
+    const int below = kRotationBits - bits;
+    return std::uint16_t((code >> below) << below);
   }
 
   /// The code with the least cost: the one nearest to the exact value, the ones next to it towards
@@ -392,38 +376,54 @@ class ContinuedCoder {
   // ---- Positions
 
   void position(Side& side, std::size_t i) {
-    const AxisBits bits = shapeBits(now_, i).position;
     const Vector64& from = places_[p_];
-    std::array<std::int32_t, 3> own{}, moved{};
-    if (!before_.motion[0].empty() && p_ < before_.motion[0].size())
-      for (std::size_t a = 0; a < 3; ++a) own[a] = before_.motion[a][p_];
-    motion_.look(from, own);
+    motion_.look(from, motionBefore());
+    const AxisBits bits = shapeBits(now_, i).position;
     std::optional<Rounding> rounding;
     if (thrift_ && thrift_->shapes) rounding.emplace(*thrift_->shapes, i, now_.lattice);
+    std::array<std::int32_t, 3> moved{};
     for (std::size_t a = 0; a < 3; ++a) {
-      const int below = kUnitBits - bits[a];
-      const std::int64_t guess = (from[a] + motion_.motion(a)) >> below;
-      std::int64_t wanted = std::int64_t(now_.position[a][i]);
-      const auto codeIt = [&](auto& any, std::int64_t code) {
-        const auto context =
-            DifferenceModel::contextOf(motion_.expected() >> (kMagnitudeBits - 2 - bits[a]));
-        return guess + positions_[a].code(any, context, std::min<std::size_t>(active_, 3),
-                                          code - guess);
-      };
-      const std::int64_t last = (std::int64_t{1} << (now_.lattice.cellBits + bits[a])) - 1;
-      if (rounding) {
-        const double exact = rounding->wanted(a, bits[a]);
-        wanted = std::clamp<std::int64_t>(thrifty(exact, std::clamp<std::int64_t>(guess, 0, last), codeIt), 0, last);
-        rounding->rounded(a, bits[a], wanted);
-      }
-      const std::int64_t code = codeIt(side, wanted);
-      require(code >= 0 && code <= last, "a center");
-      now_.position[a][i] = std::uint32_t(code);
-      moved[a] = std::int32_t((placeOf(std::uint32_t(code), bits[a]) - from[a]) >>
-                              (kUnitBits - kMotionBits));
+      const std::uint32_t code = codeCoordinate(side, a, bits[a], i, rounding);
+      now_.position[a][i] = code;
+      moved[a] = std::int32_t((placeOf(code, bits[a]) - from[a]) >> (kUnitBits - kMotionBits));
       now_.motion[a][i] = moved[a];
     }
     motion_.learn(from, moved);
+  }
+
+  /// The motion to the previous frame; 0 if the ellipsoid was new there.
+  [[nodiscard]] std::array<std::int32_t, 3> motionBefore() const {
+    std::array<std::int32_t, 3> motion{};
+    for (std::size_t a = 0; a < 3; ++a)
+      if (p_ < before_.motion[a].size()) motion[a] = before_.motion[a][p_];
+    return motion;
+  }
+
+  class Rounding;
+
+  std::uint32_t codeCoordinate(Side& side, std::size_t a, int bits, std::size_t i,
+                               std::optional<Rounding>& rounding) {
+    const std::int64_t last = (std::int64_t{1} << (now_.lattice.cellBits + bits)) - 1;
+    const std::int64_t guess = std::clamp<std::int64_t>(
+        (places_[p_][a] + motion_.motion(a)) >> (kUnitBits - bits), 0, last);
+    const auto context =
+        DifferenceModel::contextOf(motion_.expected() >> (kMagnitudeBits - 2 - bits));
+    const auto codeIt = [&](auto& any, std::int64_t code) {
+      return guess + positions_[a].code(any, context, activity(), code - guess);
+    };
+    auto wanted = std::int64_t(now_.position[a][i]);
+    if (rounding) {
+      wanted = std::clamp<std::int64_t>(thrifty(rounding->wanted(a, bits), guess, codeIt), 0, last);
+      rounding->rounded(a, bits, wanted);
+    }
+    const std::int64_t code = codeIt(side, wanted);
+    require(code >= 0 && code <= last, "a center");
+    return std::uint32_t(code);
+  }
+
+  /// How much of the shape has changed, as a context.
+  [[nodiscard]] std::size_t activity() const {
+    return std::min(active_, DifferenceModel::kActivities - 1);
   }
 
   /// Rounds the coordinates of a center one after the other (rounding.h).
@@ -458,12 +458,12 @@ class ContinuedCoder {
     const int shift = intensityShift(now_.lattice, coarseScales(now_, i));
     const int shiftBefore = intensityShift(before_.lattice, coarseScales(before_, p_));
     const std::int32_t before = before_.intensity[p_];
-    const auto guess = std::int64_t(((2 * std::uint64_t(magnitudeOf(before)) + 1) << shift) >>
-                                    (shiftBefore + 1));
+    const auto guess =
+        std::int64_t(((2 * std::uint64_t(magnitudeOf(before)) + 1) << shift) >> (shiftBefore + 1));
     const auto context = DifferenceModel::contextOf(
         (expectedIntensity_.mean() * std::uint64_t(guess + 1)) >> (kMagnitudeBits - 2));
     const auto codeIt = [&](auto& any, std::int64_t code) {
-      return guess + intensities_.code(any, context, std::min<std::size_t>(active_, 3), code - guess);
+      return guess + intensities_.code(any, context, activity(), code - guess);
     };
     std::int32_t wanted = now_.intensity[i];
     if (thrift_) wanted = chosenIntensity(thrift_->intensities[i], shift, guess, codeIt);
@@ -481,12 +481,12 @@ class ContinuedCoder {
   [[nodiscard]] std::int32_t chosenIntensity(float exact, int shift, std::int64_t guess,
                                              const CodeIt& codeIt) {
     const bool negative = now_.lattice.signedIntensity && exact < 0.0f;
-    const double magnitude = (negative || exact > 0.0f ? std::abs(double(exact)) : 0.0) /
-                             now_.lattice.intensityStep;
+    const double magnitude =
+        (negative || exact > 0.0f ? std::abs(double(exact)) : 0.0) / now_.lattice.intensityStep;
     const double steps =
         std::clamp(std::ldexp(magnitude, shift) - 0.5, 0.0, double(Lattice::kMaxIntensity));
-    const auto code = std::int32_t(std::min(thrifty(steps, guess, codeIt),
-                                            std::int64_t(Lattice::kMaxIntensity)));
+    const auto code =
+        std::int32_t(std::min(thrifty(steps, guess, codeIt), std::int64_t(Lattice::kMaxIntensity)));
     return negative ? -1 - code : code;
   }
 
@@ -519,11 +519,26 @@ void code(Side& side, const QuantisedEllipsoids& before, QuantisedEllipsoids& no
 
 }  // namespace
 
-bool continues(const Lattice& lattice, const Lattice& before) {
-  Lattice same = lattice;
-  same.lowestCell = before.lowestCell;
-  same.cellBits = before.cellBits;
-  return same == before;
+Lattice refined(const Lattice& lattice, int octaves) {
+  constexpr int kOctave = 256;  // bases are in units of 1/256
+  Lattice result = lattice;
+  result.scaleOffset -= octaves;
+  result.rotationOffset += octaves;
+  result.positionBase += kOctave * octaves;
+  result.intensityBase += kOctave * octaves;
+  return result;
+}
+
+std::optional<int> refinementOf(const Lattice& lattice, const Lattice& before) {
+  const int octaves = before.scaleOffset - lattice.scaleOffset;
+  if (std::abs(octaves) > kMaxRefinement) return std::nullopt;
+  const auto own = lowestOf(lattice), other = lowestOf(before);
+  for (std::size_t a = 0; a < 3; ++a)
+    if (std::abs(own[a] - other[a]) > kMaxCellShift) return std::nullopt;
+  Lattice expected = refined(before, octaves);
+  expected.lowestCell = lattice.lowestCell;
+  expected.cellBits = lattice.cellBits;
+  return lattice == expected ? std::optional(octaves) : std::nullopt;
 }
 
 void codeContinued(Writer& side, const QuantisedEllipsoids& before, QuantisedEllipsoids& now) {

@@ -2,6 +2,7 @@
 /// Codes the ellipsoids of a frame that continue ellipsoids of the previous frame, as differences
 /// from predictions (docs/format.md, "Continued ellipsoids"). New ellipsoids are not coded here.
 
+#include <optional>
 #include <span>
 
 #include "codec/symbol_coder.h"
@@ -9,9 +10,18 @@
 
 namespace esvr::codec {
 
-/// True if two lattices differ by their cells only, so that ellipsoids of one can continue
-/// ellipsoids of the other.
-[[nodiscard]] bool continues(const Lattice& lattice, const Lattice& before);
+/// Largest number of octaves by which the steps of a lattice change from frame to frame.
+inline constexpr int kMaxRefinement = 3;
+
+/// The lattice with all steps smaller by a number of octaves; negative: with larger steps.
+[[nodiscard]] Lattice refined(const Lattice& lattice, int octaves);
+
+/// Largest distance of the lowest cells of two frames along an axis.
+inline constexpr std::int64_t kMaxCellShift = std::int64_t{1} << 21;
+
+/// The number of octaves by which a lattice is a refinement of another one, whatever the number
+/// of its cells; nothing if it is none or its cells lie further away than kMaxCellShift, so that ellipsoids of one cannot continue those of the other.
+[[nodiscard]] std::optional<int> refinementOf(const Lattice& lattice, const Lattice& before);
 
 /// Codes which ellipsoids of `before` are continued, and their codes in `now`.
 /// \param now  a writer takes its `continues` and codes; a reader has an empty one with a lattice.

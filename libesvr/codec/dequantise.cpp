@@ -29,7 +29,8 @@ void putRotation(const QuantisedEllipsoids& q, std::size_t i, const AxisBits& bi
 
 void putIntensity(const QuantisedEllipsoids& q, std::size_t i, int shift, Ellipsoids& e) {
   const std::int32_t code = q.intensity[i];
-  const double magnitude = middleOfCode(code < 0 ? -1 - code : code, shift) * q.lattice.intensityStep;
+  const double magnitude =
+      middleOfCode(code < 0 ? -1 - code : code, shift) * q.lattice.intensityStep;
   e.intensity[i] = float(code < 0 ? -magnitude : magnitude);
 }
 

@@ -22,13 +22,12 @@ class ExpectedMagnitude {
 
   [[nodiscard]] std::uint64_t mean() const { return mean_; }
 
-  /// \param magnitude  below 2^48
   void learn(std::uint64_t magnitude) {
     mean_ = (mean_ * (kMemory - 1) + std::min(magnitude, kLargest) + kMemory / 2) / kMemory;
   }
 
  private:
-  static constexpr std::uint64_t kMemory = 32, kLargest = std::uint64_t{1} << 48;
+  static constexpr std::uint64_t kMemory = 32, kLargest = std::uint64_t{1} << 40;
   std::uint64_t mean_;
 };
 

@@ -49,6 +49,13 @@ Ellipsoids part(const Ellipsoids& all, std::size_t first) {
   return some;
 }
 
+void truncate(std::size_t count, Ellipsoids& e) {
+  for (auto& plane : e.center) plane.resize(count);
+  for (auto& plane : e.logScale) plane.resize(count);
+  for (auto& plane : e.rotation) plane.resize(count);
+  e.intensity.resize(count);
+}
+
 /// The lattice of the previous frame, with cells for all centers.
 Lattice withCellsFor(const Ellipsoids& e, Lattice lattice) {
   std::int64_t low[3], high[3];
@@ -116,19 +123,20 @@ ContinuedMaker::ContinuedMaker(const ContinuedFit& fit, const TrialTarget& targe
   problem_.setShapes(field_);
   (void)problem_.solve(intensities, kFirstIterations);
   setIntensities(intensities, field_);
+  const Ellipsoids& e = field_.chunks[0].ellipsoids;
+  precisions_ = precisionsOf(e, problem_.curvature(), continues_, before_);
+  added_ = part(e, continues_.size());
+  refine(0);
+}
+
+void ContinuedMaker::refine(int octaves) {
   Ellipsoids& e = field_.chunks[0].ellipsoids;
-  const auto& phi2 = problem_.curvature();
-  LatticeChoice choice{withCellsFor(e, before_.lattice),
-                       precisionsOf(e, phi2, continues_, before_)};
+  const Lattice lattice = codec::refined(withCellsFor(e, before_.lattice), octaves);
   std::vector<std::size_t> order;
-  const Ellipsoids added = part(e, continues_.size());
-  fresh_ = quantise(added, choice, order);
-  if (added.size() == 0) fresh_.lattice = choice.lattice;
-  for (auto& plane : e.center) plane.resize(continues_.size());
-  for (auto& plane : e.logScale) plane.resize(continues_.size());
-  for (auto& plane : e.rotation) plane.resize(continues_.size());
-  e.intensity.resize(continues_.size());
-  for (const std::size_t i : order) append(added, i, {}, e);
+  fresh_ = quantise(added_, {lattice, precisions_}, order);
+  fresh_.lattice = lattice;
+  truncate(continues_.size(), e);
+  for (const std::size_t i : order) append(added_, i, {}, e);
 }
 
 Trial ContinuedMaker::make(double bitPrice) {

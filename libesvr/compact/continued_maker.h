@@ -27,6 +27,10 @@ class ContinuedMaker {
   /// False if no ellipsoid continues one of the previous frame; there is no trial then.
   [[nodiscard]] bool anyContinues() const { return !continues_.empty(); }
 
+  /// Makes the steps smaller than those of the previous frame by a number of octaves, at most
+  /// codec::kMaxRefinement. \throws RuntimeFailure  a value lies outside the lattice
+  void refine(int octaves);
+
   /// Chooses codes near the exact values, solves for the intensities with the chosen shapes, and
   /// chooses codes of these.
   /// \param bitPrice  as in ContinuedThrift
@@ -40,7 +44,9 @@ class ContinuedMaker {
   IntensityProblem problem_;
   const QuantisedEllipsoids& before_;
   std::vector<std::uint32_t> continues_;
-  Field field_;               ///< in the order of the frame, relative to the previous frame's origin
+  std::vector<std::uint8_t> precisions_;  ///< those of the ellipsoids that continue none
+  Ellipsoids added_;                      ///< the same ellipsoids, in their first order
+  Field field_;  ///< in the order of the frame, relative to the previous frame's origin
   QuantisedEllipsoids fresh_;  ///< those that continue none
 };
 

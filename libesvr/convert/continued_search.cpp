@@ -10,6 +10,8 @@
 #include "compact/continued_maker.h"
 #include "convert/motion_estimate.h"
 #include "convert/psnr_slope.h"
+#include "core/axes.h"
+#include "esvr/error.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -22,16 +24,18 @@ namespace {
 constexpr std::uint32_t kIterations = 60;
 /// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
 /// nothing is changed.
-constexpr double kAim = 2.2, kMin = 1.6, kMax = 4.5;
+constexpr double kAim = 1.0, kMin = 0.6, kMax = 4.0;
 /// dB by which all of these increase if the rounded ellipsoids do not reach the PSNR.
 constexpr double kFurther = 0.6;
 constexpr int kMaxFits = 5;
 /// Largest growth of the number of ellipsoids in a frame; with more, a fit from seeds is better.
 constexpr double kMaxGrowth = 1.5;
 
-/// Prices of a bit, in squares of a quantisation step: the largest one, the first that is tried, and
-/// the distance of two prices between which none is tried.
-constexpr double kMaxPrice = 0.4, kFirstPrice = 0.1, kPriceBracket = 0.04;
+/// Prices of a bit, in squares of a quantisation step: the largest one, the first that is tried, the
+/// least one that is worth a trial, and the share by which two prices may differ at the end.
+constexpr double kMaxPrice = 2.0, kFirstPrice = 0.2, kLeastPrice = 0.02, kPriceBracket = 0.25;
+/// dB that a trial without a price must leave to the PSNR.
+constexpr double kRoom = 0.25;
 /// dB by which the PSNR of a trial must exceed the wanted one: a reader's sums have another order.
 constexpr double kReaderMargin = 5e-4;
 
@@ -71,7 +75,7 @@ class ContinuedSearch {
   std::optional<Conversion> run() {
     for (int n = 0; n < kMaxFits; ++n) {
       fitOnce();
-      if (fit_.end == FitEnd::kCancelled || field_.chunks.size() != 1) return std::nullopt;
+      if (fit_.end == FitEnd::kCancelled || !isInOneChunk()) return std::nullopt;
       const bool isLast = n + 1 == kMaxFits;
       if (!isNear() && !isLast && mayChange()) continue;
       if (over() > 0.0)
@@ -110,11 +114,14 @@ class ContinuedSearch {
     fit_ = std::move(result);
   }
 
+  /// False after a fit in chunks too.
+  [[nodiscard]] bool isInOneChunk() const {
+    return field_.chunks.size() == 1 && from_.size() == field_.ellipsoidCount();
+  }
+
   /// dB of the sum over the PSNR, as the device of the fit measures it.
   [[nodiscard]] double over() const { return fit_.curve.back().psnrBox - psnr_; }
-  [[nodiscard]] bool isNear() const {
-    return over() >= kMin + margin_ && over() <= kMax + margin_;
-  }
+  [[nodiscard]] bool isNear() const { return over() >= kMin + margin_ && over() <= kMax + margin_; }
 
   /// Chooses the number of ellipsoids of the next fit. \return false if none promises to do
   [[nodiscard]] bool mayChange() {
@@ -130,8 +137,8 @@ class ContinuedSearch {
       from_ = std::move(from);
       return true;
     }
-    const auto most = std::min(kMaxGrowth * double(previous_.field.ellipsoidCount()),
-                               double(maxCount()));
+    const auto most =
+        std::min(kMaxGrowth * double(previous_.field.ellipsoidCount()), double(maxCount()));
     if (count >= most) return false;
     wanted_ = std::size_t(std::ceil(std::clamp(next, count + 1.0, most)));
     return true;
@@ -155,14 +162,7 @@ class ContinuedSearch {
   [[nodiscard]] std::optional<Conversion> quantised() {
     StoredGrid grid = makeStoredGrid(job_.input.descriptor, job_.input.source, field_,
                                      job_.options.storage.activity, job_.input.simplified);
-    const SparseVolume& source = job_.input.source;
-    ContinuedMaker maker({grid, from_, previous_},
-                         {.source = source,
-                          .box = box(),
-                          .device = rateControlDevice(fit_, job_.options.fit.device),
-                          .peak = job_.options.fit.peak});
-    if (!maker.anyContinues()) return std::nullopt;
-    auto trial = cheapest(grid, maker);
+    auto trial = rounded(grid);
     if (!trial) return std::nullopt;
     grid.field = std::move(trial->field);
     grid.quantised = std::move(trial->quantised);
@@ -176,6 +176,19 @@ class ContinuedSearch {
     return conversion;
   }
 
+  /// \return nothing if the PSNR is not reached, or a value lies outside the lattice of the previous
+  ///         frame
+  [[nodiscard]] std::optional<Trial> rounded(const StoredGrid& grid) const try {
+    ContinuedMaker maker({grid, from_, previous_},
+                         {.source = job_.input.source,
+                          .box = box(),
+                          .device = rateControlDevice(fit_, job_.options.fit.device),
+                          .peak = job_.options.fit.peak});
+    return maker.anyContinues() ? cheapest(grid, maker) : std::nullopt;
+  } catch (const RuntimeFailure&) {
+    return std::nullopt;
+  }
+
   /// Squared error of the grid that a reader gets from a trial, relative to that of its sum. A mask
   /// removes the errors outside of it.
   [[nodiscard]] double shareOfError(const StoredGrid& grid, const Trial& trial) const {
@@ -186,14 +199,24 @@ class ContinuedSearch {
     return squaresAt(psnrOf(job_, decoded)) / trial.error;
   }
 
-  /// The trial with the highest price that reaches the PSNR; nothing if none does.
+  /// The trial with the highest price that reaches the PSNR; nothing if none does. The steps are
+  /// refined where those of the previous frame leave no room for a price.
   [[nodiscard]] std::optional<Trial> cheapest(const StoredGrid& grid, ContinuedMaker& maker) const {
     Trial first = maker.make(0.0);
     const double allowed = squaresAt(psnr_ + kReaderMargin) / shareOfError(grid, first);
+    if (first.error > allowed * std::pow(10.0, -kRoom / 10.0)) {
+      maker.refine(1);
+      first = maker.make(0.0);
+    }
     if (first.error > allowed) return std::nullopt;
-    std::optional<Trial> best = std::move(first);
+    return withHighestPrice(maker, allowed, std::move(first));
+  }
+
+  /// \param best  a trial without a price, which has at most the allowed error
+  [[nodiscard]] static Trial withHighestPrice(ContinuedMaker& maker, double allowed, Trial best) {
     double low = 0.0, high = kMaxPrice;
-    for (double price = kFirstPrice; high - low > kPriceBracket; price = 0.5 * (low + high)) {
+    for (double price = kFirstPrice; high - low > kPriceBracket * high && high > kLeastPrice;
+         price = low > 0.0 ? std::sqrt(low * high) : 0.25 * high) {
       Trial trial = maker.make(price);
       const bool reached = trial.error <= allowed;
       (reached ? low : high) = price;
@@ -212,17 +235,27 @@ class ContinuedSearch {
   FitResult fit_;                    ///< the last fit
 };
 
+/// True if all places of a box have their full precision relative to the origin of a chunk.
+bool isNear(Coord origin, const Box& box) {
+  if (box.empty()) return false;
+  for (const auto axis : kAxes) {
+    const std::int64_t low = std::int64_t(box.min.*axis) - origin.*axis;
+    const std::int64_t high = std::int64_t(box.max.*axis) - origin.*axis;
+    if (low <= -kChunkExtent || high >= kChunkExtent) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 bool mayContinue(const Job& job) {
   const StoredGrid* previous = job.options.previous;
   return previous && previous->quantised.size() == 1 && previous->quantised[0].size() > 0 &&
-         !previous->residual && !previous->voxels &&
-         previous->field.fitFor == FitFor::kVoxels &&
+         !previous->residual && !previous->voxels && previous->field.fitFor == FitFor::kVoxels &&
          job.options.fit.fitFor == FitFor::kVoxels && !job.options.fit.narrowBand &&
          !job.options.fit.kappa && job.options.storage.form == Storage::kCompact &&
          job.options.representation != Representation::kVoxels &&
-         activeVoxelCount(job.input.source) > 0;
+         isNear(previous->field.chunks[0].origin, activeBox(job.input.source));
 }
 
 std::optional<Conversion> continueTo(const Job& job, double psnr) {

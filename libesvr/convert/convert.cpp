@@ -175,8 +175,8 @@ Conversion convertVolume(const ConvertInput& given, const ConvertOptions& option
   Conversion conversion = own.fit.narrowBand ? convert::convertNarrowBand({input, own}, convertTo)
                                              : convertTo({input, own});
   conversion.smallerExactBytes = smallerExactBytes({input, own}, conversion.grid);
-  conversion.grid = throughTheFormat(std::move(conversion.grid), own.previous,
-                                     memoryOf(input.source));
+  conversion.grid =
+      throughTheFormat(std::move(conversion.grid), own.previous, memoryOf(input.source));
   requirePromises({input, own}, conversion.grid);
   return conversion;
 }

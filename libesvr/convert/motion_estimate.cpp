@@ -12,8 +12,8 @@
 namespace esvr::convert {
 namespace {
 
-constexpr int kLevels = 4;      // from voxels to means of 8^3 voxels
-constexpr int kIterations = 3;  // of a level
+constexpr std::size_t kLevels = 4;  // from voxels to means of 8^3 voxels
+constexpr int kIterations = 3;      // of a level
 /// Largest change of a motion in an iteration, in voxels of the level: gradients tell no more.
 constexpr double kLargestChange = 1.0;
 /// Share of the mean curvature of all windows that is added to that of a window, so that motions
@@ -166,7 +166,8 @@ class Level {
                       [&](std::size_t b) { normals[b] = normalOf(b); });
     double trace = 0.0;
     for (const Normal& n : normals) trace += n.trace();
-    const double damping = std::max(kDamping * trace / double(std::max<std::size_t>(bricks_.size(), 1)), 1e-300);
+    const double damping =
+        std::max(kDamping * trace / double(std::max<std::size_t>(bricks_.size(), 1)), 1e-300);
     tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t b) {
       const Vector3 change = window(normals, b).solve(damping);
       for (std::size_t a = 0; a < 3; ++a)
@@ -254,15 +255,20 @@ Vector3 MotionField::at(const Vector3& place) const {
 }
 
 MotionField estimateMotion(const SparseVolume& before, const SparseVolume& now) {
-  std::vector<SparseVolume> befores{before}, nows{now};
-  for (int level = 1; level < kLevels; ++level) {
-    befores.push_back(halved(befores.back()));
-    nows.push_back(halved(nows.back()));
+  // Pointers to coarser volumes stay valid, because the vectors do not grow beyond their capacity.
+  std::vector<SparseVolume> coarser;
+  coarser.reserve(2 * (kLevels - 1));
+  std::vector<std::pair<const SparseVolume*, const SparseVolume*>> levels{{&before, &now}};
+  while (levels.size() < kLevels) {
+    const auto [finerBefore, finerNow] = levels.back();
+    const SparseVolume& a = coarser.emplace_back(halved(*finerBefore));
+    const SparseVolume& b = coarser.emplace_back(halved(*finerNow));
+    levels.emplace_back(&a, &b);
   }
   MotionField motion({}, {});
-  for (int level = kLevels; level-- > 0;) {
-    Level frames(befores[std::size_t(level)], nows[std::size_t(level)]);
-    if (level + 1 < kLevels) frames.begin(motion);
+  for (std::size_t level = levels.size(); level-- > 0;) {
+    Level frames(*levels[level].first, *levels[level].second);
+    if (level + 1 < levels.size()) frames.begin(motion);
     for (int n = 0; n < kIterations; ++n) frames.improve();
     motion = frames.field();
   }
@@ -273,9 +279,9 @@ Field moved(Field field, const MotionField& motion) {
   for (Chunk& chunk : field.chunks) {
     auto& center = chunk.ellipsoids.center;
     for (std::size_t i = 0; i < chunk.ellipsoids.size(); ++i) {
-      const Vector3 by = motion.at({double(chunk.origin.x) + center[0][i],
-                                    double(chunk.origin.y) + center[1][i],
-                                    double(chunk.origin.z) + center[2][i]});
+      const Vector3 by =
+          motion.at({double(chunk.origin.x) + center[0][i], double(chunk.origin.y) + center[1][i],
+                     double(chunk.origin.z) + center[2][i]});
       for (std::size_t a = 0; a < 3; ++a) center[a][i] += float(by[a]);
     }
   }

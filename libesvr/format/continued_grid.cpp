@@ -86,8 +86,7 @@ StoredGrid getContinuedGrid(std::span<const std::byte> content, const std::strin
   getMaskOf(in, where, previous, budget, grid);
   grid.quantised.push_back(
       getContinued(in.getBytes(in.left()), where, previous.quantised[0], budget));
-  grid.field.chunks.push_back(
-      {previous.field.chunks[0].origin, dequantise(grid.quantised[0])});
+  grid.field.chunks.push_back({previous.field.chunks[0].origin, dequantise(grid.quantised[0])});
   if (const auto fault = faultOf(grid.field.chunks[0].ellipsoids)) in.fail(fault->text);
   return grid;
 }

@@ -1,6 +1,6 @@
 #include "format/continued_section.h"
 
-#include <algorithm>
+#include <cstdlib>
 
 #include "codec/continued_coder.h"
 #include "codec/symbol_coder.h"
@@ -20,7 +20,8 @@ bool sameCells(const Lattice& a, const Lattice& b) {
   return a.lowestCell == b.lowestCell && a.cellBits == b.cellBits;
 }
 
-void putCells(ByteWriter& out, const Lattice& lattice, const Lattice& before) {
+void putLattice(ByteWriter& out, const Lattice& lattice, const Lattice& before) {
+  out.put(std::int8_t(*codec::refinementOf(lattice, before)));
   const bool same = sameCells(lattice, before);
   out.put(std::uint8_t(same ? Cells::kSame : Cells::kOwn));
   if (same) return;
@@ -29,14 +30,18 @@ void putCells(ByteWriter& out, const Lattice& lattice, const Lattice& before) {
   out.put(std::uint8_t(lattice.cellBits));
 }
 
-Lattice getCells(ByteReader& in, const Lattice& before) {
-  Lattice lattice = before;
+Lattice getLattice(ByteReader& in, const Lattice& before) {
+  const int octaves = in.get<std::int8_t>();
+  if (std::abs(octaves) > codec::kMaxRefinement)
+    in.fail("the steps change by " + std::to_string(octaves) + " octaves");
+  Lattice lattice = codec::refined(before, octaves);
   if (in.getEnum(Cells::kSame, "cells of a lattice") == Cells::kSame) return lattice;
   lattice.lowestCell.x = in.get<std::int32_t>();
   lattice.lowestCell.y = in.get<std::int32_t>();
   lattice.lowestCell.z = in.get<std::int32_t>();
   lattice.cellBits = in.get<std::uint8_t>();
   if (lattice.cellBits > Lattice::kMaxCellBits) in.fail("the lattice has too many cells");
+  if (!codec::refinementOf(lattice, before)) in.fail("the cells lie too far from those before");
   return lattice;
 }
 
@@ -65,7 +70,7 @@ void getNew(ByteReader& in, QuantisedEllipsoids& q) {
 
 bool canContinue(const QuantisedEllipsoids& q, const QuantisedEllipsoids& before) {
   return !q.continues.empty() && q.continues.back() < before.size() &&
-         codec::continues(q.lattice, before.lattice);
+         codec::refinementOf(q.lattice, before.lattice);
 }
 
 std::vector<std::byte> putContinued(const QuantisedEllipsoids& q,
@@ -75,7 +80,7 @@ std::vector<std::byte> putContinued(const QuantisedEllipsoids& q,
   codec::codeContinued(writer, before, written);
   const auto stream = writer.coder.finish();
   ByteWriter out;
-  putCells(out, q.lattice, before.lattice);
+  putLattice(out, q.lattice, before.lattice);
   putVarint(out, newOnes(q).count);
   putVarint(out, stream.size());
   out.putAll(stream);
@@ -88,7 +93,7 @@ QuantisedEllipsoids getContinued(std::span<const std::byte> content, const std::
                                  const QuantisedEllipsoids& before, MemoryBudget& budget) {
   ByteReader in(content, where);
   QuantisedEllipsoids q;
-  q.lattice = getCells(in, before.lattice);
+  q.lattice = getLattice(in, before.lattice);
   const std::uint64_t added = getVarint(in);
   checkCount(in, added, added, content.size());
   budget.take(double(before.size() + added) * kDecodedBytesPerEllipsoid, where);

@@ -4,8 +4,8 @@
 #include <limits>
 #include <utility>
 
-#include "esvr/error.h"
 #include "codec/frame_coder.h"
+#include "esvr/error.h"
 #include "format/bricks_stream.h"
 #include "format/predicted_stream.h"
 #include "format/voxel_section.h"

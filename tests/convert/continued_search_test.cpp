@@ -1,0 +1,133 @@
+// Plan: blobs move from frame to frame. The second frame continues the ellipsoids of the first one,
+// reaches its PSNR and takes a part of the bytes. A reader gets the same grid. A frame that has
+// nothing in common with the previous one is fitted anew. The bytes do not depend on threads.
+
+#include "convert/continued_search.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+
+#include "convert/volumes.h"
+#include "esvr/frame_coding.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr {
+namespace {
+
+constexpr double kPsnr = 40.0;
+const GridDescriptor kDescriptor;
+
+/// Forty blobs that have moved by a shear and a translation.
+SparseVolume frameAt(double time) {
+  test::Random random(11);
+  std::array<std::array<double, 4>, 40> blobs;
+  for (auto& [x, y, z, width] : blobs) {
+    x = random(8, 40), y = random(8, 40), z = random(8, 40), width = random(2, 4);
+    x += time * (1.5 + 0.02 * y), y += 0.8 * time;
+  }
+  return test::volumeOf({}, 6, 0.0f, [&](Coord v) {
+    double sum = 0.0;
+    for (const auto& [x, y, z, width] : blobs)
+      sum += std::exp(-((v.x - x) * (v.x - x) + (v.y - y) * (v.y - y) + (v.z - z) * (v.z - z)) /
+                      (2.0 * width * width));
+    return float(sum);
+  });
+}
+
+ConvertOptions optionsFor(const Goal& goal) {
+  ConvertOptions options;
+  options.goal = goal;
+  options.representation = Representation::kEllipsoids;
+  options.fit.iterations = 200;
+  return options;
+}
+
+StoredGrid convertedAfter(const SparseVolume& volume, const StoredGrid* previous,
+                          const Goal& goal = PsnrGoal{kPsnr}) {
+  ConvertOptions options = optionsFor(goal);
+  options.previous = previous;
+  return convertVolume({kDescriptor, volume}, options).grid;
+}
+
+bool continues(const StoredGrid& grid) {
+  return grid.quantised.size() == 1 && !grid.quantised[0].continues.empty();
+}
+
+class Continued : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    first_ = std::make_unique<StoredGrid>(convertedAfter(frameAt(0.0), nullptr));
+  }
+  static void TearDownTestSuite() { first_.reset(); }
+  static inline std::unique_ptr<StoredGrid> first_;
+};
+
+TEST_F(Continued, FrameReachesItsPsnrWithFewerBytes) {
+  const SparseVolume volume = frameAt(1.0);
+  const StoredGrid grid = convertedAfter(volume, first_.get());
+  ASSERT_TRUE(continues(grid));
+  EXPECT_GE(psnrOverBox(volume, decodeGrid(grid)), kPsnr);
+  EXPECT_LT(double(bytesInFrame(grid, first_.get())), 0.7 * double(bytesAdded(grid)));
+  EXPECT_GT(double(grid.quantised[0].continues.size()), 0.8 * double(grid.quantised[0].size()));
+}
+
+TEST_F(Continued, FramesFollowEachOther) {
+  StoredGrid previous = *first_;
+  for (int frame = 1; frame <= 3; ++frame) {
+    const SparseVolume volume = frameAt(frame);
+    StoredGrid grid = convertedAfter(volume, &previous);
+    EXPECT_TRUE(continues(grid)) << frame;
+    EXPECT_GE(psnrOverBox(volume, decodeGrid(grid)), kPsnr) << frame;
+    previous = std::move(grid);
+  }
+}
+
+TEST_F(Continued, MotionsOfTheEllipsoidsAreThoseOfTheBlobs) {
+  const StoredGrid grid = convertedAfter(frameAt(1.0), first_.get());
+  ASSERT_TRUE(continues(grid));
+  double along = 0.0;
+  const QuantisedEllipsoids& q = grid.quantised[0];
+  for (const std::int32_t m : q.motion[0]) along += m / 256.0;
+  // Blobs move by 1.5 to 2.3 voxels along x.
+  EXPECT_NEAR(along / double(q.motion[0].size()), 1.9, 0.5);
+}
+
+TEST_F(Continued, PresetsContinueToo) {
+  EXPECT_TRUE(continues(convertedAfter(frameAt(0.5), first_.get(), PresetGoal{})));
+}
+
+TEST_F(Continued, OtherGoalsDoNot) {
+  EXPECT_FALSE(continues(convertedAfter(frameAt(0.5), first_.get(), SizeGoal{900})));
+}
+
+TEST_F(Continued, AFrameWithoutLikenessIsFittedAnew) {
+  const SparseVolume other = test::tubeVolume();
+  const StoredGrid grid = convertedAfter(other, first_.get(), PsnrGoal{30.0});
+  EXPECT_GE(psnrOverBox(other, decodeGrid(grid)), 30.0);
+  EXPECT_LE(bytesInFrame(grid, first_.get()), bytesAdded(grid));
+}
+
+TEST_F(Continued, AFrameFarAwayIsFittedAnew) {
+  SparseVolume far = frameAt(0.0);
+  far.origin = far.origin + Coord{1 << 20, 0, 0};
+  const StoredGrid grid = convertedAfter(far, first_.get());
+  EXPECT_FALSE(continues(grid));
+  EXPECT_GE(psnrOverBox(far, decodeGrid(grid)), kPsnr);
+}
+
+TEST_F(Continued, BytesDoNotDependOnThreads) {
+  const auto bytes = [&] {
+    const EsvrFile file{{}, {convertedAfter(frameAt(1.0), first_.get())}};
+    const EsvrFile before{{}, {*first_}};
+    return encodeFrame(file, &before);
+  };
+  const auto all = bytes();
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(bytes(), all);
+}
+
+}  // namespace
+}  // namespace esvr
