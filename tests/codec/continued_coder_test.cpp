@@ -79,7 +79,7 @@ TEST(ContinuedCoder, BringsBackASignThatChanges) {
 TEST(ContinuedCoder, BringsBackOtherCells) {
   const QuantisedEllipsoids before = firstFrame(300);
   const Lattice moved = test::withMovedCells(before.lattice);
-  ASSERT_TRUE(continues(moved, before.lattice));
+  ASSERT_EQ(refinementOf(moved, before.lattice), 0);
   const QuantisedEllipsoids now = frameAfter(before, mostOf(before, 9), {}, moved);
   (void)expectComesBack(before, now);
   (void)expectComesBack(now, frameAfter(now, mostOf(now, 9), {}, before.lattice));
@@ -131,16 +131,26 @@ TEST(ContinuedCoder, TakesNearlyNothingForEllipsoidsThatDidNotChange) {
   EXPECT_LT(8 * expectComesBack(before, now), 10 * (16 + 1 + 10 * 12) + 32);
 }
 
-TEST(ContinuedCoder, LatticesDifferByTheirCellsOnly) {
+TEST(ContinuedCoder, BringsBackFinerAndCoarserSteps) {
+  const QuantisedEllipsoids before = firstFrame(300);
+  for (int octaves = -kMaxRefinement; octaves <= kMaxRefinement; ++octaves)
+    (void)expectComesBack(
+        before, frameAfter(before, mostOf(before, 9), {}, refined(before.lattice, octaves)));
+}
+
+TEST(ContinuedCoder, LatticesDifferByCellsAndOctavesOfSteps) {
   const Lattice lattice = firstFrame(50).lattice;
-  EXPECT_TRUE(continues(lattice, lattice));
-  EXPECT_TRUE(continues(test::withMovedCells(lattice), lattice));
+  for (int octaves = -kMaxRefinement; octaves <= kMaxRefinement; ++octaves)
+    EXPECT_EQ(refinementOf(test::withMovedCells(refined(lattice, octaves)), lattice), octaves);
   Lattice other = lattice;
-  other.scaleStep *= 2.0;
-  EXPECT_FALSE(continues(other, lattice));
+  other.scaleStep *= 1.5;
+  EXPECT_FALSE(refinementOf(other, lattice));
   other = lattice;
   other.signedIntensity = !lattice.signedIntensity;
-  EXPECT_FALSE(continues(other, lattice));
+  EXPECT_FALSE(refinementOf(other, lattice));
+  other = lattice;
+  other.lowestCell.y += std::int32_t(kMaxCellShift) + 1;
+  EXPECT_FALSE(refinementOf(other, lattice));
 }
 
 // ---- The choice of codes
@@ -331,8 +341,8 @@ TEST(ContinuedCoder, ReadsOrRefusesAnyBytes) {
   }
 }
 
-/// Positions of up to 22 bits in a single cell, which is the finest lattice, and cells at the other
-/// end of the integers.
+/// Positions of up to 22 bits in a single cell, which is the finest lattice, at the end of the
+/// integers, and cells as far away as can be.
 TEST(ContinuedCoder, ReadsOrRefusesBytesOfExtremeLattices) {
   QuantisedEllipsoids before = firstFrame(40);
   before.lattice.cellBits = 0;
@@ -341,7 +351,7 @@ TEST(ContinuedCoder, ReadsOrRefusesBytesOfExtremeLattices) {
   for (auto& plane : before.position)
     for (auto& code : plane) code &= (1u << Lattice::kMaxPositionBits) - 1;
   Lattice far = before.lattice;
-  far.lowestCell = {INT32_MAX, INT32_MIN, 0};
+  far.lowestCell = far.lowestCell + Coord{1 << 21, -(1 << 21), 1 << 21};
   QuantisedEllipsoids same = before;
   same.continues = allOf(before);
   (void)expectComesBack(before, same);

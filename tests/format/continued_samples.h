@@ -72,7 +72,7 @@ inline EsvrFile appended(SequenceWriter& writer, std::int64_t number, const Esvr
 }
 
 /// Writes the golden sequence of continued ellipsoids: a frame that stands alone, one with new
-/// ellipsoids, one with other cells, and one with a mask.
+/// ellipsoids, one with other cells and finer steps, and one with a mask.
 inline void writeContinuedSequence(const std::filesystem::path& path) {
   SequenceWriter writer(path, {true, PartialSequence::kReplace});
   const Change change;
@@ -82,7 +82,8 @@ inline void writeContinuedSequence(const std::filesystem::path& path) {
     return frameAfter(before(), mostOf(before(), 9), change, lattice);
   };
   last = appended(writer, 2, frameOf(gridOf(withNew(next(before().lattice), 12))), &last);
-  last = appended(writer, 3, frameOf(gridOf(next(withMovedCells(before().lattice)))), &last);
+  last = appended(
+      writer, 3, frameOf(gridOf(next(withMovedCells(codec::refined(before().lattice, 2))))), &last);
   (void)appended(writer, 4, frameOf(withMask(gridOf(next(before().lattice)), 0)), &last);
   (void)writer.finish();
 }

@@ -110,6 +110,16 @@ TEST(ContinuedFrame, ComesBackWithOtherCells) {
                         previous);
 }
 
+TEST(ContinuedFrame, ComesBackWithFinerAndCoarserSteps) {
+  const EsvrFile previous = firstFile();
+  const QuantisedEllipsoids& before = previous.grids[0].quantised[0];
+  for (const int octaves : {-2, 1, 3}) {
+    const Lattice lattice = codec::refined(before.lattice, octaves);
+    (void)expectContinues(
+        frameOf(gridOf(test::frameAfter(before, test::mostOf(before, 9), {}, lattice))), previous);
+  }
+}
+
 TEST(ContinuedFrame, ComesBackInEachOfSeveralGrids) {
   EsvrFile previous = firstFile(), frame = nextFile(previous);
   for (EsvrFile* file : {&previous, &frame})
@@ -161,7 +171,7 @@ TEST(ContinuedFrame, StandsAloneWhereTheLatticeOrTheOriginIsAnother) {
   EsvrFile otherOrigin = firstFile(), otherLattice = firstFile(), empty = firstFile();
   otherOrigin.grids[0].field.chunks[0].origin.x += 8;
   StoredGrid& grid = otherLattice.grids[0];
-  grid.quantised[0].lattice.intensityStep *= 2.0;
+  grid.quantised[0].lattice.scaleStep *= 1.5;
   grid.field.chunks[0].ellipsoids = dequantise(grid.quantised[0]);
   empty.grids[0].quantised.clear();
   empty.grids[0].field.chunks.clear();
@@ -225,7 +235,7 @@ TEST(ContinuedFrame, HasTheCodesAndBytesOfTheGoldenSequence) {
   SequenceReader reader(ESVR_GOLDEN_CONTINUED);
   ASSERT_EQ(reader.frames().size(), 4u);
   const std::array<std::uint64_t, 4> codes{9878378402168221528u, 4055967756162408075u,
-                                           2190701112065579476u, 14011637269432485736u};
+                                           1176396433574993199u, 8682976545001475940u};
   std::optional<EsvrFile> previous;
   for (std::size_t f = 0; f < 4; ++f) {
     const auto stored =
@@ -336,10 +346,10 @@ TEST(ContinuedSection, RefusesMoreNewEllipsoidsThanItsBytesCanHold) {
   const QuantisedEllipsoids before = test::firstFrame(10);
   const QuantisedEllipsoids now = test::frameAfter(before, test::allOf(before));
   auto bytes = format::putContinued(now, before);
-  ASSERT_EQ(bytes[1], std::byte{0});  // after the mark of cells that are the same
+  ASSERT_EQ(bytes[2], std::byte{0});  // after the octaves and the mark of cells that are the same
   const std::array<std::byte, 3> many{std::byte{0xff}, std::byte{0xff}, std::byte{0x7f}};
-  bytes.erase(bytes.begin() + 1);
-  bytes.insert(bytes.begin() + 1, many.begin(), many.end());
+  bytes.erase(bytes.begin() + 2);
+  bytes.insert(bytes.begin() + 2, many.begin(), many.end());
   MemoryBudget budget(kNoMemoryLimit);
   EXPECT_THAT([&] { (void)format::getContinued(bytes, "here", before, budget); },
               ThrowsMessage<BadInput>(HasSubstr("ellipsoids")));
