@@ -407,7 +407,7 @@ class ContinuedCoder {
     const std::int64_t guess = std::clamp<std::int64_t>(
         (places_[p_][a] + motion_.motion(a)) >> (kUnitBits - bits), 0, last);
     const auto context =
-        DifferenceModel::contextOf(motion_.expected() >> (kMagnitudeBits - 2 - bits));
+        DifferenceModel::contextOf((motion_.expected() << 2) >> (kMagnitudeBits - bits));
     const auto codeIt = [&](auto& any, std::int64_t code) {
       return guess + positions_[a].code(any, context, activity(), code - guess);
     };

@@ -246,10 +246,10 @@ class MaskSimplifier {
   }
 
   [[nodiscard]] MaskCounts count() const {
-    using Range = tbb::blocked_range<std::size_t>;
+    using MaskRange = tbb::blocked_range<std::size_t>;
     return tbb::parallel_reduce(
-        Range(0, masks_.size()), MaskCounts(),
-        [&](const Range& bricks, MaskCounts counts) {
+        MaskRange(0, masks_.size()), MaskCounts(),
+        [&](const MaskRange& bricks, MaskCounts counts) {
           for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)
             if (isUniform(b))
               counts.addUniform(masks_[b].test(0));

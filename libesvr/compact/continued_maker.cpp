@@ -13,9 +13,9 @@ namespace esvr {
 namespace {
 
 /// Iterations of the solver before shapes are rounded, and after.
-constexpr int kFirstIterations = 8, kIterations = 3;
+constexpr int kSolverStart = 8, kSolverIterations = 3;
 
-void append(const Ellipsoids& from, std::size_t i, Coord shift, Ellipsoids& to) {
+void appendEllipsoid(const Ellipsoids& from, std::size_t i, Coord shift, Ellipsoids& to) {
   const float shifts[] = {float(shift.x), float(shift.y), float(shift.z)};
   for (std::size_t a = 0; a < 3; ++a) {
     to.center[a].push_back(from.center[a][i] + shifts[a]);
@@ -26,7 +26,7 @@ void append(const Ellipsoids& from, std::size_t i, Coord shift, Ellipsoids& to) 
 }
 
 /// The field with the ellipsoids that continue others first, relative to an origin.
-Field ordered(const ContinuedFit& fit, std::vector<std::uint32_t>& continues) {
+Field continuedFirst(const ContinuedFit& fit, std::vector<std::uint32_t>& continues) {
   Field field = fit.grid.field;
   const Chunk own = std::move(field.chunks[0]);
   Chunk& chunk = field.chunks[0];
@@ -36,16 +36,16 @@ Field ordered(const ContinuedFit& fit, std::vector<std::uint32_t>& continues) {
   for (std::size_t i = 0; i < own.ellipsoids.size(); ++i) {
     if (fit.from[i] == kNoStart) continue;
     continues.push_back(fit.from[i]);
-    append(own.ellipsoids, i, shift, chunk.ellipsoids);
+    appendEllipsoid(own.ellipsoids, i, shift, chunk.ellipsoids);
   }
   for (std::size_t i = 0; i < own.ellipsoids.size(); ++i)
-    if (fit.from[i] == kNoStart) append(own.ellipsoids, i, shift, chunk.ellipsoids);
+    if (fit.from[i] == kNoStart) appendEllipsoid(own.ellipsoids, i, shift, chunk.ellipsoids);
   return field;
 }
 
-Ellipsoids part(const Ellipsoids& all, std::size_t first) {
+Ellipsoids ellipsoidsFrom(const Ellipsoids& all, std::size_t first) {
   Ellipsoids some;
-  for (std::size_t i = first; i < all.size(); ++i) append(all, i, {}, some);
+  for (std::size_t i = first; i < all.size(); ++i) appendEllipsoid(all, i, {}, some);
   return some;
 }
 
@@ -78,9 +78,9 @@ Lattice withCellsFor(const Ellipsoids& e, Lattice lattice) {
 }
 
 /// The precision of an ellipsoid's octave of weight, relative to those of the ellipsoids before.
-std::vector<std::uint8_t> precisionsOf(const Ellipsoids& all, std::span<const double> phi2,
-                                       std::span<const std::uint32_t> continues,
-                                       const QuantisedEllipsoids& before) {
+std::vector<std::uint8_t> newPrecisions(const Ellipsoids& all, std::span<const double> phi2,
+                                        std::span<const std::uint32_t> continues,
+                                        const QuantisedEllipsoids& before) {
   const auto octave = [&](std::size_t i) {
     return std::log2(std::max(std::abs(double(all.intensity[i])) * std::sqrt(phi2[i]), 1e-300));
   };
@@ -117,15 +117,15 @@ ContinuedMaker::ContinuedMaker(const ContinuedFit& fit, const TrialTarget& targe
               fit.grid.topology != TopologyKind::kThreshold},
       problem_(target_, target.device),
       before_(fit.previous.quantised[0]),
-      field_(ordered(fit, continues_)) {
+      field_(continuedFirst(fit, continues_)) {
   if (!anyContinues()) return;
   auto intensities = intensitiesOf(field_);
   problem_.setShapes(field_);
-  (void)problem_.solve(intensities, kFirstIterations);
+  (void)problem_.solve(intensities, kSolverStart);
   setIntensities(intensities, field_);
   const Ellipsoids& e = field_.chunks[0].ellipsoids;
-  precisions_ = precisionsOf(e, problem_.curvature(), continues_, before_);
-  added_ = part(e, continues_.size());
+  precisions_ = newPrecisions(e, problem_.curvature(), continues_, before_);
+  added_ = ellipsoidsFrom(e, continues_.size());
   refine(0);
 }
 
@@ -136,7 +136,7 @@ void ContinuedMaker::refine(int octaves) {
   fresh_ = quantise(added_, {lattice, precisions_}, order);
   fresh_.lattice = lattice;
   truncate(continues_.size(), e);
-  for (const std::size_t i : order) append(added_, i, {}, e);
+  for (const std::size_t i : order) appendEllipsoid(added_, i, {}, e);
 }
 
 Trial ContinuedMaker::make(double bitPrice) {
@@ -153,7 +153,7 @@ Trial ContinuedMaker::make(double bitPrice) {
   e.intensity = exact.intensity;
   problem_.setShapes(trial.field);
   auto intensities = intensitiesOf(trial.field);
-  (void)problem_.solve(intensities, kIterations);
+  (void)problem_.solve(intensities, kSolverIterations);
   quantiseIntensities(intensities, q);
   codec::chooseContinued(before_, {nullptr, intensities, bitPrice}, q);
   e = dequantise(q);

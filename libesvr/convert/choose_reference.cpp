@@ -145,7 +145,7 @@ struct AlikeGrid {
 };
 
 /// A reference, the voxels that it names, and the bytes of the sample with it.
-struct Trial {
+struct ReferenceTrial {
   VoxelReference reference;
   const VoxelLayer* of = nullptr;
   std::size_t bytes = std::numeric_limits<std::size_t>::max();
@@ -175,14 +175,14 @@ VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t gr
                                std::span<const std::size_t> candidates) {
   const VoxelLayer sample = middleOf(*grids[grid].voxels);
   const auto alike = mostAlike(grids, sample, candidates);
-  std::vector<Trial> trials(1);
+  std::vector<ReferenceTrial> trials(1);
   for (const AlikeGrid& candidate : alike)
     for (const VoxelReference& map : candidate.maps) trials.push_back({map, &candidate.part});
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t t) {
     if (const auto content = format::putRelated(sample, trials[t].reference, trials[t].of))
       trials[t].bytes = content->size();
   });
-  return std::ranges::min_element(trials, {}, &Trial::bytes)->reference;
+  return std::ranges::min_element(trials, {}, &ReferenceTrial::bytes)->reference;
 }
 
 StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,

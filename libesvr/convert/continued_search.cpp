@@ -21,15 +21,15 @@ namespace {
 
 // docs/lab-notes.md, "Ellipsoids of a sequence", has what was tried instead.
 /// Iterations of a fit. They are few, so that ellipsoids move no further than they have to.
-constexpr std::uint32_t kIterations = 60;
+constexpr std::uint32_t kContinuedIterations = 60;
 /// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
 /// nothing is changed.
-constexpr double kAim = 1.0, kMin = 0.6, kMax = 4.0;
+constexpr double kAimOver = 1.0, kMinOver = 0.6, kMaxOver = 4.0;
 /// dB by which all of these increase if the rounded ellipsoids do not reach the PSNR.
 constexpr double kFurther = 0.6;
-constexpr int kMaxFits = 5;
+constexpr int kMaxContinuedFits = 5;
 /// Largest growth of the number of ellipsoids in a frame; with more, a fit from seeds is better.
-constexpr double kMaxGrowth = 1.5;
+constexpr double kMaxContinuedGrowth = 1.5;
 
 /// Prices of a bit, in squares of a quantisation step: the largest one, the first that is tried, the
 /// least one that is worth a trial, and the share by which two prices may differ at the end.
@@ -73,10 +73,10 @@ class ContinuedSearch {
   }
 
   std::optional<Conversion> run() {
-    for (int n = 0; n < kMaxFits; ++n) {
+    for (int n = 0; n < kMaxContinuedFits; ++n) {
       fitOnce();
       if (fit_.end == FitEnd::kCancelled || !isInOneChunk()) return std::nullopt;
-      const bool isLast = n + 1 == kMaxFits;
+      const bool isLast = n + 1 == kMaxContinuedFits;
       if (!isNear() && !isLast && mayChange()) continue;
       if (over() > 0.0)
         if (auto found = quantised()) return found;
@@ -99,7 +99,7 @@ class ContinuedSearch {
   void fitOnce() {
     FitOptions options = job_.options.fit;
     options.count = std::max(wanted_, field_.ellipsoidCount());
-    options.iterations = std::min(plannedIterations(options), kIterations);
+    options.iterations = std::min(plannedIterations(options), kContinuedIterations);
     options.start = &field_;
     options.keepsStart = true;
     options.kappa = previous_.field.kernel.kappa;
@@ -121,14 +121,16 @@ class ContinuedSearch {
 
   /// dB of the sum over the PSNR, as the device of the fit measures it.
   [[nodiscard]] double over() const { return fit_.curve.back().psnrBox - psnr_; }
-  [[nodiscard]] bool isNear() const { return over() >= kMin + margin_ && over() <= kMax + margin_; }
+  [[nodiscard]] bool isNear() const {
+    return over() >= kMinOver + margin_ && over() <= kMaxOver + margin_;
+  }
 
   /// Chooses the number of ellipsoids of the next fit. \return false if none promises to do
   [[nodiscard]] bool mayChange() {
     const auto count = double(field_.ellipsoidCount());
-    const double next = countFor({count, over()}, kAim + margin_, kDbPerDoubling);
-    if (over() > kMax + margin_) {
-      wanted_ = std::size_t(std::max(next, count / kMaxGrowth));
+    const double next = countFor({count, over()}, kAimOver + margin_, kDbPerDoubling);
+    if (over() > kMaxOver + margin_) {
+      wanted_ = std::size_t(std::max(next, count / kMaxContinuedGrowth));
       if (wanted_ >= field_.ellipsoidCount()) return false;
       std::vector<std::uint32_t> kept;
       field_ = withoutWeakest(field_, wanted_, kept);
@@ -137,8 +139,8 @@ class ContinuedSearch {
       from_ = std::move(from);
       return true;
     }
-    const auto most =
-        std::min(kMaxGrowth * double(previous_.field.ellipsoidCount()), double(maxCount()));
+    const auto most = std::min(kMaxContinuedGrowth * double(previous_.field.ellipsoidCount()),
+                               double(maxCount()));
     if (count >= most) return false;
     wanted_ = std::size_t(std::ceil(std::clamp(next, count + 1.0, most)));
     return true;
@@ -231,12 +233,12 @@ class ContinuedSearch {
   Field field_;                      ///< the ellipsoids so far
   std::vector<std::uint32_t> from_;  ///< those of the previous frame that they continue
   std::size_t wanted_ = 0;           ///< number of ellipsoids of the next fit
-  double margin_ = 0.0;              ///< dB that are added to kAim, kMin and kMax
+  double margin_ = 0.0;              ///< dB that are added to kAimOver, kMinOver and kMaxOver
   FitResult fit_;                    ///< the last fit
 };
 
 /// True if all places of a box have their full precision relative to the origin of a chunk.
-bool isNear(Coord origin, const Box& box) {
+bool isNearOrigin(Coord origin, const Box& box) {
   if (box.empty()) return false;
   for (const auto axis : kAxes) {
     const std::int64_t low = std::int64_t(box.min.*axis) - origin.*axis;
@@ -255,7 +257,7 @@ bool mayContinue(const Job& job) {
          job.options.fit.fitFor == FitFor::kVoxels && !job.options.fit.narrowBand &&
          !job.options.fit.kappa && job.options.storage.form == Storage::kCompact &&
          job.options.representation != Representation::kVoxels &&
-         isNear(previous->field.chunks[0].origin, activeBox(job.input.source));
+         isNearOrigin(previous->field.chunks[0].origin, activeBox(job.input.source));
 }
 
 std::optional<Conversion> continueTo(const Job& job, double psnr) {

@@ -48,9 +48,7 @@ class Converter {
   Conversion operator()(const FitGoal&) const {
     const FitOptions& options = job_.options.fit;
     return convert::unlessExactIsSmaller(job_, [&] {
-      StorageOptions storage = job_.options.storage;
-      storage.activity = convert::activityForSize(job_, expectedBytes());
-      return stored(job_.input, fit(job_.input.source, options), options, storage);
+      return stored(job_.input, fit(job_.input.source, options), options, job_.options.storage);
     });
   }
   Conversion operator()(const PresetGoal& goal) const {
@@ -70,13 +68,6 @@ class Converter {
   Conversion operator()(const LosslessGoal&) const { return convert::convertLossless(job_); }
 
  private:
-  /// Bytes that the ellipsoids of a single fit usually take.
-  [[nodiscard]] std::uint64_t expectedBytes() const {
-    const std::uint64_t voxels = activeVoxelCount(job_.input.source);
-    return std::uint64_t(convert::kBytesPerEllipsoid *
-                         double(plannedCount(job_.options.fit, voxels)));
-  }
-
   Job job_;
 };
 

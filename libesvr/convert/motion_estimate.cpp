@@ -12,8 +12,8 @@
 namespace esvr::convert {
 namespace {
 
-constexpr std::size_t kLevels = 4;  // from voxels to means of 8^3 voxels
-constexpr int kIterations = 3;      // of a level
+constexpr std::size_t kLevels = 4;     // from voxels to means of 8^3 voxels
+constexpr int kIterationsOfLevel = 3;  // of a level
 /// Largest change of a motion in an iteration, in voxels of the level: gradients tell no more.
 constexpr double kLargestChange = 1.0;
 /// Share of the mean curvature of all windows that is added to that of a window, so that motions
@@ -141,9 +141,9 @@ struct Normal {
 };
 
 /// Two frames of one level, and the motion between them.
-class Level {
+class FramePair {
  public:
-  Level(const SparseVolume& before, const SparseVolume& now)
+  FramePair(const SparseVolume& before, const SparseVolume& now)
       : before_(before),
         now_(now),
         bricks_(absoluteBricks(before)),
@@ -267,9 +267,9 @@ MotionField estimateMotion(const SparseVolume& before, const SparseVolume& now) 
   }
   MotionField motion({}, {});
   for (std::size_t level = levels.size(); level-- > 0;) {
-    Level frames(*levels[level].first, *levels[level].second);
+    FramePair frames(*levels[level].first, *levels[level].second);
     if (level + 1 < levels.size()) frames.begin(motion);
-    for (int n = 0; n < kIterations; ++n) frames.improve();
+    for (int n = 0; n < kIterationsOfLevel; ++n) frames.improve();
     motion = frames.field();
   }
   return motion;

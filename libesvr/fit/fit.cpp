@@ -1,6 +1,7 @@
 #include "esvr/fit.h"
 
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -41,7 +42,8 @@ std::vector<std::uint32_t> startsOf(const FitState& all, std::size_t starts, std
   std::vector<std::uint32_t> startOf;
   std::size_t i = 0;
   for (const Ellipsoid& p : kept) {
-    while (all.ellipsoids[i].center != p.center) ++i;
+    while (i < all.ellipsoids.size() && all.ellipsoids[i].center != p.center) ++i;
+    if (i == all.ellipsoids.size()) throw std::logic_error("a fit lost the order of ellipsoids");
     const bool isStart = i < starts && all.adam[i].steps == steps;
     startOf.push_back(isStart ? std::uint32_t(i) : kNoStart);
     ++i;

@@ -69,7 +69,7 @@ std::optional<std::vector<std::byte>> putContinuedGrid(const StoredGrid& grid,
     return std::nullopt;
   const QuantisedEllipsoids& before = previous.quantised[0];
   const QuantisedEllipsoids q = continuing(grid.quantised[0], before);
-  if (!canContinue(q, before)) return std::nullopt;
+  if (!canContinue(q, before) || !canFollow(maskOf(grid), maskOf(previous))) return std::nullopt;
   ByteWriter out;
   putRecordAfter(out, grid, previous);
   putMaskOf(out, grid, previous);

@@ -69,8 +69,12 @@ void getNew(ByteReader& in, QuantisedEllipsoids& q) {
 }  // namespace
 
 bool canContinue(const QuantisedEllipsoids& q, const QuantisedEllipsoids& before) {
-  return !q.continues.empty() && q.continues.back() < before.size() &&
-         codec::refinementOf(q.lattice, before.lattice);
+  const auto& from = q.continues;
+  if (from.empty() || from.back() >= before.size() || from.size() > q.size()) return false;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    if ((i > 0 && from[i] <= from[i - 1]) || q.precision[i] != before.precision[from[i]])
+      return false;
+  return codec::refinementOf(q.lattice, before.lattice).has_value();
 }
 
 std::vector<std::byte> putContinued(const QuantisedEllipsoids& q,

@@ -13,7 +13,7 @@
 namespace esvr::format {
 
 /// True if ellipsoids can be stored as the continuation of others: some of them continue ellipsoids
-/// of `before`, and the lattices agree.
+/// of `before`, in their order and with their precisions, and the lattices agree.
 [[nodiscard]] bool canContinue(const QuantisedEllipsoids& q, const QuantisedEllipsoids& before);
 
 /// \param q  canContinue() is true

@@ -28,7 +28,7 @@ BrickMask inverse(BrickMask mask) {
 
 /// A mask as a layer with the codes 1 for active voxels and 0 for others, so that a frame is searched
 /// for its motion.
-VoxelLayer layerOf(std::span<const Coord> bricks, std::span<const BrickMask> active) {
+VoxelLayer maskLayer(std::span<const Coord> bricks, std::span<const BrickMask> active) {
   VoxelLayer layer;
   layer.form = VoxelForm::kQuantised;
   layer.divisor = 1.0;
@@ -51,7 +51,7 @@ Mask maskOf(VoxelLayer layer) {
 }
 
 /// Largest number of bricks: the previous mask, its neighbours and the stream limit it.
-constexpr auto kAnyBricks = std::numeric_limits<std::uint64_t>::max();
+constexpr auto kAnyMaskBricks = std::numeric_limits<std::uint64_t>::max();
 
 }  // namespace
 
@@ -79,11 +79,16 @@ Mask getMask(std::span<const std::byte> content, const std::string& where, Memor
   return maskOf(std::move(layer));
 }
 
+bool canFollow(const Mask& mask, const Mask& previous) {
+  return codec::isPredictable(maskLayer(mask.bricks, mask.active),
+                              maskLayer(previous.bricks, previous.active));
+}
+
 std::vector<std::byte> putMaskAfter(std::span<const Coord> bricks,
                                     std::span<const BrickMask> active, const Mask& previous) {
   requireBricks(bricks);
-  const VoxelLayer layer = layerOf(bricks, active);
-  const VoxelLayer before = layerOf(previous.bricks, previous.active);
+  const VoxelLayer layer = maskLayer(bricks, active);
+  const VoxelLayer before = maskLayer(previous.bricks, previous.active);
   if (!codec::isPredictable(layer, before))
     throw RuntimeFailure("a mask lies too far from that of the previous frame");
   ByteWriter out;
@@ -95,16 +100,16 @@ std::vector<std::byte> putMaskAfter(std::span<const Coord> bricks,
 Mask getMaskAfter(std::span<const std::byte> content, const std::string& where,
                   const Mask& previous, MemoryBudget& budget) {
   ByteReader in(content, where);
-  VoxelLayer layer = layerOf({}, {});
+  VoxelLayer layer = maskLayer({}, {});
   layer.origin.x = in.get<std::int32_t>();
   layer.origin.y = in.get<std::int32_t>();
   layer.origin.z = in.get<std::int32_t>();
   if (localOf(layer.origin) != Coord{}) in.fail("a mask begins within a brick");
   layer.codes = VoxelArray<std::int32_t>(budget.voxels());
-  const VoxelLayer before = layerOf(previous.bricks, previous.active);
+  const VoxelLayer before = maskLayer(previous.bricks, previous.active);
   if (!codec::isPredictable(layer, before)) in.fail("lies too far from the previous frame");
   try {
-    decodePredicted(in, codec::PastVoxels(before, layer), kAnyBricks, {where, budget}, layer);
+    decodePredicted(in, codec::PastVoxels(before, layer), kAnyMaskBricks, {where, budget}, layer);
   } catch (const BadInput& error) {
     in.fail(error.what());
   }

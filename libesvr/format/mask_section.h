@@ -25,6 +25,9 @@ struct Mask {
 [[nodiscard]] Mask getMask(std::span<const std::byte> content, const std::string& where,
                            MemoryBudget& budget);
 
+/// True if a mask can be stored as its difference from another one: it does not lie too far away.
+[[nodiscard]] bool canFollow(const Mask& mask, const Mask& previous);
+
 /// A mask as its difference from that of the previous frame, which usually takes fewer bytes.
 /// \param previous  the previous mask; without bricks if there is none
 /// \throws RuntimeFailure  as for putMask

@@ -31,8 +31,7 @@ void expectFound(Coord corner, const Vector3& by, double tolerance) {
   const Vector3 from{kMiddle, kMiddle, kMiddle};
   const Vector3 to{from[0] + by[0], from[1] + by[1], from[2] + by[2]};
   const MotionField motion = estimateMotion(blobsAt(corner, from), blobsAt(corner, to));
-  const Vector3 found =
-      motion.at({corner.x + from[0], corner.y + from[1], corner.z + from[2]});
+  const Vector3 found = motion.at({corner.x + from[0], corner.y + from[1], corner.z + from[2]});
   for (std::size_t a = 0; a < 3; ++a) EXPECT_NEAR(found[a], by[a], tolerance) << "axis " << a;
 }
 
