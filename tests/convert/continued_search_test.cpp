@@ -17,11 +17,11 @@
 namespace esvr {
 namespace {
 
-constexpr double kPsnr = 40.0;
-const GridDescriptor kDescriptor;
+constexpr double kFramePsnr = 40.0;
+const GridDescriptor kFrameDescriptor;
 
 /// Forty blobs that have moved by a shear and a translation.
-SparseVolume frameAt(double time) {
+SparseVolume movedFrame(double time) {
   test::Random random(11);
   std::array<std::array<double, 4>, 40> blobs;
   for (auto& [x, y, z, width] : blobs) {
@@ -37,7 +37,7 @@ SparseVolume frameAt(double time) {
   });
 }
 
-ConvertOptions optionsFor(const Goal& goal) {
+ConvertOptions frameOptions(const Goal& goal) {
   ConvertOptions options;
   options.goal = goal;
   options.representation = Representation::kEllipsoids;
@@ -45,31 +45,31 @@ ConvertOptions optionsFor(const Goal& goal) {
   return options;
 }
 
-StoredGrid convertedAfter(const SparseVolume& volume, const StoredGrid* previous,
-                          const Goal& goal = PsnrGoal{kPsnr}) {
-  ConvertOptions options = optionsFor(goal);
+StoredGrid convertedFrame(const SparseVolume& volume, const StoredGrid* previous,
+                          const Goal& goal = PsnrGoal{kFramePsnr}) {
+  ConvertOptions options = frameOptions(goal);
   options.previous = previous;
-  return convertVolume({kDescriptor, volume}, options).grid;
+  return convertVolume({kFrameDescriptor, volume}, options).grid;
 }
 
-bool continues(const StoredGrid& grid) {
+bool continuesFrame(const StoredGrid& grid) {
   return grid.quantised.size() == 1 && !grid.quantised[0].continues.empty();
 }
 
 class Continued : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    first_ = std::make_unique<StoredGrid>(convertedAfter(frameAt(0.0), nullptr));
+    first_ = std::make_unique<StoredGrid>(convertedFrame(movedFrame(0.0), nullptr));
   }
   static void TearDownTestSuite() { first_.reset(); }
   static inline std::unique_ptr<StoredGrid> first_;
 };
 
 TEST_F(Continued, FrameReachesItsPsnrWithFewerBytes) {
-  const SparseVolume volume = frameAt(1.0);
-  const StoredGrid grid = convertedAfter(volume, first_.get());
-  ASSERT_TRUE(continues(grid));
-  EXPECT_GE(psnrOverBox(volume, decodeGrid(grid)), kPsnr);
+  const SparseVolume volume = movedFrame(1.0);
+  const StoredGrid grid = convertedFrame(volume, first_.get());
+  ASSERT_TRUE(continuesFrame(grid));
+  EXPECT_GE(psnrOverBox(volume, decodeGrid(grid)), kFramePsnr);
   EXPECT_LT(double(bytesInFrame(grid, first_.get())), 0.7 * double(bytesAdded(grid)));
   EXPECT_GT(double(grid.quantised[0].continues.size()), 0.8 * double(grid.quantised[0].size()));
 }
@@ -77,17 +77,17 @@ TEST_F(Continued, FrameReachesItsPsnrWithFewerBytes) {
 TEST_F(Continued, FramesFollowEachOther) {
   StoredGrid previous = *first_;
   for (int frame = 1; frame <= 3; ++frame) {
-    const SparseVolume volume = frameAt(frame);
-    StoredGrid grid = convertedAfter(volume, &previous);
-    EXPECT_TRUE(continues(grid)) << frame;
-    EXPECT_GE(psnrOverBox(volume, decodeGrid(grid)), kPsnr) << frame;
+    const SparseVolume volume = movedFrame(frame);
+    StoredGrid grid = convertedFrame(volume, &previous);
+    EXPECT_TRUE(continuesFrame(grid)) << frame;
+    EXPECT_GE(psnrOverBox(volume, decodeGrid(grid)), kFramePsnr) << frame;
     previous = std::move(grid);
   }
 }
 
 TEST_F(Continued, MotionsOfTheEllipsoidsAreThoseOfTheBlobs) {
-  const StoredGrid grid = convertedAfter(frameAt(1.0), first_.get());
-  ASSERT_TRUE(continues(grid));
+  const StoredGrid grid = convertedFrame(movedFrame(1.0), first_.get());
+  ASSERT_TRUE(continuesFrame(grid));
   double along = 0.0;
   const QuantisedEllipsoids& q = grid.quantised[0];
   for (const std::int32_t m : q.motion[0]) along += m / 256.0;
@@ -96,31 +96,31 @@ TEST_F(Continued, MotionsOfTheEllipsoidsAreThoseOfTheBlobs) {
 }
 
 TEST_F(Continued, PresetsContinueToo) {
-  EXPECT_TRUE(continues(convertedAfter(frameAt(0.5), first_.get(), PresetGoal{})));
+  EXPECT_TRUE(continuesFrame(convertedFrame(movedFrame(0.5), first_.get(), PresetGoal{})));
 }
 
 TEST_F(Continued, OtherGoalsDoNot) {
-  EXPECT_FALSE(continues(convertedAfter(frameAt(0.5), first_.get(), SizeGoal{900})));
+  EXPECT_FALSE(continuesFrame(convertedFrame(movedFrame(0.5), first_.get(), SizeGoal{900})));
 }
 
 TEST_F(Continued, AFrameWithoutLikenessIsFittedAnew) {
   const SparseVolume other = test::tubeVolume();
-  const StoredGrid grid = convertedAfter(other, first_.get(), PsnrGoal{30.0});
+  const StoredGrid grid = convertedFrame(other, first_.get(), PsnrGoal{30.0});
   EXPECT_GE(psnrOverBox(other, decodeGrid(grid)), 30.0);
   EXPECT_LE(bytesInFrame(grid, first_.get()), bytesAdded(grid));
 }
 
 TEST_F(Continued, AFrameFarAwayIsFittedAnew) {
-  SparseVolume far = frameAt(0.0);
+  SparseVolume far = movedFrame(0.0);
   far.origin = far.origin + Coord{1 << 20, 0, 0};
-  const StoredGrid grid = convertedAfter(far, first_.get());
-  EXPECT_FALSE(continues(grid));
-  EXPECT_GE(psnrOverBox(far, decodeGrid(grid)), kPsnr);
+  const StoredGrid grid = convertedFrame(far, first_.get());
+  EXPECT_FALSE(continuesFrame(grid));
+  EXPECT_GE(psnrOverBox(far, decodeGrid(grid)), kFramePsnr);
 }
 
 TEST_F(Continued, BytesDoNotDependOnThreads) {
   const auto bytes = [&] {
-    const EsvrFile file{{}, {convertedAfter(frameAt(1.0), first_.get())}};
+    const EsvrFile file{{}, {convertedFrame(movedFrame(1.0), first_.get())}};
     const EsvrFile before{{}, {*first_}};
     return encodeFrame(file, &before);
   };

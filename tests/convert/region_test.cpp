@@ -37,7 +37,7 @@ void expectRegion(const SparseVolume& source, const StoredGrid& grid, const std:
   EXPECT_GT(compareVolumes(source, decoded).iou, kMinOverlap) << what;
 }
 
-ConvertOptions optionsFor(const Goal& goal, Representation representation) {
+ConvertOptions regionOptions(const Goal& goal, Representation representation) {
   ConvertOptions options;
   options.goal = goal;
   options.representation = representation;
@@ -47,7 +47,7 @@ ConvertOptions optionsFor(const Goal& goal, Representation representation) {
   return options;
 }
 
-const GridDescriptor kDescriptor;
+const GridDescriptor kRegionDescriptor;
 
 TEST(RegionOfConversion, StaysForEveryGoalAndRepresentationSlow) {
   const SparseVolume source = faintCloud();
@@ -57,8 +57,8 @@ TEST(RegionOfConversion, StaysForEveryGoalAndRepresentationSlow) {
                              Goal{PsnrGoal{30.0}}, Goal{BoundGoal{0.05}}}) {
       if (representation == Representation::kVoxels && std::holds_alternative<FitGoal>(goal))
         continue;
-      const ConvertOptions options = optionsFor(goal, representation);
-      const StoredGrid grid = convertVolume({kDescriptor, source}, options).grid;
+      const ConvertOptions options = regionOptions(goal, representation);
+      const StoredGrid grid = convertVolume({kRegionDescriptor, source}, options).grid;
       const std::string what = "goal " + std::to_string(goal.index()) + ", representation " +
                                std::to_string(int(representation));
       expectRegion(source, grid, what);
@@ -75,8 +75,8 @@ TEST(RegionOfConversion, StaysForEveryGoalAndRepresentationSlow) {
 TEST(RegionOfConversion, HasNoMaskInASmallSize) {
   const SparseVolume source = faintCloud();
   for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
-    const auto options = optionsFor(SizeGoal{1100}, representation);
-    const StoredGrid grid = convertVolume({kDescriptor, source}, options).grid;
+    const auto options = regionOptions(SizeGoal{1100}, representation);
+    const StoredGrid grid = convertVolume({kRegionDescriptor, source}, options).grid;
     EXPECT_LE(bytesAdded(grid), 1100u);
     EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
     const Box box = activeBox(source), own = activeBox(decodeGrid(grid));
@@ -87,17 +87,18 @@ TEST(RegionOfConversion, HasNoMaskInASmallSize) {
 TEST(RegionOfConversion, StaysFarFromTheOrigin) {
   for (const int far : {10'000'000, -10'000'000}) {
     const SparseVolume source = faintCloud({far, -far, far});
-    const auto options = optionsFor(FitGoal{}, Representation::kEllipsoids);
-    expectRegion(source, convertVolume({kDescriptor, source}, options).grid, std::to_string(far));
+    const auto options = regionOptions(FitGoal{}, Representation::kEllipsoids);
+    expectRegion(source, convertVolume({kRegionDescriptor, source}, options).grid,
+                 std::to_string(far));
   }
 }
 
 TEST(RegionOfConversion, GivesUpTheOverlapWhereValuesAreAskedFor) {
   const SparseVolume source = faintCloud();
   for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
-    ConvertOptions options = optionsFor(PsnrGoal{30.0}, representation);
+    ConvertOptions options = regionOptions(PsnrGoal{30.0}, representation);
     options.storage.activity = Activity::kByValue;
-    const StoredGrid grid = convertVolume({kDescriptor, source}, options).grid;
+    const StoredGrid grid = convertVolume({kRegionDescriptor, source}, options).grid;
     EXPECT_EQ(grid.topology, TopologyKind::kThreshold);
     EXPECT_LT(compareVolumes(source, decodeGrid(grid)).iou, kMinOverlap);
   }
@@ -105,10 +106,10 @@ TEST(RegionOfConversion, GivesUpTheOverlapWhereValuesAreAskedFor) {
 
 TEST(RegionOfConversion, StaysInAFrameThatIsPredicted) {
   const SparseVolume first = faintCloud(), second = faintCloud({-16, 8, 4104});
-  ConvertOptions options = optionsFor(PresetGoal{}, Representation::kVoxels);
-  const StoredGrid before = convertVolume({kDescriptor, first}, options).grid;
+  ConvertOptions options = regionOptions(PresetGoal{}, Representation::kVoxels);
+  const StoredGrid before = convertVolume({kRegionDescriptor, first}, options).grid;
   options.previous = &before;
-  expectRegion(second, convertVolume({kDescriptor, second}, options).grid, "second frame");
+  expectRegion(second, convertVolume({kRegionDescriptor, second}, options).grid, "second frame");
 }
 
 void expectRegionOfFile(const std::string& path, const ConvertOptions& options) {
@@ -128,7 +129,7 @@ TEST(RegionOfConversion, StaysForAllGridsOfAFileRealFile) {
     ConvertOptions preset;
     preset.goal = PresetGoal{};
     expectRegionOfFile(folder + name, preset);
-    expectRegionOfFile(folder + name, optionsFor(FitGoal{}, Representation::kEllipsoids));
+    expectRegionOfFile(folder + name, regionOptions(FitGoal{}, Representation::kEllipsoids));
   }
 }
 

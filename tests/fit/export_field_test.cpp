@@ -29,11 +29,11 @@ ExportFrame frameAt(Coord origin) {
   return frame;
 }
 
-constexpr double kSide = kChunkExtent;
+constexpr double kChunkSide = kChunkExtent;
 
 TEST(ExportField, KeepsCentersALittleBeforeTheOriginInOneChunk) {
   const Field field =
-      exported({{-0.25, 3.0, 0.0}, {10.0, -7.5, kSide - 1.0}}, frameAt({8, 16, 24}));
+      exported({{-0.25, 3.0, 0.0}, {10.0, -7.5, kChunkSide - 1.0}}, frameAt({8, 16, 24}));
   ASSERT_EQ(field.chunks.size(), 1u);
   EXPECT_EQ(field.chunks[0].origin, (Coord{8, 16, 24}));
   const Ellipsoids& e = field.chunks[0].ellipsoids;
@@ -42,10 +42,10 @@ TEST(ExportField, KeepsCentersALittleBeforeTheOriginInOneChunk) {
 }
 
 TEST(ExportField, DividesCentersThatAreTooFarForOneChunk) {
-  const Field field =
-      exported({{-0.25, 0.0, 0.0}, {5.0, 0.0, 0.0}, {kSide + 1.5, 0.0, 0.0}}, frameAt({8, 0, 0}));
+  const Field field = exported({{-0.25, 0.0, 0.0}, {5.0, 0.0, 0.0}, {kChunkSide + 1.5, 0.0, 0.0}},
+                               frameAt({8, 0, 0}));
   ASSERT_EQ(field.chunks.size(), 3u);
-  const std::array<float, 3> centers{float(kSide) - 0.25f, 5.0f, 1.5f};
+  const std::array<float, 3> centers{float(kChunkSide) - 0.25f, 5.0f, 1.5f};
   for (std::size_t c = 0; c < 3; ++c) {
     EXPECT_EQ(field.chunks[c].origin, (Coord{8 + (int(c) - 1) * kChunkExtent, 0, 0}));
     EXPECT_EQ(field.chunks[c].ellipsoids.center[0], std::vector<float>{centers[c]});

@@ -178,8 +178,8 @@ TEST(RelatedVoxels, ThatReferToThemselvesOrALaterGridAreNotRead) {
 
 TEST(RelatedVoxels, WithAMapThatIsNotFiniteAreNotRead) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-  for (const auto& [gain, offset] : {std::pair(kNan, 0.0f), std::pair(1.0f, HUGE_VALF)})
-    EXPECT_THAT([&] { decode(withReference(1, gain, offset)); },
+  for (const auto& map : {std::pair(kNan, 0.0f), std::pair(1.0f, HUGE_VALF)})
+    EXPECT_THAT([&] { decode(withReference(1, map.first, map.second)); },
                 ThrowsMessage<BadInput>(HasSubstr("not finite")));
 }
 
