@@ -19,8 +19,9 @@ inline constexpr int kMaxRefinement = 3;
 /// Largest distance of the lowest cells of two frames along an axis.
 inline constexpr std::int64_t kMaxCellShift = std::int64_t{1} << 21;
 
-/// The number of octaves by which a lattice is a refinement of another one, whatever the number
-/// of its cells; nothing if it is none or its cells lie further away than kMaxCellShift, so that ellipsoids of one cannot continue those of the other.
+/// The number of octaves by which a lattice is a refinement of another one. The cells of the two may
+/// differ. The result is nothing if ellipsoids of one cannot continue those of the other, because
+/// it is no refinement or its lowest cell is further away than kMaxCellShift.
 [[nodiscard]] std::optional<int> refinementOf(const Lattice& lattice, const Lattice& before);
 
 /// Codes which ellipsoids of `before` are continued, and their codes in `now`.

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "codec/lattice_bits.h"
+
 namespace esvr {
 namespace {
-
-constexpr double kLargestComponent = 0.70710678118654752;  // of x, y and z
 
 double dot(const Quaternion& a, const Quaternion& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
@@ -18,8 +18,9 @@ std::array<Quaternion, 4> sameEllipsoid(const Quaternion& q) {
           Quaternion{-q[2], -q[3], q[0], q[1]}, Quaternion{-q[3], q[2], -q[1], q[0]}};
 }
 
+/// True if the components x, y and z lie in the interval that has codes.
 bool hasCodes(const Quaternion& q) {
-  return std::max({std::abs(q[1]), std::abs(q[2]), std::abs(q[3])}) <= kLargestComponent;
+  return std::max({std::abs(q[1]), std::abs(q[2]), std::abs(q[3])}) <= kRotationSide / 2.0;
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ class ContinuedMaker {
   std::vector<std::uint32_t> continues_;
   std::vector<std::uint8_t> precisions_;  ///< those of the ellipsoids that continue none
   Ellipsoids added_;                      ///< the same ellipsoids, in their first order
-  Field field_;  ///< in the order of the frame, relative to the previous frame's origin
+  Field field_;  ///< its ellipsoids have the order of the frame and the previous origin
   QuantisedEllipsoids fresh_;  ///< those that continue none
 };
 

@@ -12,8 +12,8 @@
 namespace esvr::convert {
 namespace {
 
-constexpr std::size_t kLevels = 4;     // from voxels to means of 8^3 voxels
-constexpr int kIterationsOfLevel = 3;  // of a level
+constexpr std::size_t kLevels = 4;  // from voxels to means of 8^3 voxels
+constexpr int kIterationsOfLevel = 3;
 /// Largest change of a motion in an iteration, in voxels of the level: gradients tell no more.
 constexpr double kLargestChange = 1.0;
 /// Share of the mean curvature of all windows that is added to that of a window, so that motions
