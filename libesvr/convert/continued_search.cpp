@@ -20,11 +20,11 @@ namespace esvr::convert {
 namespace {
 
 // docs/lab-notes.md, "Ellipsoids of a sequence", has what was tried instead.
-/// Iterations of a fit. They are few, so that ellipsoids move no further than they have to.
-constexpr std::uint32_t kContinuedIterations = 60;
+/// Iterations of a fit. They are few, since it begins with ellipsoids that fit almost.
+constexpr std::uint32_t kContinuedIterations = 120;
 /// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
 /// nothing is changed.
-constexpr double kAimOver = 1.0, kMinOver = 0.6, kMaxOver = 4.0;
+constexpr double kAimOver = 1.5, kMinOver = 1.0, kMaxOver = 4.0;
 /// dB by which all of these increase if the rounded ellipsoids do not reach the PSNR.
 constexpr double kFurther = 0.6;
 constexpr int kMaxContinuedFits = 5;

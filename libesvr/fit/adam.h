@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "esvr/kernel.h"
+#include "esvr/fit.h"
 #include "fit/ellipsoid.h"
 
 namespace esvr {
@@ -28,13 +28,20 @@ struct AdamOptions {
 /// First and second moments of one ellipsoid's gradient.
 struct AdamState {
   std::array<float, kParameters> m{}, v{};
-  std::uint32_t steps = 0;  ///< steps since the ellipsoid was placed
+  std::uint32_t steps = 0;         ///< steps since the ellipsoid was placed
+  std::uint32_t start = kNoStart;  ///< its place in FitOptions::start; kNoStart for seeds
 };
 
 /// Limits of the parameters.
 struct EllipsoidLimits {
   double smallestScale, largestScale;        ///< voxels
   double lowestIntensity, highestIntensity;  ///< units of the target
+};
+
+/// Keeps ellipsoids near the places where a fit began (start_penalty.h).
+struct StartPenalty {
+  const Ellipsoid* starts = nullptr;  ///< AdamState::start refers to them; borrowed
+  double weight = 0.0;                ///< 0: there is no penalty
 };
 
 /// The derivatives of one ellipsoid.
@@ -44,9 +51,16 @@ struct EllipsoidGradient {
   double byKappa;               ///< derivative by the kernel's edge at fixed scales
 };
 
+/// What a step of Adam needs besides the ellipsoids and their gradients.
+struct AdamStep {
+  StepSizes sizes;
+  AdamOptions options;
+  EllipsoidLimits limits;
+  StartPenalty penalty{};
+};
+
 /// Takes one step with every ellipsoid.
 void adamStep(std::span<Ellipsoid> ellipsoids, std::span<AdamState> states,
-              std::span<const EllipsoidGradient> gradients, const StepSizes& sizes,
-              const AdamOptions& options, const EllipsoidLimits& limits);
+              std::span<const EllipsoidGradient> gradients, const AdamStep& step);
 
 }  // namespace esvr

@@ -25,28 +25,25 @@ RunPlan planFor(const FitTarget& target, const FitOptions& options, const Tuning
   if (options.start) {
     plan.start = stateOf(importField(*options.start, origin, target.scale));
     plan.firstCount = plan.start.ellipsoids.size();
+    for (std::uint32_t i = 0; i < plan.firstCount; ++i) plan.start.adam[i].start = i;
   }
   plan.iterations = plannedIterations(options);
   plan.psnr = options.psnr;
   plan.seconds = options.seconds;
-  plan.learnKappa = !options.kappa;
+  plan.learnKappa = !options.kappa && !options.keepsStart;
   return plan;
 }
 
 /// The ellipsoids of the start that are still there, or kNoStart.
-/// \param all   the state at the end of the run: ellipsoids of the start keep their places, and those
-///              that were replaced have taken fewer steps
+/// \param all   the state at the end of the run
 /// \param kept  some of its ellipsoids, in the same order
-std::vector<std::uint32_t> startsOf(const FitState& all, std::size_t starts, std::uint32_t steps,
-                                    std::span<const Ellipsoid> kept) {
+std::vector<std::uint32_t> startsOf(const FitState& all, std::span<const Ellipsoid> kept) {
   std::vector<std::uint32_t> startOf;
   std::size_t i = 0;
   for (const Ellipsoid& p : kept) {
     while (i < all.ellipsoids.size() && all.ellipsoids[i].center != p.center) ++i;
     if (i == all.ellipsoids.size()) throw std::logic_error("a fit lost the order of ellipsoids");
-    const bool isStart = i < starts && all.adam[i].steps == steps;
-    startOf.push_back(isStart ? std::uint32_t(i) : kNoStart);
-    ++i;
+    startOf.push_back(all.adam[i++].start);
   }
   return startOf;
 }
@@ -62,6 +59,7 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
   const RunPlan plan = planFor(target, options, tuning, volume.origin);
   OptimiserOptions optimiserOptions{{}, options.seed, options.device, options.maxDeviceBytes};
   optimiserOptions.kernel.kappa = firstKappa(options, tuning);
+  if (options.keepsStart) optimiserOptions.starts = plan.start.ellipsoids;
 
   const auto optimiser = makeOptimiser(target, optimiserOptions, tuning);
   const RunEnd end = run(*optimiser, target, recorder, plan, tuning);
@@ -75,8 +73,7 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
   result.field = exportField(ellipsoids,
                              {volume.origin, target.scale, volume.background, optimiser->kernel()});
   result.field.fitFor = options.fitFor;
-  if (options.start && result.field.chunks.size() == 1)
-    result.startOf = startsOf(all, options.start->ellipsoidCount(), end.iterations, ellipsoids);
+  if (options.start && result.field.chunks.size() == 1) result.startOf = startsOf(all, ellipsoids);
   result.range = rangeOf(volume.background, target);
   result.kappaLearned = plan.learnKappa;
   result.end = end.end;

@@ -19,6 +19,7 @@ struct Tuning {
   double relocateUntil = 0.7;       ///< fraction of the run at which relocation ends
   double relocateShare = 0.05;      ///< share of the ellipsoids that an event relocates
   double keptRelocateShare = 0.01;  ///< the same for FitOptions::keepsStart
+  double startPenalty = 0.1;        ///< weight of StartPenalty for FitOptions::keepsStart
   double eventEvery = 0.01;         ///< fraction of the run between events
   int eventSpacing = 15;            ///< smallest number of iterations between events
   int graceSteps = 14;              ///< steps of a new ellipsoid before it can be relocated

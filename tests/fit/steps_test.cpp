@@ -20,7 +20,7 @@ TEST(Adam, FirstStepHasTheTunedSizeWhateverTheGradient) {
     std::vector<EllipsoidGradient> g(1);
     g[0].byParameter.fill(0.0);
     g[0].byParameter[0] = size;
-    adamStep(p, state, g, {0.1, 0.1, 0.1}, {}, {0.25, 64.0, -2.0, 2.0});
+    adamStep(p, state, g, {{0.1, 0.1, 0.1}, {}, {0.25, 64.0, -2.0, 2.0}});
     // Float32 moments round g^2. Below 1e-19 they would underflow, which the target's scale
     // excludes.
     if (size > 1e-19 && size < 1e19) {
@@ -36,7 +36,7 @@ TEST(Adam, KeepsIntensitiesInRange) {
   std::vector<EllipsoidGradient> g(1);
   g[0].byParameter.fill(0.0);
   g[0].byParameter[9] = 1.0;
-  for (int i = 0; i < 50; ++i) adamStep(p, state, g, {}, {}, {0.25, 64.0, 0.0, 1.5});
+  for (int i = 0; i < 50; ++i) adamStep(p, state, g, {{}, {}, {0.25, 64.0, 0.0, 1.5}});
   EXPECT_EQ(p[0].intensity, 0.0);
 }
 
@@ -49,7 +49,7 @@ std::array<double, 3> descend(double scale) {
     g[0].byParameter.fill(0.0);
     for (std::size_t a = 0; a < 3; ++a)
       g[0].byParameter[a] = scale * (p[0].center[a] - double(a + 1));
-    adamStep(p, state, g, {}, {}, {0.25, 64.0, 0.0, 1.5});
+    adamStep(p, state, g, {{}, {}, {0.25, 64.0, 0.0, 1.5}});
   }
   return p[0].center;
 }
@@ -71,7 +71,7 @@ TEST(Adam, LeavesALimitWhenTheGradientPointsBackInside) {
   g[0].byParameter.fill(0.0);
   const auto push = [&](double gradient, int steps) {
     for (int k = 3; k < 6; ++k) g[0].byParameter[std::size_t(k)] = gradient;
-    for (int i = 0; i < steps; ++i) adamStep(p, state, g, {}, {}, {kSmallest, 64.0, 0.0, 1.5});
+    for (int i = 0; i < steps; ++i) adamStep(p, state, g, {{}, {}, {kSmallest, 64.0, 0.0, 1.5}});
     return principalAxes(p[0].L).scale[2];
   };
   EXPECT_NEAR(push(1.0, 30), kSmallest, 1e-9);  // shrinks until the limit holds it
@@ -85,7 +85,7 @@ TEST(Adam, SlowKeepsAShapeValidOverAHundredThousandSteps) {
   std::vector<EllipsoidGradient> g(1);
   for (int i = 0; i < 100'000; ++i) {
     for (double& value : g[0].byParameter) value = random(-1.0, 1.0);
-    adamStep(p, state, g, {}, {}, {0.25, 16.0, 0.0, 1.5});
+    adamStep(p, state, g, {{}, {}, {0.25, 16.0, 0.0, 1.5}});
   }
   const PrincipalAxes axes = principalAxes(p[0].L);
   double norm2 = 0.0;

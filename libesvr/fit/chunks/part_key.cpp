@@ -48,7 +48,7 @@ class Hash {
 };
 
 static_assert(sizeof(Ellipsoid) == 13 * sizeof(double));
-static_assert(sizeof(AdamState) == (2 * kParameters + 1) * sizeof(float));
+static_assert(sizeof(AdamState) == (2 * kParameters + 2) * sizeof(float));
 
 void addOptions(Hash& hash, const FitOptions& options) {
   hash.add(options.seed);
@@ -74,6 +74,7 @@ void addPlan(Hash& hash, const RunPlan& plan) {
   hash.add(plan.learnKappa);
   hash.add(plan.from);
   hash.add(plan.to);
+  hash.add(std::uint64_t{sizeof(AdamState)});  // stored parts of another version are of no use
   hash.addAll(plan.start.ellipsoids);
   hash.addAll(plan.start.adam);
 }

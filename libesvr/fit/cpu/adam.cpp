@@ -4,19 +4,19 @@
 #include <tbb/parallel_for.h>
 
 #include "fit/adam_math.h"
+#include "fit/start_penalty.h"
 
 namespace esvr {
 
 void adamStep(std::span<Ellipsoid> ellipsoids, std::span<AdamState> states,
-              std::span<const EllipsoidGradient> gradients, const StepSizes& sizes,
-              const AdamOptions& options, const EllipsoidLimits& limits) {
+              std::span<const EllipsoidGradient> gradients, const AdamStep& step) {
   using Range = tbb::blocked_range<std::size_t>;
   tbb::parallel_for(Range(0, ellipsoids.size(), 64), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      const ParameterVector largest = largestStep(ellipsoids[i], sizes);
-      const ParameterVector step =
-          adamDirection(states[i], gradients[i].byParameter, options, largest);
-      moveWithin(ellipsoids[i], step, limits);
+      Ellipsoid& p = ellipsoids[i];
+      const ParameterVector gradient = penalised(gradients[i], p, states[i].start, step.penalty);
+      const ParameterVector largest = largestStep(p, step.sizes);
+      moveWithin(p, adamDirection(states[i], gradient, step.options, largest), step.limits);
     }
   });
 }

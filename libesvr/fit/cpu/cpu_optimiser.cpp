@@ -53,7 +53,12 @@ bool CpuOptimiser::anyOutgrown() const {
 void CpuOptimiser::step(double factor) {
   const double core = coreRadius(pass_.kernel(), tuning_.slack.missedShare);
   const std::vector<Ellipsoid> before = ellipsoids_;
-  adamStep(ellipsoids_, states_, gradients_, tuning_.steps.scaled(factor), tuning_.adam, limits_);
+  const double weight = options_.starts.empty() ? 0.0 : tuning_.startPenalty;
+  adamStep(ellipsoids_, states_, gradients_,
+           {.sizes = tuning_.steps.scaled(factor),
+            .options = tuning_.adam,
+            .limits = limits_,
+            .penalty = {options_.starts.data(), weight}});
   std::atomic<std::uint32_t> refused = 0;
   tbb::parallel_for(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
     if (refuseStep(listed_[i], core, before[i], ellipsoids_[i])) ++refused;

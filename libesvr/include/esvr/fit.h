@@ -82,8 +82,8 @@ struct FitOptions : CommonFitOptions {
   /// edge, and adds ellipsoids until there are `count`. The field must outlive the call. Null: the
   /// fit begins with seeds.
   const Field* start = nullptr;
-  /// Few ellipsoids of the start are replaced by seeds: a fifth of the usual number. The frames of a
-  /// sequence then have most of their ellipsoids in common.
+  /// Ellipsoids stay near those of the start where nothing is gained by moving them, and few of them
+  /// are replaced by seeds: a fifth of the usual number. The frames of a sequence then differ little.
   bool keepsStart = false;
 };
 

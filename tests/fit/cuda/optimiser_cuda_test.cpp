@@ -29,28 +29,44 @@ FitResult fitOn(const Device& device, const SparseVolume& volume) {
   return fit(volume, options);
 }
 
-class StepOnGpu : public test::CudaTest, public testing::WithParamInterface<double> {};
+struct StepCase {
+  std::string name;
+  double voxelShare;
+  bool fromStart;  ///< whether a penalty keeps the ellipsoids near a start
+};
+class StepOnGpu : public test::CudaTest, public testing::WithParamInterface<StepCase> {};
 
 TEST_P(StepOnGpu, IsThatOfTheCpu) {
   const SparseVolume volume = test::denseVolume();
   FitTarget target = makeTarget(volume, std::nullopt);
-  target.voxelShare = GetParam();
-  const auto start = test::randomEllipsoids(50, 1.0, 3.0);
-  const Tuning tuning;
-  CudaOptimiser onGpu(target, {}, tuning);
-  onGpu.setEllipsoids(start);
+  target.voxelShare = GetParam().voxelShare;
+  const auto begin = test::randomEllipsoids(50, 1.0, 3.0);
+  const auto starts = test::randomEllipsoids(50, 1.1, 2.9);
+  FitState state = stateOf(begin);
+  OptimiserOptions options;
+  Tuning tuning;
+  tuning.startPenalty = 100.0;  // large, so that the step is mostly that of the penalty
+  if (GetParam().fromStart) {
+    options.starts = starts;
+    for (std::uint32_t i = 0; i < begin.size(); i += 2) state.adam[i].start = i;
+  }
+  CudaOptimiser onGpu(target, options, tuning);
+  onGpu.setState(state);
   onGpu.iterate(std::array{0.5});
 
   CpuPass engine(target, kernelConstants<double>(Kernel{}));
-  engine.rebuild(start, 0.5 + kMaxOffset);
+  engine.rebuild(begin, 0.5 + kMaxOffset);
   engine.setOffset(offsetOf(0, target.voxelShare));
-  std::vector<EllipsoidGradient> gradients(start.size());
-  engine.gradients(start, gradients);
-  auto expected = start;
-  std::vector<AdamState> states(start.size());
-  adamStep(expected, states, gradients, tuning.steps.scaled(0.5), tuning.adam,
-           {tuning.smallestScale, tuning.largestScale, tuning.intensityHeadroom * target.lowest,
-            tuning.intensityHeadroom * target.highest});
+  std::vector<EllipsoidGradient> gradients(begin.size());
+  engine.gradients(begin, gradients);
+  auto expected = begin;
+  adamStep(expected, state.adam, gradients,
+           {.sizes = tuning.steps.scaled(0.5),
+            .options = tuning.adam,
+            .limits = {tuning.smallestScale, tuning.largestScale,
+                       tuning.intensityHeadroom * target.lowest,
+                       tuning.intensityHeadroom * target.highest},
+            .penalty = {starts.data(), GetParam().fromStart ? tuning.startPenalty : 0.0}});
   const auto found = onGpu.ellipsoids();
   // Adam's first step has the given size and the sign of the gradient. A component can differ only
   // if its gradient is lost in rounding, and then by twice the step.
@@ -60,9 +76,11 @@ TEST_P(StepOnGpu, IsThatOfTheCpu) {
       differing += std::abs(found[i].center[a] - expected[i].center[a]) > 1e-6;
   EXPECT_LE(differing, 2);
 }
-INSTANTIATE_TEST_SUITE_P(VoxelShare, StepOnGpu, testing::Values(1.0, 0.0), [](const auto& share) {
-  return share.param == 1.0 ? "AtVoxels" : "BetweenVoxels";
-});
+INSTANTIATE_TEST_SUITE_P(Steps, StepOnGpu,
+                         testing::Values(StepCase{"AtVoxels", 1.0, false},
+                                         StepCase{"BetweenVoxels", 0.0, false},
+                                         StepCase{"FromAStart", 1.0, true}),
+                         [](const auto& step) { return step.param.name; });
 
 // The rule of motion_bound.h decides when lists are built again, and not the number of steps that
 // were started at once, so batches do not change the result. With large steps, supports leave the
