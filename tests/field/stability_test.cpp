@@ -1,0 +1,213 @@
+// Plan: fields of all shapes, kernels and sizes are evaluated in float32 and measured. The difference
+// must stay below the bound of the arithmetic, and the bound within a factor of what it bounds, so
+// that it says something. A wrong evaluation, or one that is not finite, is found and named. The
+// figures of small fields are known by hand: overlap, cancellation, extremes, and correct digits.
+
+#include "esvr/stability.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <tbb/global_control.h>
+#include <cmath>
+#include <limits>
+
+#include "esvr/field.h"
+#include "field/random_field.h"
+#include "field/reference_brick.h"
+
+namespace esvr {
+namespace {
+
+using test::RandomFieldOptions;
+
+struct Shape {
+  const char* name;
+  RandomFieldOptions field;
+  KernelForm form = KernelForm::kContinuous;
+};
+std::ostream& operator<<(std::ostream& out, const Shape& shape) { return out << shape.name; }
+
+Field fieldOf(const Shape& shape) {
+  Field field = test::randomField(shape.field);
+  field.kernel.form = shape.form;
+  return field;
+}
+
+class Rounding : public testing::TestWithParam<Shape> {};
+
+// The bound adds the largest errors of all operations, as if all had the same sign. A typical error is
+// the square root of their number, some 10 times smaller, in a typical direction, which is again
+// smaller: it reaches between 1/1000 and 1/2 of the bound.
+TEST_P(Rounding, StaysWithinItsBound) {
+  const Stability s = measureStability(fieldOf(GetParam()));
+  EXPECT_GT(s.largest, 0.0) << "no rounding at all proves nothing";
+  EXPECT_LT(s.shareOfBound, 1.0);
+  EXPECT_GT(s.shareOfBound, 1e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Shapes, Rounding,
+    testing::Values(Shape{"usual", {}}, Shape{"needles", {.smallest = 0.1, .aspect = 1000.0}},
+                    Shape{"subvoxel", {.smallest = 0.1, .aspect = 2.0}},
+                    Shape{"huge", {.count = 5, .smallest = 150.0, .aspect = 2.0}},
+                    Shape{"gaussian", {.kappa = -30.0f}},
+                    Shape{"hard", {.smallest = 0.5, .kappa = 30.0f}},
+                    Shape{"box", {.smallest = 0.1, .kappa = 5000.0f}},
+                    Shape{"faint", {.intensity = 1e-30}}, Shape{"bright", {.intensity = 1e30}},
+                    Shape{"crowd", {.count = 5000, .extent = 8.0, .smallest = 0.3}},
+                    Shape{"far", {.origin = {10'000'000, -10'000'000, 10'000'000}}},
+                    Shape{"farInItsChunk", {.extent = 4096.0}},
+                    Shape{"paper", {.kappa = 5.0f}, KernelForm::kPaper},
+                    Shape{"paperSoft", {.kappa = 0.5f}, KernelForm::kPaper}),
+    [](const auto& shape) { return std::string(shape.param.name); });
+
+// A float32 has 23 bits below its first one, and the smallest one is 2^-149. A sum of values near it is
+// exact to a few of these.
+TEST(Rounding, OfDenormalNumbersIsThatOfTheSmallestOnes) {
+  const Stability s = measureStability(fieldOf({"", {.intensity = 1e-40}}));
+  EXPECT_LT(s.shareOfBound, 1.0);
+  EXPECT_LT(s.largest, 40 * 0x1p-149);
+}
+
+TEST(Stability, NamesTheVoxelOfAWrongValue) {
+  const Field field = fieldOf({"", {}});
+  const Coord wrong{10, 21, 33};
+  StabilityOptions options;
+  options.worst = 2;
+  options.evaluate = [&](const Field& f, std::span<const Coord> corners, std::span<float> out) {
+    evaluateBricks(f, corners, out);
+    const auto at = std::ranges::find(corners, brickOf(wrong) * kBrickSide) - corners.begin();
+    out[std::size_t(at * kBrickVoxels + voxelOffset(localOf(wrong)))] += 0.5f;
+  };
+  const Stability s = measureStability(field, options);
+  EXPECT_NEAR(s.largest, 0.5, 1e-4);
+  ASSERT_EQ(s.worst.size(), 2u);
+  EXPECT_EQ(s.worst[0].at, wrong);
+  EXPECT_EQ(s.worst[0].corner, (Coord{8, 16, 32}));
+  EXPECT_LT(s.worst[1].largest, 1e-4);
+  EXPECT_NEAR(s.rms, 0.5 / std::sqrt(double(s.sampled) * kBrickVoxels), 1e-5);
+  EXPECT_GT(s.shareOfBound, 100.0);
+}
+
+TEST(Stability, FindsValuesThatAreNotFinite) {
+  StabilityOptions options;
+  options.evaluate = [](const Field&, std::span<const Coord>, std::span<float> out) {
+    std::ranges::fill(out, std::numeric_limits<float>::quiet_NaN());
+  };
+  const Stability s = measureStability(fieldOf({"", {}}), options);
+  EXPECT_EQ(s.largest, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(correctDigits(s.largest, s.peak), 0);
+}
+
+TEST(Stability, ComparesWhatIsLeftOfClampedValues) {
+  StabilityOptions options;
+  options.range = ValueRange{0.0f, 0.0f};
+  EXPECT_EQ(measureStability(fieldOf({"", {}}), options).largest, 0.0);
+}
+
+/// Spheres with a support of less than three voxels, all with the same center.
+Field spheresAtOneVoxel(std::initializer_list<float> intensities) {
+  Field field = test::randomField({.count = intensities.size(), .extent = 1.0});
+  Ellipsoids& e = field.chunks[0].ellipsoids;
+  for (auto& center : e.center) std::ranges::fill(center, 3.0f);
+  for (auto& scale : e.logScale) std::ranges::fill(scale, 0.0f);
+  e.intensity = intensities;
+  return field;
+}
+
+TEST(Stability, CountsOverlapAndCancellation) {
+  const Stability one = measureStability(spheresAtOneVoxel({2.0f}));
+  EXPECT_EQ(one.meanOverlap, 1.0);
+  EXPECT_EQ(one.largestOverlap, 1u);
+  EXPECT_EQ(one.meanCancellation, 1.0);
+  EXPECT_NEAR(one.peak, 2.0, 1e-12);
+  const Stability three = measureStability(spheresAtOneVoxel({2.0f, -1.0f, 1.0f}));
+  EXPECT_EQ(three.meanOverlap, 3.0);
+  EXPECT_EQ(three.largestOverlap, 3u);
+  EXPECT_NEAR(three.meanCancellation, 2.0, 1e-12);
+  EXPECT_NEAR(three.largestCancellation, 2.0, 1e-12);
+}
+
+TEST(Stability, IsThatOfNothingWithoutEllipsoids) {
+  const Stability s = measureStability(Field{});
+  EXPECT_EQ(s.sampled, 0u);
+  EXPECT_EQ(s.largest, 0.0);
+  EXPECT_EQ(s.extremes.smallestScale, 0.0);
+  EXPECT_TRUE(s.worst.empty());
+}
+
+TEST(Stability, TakesSamplesEvenlyAndWhereTheExtremesAre) {
+  const Field field = fieldOf({"", {.count = 300, .extent = 200.0}});
+  StabilityOptions options;
+  options.samples = 10, options.worst = 100;
+  const Stability s = measureStability(field, options);
+  EXPECT_GE(s.sampled, 10u);
+  EXPECT_LE(s.sampled, 14u);
+  EXPECT_EQ(s.bricks, reachedBricks(field).size());
+  options.within = {{0, 0, 0}, {7, 7, 7}};
+  EXPECT_LE(measureStability(field, options).bricks, 1u);
+  const std::vector<Coord> given{{0, 0, 0}, {0, 0, 8}};
+  options.bricks = given;
+  EXPECT_EQ(measureStability(field, options).sampled, 2u);
+}
+
+TEST(Stability, DoesNotDependOnTheNumberOfThreads) {
+  const Field field = fieldOf({"", {.count = 200}});
+  const auto figures = [&] {
+    const Stability s = measureStability(field);
+    return std::array{s.largest, s.rms, s.bound, s.meanOverlap, s.meanCancellation};
+  };
+  const auto all = figures();
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(figures(), all);
+}
+
+TEST(Extremes, AreThoseOfTheEllipsoids) {
+  Field field = test::randomField({.count = 3, .kappa = 4.0f});
+  Ellipsoids& e = field.chunks[0].ellipsoids;
+  e.logScale = {std::vector{0.0f, std::log(0.1f), 1.0f},
+                {0.0f, std::log(100.0f), 1.0f},
+                {std::log(300.0f), 0.0f, 1.0f}};
+  e.intensity = {1.0f, -3.0f, 0.5f};
+  const FieldExtremes all = extremesOf(field);
+  EXPECT_NEAR(all.smallestScale, 0.1, 1e-7);
+  EXPECT_NEAR(all.largestScale, 300.0, 1e-3);
+  EXPECT_NEAR(all.largestAspect, 1000.0, 1e-2);
+  EXPECT_NEAR(all.largestCondition, 1e6, 20.0);
+  EXPECT_EQ(all.lowestKappa, 4.0);
+  EXPECT_EQ(all.highestKappa, 4.0);
+  EXPECT_EQ(all.smallestIntensity, 0.5);
+  EXPECT_EQ(all.largestIntensity, 3.0);
+  e.kappa = {-1.0f, 2.0f, 7.0f};
+  EXPECT_EQ(extremesOf(field).lowestKappa, -1.0);
+  EXPECT_EQ(extremesOf(field).highestKappa, 7.0);
+}
+
+TEST(CorrectDigits, AreThoseBelowThePeak) {
+  EXPECT_EQ(correctDigits(0.0, 1.0), 17);
+  EXPECT_EQ(correctDigits(1e-4, 1.0), 4);
+  EXPECT_EQ(correctDigits(9e-4, 1.0), 3);
+  EXPECT_EQ(correctDigits(1e-4, 100.0), 6);
+  EXPECT_EQ(correctDigits(2.0, 1.0), 0);
+  EXPECT_EQ(correctDigits(1e-30, 0.0), 0);
+  EXPECT_EQ(correctDigits(std::numeric_limits<double>::quiet_NaN(), 1.0), 0);
+}
+
+// Both sums are in float64 and have the same terms, in the same order.
+TEST(ReferenceBrick, IsTheDefinition) {
+  Field field = test::randomField({.count = 40, .aspect = 30.0});
+  field.background = 0.25f;
+  field.chunks.push_back(
+      test::randomField({.count = 10, .origin = {-5, 3, 9}, .seed = 3}).chunks[0]);
+  const ReferenceField reference(field);
+  for (const Coord corner : {Coord{0, 0, 0}, Coord{16, 24, 8}, Coord{-8, 0, 32}}) {
+    const ReferenceBrick brick = reference.evaluate(corner);
+    for (int v = 0; v < kBrickVoxels; v += 7)
+      EXPECT_NEAR(field.background + brick.voxels[std::size_t(v)].sum,
+                  evaluateReference(field, corner + voxelLocal(v)), 1e-14);
+  }
+}
+
+}  // namespace
+}  // namespace esvr
