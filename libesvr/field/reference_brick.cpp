@@ -59,7 +59,7 @@ struct ReferenceEllipsoid {
   double intensity;
 };
 
-bool meet(const Box& a, const Box& b) { return !common(a, b).empty(); }
+bool overlap(const Box& a, const Box& b) { return !common(a, b).empty(); }
 
 }  // namespace
 
@@ -74,7 +74,7 @@ ReferenceBrick ReferenceField::evaluate(Coord corner) const {
   std::size_t number = 0;
   for (const Chunk& chunk : field_.chunks)
     for (std::size_t i = 0; i < chunk.ellipsoids.size(); ++i) {
-      if (!meet(boxes_[number++], voxels)) continue;
+      if (!overlap(boxes_[number++], voxels)) continue;
       const ReferenceEllipsoid ellipsoid(field_, chunk, i);
       ++brick.ellipsoids;
       brick.largestIntensity = std::max(brick.largestIntensity, std::abs(ellipsoid.intensity));

@@ -23,9 +23,9 @@ struct BrickFigures {
 };
 
 /// A field, and the comparison of its evaluations.
-class Comparison {
+class FieldComparison {
  public:
-  Comparison(const Field& field, const StabilityOptions& options)
+  FieldComparison(const Field& field, const StabilityOptions& options)
       : field_(field), options_(options), reference_(field) {}
 
   [[nodiscard]] BrickFigures compare(Coord corner, const ReferenceBrick& brick,
@@ -74,7 +74,7 @@ class Comparison {
 };
 
 /// `count` elements of a list, spread evenly over it.
-std::vector<Coord> spread(std::span<const Coord> bricks, std::size_t count) {
+std::vector<Coord> spreadOver(std::span<const Coord> bricks, std::size_t count) {
   count = std::min(count, bricks.size());
   std::vector<Coord> chosen;
   for (std::size_t n = 0; n < count; ++n)
@@ -84,7 +84,7 @@ std::vector<Coord> spread(std::span<const Coord> bricks, std::size_t count) {
 
 /// The bricks that are compared, increasing.
 std::vector<Coord> samplesOf(const Field& field, std::span<const Coord> bricks, std::size_t count) {
-  std::vector<Coord> samples = spread(bricks, count);
+  std::vector<Coord> samples = spreadOver(bricks, count);
   for (const Coord voxel : centersOfExtremes(field)) {
     const Coord corner = brickOf(voxel) * kBrickSide;
     if (std::ranges::binary_search(bricks, corner)) samples.push_back(corner);
@@ -146,7 +146,7 @@ Stability measureStability(const Field& field, const StabilityOptions& options) 
   Stability result;
   result.extremes = extremesOf(field);
   result.bricks = bricks.size();
-  const Comparison comparison(field, options);
+  const FieldComparison comparison(field, options);
   std::vector<ReferenceBrick> references(samples.size());
   std::vector<BrickFigures> figures(samples.size());
   tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t b) {

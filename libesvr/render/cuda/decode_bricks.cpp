@@ -25,9 +25,9 @@ void copyVoxels(const float* cells, float* out) {
 }
 
 /// A page of voxels on the device, into which batches of bricks are decoded.
-class Batches {
+class DecodeBatches {
  public:
-  Batches(const DeviceCells& cells, cudaStream_t stream)
+  DecodeBatches(const DeviceCells& cells, cudaStream_t stream)
       : cells_(cells),
         stream_(stream),
         page_(BrickSlotsView::kPageFloats, stream),
@@ -96,7 +96,7 @@ void decodeBricks(const Device& device, const Field& field, std::span<const Coor
   if (reached.numbers.empty()) return;
   const Stream stream = streamOn(device);
   const DeviceCells onDevice(cells, stream.get());
-  Batches batches(onDevice, stream.get());
+  DecodeBatches batches(onDevice, stream.get());
   for (std::size_t first = 0; first < reached.numbers.size(); first += kBatch) {
     const std::size_t count = std::min<std::size_t>(kBatch, reached.numbers.size() - first);
     const float* const values = batches.decode(std::span(reached.numbers).subspan(first, count));
