@@ -16,7 +16,7 @@ namespace {
 class GridMeasurement {
  public:
   GridMeasurement(const StabilityRun& run, const StoredGrid& grid) : run_(run), grid_(grid) {
-    requireBricks();
+    requireMemory();
     options_ = cli::stabilityOptionsOf(grid, run.request.samples);
   }
 
@@ -37,11 +37,12 @@ class GridMeasurement {
   }
 
  private:
-  /// Checks the memory for the list of bricks.
-  void requireBricks() const {
-    constexpr double kBytesOfBrick = 64;
-    requireWithinMemory(kBytesOfBrick * estimateDecode(grid_).bricks, run_.request.memory.maxBytes,
-                        "grid '" + grid_.descriptor.name + "'");
+  /// Checks the memory for the list of bricks and for the prepared ellipsoids.
+  void requireMemory() const {
+    constexpr double kBytesOfBrick = 64.0, kBytesOfEllipsoid = 512.0;
+    requireWithinMemory(kBytesOfBrick * estimateDecode(grid_).bricks +
+                            kBytesOfEllipsoid * double(grid_.field.ellipsoidCount()),
+                        run_.request.memory.maxBytes, "grid '" + grid_.descriptor.name + "'");
   }
 
   /// Compares a device with the first one, on the same bricks.
