@@ -20,26 +20,28 @@ namespace {
 
 using test::RandomFieldOptions;
 
-struct Shape {
+struct StabilityShape {
   const char* name;
   RandomFieldOptions field;
   KernelForm form = KernelForm::kContinuous;
 };
-std::ostream& operator<<(std::ostream& out, const Shape& shape) { return out << shape.name; }
+std::ostream& operator<<(std::ostream& out, const StabilityShape& shape) {
+  return out << shape.name;
+}
 
-Field fieldOf(const Shape& shape) {
+Field fieldOfShape(const StabilityShape& shape) {
   Field field = test::randomField(shape.field);
   field.kernel.form = shape.form;
   return field;
 }
 
-class Rounding : public testing::TestWithParam<Shape> {};
+class Rounding : public testing::TestWithParam<StabilityShape> {};
 
 // The bound adds the largest errors of all operations, as if all had the same sign. A typical error is
 // the square root of their number, some 10 times smaller, in a typical direction, which is again
 // smaller: it reaches between 1/1000 and 1/2 of the bound.
 TEST_P(Rounding, StaysWithinItsBound) {
-  const Stability s = measureStability(fieldOf(GetParam()));
+  const Stability s = measureStability(fieldOfShape(GetParam()));
   EXPECT_GT(s.largest, 0.0) << "no rounding at all proves nothing";
   EXPECT_LT(s.shareOfBound, 1.0);
   EXPECT_GT(s.shareOfBound, 1e-3);
@@ -47,30 +49,32 @@ TEST_P(Rounding, StaysWithinItsBound) {
 
 INSTANTIATE_TEST_SUITE_P(
     Shapes, Rounding,
-    testing::Values(Shape{"usual", {}}, Shape{"needles", {.smallest = 0.1, .aspect = 1000.0}},
-                    Shape{"subvoxel", {.smallest = 0.1, .aspect = 2.0}},
-                    Shape{"huge", {.count = 5, .smallest = 150.0, .aspect = 2.0}},
-                    Shape{"gaussian", {.kappa = -30.0f}},
-                    Shape{"hard", {.smallest = 0.5, .kappa = 30.0f}},
-                    Shape{"box", {.smallest = 0.1, .kappa = 5000.0f}},
-                    Shape{"faint", {.intensity = 1e-30}}, Shape{"bright", {.intensity = 1e30}},
-                    Shape{"crowd", {.count = 5000, .extent = 8.0, .smallest = 0.3}},
-                    Shape{"far", {.origin = {10'000'000, -10'000'000, 10'000'000}}},
-                    Shape{"farInItsChunk", {.extent = 4096.0}},
-                    Shape{"paper", {.kappa = 5.0f}, KernelForm::kPaper},
-                    Shape{"paperSoft", {.kappa = 0.5f}, KernelForm::kPaper}),
+    testing::Values(StabilityShape{"usual", {}},
+                    StabilityShape{"needles", {.smallest = 0.1, .aspect = 1000.0}},
+                    StabilityShape{"subvoxel", {.smallest = 0.1, .aspect = 2.0}},
+                    StabilityShape{"huge", {.count = 5, .smallest = 150.0, .aspect = 2.0}},
+                    StabilityShape{"gaussian", {.kappa = -30.0f}},
+                    StabilityShape{"hard", {.smallest = 0.5, .kappa = 30.0f}},
+                    StabilityShape{"box", {.smallest = 0.1, .kappa = 5000.0f}},
+                    StabilityShape{"faint", {.intensity = 1e-30}},
+                    StabilityShape{"bright", {.intensity = 1e30}},
+                    StabilityShape{"crowd", {.count = 5000, .extent = 8.0, .smallest = 0.3}},
+                    StabilityShape{"far", {.origin = {10'000'000, -10'000'000, 10'000'000}}},
+                    StabilityShape{"farInItsChunk", {.extent = 4096.0}},
+                    StabilityShape{"paper", {.kappa = 5.0f}, KernelForm::kPaper},
+                    StabilityShape{"paperSoft", {.kappa = 0.5f}, KernelForm::kPaper}),
     [](const auto& shape) { return std::string(shape.param.name); });
 
 // A float32 has 23 bits below its first one, and the smallest one is 2^-149. A sum of values near it is
 // exact to a few of these.
 TEST(Rounding, OfDenormalNumbersIsThatOfTheSmallestOnes) {
-  const Stability s = measureStability(fieldOf({"", {.intensity = 1e-40}}));
+  const Stability s = measureStability(fieldOfShape({"", {.intensity = 1e-40}}));
   EXPECT_LT(s.shareOfBound, 1.0);
   EXPECT_LT(s.largest, 40 * 0x1p-149);
 }
 
 TEST(Stability, NamesTheVoxelOfAWrongValue) {
-  const Field field = fieldOf({"", {}});
+  const Field field = fieldOfShape({"", {}});
   const Coord wrong{10, 21, 33};
   StabilityOptions options;
   options.worst = 2;
@@ -94,7 +98,7 @@ TEST(Stability, FindsValuesThatAreNotFinite) {
   options.evaluate = [](const Field&, std::span<const Coord>, std::span<float> out) {
     std::ranges::fill(out, std::numeric_limits<float>::quiet_NaN());
   };
-  const Stability s = measureStability(fieldOf({"", {}}), options);
+  const Stability s = measureStability(fieldOfShape({"", {}}), options);
   EXPECT_EQ(s.largest, std::numeric_limits<double>::infinity());
   EXPECT_EQ(correctDigits(s.largest, s.peak), 0);
 }
@@ -102,7 +106,7 @@ TEST(Stability, FindsValuesThatAreNotFinite) {
 TEST(Stability, ComparesWhatIsLeftOfClampedValues) {
   StabilityOptions options;
   options.range = ValueRange{0.0f, 0.0f};
-  EXPECT_EQ(measureStability(fieldOf({"", {}}), options).largest, 0.0);
+  EXPECT_EQ(measureStability(fieldOfShape({"", {}}), options).largest, 0.0);
 }
 
 /// Spheres with a support of less than three voxels, all with the same center.
@@ -137,7 +141,7 @@ TEST(Stability, IsThatOfNothingWithoutEllipsoids) {
 }
 
 TEST(Stability, TakesSamplesEvenlyAndWhereTheExtremesAre) {
-  const Field field = fieldOf({"", {.count = 300, .extent = 200.0}});
+  const Field field = fieldOfShape({"", {.count = 300, .extent = 200.0}});
   StabilityOptions options;
   options.samples = 10, options.worst = 100;
   const Stability s = measureStability(field, options);
@@ -152,7 +156,7 @@ TEST(Stability, TakesSamplesEvenlyAndWhereTheExtremesAre) {
 }
 
 TEST(Stability, DoesNotDependOnTheNumberOfThreads) {
-  const Field field = fieldOf({"", {.count = 200}});
+  const Field field = fieldOfShape({"", {.count = 200}});
   const auto figures = [&] {
     const Stability s = measureStability(field);
     return std::array{s.largest, s.rms, s.bound, s.meanOverlap, s.meanCancellation};
