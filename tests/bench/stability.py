@@ -12,6 +12,7 @@ chooses another folder than docs.
 import argparse
 import json
 import pathlib
+import textwrap
 
 import svg_panels
 from run_program import run
@@ -39,11 +40,15 @@ case below is measured in three ways:
   operations. A case fails if the difference of a voxel is above its bound, or above {allowed:g} of the peak, as in
   `esvr-compare stability`.
 - **Gradients.** The analytic derivatives of the squared error by all parameters of four ellipsoids and by kappa are
-  compared with central differences in float64. Errors are shares of the sum of the magnitudes of the terms of the largest
-  derivative of an ellipsoid. A case fails if an error is above its [bound](math.md#rounding).
+  compared with central differences in float64, in a target of 16^3 random values. Errors are shares of the sum of the
+  magnitudes of the terms of the largest derivative of an ellipsoid. A case fails if an error is above its
+  [bound](math.md#rounding).
 - **Fits.** A volume is fitted in {iterations} iterations with half of the tuned step sizes, with these, and with up to 64
   times as large ones. A case fails if a fit with half, all or twice the step sizes ends early, has a number that is not
   finite, or ends with a larger error than no ellipsoid at all.
+
+Some cases are volumes and not ellipsoids, and have fits only. A case has no gradients of its own if scaling or moving it
+makes it another case.
 
 The figures are made by these commands:
 
@@ -52,6 +57,11 @@ The figures are made by these commands:
     python3 tests/bench/stability.py page
 
 """
+
+
+def section(title, text):
+    """The heading and the first paragraph of a section."""
+    return f"## {title}\n\n{textwrap.fill(text, 120)}\n\n"
 
 
 def psnr(value):
@@ -94,6 +104,9 @@ class Figures:
 
     def runs(self):
         return {run["factor"]: run for run in self.fit["runs"]} if self.fit else {}
+
+    def is_finite(self):
+        return all(r["finite"] and not r["failure"] for r in self.runs().values())
 
     def diverges(self, factor):
         fitted = self.runs()[factor]
@@ -163,11 +176,12 @@ def evaluation(cases):
                 f"{figures.evaluation['cancellation']:.1f}",
                 *case.cells(lambda f: number(f.share("bound"))), *case.cells(lambda f: number(f.share("max"))),
                 *case.cells(lambda f: f"{f.evaluation['digits']}")]
-    return ("## Evaluation\n\n*Overlap* is the largest number of supports that contain a voxel, *condition* the largest "
+    return (section(
+        "Evaluation", "*Overlap* is the largest number of supports that contain a voxel, *condition* the largest "
             "condition number of Sigma, and *cancellation* the sum of the magnitudes of all terms divided by that of "
             "their sums. Bounds and differences are shares of the peak. A hard edge costs digits in proportion to kappa (or "
             "k): it lies where m is about kappa, and m has an error in proportion to itself. The paper's kernel jumps at its "
-            "end. Where rounding may decide on which side of the end a voxel lies, the jump is a part of the bound.\n\n"
+            "end. Where rounding may decide on which side of the end a voxel lies, the jump is a part of the bound.")
             + table(["case", "overlap", "condition", "cancellation", *both("bound"), *both("difference"),
                      *both("digits")], [row(c) for c in cases if c.any().evaluation]))
 
@@ -176,7 +190,7 @@ def gradients(cases):
     def row(case):
         return [case.name, number(case.any().gradients["bound"]),
                 *case.cells(lambda f: number(f.gradients["max"]))]
-    return ("## Gradients\n\nErrors are shares of the sum of the magnitudes of the terms.\n\n"
+    return (section("Gradients", "Errors are shares of the sum of the magnitudes of the terms.")
             + table(["case", "bound", *both("error")], [row(c) for c in cases if c.any().gradients]))
 
 
@@ -189,9 +203,9 @@ def fits(cases):
                 *case.cells(lambda f: psnr(f.runs()[1.0]["psnr"])),
                 *case.cells(lambda f: number(f.runs()[1.0]["max_error"])),
                 *case.cells(lambda f: f"{f.runs()[1.0]['iterations']}"),
-                *case.cells(lambda f: "yes" if all(r["finite"] for r in f.runs().values()) else "no")]
-    return ("## Fits\n\nPSNR is that over the box in dB, at the end and without ellipsoids. The largest error is a share of "
-            "the peak. A fit is *finite* if all parameters and errors are, with all step sizes that were tried.\n\n"
+                *case.cells(lambda f: "yes" if f.is_finite() else "no")]
+    return (section("Fits", "PSNR is that over the box in dB, at the end and without ellipsoids. The largest error is "
+                    "a share of the peak. A fit is *finite* if all parameters and errors are, with all step sizes that were tried.")
             + table(["case", "voxels", "ellipsoids", "PSNR of nothing", *both("PSNR"), *both("largest error"),
                      *both("iterations"), *both("finite")], [row(c) for c in cases if c.any().fit])
             + chunks(cases))
@@ -202,9 +216,10 @@ def chunks(cases):
     for case in cases:
         for device, f in case.on.items():
             if f.fit and f.fit["in_one_chunk"]:
-                text += (f"\nThe fit of the case \"{case.name}\" has {psnr(f.runs()[1.0]['psnr'])} dB in chunks and "
-                         f"{psnr(f.fit['in_one_chunk']['psnr'])} dB in one chunk ({DEVICES[device]}). The step sizes of a "
-                         "fit in chunks cannot be changed, so it is not in the section \"Step sizes\".\n")
+                text += "\n" + textwrap.fill(
+                    f"The fit of the case \"{case.name}\" has {psnr(f.runs()[1.0]['psnr'])} dB in chunks and "
+                    f"{psnr(f.fit['in_one_chunk']['psnr'])} dB in one chunk ({DEVICES[device]}). The step sizes of a fit "
+                    "in chunks cannot be changed, so it is not in the section \"Step sizes\".", 120) + "\n"
     return text
 
 
@@ -216,8 +231,8 @@ def steps(cases):
         f = case.on[device]
         return [case.name, DEVICES[device], *[psnr(f.runs()[factor]["psnr"]) for factor in factors],
                 f.first_factor(f.loses), f.first_factor(f.diverges)]
-    return ("## Step sizes\n\nThe PSNR in dB at the end of fits whose steps are multiples of the tuned ones, the smallest "
-            f"multiple above 1 that is {LOSS:g} dB worse than these, and the smallest that diverges.\n\n"
+    return (section("Step sizes", "The PSNR in dB at the end of fits whose steps are multiples of the tuned ones, the smallest "
+            f"multiple above 1 that is {LOSS:g} dB worse than these, and the smallest that diverges.")
             + table(["case", "device", *[f"x {factor:g}" for factor in factors], f"loses {LOSS:g} dB", "diverges"],
                     [row(c, d) for c in measured for d in c.on]))
 
@@ -238,8 +253,8 @@ def lines(case):
 
 def curves(cases, folder):
     """Draws the curves. Returns the section of the page."""
-    text = ("## Error against run time\n\nEach curve is a fit; its points are measured during the fit, and the time that "
-            "measuring takes counts.\n")
+    text = (section("Error against run time", "Each curve is a fit; its points are measured during the fit, and the time that "
+            "measuring takes counts.").rstrip("\n") + "\n")
     panels = [svg_panels.Panel(c.name, lines(c)) for c in cases if lines(c)]
     folder.mkdir(exist_ok=True)
     for n in range(0, len(panels), PANELS):

@@ -30,18 +30,32 @@ double largestError(const EllipsoidGradient& found, const test::Differences& exp
   return std::isfinite(largest) ? largest : std::numeric_limits<double>::infinity();
 }
 
+/// The ellipsoids of a case, and others behind them.
+std::vector<Ellipsoid> withCrowd(const test::GradientCase& c, const test::SmallTarget& target,
+                                 std::size_t crowd) {
+  std::vector<Ellipsoid> all = test::ellipsoidsOf(c, target);
+  test::Random random(47);
+  for (std::size_t n = 0; n < crowd; ++n) {
+    Ellipsoid other = test::atAVoxel(c, random);
+    other.intensity /= double(crowd);
+    all.push_back(other);
+  }
+  return all;
+}
+
 }  // namespace
 
-GradientErrors measureGradients(const test::GradientCase& c, const Device& device) {
+GradientErrors measureGradients(const test::GradientCase& c, std::size_t crowd,
+                                const Device& device) {
   const test::SmallTarget target;
-  const auto ellipsoids = test::ellipsoidsOf(c, target);
+  const auto ellipsoids = withCrowd(c, target, crowd);
   const auto residuals = test::residualsOf(target, c, ellipsoids);
   const Kernel kernel{.kappa = c.kappa};
   const auto gradients = device.kind == DeviceKind::kCuda
                              ? gradientsOnGpu(target.get(), kernel, ellipsoids, device)
                              : gradientsOnCpu(target.get(), kernel, ellipsoids);
   GradientErrors errors;
-  for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
+  for (std::size_t i = 0; i < ellipsoids.size() - crowd; ++i) {
     const test::Differences expected = test::differencesOf(target, c, ellipsoids[i], residuals);
     const double error = largestError(gradients[i], expected) / expected.magnitude;
     const double bound = test::toleranceOf(c, ellipsoids[i]);

@@ -17,8 +17,10 @@ struct GradientErrors {
   double shareOfBound = 0.0;  ///< largest error divided by its own bound
 };
 
+/// Measures the gradients of four ellipsoids.
+/// \param crowd  ellipsoids of the same shapes that are added to the sum, as faint as they are many
 [[nodiscard]] GradientErrors measureGradients(const test::GradientCase& gradientCase,
-                                              const Device& device);
+                                              std::size_t crowd, const Device& device);
 
 /// The gradients of 1/2 sum r^2 on a GPU.
 /// \throws DeviceError  the build has no CUDA

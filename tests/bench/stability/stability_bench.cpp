@@ -56,8 +56,8 @@ Json evaluation(const Field& field, const Device& device) {
           {"condition", s.extremes.largestCondition}};
 }
 
-Json gradients(const test::GradientCase& c, const Device& device) {
-  const bench::GradientErrors errors = bench::measureGradients(c, device);
+Json gradients(const bench::StabilityCase& c, const Device& device) {
+  const bench::GradientErrors errors = bench::measureGradients(*c.gradients, c.crowd, device);
   return {{"max", finiteOrNull(errors.largest)},
           {"bound", errors.bound},
           {"share_of_bound", finiteOrNull(errors.shareOfBound)}};
@@ -101,7 +101,7 @@ Json measured(const bench::StabilityCase& c, const Device& device, const Options
   return {{"name", c.name},
           {"detail", c.detail},
           {"evaluation", c.field ? evaluation(c.field(), device) : Json(nullptr)},
-          {"gradients", c.gradients ? gradients(*c.gradients, device) : Json(nullptr)},
+          {"gradients", c.gradients ? gradients(c, device) : Json(nullptr)},
           {"fit", c.fit ? fits(*c.fit, device, options.iterations) : Json(nullptr)}};
 }
 

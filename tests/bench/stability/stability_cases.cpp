@@ -91,9 +91,8 @@ std::vector<StabilityCase> shapes() {
                }),
                600}},
       {"discs 1:1000",
-       "Scales of 100, 100 and 0.1 voxels in random directions. The fit is of one layer of voxels: "
-       "a "
-       "disc with scales of 50, 50 and 0.05 voxels in the plane of an axis.",
+       "Scales of 100, 100 and 0.1 voxels in random directions. The fit is of one layer of "
+       "voxels: a disc with scales of 50, 50 and 0.05 voxels in the plane of an axis.",
        [=] { return withScales(randomField({.count = 30, .extent = 24.0}), disc); },
        test::GradientCase{"pancake", {100.0, 100.0, 0.1}, 2.0f},
        FitCase{voxelsOf([] {
@@ -102,8 +101,7 @@ std::vector<StabilityCase> shapes() {
                600}},
       {"scales of 0.1 voxels",
        "Spheres with a scale of 0.1 voxels, whose support is smaller than a voxel. The fit is of "
-       "200 "
-       "single voxels far from each other.",
+       "216 single voxels far from each other.",
        [] {
          return withScales(randomField({.count = 4000, .extent = 24.0}), {0.1, 0.1, 0.1});
        },
@@ -116,8 +114,7 @@ std::vector<StabilityCase> shapes() {
                216}},
       {"scales of 300 voxels",
        "Spheres with a scale of 300 voxels. The fit is of a cube of 40^3 voxels on the flank of "
-       "one, "
-       "which ends sharply at its sides.",
+       "one, which ends sharply at its sides.",
        [] {
          return withScales(randomField({.count = 20, .extent = 40.0}), {300.0, 300.0, 300.0});
        },
@@ -137,8 +134,8 @@ std::vector<StabilityCase> kernels() {
     const auto field = [kappa] { return randomField(usual(kappa)); };
     cases.push_back(
         {"kappa " + std::to_string(int(kappa)),
-         "Ordinary shapes with this edge. The fit keeps the edge, and is of the voxels of "
-         "the same ellipsoids.",
+         "Ordinary shapes with this edge. The fit keeps the edge, and is of the voxels of the "
+         "same ellipsoids.",
          field, test::GradientCase{"usual", {2.0, 1.0, 0.6}, kappa},
          FitCase{voxelsOf(field), 300, kappa}});
   }
@@ -157,9 +154,8 @@ std::vector<StabilityCase> sharpnesses() {
     };
     cases.push_back({"k = " + (k < 1.0f ? std::string("0.5") : std::to_string(int(k))),
                      "The paper's kernel of this sharpness with its scales of 6, 4 and 3 voxels. "
-                     "Gradients and fit "
-                     "are those of the continuous kernel with the same edge, and the fit is of a "
-                     "smooth volume.",
+                     "Gradients and fit are those of the continuous kernel with the same edge, "
+                     "and the fit is of a smooth volume.",
                      field, test::GradientCase{"paper", {6.0 * s, 4.0 * s, 3.0 * s}, k},
                      FitCase{voxelsOf([] { return randomField(usual()); }), 300, k}});
   }
@@ -176,8 +172,8 @@ std::vector<StabilityCase> magnitudes() {
     };
     cases.push_back(
         {std::string("intensities of ") + name,
-         "Ordinary shapes with intensities of this magnitude. A fit scales its target by a "
-         "power of two, so gradients are those of any other magnitude.",
+         "Ordinary shapes with intensities of this magnitude. A fit scales its target by a power "
+         "of two, so gradients are those of any other magnitude.",
          field, std::nullopt, FitCase{voxelsOf(field, float(1e-4 * factor)), 300}});
   }
   const auto denormal = [] {
@@ -187,8 +183,8 @@ std::vector<StabilityCase> magnitudes() {
   };
   cases.push_back(
       {"denormals",
-       "Intensities of 1e-40, below the normal numbers of float32. The peak has 16 bits, "
-       "so that the precision of a value is 1.4e-5 of the peak.",
+       "Intensities of 1e-40, below the normal numbers of float32. The peak has 16 bits, so that "
+       "the precision of a value is 1.4e-5 of the peak.",
        denormal, std::nullopt, FitCase{voxelsOf(denormal, 0.0f), 300}});
   const auto cancelling = [] {
     Field field = randomField(usual());
@@ -211,8 +207,8 @@ std::vector<StabilityCase> magnitudes() {
   };
   cases.push_back(
       {"signed data that cancel",
-       "Pairs of ellipsoids of both signs whose sum is a thousandth of each. The fit is of "
-       "signed data: ordinary shapes of both signs.",
+       "Pairs of ellipsoids of both signs whose sum is a thousandth of each. Gradients and "
+       "fit are of signed data: ordinary shapes of both signs.",
        cancelling, test::GradientCase{"usual", {2.0, 1.0, 0.6}, 2.0f},
        FitCase{voxelsOf([] { return randomField(usual()); }), 300}});
   return cases;
@@ -224,11 +220,11 @@ Field crowd() {
 }
 
 std::vector<StabilityCase> places() {
-  return {
+  std::vector<StabilityCase> cases{
       {"ten thousand over one voxel",
-       "10,000 ellipsoids of both signs whose centers lie within one voxel. The fit begins with "
-       "them, "
-       "and is of a ball with a radius of 12 voxels.",
+       "10,000 ellipsoids of both signs whose centers lie within one voxel. Gradients are those of "
+       "four ellipsoids among 10,000 in 16^3 voxels. The fit begins with the ellipsoids over one "
+       "voxel, and is of a ball with a radius of 12 voxels.",
        crowd, test::GradientCase{"usual", {2.0, 1.0, 0.6}, 2.0f},
        FitCase{[] {
                  return cubeOf(4, [](Coord c) {
@@ -244,9 +240,9 @@ std::vector<StabilityCase> places() {
                  return field;
                }}},
       {"coordinates of +-1e7",
-       "Ordinary shapes ten million voxels from the origin, on both sides. Centers are relative to "
-       "a "
-       "chunk, and a fit is relative to the volume, so gradients are those of any other place.",
+       "Ordinary shapes ten million voxels from the origin, on both sides. Centers are relative "
+       "to a chunk, and a fit is relative to the volume, so gradients are those of any other "
+       "place.",
        [] {
          RandomFieldOptions o = usual();
          o.origin = {10'000'000, -10'000'000, 10'000'000};
@@ -261,8 +257,7 @@ std::vector<StabilityCase> places() {
                300}},
       {"chunk seams",
        "Ellipsoids on both sides of a border of chunks of coordinates (4096 voxels), to which "
-       "their "
-       "centers are relative. The fit is in chunks of 20,000 voxels, whose borders cut the "
+       "their centers are relative. The fit is in chunks of 20,000 voxels, whose borders cut the "
        "ellipsoids.",
        [] {
          RandomFieldOptions o = usual();
@@ -276,6 +271,8 @@ std::vector<StabilityCase> places() {
          return field;
        },
        std::nullopt, FitCase{voxelsOf([] { return randomField(usual()); }), 300, {}, {}, 20000}}};
+  cases.front().crowd = 10000;
+  return cases;
 }
 
 std::vector<StabilityCase> values() {
@@ -293,8 +290,8 @@ std::vector<StabilityCase> values() {
                    },
                    1}},
           {"a checkerboard",
-           "A cube of 16^3 voxels, every other one of the value 1. It is the worst case of smooth "
-           "primitives: only an ellipsoid for each voxel of value 1 is precise.",
+           "A cube of 16^3 voxels, every other one of the value 1. It is the worst case of "
+           "smooth primitives: only an ellipsoid for each voxel of value 1 is precise.",
            {},
            std::nullopt,
            FitCase{[] { return cubeOf(2, [](Coord c) { return float((c.x + c.y + c.z) & 1); }); },

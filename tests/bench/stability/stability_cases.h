@@ -28,6 +28,8 @@ struct StabilityCase {
   std::function<Field()> field{};                 ///< is evaluated; empty: not measured
   std::optional<test::GradientCase> gradients{};  ///< nothing: not measured
   std::optional<FitCase> fit{};                   ///< nothing: not measured
+  /// Further ellipsoids at the same voxels, in the measurement of gradients.
+  std::size_t crowd = 0;
 };
 
 [[nodiscard]] std::vector<StabilityCase> stabilityCases();
