@@ -2,9 +2,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/grid_stability.h"
 #include "cli/json_file.h"
 #include "cli/memory.h"
 #include "cli/names.h"
+#include "cli/stability_json.h"
 #include "cli/version_json.h"
 #include "vdb2esvr/left_out_report.h"
 #include "vdb2esvr/paper_report.h"
@@ -304,6 +306,17 @@ Json sharedOf(const ConvertedGrid& grid) {
           {"seconds", shared.seconds}};
 }
 
+/// The evaluation of a grid's ellipsoids; null if it has none.
+Json stabilityOf(const StoredGrid& grid) {
+  constexpr std::size_t kSamples = 32;
+  if (grid.field.ellipsoidCount() == 0) return nullptr;
+  const Stability stability = measureStability(grid.field, cli::stabilityOptionsOf(grid, kSamples));
+  Json json{{"correct_digits", correctDigits(stability.largest, cli::largestMagnitude(grid))}};
+  json.update(cli::differencesJson(stability));
+  json.update(cli::difficultiesJson(stability));
+  return json;
+}
+
 Json gridOf(const RunRecord& record, std::size_t g) {
   const ConvertedGrid& grid = record.grids[g];
   return {{"name", grid.uniqueName},
@@ -321,6 +334,7 @@ Json gridOf(const RunRecord& record, std::size_t g) {
           {"compact", compactOf(grid)},
           {"representation", choiceOf(grid)},
           {"layers", layersOf(grid.stored())},
+          {"stability", stabilityOf(grid.stored())},
           {"metrics", metricsOf(grid.metrics, grid.psnrBetween)},
           {"surface", surfaceOf(grid.surface)},
           {"seconds", secondsOf(grid.seconds)},

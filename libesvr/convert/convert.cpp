@@ -9,6 +9,7 @@
 #include "convert/exact_voxels.h"
 #include "convert/narrow_band.h"
 #include "convert/preset.h"
+#include "convert/summable.h"
 #include "esvr/error.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
@@ -113,6 +114,23 @@ void requirePossible(const ConvertOptions& options) {
     throw UsageError("ellipsoids are not lossless");
 }
 
+[[noreturn]] void refuseSums(const ConvertInput& input, Coord tooLarge) {
+  throw BadInput("grid '" + input.descriptor.name + "': the value at " + toString(tooLarge) +
+                 " is too large for a sum of ellipsoids in float32; store voxels, with a PSNR, a "
+                 "size, a bound or lossless");
+}
+
+/// The representation of a grid: voxels, if its values are too large for sums.
+Representation possibleRepresentation(const ConvertInput& input, const ConvertOptions& options) {
+  const auto tooLarge = convert::tooLargeForSums(input.source);
+  if (!tooLarge || std::holds_alternative<LosslessGoal>(options.goal))
+    return options.representation;
+  if (options.representation == Representation::kEllipsoids ||
+      options.storage.form == Storage::kFloat32 || std::holds_alternative<FitGoal>(options.goal))
+    refuseSums(input, *tooLarge);
+  return Representation::kVoxels;
+}
+
 /// The sample for a remark on exact voxels. Coding it takes at most 0.2 s.
 constexpr convert::SampleSize kRemarkSample{.bricks = 512, .runs = 32};
 
@@ -160,6 +178,7 @@ Conversion convertVolume(const ConvertInput& given, const ConvertOptions& option
   if (own.fit.narrowBand) own.fit.fitFor = FitFor::kVoxels;
   if (own.fit.fitFor == FitFor::kDrawing) own.representation = Representation::kEllipsoids;
   if (keepsVoxels(own)) own.representation = Representation::kVoxels;
+  own.representation = possibleRepresentation(input, own);
   const auto convertTo = [](const Job& job) {
     return std::visit(Converter(job), job.options.goal);
   };
@@ -182,6 +201,7 @@ PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions&
         "grid '" + input.descriptor.name +
         "' is a level set; the paper's method cannot fit it, because its loss compares windows "
         "that a narrow band does not fill");
+  if (const auto tooLarge = convert::tooLargeForSums(input.source)) refuseSums(input, *tooLarge);
   PaperFitResult made = fitByPaper(input.source, options);
   Conversion conversion = stored(input, std::move(made.fit), options, storage);
   conversion.grid = throughTheFormat(std::move(conversion.grid), nullptr, memoryOf(input.source));

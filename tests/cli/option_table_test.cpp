@@ -221,13 +221,27 @@ Table curvesTests() {
           {"--peak", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"}};
 }
 
+Table stabilityTests() {
+  return {
+      {"--bricks", "CompareStability.comparesAsManyBricksAsAsked"},
+      {"--device", "CompareStabilityOnGpu.measuresBothDevices"},
+      {"--force", "CompareStability.replacesAReportWhereForced"},
+      {"--frames", "CompareStability.measuresTheFramesOfASequence"},
+      {"--grid", "CompareStability.listsGridsThatHaveNoEllipsoids"},
+      {"--max-difference", "CompareStability.failsBeyondTheLimitAndNamesTheFirstDigitThatIsLost"},
+      {"--max-memory", "CompareStability.refusesWhatHasNoEllipsoidsAndWhatIsTooLarge"},
+      {"--report", "CompareStability.replacesAReportWhereForced"},
+      {"--scratch", "CompareStability.refusesWhatHasNoEllipsoidsAndWhatIsTooLarge"}};
+}
+
 std::vector<Program> programs() {
   return {{"vdb2esvr", VDB2ESVR, "", vdb2esvrTests()},
           {"esvr2vdb", ESVR2VDB, "", esvr2vdbTests()},
           {"render", ESVR_RENDER, "", renderTests()},
           {"check", ESVR_COMPARE, "check", checkTests()},
           {"table", ESVR_COMPARE, "table", tableTests()},
-          {"curves", ESVR_COMPARE, "curves", curvesTests()}};
+          {"curves", ESVR_COMPARE, "curves", curvesTests()},
+          {"stability", ESVR_COMPARE, "stability", stabilityTests()}};
 }
 
 /// The short name of each long name, such as "-g" for "--grid"; empty if there is none.

@@ -96,6 +96,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Journey{"both signs", bothSigns(), kAlike},
                     Journey{"tiny values", ball({}, 1e-30f), kAlike},
                     Journey{"huge values", ball({}, 1e30f), kAlike},
+                    Journey{"the largest values that are fitted", ball({}, 1e36f), kAlike},
                     Journey{"far up", ball({kFar, kFar, kFar}), kAlike},
                     Journey{"far down", ball({-kFar, -kFar, -kFar}), kAlike},
                     Journey{"a rotated map", ballUnder(InputMap::kRotated), kAlike},

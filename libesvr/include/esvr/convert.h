@@ -192,6 +192,10 @@ struct Conversion {
 ///                     representation exclude each other; kEllipsoids is requested for a BoundGoal
 ///                     that ellipsoids with a residual cannot reach; a SizeGoal is too small for
 ///                     the ellipsoids of a narrow band and the residual of their signs
+/// Values that differ from the background by more than 2^120 (1.3e36) are too large for sums in
+/// float32; such a grid is stored as voxels.
+/// \throws BadInput  values are too large for sums, and the goal or an option needs ellipsoids (the
+///                   text names the grid and the voxel)
 /// \throws RuntimeFailure  the stored grid exceeds its bound; a voxel of a narrow band has another
 ///                         sign than in the source (the text names the grid and the voxel)
 /// Other exceptions are those of fit and compactGrid.
@@ -205,6 +209,7 @@ struct PaperConversion {
 /// Converts a volume with a fit by the paper's method, for comparison.
 /// \throws UsageError  the volume is a narrow band; k is learned for each ellipsoid, but the
 ///                     storage is kCompact
+/// \throws BadInput  values are too large for sums, as for convertVolume
 /// Other exceptions are those of fitByPaper and compactGrid.
 [[nodiscard]] PaperConversion convertByPaper(const ConvertInput& input,
                                              const PaperFitOptions& options,

@@ -1,4 +1,5 @@
 #include "core/refuse_cuda.h"
+#include "render/cuda/decode_bricks.h"
 #include "render/cuda/make_cuda_renderer.h"
 
 namespace esvr::cuda {
@@ -26,6 +27,10 @@ std::unique_ptr<Renderer> makeCudaNanoRenderer(const NanoVolume&, const Device& 
 std::unique_ptr<Renderer> makeCudaGridsRenderer(const std::vector<DrawnGrid>&, const Device& device,
                                                 const RendererLimits&) {
   refuseCuda("drawing", device);
+}
+
+void decodeBricks(const Device& device, const Field&, std::span<const Coord>, std::span<float>) {
+  refuseCuda("evaluating bricks", device);
 }
 
 }  // namespace esvr::cuda

@@ -1,0 +1,328 @@
+#!/usr/bin/env python3
+"""Measures stiff and extreme cases, and writes docs/stability.md from the figures.
+
+    stability.py measure --bin BUILD --device cpu --machine TEXT   writes docs/stability/cpu.json
+    stability.py measure --bin BUILD --device cuda --machine TEXT  writes docs/stability/cuda.json
+    stability.py page                                              writes docs/stability.md and its pictures
+
+BUILD has the program bench_stability (target of that name, with -DESVR_BUILD_BENCHMARKS=ON). TEXT describes the machine
+on the page. The page has the figures of both files; if one is missing, it says that they were not measured. --docs
+chooses another folder than docs.
+"""
+import argparse
+import json
+import pathlib
+import textwrap
+
+import svg_panels
+from run_program import run
+
+DEVICES = {"cpu": "CPU", "cuda": "CUDA"}
+COLORS = {0.5: "#3b82f6", 1.0: "#16a34a", 2.0: "#ea580c"}  # by multiples of the tuned step sizes
+IN_CHUNKS = "#a21caf"
+ALLOWED = 1e-4       # share of the peak; the default of esvr-compare stability --max-difference
+LOSS = 3.0           # dB, by which a fit is worse than that with the tuned steps
+EXACT = 999.0        # dB, which stand for no error
+PANELS = 6           # charts of a picture
+NOT_MEASURED = "not measured"
+
+INTRODUCTION = """\
+# Stability
+
+*This page is made by `tests/bench/stability.py`; do not edit it.*
+
+How precise is float32 on ellipsoids that are difficult to evaluate, are the gradients right, and do fits converge? Each
+case below is measured in three ways:
+
+- **Evaluation.** A sum of ellipsoids is evaluated in float32 and by its definition in float64 at all voxels of up to 512
+  bricks. The CPU's is the function that decodes files, and CUDA's the decoder of `esvr-render`. Differences and bounds are
+  shares of the peak. The bound follows from the arithmetic ([math.md](math.md#rounding)) and adds the worst case of all
+  operations. A case fails if the difference of a voxel is above its bound, or above {allowed:g} of the peak, as in
+  `esvr-compare stability`.
+- **Gradients.** The analytic derivatives of the squared error by all parameters of four ellipsoids and by kappa are
+  compared with central differences in float64, in a target of 16^3 random values. Errors are shares of the sum of the
+  magnitudes of the terms of the largest derivative of an ellipsoid. A case fails if an error is above its
+  [bound](math.md#rounding).
+- **Fits.** A volume is fitted in {iterations} iterations with half of the tuned step sizes, with these, and with up to 64
+  times as large ones. A case fails if a fit with half, all or twice the step sizes ends early, has a number that is not
+  finite, or ends with a larger error than no ellipsoid at all.
+
+Some cases are volumes and not ellipsoids, and have fits only. A case has no gradients of its own if scaling or moving it
+makes it another case.
+
+The figures are made by these commands:
+
+    python3 tests/bench/stability.py measure --bin build/release --device cpu --machine TEXT
+    python3 tests/bench/stability.py measure --bin build/release --device cuda --machine TEXT
+    python3 tests/bench/stability.py page
+
+"""
+
+
+def section(title, text):
+    """The heading and the first paragraph of a section."""
+    return f"## {title}\n\n{textwrap.fill(text, 120)}\n\n"
+
+
+def psnr(value):
+    if value is None:
+        return "not finite"
+    return "exact" if value >= EXACT else f"{value:.1f}"
+
+
+def number(value):
+    return "not finite" if value is None else f"{value:.1e}"
+
+
+class Figures:
+    """The figures of a case on one device."""
+
+    def __init__(self, case):
+        self.evaluation, self.gradients, self.fit = case["evaluation"], case["gradients"], case["fit"]
+
+    def share(self, key):
+        value = self.evaluation[key]
+        return None if value is None else value / self.evaluation["peak"]
+
+    def evaluation_failure(self):
+        if not self.evaluation:
+            return None
+        if self.evaluation["max"] is None:
+            return "a value is not finite"
+        if self.evaluation["share_of_bound"] > 1:
+            return "the evaluation is beyond its bound"
+        if self.share("max") > ALLOWED:
+            return f"digit {self.evaluation['digits'] + 1} of the evaluation is lost"
+        return None
+
+    def gradient_failure(self):
+        if not self.gradients:
+            return None
+        if self.gradients["max"] is None:
+            return "a gradient is not finite"
+        return "a gradient is beyond its bound" if self.gradients["share_of_bound"] > 1 else None
+
+    def runs(self):
+        return {run["factor"]: run for run in self.fit["runs"]} if self.fit else {}
+
+    def is_finite(self):
+        return all(r["finite"] and not r["failure"] for r in self.runs().values())
+
+    def diverges(self, factor):
+        fitted = self.runs()[factor]
+        return bool(fitted["failure"]) or not fitted["finite"] or fitted["psnr"] < self.fit["psnr_of_nothing"]
+
+    def fit_failure(self):
+        diverging = [f for f in COLORS if f in self.runs() and self.diverges(f)]
+        return f"the fit diverges with {diverging[0]:g} times the step sizes" if diverging else None
+
+    def failures(self):
+        found = [self.evaluation_failure(), self.gradient_failure(), self.fit_failure()]
+        return [text for text in found if text]
+
+    def first_factor(self, fails):
+        """The smallest factor above 1 for which `fails`, as text."""
+        factors = [f for f in self.runs() if f > 1]
+        if not factors:
+            return ""
+        return next((f"{f:g}" for f in factors if fails(f)), f"> {max(factors):g}")
+
+    def loses(self, factor):
+        runs = self.runs()
+        return self.diverges(factor) or runs[factor]["psnr"] < runs[1.0]["psnr"] - LOSS
+
+
+class Case:
+    """A case on all devices that were measured."""
+
+    def __init__(self, case, files):
+        self.name, self.detail = case["name"], case["detail"]
+        self.on = {}
+        for device, content in files.items():
+            self.on.update({device: Figures(c) for c in content["cases"] if c["name"] == self.name})
+
+    def any(self):
+        return next(iter(self.on.values()))
+
+    def failures(self):
+        return [f"{DEVICES[device]}: {text}" for device, f in self.on.items() for text in f.failures()]
+
+    def cells(self, cell):
+        """A cell for each device. `cell` makes it from the figures of one."""
+        return [cell(self.on[d]) if d in self.on else NOT_MEASURED for d in DEVICES]
+
+
+def table(header, rows):
+    lines = ["| " + " | ".join(header) + " |", "|---|" + "--:|" * (len(header) - 1)]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
+
+
+def both(text):
+    """A heading for each device."""
+    return [f"{text}, {device}" for device in DEVICES.values()]
+
+
+def results(cases):
+    rows = [[c.name, *c.cells(lambda f: "fails" if f.failures() else "passes"), "; ".join(c.failures()), c.detail]
+            for c in cases]
+    return ("## Results\n\n"
+            + table(["case", *DEVICES.values(), "what fails", "what is measured"], rows).replace("--:|", "---|"))
+
+
+def evaluation(cases):
+    def row(case):
+        figures = case.any()
+        return [case.name, f"{figures.evaluation['overlap']}", f"{figures.evaluation['condition']:.1e}",
+                f"{figures.evaluation['cancellation']:.1f}",
+                *case.cells(lambda f: number(f.share("bound"))), *case.cells(lambda f: number(f.share("max"))),
+                *case.cells(lambda f: f"{f.evaluation['digits']}")]
+    return (section(
+        "Evaluation", "*Overlap* is the largest number of supports that contain a voxel, *condition* the largest "
+            "condition number of Sigma, and *cancellation* the sum of the magnitudes of all terms divided by that of "
+            "their sums. Bounds and differences are shares of the peak. A hard edge costs digits in proportion to kappa (or "
+            "k): it lies where m is about kappa, and m has an error in proportion to itself. The paper's kernel jumps at its "
+            "end. Where rounding may decide on which side of the end a voxel lies, the jump is a part of the bound.")
+            + table(["case", "overlap", "condition", "cancellation", *both("bound"), *both("difference"),
+                     *both("digits")], [row(c) for c in cases if c.any().evaluation]))
+
+
+def gradients(cases):
+    def row(case):
+        return [case.name, number(case.any().gradients["bound"]),
+                *case.cells(lambda f: number(f.gradients["max"]))]
+    return (section("Gradients", "Errors are shares of the sum of the magnitudes of the terms.")
+            + table(["case", "bound", *both("error")], [row(c) for c in cases if c.any().gradients]))
+
+
+def fits(cases):
+    def row(case):
+        figures = case.any()
+        first = figures.runs()[1.0]
+        return [case.name, f"{figures.fit['active_voxels']}", f"{first['ellipsoids']}",
+                psnr(figures.fit["psnr_of_nothing"]),
+                *case.cells(lambda f: psnr(f.runs()[1.0]["psnr"])),
+                *case.cells(lambda f: number(f.runs()[1.0]["max_error"])),
+                *case.cells(lambda f: f"{f.runs()[1.0]['iterations']}"),
+                *case.cells(lambda f: "yes" if f.is_finite() else "no")]
+    return (section("Fits", "PSNR is that over the box in dB, at the end and without ellipsoids. The largest error is "
+                    "a share of the peak. A fit is *finite* if all parameters and errors are, with all step sizes that were tried.")
+            + table(["case", "voxels", "ellipsoids", "PSNR of nothing", *both("PSNR"), *both("largest error"),
+                     *both("iterations"), *both("finite")], [row(c) for c in cases if c.any().fit])
+            + chunks(cases))
+
+
+def chunks(cases):
+    text = ""
+    for case in cases:
+        for device, f in case.on.items():
+            if f.fit and f.fit["in_one_chunk"]:
+                text += "\n" + textwrap.fill(
+                    f"The fit of the case \"{case.name}\" has {psnr(f.runs()[1.0]['psnr'])} dB in chunks and "
+                    f"{psnr(f.fit['in_one_chunk']['psnr'])} dB in one chunk ({DEVICES[device]}). The step sizes of a fit "
+                    "in chunks cannot be changed, so it is not in the section \"Step sizes\".", 120) + "\n"
+    return text
+
+
+def steps(cases):
+    measured = [c for c in cases if len(c.any().runs()) > 1]
+    factors = list(measured[0].any().runs())
+
+    def row(case, device):
+        f = case.on[device]
+        return [case.name, DEVICES[device], *[psnr(f.runs()[factor]["psnr"]) for factor in factors],
+                f.first_factor(f.loses), f.first_factor(f.diverges)]
+    return (section("Step sizes", "The PSNR in dB at the end of fits whose steps are multiples of the tuned ones, the smallest "
+            f"multiple above 1 that is {LOSS:g} dB worse than these, and the smallest that diverges.")
+            + table(["case", "device", *[f"x {factor:g}" for factor in factors], f"loses {LOSS:g} dB", "diverges"],
+                    [row(c, d) for c in measured for d in c.on]))
+
+
+def lines(case):
+    found = []
+    for device, figures in case.on.items():
+        runs = [(f"steps x {factor:g}", COLORS[factor], r) for factor, r in figures.runs().items() if factor in COLORS]
+        if figures.fit and figures.fit["in_one_chunk"]:
+            runs = [("in chunks", IN_CHUNKS, figures.runs()[1.0]),
+                    ("steps x 1", COLORS[1.0], figures.fit["in_one_chunk"])]
+        for name, color, fitted in runs:
+            points = [p for p in fitted["curve"] if p[1] is not None and p[1] < EXACT]
+            if points:
+                found.append(svg_panels.Line(f"{DEVICES[device]}, {name}", points, color, device != "cpu"))
+    return found
+
+
+def curves(cases, folder):
+    """Draws the curves. Returns the section of the page."""
+    text = (section("Error against run time", "Each curve is a fit; its points are measured during the fit, and the time that "
+            "measuring takes counts.").rstrip("\n") + "\n")
+    panels = [svg_panels.Panel(c.name, lines(c)) for c in cases if lines(c)]
+    folder.mkdir(exist_ok=True)
+    for n in range(0, len(panels), PANELS):
+        part, file = panels[n:n + PANELS], f"stability_{n // PANELS + 1}.svg"
+        (folder / file).write_text(svg_panels.draw(part, "seconds", "PSNR over the box, dB"))
+        text += f"\n![Error against run time: {', '.join(p.title for p in part)}](img/{file})\n"
+    exact = [c.name for c in cases if c.any().fit and not lines(c)]  # no point has an error
+    if exact:
+        text += f"\nThere is no curve of {', '.join(exact)}, which is exact from the first point on.\n"
+    return text
+
+
+def machines(files):
+    text = "".join(f"- {content['device']}: {content['machine']}\n" for content in files.values())
+    missing = [device for device in DEVICES if device not in files]
+    for device in missing:
+        text += (f"- **{DEVICES[device]} was not measured**: `docs/stability/{device}.json` does not exist. Its columns are "
+                 f"marked \"{NOT_MEASURED}\".\n")
+    return text + "\n"
+
+
+def verdict(cases):
+    failing = [c for c in cases if c.failures()]
+    if not failing:
+        return f"**All {len(cases)} cases pass on the devices that were measured.**\n\n"
+    names = ", ".join(f'"{c.name}"' for c in failing)
+    return (f"**Of {len(cases)} cases, {len(failing)} {'fails' if len(failing) == 1 else 'fail'}**: {names}. Cases that fail "
+            "are the first rows of each table.\n\n")
+
+
+def load(docs):
+    paths = {device: docs / "stability" / f"{device}.json" for device in DEVICES}
+    return {device: json.loads(path.read_text()) for device, path in paths.items() if path.exists()}
+
+
+def page(arguments):
+    files = load(arguments.docs)
+    if not files:
+        raise SystemExit("nothing was measured; run stability.py measure")
+    first = next(iter(files.values()))
+    cases = [Case(c, files) for c in first["cases"]]
+    cases.sort(key=lambda case: not case.failures())
+    introduction = INTRODUCTION.format(allowed=ALLOWED, iterations=first["iterations"])
+    sections = [results(cases), evaluation(cases), gradients(cases), fits(cases), steps(cases),
+                curves(cases, arguments.docs / "img")]
+    (arguments.docs / "stability.md").write_text(introduction + machines(files) + verdict(cases)
+                                                 + "\n".join(sections))
+
+
+def measure(arguments):
+    folder = arguments.docs / "stability"
+    folder.mkdir(parents=True, exist_ok=True)
+    run([arguments.bin / "tests/bench/stability/bench_stability", folder / f"{arguments.device}.json", "--device",
+         arguments.device, "--machine", arguments.machine])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    jobs = {"measure": measure, "page": page}
+    parser.add_argument("what", choices=jobs)
+    parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
+    parser.add_argument("--docs", type=pathlib.Path, default=pathlib.Path("docs"))
+    parser.add_argument("--device", choices=DEVICES, default="cpu")
+    parser.add_argument("--machine", default="a machine that was not described")
+    arguments = parser.parse_args()
+    jobs[arguments.what](arguments)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,11 @@
+#include "core/refuse_cuda.h"
+#include "measure_gradients.h"
+
+namespace esvr::bench {
+
+std::vector<EllipsoidGradient> gradientsOnGpu(const FitTarget&, const Kernel&,
+                                              std::span<const Ellipsoid>, const Device& device) {
+  refuseCuda("gradients", device);
+}
+
+}  // namespace esvr::bench
