@@ -1,5 +1,7 @@
 #include "vdb2esvr/frame_conversion.h"
 
+#include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "cli/failure.h"
@@ -24,6 +26,24 @@ cli::Verbosity verbosityOfFrames(const Options& options) {
                                                      : cli::Verbosity::kNormal;
 }
 
+/// The largest number of frames that a GPU converts at the same time, since a conversion uses it for
+/// a part of its time only. Three groups at a time took a third of the time of one after the other
+/// (docs/sequences.md).
+constexpr int kFramesOfGpu = 4;
+
+bool fitsOn(const Device& device, const Options& options) {
+  return device.kind == DeviceKind::kCuda && mayFit(options);
+}
+
+/// Bytes of a device's memory that frames may share: half of a GPU's, because the memory of fits is
+/// not known before they begin. The memory of the host has a gate of its own.
+std::uint64_t sharedMemoryOf(const Device& device, const Options& options) {
+  if (!fitsOn(device, options)) return std::numeric_limits<std::uint64_t>::max();
+  const bool isLimited = options.convert.fit.maxDeviceBytes || options.convert.fit.seconds;
+  constexpr std::uint64_t kOneAfterTheOther = 1;  // every frame needs more and is let in alone
+  return isLimited ? kOneAfterTheOther : std::max(freeDeviceMemory(device) / 2, kOneAfterTheOther);
+}
+
 /// The memory that the conversion of a file may take, bytes.
 std::uint64_t memoryOf(const Options& options) {
   const VdbSummary file = inspectVdb(options.input);
@@ -40,6 +60,9 @@ FrameConversion::FrameConversion(const Options& options, const std::vector<cli::
       gate_(options.read.maxBytes),
       bar_(options.input.string(), options.progress, options.verbosity),
       log_(kProgram, options.verbosity) {
+  for (const Device& device : devices_)
+    if (!deviceGates_.contains(device.index))
+      deviceGates_.try_emplace(device.index, sharedMemoryOf(device, options));
   for (const cli::Frame& frame : frames) {
     const bool isLeftOut = frame.missing && !frame.holds;
     record_.frames.push_back(
@@ -49,8 +72,9 @@ FrameConversion::FrameConversion(const Options& options, const std::vector<cli::
 }
 
 int FrameConversion::workers(std::size_t tasks) const {
-  if (mayFit(options_) && devices_.front().kind == DeviceKind::kCuda) return int(devices_.size());
-  return cli::taskWorkers(options_.threads, tasks);
+  const int most = cli::taskWorkers(options_.threads, tasks);
+  return fitsOn(devices_.front(), options_) ? std::min(most, kFramesOfGpu * int(devices_.size()))
+                                            : most;
 }
 
 void FrameConversion::attempt(FrameRecord& frame, const std::function<void()>& action) {
@@ -80,7 +104,9 @@ Options FrameConversion::optionsOf(const cli::Frame& frame, int worker) const {
 }
 
 void FrameConversion::convert(const Options& own, FrameRecord& frame, const StoreFile& store) {
-  const auto memory = gate_.take(memoryOf(own));
+  const std::uint64_t bytes = memoryOf(own);
+  const auto memory = gate_.take(bytes);
+  const auto onDevice = deviceGates_.at(selectDevices(own.device).front().index).take(bytes);
   const cli::Log log = warnings_.logOf(frame.frame, kProgram, verbosityOfFrames(options_));
   const RunRecord run = convertFile(own, {nullptr, cancel_, log, store});
   takeFigures(run, frame);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -29,8 +30,7 @@ class FrameConversion {
   FrameConversion(const Options& options, const std::vector<cli::Frame>& frames,
                   const CancelToken& cancel);
 
-  /// The number of workers for tasks that each convert one or several frames. A GPU converts one
-  /// frame after the other, because a fit may take all of its memory.
+  /// The number of workers for tasks that each convert one or several frames.
   [[nodiscard]] int workers(std::size_t tasks) const;
 
   /// Runs an action that gives a frame its output, records whether it failed, and tells that the
@@ -40,7 +40,7 @@ class FrameConversion {
   /// The options with which a frame is converted. The bar of a fit is not shown.
   [[nodiscard]] Options optionsOf(const cli::Frame& frame, int worker) const;
 
-  /// Converts a frame as soon as there is memory for it.
+  /// Converts a frame as soon as there is memory for it, on the host and on its GPU.
   /// \param own  options of the frame
   void convert(const Options& own, FrameRecord& frame, const StoreFile& store);
 
@@ -58,6 +58,7 @@ class FrameConversion {
   const CancelToken& cancel_;
   const std::vector<Device> devices_;
   cli::MemoryGate gate_;
+  std::map<int, cli::MemoryGate> deviceGates_;  ///< by Device::index
   cli::FrameWarnings warnings_;
   SequenceRecord record_;
   std::mutex mutex_;  ///< of the members below

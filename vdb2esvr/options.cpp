@@ -85,7 +85,7 @@ cli::ProgramText programText() {
           "frames have the PSNR of --preset, whatever their "
           "size.\n"
           "In a pattern, #, #### and %04d are four digits, and @ is as many as needed. Frames are\n"
-          "converted at the same time on the threads of --threads, or one on each GPU of "
+          "converted at the same time on the threads of --threads, or up to four on each GPU of "
           "--device,\n"
           "as far as --max-memory allows. A frame that fails is named, and does not stop the "
           "others\n"

@@ -7,6 +7,8 @@ bool builtWithCuda() noexcept { return false; }
 
 void startDevice(const Device&) noexcept {}
 
+std::uint64_t freeDeviceMemory(const Device&) { return 0; }
+
 CudaProbe probeCuda() {
   return {.versions = "no CUDA", .devices = {}, .whyNoDevices = "this build has no CUDA"};
 }

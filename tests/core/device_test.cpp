@@ -31,6 +31,8 @@ CudaProbe onlyAnOldGpu() {
   return {.versions = {}, .devices = {{0, "Old", "too old"}}, .whyNoDevices = {}};
 }
 
+TEST(FreeDeviceMemory, IsNoneOnTheCpu) { EXPECT_EQ(freeDeviceMemory(Device{}), 0u); }
+
 TEST(ChooseDevice, CpuIsTheCpuWhateverThereIs) {
   EXPECT_EQ(chooseDevice("cpu", threeGpus()).kind, DeviceKind::kCpu);
   EXPECT_EQ(chooseDevice("cpu", noGpu()).kind, DeviceKind::kCpu);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/cuda/check.h"
+#include "core/cuda/use_device.h"
 #include "core/cuda_probe.h"
 #include "esvr/device.h"
 
@@ -73,6 +74,14 @@ void startDevice(const Device& device) noexcept {
   cudaSetDevice(device.index);
   cudaFree(nullptr);   // creates the context
   cudaGetLastError();  // an error of this thread must not remain
+}
+
+std::uint64_t freeDeviceMemory(const Device& device) {
+  if (device.kind != DeviceKind::kCuda) return 0;
+  cuda::useDevice(device);
+  std::size_t free = 0, total = 0;
+  cuda::check(cudaMemGetInfo(&free, &total), "asking for the free memory");
+  return free;
 }
 
 CudaProbe probeCuda() {

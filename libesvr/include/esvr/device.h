@@ -1,6 +1,7 @@
 #pragma once
 /// Selects the device that computes.
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,10 @@ struct Device {
 /// Starts a device, which takes some tenths of a second for a GPU, so that its first use need not
 /// wait. It may be called on another thread. It reports no error, because the first use does.
 void startDevice(const Device& device) noexcept;
+
+/// Free memory of a GPU in bytes; 0 for the CPU.
+/// \throws DeviceError  the GPU cannot be used
+[[nodiscard]] std::uint64_t freeDeviceMemory(const Device& device);
 
 /// The name of a device: "CPU", or the GPU's name and number, "NVIDIA H200 (cuda:0)".
 [[nodiscard]] std::string deviceName(const Device& device);
