@@ -21,13 +21,17 @@ Interval within(int step) {
 
 }  // namespace
 
-void MaskCube::fillPart(Coord step, const BrickMask* mask) {
+void MaskCube::fillPart(Coord step, const Masks& masks) {
+  const auto in = [](const BrickMask* mask, Coord voxel) {
+    return mask && mask->test(voxelOffset(localOf(voxel)));
+  };
   const Interval xs = within(step.x), ys = within(step.y), zs = within(step.z);
   for (int x = xs.first; x <= xs.last; ++x)
     for (int y = ys.first; y <= ys.last; ++y)
       for (int z = zs.first; z <= zs.last; ++z) {
-        active_[at(x, y, z)] = mask && mask->test(voxelOffset(localOf({x, y, z})));
-        coded_[at(x, y, z)] = mask != nullptr;
+        active_[at(x, y, z)] = in(masks.own, {x, y, z});
+        expected_[at(x, y, z)] = in(masks.expected, {x, y, z});
+        coded_[at(x, y, z)] = masks.own != nullptr;
       }
 }
 

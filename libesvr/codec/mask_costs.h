@@ -1,6 +1,6 @@
 #pragma once
 /// The bits that the active mask of a brick takes, estimated with the contexts of the voxel coder
-/// (voxel_halo.h), and what changes of the mask would save.
+/// (voxel_halo.h) and the state in an expected mask, and what changes of the mask would save.
 
 #include <array>
 #include <cstddef>
@@ -23,7 +23,13 @@ class MaskCube {
     return {brick / 9 - 1, brick / 3 % 3 - 1, brick % 3 - 1};
   }
 
-  /// \param find  find(step) returns the mask of the brick at a step, or null if there is none
+  /// The masks of a brick; null: there is none.
+  struct Masks {
+    const BrickMask* own = nullptr;
+    const BrickMask* expected = nullptr;  ///< a guess of it that a decoder has too
+  };
+
+  /// \param find  find(step) returns the Masks of the brick at a step
   template <class Find>
   void fill(const Find& find) {
     for (int n = 0; n < kBricks; ++n) fillPart(step(n), find(step(n)));
@@ -41,7 +47,7 @@ class MaskCube {
 
   /// The context of a voxel with coordinates from 0 to kBrickSide.
   [[nodiscard]] std::size_t context(std::size_t at) const {
-    std::size_t bits = 0;
+    std::size_t bits = expected_[at];
     for (const std::size_t back : kBack) bits = bits << 1 | active_[at - back];
     return bits;
   }
@@ -51,14 +57,14 @@ class MaskCube {
   /// The voxels before a voxel, in the order of Halo::activityAround().
   static constexpr std::array kBack{kX, kY, std::size_t{1}, kX + kY, kX + 1, kY + 1, kX + kY + 1};
 
-  void fillPart(Coord step, const BrickMask* mask);
+  void fillPart(Coord step, const Masks& masks);
 
-  std::array<std::uint8_t, kCells> active_{}, coded_{};
+  std::array<std::uint8_t, kCells> active_{}, coded_{}, expected_{};
 };
 
 /// The bits of a voxel by its context and its state.
 struct MaskCosts {
-  static constexpr std::size_t kContexts = 128;
+  static constexpr std::size_t kContexts = 256;
 
   std::array<std::array<float, 2>, kContexts> bits{};
 
@@ -72,8 +78,10 @@ class MaskCounts {
  public:
   void add(const MaskCube& cube);
   /// Adds a brick whose voxels are, like those around it, all in one state.
-  void addUniform(bool active) {
-    counts_[active ? MaskCosts::kContexts - 1 : 0][active] += kBrickVoxels;
+  /// \param expected  the state of all of its voxels in the expected mask
+  void addUniform(bool active, bool expected) {
+    constexpr std::size_t kStates = MaskCosts::kContexts / 2;
+    counts_[(expected ? kStates : 0) + (active ? kStates - 1 : 0)][active] += kBrickVoxels;
   }
   void add(const MaskCounts& other);
   [[nodiscard]] MaskCosts costs() const;

@@ -200,8 +200,9 @@ class BrickMoves {
 
 class MaskSimplifier {
  public:
-  MaskSimplifier(const SparseVolume& volume, double error)
+  MaskSimplifier(const SparseVolume& volume, double error, std::span<const BrickMask> expected)
       : volume_(volume),
+        expected_(expected),
         index_(volume.bricks),
         prices_(volume, index_, error),
         masks_(volume.active) {
@@ -252,7 +253,7 @@ class MaskSimplifier {
         [&](const MaskRange& bricks, MaskCounts counts) {
           for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)
             if (isUniform(b))
-              counts.addUniform(masks_[b].test(0));
+              counts.addUniform(masks_[b].test(0), !expected_.empty() && expected_[b].test(0));
             else
               counts.add(cubeOf(b));
           return counts;
@@ -263,27 +264,36 @@ class MaskSimplifier {
         });
   }
 
-  /// The mask of the brick at a step from brick b; null if there is no such brick.
-  [[nodiscard]] const BrickMask* maskBeside(std::size_t b, Coord step) const {
+  /// The masks of the brick at a step from brick b.
+  [[nodiscard]] MaskCube::Masks masksBeside(std::size_t b, Coord step) const {
     const std::uint32_t at = index_.find(volume_.bricks[b] + step);
-    return at == BrickIndex::kNone ? nullptr : &masks_[at];
+    if (at == BrickIndex::kNone) return {};
+    return {&masks_[at], expected_.empty() ? nullptr : &expected_[at]};
   }
 
-  /// True if all voxels of a brick and of the bricks around it are in the same state.
+  /// True if all voxels of a brick and of the bricks around it are in the same state, and those of
+  /// the brick in one state in the expected mask.
   [[nodiscard]] bool isUniform(std::size_t b) const {
     BrickMask uniform;
     if (masks_[b].test(0)) uniform.setAll();
     if (masks_[b] != uniform) return false;
+    if (!expected_.empty() && !isUniform(expected_[b])) return false;
     for (int n = 0; n < MaskCube::kBricks; ++n) {
-      const BrickMask* mask = maskBeside(b, MaskCube::step(n));
+      const BrickMask* mask = masksBeside(b, MaskCube::step(n)).own;
       if ((mask ? *mask : BrickMask{}) != uniform) return false;
     }
     return true;
   }
 
+  [[nodiscard]] static bool isUniform(const BrickMask& mask) {
+    BrickMask full;
+    full.setAll();
+    return mask == full || mask == BrickMask{};
+  }
+
   [[nodiscard]] MaskCube cubeOf(std::size_t b) const {
     MaskCube cube;
-    cube.fill([&](Coord step) { return maskBeside(b, step); });
+    cube.fill([&](Coord step) { return masksBeside(b, step); });
     return cube;
   }
 
@@ -297,6 +307,7 @@ class MaskSimplifier {
   }
 
   const SparseVolume& volume_;
+  std::span<const BrickMask> expected_;  ///< masks of the bricks; empty if nothing is expected
   BrickIndex index_;
   Prices prices_;
   std::vector<BrickMask> masks_;
@@ -315,18 +326,20 @@ MaskOverlap overlapOf(std::span<const BrickMask> a, std::span<const BrickMask> b
   return overlap;
 }
 
-std::vector<BrickMask> simplifiedMask(const SparseVolume& volume, double error) {
-  return MaskSimplifier(volume, error).run();
+std::vector<BrickMask> simplifiedMask(const SparseVolume& volume, double error,
+                                      std::span<const BrickMask> expected) {
+  return MaskSimplifier(volume, error, expected).run();
 }
 
 std::span<const BrickMask> SimplifiedMasks::forError(double error) const {
   const int exponent = int(std::lround(std::log2(std::max(error, kLeastError))));
   const std::lock_guard lock(making_);
   auto& masks = byExponent_[exponent];
+  if (!expected_) expected_ = makeExpected_ ? makeExpected_() : std::vector<BrickMask>{};
   if (masks.empty() &&
       volume_.brickCount() > 0)  // the loops must not take up a task that waits here
     tbb::this_task_arena::isolate(
-        [&] { masks = simplifiedMask(volume_, std::ldexp(1.0, exponent)); });
+        [&] { masks = simplifiedMask(volume_, std::ldexp(1.0, exponent), *expected_); });
   return masks;
 }
 

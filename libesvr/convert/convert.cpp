@@ -2,6 +2,7 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "convert/attempt.h"
 #include "convert/bounded.h"
@@ -14,6 +15,7 @@
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "format/mask_section.h"
 
 namespace esvr {
 namespace {
@@ -154,6 +156,18 @@ bool keepsVoxels(const ConvertOptions& options) {
          options.storage.form == Storage::kCompact && options.fit.fitFor == FitFor::kVoxels;
 }
 
+/// The mask of the previous frame, moved to where the voxels of the source are.
+std::vector<BrickMask> expectedMasks(const SparseVolume& source, const StoredGrid& previous) {
+  const SparseVolume before = decodeGrid(previous, {.memory = memoryOf(source)});
+  const auto maskOf = [](const SparseVolume& volume) {
+    format::Mask mask{{}, volume.active};
+    for (std::size_t b = 0; b < volume.brickCount(); ++b)
+      mask.bricks.push_back(volume.brickCorner(b));
+    return mask;
+  };
+  return format::movedMask(maskOf(source), maskOf(before));
+}
+
 }  // namespace
 
 double presetPsnr(Preset preset) {
@@ -170,7 +184,9 @@ double presetPsnr(Preset preset) {
 
 Conversion convertVolume(const ConvertInput& given, const ConvertOptions& options) {
   requirePossible(options);
-  const SimplifiedMasks masks(given.source);  // all attempts share them
+  SimplifiedMasks::MakeExpected expected;
+  if (options.previous) expected = [&] { return expectedMasks(given.source, *options.previous); };
+  const SimplifiedMasks masks(given.source, std::move(expected));  // all attempts share them
   const ConvertInput input{given.descriptor, given.source,
                            given.simplified ? given.simplified : &masks};
   ConvertOptions own = options;

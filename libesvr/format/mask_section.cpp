@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "codec/frame_coder.h"
+#include "codec/motion_search.h"
 #include "esvr/error.h"
 #include "format/bricks_stream.h"
 #include "format/predicted_stream.h"
@@ -95,6 +96,25 @@ std::vector<std::byte> putMaskAfter(std::span<const Coord> bricks,
   for (const auto start : {layer.origin.x, layer.origin.y, layer.origin.z}) out.put(start);
   out.putAll(encodePredicted(layer, codec::PastVoxels(before, layer)));
   return out.take();
+}
+
+std::vector<BrickMask> movedMask(const Mask& mask, const Mask& previous) {
+  const VoxelLayer layer = maskLayer(mask.bricks, mask.active);
+  const VoxelLayer before = maskLayer(previous.bricks, previous.active);
+  if (!codec::isPredictable(layer, before)) return {};
+  const codec::PastVoxels past(before, layer);
+  codec::MotionSearch search(past);
+  codec::PastCube<0> cube;
+  std::vector<BrickMask> moved(mask.bricks.size());
+  Coord motion;
+  for (std::size_t b = 0; b < moved.size(); ++b) {
+    const std::span codes(layer.codes);
+    motion = search.find(layer.bricks[b], codes.subspan(b * kBrickVoxels, kBrickVoxels), motion);
+    past.fill(layer.bricks[b], motion, cube);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (cube.active[codec::PastCube<0>::cell(voxelLocal(v))]) moved[b].set(v);
+  }
+  return moved;
 }
 
 Mask getMaskAfter(std::span<const std::byte> content, const std::string& where,

@@ -35,6 +35,10 @@ struct Mask {
                                                   std::span<const BrickMask> active,
                                                   const Mask& previous);
 
+/// The previous mask, moved as the mask of a frame has moved since: what putMaskAfter() expects.
+/// \return masks of the bricks of the frame; empty if its mask cannot follow the previous one
+[[nodiscard]] std::vector<BrickMask> movedMask(const Mask& mask, const Mask& previous);
+
 /// \throws BadInput, MemoryExceeded  as for getMask
 [[nodiscard]] Mask getMaskAfter(std::span<const std::byte> content, const std::string& where,
                                 const Mask& previous, MemoryBudget& budget);

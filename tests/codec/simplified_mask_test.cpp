@@ -115,6 +115,32 @@ TEST(SimplifiedMask, ChangesFewerVoxelsForASmallerError) {
   EXPECT_EQ(changed(1e-9), 0u);
 }
 
+// The expected mask is a coarser one of the same body. Where the two differ by faint voxels, the
+// expected state takes fewer bits.
+TEST(SimplifiedMask, IsMoreLikeAMaskThatIsExpected) {
+  const SparseVolume source = roughBall(0.1, 0.0f);
+  const auto coarser = simplifiedMask(source, 4.0 * kError);
+  const auto likeness = [&](std::span<const BrickMask> expected) {
+    const auto masks = simplifiedMask(source, kError, expected);
+    EXPECT_TRUE(overlapOf(source.active, masks).suffices());
+    return overlapOf(masks, coarser).iou();
+  };
+  EXPECT_GT(likeness(coarser), likeness({}));
+}
+
+TEST(SimplifiedMasks, AskOnceForWhatIsExpected) {
+  const SparseVolume source = roughBall(0.1, 0.0f);
+  int asked = 0;
+  const SimplifiedMasks masks(source, [&] {
+    ++asked;
+    return source.active;
+  });
+  EXPECT_EQ(asked, 0);
+  (void)masks.forError(0.0156);
+  (void)masks.forError(0.03);
+  EXPECT_EQ(asked, 1);
+}
+
 TEST(SimplifiedMasks, AreMadeOnceForAllErrorsOfAPowerOfTwo) {
   const SparseVolume source = roughBall(0.1, 0.0f);
   const SimplifiedMasks masks(source);

@@ -15,6 +15,7 @@
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
+#include "esvr/simplified_mask.h"
 #include "fit/volumes.h"
 #include "format/checksum.h"
 #include "format/continued_samples.h"
@@ -194,6 +195,37 @@ TEST(ContinuedFrame, RepeatsAnEqualMaskInFewBytes) {
   const EsvrFile plain = firstFile(), masked = frameOf(withMask(plain.grids[0], 0));
   // A length, an origin, and a few decisions for each brick.
   EXPECT_LT(expectContinues(masked, masked).size(), expectContinues(plain, plain).size() + 50);
+}
+
+/// A ball as a mask of bricks, some of which may be empty.
+format::Mask ballMask(Coord middle) {
+  constexpr int kRadius = 9, kBricks = 4;
+  format::Mask mask;
+  for (int x = 0; x < kBricks; ++x)
+    for (int y = 0; y < kBricks; ++y)
+      for (int z = 0; z < kBricks; ++z) mask.bricks.push_back(Coord{x, y, z} * kBrickSide);
+  mask.active.resize(mask.bricks.size());
+  for (std::size_t b = 0; b < mask.bricks.size(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Coord p = mask.bricks[b] + voxelLocal(v) - middle;
+      if (p.x * p.x + p.y * p.y + p.z * p.z <= kRadius * kRadius) mask.active[b].set(v);
+    }
+  return mask;
+}
+
+TEST(MovedMask, IsThatOfABallThatHasMoved) {
+  const format::Mask before = ballMask({14, 16, 16}), now = ballMask({16, 15, 16});
+  const auto moved = format::movedMask(now, before);
+  ASSERT_EQ(moved.size(), now.bricks.size());
+  // Bricks with few voxels of the ball do not show how it moves.
+  EXPECT_GT(overlapOf(moved, now.active).iou(), 0.97);
+  EXPECT_LT(overlapOf(before.active, now.active).iou(), 0.85);
+}
+
+TEST(MovedMask, IsNoneForAMaskFarAway) {
+  format::Mask far = ballMask({16, 16, 16});
+  for (Coord& corner : far.bricks) corner.x += 1 << 30;
+  EXPECT_TRUE(format::movedMask(ballMask({16, 16, 16}), far).empty());
 }
 
 TEST(MaskAfter, BringsBackMasksThatGrowShrinkAndVanish) {
