@@ -68,6 +68,16 @@ std::vector<SearchStep> searchOf(const Match& match) {
   return steps;
 }
 
+std::string settingOf(double bound) { return "bound=" + boundText(bound); }
+
+std::vector<SearchStep> searchOf(const ExternalMatch& match) {
+  std::vector<SearchStep> steps;
+  for (const auto& step : match.steps)
+    steps.push_back({settingOf(step.bound), step.bytes,
+                     std::isnan(step.psnr) ? std::nullopt : std::optional(step.psnr)});
+  return steps;
+}
+
 /// Index in EsvrFile::grids of the grid that has the reference's name; if only one grid of a file
 /// is not carried, it is taken.
 std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
@@ -217,6 +227,54 @@ TableRow RowMaker::external(const External& external) {
                 NanoValues::kFloat, row);
   if (external.fps) row.fps = external.fps;
   return row;
+}
+
+void RowMaker::measure(ExternalCodec& codec, double bound, TableRow& row) {
+  row.setting = settingOf(bound);
+  row.bytes = codec.encode(bound).bytes;
+  row.encode = timed(scene_.options.runs, [&] { return codec.encode(bound).seconds; });
+  row.decode = timed(scene_.options.runs, [&] { return codec.secondsToDecode(); });
+  row.note = "times of the whole command";
+  measureVoxels(codec.decode(), NanoValues::kFloat, row);
+}
+
+TableRow RowMaker::matched(const ExternalCommand& command, const TableRow& like,
+                           const std::function<ExternalMatch(ExternalCodec&)>& search) try {
+  TableRow row = like;
+  ExternalCodec codec(command, {.volume = scene_.reference.volume,
+                                .box = scene_.box,
+                                .peak = scene_.peak,
+                                .folder = scene_.folder,
+                                .maxDense = scene_.options.maxDense,
+                                .memory = scene_.options.memory,
+                                .cancel = &scene_.cancel});
+  const ExternalMatch match = search(codec);
+  row.search = searchOf(match);
+  if (match.found)
+    measure(codec, match.best.bound, row);
+  else
+    row.note = "out of reach";
+  return row;
+} catch (const Cancelled&) {
+  throw;
+} catch (const Error& error) {
+  if (scene_.cancel.cancelled()) throw Cancelled();  // Ctrl-C also ends the command
+  return {.name = like.name, .group = like.group, .command = like.command, .note = error.what()};
+}
+
+TableRow RowMaker::sizeMatched(const ExternalCommand& external, std::uint64_t bytes) {
+  const std::string size = std::to_string(bytes);
+  return matched(external,
+                 {.name = external.name,
+                  .group = "at " + size + " bytes",
+                  .command = command("--rows none --size " + size + " --external-command " +
+                                     shellWord(external.text))},
+                 [=](ExternalCodec& codec) { return matchSize(codec, bytes); });
+}
+
+TableRow RowMaker::psnrMatched(const ExternalCommand& external, double psnr) {
+  return matched(external, {.name = external.name, .group = "at " + cli::decibels(psnr) + " dB"},
+                 [=](ExternalCodec& codec) { return matchPsnr(codec, psnr); });
 }
 
 void RowMaker::measureEsvr(const std::filesystem::path& path, TableRow& row) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "compare/external_search.h"
 #include "compare/table_options.h"
 #include "compare/table_record.h"
 #include "esvr/baseline.h"
@@ -42,6 +43,9 @@ class RowMaker {
   TableRow sizeMatched(const BaselineSetting& like, std::uint64_t bytes);
   TableRow psnrMatched(const BaselineSetting& like, double psnr);
   TableRow external(const External& external);
+  /// Searches the best bound of an external command for a size or a PSNR.
+  TableRow sizeMatched(const ExternalCommand& command, std::uint64_t bytes);
+  TableRow psnrMatched(const ExternalCommand& command, double psnr);
   /// \throws BadInput  the candidate does not have the grid, or its voxels lie elsewhere
   TableRow candidate(const std::filesystem::path& path);
   /// Fits ellipsoids.
@@ -49,6 +53,9 @@ class RowMaker {
 
  private:
   void measure(const BaselineSetting& setting, TableRow& row);
+  TableRow matched(const ExternalCommand& command, const TableRow& row,
+                   const std::function<ExternalMatch(ExternalCodec&)>& search);
+  void measure(ExternalCodec& codec, double bound, TableRow& row);
   TableRow matched(const BaselineSetting& like, const std::string& group,
                    const std::function<Match()>& search);
   /// \param head  size of a file without grids, bytes

@@ -1,16 +1,12 @@
 #include "compare/picture_metric.h"
 
-#include <sys/wait.h>
-
-#include <array>
-#include <cstdio>
-#include <memory>
 #include <span>
 #include <sstream>
 #include <utility>
 
 #include "cli/bytes_file.h"
 #include "cli/number.h"
+#include "compare/shell_command.h"
 #include "compare/shell_word.h"
 #include "esvr/error.h"
 #include "report/png_image.h"
@@ -23,20 +19,6 @@ std::filesystem::path written(const Image& image, const std::filesystem::path& p
   const std::string png = report::toPng(image);
   cli::writeBytes(path, std::as_bytes(std::span(png)), kOverwrite);
   return path;
-}
-
-/// The output of a shell command. \throws RuntimeFailure  its exit code is not 0
-std::string outputOf(const std::string& command) {
-  FILE* pipe = popen(command.c_str(), "r");
-  if (!pipe) throw RuntimeFailure("--lpips: cannot run " + command);
-  std::string text;
-  std::array<char, 256> part{};
-  while (std::fgets(part.data(), int(part.size()), pipe)) text += part.data();
-  const int status = pclose(pipe);
-  if (status != 0)
-    throw RuntimeFailure("--lpips: " + command + " ended with code " +
-                         std::to_string(WIFEXITED(status) ? WEXITSTATUS(status) : status));
-  return text;
 }
 
 double lastNumber(const std::string& command, const std::string& text) {
@@ -58,7 +40,7 @@ double PictureMetric::of(const Image& reference, const Image& picture) const {
   const auto command = command_ + " " +
                        shellWord(written(reference, folder_ / "reference.png").string()) + " " +
                        shellWord(written(picture, folder_ / "picture.png").string());
-  return lastNumber(command_, outputOf(command));
+  return lastNumber(command_, outputOf(command, "--lpips"));
 }
 
 }  // namespace esvr::compare

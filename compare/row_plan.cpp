@@ -48,6 +48,7 @@ std::vector<NamedSetting> quantisedSettings(double peak) {
 std::vector<BaselineSetting> sizeForms(const TableOptions& options) {
   using F = PackedForm;
   std::vector<BaselineSetting> forms;
+  if (!options.settings.empty()) return forms;
   if (options.matched)
     forms = {packed(F::kOpenVdbHalf, kBlosc), packed(F::kNanoFloat, kZip),
              packed(F::kNanoFp16, kZip),      packed(F::kNanoFp8, kZip),
@@ -62,6 +63,7 @@ std::vector<BaselineSetting> sizeForms(const TableOptions& options) {
 
 std::vector<BaselineSetting> psnrForms(const TableOptions& options) {
   std::vector<BaselineSetting> forms;
+  if (!options.settings.empty()) return forms;
   if (options.matched) forms = {packed(PackedForm::kNanoFpN, kZip)};
   if (options.zfp && !zfpVersion().empty()) {
     forms.push_back(zfp(ZfpMode::kAccuracy));

@@ -21,7 +21,8 @@ struct NamedSetting {
 };
 [[nodiscard]] std::vector<NamedSetting> quantisedSettings(double peak);
 
-/// The forms for which the best setting for a size, or for a PSNR, is searched.
+/// The forms for which the best setting for a size, or for a PSNR, is searched; none if --row names
+/// the baselines.
 [[nodiscard]] std::vector<BaselineSetting> sizeForms(const TableOptions& options);
 [[nodiscard]] std::vector<BaselineSetting> psnrForms(const TableOptions& options);
 

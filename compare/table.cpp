@@ -32,8 +32,7 @@ class TableRun {
     if (options_.fitPaper) add(maker_.fitted({.paper = true}));
     for (const std::uint64_t bytes : options_.fits) add(maker_.fitted({.bytes = bytes}));
     for (const auto& setting : options_.settings) addBaseline("given", setting);
-    if (!options_.settings.empty()) return;
-    plainRows();
+    if (options_.settings.empty()) plainRows();
     matchedRows();
   } catch (const Cancelled&) {
     record_.interrupted = true;
@@ -66,10 +65,14 @@ class TableRun {
       sizes.insert(*row.bytes);
       if (std::isfinite(row.metrics->psnrBox)) psnrs.insert(row.metrics->psnrBox);
     }
-    for (const std::uint64_t bytes : sizes)
+    for (const std::uint64_t bytes : sizes) {
       for (const auto& form : sizeForms(options_)) add(maker_.sizeMatched(form, bytes));
-    for (const double psnr : psnrs)
+      for (const auto& command : options_.commands) add(maker_.sizeMatched(command, bytes));
+    }
+    for (const double psnr : psnrs) {
       for (const auto& form : psnrForms(options_)) add(maker_.psnrMatched(form, psnr));
+      for (const auto& command : options_.commands) add(maker_.psnrMatched(command, psnr));
+    }
   }
 
   const TableScene& scene_;

@@ -38,6 +38,13 @@ cli::ProgramText programText() {
           "searches for the smallest FpN and ZFP files. -v shows the searches, and --report\n"
           "includes them.\n"
           "\n"
+          "--external-command takes any compressor of arrays. COMMAND is run in a shell as\n"
+          "  COMMAND encode RAW PACKED NX NY NZ BOUND\n"
+          "  COMMAND decode PACKED RAW NX NY NZ BOUND\n"
+          "RAW has NX x NY x NZ float32 values (little-endian, x fastest). BOUND is an error in\n"
+          "units of the values; the program searches for the largest one that suits. PACKED may\n"
+          "have any form; its size is that of the row.\n"
+          "\n"
           "The ratio is the size of the half-float Blosc VDB of the same grid divided by the size\n"
           "of the row. Times are medians of --runs runs after a warm-up run. Encoding goes from\n"
           "OpenVDB's tree (ZFP: from an array) to the file. Decoding goes from the file to\n"
@@ -50,6 +57,8 @@ cli::ProgramText programText() {
           "  esvr-compare table smoke.vdb smoke.esvr\n"
           "  esvr-compare table smoke.vdb smoke.esvr --html page.html --markdown table.md\n"
           "  esvr-compare table ct.vdb ct.esvr --external SZ3=out.raw:48915:256x256x256:float32\n"
+          "  esvr-compare table ct.vdb --size 50KB --external-command SZ3='compressors/sz3 "
+          "bin/sz3'\n"
           "  esvr-compare table smoke.vdb --row nvdb-fpn-zip,tolerance=0.01,threshold=0.002"};
 }
 
@@ -71,6 +80,9 @@ cli::CommandLine makeCommandLine() {
      "add a row for the result of another system: NAME=FILE:BYTES, where FILE is a VDB file, or a "
      "raw file if :NXxNYxNZ:TYPE follows; then any of :encode=S, :decode=S, :fps=N; may be "
      "repeated")
+    ("external-command", value<Words>()->value_name("X")->composing(),
+     "add rows for a compressor that a command runs, at each size and PSNR: NAME=COMMAND; see below; "
+     "may be repeated")
     ("runs", value<int>()->value_name("N")->default_value(TableOptions{}.runs),
      "number of runs; times are their medians")
     ("images", value<int>()->value_name("N"),
@@ -125,6 +137,16 @@ void readSizes(const Arguments& a, TableOptions& options) {
   }
 }
 
+/// \pre the candidates and the sizes were read
+void readCommands(const Arguments& a, TableOptions& options) {
+  for (const auto& text : a.find<Words>("external-command").value_or(Words{}))
+    options.commands.push_back(parseExternalCommand(text));
+  const bool hasAim = !options.candidates.empty() || !options.sizes.empty() ||
+                      !options.fits.empty() || options.fitDefault || options.fitPaper;
+  if (!options.commands.empty() && !hasAim)
+    throw UsageError("--external-command needs a size or a PSNR to match: CAND, --size or --fit");
+}
+
 /// Reads a text like "viridis" or "viridis:tent".
 NamedTransfer builtInTransfer(const std::string& text) {
   const std::size_t colon = std::min(text.find(':'), text.size());
@@ -168,6 +190,7 @@ std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv)
   readSizes(a, options);
   for (const auto& text : a.find<Words>("external").value_or(Words{}))
     options.externals.push_back(parseExternal(text));
+  readCommands(a, options);
   options.runs = a.get<int>("runs");
   cli::requireRange("runs", options.runs, 1, kMaxRuns);
   readImages(a, options);

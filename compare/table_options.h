@@ -10,6 +10,7 @@
 #include "cli/host_memory.h"
 #include "cli/log.h"
 #include "compare/external.h"
+#include "compare/external_command.h"
 #include "compare/gallery.h"
 #include "compare/report_options.h"
 #include "esvr/baseline.h"
@@ -28,6 +29,7 @@ struct TableOptions {
   bool fitDefault = false;                ///< whether a fit with the default options is made
   bool fitPaper = false;                  ///< whether a fit by the paper's method is made
   std::vector<External> externals;
+  std::vector<ExternalCommand> commands;  ///< compressors that a command runs
   int runs = 3;
   std::uint64_t maxDense = 0;
   std::optional<Box> box;

@@ -31,7 +31,8 @@ struct TableRow {
   std::string name;  ///< name, for example "NanoVDB FpN Zip"
   std::string
       group;  ///< "lossless", "quantised", "at 48214 bytes", "at 44.70 dB", "ESVR", "external"
-  std::string setting{};  ///< value for --row; empty if the row is no baseline
+  /// Value for --row, or "bound=B" of an external command; empty if the row is neither.
+  std::string setting{};
   std::string command{};
   std::optional<std::uint64_t> bytes{};
   std::optional<VolumeMetrics> metrics{};

@@ -1,6 +1,6 @@
 // Plan: `esvr-compare table` is run as a separate process, on a small grid. The tests check which
 // rows there are, that figures agree with the files, that the command of a row makes the same row,
-// matched sizes, external results, all report formats, and what the program refuses.
+// matched sizes, external results and commands, all report formats, and what the program refuses.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -162,6 +162,88 @@ TEST_F(CompareTable, takesExternalResults) {
   EXPECT_EQ((*rowOf(report, "Same"))["max_error"], 0.0);
 }
 
+/// A compressor of float arrays: rounds to multiples of the bound and compresses their text.
+constexpr const char* kRoundingCompressor = R"(#!/usr/bin/perl
+use strict;
+my ($job, $from, $to, $nx, $ny, $nz, $bound) = @ARGV;
+local $/;
+if ($job eq 'encode') {
+  open(my $in, '<:raw', $from) or die;
+  my @values = unpack('f<*', <$in>);
+  die "the array has another size\n" unless @values == $nx * $ny * $nz;
+  open(my $out, '|-', "gzip -9n > '$to'") or die;
+  print $out join(' ', map { sprintf('%.0f', $_ / $bound) } @values);
+  close($out) or die;
+} else {
+  open(my $in, '-|', "gzip -dc '$from'") or die;
+  my @steps = split(/ /, <$in>);
+  open(my $out, '>:raw', $to) or die;
+  print $out pack('f<*', map { $_ * $bound } @steps);
+}
+)";
+
+class CompareTableCommand : public CompareTable {
+ protected:
+  void SetUp() override {
+    CompareTable::SetUp();
+    std::ofstream(at("rounding.pl")) << kRoundingCompressor;
+  }
+  [[nodiscard]] std::string option() const { return "Rounding=perl " + at("rounding.pl"); }
+};
+
+TEST_F(CompareTableCommand, isSearchedForASize) {
+  constexpr std::uint64_t kBytes = 200;
+  const auto report = reportOf(
+      {"--rows", "none", "--size", std::to_string(kBytes), "--external-command", option()});
+  const json* row = rowOf(report, "Rounding", "at 200 bytes");
+  ASSERT_NE(row, nullptr);
+  ASSERT_TRUE(row->contains("bytes")) << row->dump();
+  EXPECT_LE((*row)["bytes"].get<std::uint64_t>(), kBytes);
+  const double bound = std::stod((*row)["setting"].get<std::string>().substr(6));
+  EXPECT_LE((*row)["max_error"].get<double>(), 0.5001 * bound) << "values are rounded to the bound";
+  EXPECT_GT((*row)["max_error"].get<double>(), 0.0);
+  bool triedLarger = false;
+  for (const auto& step : (*row)["search"]) {
+    const bool fits = step["bytes"].get<std::uint64_t>() <= kBytes;
+    triedLarger |= !fits;
+    if (fits) {
+      EXPECT_GE((*row)["psnr_box"].get<double>(), step["psnr_box"].get<double>());
+    }
+  }
+  EXPECT_TRUE(triedLarger) << "the search ends at the size";
+}
+
+TEST_F(CompareTableCommand, isSearchedForThePsnrOfACandidate) {
+  const auto report = reportOf({at("fit.esvr"), "--rows", "none", "--external-command", option()});
+  const double psnr = (*rowOf(report, "fit.esvr"))["psnr_box"];
+  int rows = 0;
+  for (const auto& row : report["rows"]) {
+    if (row["name"] != "Rounding" || !row["group"].get<std::string>().ends_with(" dB")) continue;
+    ++rows;
+    EXPECT_GE(row["psnr_box"].get<double>(), psnr);
+    for (const auto& step : row["search"])
+      if (step["psnr_box"].get<double>() >= psnr) {
+        EXPECT_LE(row["bytes"].get<double>(), step["bytes"].get<double>());
+      }
+  }
+  EXPECT_EQ(rows, 1);
+}
+
+TEST_F(CompareTableCommand, leavesTheReasonWhereItFails) {
+  const auto report =
+      reportOf({"--rows", "none", "--size", "1KB", "--external-command",
+                "Bad=echo out of luck; false", "--external-command", "Silent=true"});
+  EXPECT_THAT((*rowOf(report, "Bad"))["note"].get<std::string>(), HasSubstr("ended with code 1"));
+  EXPECT_THAT((*rowOf(report, "Silent"))["note"].get<std::string>(), HasSubstr("wrote no file"));
+}
+
+TEST_F(CompareTableCommand, hasALimitOnTheArray) {
+  const auto report = reportOf(
+      {"--rows", "none", "--size", "1KB", "--max-dense", "100", "--external-command", option()});
+  EXPECT_THAT((*rowOf(report, "Rounding"))["note"].get<std::string>(),
+              HasSubstr("more than the bound"));
+}
+
 TEST_F(CompareTable, writesReportsInEachForm) {
   const auto run =
       table({at("ref.vdb"), at("fit.esvr"), "--rows", "lossless", "--runs", "1", "--markdown",
@@ -278,6 +360,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1:9x9x9:uint8"}, 3, "729"},
         Refusal{{"DIR/ref.vdb", "--external", "A=DIR/no.raw:1:9x9x9:uint8"}, 3, "no.raw"},
         Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1"}, 3, "out.raw"},
+        Refusal{{"DIR/ref.vdb", "--external-command", "A=true"}, 2, "--size"},
+        Refusal{{"DIR/ref.vdb", "--size", "1KB", "--external-command", "true"}, 2, "NAME=COMMAND"},
         Refusal{{"DIR/ref.vdb", "DIR/far.esvr"}, 3, "do not meet"},
         Refusal{{"DIR/ref.vdb", "DIR/far.vdb"}, 3, "--external"},
         Refusal{{"DIR/ref.vdb", "DIR/no.esvr"}, 3, "no.esvr"},

@@ -185,6 +185,7 @@ Table tableTests() {
           {"--csv", "CompareTable.writesReportsInEachForm"},
           {"--device", "CompareTable.fitsEllipsoidsWhereAsked"},
           {"--external", "CompareTable.takesExternalResults"},
+          {"--external-command", "CompareTableCommand.isSearchedForASize"},
           {"--fit", "CompareTable.fitsEllipsoidsWhereAsked"},
           {"--force", "CompareOption.tablesAreReplacedWhereForced"},
           {"--grid", "CompareOption.tableTakesTheGridTheBoxAndThePeak"},
