@@ -90,8 +90,7 @@ std::vector<std::size_t> chosenGrids(const StabilityRun& run, const GridFile& fi
   if (chosen.empty())
     for (std::size_t g = 0; g < file.grids().size(); ++g) chosen.push_back(g);
   std::ranges::sort(chosen);
-  const auto repeated = std::ranges::unique(chosen);
-  chosen.erase(repeated.begin(), repeated.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   return chosen;
 }
 

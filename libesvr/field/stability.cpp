@@ -90,8 +90,7 @@ std::vector<Coord> samplesOf(const Field& field, std::span<const Coord> bricks, 
     if (std::ranges::binary_search(bricks, corner)) samples.push_back(corner);
   }
   std::ranges::sort(samples);
-  const auto repeated = std::ranges::unique(samples);
-  samples.erase(repeated.begin(), repeated.end());
+  samples.erase(std::unique(samples.begin(), samples.end()), samples.end());
   return samples;
 }
 
