@@ -204,12 +204,9 @@ std::string referenceOf(const Listing& listing, const StoredGrid& grid) {
 void printStoredDetails(const Listing& listing, const std::string& name, const StoredGrid& grid) {
   std::cout << cli::printable(name) << ": " << cli::printable(grid.descriptor.transform.mapType)
             << ", background " << cli::shortNumber(grid.descriptor.background) << ", values "
-            << cli::shortNumber(grid.valueMin) << " to " << cli::shortNumber(grid.valueMax)
-            << (grid.topology == TopologyKind::kMask
-                    ? ", a mask"
-                    : ", threshold " + cli::shortNumber(grid.activeThreshold))
-            << ", active box " << cli::textOf(grid.activeBox) << ", chunks "
-            << grid.field.chunks.size();
+            << cli::shortNumber(grid.valueMin) << " to " << cli::shortNumber(grid.valueMax) << ", "
+            << cli::activityOf(grid) << ", active box " << cli::textOf(grid.activeBox)
+            << ", chunks " << grid.field.chunks.size();
   if (const std::string reference = referenceOf(listing, grid); !reference.empty())
     std::cout << ", voxels refer to " << cli::printable(reference);
   std::cout << '\n';

@@ -54,6 +54,7 @@ const char* nameOf(Activity activity) {
     case Activity::kByValue:
       return "threshold";
     case Activity::kAuto:
+    case Activity::kNoMask:
       break;
   }
   return "auto";
@@ -167,11 +168,13 @@ Json kernelOf(const Kernel& kernel) {
 /// How the file says which voxels are active. A threshold without bound has no meaning.
 Json topologyOf(const RunRecord& record, std::size_t g) {
   const StoredGrid& grid = record.grids[g].stored();
-  const bool byThreshold = !grid.voxels && grid.topology != TopologyKind::kMask;
+  const bool byThreshold = !grid.voxels && (grid.topology == TopologyKind::kThreshold ||
+                                            grid.topology == TopologyKind::kBricks);
   return {{"kind", grid.voxels ? "voxels" : cli::nameOf(grid.topology)},
           {"threshold", byThreshold ? Json(grid.activeThreshold) : Json(nullptr)},
           {"bricks", grid.bricks.size()},
-          {"mask_bytes", maskBytes(record.output, g)}};
+          {"mask_bytes", bytesOf(record.output, g, "mask")},
+          {"level_bytes", bytesOf(record.output, g, "levels")}};
 }
 
 Json fitOf(const ConvertedGrid& grid) {

@@ -8,6 +8,7 @@
 
 #include "cli/interrupts.h"
 #include "cli/json_file.h"
+#include "cli/names.h"
 #include "cli/output.h"
 #include "cli/stopwatch.h"
 #include "cli/table.h"
@@ -67,10 +68,8 @@ void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
                     std::to_string(fit.wanted));
   log.detail("grid \"" + grid.uniqueName + "\": kappa " +
              cli::shortNumber(grid.stored().field.kernel.kappa) + ", " +
-             (grid.stored().topology == TopologyKind::kMask
-                  ? "a mask"
-                  : "threshold " + cli::shortNumber(grid.stored().activeThreshold)) +
-             ", overlap of active voxels " + cli::shortNumber(grid.metrics.iou));
+             cli::activityOf(grid.stored()) + ", overlap of active voxels " +
+             cli::shortNumber(grid.metrics.iou));
 }
 
 /// Converts one grid after the other until all are done or the run is interrupted. Grids with the

@@ -12,10 +12,10 @@ bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& ki
                      [&](const SectionSummary& s) { return s.grid == grid && s.kind == kind; });
 }
 
-std::uint64_t maskBytes(const EsvrSummary& file, std::size_t grid) {
+std::uint64_t bytesOf(const EsvrSummary& file, std::size_t grid, const std::string& kind) {
   std::uint64_t bytes = 0;
   for (const SectionSummary& s : file.sections)
-    if (s.grid == grid && s.kind == "mask") bytes += s.storedBytes;
+    if (s.grid == grid && s.kind == kind) bytes += s.storedBytes;
   return bytes;
 }
 

@@ -55,8 +55,9 @@ struct Ratio {
 /// True where the file holds a section of this kind for the grid.
 [[nodiscard]] bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& kind);
 
-/// Bytes of a grid's mask of active voxels; 0 if the file has none.
-[[nodiscard]] std::uint64_t maskBytes(const EsvrSummary& file, std::size_t grid);
+/// Bytes of a grid's sections of a kind.
+[[nodiscard]] std::uint64_t bytesOf(const EsvrSummary& file, std::size_t grid,
+                                    const std::string& kind);
 
 /// The first grid below its wanted PSNR; null if all grids reach it.
 [[nodiscard]] const ConvertedGrid* firstBelow(const RunRecord& record);

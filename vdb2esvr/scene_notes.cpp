@@ -44,7 +44,8 @@ std::vector<LeftOut> partsLeftOut(const RunRecord& record, std::size_t g) {
   if (lacks("chunks")) notes.push_back({"chunk table", "the grid fits in one chunk"});
   if (grid.stored().topology != TopologyKind::kMask)
     notes.push_back({"voxel masks",
-                     lacks("bricks")
+                     !lacks("levels") ? "thresholds of blocks determine the active voxels"
+                     : lacks("bricks")
                          ? "a threshold determines the active voxels"
                          : "the values determine the active voxels in the stored bricks",
                      grid.bricks * kMaskBytes});

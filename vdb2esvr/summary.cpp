@@ -44,14 +44,17 @@ void printOverlap(const Options& options, const ConvertedGrid& grid, std::ostrea
       << cli::shortNumber(grid.metrics.iou) << '\n';
 }
 
-/// Says what the mask of active voxels takes, if there is one.
-void printMask(const RunRecord& record, std::size_t g, std::ostream& out) {
+/// Says what the mask of active voxels or the thresholds of blocks take, if there are any.
+void printTopology(const RunRecord& record, std::size_t g, std::ostream& out) {
   const ConvertedGrid& grid = record.grids[g];
-  if (grid.stored().voxels || grid.stored().topology != TopologyKind::kMask) return;
+  const TopologyKind kind = grid.stored().topology;
+  const bool isMask = kind == TopologyKind::kMask;
+  if (grid.stored().voxels || !(isMask || kind == TopologyKind::kBlocks)) return;
   out << cli::printable(grid.uniqueName) << ": "
-      << (grid.metrics.iou < 1.0 ? "a simplified mask of active voxels"
-                                 : "the mask of active voxels")
-      << " takes " << maskBytes(record.output, g) << " bytes, with an overlap of "
+      << (!isMask                  ? "thresholds of blocks take "
+          : grid.metrics.iou < 1.0 ? "a simplified mask of active voxels takes "
+                                   : "the mask of active voxels takes ")
+      << bytesOf(record.output, g, isMask ? "mask" : "levels") << " bytes, with an overlap of "
       << cli::shortNumber(grid.metrics.iou) << '\n';
 }
 
@@ -119,7 +122,7 @@ void printFitted(const Options& options, const RunRecord& record, std::ostream& 
   table.print(out);
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
     if (!record.grids[g].sameAs) {
-      printMask(record, g, out);
+      printTopology(record, g, out);
       printOverlap(options, record.grids[g], out);
     }
     printNote(options, record.grids[g], out);

@@ -1,5 +1,7 @@
 #include "cli/names.h"
 
+#include "cli/table.h"
+
 namespace esvr::cli {
 
 std::string nameOf(GridClass gridClass) {
@@ -31,8 +33,25 @@ std::string nameOf(ValueType type) {
 std::string nameOf(KernelForm form) { return form == KernelForm::kPaper ? "paper" : "continuous"; }
 
 std::string nameOf(TopologyKind kind) {
-  if (kind == TopologyKind::kMask) return "mask";
-  return kind == TopologyKind::kBricks ? "bricks" : "threshold";
+  switch (kind) {
+    case TopologyKind::kBricks:
+      return "bricks";
+    case TopologyKind::kMask:
+      return "mask";
+    case TopologyKind::kBlocks:
+      return "blocks";
+    case TopologyKind::kThreshold:
+      break;
+  }
+  return "threshold";
+}
+
+std::string activityOf(const StoredGrid& grid) {
+  if (grid.topology == TopologyKind::kMask) return "a mask";
+  if (grid.topology != TopologyKind::kBlocks)
+    return "threshold " + shortNumber(grid.activeThreshold);
+  return "thresholds of blocks around " +
+         shortNumber(thresholdAt(grid.activeThreshold, kMiddleLevel));
 }
 
 std::string valuesOf(const GridSummary& grid) {

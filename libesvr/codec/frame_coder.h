@@ -18,9 +18,6 @@ namespace esvr::codec {
 /// Largest motion of a brick along an axis, in voxels.
 inline constexpr int kLargestMotion = 4;
 
-/// Bits of the number of a brick's position along an axis.
-inline constexpr int kFrameBrickBits = 21;
-
 /// What chooseFrameCodes() weighs.
 struct FrameThrift {
   std::vector<double> exact;  ///< the voxels in units of the lattice, as the layer's codes

@@ -29,8 +29,8 @@ Trial choose(TrialMaker& maker, const CompactOptions& options) {
   return chooseStepsWithin(maker, allowedError(maker, options));
 }
 
-/// With a mask, a reader's PSNR differs from that of the trials, which sum ellipsoids at all voxels
-/// of the mask's bricks. The PSNR of the trials is corrected by what the result misses or exceeds,
+/// With a mask or several thresholds, a reader's PSNR differs from that of the trials, which know one
+/// threshold. The PSNR of the trials is corrected by what the result misses or exceeds,
 /// at most kMaxCorrections times, unless it exceeds the wanted PSNR by kSmallExcess, dB, at most.
 constexpr int kMaxCorrections = 2;
 constexpr double kSmallExcess = 0.05;
@@ -69,23 +69,41 @@ std::optional<SparseVolume> ownVoxels(const StoredGrid& grid, const VoxelMemory&
 
 namespace {
 
+/// Renews the rule of a result. \return whether it has changed
+bool renewed(const SparseVolume& source, const CompactOptions& options, StoredGrid& grid) {
+  if (!options.activity) return false;
+  StoredGrid other = grid;
+  renewActivity(source, *options.activity, other);
+  const bool isSame = other.topology == grid.topology && other.levels == grid.levels &&
+                      other.bricks == grid.bricks && other.activeThreshold == grid.activeThreshold;
+  if (isSame || (options.bytes && bytesAdded(other) > bytesAdded(grid))) return false;
+  grid = std::move(other);
+  return true;
+}
+
+/// True if a single threshold determines the active voxels.
+bool hasOneThreshold(const StoredGrid& grid) {
+  return grid.topology == TopologyKind::kThreshold || grid.topology == TopologyKind::kBricks;
+}
+
 CompactResult compactOnce(const StoredGrid& grid, const SparseVolume& source,
                           const CompactOptions& options) {
   CompactResult result{grid, {}, 0.0, 0};
   if (grid.field.ellipsoidCount() == 0) return result;
   const Box box = options.box.value_or(activeBox(source));
   const auto own = ownVoxels(grid, memoryOf(source));
-  TrialMaker maker(grid, {.source = source,
-                          .box = box,
-                          .device = options.device,
-                          .solvedFor = own ? &*own : nullptr,
-                          .peak = options.peak});
+  TrialMaker maker(withOneThreshold(grid), {.source = source,
+                                            .box = box,
+                                            .device = options.device,
+                                            .solvedFor = own ? &*own : nullptr,
+                                            .peak = options.peak});
   Trial chosen = choose(maker, options);
-  // the trials know no mask, and no voxels outside the active box that become the background
-  const bool byValues = grid.topology != TopologyKind::kMask && common(box, grid.activeBox) == box;
-  if (byValues) result.grid.layerErrors = maker.layerErrors(chosen);
+  // the trials know one threshold, no mask, and no voxels outside the active box that become the background
+  const bool sameRule = hasOneThreshold(grid) && common(box, grid.activeBox) == box;
+  if (sameRule) result.grid.layerErrors = maker.layerErrors(chosen);
   result.grid.field = std::move(chosen.field);
   result.grid.quantised = std::move(chosen.quantised);
+  const bool byValues = !renewed(source, options, result.grid) && sameRule;
   if (!byValues)
     result.grid.layerErrors =
         measureLayers(result.grid, source, {.box = box, .peak = options.peak});
@@ -100,11 +118,11 @@ CompactResult compactOnce(const StoredGrid& grid, const SparseVolume& source,
   return result;
 }
 
-/// The smallest result found for a grid with a mask that reaches the wanted PSNR.
-CompactResult compactMasked(const StoredGrid& grid, const SparseVolume& source,
-                            const CompactOptions& options) {
+/// Looks for a smaller result, or one that reaches the wanted PSNR.
+/// \param best  a first result
+CompactResult corrected(CompactResult best, const StoredGrid& grid, const SparseVolume& source,
+                        const CompactOptions& options) {
   CompactOptions aimed = options;
-  CompactResult best = compactOnce(grid, source, aimed);
   double excess = excessOf(best.grid, source, options), last = excess;
   for (int n = 0; n < kMaxCorrections && !(excess >= 0.0 && excess <= kSmallExcess); ++n) {
     *aimed.psnr += 0.5 * kSmallExcess - last;
@@ -121,8 +139,9 @@ CompactResult compactMasked(const StoredGrid& grid, const SparseVolume& source,
 CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                           const CompactOptions& options) {
   requireOneKappa(grid);
-  const bool masked = options.psnr && grid.topology == TopologyKind::kMask;
-  return masked ? compactMasked(grid, source, options) : compactOnce(grid, source, options);
+  CompactResult result = compactOnce(grid, source, options);
+  if (!options.psnr || hasOneThreshold(result.grid)) return result;
+  return corrected(std::move(result), grid, source, options);
 }
 
 }  // namespace esvr

@@ -110,7 +110,8 @@ bool fillCodes(const Bounded& bounded, std::span<const float> wanted, const Bric
 }  // namespace
 
 std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& source, double bound) {
-  if (grid.topology == TopologyKind::kBricks) return std::nullopt;
+  if (grid.topology == TopologyKind::kBricks || grid.topology == TopologyKind::kBlocks)
+    return std::nullopt;
   const auto corners = bricksOfEither(grid, source);
   const auto margins = compact::marginsOf(grid.field, corners);
   const double margin = margins.empty() ? 0.0 : *std::max_element(margins.begin(), margins.end());

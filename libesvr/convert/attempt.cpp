@@ -34,8 +34,8 @@ Attempt attempted(const Job& job, const FitOptions& options) {
   Attempt result;
   result.asked = *options.count;
   result.fit = fit(source, options);
-  result.grid = makeStoredGrid(job.input.descriptor, source, std::move(result.fit.field),
-                               job.options.storage.activity, job.input.simplified);
+  result.grid =
+      makeStoredGrid(job.input.descriptor, source, std::move(result.fit.field), activityOf(job));
   result.psnr = psnrOf(job, result.grid);
   return result;
 }
@@ -107,6 +107,10 @@ bool saturates(const SparseVolume& volume) {
   return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
 }
 
+ActivityOptions activityOf(const Job& job) {
+  return {job.options.storage.activity, job.input.simplified, job.options.previous};
+}
+
 Activity voxelActivity(const Job& job) {
   const bool levelSet = job.input.descriptor.gridClass == GridClass::kLevelSet;
   return levelSet ? Activity::kExact : job.options.storage.activity;
@@ -115,7 +119,7 @@ Activity voxelActivity(const Job& job) {
 Activity activityForSize(const Job& job, std::uint64_t bytes) {
   const Activity wanted = job.options.storage.activity;
   if (wanted != Activity::kAuto || job.options.fit.narrowBand) return wanted;
-  return kMaxMaskShare * double(bytes) < double(maskBytes(job)) ? Activity::kByValue : wanted;
+  return kMaxMaskShare * double(bytes) < double(maskBytes(job)) ? Activity::kNoMask : wanted;
 }
 
 RoundedSigns voxelSigns(const Job& job) {
@@ -174,7 +178,8 @@ CompactResult compacted(const Job& job, const Attempt& attempt, const StorageTar
                       .bytes = target.bytes,
                       .box = fit.box,
                       .peak = fit.peak,
-                      .device = rateControlDevice(attempt.fit, fit.device)});
+                      .device = rateControlDevice(attempt.fit, fit.device),
+                      .activity = activityOf(job)});
 }
 
 Device rateControlDevice(const FitResult& fit, const Device& device) {

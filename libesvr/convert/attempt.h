@@ -31,13 +31,16 @@ struct Job {
 [[nodiscard]] double psnrOf(const Job& job, const SparseVolume& volume);
 [[nodiscard]] double psnrOf(const Job& job, const StoredGrid& grid);
 
+/// How a stored grid of the job finds its active voxels.
+[[nodiscard]] ActivityOptions activityOf(const Job& job);
+
 /// How voxels store the active mask of a grid: as StorageOptions say, but exactly for a level set,
 /// because the width of its band is part of its shape.
 [[nodiscard]] Activity voxelActivity(const Job& job);
 
-/// How active voxels are stored in a grid of a size: as StorageOptions say, but by value for
-/// Activity::kAuto if a simplified mask would take more than a quarter of the size, because too
-/// little would be left for the values.
+/// How active voxels are stored in a grid of a size: as StorageOptions say, but without a mask for
+/// Activity::kAuto if a simplified one would take more than a quarter of the size, because too little
+/// would be left for the values.
 [[nodiscard]] Activity activityForSize(const Job& job, std::uint64_t bytes);
 
 /// How voxels are rounded: with their signs if the grid is a narrow band.

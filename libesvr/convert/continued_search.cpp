@@ -162,12 +162,13 @@ class ContinuedSearch {
   }
 
   [[nodiscard]] std::optional<Conversion> quantised() {
-    StoredGrid grid = makeStoredGrid(job_.input.descriptor, job_.input.source, field_,
-                                     job_.options.storage.activity, job_.input.simplified);
+    StoredGrid grid =
+        makeStoredGrid(job_.input.descriptor, job_.input.source, field_, activityOf(job_));
     auto trial = rounded(grid);
     if (!trial) return std::nullopt;
     grid.field = std::move(trial->field);
     grid.quantised = std::move(trial->quantised);
+    renewActivity(job_.input.source, activityOf(job_), grid);
     if (psnrOf(job_, grid) < psnr_ || bytesInFrame(grid, &previous_) >= bytesAdded(grid))
       return std::nullopt;
     Conversion conversion;
@@ -181,7 +182,8 @@ class ContinuedSearch {
   /// \return nothing if the PSNR is not reached, or a value lies outside the lattice of the previous
   ///         frame
   [[nodiscard]] std::optional<Trial> rounded(const StoredGrid& grid) const try {
-    ContinuedMaker maker({grid, from_, previous_},
+    const StoredGrid tried = withOneThreshold(grid);
+    ContinuedMaker maker({tried, from_, previous_},
                          {.source = job_.input.source,
                           .box = box(),
                           .device = rateControlDevice(fit_, job_.options.fit.device),
@@ -192,9 +194,9 @@ class ContinuedSearch {
   }
 
   /// Squared error of the grid that a reader gets from a trial, relative to that of its sum. A mask
-  /// removes the errors outside of it.
+  /// or the thresholds of blocks remove errors outside of it.
   [[nodiscard]] double shareOfError(const StoredGrid& grid, const Trial& trial) const {
-    if (grid.topology != TopologyKind::kMask || !(trial.error > 0.0)) return 1.0;
+    if (grid.topology == TopologyKind::kThreshold || !(trial.error > 0.0)) return 1.0;
     StoredGrid decoded = grid;
     decoded.field = trial.field;
     decoded.quantised.clear();

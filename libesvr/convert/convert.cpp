@@ -22,11 +22,12 @@ namespace {
 
 using convert::Job;
 
-/// Stores a fit in the form that `storage` determines.
-Conversion stored(const ConvertInput& input, FitResult fit, const CommonFitOptions& options,
-                  const StorageOptions& storage) {
-  StoredGrid grid = makeStoredGrid(input.descriptor, input.source, std::move(fit.field),
-                                   storage.activity, input.simplified);
+/// Stores a fit in the form that the options determine.
+Conversion stored(const Job& job, FitResult fit, const CommonFitOptions& options) {
+  const StorageOptions& storage = job.options.storage;
+  const ActivityOptions activity = convert::activityOf(job);
+  StoredGrid grid =
+      makeStoredGrid(job.input.descriptor, job.input.source, std::move(fit.field), activity);
   grid.curve = withoutTimes(fit.curve);
   Conversion conversion;
   if (storage.form == Storage::kFloat32) {
@@ -34,12 +35,13 @@ Conversion stored(const ConvertInput& input, FitResult fit, const CommonFitOptio
     conversion.grid = std::move(grid);
     return conversion;
   }
-  CompactResult compact = compactGrid(grid, input.source,
+  CompactResult compact = compactGrid(grid, job.input.source,
                                       {.loss = storage.loss,
                                        .psnr = options.psnr,
                                        .box = options.box,
                                        .peak = options.peak,
-                                       .device = convert::rateControlDevice(fit, options.device)});
+                                       .device = convert::rateControlDevice(fit, options.device),
+                                       .activity = activity});
   return convert::conversionOf(std::move(fit), std::move(compact));
 }
 
@@ -50,9 +52,8 @@ class Converter {
 
   Conversion operator()(const FitGoal&) const {
     const FitOptions& options = job_.options.fit;
-    return convert::unlessExactIsSmaller(job_, [&] {
-      return stored(job_.input, fit(job_.input.source, options), options, job_.options.storage);
-    });
+    return convert::unlessExactIsSmaller(
+        job_, [&] { return stored(job_, fit(job_.input.source, options), options); });
   }
   Conversion operator()(const PresetGoal& goal) const {
     return convert::convertToPreset(job_, goal, [&] { return (*this)(FitGoal{}); });
@@ -219,7 +220,9 @@ PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions&
         "that a narrow band does not fill");
   if (const auto tooLarge = convert::tooLargeForSums(input.source)) refuseSums(input, *tooLarge);
   PaperFitResult made = fitByPaper(input.source, options);
-  Conversion conversion = stored(input, std::move(made.fit), options, storage);
+  ConvertOptions own;
+  own.storage = storage;
+  Conversion conversion = stored({input, own}, std::move(made.fit), options);
   conversion.grid = throughTheFormat(std::move(conversion.grid), nullptr, memoryOf(input.source));
   return {std::move(conversion), std::move(made.record)};
 }

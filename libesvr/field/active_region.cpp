@@ -38,6 +38,7 @@ BrickRegion regionIn(const RevoxeliseOptions& options, Coord corner) {
   if (!options.restrictToBricks) return {inBox, true};
   const auto place = placeIn(options.bricks, corner);
   if (!place) return {};
+  if (!options.levels.empty()) return {inBox, true, &options.levels[*place]};
   if (options.masks.empty()) return {inBox, true};
   return {common(inBox, options.masks[*place]), false};
 }
@@ -46,7 +47,7 @@ BrickMask settle(const VoxelRule& rule, const BrickRegion& region, std::span<flo
   BrickMask mask;
   for (int v = 0; v < kBrickVoxels; ++v) {
     values[v] = rule.settled(values[v]);
-    if (region.within.test(v) && (!region.byValue || rule.isActive(values[v])))
+    if (region.isActive(rule, v, values[v]))
       mask.set(v);
     else
       values[v] = rule.inactiveValue(values[v]);

@@ -13,6 +13,14 @@ namespace esvr {
 struct BrickRegion {
   BrickMask within;     ///< no other voxel is active
   bool byValue = true;  ///< true: the rule of values decides about these; false: all are active
+  const BlockLevels* levels = nullptr;  ///< levels of the brick's blocks; null: one threshold
+
+  /// \param v  voxelOffset of a voxel, of which `settled` is the value by the rule
+  [[nodiscard]] bool isActive(const VoxelRule& rule, int v, float settled) const {
+    if (!within.test(v)) return false;
+    if (!byValue) return true;
+    return levels ? rule.isActive(settled, levels->at(v)) : rule.isActive(settled);
+  }
 };
 
 /// The voxels of a brick that lie in a box. \param corner  its first voxel

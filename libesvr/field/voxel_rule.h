@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "esvr/block_levels.h"
 #include "esvr/field.h"
 #include "esvr/kernel.h"
 
@@ -26,6 +27,10 @@ struct VoxelRule {
     return narrowBand ? background - std::fabs(settled) : std::fabs(settled - background);
   }
   [[nodiscard]] ESVR_HD bool isActive(float settled) const { return activity(settled) > threshold; }
+  /// The same with the threshold of a level (block_levels.h).
+  [[nodiscard]] ESVR_HD bool isActive(float settled, int level) const {
+    return activity(settled) > thresholdAt(threshold, level);
+  }
   /// The value of an inactive voxel.
   [[nodiscard]] ESVR_HD float inactiveValue(float settled) const {
     return narrowBand ? std::copysign(background, settled) : background;

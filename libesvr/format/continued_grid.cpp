@@ -7,6 +7,7 @@
 #include "format/byte_reader.h"
 #include "format/byte_writer.h"
 #include "format/continued_section.h"
+#include "format/level_section.h"
 #include "format/mask_section.h"
 #include "format/record_difference.h"
 #include "format/validity.h"
@@ -19,7 +20,7 @@ bool hasOneQuantisedChunk(const StoredGrid& grid) {
   return grid.field.chunks.size() == 1 && grid.quantised.size() == 1;
 }
 
-/// True if a grid is its record, its ellipsoids and perhaps a mask.
+/// True if a grid is its record, its ellipsoids and perhaps a mask or levels.
 bool hasEllipsoidsOnly(const StoredGrid& grid) {
   return hasOneQuantisedChunk(grid) && !grid.residual && !grid.voxels &&
          grid.topology != TopologyKind::kBricks && grid.layerErrors.empty() && grid.curve.empty();
@@ -46,18 +47,38 @@ Mask maskOf(const StoredGrid& grid) {
   return {grid.bricks, grid.mask};
 }
 
-void putMaskOf(ByteWriter& out, const StoredGrid& grid, const StoredGrid& previous) {
+/// The levels of a grid; without bricks if it has none.
+Levels levelsOf(const StoredGrid& grid) {
+  if (grid.topology != TopologyKind::kBlocks) return {};
+  return {grid.bricks, grid.levels};
+}
+
+void putTopology(ByteWriter& out, const StoredGrid& grid, const StoredGrid& previous) {
   if (grid.topology == TopologyKind::kMask)
     out.putSized(putMaskAfter(grid.bricks, grid.mask, maskOf(previous)));
+  if (grid.topology == TopologyKind::kBlocks)
+    out.putSized(putLevels(levelsOf(grid), levelsOf(previous)));
 }
 
 void getMaskOf(ByteReader& in, const std::string& where, const StoredGrid& previous,
                MemoryBudget& budget, StoredGrid& grid) {
-  if (grid.topology == TopologyKind::kBricks) in.fail("a narrow band continues no ellipsoids");
-  if (grid.topology != TopologyKind::kMask) return;
   Mask mask = getMaskAfter(in.getSized(), where, maskOf(previous), budget);
   grid.bricks = std::move(mask.bricks);
   grid.mask = std::move(mask.active);
+}
+
+void getLevelsOf(ByteReader& in, const std::string& where, const StoredGrid& previous,
+                 MemoryBudget& budget, StoredGrid& grid) {
+  Levels levels = getLevels(in.getSized(), where, levelsOf(previous), budget);
+  grid.bricks = std::move(levels.bricks);
+  grid.levels = std::move(levels.levels);
+}
+
+void getTopology(ByteReader& in, const std::string& where, const StoredGrid& previous,
+                 MemoryBudget& budget, StoredGrid& grid) {
+  if (grid.topology == TopologyKind::kBricks) in.fail("a narrow band continues no ellipsoids");
+  if (grid.topology == TopologyKind::kMask) getMaskOf(in, where, previous, budget, grid);
+  if (grid.topology == TopologyKind::kBlocks) getLevelsOf(in, where, previous, budget, grid);
 }
 
 }  // namespace
@@ -72,7 +93,7 @@ std::optional<std::vector<std::byte>> putContinuedGrid(const StoredGrid& grid,
   if (!canContinue(q, before) || !canFollow(maskOf(grid), maskOf(previous))) return std::nullopt;
   ByteWriter out;
   putRecordAfter(out, grid, previous);
-  putMaskOf(out, grid, previous);
+  putTopology(out, grid, previous);
   out.putAll(putContinued(q, before));
   return out.take();
 }
@@ -83,7 +104,7 @@ StoredGrid getContinuedGrid(std::span<const std::byte> content, const std::strin
     throw BadInput(where + ": the grid of the previous frame has no ellipsoids that go on");
   ByteReader in(content, where);
   StoredGrid grid = getRecordAfter(in, previous, where);
-  getMaskOf(in, where, previous, budget, grid);
+  getTopology(in, where, previous, budget, grid);
   grid.quantised.push_back(
       getContinued(in.getBytes(in.left()), where, previous.quantised[0], budget));
   grid.field.chunks.push_back({previous.field.chunks[0].origin, dequantise(grid.quantised[0])});

@@ -18,6 +18,7 @@
 #include "format/grid_records.h"
 #include "format/layer_errors_stream.h"
 #include "format/layered_section.h"
+#include "format/level_section.h"
 #include "format/mask_section.h"
 #include "format/planes.h"
 #include "format/predicted_grid.h"
@@ -70,6 +71,7 @@ class GridDecoder {
     readChunks(record.chunks, grid);
     if (grid.topology == TopologyKind::kBricks) readBricks(grid);
     if (grid.topology == TopologyKind::kMask) readMask(grid);
+    if (grid.topology == TopologyKind::kBlocks) readLevels(grid);
     readVoxels(grid);
     readRelated(before, grid);
     readResidual(grid);
@@ -248,6 +250,14 @@ class GridDecoder {
     Mask mask = getMask(sections_.get(section), sections_.place(section), sections_.budget());
     grid.bricks = std::move(mask.bricks);
     grid.mask = std::move(mask.active);
+  }
+
+  void readLevels(StoredGrid& grid) {
+    const auto section = id(SectionKind::kLevels);
+    Levels levels =
+        getLevels(sections_.get(section), sections_.place(section), {}, sections_.budget());
+    grid.bricks = std::move(levels.bricks);
+    grid.levels = std::move(levels.levels);
   }
 
   void readVoxels(StoredGrid& grid) {

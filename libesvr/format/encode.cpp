@@ -18,6 +18,7 @@
 #include "format/grid_records.h"
 #include "format/layer_errors_stream.h"
 #include "format/layered_section.h"
+#include "format/level_section.h"
 #include "format/mask_section.h"
 #include "format/morton_order.h"
 #include "format/planes.h"
@@ -63,6 +64,8 @@ void checkGrid(const StoredGrid& grid) {
     refuse(grid, "it has bricks, but a topology without");
   if (grid.mask.size() != (grid.topology == TopologyKind::kMask ? grid.bricks.size() : 0))
     refuse(grid, "its mask is not that of its topology");
+  if (grid.levels.size() != (grid.topology == TopologyKind::kBlocks ? grid.bricks.size() : 0))
+    refuse(grid, "its levels are not those of its topology");
   if (grid.reference && !grid.voxels) refuse(grid, "it has a reference, but no voxels");
   if (!grid.quantised.empty() && grid.quantised.size() != grid.field.chunks.size())
     refuse(grid, "its quantised chunks are not those of its field");
@@ -171,6 +174,8 @@ void addExtras(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> 
   const StoredGrid& grid = grids[g];
   if (grid.topology == TopologyKind::kMask)
     out.addRaw({SectionKind::kMask, g}, kRequired, putMask(grid.bricks, grid.mask));
+  else if (grid.topology == TopologyKind::kBlocks)
+    out.addRaw({SectionKind::kLevels, g}, kRequired, putLevels({grid.bricks, grid.levels}));
   else if (!grid.bricks.empty())
     out.add({SectionKind::kBricks, g}, kRequired, putBricks(grid.bricks), kFloatSize);
   if (grid.residual) out.addVoxels({SectionKind::kResidual, g}, *grid.residual);

@@ -12,6 +12,7 @@
 #include "esvr/field.h"
 #include "field/active_region.h"
 #include "format/active_threshold.h"
+#include "format/choose_levels.h"
 #include "format/grid_rule.h"
 #include "format/residual_value.h"
 
@@ -26,6 +27,7 @@ void storeMask(const SparseVolume& source, std::span<const BrickMask> masks, Sto
   grid.topology = TopologyKind::kMask;
   grid.activeThreshold = kAlwaysActive;
   grid.bricks.clear();
+  grid.levels.clear();
   grid.mask.clear();
   for (std::size_t b = 0; b < masks.size(); ++b) {
     if (masks[b].count() == 0) continue;
@@ -61,36 +63,75 @@ ValueRange rangeOf(const StoredGrid& grid) {
   return {std::min(grid.valueMin, background), std::max(grid.valueMax, background)};
 }
 
+/// Where voxels may become active by their values.
+format::ThresholdPlace placeOf(const StoredGrid& grid) {
+  return {grid.topology == TopologyKind::kBricks ? grid.bricks
+                                                 : reachedBricks(grid.field, grid.activeBox),
+          grid.activeBox};
+}
+
 ThresholdChoice chooseThreshold(const SparseVolume& source, const StoredGrid& grid) {
-  const format::ThresholdPlace place{grid.topology == TopologyKind::kBricks
-                                         ? grid.bricks
-                                         : reachedBricks(grid.field, grid.activeBox),
-                                     grid.activeBox};
-  return format::chooseThreshold(source, grid.field, ruleOf(grid), place);
+  return format::chooseThreshold(source, grid.field, ruleOf(grid), placeOf(grid));
 }
 
-/// Stores a simplified mask of the source. \param squares  squared error of the active voxels
-void storeSimplifiedMask(const SparseVolume& source, double squares,
-                         const SimplifiedMasks* simplified, StoredGrid& grid) {
-  const SimplifiedMasks own(source);
-  const double error = std::sqrt(squares / double(grid.activeVoxels));
-  storeMask(source, (simplified ? *simplified : own).forError(error), grid);
+/// Root mean square error of the active voxels.
+double errorOf(const ThresholdChoice& choice, const StoredGrid& grid) {
+  return std::sqrt(choice.squares / double(grid.activeVoxels));
 }
 
-/// True if the volume's values are in memory. Coding a mask takes as much memory as they do.
+/// True if the volume's values are in memory. Coding a mask, and choosing levels, takes as much memory
+/// as they do.
 bool fitsIntoMemory(const SparseVolume& source) {
   return !memoryOf(source).isInFile(source.values.size() * sizeof(float));
 }
 
-void chooseTopology(const SparseVolume& source, Activity activity,
-                    const SimplifiedMasks* simplified, StoredGrid& grid) {
+/// The levels of the previous frame, if they are near those of a grid with a threshold.
+const StoredGrid* previousLevels(const StoredGrid* previous, float threshold) {
+  constexpr float kNear = 4.0f;
+  if (!previous || previous->topology != TopologyKind::kBlocks) return nullptr;
+  const float before = thresholdAt(previous->activeThreshold, kMiddleLevel);
+  return threshold < before * kNear && before < threshold * kNear ? previous : nullptr;
+}
+
+/// Gives the blocks of a grid thresholds of their own. \return false if none suffice
+bool storeLevels(const SparseVolume& source, const ThresholdChoice& choice,
+                 const StoredGrid* previous, StoredGrid& grid) {
+  constexpr double kLeastShare = 1e-3;  // of the threshold, where the sum is nearly exact
+  const double sumError = errorOf(choice, grid);
+  const float middle = choice.threshold > 0.0f ? choice.threshold : float(sumError);
+  const double error = std::max(sumError, kLeastShare * middle);
+  const StoredGrid* before = previousLevels(previous, middle);
+  const float base = before ? before->activeThreshold : middle / thresholdAt(1.0f, kMiddleLevel);
+  if (!std::isnormal(base)) return false;
+  const format::ThresholdPlace place = placeOf(grid);
+  const format::Levels levels =
+      before ? format::Levels{before->bricks, before->levels} : format::Levels{};
+  auto found = format::chooseLevels(
+      {source, grid.field, ruleOf(grid), place, base, error, before ? &levels : nullptr});
+  if (!found || !format::areNear(found->bricks)) return false;
+  grid.topology = TopologyKind::kBlocks;
+  grid.activeThreshold = base;
+  grid.bricks = std::move(found->bricks);
+  grid.levels = std::move(found->levels);
+  return true;
+}
+
+void storeSimplifiedMask(const SparseVolume& source, double error,
+                         const SimplifiedMasks* simplified, StoredGrid& grid) {
+  const SimplifiedMasks own(source);
+  storeMask(source, (simplified ? *simplified : own).forError(error), grid);
+}
+
+void chooseTopology(const SparseVolume& source, const ActivityOptions& options, StoredGrid& grid) {
   const bool isBand = grid.topology == TopologyKind::kBricks;
   if (isBand) grid.bricks = brickCorners(source);
   const ThresholdChoice choice = chooseThreshold(source, grid);
   grid.activeThreshold = choice.threshold;
-  const bool mayHaveMask = activity == Activity::kAuto && !isBand && fitsIntoMemory(source);
-  if (mayHaveMask && !(choice.iou > kMinOverlap))
-    storeSimplifiedMask(source, choice.squares, simplified, grid);
+  const bool needsMore = options.activity != Activity::kByValue && !isBand &&
+                         !(choice.iou > kMinOverlap) && fitsIntoMemory(source);
+  if (needsMore && storeLevels(source, choice, options.previous, grid)) return;
+  if (needsMore && options.activity == Activity::kAuto)
+    storeSimplifiedMask(source, errorOf(choice, grid), options.simplified, grid);
   else if (!(choice.iou > 0.0))
     storeMask(source, source.active, grid);
 }
@@ -108,11 +149,13 @@ VoxelRule ruleOf(const StoredGrid& grid) {
 RevoxeliseOptions voxelRule(const StoredGrid& grid) {
   RevoxeliseOptions options{.threshold = grid.activeThreshold};
   if (grid.withinRange) options.range = rangeOf(grid);
-  options.narrowBand = grid.topology != TopologyKind::kThreshold &&
-                       isLevelSet(grid.descriptor, grid.field.background);
+  options.narrowBand =
+      (grid.topology == TopologyKind::kBricks || grid.topology == TopologyKind::kMask) &&
+      isLevelSet(grid.descriptor, grid.field.background);
   options.bricks = grid.bricks;
   options.restrictToBricks = grid.topology != TopologyKind::kThreshold;
   options.masks = grid.mask;
+  options.levels = grid.levels;
   options.box = grid.activeBox;
   return options;
 }
@@ -160,18 +203,37 @@ StoredGrid makeStoredVoxels(const GridDescriptor& descriptor, const SparseVolume
 }
 
 StoredGrid makeStoredGrid(const GridDescriptor& descriptor, const SparseVolume& source, Field field,
-                          Activity activity, const SimplifiedMasks* simplified) {
+                          const ActivityOptions& options) {
   StoredGrid grid = describe(descriptor, source);
   grid.field = std::move(field);
   if (isNarrowBand(descriptor, source)) {
     grid.topology = TopologyKind::kBricks;
     grid.withinRange = false;  // values beyond the band's ends tell its sides apart
   }
-  if (activity == Activity::kExact)
+  if (options.activity == Activity::kExact)
     storeMask(source, source.active, grid);
   else
-    chooseTopology(source, activity, simplified, grid);
+    chooseTopology(source, options, grid);
   return grid;
+}
+
+StoredGrid withOneThreshold(StoredGrid grid) {
+  if (grid.topology != TopologyKind::kBlocks) return grid;
+  grid.topology = TopologyKind::kThreshold;
+  grid.activeThreshold = thresholdAt(grid.activeThreshold, kMiddleLevel);
+  grid.bricks.clear();
+  grid.levels.clear();
+  return grid;
+}
+
+void renewActivity(const SparseVolume& source, const ActivityOptions& options, StoredGrid& grid) {
+  const bool byLevels = grid.topology == TopologyKind::kBlocks;
+  const bool byThreshold = grid.topology == TopologyKind::kThreshold;
+  if (options.activity == Activity::kByValue || !(byLevels || byThreshold)) return;
+  StoredGrid renewed = withOneThreshold(grid);
+  if (byThreshold && chooseThreshold(source, renewed).iou > kMinOverlap) return;
+  chooseTopology(source, options, renewed);
+  grid = std::move(renewed);
 }
 
 namespace {
@@ -192,10 +254,11 @@ struct WantedVoxels {
   RevoxeliseOptions rule;
   std::vector<Coord> bricks{};
   std::vector<BrickMask> masks{};
+  std::vector<BlockLevels> levels{};
 
   WantedVoxels(const StoredGrid& grid, const DecodeOptions& options) : rule(voxelRule(grid)) {
     rule.threshold = options.threshold.value_or(rule.threshold);
-    if (options.threshold) rule.masks = {};
+    if (options.threshold) rule.masks = {}, rule.levels = {};
     rule.box = placeOf(grid, options);
     rule.memory = options.memory;
     if (rule.restrictToBricks && options.box) takeThose();
@@ -210,9 +273,11 @@ struct WantedVoxels {
       if (!meets(rule.box, rule.bricks[b])) continue;
       bricks.push_back(rule.bricks[b]);
       if (!rule.masks.empty()) masks.push_back(rule.masks[b]);
+      if (!rule.levels.empty()) levels.push_back(rule.levels[b]);
     }
     rule.bricks = bricks;
     rule.masks = masks;
+    rule.levels = levels;
   }
 };
 

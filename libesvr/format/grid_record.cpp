@@ -78,7 +78,7 @@ void putVoxelFacts(ByteWriter& out, const StoredGrid& grid) {
   out.put(grid.valueMax);
 }
 void getVoxelFacts(ByteReader& in, StoredGrid& grid) {
-  grid.topology = in.getEnum(TopologyKind::kMask, "topology");
+  grid.topology = in.getEnum(TopologyKind::kBlocks, "topology");
   grid.withinRange = getBool(in, "mark of a range of values");
   grid.activeThreshold = in.get<float>();
   grid.activeBox = getBox(in);

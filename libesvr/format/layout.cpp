@@ -36,6 +36,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kPredicted, "predicted grid"},
     {SectionKind::kRelated, "related voxels"},
     {SectionKind::kContinued, "continued ellipsoids"},
+    {SectionKind::kLevels, "levels"},
     {SectionKind::kSequenceIndex, "sequence index"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
@@ -74,6 +75,7 @@ std::uint16_t minorVersionOf(SectionKind kind) {
     case SectionKind::kPacked:
     case SectionKind::kRelated:
     case SectionKind::kContinued:
+    case SectionKind::kLevels:
       return 4;
     default:
       return 0;

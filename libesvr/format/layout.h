@@ -51,6 +51,7 @@ enum class SectionKind : std::uint32_t {
   kPredicted = 39,
   kRelated = 41,
   kContinued = 42,
+  kLevels = 43,
   kSequenceIndex = 64,
 };
 

@@ -57,6 +57,8 @@ std::optional<Fault> faultOf(const StoredGrid& grid) {
   if (!validKernel(grid.field.kernel))
     return fault("the kernel's kappa is not finite or its epsilon not between 0 and 1");
   if (!finite(grid.activeThreshold)) return fault("the threshold is not finite");
+  if (grid.topology == TopologyKind::kBlocks && !(grid.activeThreshold > 0.0f))
+    return fault("the threshold of blocks is not above 0");
   if (!allFinite({grid.valueMin, grid.valueMax}) || grid.valueMin > grid.valueMax)
     return fault("the range of values is not finite or empty");
   return std::nullopt;

@@ -51,12 +51,14 @@ Box cellBricksOf(const Box& voxels) {
   return voxels.empty() ? voxels : Box{bricks.min - Coord{1, 1, 1}, bricks.max};
 }
 
-/// Finds the masks of the voxels at the corners of the bricks.
-void numberMasks(CellField& cells, const BrickIndex& given, std::span<const BrickMask> masks) {
-  cells.masks.assign(masks.begin(), masks.end());
+/// Finds the masks or the levels of the voxels at the corners of the bricks.
+void numberRules(CellField& cells, const BrickIndex& given, const RevoxeliseOptions& voxels) {
+  cells.masks.assign(voxels.masks.begin(), voxels.masks.end());
+  cells.blockLevels.assign(voxels.levels.begin(), voxels.levels.end());
+  if (cells.masks.empty() && cells.blockLevels.empty()) return;
   for (std::size_t i = 0; i < cells.table.bricks.size(); ++i)
     for (int c = 0; c < kCellCorners; ++c)
-      cells.maskOf.push_back(given.find(cells.table.place(i) + stepToCorner(c)));
+      cells.ruleOf.push_back(given.find(cells.table.place(i) + stepToCorner(c)));
 }
 
 /// Numbers the bricks that supports reach.
@@ -67,7 +69,7 @@ void numberBricks(CellField& cells, std::vector<Coord> reached, const Revoxelise
   if (!voxels.restrictToBricks) return;
   for (std::size_t i = 0; i < cells.table.bricks.size(); ++i)
     cells.corners.push_back(cornersIn(given, cells.table.place(i)));
-  if (!voxels.masks.empty()) numberMasks(cells, given, voxels.masks);
+  numberRules(cells, given, voxels);
 }
 
 }  // namespace

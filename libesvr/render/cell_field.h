@@ -22,10 +22,12 @@ struct CellField {
   /// By brick: bit c is set if voxels in the brick of corner c (core/cell_corner.h) may differ from
   /// the background. Empty: all may.
   std::vector<std::uint8_t> corners;
-  /// If voxels are active by masks: the masks, and for each brick and corner the number of the mask
-  /// of the voxels there, or BrickIndex::kNone. Otherwise empty.
+  /// The masks by which voxels are active, or the levels of their thresholds (block_levels.h), and for
+  /// each brick and corner the number of those of the voxels there, or BrickIndex::kNone. Otherwise
+  /// empty.
   std::vector<BrickMask> masks;
-  std::vector<std::uint32_t> maskOf;
+  std::vector<BlockLevels> blockLevels;
+  std::vector<std::uint32_t> ruleOf;
   Box box;  ///< no voxel outside it is active
   VoxelRule rule;
 };

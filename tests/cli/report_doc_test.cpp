@@ -23,8 +23,8 @@ using Keys = std::set<std::string>;
 using Table = std::map<std::string, std::string>;  // meaning of each key
 
 /// Words in backticks in the document that are values, or keys of another object.
-const Keys kNoKeys{"default", "drawing", "learned", "mask",  "null",
-                   "paper",   "vec3d",   "vec3s",   "voxels"};
+const Keys kNoKeys{"blocks", "default", "drawing", "learned", "mask",
+                   "null",   "paper",   "vec3d",   "vec3s",   "voxels"};
 
 /// Words in backticks that may be keys: options have dashes, and values capitals or spaces.
 Keys namedIn(const std::string& text) {

@@ -128,6 +128,34 @@ TEST_F(Vdb2Esvr, saysWhatAMaskTakesAndWhereASizeHasNoRoomForIt) {
       << small.err;
 }
 
+/// A cloud that is cut off at a value which grows along x.
+std::vector<test::InputVoxel> cutCloud() {
+  std::vector<test::InputVoxel> voxels;
+  for (Coord v; v.x < 48; ++v.x)
+    for (v.y = 0; v.y < 32; ++v.y)
+      for (v.z = 0; v.z < 32; ++v.z) {
+        const double value = std::exp(
+            -(std::pow(v.x - 24.0, 2) / 4 + std::pow(v.y - 16.0, 2) + std::pow(v.z - 16.0, 2)) /
+            50.0);
+        if (value > 0.005 * std::exp2(v.x / 8.0)) voxels.push_back({v, float(value)});
+      }
+  return voxels;
+}
+
+TEST_F(Vdb2Esvr, saysWhatThresholdsOfBlocksTake) {
+  test::writeInput(in(), {{.voxels = cutCloud()}});
+  const std::string report = folder_ / "report.json";
+  const auto run =
+      vdb2esvr({in(), out(), "--psnr", "45", "--representation", "ellipsoids", "--report", report});
+  EXPECT_THAT(run.out, HasSubstr("density: thresholds of blocks take ")) << run.err;
+  const Json grid = Json::parse(test::readText(report))["grids"][0];
+  EXPECT_EQ(grid["topology"]["kind"], "blocks");
+  EXPECT_GT(grid["topology"]["level_bytes"].get<int>(), 0);
+  EXPECT_TRUE(grid["topology"]["threshold"].is_null());
+  EXPECT_GT(grid["metrics"]["iou"].get<double>(), 0.95);
+  EXPECT_GE(grid["metrics"]["psnr_box"].get<double>(), 45.0);
+}
+
 TEST_F(Vdb2Esvr, givesTheSameBytesInEveryRunOnAnyNumberOfThreads) {
   const std::string other = folder_ / "other.esvr";
   ASSERT_EQ(fitQuickly({"--threads", "1"}).exitCode, 0);

@@ -37,7 +37,7 @@ TEST(WithResidual, KeepsEveryVoxelWithinTheBound) {
   const Field field = roughFit(tube);
   for (const auto activity : {Activity::kByValue, Activity::kExact})
     for (const double bound : {0.3, 0.05, 0.01}) {
-      const auto grid = withResidual(makeStoredGrid({}, tube, field, activity), tube, bound);
+      const auto grid = withResidual(makeStoredGrid({}, tube, field, {activity}), tube, bound);
       ASSERT_TRUE(grid);
       const SparseVolume back = decodeGrid(throughTheFile(*grid));
       EXPECT_LE(largestDifference(tube, back), bound);

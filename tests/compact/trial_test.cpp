@@ -35,7 +35,7 @@ struct Fitted {
     options.count = 100;
     options.iterations = 150;
     options.kappa = 2.0f;
-    grid = makeStoredGrid({}, source, fit(source, options).field, Activity::kByValue);
+    grid = makeStoredGrid({}, source, fit(source, options).field, {Activity::kByValue});
   }
 };
 
@@ -66,7 +66,7 @@ TEST(Trial, KnowsTheErrorsOfItsLayers) {
   Field field = test::randomField({.count = 2500, .extent = 30.0, .smallest = 0.7, .seed = 5});
   test::Random random(6);
   for (float& i : field.chunks[0].ellipsoids.intensity) i = float(std::exp(random(-6.0, -1.0)));
-  const StoredGrid grid = makeStoredGrid({}, source, field, Activity::kByValue);
+  const StoredGrid grid = makeStoredGrid({}, source, field, {Activity::kByValue});
   TrialMaker maker(grid, {source, activeBox(source), {}});
   const Trial trial = maker.make({0.1, 0.1, 0.1, 0.1});
   const StoredGrid stored = storedOf(grid, trial);

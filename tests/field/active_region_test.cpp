@@ -64,6 +64,28 @@ TEST(ActiveRegion, IsThatOfTheBoxTheBricksAndTheMasks) {
   EXPECT_EQ(regionIn(masked, elsewhere).within.count(), 0);
 }
 
+TEST(ActiveRegion, EachBlockHasTheThresholdOfItsLevel) {
+  const std::vector<Coord> bricks{{0, 0, 0}, {8, 0, 0}};
+  std::vector<BlockLevels> levels(2);
+  levels[0].of = {0, 4, 8, 12, 16, 20, 24, 28};  // thresholds 0.25, 0.5, 1, ..., 32
+  levels[1].of.fill(0);
+  const RevoxeliseOptions options{
+      .threshold = 0.25f, .bricks = bricks, .restrictToBricks = true, .levels = levels};
+  const VoxelRule rule = makeVoxelRule(0.0f, options);
+  for (const float value : {0.25f, 0.75f, -3.0f, 40.0f}) {
+    std::vector<float> values(kBrickVoxels, value);
+    const BrickMask active = settle(rule, regionIn(options, bricks[0]), values);
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const bool expected = std::abs(value) > std::ldexp(0.25f, blockOf(v));
+      EXPECT_EQ(active.test(v), expected) << value << ", " << v;
+      EXPECT_EQ(values[std::size_t(v)], expected ? value : 0.0f);
+    }
+  }
+  std::vector<float> values(kBrickVoxels, 0.3f);
+  EXPECT_EQ(settle(rule, regionIn(options, bricks[1]), values).count(), kBrickVoxels);
+  EXPECT_EQ(settle(rule, regionIn(options, {0, 8, 0}), values).count(), 0);
+}
+
 // A mask makes voxels active whose values are the background, and no others.
 TEST(ActiveRegion, VoxelsOfAMaskAreActiveWhateverTheirValues) {
   BrickRegion region{{}, false};

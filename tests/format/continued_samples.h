@@ -62,6 +62,18 @@ inline StoredGrid withMask(StoredGrid grid, int frame) {
   return grid;
 }
 
+/// Thresholds for the blocks of 4^3 bricks, which change in every third brick from frame to frame.
+inline StoredGrid withLevels(StoredGrid grid, int frame) {
+  grid.topology = TopologyKind::kBlocks;
+  grid.activeThreshold = 0.01f;
+  for (std::int32_t n = 0; n < 64; ++n) {
+    grid.bricks.push_back(Coord{n / 16 + frame / 2, n / 4 % 4, n % 4 - 2} * kBrickSide);
+    const int change = n % 3 == 0 ? frame : 0;
+    grid.levels.emplace_back().of.fill(std::uint8_t((n * 5 + change) % kLevelCount));
+  }
+  return grid;
+}
+
 /// The frame after another one, as a reader gets it.
 inline EsvrFile appended(SequenceWriter& writer, std::int64_t number, const EsvrFile& frame,
                          const EsvrFile* previous) {
@@ -72,7 +84,8 @@ inline EsvrFile appended(SequenceWriter& writer, std::int64_t number, const Esvr
 }
 
 /// Writes the golden sequence of continued ellipsoids: a frame that stands alone, one with new
-/// ellipsoids, one with other cells and finer steps, and one with a mask.
+/// ellipsoids, one with other cells and finer steps, one with a mask, and
+/// two with levels.
 inline void writeContinuedSequence(const std::filesystem::path& path) {
   SequenceWriter writer(path, {true, PartialSequence::kReplace});
   const Change change;
@@ -84,7 +97,10 @@ inline void writeContinuedSequence(const std::filesystem::path& path) {
   last = appended(writer, 2, frameOf(gridOf(withNew(next(before().lattice), 12))), &last);
   last = appended(
       writer, 3, frameOf(gridOf(next(withMovedCells(codec::refined(before().lattice, 2))))), &last);
-  (void)appended(writer, 4, frameOf(withMask(gridOf(next(before().lattice)), 0)), &last);
+  last = appended(writer, 4, frameOf(withMask(gridOf(next(before().lattice)), 0)), &last);
+  for (const int frame : {1, 2})
+    last = appended(writer, 4 + frame, frameOf(withLevels(gridOf(next(before().lattice)), frame)),
+                    &last);
   (void)writer.finish();
 }
 

@@ -32,6 +32,7 @@ using testing::ThrowsMessage;
 
 using test::frameOf;
 using test::gridOf;
+using test::withLevels;
 using test::withMask;
 using test::withNew;
 
@@ -197,6 +198,16 @@ TEST(ContinuedFrame, RepeatsAnEqualMaskInFewBytes) {
   EXPECT_LT(expectContinues(masked, masked).size(), expectContinues(plain, plain).size() + 50);
 }
 
+TEST(ContinuedFrame, HasLevelsAfterLevelsOrNone) {
+  const EsvrFile plain = firstFile(), levels = frameOf(withLevels(plain.grids[0], 0));
+  const EsvrFile next = nextFile(plain), nextLevels = frameOf(withLevels(next.grids[0], 1));
+  (void)expectContinues(next, levels);
+  (void)expectContinues(nextLevels, frameOf(withMask(plain.grids[0], 0)));
+  const auto first = expectContinues(nextLevels, plain),
+             second = expectContinues(nextLevels, levels);
+  EXPECT_LT(second.size() + 20, first.size());
+}
+
 /// A ball as a mask of bricks, some of which may be empty.
 format::Mask ballMask(Coord middle) {
   constexpr int kRadius = 9, kBricks = 4;
@@ -258,6 +269,7 @@ std::uint64_t checksumOf(const StoredGrid& grid) {
   sum.add(std::as_bytes(std::span(q.precision)));
   sum.add(std::as_bytes(std::span(q.intensity)));
   sum.add(std::as_bytes(std::span(grid.mask)));
+  sum.add(std::as_bytes(std::span(grid.levels)));
   return sum.value();
 }
 
@@ -265,11 +277,12 @@ std::uint64_t checksumOf(const StoredGrid& grid) {
 TEST(ContinuedFrame, HasTheCodesAndBytesOfTheGoldenSequence) {
   const auto whole = test::bytesIn(ESVR_GOLDEN_CONTINUED);
   SequenceReader reader(ESVR_GOLDEN_CONTINUED);
-  ASSERT_EQ(reader.frames().size(), 4u);
-  const std::array<std::uint64_t, 4> codes{9878378402168221528u, 4055967756162408075u,
-                                           1176396433574993199u, 8682976545001475940u};
+  ASSERT_EQ(reader.frames().size(), 6u);
+  const std::array<std::uint64_t, 6> codes{9878378402168221528u, 4055967756162408075u,
+                                           1176396433574993199u, 8682976545001475940u,
+                                           1758888499782260259u, 5226278277942333774u};
   std::optional<EsvrFile> previous;
-  for (std::size_t f = 0; f < 4; ++f) {
+  for (std::size_t f = 0; f < codes.size(); ++f) {
     const auto stored =
         std::span(whole).subspan(reader.frames()[f].offset, reader.frames()[f].bytes);
     EsvrFile now = reader.read(reader.frames()[f].number);
@@ -342,11 +355,8 @@ void correctChecksum(std::vector<std::byte>& bytes) {
   std::ranges::copy(std::as_bytes(std::span(&sum, 1)), bytes.end() - sizeof sum);
 }
 
-/// Every byte of a frame with another value: an error, or a grid that can be written and read.
-TEST(ContinuedFrame, ReadsOrRefusesChangedBytesWithACorrectChecksum) {
-  const EsvrFile plain = firstFile(15);
-  const EsvrFile previous = frameOf(withMask(plain.grids[0], 0));
-  const EsvrFile frame = frameOf(withMask(nextFile(plain, 5).grids[0], 1));
+/// Changes every byte of a frame: an error, or a grid that can be written and read.
+void expectSurvivesChangedBytes(const EsvrFile& frame, const EsvrFile& previous) {
   const auto whole = encodeFrame(frame, &previous);
   ASSERT_TRUE(dependsOnPrevious(whole));
   int read = 0;
@@ -364,6 +374,14 @@ TEST(ContinuedFrame, ReadsOrRefusesChangedBytesWithACorrectChecksum) {
     }
   }
   EXPECT_GT(read, 0);
+}
+
+TEST(ContinuedFrame, ReadsOrRefusesChangedBytesWithACorrectChecksum) {
+  const EsvrFile plain = firstFile(15), next = nextFile(plain, 5);
+  expectSurvivesChangedBytes(frameOf(withMask(next.grids[0], 1)),
+                             frameOf(withMask(plain.grids[0], 0)));
+  expectSurvivesChangedBytes(frameOf(withLevels(next.grids[0], 1)),
+                             frameOf(withLevels(plain.grids[0], 0)));
 }
 
 TEST(ContinuedFrame, KeepsToTheLimitOfMemory) {

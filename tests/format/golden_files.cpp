@@ -95,6 +95,21 @@ StoredGrid masked() {
   return grid;
 }
 
+/// An ellipsoid whose bricks, in two places, have thresholds for each block.
+StoredGrid levelled() {
+  StoredGrid grid = oneEllipsoid();
+  grid.topology = TopologyKind::kBlocks;
+  grid.activeThreshold = 0.125f;
+  for (const std::int32_t x : {-8, 0, 64})
+    for (std::int32_t z = 0; z < 40; z += 8) {
+      grid.bricks.push_back({x, 16, z});
+      BlockLevels& levels = grid.levels.emplace_back();
+      for (std::size_t n = 0; n < kBlocksOfBrick; ++n)
+        levels.of[n] = std::uint8_t(n == 3 ? z : x == 64 ? 47 - n : 20);
+    }
+  return grid;
+}
+
 /// Two grids with the same ellipsoids and the same mask.
 EsvrFile twins() {
   EsvrFile file{{}, {masked(), masked()}};
@@ -178,6 +193,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"mirrored_voxels", fileOf(mirroredValues())},
       {"copied_voxels", fileOf(copiedValues())},
       {"mask", fileOf(masked())},
+      {"levels", fileOf(levelled())},
       {"twins", twins()},
       {"residual", fileOf(corrected())},
       {"carried",

@@ -113,7 +113,7 @@ TEST(GridCoding, AFieldThatFitsGivesItsSourceBack) {
 TEST(GridCoding, TheThresholdOverlapsAsWellAsTheBestOfManyThatCostNoError) {
   const Field truth = positiveField(3);
   const SparseVolume source = revoxelise(truth, {.threshold = 0.2f});
-  const StoredGrid grid = makeStoredGrid(kFog, source, perturbed(truth), Activity::kByValue);
+  const StoredGrid grid = makeStoredGrid(kFog, source, perturbed(truth), {Activity::kByValue});
   const double mseOfAll = decodedAt(grid, source, 0.0f).mseBox;
 
   double bestIou = 0.0;
@@ -138,7 +138,7 @@ TEST(GridCoding, TheThresholdIsTheSameElsewhereAndScalesWithTheValues) {
 
   const auto thresholdOf = [](const Field& field, float cut) {
     return makeStoredGrid(kFog, revoxelise(field, {.threshold = cut}), perturbed(field),
-                          Activity::kByValue)
+                          {Activity::kByValue})
         .activeThreshold;
   };
   const float threshold = thresholdOf(here, 0.1f);
@@ -232,7 +232,7 @@ TEST(GridCoding, TheMaskComesBackBitForBitWhereItIsStored) {
   SparseVolume source = revoxelise(field, {.threshold = 0.01f});
   // The mask has holes that no threshold finds, and a voxel that no ellipsoid reaches.
   for (auto& mask : source.active) mask.words[3] &= 0x5555555555555555;
-  const StoredGrid grid = makeStoredGrid(kFog, source, field, Activity::kExact);
+  const StoredGrid grid = makeStoredGrid(kFog, source, field, {Activity::kExact});
   EXPECT_EQ(grid.topology, TopologyKind::kMask);
   const auto bytes = encodeEsvr({{}, {grid}});
   const EsvrFile stored = decodeEsvr(bytes, "memory");
@@ -261,7 +261,7 @@ TEST(GridCoding, NoVoxelOutsideTheActiveBoxIsActive) {
     ASSERT_EQ(activeBox(source).max.z, half.z);
     ASSERT_FALSE(staysWithin(revoxelise(field, {.threshold = 0.05f}), source));
     for (const auto activity : {Activity::kAuto, Activity::kByValue, Activity::kExact}) {
-      const StoredGrid grid = makeStoredGrid(kFog, source, field, activity);
+      const StoredGrid grid = makeStoredGrid(kFog, source, field, {activity});
       expectSame(decodeGrid(grid), source);
     }
   }
@@ -285,7 +285,7 @@ TEST(GridCoding, ASimplifiedMaskTakesFewerBytesThanTheExactOne) {
   const Field field = positiveField(3);
   const SparseVolume source = revoxelise(field, {.threshold = 0.001f});
   const auto bytesOf = [&](Activity activity) {
-    return bytesAdded(makeStoredGrid(kFog, source, perturbed(field), activity));
+    return bytesAdded(makeStoredGrid(kFog, source, perturbed(field), {activity}));
   };
   EXPECT_LT(bytesOf(Activity::kAuto), bytesOf(Activity::kExact));
 }
@@ -312,7 +312,7 @@ TEST(GridCoding, ALevelSetsMaskComesBackWithItsInside) {
   const Field field = ball();
   const SparseVolume source = revoxelise(field, {.threshold = 0.25f, .narrowBand = true});
   const SparseVolume decoded =
-      decodeGrid(makeStoredGrid(kLevelSet, source, field, Activity::kExact));
+      decodeGrid(makeStoredGrid(kLevelSet, source, field, {Activity::kExact}));
   expectSame(source, decoded);
 }
 
@@ -322,7 +322,7 @@ TEST(GridCoding, ABoxLeavesTheVoxelsOutsideInactive) {
   const Box all = activeBox(source);
   const Box box{all.min, {all.max.x, (all.min.y + all.max.y) / 2, all.max.z}};
   for (const auto activity : {Activity::kAuto, Activity::kByValue, Activity::kExact}) {
-    const StoredGrid grid = makeStoredGrid(kFog, source, field, activity);
+    const StoredGrid grid = makeStoredGrid(kFog, source, field, {activity});
     const SparseVolume whole = decodeGrid(grid), part = decodeGrid(grid, {.box = box});
     EXPECT_LT(activeVoxelCount(part), activeVoxelCount(whole));
     for (Coord v = all.min; v.y <= all.max.y; ++v.y)
@@ -332,7 +332,8 @@ TEST(GridCoding, ABoxLeavesTheVoxelsOutsideInactive) {
 
 TEST(GridCoding, TheRuleOfTheVoxelsIsWhatDecodingGoesBy) {
   const auto expectDecoded = [](const Field& field, Activity activity, TopologyKind kind) {
-    const StoredGrid grid = makeStoredGrid(kFog, revoxelise(field, {}), perturbed(field), activity);
+    const StoredGrid grid =
+        makeStoredGrid(kFog, revoxelise(field, {}), perturbed(field), {activity});
     EXPECT_EQ(grid.topology, kind);
     expectSame(decodeGrid(grid), revoxelise(grid.field, voxelRule(grid)));
   };

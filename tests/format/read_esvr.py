@@ -21,7 +21,8 @@ KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "bricks", 6: "layer erro
          7: "curve", 8: "carried grid", 9: "vector grid", 11: "grid records",
          12: "packed sections", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
          20: "kappas", 32: "ellipsoids", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
-         37: "residual", 38: "carried bytes", 41: "related voxels", 64: "sequence index"}
+         37: "residual", 38: "carried bytes", 41: "related voxels", 43: "levels",
+         64: "sequence index"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
 
@@ -498,6 +499,49 @@ def voxels(data):
     return head, v.held
 
 
+def difference_(stream):
+    """A signed number: whether it differs from 0, its sign, and its magnitude."""
+    if not stream.decision("differs"):
+        return 0
+    negative, magnitude = stream.decision("negative"), 1
+    while magnitude <= 3 and stream.decision("above", magnitude):
+        magnitude += 1
+    if magnitude > 3:
+        magnitude += stream.number("magnitude", bits=6)
+    return -magnitude if negative else magnitude
+
+
+def level(stream, held, brick, n):
+    """The level of block n of a brick; `held` has those before."""
+    before = []
+    for axis, bit in ((2, 1), (1, 2), (0, 4)):
+        other = tuple(c - (a == axis and not n & bit) for a, c in enumerate(brick))
+        before.append(held.get((other, n ^ bit)))
+    z, y, x = before
+    agreement = (0 if y == x else 1) if z == y else 2 if z == x else 3 if y == x else 4
+    for axis, offer in enumerate(before):
+        if offer is None or offer in before[:axis]:
+            continue
+        if stream.decision("same", n, agreement, axis):
+            return offer
+    known = [offer for offer in before if offer is not None]
+    mean = (sum(known) + len(known) // 2) // len(known) if known else 24
+    return mean + difference_(stream)
+
+
+def levels(data):
+    """The levels of the blocks of bricks, without a previous frame: {(brick, block): level}."""
+    origin = struct.unpack_from("<3i", data)
+    stream = Decoder(data[12:])
+    count, held = stream.number("count", bits=6), {}
+    for key in keys(count, 63, stream):
+        brick = tuple(origin[a] + sum((key >> (3 * b + a) & 1) << b for b in range(21))
+                      for a in range(3))
+        for n in range(8):
+            held[brick, n] = level(stream, held, brick, n)
+    return held
+
+
 def carried(data):
     r = Record(data)
     record = {"name": r.sized(), "tree type": r.sized(), "half": r.get("B"),
@@ -581,7 +625,7 @@ def content(name, data):
                "voxels": voxels, "mask": voxels, "residual": voxels,
                "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve,
                "carried grid": carried, "vector grid": vectors, "grid records": grid_records,
-               "related voxels": related, "packed sections": packed, "sequence index": sequence_index}
+               "related voxels": related, "levels": levels, "packed sections": packed, "sequence index": sequence_index}
     return readers[name](data) if name in readers else data
 
 
@@ -623,7 +667,7 @@ def add(sections, minor, row):
     if name is None:
         assert flags == 0, "an unknown kind is optional here"
         return None
-    since = {8: 1, 38: 1, 9: 2, 64: 3, 11: 4, 12: 4, 41: 4}.get(kind, 0)
+    since = {8: 1, 38: 1, 9: 2, 64: 3, 11: 4, 12: 4, 41: 4, 43: 4}.get(kind, 0)
     assert minor >= since, f"a kind of version 1.{since}"
     optional = name in ("curve", "layer errors", "carried grid", "carried bytes", "vector grid")
     assert flags == (0 if optional else 1), "flags"
@@ -764,6 +808,14 @@ def check_mask(sections):
         if z > 2 or (x, y, z) == (-5, 18, 1)}
 
 
+def check_levels(sections):
+    record = sections["grid", 0, NONE]
+    assert (record["topology"], record["threshold"]) == (3, 0.125)
+    assert sections["levels", 0, NONE] == {
+        ((x, 2, z), n): 8 * z if n == 3 else 47 - n if x == 8 else 20
+        for x in (-1, 0, 8) for z in range(5) for n in range(8)}
+
+
 def check_residual(sections):
     head, held = sections["residual", 0, NONE]
     assert (head["form"], head["divisor"], head["origin"]) == (0, 64.0, (8, -24, 1024))
@@ -888,7 +940,7 @@ def check_sequence(sections):
 
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
-          "voxels": check_voxels, "mask": check_mask, "residual": check_residual,
+          "voxels": check_voxels, "mask": check_mask, "levels": check_levels, "residual": check_residual,
           "mirrored_voxels": check_mirrored, "copied_voxels": check_copied,
           "two_grids": check_two_grids, "twins": check_twins, "carried": check_carried,
           "vector_grid": check_vector_grid, "related_voxels": check_related_voxels,

@@ -77,7 +77,8 @@ std::string difference(const Field& a, const Field& b) {
 std::string difference(const StoredGrid& a, const StoredGrid& b) {
   if (!(a.descriptor == b.descriptor)) return "descriptor";
   if (!sameBits(a.descriptor.background, b.descriptor.background)) return "background";
-  if (a.topology != b.topology || a.bricks != b.bricks || a.mask != b.mask) return "topology";
+  if (a.topology != b.topology || a.bricks != b.bricks || a.mask != b.mask || a.levels != b.levels)
+    return "topology";
   if (!sameBits(a.activeThreshold, b.activeThreshold)) return "threshold";
   if (a.withinRange != b.withinRange) return "withinRange";
   if (!(a.activeBox == b.activeBox) || a.activeVoxels != b.activeVoxels) return "active voxels";

@@ -35,6 +35,16 @@ esvr::EsvrFile frameOfEllipsoids() {
   return {{}, {std::move(grid)}};
 }
 
+esvr::EsvrFile frameOfLevels() {
+  esvr::EsvrFile frame = frameOfEllipsoids();
+  esvr::StoredGrid& grid = frame.grids[0];
+  grid.topology = esvr::TopologyKind::kBlocks;
+  grid.activeThreshold = 0.01f;
+  grid.mask.clear();
+  grid.levels.resize(grid.bricks.size());
+  return frame;
+}
+
 void decodeAndEncode(std::span<const std::byte> bytes, const esvr::EsvrFile& previous) {
   try {
     const auto frame = esvr::decodeFrame(bytes, "fuzz", {kMaxContent}, &previous);
@@ -50,7 +60,7 @@ void decodeAndEncode(std::span<const std::byte> bytes, const esvr::EsvrFile& pre
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto bytes = std::as_bytes(std::span(data, size));
-  static const esvr::EsvrFile frames[] = {frameOfVoxels(), frameOfEllipsoids()};
+  static const esvr::EsvrFile frames[] = {frameOfVoxels(), frameOfEllipsoids(), frameOfLevels()};
   for (const esvr::EsvrFile& previous : frames) {
     decodeAndEncode(bytes, previous);
     decodeAndEncode(esvr::fuzz::repaired(bytes), previous);

@@ -151,6 +151,22 @@ TEST(RenderCells, DrawsTheVoxelsOfMasksWithinABox) {
   }
 }
 
+TEST(RenderCells, DrawsTheVoxelsOfThresholdsOfBlocks) {
+  const Field field = randomField({.count = 200});
+  const auto bricks = reachedBricks(field, {{0, 0, 0}, {23, 39, 39}});
+  std::vector<BlockLevels> levels(bricks.size());
+  for (std::size_t b = 0; b < levels.size(); ++b)
+    for (std::size_t n = 0; n < kBlocksOfBrick; ++n) levels[b].of[n] = std::uint8_t(n * b % 13);
+  const RevoxeliseOptions rule{
+      .threshold = 0.1f, .bricks = bricks, .restrictToBricks = true, .levels = levels};
+  EXPECT_GE(agreement(field, optionsFor(), rule), kAskedByThreshold);
+  RevoxeliseOptions one = rule;
+  one.levels = {};
+  EXPECT_LT(
+      imagePsnr(renderField(field, optionsFor(), rule), renderField(field, optionsFor(), one)),
+      40.0);
+}
+
 TEST(RenderCells, IsTheSameForAnyNumberOfThreads) {
   const Field field = randomField({.count = 300});
   const RenderOptions o = optionsFor({}, {130, 70});

@@ -8,6 +8,7 @@
 #include "esvr/container.h"
 #include "esvr/coord.h"
 #include "esvr/device.h"
+#include "esvr/grid_coding.h"
 #include "esvr/quantised.h"
 #include "esvr/sparse_volume.h"
 
@@ -25,6 +26,10 @@ struct CompactOptions {
   std::optional<Box> box{};      ///< box of the PSNR; default: the active bounding box
   std::optional<double> peak{};  ///< peak of the PSNR, above 0; default: peakOf() of the source
   Device device{};               ///< device that evaluates the trials
+  /// How the result finds its active voxels, if the rule of the grid does not suffice any more
+  /// (renewActivity); nothing: the rule stays. If `bytes` are given, it stays where another one would
+  /// take more bytes.
+  std::optional<ActivityOptions> activity{};
 };
 
 struct CompactResult {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "esvr/block_levels.h"
 #include "esvr/carried_grid.h"
 #include "esvr/coord.h"
 #include "esvr/ellipsoids.h"
@@ -33,6 +34,9 @@ enum class TopologyKind {
   /// of these bricks is active if |V| < background - activeThreshold.
   kBricks = 1,
   kMask = 2,  ///< the voxels of `mask` are active, whatever their values
+  /// The rule of kThreshold within the stored bricks only, and with a threshold for each block of
+  /// 4^3 voxels: thresholdAt(activeThreshold, level).
+  kBlocks = 3,
 };
 
 /// The error of the first k importance layers of every chunk against the source. A grid has a row
@@ -58,13 +62,15 @@ struct StoredGrid {
   GridDescriptor descriptor;
   Field field;
   TopologyKind topology = TopologyKind::kThreshold;
-  float activeThreshold = 0.0f;  ///< threshold of the topology; negative: all voxels are active
-  /// Index corners of the source's bricks, increasing, for kBricks and kMask; otherwise empty.
+  /// Threshold of the topology; negative: all voxels are active. For kBlocks that of level 0, above 0.
+  float activeThreshold = 0.0f;
+  /// Index corners of the bricks that may have active voxels, increasing; empty for kThreshold.
   std::vector<Coord> bricks;
-  std::vector<BrickMask> mask;     ///< active voxels of each brick, for kMask; else empty
-  bool withinRange = true;         ///< decoded values are clamped to the source's range of values
-  Box activeBox;                   ///< active bounding box of the source, index coordinates
-  std::uint64_t activeVoxels = 0;  ///< number of active voxels of the source
+  std::vector<BrickMask> mask;      ///< active voxels of each brick, for kMask; else empty
+  std::vector<BlockLevels> levels;  ///< levels of each brick, for kBlocks; else empty
+  bool withinRange = true;          ///< decoded values are clamped to the source's range of values
+  Box activeBox;                    ///< active bounding box of the source, index coordinates
+  std::uint64_t activeVoxels = 0;   ///< number of active voxels of the source
   float valueMin = 0.0f, valueMax = 0.0f;  ///< range of the source's active voxels
   std::vector<CurvePoint> curve;
   /// The quantised ellipsoids of every chunk. The ellipsoids of `field` are exactly their

@@ -88,7 +88,7 @@ struct StorageOptions {
   Storage form = Storage::kCompact;
   /// PSNR over the box, in dB, that kCompact may lose for a FitGoal. The other goals ignore it.
   double loss = CompactOptions::kDefaultLoss;
-  /// How active voxels are stored. For Activity::kAuto, a SizeGoal takes kByValue where a simplified
+  /// How active voxels are stored. For Activity::kAuto, a SizeGoal takes kNoMask where a simplified
   /// mask would take more than a quarter of the size. Level sets that are stored as voxels always
   /// take kExact.
   Activity activity = Activity::kAuto;

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "esvr/block_levels.h"
 #include "esvr/coord.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/sparse_volume.h"
@@ -56,6 +57,9 @@ struct RevoxeliseOptions {
   /// If this is not empty, the voxels of these masks, one for each of `bricks`, are active whatever
   /// their values, and no others. It needs `restrictToBricks`.
   std::span<const BrickMask> masks{};
+  /// If this is not empty, `threshold` is that of level 0, and the blocks of `bricks` have these
+  /// levels (block_levels.h). It needs `restrictToBricks`, and no masks.
+  std::span<const BlockLevels> levels{};
   Box box = Box::whole();  ///< no voxel outside this box is active
   VoxelMemory memory{};    ///< holds the voxels
 };

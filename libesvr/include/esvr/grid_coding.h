@@ -18,22 +18,40 @@
 
 namespace esvr {
 
+/// How a stored grid finds its active voxels.
+struct ActivityOptions {
+  Activity activity = Activity::kAuto;
+  /// The simplified masks of the source, if they are kept; null: one is made if needed.
+  const SimplifiedMasks* simplified = nullptr;
+  /// The grid of the previous frame, whose thresholds are kept where it matters little; null: none.
+  const StoredGrid* previous = nullptr;
+};
+
 /// Makes a stored grid from a fitted field and the properties of its source. It chooses the rule by
 /// which a reader determines the active voxels:
 ///  - a threshold. Among the thresholds that increase the squared error by at most 0.004 dB, it is
 ///    the one whose active voxels have the largest intersection over union with the source's;
-///  - the source's simplified mask, if `activity` is kAuto, the overlap of the threshold does not
-///    suffice (MaskOverlap, simplified_mask.h) and the source's values are not in a file;
+///  - a threshold for each block (block_levels.h), unless `activity` is kByValue, if the overlap of the
+///    single one does not suffice (MaskOverlap, simplified_mask.h), those of the blocks do, and the
+///    source's values are not in a file;
+///  - the source's simplified mask, if `activity` is kAuto, no thresholds suffice, and the source's
+///    values are not in a file;
 ///  - the source's active mask, if `activity` is kExact, or if no threshold restores a voxel
 ///    because all values equal the background;
 ///  - for a narrow band, the rule of kBricks (container.h) with the source's bricks, unless
 ///    `activity` is kExact.
 /// The curve is left empty.
-/// \param simplified  the simplified masks of `source`, if they are kept; null: one is made if needed
 [[nodiscard]] StoredGrid makeStoredGrid(const GridDescriptor& descriptor,
                                         const SparseVolume& source, Field field,
-                                        Activity activity = Activity::kAuto,
-                                        const SimplifiedMasks* simplified = nullptr);
+                                        const ActivityOptions& options = {});
+
+/// Chooses the rule by which a reader determines the active voxels again, after the ellipsoids of a
+/// grid have changed. Masks, and a single threshold that still suffices, are kept.
+void renewActivity(const SparseVolume& source, const ActivityOptions& options, StoredGrid& grid);
+
+/// A grid whose blocks have thresholds of their own with the middle one for all of them; other grids
+/// are returned unchanged.
+[[nodiscard]] StoredGrid withOneThreshold(StoredGrid grid);
 
 /// Gives a grid of ellipsoids a mask of active voxels instead of its own rule.
 /// \param masks  those of the bricks of `source`

@@ -47,6 +47,7 @@ enum class Activity {
   /// By value if the overlap with the mask of the source then suffices (MaskOverlap,
   /// simplified_mask.h). Otherwise a simplified mask is stored, with which it does.
   kAuto,
+  kNoMask,  ///< as kAuto, but no mask is stored
   kExact,   ///< the exact active mask is stored
   kByValue  ///< a voxel is active if its value differs from the background by more than the bound
 };

@@ -15,7 +15,7 @@ namespace {
 /// asks for four times as many.
 constexpr int kAhead = 16, kMostPasses = 4;
 
-static_assert(CellFieldView::kNoMask == BrickIndex::kNone, "masks are numbered by brick");
+static_assert(CellFieldView::kNoRule == BrickIndex::kNone, "masks are numbered by brick");
 
 LevelBricks bricksOf(const DeviceLevel& level) {
   return {level.table().origin, level.first(), level.count(), level.bricks()};
@@ -33,7 +33,8 @@ DeviceCells::DeviceCells(const CellField& field, cudaStream_t stream)
       ellipsoid_(field.ellipsoid, stream),
       corners_(field.corners, stream),
       masks_(field.masks, stream),
-      maskOf_(field.maskOf, stream) {
+      blockLevels_(field.blockLevels, stream),
+      ruleOf_(field.ruleOf, stream) {
   add(DeviceLevel(field.table, stream));
 }
 
@@ -48,7 +49,8 @@ CellFieldView DeviceCells::view() const {
                      .ellipsoid = ellipsoid_.data(),
                      .corners = corners_.data(),
                      .masks = masks_.data(),
-                     .maskOf = maskOf_.data(),
+                     .blockLevels = blockLevels_.data(),
+                     .ruleOf = ruleOf_.data(),
                      .box = box_,
                      .rule = rule_};
   for (int l = 0; l < levelCount(); ++l) view.levels[l] = bricksOf(level(l));
@@ -57,7 +59,8 @@ CellFieldView DeviceCells::view() const {
 
 std::size_t DeviceCells::bytes() const {
   std::size_t bytes = forms_.bytes() + kernels_.bytes() + origins_.bytes() + begin_.bytes() +
-                      ellipsoid_.bytes() + corners_.bytes() + masks_.bytes() + maskOf_.bytes();
+                      ellipsoid_.bytes() + corners_.bytes() + masks_.bytes() +
+                      blockLevels_.bytes() + ruleOf_.bytes();
   for (const DeviceLevel& level : levels_) bytes += level.bytes();
   return bytes;
 }

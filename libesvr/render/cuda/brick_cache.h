@@ -42,7 +42,8 @@ class DeviceCells {
   DeviceBuffer<std::uint32_t> begin_, ellipsoid_;
   DeviceBuffer<std::uint8_t> corners_;
   DeviceBuffer<BrickMask> masks_;
-  DeviceBuffer<std::uint32_t> maskOf_;
+  DeviceBuffer<BlockLevels> blockLevels_;
+  DeviceBuffer<std::uint32_t> ruleOf_;
 };
 
 class BrickCache {

@@ -151,9 +151,12 @@ __device__ bool mayDiffer(const CellFieldView& field, std::uint32_t brick, int c
 /// Whether a voxel of this settled value is active, apart from the box.
 __device__ bool isActive(const CellFieldView& field, std::uint32_t brick, const Coord& voxel,
                          float settled) {
-  if (field.masks == nullptr) return field.rule.isActive(settled);
-  const std::uint32_t mask = field.maskOf[brick * kCellCorners + cornerOf(voxel)];
-  return mask != CellFieldView::kNoMask && field.masks[mask].test(voxelOffset(localOf(voxel)));
+  if (field.ruleOf == nullptr) return field.rule.isActive(settled);
+  const std::uint32_t rule = field.ruleOf[brick * kCellCorners + cornerOf(voxel)];
+  if (rule == CellFieldView::kNoRule) return false;
+  const int offset = voxelOffset(localOf(voxel));
+  if (field.masks != nullptr) return field.masks[rule].test(offset);
+  return field.rule.isActive(settled, field.blockLevels[rule].at(offset));
 }
 
 /// The voxel that a sum becomes. \param local  its place in the brick

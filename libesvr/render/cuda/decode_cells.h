@@ -31,11 +31,12 @@ struct CellFieldView {
   const Coord* origins;
   const std::uint32_t *begin, *ellipsoid;
   const std::uint8_t* corners;  ///< null: all voxels may differ from the background
-  /// Masks of active voxels, and their numbers (or kNoMask) by brick and corner; null: voxels are
-  /// active by value.
-  static constexpr std::uint32_t kNoMask = 0xffffffffu;
+  /// Masks of active voxels, or levels of their thresholds; null: there are none. Their numbers by
+  /// brick and corner, or kNoRule.
+  static constexpr std::uint32_t kNoRule = 0xffffffffu;
   const BrickMask* masks;
-  const std::uint32_t* maskOf;
+  const BlockLevels* blockLevels;
+  const std::uint32_t* ruleOf;
   Box box;  ///< no voxel outside it is active
   VoxelRule rule;
 };

@@ -1,0 +1,83 @@
+#include "format/level_graph.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+
+#include "core/brick_index.h"
+
+namespace esvr::format {
+namespace {
+
+/// Edges between blocks that the level of the previous frame in the same place is worth
+/// (docs/lab-notes.md, "Thresholds of blocks").
+constexpr double kExpectedEdges = 3.0;
+/// After this many rounds hardly a level changes.
+constexpr int kMaxRounds = 12;
+
+std::array<std::uint8_t, 2> endsOf(const LevelCosts& costs) {
+  const auto least = std::min_element(costs.begin(), costs.end());
+  const auto last = std::find(costs.rbegin(), costs.rend(), *least);
+  return {std::uint8_t(least - costs.begin()), std::uint8_t(costs.rend() - last - 1)};
+}
+
+}  // namespace
+
+LevelGraph::LevelGraph(std::span<const Coord> places, std::span<const LevelCosts> costs,
+                       double edge)
+    : costs_(costs), edge_(edge) {
+  constexpr Coord kSteps[kNeighbours] = {{-1, 0, 0}, {1, 0, 0},  {0, -1, 0},
+                                         {0, 1, 0},  {0, 0, -1}, {0, 0, 1}};
+  const BrickIndex index(places);
+  for (std::size_t n = 0; n < places.size(); ++n) {
+    const Coord p = places[n];
+    auto& near = near_.emplace_back();
+    for (int s = 0; s < kNeighbours; ++s) near[std::size_t(s)] = index.find(p + kSteps[s]);
+    byColor_[std::size_t((p.x + p.y + p.z) & 1)].push_back(n);
+    ends_.push_back(endsOf(costs[n]));
+  }
+}
+
+double LevelGraph::costOf(std::size_t node, std::uint8_t level, double price,
+                          const std::vector<std::uint8_t>& levels) const {
+  double edges = 0.0;
+  for (const std::uint32_t other : near_[node])
+    edges += other != BrickIndex::kNone && levels[other] != level ? edge_ : 0.0;
+  if (isExpected(node) && expected_[node] != level) edges += kExpectedEdges;
+  return costs_[node][level] + price * edges;
+}
+
+/// The best of the own level, those of the neighbours and of the previous frame, and the ends of the
+/// cheapest levels.
+std::uint8_t LevelGraph::best(std::size_t node, double price,
+                              const std::vector<std::uint8_t>& levels) const {
+  std::uint8_t found = levels[node];
+  double least = costOf(node, found, price, levels);
+  const auto offer = [&](std::uint8_t level) {
+    if (level == found) return;
+    const double cost = costOf(node, level, price, levels);
+    if (cost < least) least = cost, found = level;
+  };
+  for (const std::uint32_t other : near_[node])
+    if (other != BrickIndex::kNone) offer(levels[other]);
+  if (isExpected(node)) offer(expected_[node]);
+  for (const std::uint8_t end : ends_[node]) offer(end);
+  return found;
+}
+
+void LevelGraph::improve(double price, std::vector<std::uint8_t>& levels) const {
+  for (int round = 0; round < kMaxRounds; ++round) {
+    std::atomic<bool> changed = false;
+    for (const auto& nodes : byColor_)
+      tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t n) {
+        const std::uint8_t level = best(nodes[n], price, levels);
+        if (level == levels[nodes[n]]) return;
+        levels[nodes[n]] = level;
+        changed.store(true, std::memory_order_relaxed);
+      });
+    if (!changed) return;
+  }
+}
+
+}  // namespace esvr::format

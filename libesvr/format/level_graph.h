@@ -1,0 +1,54 @@
+#pragma once
+/// Levels of neighbouring blocks or bricks, weighed by what a level costs in its own place and by the
+/// number of neighbours with different levels, on which the bits depend.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "esvr/block_levels.h"
+#include "esvr/coord.h"
+
+namespace esvr::format {
+
+/// The cost of each level in one place.
+using LevelCosts = std::array<float, kLevelCount>;
+
+class LevelGraph {
+ public:
+  /// \param places  coordinates of the nodes; those that differ by 1 along one axis are neighbours
+  /// \param costs   costs of each node, which must outlive the graph
+  /// \param edge    what an edge is worth: 1 between blocks
+  LevelGraph(std::span<const Coord> places, std::span<const LevelCosts> costs, double edge);
+
+  /// Gives nodes a level that the previous frame has in the same place, or kNoLevel. The list must
+  /// outlive the graph.
+  void expect(std::span<const std::uint8_t> levels) { expected_ = levels; }
+  static constexpr std::uint8_t kNoLevel = 255;
+
+  /// Changes the level of one node after the other while that reduces the sum of costs. Nodes that are
+  /// no neighbours change at the same time.
+  /// \param price  cost of an edge of 1 between different levels
+  void improve(double price, std::vector<std::uint8_t>& levels) const;
+
+ private:
+  static constexpr int kNeighbours = 6;
+
+  [[nodiscard]] bool isExpected(std::size_t node) const {
+    return !expected_.empty() && expected_[node] != kNoLevel;
+  }
+  [[nodiscard]] std::uint8_t best(std::size_t node, double price,
+                                  const std::vector<std::uint8_t>& levels) const;
+  [[nodiscard]] double costOf(std::size_t node, std::uint8_t level, double price,
+                              const std::vector<std::uint8_t>& levels) const;
+
+  std::span<const LevelCosts> costs_;
+  double edge_;
+  std::vector<std::array<std::uint32_t, kNeighbours>> near_;
+  std::array<std::vector<std::size_t>, 2> byColor_;  ///< neighbours have different colors
+  std::span<const std::uint8_t> expected_;           ///< empty if nothing is expected
+  std::vector<std::array<std::uint8_t, 2>> ends_;    ///< first and last of the cheapest levels
+};
+
+}  // namespace esvr::format

@@ -1,0 +1,128 @@
+// Plan: where errors differ from place to place, a threshold for each block restores the active voxels
+// and one for all does not; the choice is the same for any number of threads; levels of the previous
+// frame make it cheaper; active voxels that do not depend on the values have no thresholds.
+#include "format/choose_levels.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "esvr/field.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+#include "field/random_field.h"
+#include "support/on_threads.h"
+
+namespace esvr {
+namespace {
+
+using format::Levels;
+
+/// Blobs whose sum is active where it exceeds a threshold that grows along x.
+SparseVolume uneven(const Field& field) {
+  SparseVolume volume = revoxelise(field, {.threshold = 0.0f});
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    BrickMask active;
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Coord at = volume.brickCorner(b) + voxelLocal(v);
+      float& value = volume.brickValues(b)[v];
+      if (value > 0.01f * std::exp2(float(at.x) / 12.0f))
+        active.set(v);
+      else
+        value = 0.0f;
+    }
+    volume.active[b] = active;
+  }
+  dropInactiveBricks(volume);
+  return volume;
+}
+
+Field blobs() {
+  Field field = test::randomField({.count = 60, .extent = 60.0});
+  for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+  return field;
+}
+
+StoredGrid stored(Activity activity, const StoredGrid* previous = nullptr) {
+  const Field field = blobs();
+  return makeStoredGrid({}, uneven(field), field, {activity, nullptr, previous});
+}
+
+double overlapOf(const StoredGrid& grid) {
+  return compareVolumes(uneven(blobs()), decodeGrid(grid)).iou;
+}
+
+TEST(ChooseLevels, ThresholdsOfBlocksRestoreWhatOneDoesNot) {
+  const StoredGrid one = stored(Activity::kByValue), several = stored(Activity::kAuto);
+  EXPECT_EQ(one.topology, TopologyKind::kThreshold);
+  EXPECT_LT(overlapOf(one), 0.9);
+  ASSERT_EQ(several.topology, TopologyKind::kBlocks);
+  EXPECT_GT(overlapOf(several), kMinOverlap);
+  EXPECT_EQ(stored(Activity::kNoMask).levels, several.levels);
+}
+
+TEST(ChooseLevels, TheyTakeFewerBytesThanAMask) {
+  const StoredGrid several = stored(Activity::kAuto), exact = stored(Activity::kExact);
+  EXPECT_LT(4 * format::putLevels({several.bricks, several.levels}).size(),
+            bytesAdded(exact) - bytesAdded(stored(Activity::kByValue)));
+}
+
+TEST(ChooseLevels, AreTheSameForAnyNumberOfThreads) {
+  const auto levels = [] { return stored(Activity::kAuto).levels; };
+  const auto one = test::onThreads(1, levels);
+  EXPECT_EQ(one, test::onThreads(2, levels));
+  EXPECT_EQ(one, test::onThreads(5, levels));
+}
+
+TEST(ChooseLevels, ThoseOfThePreviousFrameAreKept) {
+  const StoredGrid first = stored(Activity::kAuto);
+  const StoredGrid next = stored(Activity::kAuto, &first);
+  ASSERT_EQ(next.topology, TopologyKind::kBlocks);
+  EXPECT_EQ(next.activeThreshold, first.activeThreshold);
+  const Levels before{first.bricks, first.levels}, now{next.bricks, next.levels};
+  EXPECT_LT(5 * format::putLevels(now, before).size(), format::putLevels(now).size());
+}
+
+// Every second voxel is active, whatever its value.
+TEST(ChooseLevels, AreNotFoundWhereValuesDoNotTell) {
+  const Field field = blobs();
+  SparseVolume source = revoxelise(field, {.threshold = 0.05f});
+  for (BrickMask& mask : source.active)
+    for (auto& word : mask.words) word &= 0x5555555555555555u;
+  EXPECT_EQ(makeStoredGrid({}, source, field).topology, TopologyKind::kMask);
+  EXPECT_EQ(makeStoredGrid({}, source, field, {Activity::kNoMask}).topology,
+            TopologyKind::kThreshold);
+}
+
+TEST(ChooseLevels, AreRenewedForEllipsoidsThatHaveChanged) {
+  const SparseVolume source = uneven(blobs());
+  StoredGrid grid = stored(Activity::kAuto);
+  for (float& i : grid.field.chunks[0].ellipsoids.intensity) i *= 3.0f;
+  ASSERT_LT(overlapOf(grid), kMinOverlap);
+  renewActivity(source, {}, grid);
+  EXPECT_EQ(grid.topology, TopologyKind::kBlocks);
+  EXPECT_GT(overlapOf(grid), kMinOverlap);
+}
+
+TEST(ChooseLevels, APartIsDecodedAsInTheWhole) {
+  const StoredGrid grid = stored(Activity::kAuto);
+  const Box all = grid.activeBox, box{all.min + Coord{3, 3, 3}, all.max - Coord{9, 5, 3}};
+  const SparseVolume whole = decodeGrid(grid), part = decodeGrid(grid, {.box = box});
+  for (Coord v = all.min; v.y <= all.max.y; ++v.y)
+    for (v.x = all.min.x; v.x <= all.max.x; ++v.x)
+      EXPECT_EQ(valueAt(part, v), box.contains(v) ? valueAt(whole, v) : 0.0f);
+}
+
+TEST(ChooseLevels, AGivenThresholdReplacesThem) {
+  const StoredGrid grid = stored(Activity::kAuto);
+  const SparseVolume decoded = decodeGrid(grid, {.threshold = 0.1f});
+  const SparseVolume expected = revoxelise(grid.field, {.threshold = 0.1f,
+                                                        .range = voxelRule(grid).range,
+                                                        .bricks = grid.bricks,
+                                                        .restrictToBricks = true,
+                                                        .box = grid.activeBox});
+  EXPECT_EQ(decoded.active, expected.active);
+}
+
+}  // namespace
+}  // namespace esvr
