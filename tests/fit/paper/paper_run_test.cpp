@@ -91,6 +91,17 @@ TEST(InitialPoints, OfEveryVoxelAddUpToTheVolume) {
   }
 }
 
+TEST(InitialPoints, OfBothKernelsReachThreeTimesTheirDistance) {
+  const SparseVolume volume = test::volumeOf({}, 2, 0.0f, [](Coord) { return 1.0f; });
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  const std::size_t points = target.values.size() / 8;  // a distance of 2 voxels
+  for (const KernelKind kind : {KernelKind{}, KernelKind{.gaussian = true}}) {
+    const double ending = supportRadius(kernelConstants<double>(kernelOf(kind)));
+    const auto p = initialPoints(target, points, kind, 1).front();
+    EXPECT_NEAR(std::exp(p.logScale[0]) * ending / kind.unitsPerScale(kind.k), 6.0, 1e-9);
+  }
+}
+
 TEST(PaperMethod, IsScaledInAllThatIsSaidInEpochs) {
   const PaperMethod method = scaledTo({}, 280);
   EXPECT_EQ(method.densifyUntil, 40u);
