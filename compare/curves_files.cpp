@@ -9,28 +9,34 @@
 
 #include "cli/bytes_file.h"
 #include "cli/json_file.h"
-#include "compare/program.h"
+#include "compare/error_plot.h"
+#include "compare/finding.h"
 #include "compare/report_versions.h"
+#include "compare/table_lines.h"
 #include "report/data_table.h"
+#include "report/html_chart.h"
 #include "report/html_page.h"
+#include "report/html_table.h"
 #include "report/plot.h"
+#include "report/units.h"
 
 namespace esvr::compare {
 namespace {
 
 using Json = nlohmann::ordered_json;
 using report::Cell;
+using report::Html;
 using report::Kind;
 using report::Plot;
 using report::Series;
 
 constexpr const char* kCurvesSchema = "esvr-curves";
 constexpr int kCurvesVersion = 1;
-constexpr const char* kOurs = "ESVR";
 constexpr const char* kFile = "file";
+constexpr const char* kFit = "fit";
 
 /// The curve of a row: rows of the same name form a curve, and all rows of ESVR form one.
-std::string seriesOf(const TableRow& row) { return row.group == kOurs ? kOurs : row.name; }
+std::string seriesOf(const TableRow& row) { return row.group == kOurGroup ? kOurGroup : row.name; }
 
 /// The rows with bytes and figures, sorted by series and by bytes.
 std::map<std::string, std::vector<const TableRow*>> rowsBySeries(const TableRecord& record) {
@@ -60,8 +66,8 @@ report::DataTable points(const TableRecord& record) {
   for (const auto& [series, rows] : rowsBySeries(record))
     for (const TableRow* row : rows) {
       for (const auto& at : row->curve)
-        table.rows.push_back({std::string("fit"), series, row->name, double(*row->bytes),
-                              at.seconds, at.psnrBox, at.psnrActive, at.maxError, Cell(), Cell()});
+        table.rows.push_back({std::string(kFit), series, row->name, double(*row->bytes), at.seconds,
+                              at.psnrBox, at.psnrActive, at.maxError, Cell(), Cell()});
       const auto seconds = row->encode ? std::optional(row->encode->median) : std::nullopt;
       table.rows.push_back({std::string(kFile), series, row->name, double(*row->bytes),
                             report::cellOf(seconds), row->metrics->psnrBox,
@@ -71,32 +77,57 @@ report::DataTable points(const TableRecord& record) {
   return table;
 }
 
-Plot overBytes(const TableRecord& record, const std::string& title, const std::string& yLabel,
-               const std::function<double(const TableRow&)>& valueOf) {
-  Plot plot{.title = title, .xLabel = "bytes", .yLabel = yLabel, .logarithmicX = true};
+/// A curve for each series of rows. \param pointOf  the point of a row
+std::vector<Series> curvesOf(const TableRecord& record,
+                             const std::function<report::Point(const TableRow&)>& pointOf) {
+  std::vector<Series> curves;
   for (const auto& [name, rows] : rowsBySeries(record)) {
-    Series series{name, {}};
-    for (const TableRow* row : rows) series.points.push_back({double(*row->bytes), valueOf(*row)});
-    plot.series.push_back(std::move(series));
+    Series series{.name = name};
+    if (name == kOurGroup) series.emphasis = report::Emphasis::kOurs;
+    for (const TableRow* row : rows) series.points.push_back(pointOf(*row));
+    curves.push_back(std::move(series));
   }
+  return curves;
+}
+
+Plot overBytes(const TableRecord& record) {
+  Plot plot = errorOverBytes("Error over bytes");
+  plot.series = curvesOf(record, [](const TableRow& row) {
+    return errorPoint(double(*row.bytes), row.metrics->psnrBox);
+  });
+  addDecibels(plot);
+  return plot;
+}
+
+Plot fpsOverBytes(const TableRecord& record) {
+  Plot plot{.title = "Pictures per second over bytes",
+            .xLabel = "size of the file",
+            .yLabel = "pictures per second",
+            .logarithmicX = true,
+            .logarithmicY = true,
+            .textX = report::bytesText,
+            .textY = report::plainText};
+  plot.series = curvesOf(record, [](const TableRow& row) {
+    return report::Point{double(*row.bytes), row.fps.value_or(NAN)};
+  });
   return plot;
 }
 
 /// The curves of the fits, and a curve through the end-to-end times from voxels to file.
 Plot overSeconds(const TableRecord& record) {
-  Plot plot{.title = "Error over run time",
-            .xLabel = "seconds",
-            .yLabel = "PSNR over the box, dB",
-            .logarithmicX = true};
-  Series ends{"end to end", {}};
+  Plot plot = errorOverSeconds("Error over run time");
+  Series ends{.name = "end to end", .emphasis = report::Emphasis::kOurs};
   for (const auto& row : record.rows) {
-    if (row.group != kOurs || row.curve.empty() || !row.metrics) continue;
-    Series series{row.name, {}};
-    for (const auto& at : row.curve) series.points.push_back({at.seconds, at.psnrBox});
+    if (row.group != kOurGroup || row.curve.empty() || !row.metrics) continue;
+    Series series{.name = row.name};
+    for (const auto& at : row.curve) series.points.push_back(errorPoint(at.seconds, at.psnrBox));
     plot.series.push_back(std::move(series));
-    if (row.fittedHere) ends.points.push_back({row.encode->median, row.metrics->psnrBox});
+    if (row.fittedHere)
+      ends.points.push_back(errorPoint(row.encode->median, row.metrics->psnrBox,
+                                       report::bytesText(double(*row.bytes))));
   }
   if (!ends.points.empty()) plot.series.push_back(std::move(ends));
+  addDecibels(plot);
   return plot;
 }
 
@@ -141,32 +172,58 @@ struct NamedPlot {
 };
 
 std::vector<NamedPlot> plotsOf(const TableRecord& record) {
-  std::vector<NamedPlot> plots;
-  plots.push_back({"-seconds", overSeconds(record)});
-  plots.push_back({"-bytes", overBytes(record, "Error over bytes", "PSNR over the box, dB",
-                                       [](const TableRow& row) { return row.metrics->psnrBox; })});
-  if (!hasFps(record)) return plots;
-  Plot fps = overBytes(record, "Pictures a second over bytes", "pictures a second",
-                       [](const TableRow& row) { return row.fps.value_or(NAN); });
-  fps.logarithmicY = true;
-  plots.push_back({"-fps", std::move(fps)});
+  std::vector<NamedPlot> plots{{"-seconds", overSeconds(record)}, {"-bytes", overBytes(record)}};
+  if (hasFps(record)) plots.push_back({"-fps", fpsOverBytes(record)});
   return plots;
 }
 
-/// The points of kind "file"; the points of fits are in the plots.
-report::DataTable filesOf(report::DataTable points) {
-  std::erase_if(points.rows,
-                [](const report::Row& row) { return row.front() != Cell(std::string(kFile)); });
-  return points;
+/// The points of a kind, under headings of their series.
+report::FigureTable pointsOf(const std::string& kind, report::DataTable points) {
+  std::erase_if(points.rows, [&](const report::Row& row) { return row.front() != Cell(kind); });
+  report::FigureTable figures{.folded = {"setting"}};
+  for (const auto& row : points.rows) {
+    const std::string& series = std::get<std::string>(row[1]);
+    const bool ours = series == kOurGroup;
+    if (figures.groups.empty() || figures.groups.back().heading != series)
+      figures.groups.push_back({series, 0});
+    ++figures.groups.back().rows;
+    figures.emphasis.push_back(ours && kind == kFile ? report::Emphasis::kOurs
+                                                     : report::Emphasis::kNone);
+  }
+  figures.table = withColumns(points, {"name", "bytes", "seconds", "psnr_box", "psnr_active",
+                                       "max_error", "fps", "setting"});
+  return figures;
+}
+
+Html chartsOf(const std::vector<NamedPlot>& plots) {
+  Html charts;
+  for (const auto& [ending, plot] : plots) charts += report::toHtml(plot);
+  return report::element("div", {{"class", "charts"}}, charts);
+}
+
+Html foldedPoints(const report::DataTable& data) {
+  report::FigureTable fits = pointsOf(kFit, data);
+  if (fits.table.rows.empty()) return {};
+  fits.table.title = "During the fits: seconds of the optimisation, and errors at that time.";
+  Html content = report::element("summary", "Points of the curves over run time");
+  content += report::toHtml(fits);
+  return report::element("details", {}, content);
 }
 
 std::string page(const CurvesReport& report, const report::DataTable& data,
                  const std::vector<NamedPlot>& plots) {
   report::HtmlPage page;
-  page.title = std::string(kProgram) + ": " + report.record.grid;
-  for (const auto& [ending, plot] : plots)
-    page.pictures.push_back({plot.title, "image/svg+xml", report::toSvg(plot)});
-  page.tables = {filesOf(data)};
+  page.title = "Grid " + report.record.grid;
+  page.finding = findingOf(report.record);
+  page.paragraphs = {sceneLine(report.record) + ".", interruption(report.record)};
+  report::FigureTable files = pointsOf(kFile, data);
+  files.table.title =
+      "Files: seconds from the voxels to the file; errors in value units. A click on a header "
+      "sorts.";
+  Html tables = report::toHtml(files);
+  tables += foldedPoints(data);
+  page.sections = {report::section("", "Curves", chartsOf(plots)),
+                   report::section("figures", "Points", tables)};
   page.commands = versionLines();
   page.commands.insert(page.commands.begin(), joined(report.commandLine));
   return report::toHtml(page);

@@ -9,6 +9,7 @@
 #include "cli/names.h"
 #include "cli/stopwatch.h"
 #include "cli/table.h"
+#include "compare/finding.h"
 #include "compare/program.h"
 #include "esvr/compact.h"
 #include "esvr/error.h"
@@ -115,6 +116,9 @@ std::string wordOf(const FitWish& wish) {
   return wish.bytes ? std::to_string(*wish.bytes) : "default";
 }
 
+std::string sizeGroup(std::uint64_t bytes) { return "at " + std::to_string(bytes) + " bytes"; }
+std::string psnrGroup(double psnr) { return "at " + cli::decibels(psnr) + " dB"; }
+
 std::uint64_t bytesOf(const GridFile& file, const std::filesystem::path& path, std::size_t grid) {
   return file.grids().size() == 1 ? file.bytes() : cli::storedBytes(inspectEsvr(path), grid);
 }
@@ -206,13 +210,15 @@ TableRow RowMaker::matched(const BaselineSetting& like, const std::string& group
 }
 
 TableRow RowMaker::sizeMatched(const BaselineSetting& like, std::uint64_t bytes) {
-  return matched(like, "at " + std::to_string(bytes) + " bytes",
-                 [&] { return matchSize(encoder_, like, bytes); });
+  TableRow row = matched(like, sizeGroup(bytes), [&] { return matchSize(encoder_, like, bytes); });
+  row.matchedBytes = bytes;
+  return row;
 }
 
 TableRow RowMaker::psnrMatched(const BaselineSetting& like, double psnr) {
-  return matched(like, "at " + cli::decibels(psnr) + " dB",
-                 [&] { return matchPsnr(encoder_, like, psnr); });
+  TableRow row = matched(like, psnrGroup(psnr), [&] { return matchPsnr(encoder_, like, psnr); });
+  row.matchedPsnr = psnr;
+  return row;
 }
 
 TableRow RowMaker::external(const External& external) {
@@ -259,21 +265,24 @@ TableRow RowMaker::matched(const ExternalCommand& command, const TableRow& like,
   throw;
 } catch (const Error& error) {
   if (scene_.cancel.cancelled()) throw Cancelled();  // Ctrl-C also ends the command
-  return {.name = like.name, .group = like.group, .command = like.command, .note = error.what()};
+  TableRow row = like;
+  row.note = error.what();
+  return row;
 }
 
 TableRow RowMaker::sizeMatched(const ExternalCommand& external, std::uint64_t bytes) {
   const std::string size = std::to_string(bytes);
   return matched(external,
                  {.name = external.name,
-                  .group = "at " + size + " bytes",
+                  .group = sizeGroup(bytes),
                   .command = command("--rows none --size " + size + " --external-command " +
-                                     shellWord(external.text))},
+                                     shellWord(external.text)),
+                  .matchedBytes = bytes},
                  [=](ExternalCodec& codec) { return matchSize(codec, bytes); });
 }
 
 TableRow RowMaker::psnrMatched(const ExternalCommand& external, double psnr) {
-  return matched(external, {.name = external.name, .group = "at " + cli::decibels(psnr) + " dB"},
+  return matched(external, {.name = external.name, .group = psnrGroup(psnr), .matchedPsnr = psnr},
                  [=](ExternalCodec& codec) { return matchPsnr(codec, psnr); });
 }
 
@@ -305,7 +314,7 @@ void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Tabl
 }
 
 TableRow RowMaker::candidate(const std::filesystem::path& path) {
-  TableRow row{.name = path.filename().string(), .group = "ESVR"};
+  TableRow row{.name = path.filename().string(), .group = kOurGroup};
   const GridFile file(path, scene_.options.memory);
   if (!file.esvr())
     throw BadInput(path.string() +
@@ -332,7 +341,7 @@ Conversion RowMaker::convert(const FitWish& wish, std::uint64_t head) const {
 
 TableRow RowMaker::fitted(const FitWish& wish) {
   const std::string word = wordOf(wish);
-  TableRow row{.name = "ESVR fitted, " + word, .group = "ESVR", .fittedHere = true};
+  TableRow row{.name = "ESVR fitted, " + word, .group = kOurGroup, .fittedHere = true};
   row.command = command("--rows none --fit " + word);
   const auto path = scene_.folder / "fitted.esvr";
 

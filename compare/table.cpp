@@ -7,6 +7,7 @@
 #include "cli/interrupts.h"
 #include "cli/json_file.h"
 #include "cli/thread_limit.h"
+#include "compare/finding.h"
 #include "compare/program.h"
 #include "compare/row_plan.h"
 #include "compare/scene_files.h"
@@ -15,6 +16,9 @@
 
 namespace esvr::compare {
 namespace {
+
+constexpr const char* kLossless = "lossless";
+constexpr const char* kNearlyLossless = "nearly lossless";
 
 /// Makes one row after the other. Finished rows are kept if the run is interrupted.
 class TableRun {
@@ -51,17 +55,24 @@ class TableRun {
 
   void plainRows() {
     if (options_.lossless)
-      for (const auto& setting : losslessSettings()) addBaseline("lossless", setting);
+      for (const auto& setting : losslessSettings()) addLossless(setting);
     if (options_.quantised)
       for (const auto& [setting, name] : quantisedSettings(scene_.peak))
         add(maker_.baseline("quantised", setting, name));
+  }
+
+  /// Half floats have an error unless the values are half floats themselves.
+  void addLossless(const BaselineSetting& setting) {
+    TableRow row = maker_.baseline(kLossless, setting, displayName(setting));
+    if (row.metrics && row.metrics->maxError > 0.0) row.group = kNearlyLossless;
+    add(std::move(row));
   }
 
   void matchedRows() {
     std::set<std::uint64_t> sizes(options_.sizes.begin(), options_.sizes.end());
     std::set<double> psnrs;
     for (const auto& row : record_.rows) {
-      if (row.group != "ESVR") continue;
+      if (row.group != kOurGroup) continue;
       sizes.insert(*row.bytes);
       if (std::isfinite(row.metrics->psnrBox)) psnrs.insert(row.metrics->psnrBox);
     }

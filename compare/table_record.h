@@ -29,11 +29,14 @@ struct SearchStep {
 
 struct TableRow {
   std::string name;  ///< name, for example "NanoVDB FpN Zip"
-  std::string
-      group;  ///< "lossless", "quantised", "at 48214 bytes", "at 44.70 dB", "ESVR", "external"
+  /// "ESVR", "external", "lossless", "nearly lossless", "quantised", "given", "at 48214 bytes",
+  /// "at 44.70 dB"
+  std::string group;
   /// Value for --row, or "bound=B" of an external command; empty if the row is neither.
   std::string setting{};
   std::string command{};
+  std::optional<std::uint64_t> matchedBytes{};  ///< size that the row was searched for
+  std::optional<double> matchedPsnr{};          ///< PSNR that the row was searched for, dB
   std::optional<std::uint64_t> bytes{};
   std::optional<VolumeMetrics> metrics{};
   std::optional<Timing> encode{}, decode{};

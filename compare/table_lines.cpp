@@ -1,0 +1,28 @@
+#include "compare/table_lines.h"
+
+#include "cli/table.h"
+
+namespace esvr::compare {
+
+std::string sceneLine(const TableRecord& record) {
+  return "grid \"" + record.grid + "\", " + std::to_string(record.activeVoxels) +
+         " active voxels, box " + toString(record.box.min) + " to " + toString(record.box.max) +
+         ", peak " + cli::shortNumber(record.peak);
+}
+
+std::string pictureLine(const TableRecord& record) {
+  if (!record.referenceCost) return {};
+  const ImageFigures& cost = *record.referenceCost;
+  std::string text = "Pictures drawn on " + record.drawnOn + ", the reference's at " +
+                     cli::shortNumber(cost.fps) + " pictures per second";
+  if (cost.deviceBytes)
+    text += ", as a NanoVDB float grid in " + cli::shortNumber(double(*cost.deviceBytes) / 1e6) +
+            " MB of the device";
+  return text + ".";
+}
+
+std::string interruption(const TableRecord& record) {
+  return record.interrupted ? "Interrupted: rows are missing." : "";
+}
+
+}  // namespace esvr::compare

@@ -1,0 +1,157 @@
+#include "compare/table_page.h"
+
+#include <algorithm>
+#include <span>
+
+#include "cli/table.h"
+#include "compare/error_plot.h"
+#include "compare/finding.h"
+#include "compare/page_order.h"
+#include "compare/report_versions.h"
+#include "compare/table_columns.h"
+#include "compare/table_lines.h"
+#include "report/html_chart.h"
+#include "report/html_page.h"
+#include "report/html_pictures.h"
+#include "report/html_table.h"
+#include "report/units.h"
+
+namespace esvr::compare {
+namespace {
+
+using report::Cell;
+using report::DataTable;
+using report::Emphasis;
+using report::FigureTable;
+using report::Html;
+using report::Kind;
+
+constexpr const char* kRivalRule =
+    "The best rival is the row with the highest PSNR over the box among all rows that are not "
+    "larger than the file of ESVR (by more than 2 %).";
+
+/// Columns whose figures are folded below their row.
+const std::vector<std::string> kFolded{
+    "group",        "setting",      "p999_error",   "mass_error",   "encode_min_s",
+    "encode_max_s", "decode_min_s", "decode_max_s", "memory_bytes", "image_ssim",
+    "device_bytes", "note",         "command"};
+
+constexpr const char* kTableCaption =
+    "Ratios are to the half-float Blosc VDB; errors are in value units; the best figures of a "
+    "group "
+    "are bold. A click on a header sorts.";
+
+/// Figures that look the same are equally good.
+bool isBetter(const TableColumn& column, const Cell& cell, const Cell& than) {
+  const auto *a = std::get_if<double>(&cell), *b = std::get_if<double>(&than);
+  if (!a || !b || cellText(column.column, cell) == cellText(column.column, than)) return false;
+  return column.better == Better::kLess ? *a < *b : column.better == Better::kMore && *a > *b;
+}
+
+bool isSize(const TableColumn& column) {
+  return column.column.key == "bytes" || column.column.key == "ratio";
+}
+
+/// The cells of a column that are better than another one, and worse than none.
+std::vector<std::size_t> bestRows(std::span<const report::Row> rows, std::size_t c) {
+  const TableColumn& column = tableColumns()[c];
+  const auto isAny = [&](const auto& test) { return std::any_of(rows.begin(), rows.end(), test); };
+  std::vector<std::size_t> best;
+  for (std::size_t r = 0; r < rows.size(); ++r)
+    if (isAny([&](const auto& row) { return isBetter(column, rows[r][c], row[c]); }) &&
+        !isAny([&](const auto& row) { return isBetter(column, row[c], rows[r][c]); }))
+      best.push_back(r);
+  return best;
+}
+
+/// Adds a group of rows. Where all rows were searched for one size, no size is the best.
+void addGroup(const RowGroup& group, const TableRecord& record, FigureTable& figures) {
+  auto& rows = figures.table.rows;
+  const std::size_t begin = rows.size();
+  for (const TableRow* row : group.rows) rows.push_back(cellsOf(*row, record));
+  figures.groups.push_back({group.heading, group.rows.size()});
+  for (std::size_t c = 0; c < tableColumns().size(); ++c)
+    if (!group.ofOneSize || !isSize(tableColumns()[c]))
+      for (const std::size_t r : bestRows(std::span(rows).subspan(begin), c))
+        figures.best.push_back({begin + r, c});
+}
+
+Html allRows(const TableRecord& record, const PageOrder& order) {
+  FigureTable figures{.table = dataTable(record, {}), .folded = kFolded, .reason = "note"};
+  for (const auto& group : order.groups()) {
+    addGroup(group, record, figures);
+    for (const TableRow* row : group.rows) figures.emphasis.push_back(order.emphasisOf(*row));
+  }
+  figures.table.title = kTableCaption;
+  return report::section("figures", "All rows", report::toHtml(figures));
+}
+
+/// The figures of a duel, one in a line.
+Html duelTable(const Duel& duel, const TableRecord& record) {
+  FigureTable figures{.sortable = false};
+  DataTable& table = figures.table;
+  table.columns = {
+      {"figure", "figure", Kind::kText}, {"ours", duel.ours->name}, {"rival", duel.rival->name}};
+  table.title = "The better figures are bold.";
+  for (const auto& column : tableColumns()) {
+    const Cell ours = column.of(*duel.ours, record), rival = column.of(*duel.rival, record);
+    if (column.better == Better::kNeither || report::exactText(ours).empty()) continue;
+    if (!isSize(column) && isBetter(column, ours, rival))
+      figures.best.push_back({table.rows.size(), 1});
+    if (!isSize(column) && isBetter(column, rival, ours))
+      figures.best.push_back({table.rows.size(), 2});
+    table.rows.push_back(
+        {column.column.meaning, cellText(column.column, ours), cellText(column.column, rival)});
+  }
+  return report::toHtml(figures);
+}
+
+Html overview(const TableRecord& record, const PageOrder& order) {
+  Html content;
+  const auto& duels = order.duels();
+  if (duels.size() == 1 && duels.front().rival)
+    content += report::section("duel", "ESVR and its best rival", duelTable(duels.front(), record));
+  content +=
+      report::section("charts", "Error over size", report::toHtml(familiesOverBytes(record)));
+  return report::element("div", {{"class", "overview"}}, content);
+}
+
+report::Shot shotOf(const TableRow& row, Emphasis emphasis) {
+  const ImageFigures& figures = *row.images;
+  std::string text = report::bytesText(double(row.bytes.value_or(0))) + ", PSNR of the pictures " +
+                     cli::decibels(figures.psnr) + " dB, FLIP " + report::plainText(figures.flip);
+  return {row.name, std::move(text), row.shown.picturePng, row.shown.errorPng, emphasis};
+}
+
+/// ESVR and its rivals first; the pictures of the other rows are folded.
+Html pictures(const TableRecord& record, const PageOrder& order) {
+  report::PictureSheet sheet{
+      .caption = "The first view of each row, and its errors against the picture of the reference.",
+      .reference = {.name = "reference", .png = record.referencePng}};
+  for (const auto& group : order.groups())
+    for (const TableRow* row : group.rows) {
+      if (!row->images) continue;
+      const Emphasis emphasis = order.emphasisOf(*row);
+      (emphasis == Emphasis::kNone ? sheet.others : sheet.shots).push_back(shotOf(*row, emphasis));
+    }
+  return report::toHtml(sheet);
+}
+
+}  // namespace
+
+std::string tablePage(const TableOptions& options, const TableRecord& record) {
+  const PageOrder order(record);
+  report::HtmlPage page;
+  page.title = options.reference.filename().string();
+  page.finding = findingOf(record);
+  page.paragraphs = {sceneLine(record) + ".", order.duels().empty() ? "" : kRivalRule,
+                     pictureLine(record), interruption(record)};
+  page.sections = {overview(record, order), allRows(record, order)};
+  if (!record.referencePng.empty())
+    page.sections.push_back(report::section("pictures", "Pictures", pictures(record, order)));
+  page.commands = versionLines();
+  page.commands.insert(page.commands.begin(), joined(options.commandLine));
+  return report::toHtml(page);
+}
+
+}  // namespace esvr::compare
