@@ -213,9 +213,10 @@ Html foldedPoints(const report::DataTable& data) {
 std::string page(const CurvesReport& report, const report::DataTable& data,
                  const std::vector<NamedPlot>& plots) {
   report::HtmlPage page;
-  page.title = "Grid " + report.record.grid;
+  page.title = report.reference.filename().string();
   page.finding = findingOf(report.record);
-  page.paragraphs = {sceneLine(report.record) + ".", interruption(report.record)};
+  page.paragraphs = {sceneLine(report.record) + ".", page.finding.empty() ? "" : rivalRule(),
+                     interruption(report.record)};
   report::FigureTable files = pointsOf(kFile, data);
   files.table.title =
       "Files: seconds from the voxels to the file; errors in value units. A click on a header "

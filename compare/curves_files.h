@@ -13,6 +13,7 @@ namespace esvr::compare {
 [[nodiscard]] std::vector<std::filesystem::path> curveFiles(const std::string& prefix, bool fps);
 
 struct CurvesReport {
+  const std::filesystem::path& reference;
   const TableRecord& record;
   const std::vector<std::string>& commandLine;
 };

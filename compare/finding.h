@@ -8,9 +8,6 @@
 
 namespace esvr::compare {
 
-/// The group of the rows of ESVR.
-inline constexpr const char* kOurGroup = "ESVR";
-
 /// A row of ESVR and its best rival.
 struct Duel {
   const TableRow* ours;

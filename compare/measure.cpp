@@ -9,7 +9,6 @@
 #include "cli/names.h"
 #include "cli/stopwatch.h"
 #include "cli/table.h"
-#include "compare/finding.h"
 #include "compare/program.h"
 #include "esvr/compact.h"
 #include "esvr/error.h"
@@ -222,7 +221,7 @@ TableRow RowMaker::psnrMatched(const BaselineSetting& like, double psnr) {
 }
 
 TableRow RowMaker::external(const External& external) {
-  TableRow row{.name = external.name, .group = "external"};
+  TableRow row{.name = external.name, .group = kExternalGroup};
   row.command = "--external " + shellWord(external.text);
   row.bytes = external.bytes;
   if (external.encodeSeconds) row.encode = once(*external.encodeSeconds);

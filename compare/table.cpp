@@ -7,7 +7,6 @@
 #include "cli/interrupts.h"
 #include "cli/json_file.h"
 #include "cli/thread_limit.h"
-#include "compare/finding.h"
 #include "compare/program.h"
 #include "compare/row_plan.h"
 #include "compare/scene_files.h"
@@ -16,9 +15,6 @@
 
 namespace esvr::compare {
 namespace {
-
-constexpr const char* kLossless = "lossless";
-constexpr const char* kNearlyLossless = "nearly lossless";
 
 /// Makes one row after the other. Finished rows are kept if the run is interrupted.
 class TableRun {
@@ -58,13 +54,13 @@ class TableRun {
       for (const auto& setting : losslessSettings()) addLossless(setting);
     if (options_.quantised)
       for (const auto& [setting, name] : quantisedSettings(scene_.peak))
-        add(maker_.baseline("quantised", setting, name));
+        add(maker_.baseline(kQuantisedGroup, setting, name));
   }
 
   /// Half floats have an error unless the values are half floats themselves.
   void addLossless(const BaselineSetting& setting) {
-    TableRow row = maker_.baseline(kLossless, setting, displayName(setting));
-    if (row.metrics && row.metrics->maxError > 0.0) row.group = kNearlyLossless;
+    TableRow row = maker_.baseline(kLosslessGroup, setting, displayName(setting));
+    if (row.metrics && row.metrics->maxError > 0.0) row.group = kNearlyLosslessGroup;
     add(std::move(row));
   }
 

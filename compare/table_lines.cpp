@@ -1,6 +1,7 @@
 #include "compare/table_lines.h"
 
 #include "cli/table.h"
+#include "compare/finding.h"
 
 namespace esvr::compare {
 
@@ -19,6 +20,13 @@ std::string pictureLine(const TableRecord& record) {
     text += ", as a NanoVDB float grid in " + cli::shortNumber(double(*cost.deviceBytes) / 1e6) +
             " MB of the device";
   return text + ".";
+}
+
+std::string rivalRule() {
+  constexpr double kPercent = 100.0;
+  return "The best rival is the row with the highest PSNR over the box among all rows that are not "
+         "more than " +
+         cli::shortNumber(kPercent * kSameSize) + " % larger than the file of ESVR.";
 }
 
 std::string interruption(const TableRecord& record) {

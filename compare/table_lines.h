@@ -11,6 +11,8 @@ namespace esvr::compare {
 [[nodiscard]] std::string sceneLine(const TableRecord& record);
 /// The device that drew the pictures and the cost of the reference's; empty without pictures.
 [[nodiscard]] std::string pictureLine(const TableRecord& record);
+/// Which rows are rivals (finding.h).
+[[nodiscard]] std::string rivalRule();
 /// Whether rows are missing; empty if not.
 [[nodiscard]] std::string interruption(const TableRecord& record);
 

@@ -26,10 +26,6 @@ using report::FigureTable;
 using report::Html;
 using report::Kind;
 
-constexpr const char* kRivalRule =
-    "The best rival is the row with the highest PSNR over the box among all rows that are not "
-    "larger than the file of ESVR (by more than 2 %).";
-
 /// Columns whose figures are folded below their row.
 const std::vector<std::string> kFolded{
     "group",        "setting",      "p999_error",   "mass_error",   "encode_min_s",
@@ -111,8 +107,7 @@ Html overview(const TableRecord& record, const PageOrder& order) {
   const auto& duels = order.duels();
   if (duels.size() == 1 && duels.front().rival)
     content += report::section("duel", "ESVR and its best rival", duelTable(duels.front(), record));
-  content +=
-      report::section("charts", "Error over size", report::toHtml(familiesOverBytes(record)));
+  content += report::section("", "Error over size", report::toHtml(familiesOverBytes(record)));
   return report::element("div", {{"class", "overview"}}, content);
 }
 
@@ -123,6 +118,12 @@ report::Shot shotOf(const TableRow& row, Emphasis emphasis) {
   return {row.name, std::move(text), row.shown.picturePng, row.shown.errorPng, emphasis};
 }
 
+/// Whether a row is neither near ESVR in size nor in PSNR, so that its pictures say little.
+bool isPlain(const TableRow& row) {
+  return row.group == kLosslessGroup || row.group == kNearlyLosslessGroup ||
+         row.group == kQuantisedGroup;
+}
+
 /// ESVR and its rivals first; the pictures of the other rows are folded.
 Html pictures(const TableRecord& record, const PageOrder& order) {
   report::PictureSheet sheet{
@@ -130,8 +131,8 @@ Html pictures(const TableRecord& record, const PageOrder& order) {
       .reference = {.name = "reference", .png = record.referencePng}};
   for (const auto& group : order.groups())
     for (const TableRow* row : group.rows) {
-      if (!row->images) continue;
       const Emphasis emphasis = order.emphasisOf(*row);
+      if (!row->images || (emphasis == Emphasis::kNone && isPlain(*row))) continue;
       (emphasis == Emphasis::kNone ? sheet.others : sheet.shots).push_back(shotOf(*row, emphasis));
     }
   return report::toHtml(sheet);
@@ -144,7 +145,7 @@ std::string tablePage(const TableOptions& options, const TableRecord& record) {
   report::HtmlPage page;
   page.title = options.reference.filename().string();
   page.finding = findingOf(record);
-  page.paragraphs = {sceneLine(record) + ".", order.duels().empty() ? "" : kRivalRule,
+  page.paragraphs = {sceneLine(record) + ".", order.duels().empty() ? "" : rivalRule(),
                      pictureLine(record), interruption(record)};
   page.sections = {overview(record, order), allRows(record, order)};
   if (!record.referencePng.empty())

@@ -27,10 +27,14 @@ struct SearchStep {
   std::optional<double> psnr;
 };
 
+/// Names of groups.
+inline constexpr const char *kOurGroup = "ESVR", *kExternalGroup = "external",
+                            *kLosslessGroup = "lossless", *kNearlyLosslessGroup = "nearly lossless",
+                            *kQuantisedGroup = "quantised";
+
 struct TableRow {
   std::string name;  ///< name, for example "NanoVDB FpN Zip"
-  /// "ESVR", "external", "lossless", "nearly lossless", "quantised", "given", "at 48214 bytes",
-  /// "at 44.70 dB"
+  /// One of the names above, or "given", "at 48214 bytes", "at 44.70 dB".
   std::string group;
   /// Value for --row, or "bound=B" of an external command; empty if the row is neither.
   std::string setting{};

@@ -21,10 +21,21 @@ Html headOf(const HtmlPage& page) {
   return element("head", {}, head);
 }
 
+/// Keeps a number and the word behind it, such as its unit, in one line.
+std::string withWholeFigures(const std::string& text) {
+  constexpr const char* kNoBreakSpace = "\u00a0";
+  std::string result;
+  for (const char c : text) {
+    const bool behindDigit = !result.empty() && result.back() >= '0' && result.back() <= '9';
+    result += c == ' ' && behindDigit ? kNoBreakSpace : std::string(1, c);
+  }
+  return result;
+}
+
 Html headerOf(const HtmlPage& page) {
   Html header;
   if (!page.finding.empty()) header += element("p", {{"class", "title"}}, page.title);
-  header += element("h1", page.finding.empty() ? page.title : page.finding);
+  header += element("h1", page.finding.empty() ? page.title : withWholeFigures(page.finding));
   for (const auto& paragraph : page.paragraphs)
     if (!paragraph.empty()) header += element("p", paragraph);
   return element("header", {}, header);
@@ -33,7 +44,7 @@ Html headerOf(const HtmlPage& page) {
 Html footerOf(const HtmlPage& page) {
   std::string lines;
   for (const auto& command : page.commands) lines += command + '\n';
-  return section("commands", "Commands and versions", element("pre", {{"tabindex", "0"}}, lines));
+  return section("commands", "Commands and versions", element("pre", lines));
 }
 
 }  // namespace

@@ -316,7 +316,7 @@ TEST_F(CompareTable, hasItsFindingAsTheHeadline) {
   };
   EXPECT_THAT(headline({}), HasSubstr("; no other row is that small."));
   EXPECT_THAT(headline({"--external", "A<b>=" + at("good.raw") + ":10:9x9x9:float32"}),
-              HasSubstr(" dB less than the best rival, A&lt;b&gt;."));
+              HasSubstr("\u00a0dB less than the best rival, A&lt;b&gt;."));
 }
 
 TEST_F(CompareTable, SlowFitsHundredColumns) {

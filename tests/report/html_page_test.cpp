@@ -27,7 +27,7 @@ TEST(HtmlPage, hasTheFindingAsItsHeadline) {
   const std::string html = toHtml(page());
   EXPECT_THAT(html, StartsWith("<!DOCTYPE html>\n<html lang=\"en\">"));
   EXPECT_THAT(html, HasSubstr("<title>&lt;a.vdb&gt;</title>"));
-  EXPECT_THAT(html, HasSubstr("<h1>ESVR has 52.3 dB &amp; more.</h1>"));
+  EXPECT_THAT(html, HasSubstr("<h1>ESVR has 52.3\u00a0dB &amp; more.</h1>"));
   EXPECT_THAT(html, HasSubstr("<h2>Part</h2>\n<p>content</p>"));
   EXPECT_THAT(html, HasSubstr("a&lt;b"));
   EXPECT_THAT(html, Not(HasSubstr("<p></p>"))) << "empty paragraphs are left out";
