@@ -12,19 +12,21 @@ namespace {
 using report::Emphasis;
 using testing::ElementsAre;
 
-TableRow row(const std::string& name, const std::string& group, std::uint64_t bytes, double psnr) {
+TableRow measured(const std::string& name, const std::string& group, std::uint64_t bytes,
+                  double psnr) {
   TableRow made{.name = name, .group = group, .bytes = bytes};
   made.metrics = VolumeMetrics{};
   made.metrics->psnrBox = psnr;
   return made;
 }
 
-TableRecord record() {
+TableRecord orderedRows() {
   TableRecord made;
-  made.rows = {row("large", kOurGroup, 9000, 50.0),    row("small", kOurGroup, 1000, 40.0),
-               row("Blosc", "lossless", 99000, 140.0), row("a", "at 1000 bytes", 990, 30.0),
-               row("b", "at 9000 bytes", 8990, 45.0),  row("c", "at 40.00 dB", 2000, 40.1),
-               row("d", "at 500 bytes", 490, 20.0)};
+  made.rows = {
+      measured("large", kOurGroup, 9000, 50.0),    measured("small", kOurGroup, 1000, 40.0),
+      measured("Blosc", "lossless", 99000, 140.0), measured("a", "at 1000 bytes", 990, 30.0),
+      measured("b", "at 9000 bytes", 8990, 45.0),  measured("c", "at 40.00 dB", 2000, 40.1),
+      measured("d", "at 500 bytes", 490, 20.0)};
   made.rows[3].matchedBytes = 1000;
   made.rows[4].matchedBytes = 9000;
   made.rows[5].matchedPsnr = 40.0;
@@ -42,7 +44,7 @@ std::vector<std::string> linesOf(const PageOrder& order) {
 }
 
 TEST(PageOrder, putsRowsBesideTheFileOfTheirSize) {
-  const TableRecord rows = record();
+  const TableRecord rows = orderedRows();
   EXPECT_THAT(linesOf(PageOrder(rows)),
               ElementsAre("at most 1000 bytes (1 KB) =", "  small", "  a", "at 40.00 dB", "  c",
                           "at most 9000 bytes (9 KB) =", "  large", "  b", "lossless", "  Blosc",
@@ -50,7 +52,7 @@ TEST(PageOrder, putsRowsBesideTheFileOfTheirSize) {
 }
 
 TEST(PageOrder, marksEsvrAndItsRivals) {
-  const TableRecord rows = record();
+  const TableRecord rows = orderedRows();
   const PageOrder order(rows);
   EXPECT_EQ(order.emphasisOf(rows.rows[0]), Emphasis::kOurs);
   EXPECT_EQ(order.emphasisOf(rows.rows[3]), Emphasis::kRival);

@@ -18,7 +18,7 @@ using testing::HasSubstr;
 
 std::string square() { return toPng(Image{64, 48, std::vector<float>(64 * 48 * 4, 0.5f)}); }
 
-FigureTable table() {
+FigureTable rowsOfPage() {
   return {
       .table = {"Rows",
                 {{"name", "row", Kind::kText},
@@ -41,7 +41,7 @@ HtmlPage page() {
   return {.title = "A page & more",
           .finding = {},
           .paragraphs = {"One."},
-          .sections = {section("figures", "Table", toHtml(table())),
+          .sections = {section("figures", "Table", toHtml(rowsOfPage())),
                        section("charts", "Curves", toHtml(plot)),
                        section("pictures", "Pictures", toHtml(sheet))},
           .commands = {"esvr-compare table a.vdb", "esvr 0.1.0"}};

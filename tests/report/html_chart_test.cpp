@@ -17,7 +17,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-Plot plot() {
+Plot curves() {
   return {.title = "Error over size",
           .xLabel = "size of the file",
           .yLabel = "error, %",
@@ -54,7 +54,7 @@ std::size_t labelsWith(const std::string& svg, const std::string& unit) {
 TEST(HtmlChart, hasAtLeastThreeTicksOnEachAxisAtEachWidth) {
   for (const char* name : {"wide", "narrow"})
     for (const double factor : {1.001, 1.5, 4.0, 30.0, 1e4, 1e9}) {
-      Plot ranged = plot();
+      Plot ranged = curves();
       ranged.series = {{.name = "a", .points = {{2e4, 0.03}, {2e4 * factor, 0.03 * factor}}}};
       const std::string svg = drawing(ranged, name);
       EXPECT_GE(labelsWith(svg, "B"), 3u) << name << ", " << factor;
@@ -63,7 +63,7 @@ TEST(HtmlChart, hasAtLeastThreeTicksOnEachAxisAtEachWidth) {
 }
 
 TEST(HtmlChart, saysTheValuesOfItsPoints) {
-  const std::string svg = drawing(plot(), "wide");
+  const std::string svg = drawing(curves(), "wide");
   EXPECT_THAT(svg, HasSubstr("<title>ESVR\n10 KB, 0.5 %\n46.02 dB</title>"));
   EXPECT_THAT(svg, HasSubstr("<title>&lt;ZFP&gt;\n20 KB, 4 %</title>"));
   EXPECT_EQ(count(svg, "<circle"), 4u);
@@ -71,13 +71,13 @@ TEST(HtmlChart, saysTheValuesOfItsPoints) {
 }
 
 TEST(HtmlChart, drawsOursLastAndNamesIt) {
-  const std::string svg = drawing(plot(), "narrow");
+  const std::string svg = drawing(curves(), "narrow");
   EXPECT_LT(svg.find("data-curve=\"1\""), svg.find("data-curve=\"0\""));
   EXPECT_THAT(svg, HasSubstr(">ESVR</text>"));
 }
 
 TEST(HtmlChart, passesOverWhatCannotBeShown) {
-  Plot with = plot();
+  Plot with = curves();
   with.series[1].points.push_back({3e5, 0.0});
   with.series[1].points.push_back({3e5, std::numeric_limits<double>::quiet_NaN()});
   EXPECT_EQ(count(drawing(with, "wide"), "<circle"), 4u);
@@ -85,7 +85,7 @@ TEST(HtmlChart, passesOverWhatCannotBeShown) {
 }
 
 TEST(HtmlChart, hasASecondScale) {
-  Plot with = plot();
+  Plot with = curves();
   with.rightLabel = "PSNR, dB";
   with.rightTicks = {{1.0, "40"}, {0.1, "60"}, {1e-9, "200"}};
   const std::string svg = drawing(with, "wide");
@@ -95,7 +95,7 @@ TEST(HtmlChart, hasASecondScale) {
 }
 
 TEST(HtmlChart, keepsItsDrawingWithinItsFrame) {
-  const std::string svg = drawing(plot(), "narrow");
+  const std::string svg = drawing(curves(), "narrow");
   const std::regex number("(?:x|cx|x1|x2)=\"([-0-9.]+)\"");
   for (auto it = std::sregex_iterator(svg.begin(), svg.end(), number); it != std::sregex_iterator();
        ++it) {

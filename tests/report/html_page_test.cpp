@@ -15,7 +15,7 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
 
-HtmlPage page() {
+HtmlPage framedPage() {
   return {.title = "<a.vdb>",
           .finding = "ESVR has 52.3 dB & more.",
           .paragraphs = {"One.", ""},
@@ -24,7 +24,7 @@ HtmlPage page() {
 }
 
 TEST(HtmlPage, hasTheFindingAsItsHeadline) {
-  const std::string html = toHtml(page());
+  const std::string html = toHtml(framedPage());
   EXPECT_THAT(html, StartsWith("<!DOCTYPE html>\n<html lang=\"en\">"));
   EXPECT_THAT(html, HasSubstr("<title>&lt;a.vdb&gt;</title>"));
   EXPECT_THAT(html, HasSubstr("<h1>ESVR has 52.3\u00a0dB &amp; more.</h1>"));
@@ -34,18 +34,18 @@ TEST(HtmlPage, hasTheFindingAsItsHeadline) {
 }
 
 TEST(HtmlPage, hasItsTitleAsHeadlineWithoutAFinding) {
-  HtmlPage plain = page();
+  HtmlPage plain = framedPage();
   plain.finding.clear();
   EXPECT_THAT(toHtml(plain), HasSubstr("<h1>&lt;a.vdb&gt;</h1>"));
 }
 
 TEST(HtmlPage, hasColorsForLightAndDark) {
-  EXPECT_THAT(toHtml(page()), HasSubstr(std::string(pageStyle())));
+  EXPECT_THAT(toHtml(framedPage()), HasSubstr(std::string(pageStyle())));
   EXPECT_THAT(std::string(pageStyle()), HasSubstr("prefers-color-scheme: dark"));
 }
 
 TEST(HtmlPage, namesNothingOutsideItself) {
-  const std::string html = toHtml(page());
+  const std::string html = toHtml(framedPage());
   for (const char* reference : {"http:", "https:", "@import", "<link", "src=", "url(", "fetch("})
     EXPECT_THAT(html, Not(HasSubstr(reference)));
 }
