@@ -1,6 +1,7 @@
 #include "compare/table_page.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "cli/table.h"
@@ -33,9 +34,9 @@ const std::vector<std::string> kFolded{
     "device_bytes", "note",         "command"};
 
 constexpr const char* kTableCaption =
-    "Ratios are to the half-float Blosc VDB; errors are in value units; the best figures of a "
+    "Ratios are to the half-float Blosc VDB. Errors are in value units. The best figures of a "
     "group "
-    "are bold. A click on a header sorts.";
+    "are bold.";
 
 /// Figures that look the same are equally good.
 bool isBetter(const TableColumn& column, const Cell& cell, const Cell& than) {
@@ -82,8 +83,9 @@ Html allRows(const TableRecord& record, const PageOrder& order) {
   return report::section("figures", "All rows", report::toHtml(figures));
 }
 
-/// The figures of a duel, one in a line.
+/// The figures of a duel, one in a line. Sizes say something only where both have no error.
 Html duelTable(const Duel& duel, const TableRecord& record) {
+  const bool ofOneSize = std::isfinite(duel.ours->metrics->psnrBox);
   FigureTable figures{.sortable = false};
   DataTable& table = figures.table;
   table.columns = {
@@ -92,10 +94,9 @@ Html duelTable(const Duel& duel, const TableRecord& record) {
   for (const auto& column : tableColumns()) {
     const Cell ours = column.of(*duel.ours, record), rival = column.of(*duel.rival, record);
     if (column.better == Better::kNeither || report::exactText(ours).empty()) continue;
-    if (!isSize(column) && isBetter(column, ours, rival))
-      figures.best.push_back({table.rows.size(), 1});
-    if (!isSize(column) && isBetter(column, rival, ours))
-      figures.best.push_back({table.rows.size(), 2});
+    const bool counts = !(ofOneSize && isSize(column));
+    if (counts && isBetter(column, ours, rival)) figures.best.push_back({table.rows.size(), 1});
+    if (counts && isBetter(column, rival, ours)) figures.best.push_back({table.rows.size(), 2});
     table.rows.push_back(
         {column.column.meaning, cellText(column.column, ours), cellText(column.column, rival)});
   }

@@ -22,13 +22,11 @@ class SortableTable {
     this.sorted = document.createElement('tbody');
     this.table = table;
     this.headers.forEach((header, column) => {
-      header.tabIndex = 0;
+      const button = document.createElement('button');
+      button.type = 'button';
+      button.append(...header.childNodes);
+      header.append(button);
       header.addEventListener('click', () => this.turn(column));
-      header.addEventListener('keydown', event => {
-        if (event.key !== 'Enter' && event.key !== ' ') return;
-        event.preventDefault();
-        this.turn(column);
-      });
     });
   }
 
