@@ -11,6 +11,7 @@
 #include "cli/json_file.h"
 #include "compare/error_plot.h"
 #include "compare/finding.h"
+#include "compare/page_order.h"
 #include "compare/report_versions.h"
 #include "compare/table_lines.h"
 #include "report/data_table.h"
@@ -51,18 +52,19 @@ std::map<std::string, std::vector<const TableRow*>> rowsBySeries(const TableReco
 
 /// All points: those of kind "fit" are points of a fit's curve, those of kind "file" are files.
 report::DataTable points(const TableRecord& record) {
-  report::DataTable table{{},
-                          {{"kind", "kind", Kind::kText},
-                           {"series", "series", Kind::kText},
-                           {"name", "name", Kind::kText},
-                           {"bytes", "bytes", Kind::kBytes},
-                           {"seconds", "seconds", Kind::kSeconds},
-                           {"psnr_box", "PSNR box", Kind::kDecibels},
-                           {"psnr_active", "active", Kind::kDecibels},
-                           {"max_error", "max error"},
-                           {"fps", "FPS"},
-                           {"setting", "setting", Kind::kText}},
-                          {}};
+  report::DataTable table{
+      {},
+      {{"kind", "kind", Kind::kText},
+       {"series", "series", Kind::kText},
+       {"name", "name", Kind::kText},
+       {"bytes", "bytes", Kind::kBytes, "size of the file, bytes"},
+       {"seconds", "seconds", Kind::kSeconds},
+       {"psnr_box", "PSNR box", Kind::kDecibels, "PSNR over the box, dB"},
+       {"psnr_active", "active", Kind::kDecibels, "PSNR over the active voxels, dB"},
+       {"max_error", "max error", Kind::kNumber, "largest error of a voxel, value units"},
+       {"fps", "FPS", Kind::kNumber, "pictures per second"},
+       {"setting", "setting", Kind::kText}},
+      {}};
   for (const auto& [series, rows] : rowsBySeries(record))
     for (const TableRow* row : rows) {
       for (const auto& at : row->curve)
@@ -126,7 +128,7 @@ Plot overSeconds(const TableRecord& record) {
       ends.points.push_back(errorPoint(row.encode->median, row.metrics->psnrBox,
                                        report::bytesText(double(*row.bytes))));
   }
-  if (!ends.points.empty()) plot.series.push_back(std::move(ends));
+  if (!ends.points.empty()) plot.series.insert(plot.series.begin(), std::move(ends));
   addDecibels(plot);
   return plot;
 }
@@ -183,21 +185,28 @@ report::FigureTable pointsOf(const std::string& kind, report::DataTable points) 
   report::FigureTable figures{.folded = {"setting"}};
   for (const auto& row : points.rows) {
     const std::string& series = std::get<std::string>(row[1]);
-    const bool ours = series == kOurGroup;
     if (figures.groups.empty() || figures.groups.back().heading != series)
       figures.groups.push_back({series, 0});
     ++figures.groups.back().rows;
-    figures.emphasis.push_back(ours && kind == kFile ? report::Emphasis::kOurs
-                                                     : report::Emphasis::kNone);
   }
   figures.table = withColumns(points, {"name", "bytes", "seconds", "psnr_box", "psnr_active",
                                        "max_error", "fps", "setting"});
   return figures;
 }
 
+/// How the files stand out, in the order of the points.
+std::vector<report::Emphasis> emphasisOfFiles(const TableRecord& record) {
+  const PageOrder order(record);
+  std::vector<report::Emphasis> emphasis;
+  for (const auto& [series, rows] : rowsBySeries(record))
+    for (const TableRow* row : rows) emphasis.push_back(order.emphasisOf(*row));
+  return emphasis;
+}
+
 Html chartsOf(const std::vector<NamedPlot>& plots) {
   Html charts;
-  for (const auto& [ending, plot] : plots) charts += report::toHtml(plot);
+  for (const auto& [ending, plot] : plots)
+    if (!plot.series.empty()) charts += report::toHtml(plot);
   return report::element("div", {{"class", "charts"}}, charts);
 }
 
@@ -218,9 +227,8 @@ std::string page(const CurvesReport& report, const report::DataTable& data,
   page.paragraphs = {sceneLine(report.record) + ".", page.finding.empty() ? "" : rivalRule(),
                      interruption(report.record)};
   report::FigureTable files = pointsOf(kFile, data);
-  files.table.title =
-      "Files: seconds from the voxels to the file; errors in value units. A click on a header "
-      "sorts.";
+  files.table.title = "Files: seconds from the voxels to the file; errors in value units.";
+  files.emphasis = emphasisOfFiles(report.record);
   Html tables = report::toHtml(files);
   tables += foldedPoints(data);
   page.sections = {report::section("", "Curves", chartsOf(plots)),

@@ -75,6 +75,13 @@ TEST_F(CompareCurves, hasEveryPointOnThePage) {
       EXPECT_TRUE(page.find("data-value=\"" + lines[line][c] + "\"") < page.size()) << line;
 }
 
+TEST_F(CompareCurves, showsOnlyThePlotsThatHaveCurves) {
+  ASSERT_EQ(curves({at("ref.vdb"), at("fit.esvr"), "--no-baselines", "-o", at("c")}).exitCode, 0);
+  const std::string page = test::readText(at("c.html"));
+  EXPECT_THAT(page, testing::AllOf(HasSubstr("Error over bytes"), HasSubstr("class=\"row ours\""),
+                                   testing::Not(HasSubstr("Error over run time"))));
+}
+
 TEST_F(CompareCurves, refusesWhatTakesMoreMemoryThanAllowed) {
   const auto run = curves(
       {at("ref.vdb"), at("fit.esvr"), "--no-baselines", "--max-memory", "1KB", "-o", at("c")});
