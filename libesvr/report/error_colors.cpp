@@ -77,15 +77,17 @@ Html errorScale() {
                         {"y", printed("%.0f", kText)},
                         {"text-anchor", "middle"}},
                        printed("%g", tick));
-  Html figure = element("svg",
-                        {{"viewBox", "0 0 480 40"},
-                         {"role", "img"},
-                         {"aria-label", "colors of errors from 0 (black) to 0.125 (light yellow)"}},
-                        content);
+  const std::string most = printed("%g", kMostError);
+  Html figure =
+      element("svg",
+              {{"viewBox", "0 0 480 40"},
+               {"role", "img"},
+               {"aria-label", "colors of errors from 0 (black) to " + most + " (light yellow)"}},
+              content);
   figure += element("figcaption",
                     "Error maps: the largest difference of a pixel's channels, which are between 0 "
                     "and 1. Errors above " +
-                        printed("%g", kMostError) + " have the last color.");
+                        most + " have the last color.");
   return element("figure", {{"class", "scale"}}, figure);
 }
 

@@ -210,6 +210,8 @@ class Zoom {
     });
     for (const end of ['pointerup', 'pointercancel']) pane.addEventListener(end, () => { last = null; });
     pane.tabIndex = 0;
+    pane.setAttribute('role', 'group');
+    pane.setAttribute('aria-label', pane.querySelector('img').alt + ', plus and minus zoom, arrow keys move');
     pane.addEventListener('keydown', event => {
       const step = 10;
       const way = {ArrowLeft: [step, 0], ArrowRight: [-step, 0], ArrowUp: [0, step], ArrowDown: [0, -step]}[event.key];
