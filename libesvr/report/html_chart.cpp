@@ -18,7 +18,7 @@ struct Form {
   double width, height;
   int ticksX, ticksY;
 };
-constexpr std::array kForms{Form{"wide", 780.0, 420.0, 8, 8}, Form{"narrow", 400.0, 340.0, 7, 7}};
+constexpr std::array kForms{Form{"wide", 640.0, 380.0, 8, 8}, Form{"narrow", 400.0, 340.0, 7, 7}};
 
 /// A length or a position with a tenth of a unit.
 std::string lengthText(double value) {
