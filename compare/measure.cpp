@@ -109,6 +109,16 @@ NanoValues valuesOf(const BaselineSetting& setting) {
 
 Timing once(double seconds) { return {seconds, seconds, seconds, 1}; }
 
+/// The curve of a fit, whose PSNR has the source's peak, with the peak of all rows.
+std::vector<TimedCurvePoint> withPeak(std::vector<TimedCurvePoint> curve, const TableScene& scene) {
+  const double more = 20.0 * std::log10(scene.peak / peakOf(scene.reference.volume));
+  for (auto& point : curve) {
+    point.psnrBox += more;
+    point.psnrActive += more;
+  }
+  return curve;
+}
+
 /// The value of --fit.
 std::string wordOf(const FitWish& wish) {
   if (wish.paper) return "paper";
@@ -352,7 +362,7 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   if (wish.bytes && *wish.bytes <= head)
     throw UsageError("--fit " + word + " is too small for a grid");
   Conversion conversion = convert(wish, head);
-  row.curve = std::move(conversion.fit.curve);
+  row.curve = withPeak(std::move(conversion.fit.curve), scene_);
   file.grids.push_back(std::move(conversion.grid));
   row.bytes = writeEsvr(path, file, {.overwrite = true});
   row.encode = once(watch.lap());

@@ -75,6 +75,21 @@ TEST_F(CompareCurves, hasEveryPointOnThePage) {
       EXPECT_TRUE(page.find("data-value=\"" + lines[line][c] + "\"") < page.size()) << line;
 }
 
+/// The values of the ball reach up to 1; a peak of 100 adds 40 dB to every figure.
+TEST_F(CompareCurves, hasOnePeakForFitsAndFiles) {
+  const auto run = curves({at("ref.vdb"), "--fit", "3KB", "--peak", "100", "--device", "cpu",
+                           "--no-baselines", "-o", at("c")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const json all = points();
+  ASSERT_GT(all.size(), 2u);
+  const json &last = all[all.size() - 2], &file = all.back();
+  ASSERT_EQ(last["kind"], "fit");
+  ASSERT_EQ(file["kind"], "file");
+  // Quantisation may cost some dB, but not half of those of the peak.
+  for (const char* key : {"psnr_box", "psnr_active"})
+    EXPECT_NEAR(last[key].get<double>(), file[key].get<double>(), 20.0) << key;
+}
+
 TEST_F(CompareCurves, showsOnlyThePlotsThatHaveCurves) {
   ASSERT_EQ(curves({at("ref.vdb"), at("fit.esvr"), "--no-baselines", "-o", at("c")}).exitCode, 0);
   const std::string page = test::readText(at("c.html"));

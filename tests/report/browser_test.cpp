@@ -100,6 +100,15 @@ TEST_F(Browser, SlowSortsByTheColumnThatIsClicked) {
   EXPECT_THAT(dom, HasSubstr("<title>A page &amp; more</title>")) << "no text became a script";
 }
 
+TEST_F(Browser, SlowKeepsHeadersInSight) {
+  const std::string dom = after(
+      "for (const cell of document.querySelectorAll('tr.row td')) cell.style.height = '900px';"
+      "scrollTo(0, 1500);"
+      "see(Math.round(document.querySelector('thead th').getBoundingClientRect().top));"
+      "see(document.querySelector('h1').getBoundingClientRect().top < -1000);");
+  EXPECT_THAT(dom, HasSubstr("[0][true]"));
+}
+
 TEST_F(Browser, SlowUnfoldsTheFiguresOfARow) {
   const std::string dom = after(
       "const more = document.querySelector('tr.more'), button = document.querySelector('.unfold');"
