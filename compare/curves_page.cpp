@@ -2,6 +2,7 @@
 
 #include "compare/curves_plots.h"
 #include "compare/curves_points.h"
+#include "compare/duel_tables.h"
 #include "compare/finding.h"
 #include "compare/page_order.h"
 #include "compare/report_versions.h"
@@ -71,6 +72,7 @@ std::string curvesPage(const CurvesReport& report) {
   Html tables = report::toHtml(files);
   tables += foldedPoints(data);
   page.sections = {report::section("", "Curves", chartsOf(curvePlots(report.record))),
+                   duelSection(duelsOf(report.record), report.record),
                    report::section("figures", "Points", tables)};
   page.commands = versionLines();
   page.commands.insert(page.commands.begin(), joined(report.commandLine));

@@ -46,9 +46,6 @@ std::string decibels(double value) { return oneDecimal(value) + " dB"; }
 
 std::string bestRivalName(const Duel& duel) { return "the best rival, " + duel.rival->name; }
 
-/// How many dB ESVR has more than its rival; infinite if only one of them has an error.
-double leadOf(const Duel& duel) { return psnrOf(*duel.ours) - psnrOf(*duel.rival); }
-
 std::string leadText(const Duel& duel) {
   if (!duel.rival) return "; no other row is that small.";
   if (isExact(*duel.rival)) return "; " + bestRivalName(duel) + ", has no error.";
@@ -102,6 +99,8 @@ std::string sentenceOfUncontested(std::size_t files) {
 }
 
 }  // namespace
+
+double leadOf(const Duel& duel) { return psnrOf(*duel.ours) - psnrOf(*duel.rival); }
 
 std::vector<Duel> duelsOf(const TableRecord& record) {
   std::vector<Duel> duels;

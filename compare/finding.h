@@ -23,6 +23,10 @@ inline constexpr double kSameSize = 0.02;
 /// the row of ESVR has no error, it is the smallest row of any size without an error.
 [[nodiscard]] std::vector<Duel> duelsOf(const TableRecord& record);
 
+/// How many dB ESVR has more than its rival; infinite if only one of them has an error, NaN if none
+/// has. \param duel  a duel with a rival
+[[nodiscard]] double leadOf(const Duel& duel);
+
 /// The finding in one sentence. Further ones say how many files of ESVR have no rival, and what its
 /// file without an error takes.
 /// Empty if there is no row of ESVR.

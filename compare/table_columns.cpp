@@ -124,6 +124,16 @@ const std::vector<TableColumn>& tableColumns() {
   return columns;
 }
 
+bool isBetter(const TableColumn& column, const Cell& cell, const Cell& than) {
+  const auto *a = std::get_if<double>(&cell), *b = std::get_if<double>(&than);
+  if (!a || !b || cellText(column.column, cell) == cellText(column.column, than)) return false;
+  return column.better == Better::kLess ? *a < *b : column.better == Better::kMore && *a > *b;
+}
+
+bool isSize(const TableColumn& column) {
+  return column.column.key == "bytes" || column.column.key == "ratio";
+}
+
 report::Row cellsOf(const TableRow& row, const TableRecord& record) {
   report::Row cells;
   for (const auto& column : tableColumns()) cells.push_back(column.of(row, record));

@@ -20,6 +20,13 @@ struct TableColumn {
 
 [[nodiscard]] const std::vector<TableColumn>& tableColumns();
 
+/// Whether a figure of a column is better than another one. Figures that look the same are equally
+/// good.
+[[nodiscard]] bool isBetter(const TableColumn& column, const report::Cell& cell,
+                            const report::Cell& than);
+/// Whether the figures of a column say only how large a file is.
+[[nodiscard]] bool isSize(const TableColumn& column);
+
 /// The cells of all columns.
 [[nodiscard]] report::Row cellsOf(const TableRow& row, const TableRecord& record);
 /// The rows with all columns.

@@ -1,10 +1,10 @@
 #include "compare/table_page.h"
 
 #include <algorithm>
-#include <cmath>
 #include <span>
 
 #include "cli/table.h"
+#include "compare/duel_tables.h"
 #include "compare/error_plot.h"
 #include "compare/finding.h"
 #include "compare/page_order.h"
@@ -20,12 +20,9 @@
 namespace esvr::compare {
 namespace {
 
-using report::Cell;
-using report::DataTable;
 using report::Emphasis;
 using report::FigureTable;
 using report::Html;
-using report::Kind;
 
 /// Columns whose figures are folded below their row.
 const std::vector<std::string> kFolded{
@@ -35,19 +32,7 @@ const std::vector<std::string> kFolded{
 
 constexpr const char* kTableCaption =
     "Ratios are to the half-float Blosc VDB. Errors are in value units. The best figures of a "
-    "group "
-    "are bold.";
-
-/// Figures that look the same are equally good.
-bool isBetter(const TableColumn& column, const Cell& cell, const Cell& than) {
-  const auto *a = std::get_if<double>(&cell), *b = std::get_if<double>(&than);
-  if (!a || !b || cellText(column.column, cell) == cellText(column.column, than)) return false;
-  return column.better == Better::kLess ? *a < *b : column.better == Better::kMore && *a > *b;
-}
-
-bool isSize(const TableColumn& column) {
-  return column.column.key == "bytes" || column.column.key == "ratio";
-}
+    "group are bold.";
 
 /// The cells of a column that are better than another one, and worse than none.
 std::vector<std::size_t> bestRows(std::span<const report::Row> rows, std::size_t c) {
@@ -83,31 +68,8 @@ Html allRows(const TableRecord& record, const PageOrder& order) {
   return report::section("figures", "All rows", report::toHtml(figures));
 }
 
-/// The figures of a duel, one in a line. Sizes say something only where both have no error.
-Html duelTable(const Duel& duel, const TableRecord& record) {
-  const bool ofOneSize = std::isfinite(duel.ours->metrics->psnrBox);
-  FigureTable figures{.sortable = false};
-  DataTable& table = figures.table;
-  table.columns = {
-      {"figure", "figure", Kind::kText}, {"ours", duel.ours->name}, {"rival", duel.rival->name}};
-  table.title = "The better figures are bold.";
-  for (const auto& column : tableColumns()) {
-    const Cell ours = column.of(*duel.ours, record), rival = column.of(*duel.rival, record);
-    if (column.better == Better::kNeither || report::exactText(ours).empty()) continue;
-    const bool counts = !(ofOneSize && isSize(column));
-    if (counts && isBetter(column, ours, rival)) figures.best.push_back({table.rows.size(), 1});
-    if (counts && isBetter(column, rival, ours)) figures.best.push_back({table.rows.size(), 2});
-    table.rows.push_back(
-        {column.column.meaning, cellText(column.column, ours), cellText(column.column, rival)});
-  }
-  return report::toHtml(figures);
-}
-
 Html overview(const TableRecord& record, const PageOrder& order) {
-  Html content;
-  const auto& duels = order.duels();
-  if (duels.size() == 1 && duels.front().rival)
-    content += report::section("duel", "ESVR and its best rival", duelTable(duels.front(), record));
+  Html content = duelSection(order.duels(), record);
   content += report::section("", "Error over size", report::toHtml(familiesOverBytes(record)));
   return report::element("div", {{"class", "overview"}}, content);
 }

@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -315,8 +316,29 @@ TEST_F(CompareTable, hasItsFindingAsTheHeadline) {
     return page.substr(begin, page.find("</h1>") - begin);
   };
   EXPECT_THAT(headline({}), HasSubstr("; no other row is that small."));
+  EXPECT_THAT(test::readText(at("p.html")), Not(HasSubstr("best rival</h2>")));
   EXPECT_THAT(headline({"--external", "A<b>=" + at("good.raw") + ":10:9x9x9:float32"}),
               HasSubstr("\u00a0dB less than the best rival, A&lt;b&gt;."));
+  EXPECT_THAT(test::readText(at("p.html")), HasSubstr("ESVR and its best rival</h2>"));
+}
+
+TEST_F(CompareTable, comparesEachFileWithItsBestRival) {
+  writeRaw("good.raw", 0.001f);
+  ASSERT_EQ(test::quickFit(at("ref.vdb"), at("other.esvr")).exitCode, 0);
+  const auto run = table({at("ref.vdb"), at("fit.esvr"), at("other.esvr"), "--rows", "none",
+                          "--runs", "1", "--external", "A=" + at("good.raw") + ":10:9x9x9:float32",
+                          "--html", at("p.html"), "--csv", at("p.csv")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const std::string page = test::readText(at("p.html"));
+  EXPECT_THAT(page, AllOf(HasSubstr("<h1>ESVR has a higher PSNR than the best rival for none of 2"),
+                          HasSubstr("ESVR and its best rivals</h2>")));
+  // An error of 0.001 of a peak of 1 is 60 dB.
+  const double ours = std::stod(test::csvFields(test::readText(at("p.csv")))[1][5]);
+  EXPECT_LT(ours, 59.0);
+  std::ostringstream lead;
+  lead << std::fixed << std::setprecision(2) << ours - 60.0;
+  EXPECT_THAT(page, HasSubstr(">60.00</td>"));
+  EXPECT_THAT(page, HasSubstr(">" + lead.str() + "</td>"));
 }
 
 TEST_F(CompareTable, SlowFitsHundredColumns) {
