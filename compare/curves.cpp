@@ -84,7 +84,8 @@ void curves(const CurvesOptions& options) {
   TableRecord record = files.record();
   const TableScene scene = files.scene();
   CurvesRun(scene, record, log).run();
-  writeCurves(options.prefix, {record, options.table.commandLine}, options.overwrite);
+  writeCurves(options.prefix, {options.table.reference, record, options.table.commandLine},
+              options.overwrite);
   for (const auto& file : curveFiles(options.prefix, options.table.images.views > 0))
     log.info("wrote " + file.string());
   requireAllRows(record);

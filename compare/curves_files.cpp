@@ -1,104 +1,23 @@
 #include "compare/curves_files.h"
 
-#include <algorithm>
 #include <cmath>
-#include <functional>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <span>
 
 #include "cli/bytes_file.h"
 #include "cli/json_file.h"
-#include "compare/program.h"
-#include "compare/report_versions.h"
+#include "compare/curves_plots.h"
+#include "compare/curves_points.h"
 #include "report/data_table.h"
-#include "report/html_page.h"
 #include "report/plot.h"
 
 namespace esvr::compare {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using report::Cell;
-using report::Kind;
-using report::Plot;
-using report::Series;
 
 constexpr const char* kCurvesSchema = "esvr-curves";
 constexpr int kCurvesVersion = 1;
-constexpr const char* kOurs = "ESVR";
-constexpr const char* kFile = "file";
-
-/// The curve of a row: rows of the same name form a curve, and all rows of ESVR form one.
-std::string seriesOf(const TableRow& row) { return row.group == kOurs ? kOurs : row.name; }
-
-/// The rows with bytes and figures, sorted by series and by bytes.
-std::map<std::string, std::vector<const TableRow*>> rowsBySeries(const TableRecord& record) {
-  std::map<std::string, std::vector<const TableRow*>> series;
-  for (const auto& row : record.rows)
-    if (row.bytes && row.metrics) series[seriesOf(row)].push_back(&row);
-  for (auto& [name, rows] : series)
-    std::sort(rows.begin(), rows.end(),
-              [](const TableRow* a, const TableRow* b) { return *a->bytes < *b->bytes; });
-  return series;
-}
-
-/// All points: those of kind "fit" are points of a fit's curve, those of kind "file" are files.
-report::DataTable points(const TableRecord& record) {
-  report::DataTable table{{},
-                          {{"kind", "kind", Kind::kText},
-                           {"series", "series", Kind::kText},
-                           {"name", "name", Kind::kText},
-                           {"bytes", "bytes", Kind::kBytes},
-                           {"seconds", "seconds", Kind::kSeconds},
-                           {"psnr_box", "PSNR box", Kind::kDecibels},
-                           {"psnr_active", "active", Kind::kDecibels},
-                           {"max_error", "max error"},
-                           {"fps", "FPS"},
-                           {"setting", "setting", Kind::kText}},
-                          {}};
-  for (const auto& [series, rows] : rowsBySeries(record))
-    for (const TableRow* row : rows) {
-      for (const auto& at : row->curve)
-        table.rows.push_back({std::string("fit"), series, row->name, double(*row->bytes),
-                              at.seconds, at.psnrBox, at.psnrActive, at.maxError, Cell(), Cell()});
-      const auto seconds = row->encode ? std::optional(row->encode->median) : std::nullopt;
-      table.rows.push_back({std::string(kFile), series, row->name, double(*row->bytes),
-                            report::cellOf(seconds), row->metrics->psnrBox,
-                            row->metrics->psnrActive, row->metrics->maxError,
-                            report::cellOf(row->fps), row->setting});
-    }
-  return table;
-}
-
-Plot overBytes(const TableRecord& record, const std::string& title, const std::string& yLabel,
-               const std::function<double(const TableRow&)>& valueOf) {
-  Plot plot{.title = title, .xLabel = "bytes", .yLabel = yLabel, .logarithmicX = true};
-  for (const auto& [name, rows] : rowsBySeries(record)) {
-    Series series{name, {}};
-    for (const TableRow* row : rows) series.points.push_back({double(*row->bytes), valueOf(*row)});
-    plot.series.push_back(std::move(series));
-  }
-  return plot;
-}
-
-/// The curves of the fits, and a curve through the end-to-end times from voxels to file.
-Plot overSeconds(const TableRecord& record) {
-  Plot plot{.title = "Error over run time",
-            .xLabel = "seconds",
-            .yLabel = "PSNR over the box, dB",
-            .logarithmicX = true};
-  Series ends{"end to end", {}};
-  for (const auto& row : record.rows) {
-    if (row.group != kOurs || row.curve.empty() || !row.metrics) continue;
-    Series series{row.name, {}};
-    for (const auto& at : row.curve) series.points.push_back({at.seconds, at.psnrBox});
-    plot.series.push_back(std::move(series));
-    if (row.fittedHere) ends.points.push_back({row.encode->median, row.metrics->psnrBox});
-  }
-  if (!ends.points.empty()) plot.series.push_back(std::move(ends));
-  return plot;
-}
 
 Json toJson(const report::DataTable& table) {
   Json points = Json::array();
@@ -129,49 +48,6 @@ class Writer {
   bool overwrite_;
 };
 
-bool hasFps(const TableRecord& record) {
-  return std::any_of(record.rows.begin(), record.rows.end(),
-                     [](const TableRow& row) { return row.fps.has_value(); });
-}
-
-/// A plot and the suffix of its file's name.
-struct NamedPlot {
-  std::string ending;
-  Plot plot;
-};
-
-std::vector<NamedPlot> plotsOf(const TableRecord& record) {
-  std::vector<NamedPlot> plots;
-  plots.push_back({"-seconds", overSeconds(record)});
-  plots.push_back({"-bytes", overBytes(record, "Error over bytes", "PSNR over the box, dB",
-                                       [](const TableRow& row) { return row.metrics->psnrBox; })});
-  if (!hasFps(record)) return plots;
-  Plot fps = overBytes(record, "Pictures a second over bytes", "pictures a second",
-                       [](const TableRow& row) { return row.fps.value_or(NAN); });
-  fps.logarithmicY = true;
-  plots.push_back({"-fps", std::move(fps)});
-  return plots;
-}
-
-/// The points of kind "file"; the points of fits are in the plots.
-report::DataTable filesOf(report::DataTable points) {
-  std::erase_if(points.rows,
-                [](const report::Row& row) { return row.front() != Cell(std::string(kFile)); });
-  return points;
-}
-
-std::string page(const CurvesReport& report, const report::DataTable& data,
-                 const std::vector<NamedPlot>& plots) {
-  report::HtmlPage page;
-  page.title = std::string(kProgram) + ": " + report.record.grid;
-  for (const auto& [ending, plot] : plots)
-    page.pictures.push_back({plot.title, "image/svg+xml", report::toSvg(plot)});
-  page.tables = {filesOf(data)};
-  page.commands = versionLines();
-  page.commands.insert(page.commands.begin(), joined(report.commandLine));
-  return report::toHtml(page);
-}
-
 }  // namespace
 
 std::vector<std::filesystem::path> curveFiles(const std::string& prefix, bool fps) {
@@ -185,7 +61,7 @@ std::vector<std::filesystem::path> curveFiles(const std::string& prefix, bool fp
 void writeCurves(const std::string& prefix, const CurvesReport& report, bool overwrite) {
   const Writer writer(prefix, overwrite);
   const TableRecord& record = report.record;
-  const report::DataTable data = points(record);
+  const report::DataTable data = curvePoints(record);
   writer.text(".csv", report::toCsv(data));
   writer.json({{"schema", kCurvesSchema},
                {"schema_version", kCurvesVersion},
@@ -194,12 +70,11 @@ void writeCurves(const std::string& prefix, const CurvesReport& report, bool ove
                {"peak", record.peak},
                {"interrupted", record.interrupted},
                {"points", toJson(data)}});
-  const auto plots = plotsOf(record);
-  for (const auto& [ending, plot] : plots) {
+  for (const auto& [ending, plot] : curvePlots(record)) {
     writer.text(ending + ".svg", report::toSvg(plot));
     writer.text(ending + ".png", report::toPng(plot));
   }
-  writer.text(".html", page(report, data, plots));
+  writer.text(".html", curvesPage(report));
 }
 
 }  // namespace esvr::compare

@@ -5,17 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "compare/table_record.h"
+#include "compare/curves_page.h"
 
 namespace esvr::compare {
 
 /// The output files, whose names begin with a prefix.
 [[nodiscard]] std::vector<std::filesystem::path> curveFiles(const std::string& prefix, bool fps);
-
-struct CurvesReport {
-  const TableRecord& record;
-  const std::vector<std::string>& commandLine;
-};
 
 /// Writes all files. \throws RuntimeFailure  a file is not writable
 void writeCurves(const std::string& prefix, const CurvesReport& report, bool overwrite);

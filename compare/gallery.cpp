@@ -7,12 +7,11 @@
 #include "compare/row_renderer.h"
 #include "esvr/image_metrics.h"
 #include "esvr/metrics.h"
+#include "report/error_colors.h"
 #include "report/png_image.h"
 
 namespace esvr::compare {
 namespace {
-
-constexpr double kErrorGain = 8.0;  // gain of error maps; an error of 1/8 is white
 
 ValueRange rangeOf(const SparseVolume& volume) {
   const ValueRange range = activeRange(volume);
@@ -96,6 +95,12 @@ struct Sums {
   }
 };
 
+std::string errorPng(const Image& reference, const Image& image) {
+  Image map = errorMap(reference, image, 1.0 / report::kMostError);
+  report::colorErrors(map);
+  return report::toPng(map);
+}
+
 }  // namespace
 
 Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference, const Device& device,
@@ -118,9 +123,7 @@ Gallery::Compared Gallery::compare(Renderer& renderer, Between between) const {
     view.between = between;
     const Image image = clock.draw(view);
     sums.add(references_[i], image, lpips_);
-    if (i == 0)
-      result.shown = {report::toPng(image),
-                      report::toPng(errorMap(references_[i], image, kErrorGain))};
+    if (i == 0) result.shown = {report::toPng(image), errorPng(references_[i], image)};
   }
   result.figures = sums.over(double(views_.size()), clock.cost());
   if (lpips_) result.figures.lpips = sums.lpips / double(views_.size());

@@ -36,7 +36,7 @@ struct ImageFigures {
   std::optional<double> lpips{};               ///< LPIPS if a command was given
 };
 
-/// The first picture of a row and its map of errors.
+/// The first picture of a row and its map of errors in the colors of report::errorScale().
 struct Shown {
   std::string picturePng, errorPng;
 };

@@ -109,11 +109,24 @@ NanoValues valuesOf(const BaselineSetting& setting) {
 
 Timing once(double seconds) { return {seconds, seconds, seconds, 1}; }
 
+/// The curve of a fit, whose PSNR has the source's peak, with the peak of all rows.
+std::vector<TimedCurvePoint> withPeak(std::vector<TimedCurvePoint> curve, const TableScene& scene) {
+  const double more = 20.0 * std::log10(scene.peak / peakOf(scene.reference.volume));
+  for (auto& point : curve) {
+    point.psnrBox += more;
+    point.psnrActive += more;
+  }
+  return curve;
+}
+
 /// The value of --fit.
 std::string wordOf(const FitWish& wish) {
   if (wish.paper) return "paper";
   return wish.bytes ? std::to_string(*wish.bytes) : "default";
 }
+
+std::string sizeGroup(std::uint64_t bytes) { return "at " + std::to_string(bytes) + " bytes"; }
+std::string psnrGroup(double psnr) { return "at " + cli::decibels(psnr) + " dB"; }
 
 std::uint64_t bytesOf(const GridFile& file, const std::filesystem::path& path, std::size_t grid) {
   return file.grids().size() == 1 ? file.bytes() : cli::storedBytes(inspectEsvr(path), grid);
@@ -206,17 +219,19 @@ TableRow RowMaker::matched(const BaselineSetting& like, const std::string& group
 }
 
 TableRow RowMaker::sizeMatched(const BaselineSetting& like, std::uint64_t bytes) {
-  return matched(like, "at " + std::to_string(bytes) + " bytes",
-                 [&] { return matchSize(encoder_, like, bytes); });
+  TableRow row = matched(like, sizeGroup(bytes), [&] { return matchSize(encoder_, like, bytes); });
+  row.matchedBytes = bytes;
+  return row;
 }
 
 TableRow RowMaker::psnrMatched(const BaselineSetting& like, double psnr) {
-  return matched(like, "at " + cli::decibels(psnr) + " dB",
-                 [&] { return matchPsnr(encoder_, like, psnr); });
+  TableRow row = matched(like, psnrGroup(psnr), [&] { return matchPsnr(encoder_, like, psnr); });
+  row.matchedPsnr = psnr;
+  return row;
 }
 
 TableRow RowMaker::external(const External& external) {
-  TableRow row{.name = external.name, .group = "external"};
+  TableRow row{.name = external.name, .group = kExternalGroup};
   row.command = "--external " + shellWord(external.text);
   row.bytes = external.bytes;
   if (external.encodeSeconds) row.encode = once(*external.encodeSeconds);
@@ -259,21 +274,24 @@ TableRow RowMaker::matched(const ExternalCommand& command, const TableRow& like,
   throw;
 } catch (const Error& error) {
   if (scene_.cancel.cancelled()) throw Cancelled();  // Ctrl-C also ends the command
-  return {.name = like.name, .group = like.group, .command = like.command, .note = error.what()};
+  TableRow row = like;
+  row.note = error.what();
+  return row;
 }
 
 TableRow RowMaker::sizeMatched(const ExternalCommand& external, std::uint64_t bytes) {
   const std::string size = std::to_string(bytes);
   return matched(external,
                  {.name = external.name,
-                  .group = "at " + size + " bytes",
+                  .group = sizeGroup(bytes),
                   .command = command("--rows none --size " + size + " --external-command " +
-                                     shellWord(external.text))},
+                                     shellWord(external.text)),
+                  .matchedBytes = bytes},
                  [=](ExternalCodec& codec) { return matchSize(codec, bytes); });
 }
 
 TableRow RowMaker::psnrMatched(const ExternalCommand& external, double psnr) {
-  return matched(external, {.name = external.name, .group = "at " + cli::decibels(psnr) + " dB"},
+  return matched(external, {.name = external.name, .group = psnrGroup(psnr), .matchedPsnr = psnr},
                  [=](ExternalCodec& codec) { return matchPsnr(codec, psnr); });
 }
 
@@ -305,7 +323,7 @@ void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Tabl
 }
 
 TableRow RowMaker::candidate(const std::filesystem::path& path) {
-  TableRow row{.name = path.filename().string(), .group = "ESVR"};
+  TableRow row{.name = path.filename().string(), .group = kOurGroup};
   const GridFile file(path, scene_.options.memory);
   if (!file.esvr())
     throw BadInput(path.string() +
@@ -332,7 +350,7 @@ Conversion RowMaker::convert(const FitWish& wish, std::uint64_t head) const {
 
 TableRow RowMaker::fitted(const FitWish& wish) {
   const std::string word = wordOf(wish);
-  TableRow row{.name = "ESVR fitted, " + word, .group = "ESVR", .fittedHere = true};
+  TableRow row{.name = "ESVR fitted, " + word, .group = kOurGroup, .fittedHere = true};
   row.command = command("--rows none --fit " + word);
   const auto path = scene_.folder / "fitted.esvr";
 
@@ -344,7 +362,7 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   if (wish.bytes && *wish.bytes <= head)
     throw UsageError("--fit " + word + " is too small for a grid");
   Conversion conversion = convert(wish, head);
-  row.curve = std::move(conversion.fit.curve);
+  row.curve = withPeak(std::move(conversion.fit.curve), scene_);
   file.grids.push_back(std::move(conversion.grid));
   row.bytes = writeEsvr(path, file, {.overwrite = true});
   row.encode = once(watch.lap());

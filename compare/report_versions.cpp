@@ -29,10 +29,9 @@ std::vector<std::string> versionLines() {
 }
 
 nlohmann::ordered_json versionJson() {
-  using Json = nlohmann::ordered_json;
-  Json versions = cli::versionJson();
-  const std::string zfp = zfpVersion();
-  versions["zfp"] = zfp.empty() ? Json() : Json(zfp);
+  nlohmann::ordered_json versions = cli::versionJson();
+  versions["zfp"] = nullptr;
+  if (!zfpVersion().empty()) versions["zfp"] = zfpVersion();
   return versions;
 }
 

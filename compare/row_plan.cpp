@@ -23,9 +23,9 @@ BaselineSetting halfBlosc() { return packed(PackedForm::kOpenVdbHalf, kBlosc); }
 std::vector<BaselineSetting> losslessSettings() {
   using F = PackedForm;
   return {packed(F::kOpenVdbFloat, kBlosc), packed(F::kOpenVdbFloat, kZip),
-          packed(F::kOpenVdbHalf, kBlosc),  packed(F::kOpenVdbHalf, kZip),
           packed(F::kNanoFloat, kNone),     packed(F::kNanoFloat, kZip),
-          packed(F::kNanoFloat, kBlosc)};
+          packed(F::kNanoFloat, kBlosc),    packed(F::kOpenVdbHalf, kBlosc),
+          packed(F::kOpenVdbHalf, kZip)};
 }
 
 std::vector<NamedSetting> quantisedSettings(double peak) {

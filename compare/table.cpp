@@ -51,17 +51,24 @@ class TableRun {
 
   void plainRows() {
     if (options_.lossless)
-      for (const auto& setting : losslessSettings()) addBaseline("lossless", setting);
+      for (const auto& setting : losslessSettings()) addLossless(setting);
     if (options_.quantised)
       for (const auto& [setting, name] : quantisedSettings(scene_.peak))
-        add(maker_.baseline("quantised", setting, name));
+        add(maker_.baseline(kQuantisedGroup, setting, name));
+  }
+
+  /// Half floats have an error unless the values are half floats themselves.
+  void addLossless(const BaselineSetting& setting) {
+    TableRow row = maker_.baseline(kLosslessGroup, setting, displayName(setting));
+    if (row.metrics && row.metrics->maxError > 0.0) row.group = kNearlyLosslessGroup;
+    add(std::move(row));
   }
 
   void matchedRows() {
     std::set<std::uint64_t> sizes(options_.sizes.begin(), options_.sizes.end());
     std::set<double> psnrs;
     for (const auto& row : record_.rows) {
-      if (row.group != "ESVR") continue;
+      if (row.group != kOurGroup) continue;
       sizes.insert(*row.bytes);
       if (std::isfinite(row.metrics->psnrBox)) psnrs.insert(row.metrics->psnrBox);
     }

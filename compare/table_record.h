@@ -27,13 +27,20 @@ struct SearchStep {
   std::optional<double> psnr;
 };
 
+/// Names of groups.
+inline constexpr const char *kOurGroup = "ESVR", *kExternalGroup = "external",
+                            *kLosslessGroup = "lossless", *kNearlyLosslessGroup = "nearly lossless",
+                            *kQuantisedGroup = "quantised";
+
 struct TableRow {
   std::string name;  ///< name, for example "NanoVDB FpN Zip"
-  std::string
-      group;  ///< "lossless", "quantised", "at 48214 bytes", "at 44.70 dB", "ESVR", "external"
+  /// One of the names above, or "given", "at 48214 bytes", "at 44.70 dB".
+  std::string group;
   /// Value for --row, or "bound=B" of an external command; empty if the row is neither.
   std::string setting{};
   std::string command{};
+  std::optional<std::uint64_t> matchedBytes{};  ///< size that the row was searched for
+  std::optional<double> matchedPsnr{};          ///< PSNR that the row was searched for, dB
   std::optional<std::uint64_t> bytes{};
   std::optional<VolumeMetrics> metrics{};
   std::optional<Timing> encode{}, decode{};

@@ -9,113 +9,21 @@
 #include "cli/json_file.h"
 #include "cli/printable.h"
 #include "cli/table.h"
-#include "compare/figures.h"
-#include "compare/program.h"
 #include "compare/report_versions.h"
+#include "compare/table_columns.h"
+#include "compare/table_lines.h"
+#include "compare/table_page.h"
 #include "report/data_table.h"
-#include "report/html_page.h"
 
 namespace esvr::compare {
 namespace {
 
 using Json = nlohmann::ordered_json;
 using report::Cell;
-using report::Column;
 using report::DataTable;
-using report::Kind;
 
 constexpr const char* kTableSchema = "esvr-table";
 constexpr int kTableVersion = 1;
-
-/// A column and the function that gets its figure from a row.
-struct TableColumn {
-  Column column;
-  Cell (*of)(const TableRow&, const TableRecord&);
-};
-
-template <auto Member>
-Cell metric(const TableRow& row, const TableRecord&) {
-  return row.metrics ? Cell(double((*row.metrics).*Member)) : Cell();
-}
-
-template <auto Timing_, auto Member>
-Cell seconds(const TableRow& row, const TableRecord&) {
-  const auto& timing = row.*Timing_;
-  return timing ? Cell(double((*timing).*Member)) : Cell();
-}
-
-Cell ratio(const TableRow& row, const TableRecord& record) {
-  if (!row.bytes || !record.halfBlosc) return {};
-  return double(*record.halfBlosc) / double(*row.bytes);
-}
-
-Cell ssim(const TableRow& row, const TableRecord&) {
-  return row.metrics ? report::cellOf(row.metrics->ssim) : Cell();
-}
-
-template <auto Member>
-Cell image(const TableRow& row, const TableRecord&) {
-  return row.images ? Cell(double((*row.images).*Member)) : Cell();
-}
-
-Cell mass(const TableRow& row, const TableRecord&) {
-  return row.metrics ? Cell(massError(*row.metrics)) : Cell();
-}
-
-Cell deviceMegabytes(const TableRow& row, const TableRecord&) {
-  const bool known = row.images && row.images->deviceBytes;
-  return known ? Cell(double(*row.images->deviceBytes) / 1e6) : Cell();
-}
-
-const std::vector<TableColumn>& tableColumns() {
-  using R = TableRow;
-  using T = TableRecord;
-  using M = VolumeMetrics;
-  static const std::vector<TableColumn> columns{
-      {{"name", "row", Kind::kText}, [](const R& r, const T&) -> Cell { return r.name; }},
-      {{"group", "group", Kind::kText}, [](const R& r, const T&) -> Cell { return r.group; }},
-      {{"setting", "setting", Kind::kText}, [](const R& r, const T&) -> Cell { return r.setting; }},
-      {{"bytes", "bytes", Kind::kBytes},
-       [](const R& r, const T&) { return r.bytes ? Cell(double(*r.bytes)) : Cell(); }},
-      {{"ratio", "ratio"}, ratio},
-      {{"psnr_box", "PSNR box", Kind::kDecibels}, metric<&M::psnrBox>},
-      {{"psnr_active", "active", Kind::kDecibels}, metric<&M::psnrActive>},
-      {{"max_error", "max err", Kind::kError}, metric<&M::maxError>},
-      {{"p999_error", "p99.9", Kind::kError}, metric<&M::p999Error>},
-      {{"ssim", "SSIM", Kind::kShare}, ssim},
-      {{"iou", "IoU", Kind::kShare}, metric<&M::iou>},
-      {{"mass_error", "mass err", Kind::kError}, mass},
-      {{"encode_s", "encode s", Kind::kSeconds}, seconds<&R::encode, &Timing::median>},
-      {{"encode_min_s", "min", Kind::kSeconds}, seconds<&R::encode, &Timing::min>},
-      {{"encode_max_s", "max", Kind::kSeconds}, seconds<&R::encode, &Timing::max>},
-      {{"decode_s", "decode s", Kind::kSeconds}, seconds<&R::decode, &Timing::median>},
-      {{"decode_min_s", "min", Kind::kSeconds}, seconds<&R::decode, &Timing::min>},
-      {{"decode_max_s", "max", Kind::kSeconds}, seconds<&R::decode, &Timing::max>},
-      {{"memory_bytes", "memory MB"},
-       [](const R& r, const T&) { return r.memory ? Cell(double(*r.memory) / 1e6) : Cell(); }},
-      {{"image_psnr", "image PSNR", Kind::kDecibels}, image<&ImageFigures::psnr>},
-      {{"image_ssim", "image SSIM", Kind::kShare}, image<&ImageFigures::ssim>},
-      {{"flip", "FLIP", Kind::kShare}, image<&ImageFigures::flip>},
-      {{"lpips", "LPIPS"},
-       [](const R& r, const T&) { return r.images ? report::cellOf(r.images->lpips) : Cell(); }},
-      {{"fps", "FPS"}, [](const R& r, const T&) { return report::cellOf(r.fps); }},
-      {{"device_bytes", "device MB"}, deviceMegabytes},
-      {{"note", "note", Kind::kText}, [](const R& r, const T&) -> Cell { return r.note; }},
-      {{"command", "command", Kind::kText}, [](const R& r, const T&) -> Cell { return r.command; }},
-  };
-  return columns;
-}
-
-DataTable dataTable(const TableRecord& record, std::span<const TableRow> rows) {
-  DataTable table;
-  for (const auto& column : tableColumns()) table.columns.push_back(column.column);
-  for (const auto& row : rows) {
-    report::Row cells;
-    for (const auto& column : tableColumns()) cells.push_back(column.of(row, record));
-    table.rows.push_back(std::move(cells));
-  }
-  return table;
-}
 
 const std::vector<std::string> kQuality{"name",        "bytes",     "ratio",      "psnr_box",
                                         "psnr_active", "max_error", "p999_error", "ssim",
@@ -151,24 +59,6 @@ void print(const DataTable& table, std::ostream& out) {
   text.print(out);
 }
 
-std::string sceneLine(const TableRecord& record) {
-  return "grid \"" + record.grid + "\", " + std::to_string(record.activeVoxels) +
-         " active voxels, box " + toString(record.box.min) + " to " + toString(record.box.max) +
-         ", peak " + cli::shortNumber(record.peak);
-}
-
-/// A line about the device that drew the pictures and the cost of the reference's.
-std::string pictureLine(const TableRecord& record) {
-  if (!record.referenceCost) return {};
-  const ImageFigures& cost = *record.referenceCost;
-  std::string text = "Pictures drawn on " + record.drawnOn + ", the reference's at " +
-                     cli::shortNumber(cost.fps) + " pictures per second";
-  if (cost.deviceBytes)
-    text += ", as a NanoVDB float grid in " + cli::shortNumber(double(*cost.deviceBytes) / 1e6) +
-            " MB of the device";
-  return text + ".";
-}
-
 void printNotes(std::span<const TableRow> rows, bool search, std::ostream& out) {
   for (const auto& row : rows) {
     if (!row.note.empty()) out << cli::printable(row.name + ": " + row.note) << '\n';
@@ -181,22 +71,6 @@ void printNotes(std::span<const TableRow> rows, bool search, std::ostream& out) 
       out << "    " << step.setting << ": " << step.bytes << " bytes"
           << (step.psnr ? ", " + cli::decibels(*step.psnr) + " dB" : "") << '\n';
   }
-}
-
-/// The columns for which at least one row has a figure.
-DataTable withoutEmptyColumns(const DataTable& table) {
-  std::vector<std::string> keys;
-  for (std::size_t c = 0; c < table.columns.size(); ++c)
-    for (const auto& row : table.rows)
-      if (!report::exactText(row[c]).empty()) {
-        keys.push_back(table.columns[c].key);
-        break;
-      }
-  return withColumns(table, keys);
-}
-
-std::string interruption(const TableRecord& record) {
-  return record.interrupted ? "Interrupted: rows are missing." : "";
 }
 
 std::string markdown(const TableOptions& options, const TableRecord& record) {
@@ -212,37 +86,6 @@ std::string markdown(const TableOptions& options, const TableRecord& record) {
   text += "Made by `" + joined(options.commandLine) + "` with\n\n";
   for (const auto& line : versionLines()) text += "    " + line + '\n';
   return text;
-}
-
-/// Adds a contact sheet of the rows of similar size, and a slider for each row of ESVR.
-void addPictures(const TableRecord& record, report::HtmlPage& page) {
-  if (record.referencePng.empty()) return;
-  const auto png = [](const std::string& caption, const std::string& bytes) {
-    return report::Picture{caption, "image/png", bytes};
-  };
-  const report::Picture reference = png("reference", record.referencePng);
-  page.pictures.push_back(reference);
-  for (const auto& row : record.rows) {
-    if (!row.images || row.group == "lossless" || row.group == "quantised") continue;
-    const std::string name = row.name + ", " + row.group;
-    page.pictures.push_back(png(name, row.shown.picturePng));
-    page.pictures.push_back(png(name + ": errors, 8 times", row.shown.errorPng));
-    if (row.group == "ESVR")
-      page.sliders.push_back({"reference on the left, " + row.name + " on the right", reference,
-                              png(name, row.shown.picturePng)});
-  }
-}
-
-std::string html(const TableOptions& options, const TableRecord& record) {
-  report::HtmlPage page;
-  page.title = "esvr-compare: " + options.reference.filename().string();
-  page.paragraphs = {sceneLine(record) + ". Ratio to the half-float Blosc VDB.",
-                     pictureLine(record), interruption(record)};
-  page.tables = {withoutEmptyColumns(dataTable(record, record.rows))};
-  addPictures(record, page);
-  page.commands = versionLines();
-  page.commands.insert(page.commands.begin(), joined(options.commandLine));
-  return report::toHtml(page);
 }
 
 Json toJson(const std::optional<Timing>& timing) {
@@ -339,7 +182,7 @@ void writeReports(const TableOptions& options, const TableRecord& record) {
     writeText(files.markdown, markdown(options, record), files.overwrite);
   if (!files.csv.empty())
     writeText(files.csv, report::toCsv(dataTable(record, record.rows)), files.overwrite);
-  if (!files.html.empty()) writeText(files.html, html(options, record), files.overwrite);
+  if (!files.html.empty()) writeText(files.html, tablePage(options, record), files.overwrite);
 }
 
 }  // namespace esvr::compare

@@ -9,7 +9,6 @@ namespace esvr::report {
 namespace {
 
 constexpr double kMargin = 0.04;  // margin at each end, relative to the range of the values
-constexpr double kMaxTicks = 8.0;
 
 constexpr double kRounding = 1e-6;  // relative error of ends, which may be rounded to float32
 constexpr double kPlainFrom = 1e-3, kPlainTo = 1e6;  // numbers that need no exponent
@@ -53,6 +52,8 @@ double roundUp(double value) {
     if (digit * power >= value * (1.0 - kRounding)) return digit * power;
   return 10.0 * power;
 }
+
+constexpr std::size_t kFewestTicks = 3;
 
 }  // namespace
 
@@ -98,16 +99,21 @@ bool Axis::holds(double value) const {
 
 double Axis::place(double value) const { return (scaled(value) - low_) / (high_ - low_); }
 
-/// Ticks at the powers of ten; if there are few of them, also at 2 and 5, or at every digit.
-std::vector<Tick> Axis::logarithmicTicks() const {
-  constexpr double kFewDecades = 3.0, kOneDecade = 1.0;
-  const double decades = high_ - low_;
-  const std::vector<double> digits = decades > kFewDecades ? std::vector<double>{1}
-                                     : decades > kOneDecade
-                                         ? std::vector<double>{1, 2, 5}
-                                         : std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9};
+namespace {
+
+/// Ticks at equal distances. A step of the form 1, 2 or 5 may leave few of them, and the next smaller
+/// one is then taken.
+std::vector<Tick> linearTicks(double low, double high, std::size_t most) {
+  constexpr double kAlwaysEnough = 7.5;  // intervals; a step is at most 2.5 times as large as asked
+  auto ticks = roundTicks(low, high, double(most - 1));
+  return ticks.size() < kFewestTicks ? roundTicks(low, high, kAlwaysEnough) : ticks;
+}
+
+}  // namespace
+
+std::vector<Tick> Axis::decadeTicks(std::span<const double> digits, int stride) const {
   std::vector<Tick> ticks;
-  for (double decade = std::floor(low_); decade <= high_; ++decade)
+  for (double decade = stride * std::floor(low_ / stride); decade <= high_; decade += stride)
     for (const double digit : digits) {
       const double value = digit * std::pow(10.0, decade);
       if (holds(value)) ticks.push_back({value, labelOf(value)});
@@ -115,8 +121,28 @@ std::vector<Tick> Axis::logarithmicTicks() const {
   return ticks;
 }
 
-std::vector<Tick> Axis::ticks() const {
-  return logarithmic_ ? logarithmicTicks() : roundTicks(low_, high_, kMaxTicks);
+/// The densest ticks that are not too many. Where the axis is much shorter than a decade, they have
+/// equal distances, as on a linear axis.
+std::vector<Tick> Axis::logarithmicTicks(std::size_t most) const {
+  constexpr std::array kAll{1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0};
+  constexpr std::array kThree{1.0, 2.0, 5.0};
+  constexpr std::array kTwo{1.0, 3.0};
+  constexpr std::array kOne{1.0};
+  for (const auto digits : {std::span<const double>(kAll), std::span<const double>(kThree),
+                            std::span<const double>(kTwo)}) {
+    auto ticks = decadeTicks(digits, 1);
+    if (ticks.size() < kFewestTicks)
+      return linearTicks(std::pow(10.0, low_), std::pow(10.0, high_), most);
+    if (ticks.size() <= most) return ticks;
+  }
+  int stride = 1;
+  while (decadeTicks(kOne, stride).size() > most) ++stride;
+  return decadeTicks(kOne, stride);
+}
+
+std::vector<Tick> Axis::ticks(int most) const {
+  return logarithmic_ ? logarithmicTicks(std::size_t(most))
+                      : linearTicks(low_, high_, std::size_t(most));
 }
 
 }  // namespace esvr::report

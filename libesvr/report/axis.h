@@ -27,13 +27,18 @@ class Axis {
   /// The position of a value: 0 at the lower end, 1 at the upper end.
   /// \param value  a value that the axis covers
   [[nodiscard]] double place(double value) const;
-  /// About five to ten ticks at round numbers.
-  [[nodiscard]] std::vector<Tick> ticks() const;
+  /// Ticks at round numbers: as many as there can be, at most `most`. There are at least three if
+  /// `most` is at least kFewestAllowed, unless the ends of the axis are hardly different.
+  [[nodiscard]] std::vector<Tick> ticks(int most = kUsualTicks) const;
+
+  static constexpr int kUsualTicks = 9, kFewestAllowed = 7;
 
  private:
   [[nodiscard]] double scaled(double value) const;
   void include(std::span<const double> values);
-  [[nodiscard]] std::vector<Tick> logarithmicTicks() const;
+  /// Ticks at these multiples of every power of ten whose exponent is a multiple of `stride`.
+  [[nodiscard]] std::vector<Tick> decadeTicks(std::span<const double> digits, int stride) const;
+  [[nodiscard]] std::vector<Tick> logarithmicTicks(std::size_t most) const;
 
   bool logarithmic_;
   double low_ = 0.0, high_ = 1.0;  ///< range of the results of scaled()

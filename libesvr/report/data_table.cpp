@@ -22,6 +22,8 @@ std::string numberText(Kind kind, double value) {
   switch (kind) {
     case Kind::kBytes:
       return formatted("%.0f", value);
+    case Kind::kMegabytes:
+      return formatted("%.3g", value / 1e6);
     case Kind::kDecibels:
       return cli::decibels(value);
     case Kind::kError:

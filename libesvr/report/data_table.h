@@ -11,18 +11,20 @@ namespace esvr::report {
 /// The format of a column's figures.
 enum class Kind {
   kText,
-  kBytes,     ///< all digits
-  kNumber,    ///< three significant digits
-  kError,     ///< two significant digits
-  kShare,     ///< four decimals
-  kDecibels,  ///< two decimals; "exact" where infinite
-  kSeconds,   ///< three significant digits
+  kBytes,      ///< all digits
+  kMegabytes,  ///< bytes in units of a million, three significant digits
+  kNumber,     ///< three significant digits
+  kError,      ///< two significant digits
+  kShare,      ///< four decimals
+  kDecibels,   ///< two decimals; "exact" where infinite
+  kSeconds,    ///< three significant digits
 };
 
 struct Column {
   std::string key;     ///< name in CSV and JSON: "psnr_box"
   std::string header;  ///< name in tables for people: "PSNR box"
   Kind kind = Kind::kNumber;
+  std::string meaning{};  ///< what the figure is, with its unit, where there is room for it
 };
 
 /// A figure or a text; nothing if there is no figure.

@@ -1,36 +1,26 @@
 #pragma once
-/// A self-contained HTML page, which needs no other file and no network.
+/// A self-contained HTML page, which needs no other file and no network. It can be read without
+/// its script, in light and dark colors, on narrow and wide screens.
 
 #include <string>
 #include <vector>
 
-#include "report/data_table.h"
+#include "report/html.h"
 
 namespace esvr::report {
 
-/// A picture as the bytes of a file, with a caption.
-struct Picture {
-  std::string caption;
-  std::string type;  ///< "image/png", "image/svg+xml"
-  std::string bytes;
-};
-
-/// Two pictures of the same size on top of each other; a slider moves the border between them.
-struct Slider {
-  std::string caption;
-  Picture reference, candidate;
-};
-
 struct HtmlPage {
-  std::string title;
-  std::vector<std::string> paragraphs;
-  std::vector<DataTable> tables;  ///< a click on a header sorts
-  std::vector<Picture> pictures;
-  std::vector<Slider> sliders;
+  std::string title;                    ///< what the page is about
+  std::string finding;                  ///< its headline; if it is empty, the title is
+  std::vector<std::string> paragraphs;  ///< empty ones are left out
+  std::vector<Html> sections;
   std::vector<std::string> commands;  ///< and versions: a line each
 };
 
-/// The page as HTML 5 in UTF-8. All texts are escaped.
+/// The page as HTML 5 in UTF-8.
 [[nodiscard]] std::string toHtml(const HtmlPage& page);
+
+/// A part of a page under a heading. `kind` is its class in page.css.
+[[nodiscard]] Html section(const char* kind, const std::string& heading, const Html& content);
 
 }  // namespace esvr::report

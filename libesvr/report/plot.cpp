@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 
-#include "report/axis.h"
 #include "report/cairo_surface.h"
 #include "report/utf8.h"
 
@@ -23,8 +22,10 @@ constexpr std::array kPalette{Rgb{0.00, 0.45, 0.70}, Rgb{0.84, 0.37, 0.00}, Rgb{
                               Rgb{0.45, 0.55, 0.10}};
 constexpr Rgb kInk{0.1, 0.1, 0.1}, kGrid{0.88, 0.88, 0.88};
 
-constexpr double kTextSize = 13.0, kTitleSize = 16.0, kLine = 1.8, kHair = 1.0, kMarker = 3.2;
-constexpr double kLeft = 74.0, kRight = 18.0, kTop = 42.0, kBottom = 52.0, kLegendLine = 18.0;
+constexpr double kTextSize = 13.0, kTitleSize = 16.0, kLine = 1.8, kThickLine = 3.6, kHair = 1.0,
+                 kMarker = 3.2;
+constexpr double kLeft = 74.0, kRight = 18.0, kRightScale = 58.0, kTop = 42.0, kBottom = 52.0,
+                 kLegendLine = 18.0;
 constexpr double kLegendMark = 24.0, kTickGap = 8.0;
 constexpr double kTurn = 6.283185307179586, kQuarter = kTurn / 4;
 
@@ -34,10 +35,7 @@ enum class Anchor { kStart, kMiddle, kEnd };
 class Painter {
  public:
   Painter(const Plot& plot, const Surface& surface)
-      : plot_(plot),
-        cr_(cairo_create(surface.get())),
-        x_(valuesOf(&Point::x), plot.logarithmicX),
-        y_(valuesOf(&Point::y), plot.logarithmicY) {}
+      : plot_(plot), cr_(cairo_create(surface.get())), axes_(plot) {}
 
   void paint() {
     measureLegend();
@@ -50,21 +48,25 @@ class Painter {
   }
 
  private:
-  [[nodiscard]] std::vector<double> valuesOf(double Point::*coordinate) const {
-    std::vector<double> values;
-    for (const auto& series : plot_.series)
-      for (const auto& point : series.points) values.push_back(point.*coordinate);
-    return values;
-  }
-
-  [[nodiscard]] double right() const { return plot_.width - kRight - legendWidth_; }
+  [[nodiscard]] double right() const { return frameEnd() - rightScale(); }
+  /// Where the plot and its scales end and the legend begins.
+  [[nodiscard]] double frameEnd() const { return plot_.width - kRight - legendWidth_; }
+  [[nodiscard]] double rightScale() const { return plot_.rightTicks.empty() ? 0.0 : kRightScale; }
   [[nodiscard]] double bottom() const { return plot_.height - kBottom; }
-  [[nodiscard]] double pixelX(double x) const { return kLeft + x_.place(x) * (right() - kLeft); }
-  [[nodiscard]] double pixelY(double y) const { return bottom() - y_.place(y) * (bottom() - kTop); }
+  [[nodiscard]] double pixelX(double x) const {
+    return kLeft + axes_.x.place(x) * (right() - kLeft);
+  }
+  [[nodiscard]] double pixelY(double y) const {
+    return bottom() - axes_.y.place(y) * (bottom() - kTop);
+  }
 
   void color(const Rgb& c) { cairo_set_source_rgb(cr_.get(), c.r, c.g, c.b); }
   [[nodiscard]] static const Rgb& colorOf(std::size_t series) {
     return kPalette[series % kPalette.size()];
+  }
+
+  [[nodiscard]] static double widthOf(const Series& series) {
+    return series.emphasis == Emphasis::kOurs ? kThickLine : kLine;
   }
 
   void line(double x0, double y0, double x1, double y1, double width) {
@@ -95,30 +97,50 @@ class Painter {
   }
 
   void drawAxes() {
-    for (const Tick& tick : x_.ticks()) {
+    for (const Tick& tick : axes_.x.ticks()) {
       color(kGrid);
       line(pixelX(tick.value), kTop, pixelX(tick.value), bottom(), kHair);
       color(kInk);
-      text(tick.label, pixelX(tick.value), bottom() + kTextSize + kTickGap / 2, Anchor::kMiddle);
+      text(labelOf(tick, plot_.textX), pixelX(tick.value), bottom() + kTextSize + kTickGap / 2,
+           Anchor::kMiddle);
     }
-    for (const Tick& tick : y_.ticks()) {
+    for (const Tick& tick : axes_.y.ticks()) {
       color(kGrid);
       line(kLeft, pixelY(tick.value), right(), pixelY(tick.value), kHair);
       color(kInk);
-      text(tick.label, kLeft - kTickGap, pixelY(tick.value) + kTextSize / 3, Anchor::kEnd);
+      text(labelOf(tick, plot_.textY), kLeft - kTickGap, pixelY(tick.value) + kTextSize / 3,
+           Anchor::kEnd);
     }
     line(kLeft, bottom(), right(), bottom(), kHair);
     line(kLeft, kTop, kLeft, bottom(), kHair);
+    drawRightScale();
     drawTitles();
+  }
+
+  void drawRightScale() {
+    if (plot_.rightTicks.empty()) return;
+    color(kInk);
+    line(right(), bottom(), right(), kTop, kHair);
+    for (const Tick& tick : plot_.rightTicks) {
+      if (!axes_.y.holds(tick.value)) continue;
+      const double y = pixelY(tick.value);
+      line(right(), y, right() + kTickGap / 2, y, kHair);
+      text(tick.label, right() + kTickGap, y + kTextSize / 3, Anchor::kStart);
+    }
+    textUpwards(plot_.rightLabel, frameEnd() - kTickGap / 2);
   }
 
   void drawTitles() {
     text(plot_.title, plot_.width / 2.0, kTop / 2 + kTitleSize / 3, Anchor::kMiddle, kTitleSize);
     text(plot_.xLabel, (kLeft + right()) / 2, plot_.height - kTextSize, Anchor::kMiddle);
+    textUpwards(plot_.yLabel, kTextSize + kTickGap);
+  }
+
+  void textUpwards(const std::string& shown, double x) {
     cairo_save(cr_.get());
-    cairo_translate(cr_.get(), kTextSize + kTickGap, (kTop + bottom()) / 2);
+    cairo_translate(cr_.get(), x, (kTop + bottom()) / 2);
     cairo_rotate(cr_.get(), -kQuarter);
-    text(plot_.yLabel, 0.0, 0.0, Anchor::kMiddle);
+    text(shown, 0.0, 0.0, Anchor::kMiddle);
     cairo_restore(cr_.get());
   }
 
@@ -131,18 +153,15 @@ class Painter {
     constexpr std::size_t kMaxMarkers = 40;  // more markers would hide the line
     const auto& points = plot_.series[i].points;
     color(colorOf(i));
-    cairo_set_line_width(cr_.get(), kLine);
+    cairo_set_line_width(cr_.get(), widthOf(plot_.series[i]));
     cairo_new_path(cr_.get());  // a text sets the current point to its end
     for (const Point& point : points)
-      if (shows(point)) cairo_line_to(cr_.get(), pixelX(point.x), pixelY(point.y));
+      if (plot_.series[i].joined && axes_.hold(point))
+        cairo_line_to(cr_.get(), pixelX(point.x), pixelY(point.y));
     cairo_stroke(cr_.get());
     if (points.size() > kMaxMarkers) return;
     for (const Point& point : points)
-      if (shows(point)) marker(pixelX(point.x), pixelY(point.y));
-  }
-
-  [[nodiscard]] bool shows(const Point& point) const {
-    return x_.holds(point.x) && y_.holds(point.y);
+      if (axes_.hold(point)) marker(pixelX(point.x), pixelY(point.y));
   }
 
   /// Draws the legend beside the curves.
@@ -155,9 +174,10 @@ class Painter {
   void drawLegend() {
     double y = kTop + kLegendLine;
     for (std::size_t i = 0; i < plot_.series.size(); ++i, y += kLegendLine) {
-      const double begin = right() + kTickGap;
+      const double begin = frameEnd() + kTickGap;
       color(colorOf(i));
-      line(begin, y - kTextSize / 3, begin + kLegendMark, y - kTextSize / 3, kLine);
+      line(begin, y - kTextSize / 3, begin + kLegendMark, y - kTextSize / 3,
+           widthOf(plot_.series[i]));
       color(kInk);
       text(plot_.series[i].name, begin + kLegendMark + kTickGap, y, Anchor::kStart);
     }
@@ -165,11 +185,26 @@ class Painter {
 
   const Plot& plot_;
   Context cr_;
-  Axis x_, y_;
+  PlotAxes axes_;
   double legendWidth_ = 0.0;
 };
 
+std::vector<double> valuesOf(const Plot& plot, double Point::*coordinate) {
+  std::vector<double> values;
+  for (const auto& series : plot.series)
+    for (const auto& point : series.points) values.push_back(point.*coordinate);
+  return values;
+}
+
 }  // namespace
+
+PlotAxes::PlotAxes(const Plot& plot)
+    : x(valuesOf(plot, &Point::x), plot.logarithmicX),
+      y(valuesOf(plot, &Point::y), plot.logarithmicY) {}
+
+std::string labelOf(const Tick& tick, std::string (*textOf)(double)) {
+  return textOf ? textOf(tick.value) : tick.label;
+}
 
 std::string toSvg(const Plot& plot) {
   std::string bytes;

@@ -10,6 +10,7 @@
 
 #include "cli/compare_fixture.h"
 #include "cli/converters.h"
+#include "cli/csv_fields.h"
 #include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
 
@@ -57,8 +58,43 @@ TEST_F(CompareCurves, hasTheCurveOfAFitAndTheFilesOfBoth) {
   EXPECT_THAT(folder_.names(),
               testing::ElementsAre("c-bytes.png", "c-bytes.svg", "c-seconds.png", "c-seconds.svg",
                                    "c.csv", "c.html", "c.json", "fit.esvr", "ref.vdb"));
-  EXPECT_THAT(test::readText(at("c.html")),
-              testing::AllOf(HasSubstr("Error over run time"), HasSubstr("image/svg+xml")));
+}
+
+TEST_F(CompareCurves, hasEveryPointOnThePage) {
+  ASSERT_EQ(
+      curves({at("ref.vdb"), "--fit", "3KB", "--no-baselines", "--device", "cpu", "-o", at("c")})
+          .exitCode,
+      0);
+  const std::string page = test::readText(at("c.html"));
+  EXPECT_THAT(page, testing::AllOf(HasSubstr("<h1>At "), HasSubstr("Error over run time"),
+                                   HasSubstr("RMS error over the box, % of the peak")));
+  const auto lines = test::csvFields(test::readText(at("c.csv")));
+  ASSERT_GT(lines.size(), 4u);
+  for (std::size_t line = 1; line < lines.size(); ++line)
+    for (const std::size_t c : {3u, 4u, 5u, 6u, 7u})  // bytes to max_error
+      EXPECT_TRUE(page.find("data-value=\"" + lines[line][c] + "\"") < page.size()) << line;
+}
+
+/// The values of the ball reach up to 1; a peak of 100 adds 40 dB to every figure.
+TEST_F(CompareCurves, hasOnePeakForFitsAndFiles) {
+  const auto run = curves({at("ref.vdb"), "--fit", "3KB", "--peak", "100", "--device", "cpu",
+                           "--no-baselines", "-o", at("c")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const json all = points();
+  ASSERT_GT(all.size(), 2u);
+  const json &last = all[all.size() - 2], &file = all.back();
+  ASSERT_EQ(last["kind"], "fit");
+  ASSERT_EQ(file["kind"], "file");
+  // Quantisation may cost some dB, but not half of those of the peak.
+  for (const char* key : {"psnr_box", "psnr_active"})
+    EXPECT_NEAR(last[key].get<double>(), file[key].get<double>(), 20.0) << key;
+}
+
+TEST_F(CompareCurves, showsOnlyThePlotsThatHaveCurves) {
+  ASSERT_EQ(curves({at("ref.vdb"), at("fit.esvr"), "--no-baselines", "-o", at("c")}).exitCode, 0);
+  const std::string page = test::readText(at("c.html"));
+  EXPECT_THAT(page, testing::AllOf(HasSubstr("Error over bytes"), HasSubstr("class=\"row ours\""),
+                                   testing::Not(HasSubstr("Error over run time"))));
 }
 
 TEST_F(CompareCurves, refusesWhatTakesMoreMemoryThanAllowed) {

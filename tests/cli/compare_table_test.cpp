@@ -7,11 +7,13 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "cli/compare_fixture.h"
 #include "cli/converters.h"
+#include "cli/csv_fields.h"
 #include "cli/refusal.h"
 #include "cli/vdb_inputs.h"
 
@@ -87,8 +89,20 @@ TEST_F(CompareTable, hasLosslessRowsWithoutError) {
     EXPECT_GT((*row)["encode_s"].get<double>(), 0.0);
     EXPECT_GT((*row)["decode_s"].get<double>(), 0.0);
   }
-  ASSERT_NE(rowOf(report, "OpenVDB half Blosc"), nullptr);
-  EXPECT_EQ((*rowOf(report, "OpenVDB half Blosc"))["ratio"], 1.0) << "what ratios are to";
+  const json* half = rowOf(report, "OpenVDB half Blosc", "nearly lossless");
+  ASSERT_NE(half, nullptr) << "the values of the ball are not half floats";
+  EXPECT_EQ((*half)["ratio"], 1.0) << "what ratios are to";
+  for (const auto& row : report["rows"])
+    EXPECT_EQ(row["group"] == "lossless", row["max_error"] == 0.0) << row["name"];
+}
+
+TEST_F(CompareTable, callsHalfFloatsLosslessWhereTheyAre) {
+  test::writeInput(at("halves.vdb"), {{.voxels = {{{0, 0, 0}, 0.5f}, {{1, 0, 0}, 0.25f}}}});
+  const auto run = table({at("halves.vdb"), "--rows", "lossless", "--runs", "1", "--report", "-"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const json report = json::parse(run.out);
+  EXPECT_NE(rowOf(report, "OpenVDB half Zip", "lossless"), nullptr);
+  for (const auto& row : report["rows"]) EXPECT_EQ(row["group"], "lossless") << row["name"];
 }
 
 TEST_F(CompareTable, hasQuantisedRowsWithinTheirBounds) {
@@ -252,8 +266,79 @@ TEST_F(CompareTable, writesReportsInEachForm) {
   EXPECT_THAT(test::readText(at("t.md")), AllOf(HasSubstr("| fit.esvr |"), HasSubstr("OpenVDB 1")));
   EXPECT_THAT(test::readText(at("t.csv")),
               HasSubstr("\nOpenVDB float Blosc,lossless,vdb-float-blosc,"));
-  EXPECT_THAT(test::readText(at("t.html")), AllOf(HasSubstr("<table>"), HasSubstr("fit.esvr")));
+  EXPECT_THAT(test::readText(at("t.html")), AllOf(HasSubstr("<table"), HasSubstr("fit.esvr")));
   EXPECT_EQ(json::parse(test::readText(at("t.json")))["schema"], "esvr-table");
+}
+
+/// Whether a row of a page has all figures of a line of a CSV file.
+bool hasRow(const std::string& page, const std::vector<std::string>& keys,
+            const std::vector<std::string>& fields) {
+  const std::string begin = "<th scope=\"row\">" + fields.front() + "</th>";
+  for (std::size_t at = page.find("All rows"); (at = page.find(begin, at + 1)) < page.size();) {
+    const std::string row = page.substr(at, page.find("</dl>", at) - at);
+    bool all = true;
+    for (std::size_t c = 1; c < fields.size(); ++c) {
+      const bool isText = keys[c] == "group" || keys[c] == "setting" || keys[c] == "note";
+      const std::string number = fields[c] == "inf" ? "Infinity" : fields[c];
+      if (keys[c] != "command" && !number.empty())
+        all &= row.find(isText ? ">" + number + "<" : "data-value=\"" + number + "\"") < row.size();
+    }
+    if (all) return true;
+  }
+  return false;
+}
+
+TEST_F(CompareTable, hasEveryFigureOfTheCsvOnThePage) {
+  const auto run =
+      table({at("ref.vdb"), at("fit.esvr"), "--runs", "1", "--rows", "lossless,quantised,zfp",
+             "--csv", at("t.csv"), "--markdown", at("t.md"), "--html", at("t.html")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const std::string page = test::readText(at("t.html")), markdown = test::readText(at("t.md"));
+  const auto lines = test::csvFields(test::readText(at("t.csv")));
+  ASSERT_GT(lines.size(), 20u);
+  for (std::size_t line = 1; line < lines.size(); ++line) {
+    EXPECT_THAT(markdown, HasSubstr("| " + lines[line].front() + " |"));
+    EXPECT_TRUE(hasRow(page, lines[0], lines[line])) << lines[line].front();
+  }
+}
+
+TEST_F(CompareTable, hasItsFindingAsTheHeadline) {
+  writeRaw("good.raw", 1e-6f);
+  const auto headline = [&](const std::vector<std::string>& rows) {
+    std::vector<std::string> arguments{at("ref.vdb"), at("fit.esvr"), "--rows",
+                                       "none",        "--runs",       "1",
+                                       "--html",      at("p.html"),   "--force"};
+    arguments.insert(arguments.end(), rows.begin(), rows.end());
+    const auto run = table(arguments);
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    const std::string page = test::readText(at("p.html"));
+    const std::size_t begin = page.find("<h1>") + 4;
+    return page.substr(begin, page.find("</h1>") - begin);
+  };
+  EXPECT_THAT(headline({}), HasSubstr("; no other row is that small."));
+  EXPECT_THAT(test::readText(at("p.html")), Not(HasSubstr("best rival</h2>")));
+  EXPECT_THAT(headline({"--external", "A<b>=" + at("good.raw") + ":10:9x9x9:float32"}),
+              HasSubstr("\u00a0dB less than the best rival, A&lt;b&gt;."));
+  EXPECT_THAT(test::readText(at("p.html")), HasSubstr("ESVR and its best rival</h2>"));
+}
+
+TEST_F(CompareTable, comparesEachFileWithItsBestRival) {
+  writeRaw("good.raw", 0.001f);
+  ASSERT_EQ(test::quickFit(at("ref.vdb"), at("other.esvr")).exitCode, 0);
+  const auto run = table({at("ref.vdb"), at("fit.esvr"), at("other.esvr"), "--rows", "none",
+                          "--runs", "1", "--external", "A=" + at("good.raw") + ":10:9x9x9:float32",
+                          "--html", at("p.html"), "--csv", at("p.csv")});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const std::string page = test::readText(at("p.html"));
+  EXPECT_THAT(page, AllOf(HasSubstr("<h1>ESVR has a higher PSNR than the best rival for none of 2"),
+                          HasSubstr("ESVR and its best rivals</h2>")));
+  // An error of 0.001 of a peak of 1 is 60 dB.
+  const double ours = std::stod(test::csvFields(test::readText(at("p.csv")))[1][5]);
+  EXPECT_LT(ours, 59.0);
+  std::ostringstream lead;
+  lead << std::fixed << std::setprecision(2) << ours - 60.0;
+  EXPECT_THAT(page, HasSubstr(">60.00</td>"));
+  EXPECT_THAT(page, HasSubstr(">" + lead.str() + "</td>"));
 }
 
 TEST_F(CompareTable, SlowFitsHundredColumns) {
@@ -314,8 +399,8 @@ TEST_F(CompareTable, SlowPutsPicturesOnThePage) {
                           "--images", "1", "--image-size", "32", "--html", at("p.html")});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const std::string page = test::readText(at("p.html"));
-  EXPECT_THAT(page, AllOf(HasSubstr("data:image/png;base64,"), HasSubstr("errors, 8 times"),
-                          HasSubstr("type=\"range\"")));
+  EXPECT_THAT(page, AllOf(HasSubstr("data:image/png;base64,"), HasSubstr("errors of fit.esvr"),
+                          HasSubstr("type=\"range\""), HasSubstr("class=\"scale\"")));
   EXPECT_THAT(run.out, HasSubstr("FLIP"));
 }
 

@@ -31,6 +31,23 @@ TEST(Axis, hasTicksAtPowersWhereItIsLogarithmic) {
   EXPECT_EQ(labels(Axis(narrow, true)), (Labels{"4", "5", "6", "7"}));
   const std::vector<double> wide{1e-4, 1e4};
   EXPECT_EQ(labels(Axis(wide, true)).size(), 9u);
+  const std::vector<double> widest{1e-20, 1e20};
+  EXPECT_EQ(labels(Axis(widest, true)),
+            (Labels{"1e-20", "1e-15", "1e-10", "1e-05", "1", "100000", "1e+10", "1e+15", "1e+20"}))
+      << "every fifth power";
+}
+
+TEST(Axis, hasThreeTicksOrMoreWhateverItsRange) {
+  for (const bool logarithmic : {false, true})
+    for (const int most : {Axis::kFewestAllowed, Axis::kUsualTicks})
+      for (const double low : {1e-6, 0.7, 3.0, 9.9, 1234.5})
+        for (double factor = 1.001; factor < 1e12; factor *= 1.3) {
+          const std::vector<double> values{low, factor * low};
+          const auto ticks = Axis(values, logarithmic).ticks(most);
+          EXPECT_GE(ticks.size(), 3u) << logarithmic << ", " << low << ", " << factor;
+          EXPECT_LE(ticks.size(), std::size_t(most))
+              << logarithmic << ", " << low << ", " << factor;
+        }
 }
 
 Labels roundLabels(double low, double high, double most) {
@@ -81,6 +98,8 @@ TEST(Axis, holdsOnlyWhatItCanShow) {
 TEST(Axis, isThereForOneValueAndForNone) {
   const std::vector<double> one{7.0};
   EXPECT_NEAR(Axis(one, false).place(7.0), 0.5, 1e-15);
+  EXPECT_GE(Axis(one, false).ticks().size(), 3u);
+  EXPECT_GE(Axis(one, true).ticks().size(), 3u);
   EXPECT_FALSE(Axis({}, false).ticks().empty());
 }
 

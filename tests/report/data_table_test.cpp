@@ -22,6 +22,7 @@ DataTable table() {
 
 TEST(CellText, isShortForPeople) {
   EXPECT_EQ(cellText({"", "", Kind::kBytes}, 1234567.0), "1234567");
+  EXPECT_EQ(cellText({"", "", Kind::kMegabytes}, 1234567.0), "1.23");
   EXPECT_EQ(cellText({"", "", Kind::kDecibels}, 44.7123), "44.71");
   EXPECT_EQ(cellText({"", "", Kind::kDecibels}, kInfinity), "exact");
   EXPECT_EQ(cellText({"", "", Kind::kShare}, 0.99876), "0.9988");

@@ -64,6 +64,19 @@ TEST(Plot, passesOverWhatCannotBeDrawn) {
   EXPECT_TRUE(toPng(with) == toPng(plot()));
 }
 
+TEST(Plot, hasLinesScalesAndLabelsWhereTheyAreAskedFor) {
+  const std::string plain = toPng(plot());
+  Plot thick = plot(), loose = plot(), scaled = plot(), labelled = plot();
+  thick.series[0].emphasis = Emphasis::kOurs;
+  loose.series[0].joined = false;
+  scaled.rightTicks = {{40.0, "1 %"}};
+  labelled.textX = [](double) { return std::string("x"); };
+  for (const Plot& other : {thick, loose, scaled, labelled}) EXPECT_FALSE(toPng(other) == plain);
+  Plot beyond = scaled;
+  beyond.rightTicks.push_back({1e9, "beyond the axis"});
+  EXPECT_TRUE(toPng(beyond) == toPng(scaled));
+}
+
 TEST(Plot, isThereWithoutCurvesAndWithAnyText) {
   EXPECT_THAT(toPng({.title = "\xff<&>\x1b"}), StartsWith(kPngSignature));
   EXPECT_THAT(toSvg({.title = "\xff<&>\x1b", .series = {{"\xff", {}}}}), HasSubstr("</svg>"));

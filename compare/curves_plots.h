@@ -1,0 +1,21 @@
+#pragma once
+/// The plots of curves.
+
+#include <string>
+#include <vector>
+
+#include "compare/table_record.h"
+#include "report/plot.h"
+
+namespace esvr::compare {
+
+/// A plot and the suffix of its file's name.
+struct NamedPlot {
+  std::string ending;
+  report::Plot plot;
+};
+
+/// Error over run time, error over bytes and, if it was measured, speed over bytes.
+[[nodiscard]] std::vector<NamedPlot> curvePlots(const TableRecord& record);
+
+}  // namespace esvr::compare

@@ -1,0 +1,131 @@
+#include "compare/finding.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "report/units.h"
+
+namespace esvr::compare {
+namespace {
+
+using report::bytesText;
+
+constexpr double kVisible = 0.05;  // dB; smaller differences are 0.0 in a sentence
+
+double bytesOf(const TableRow& row) { return double(*row.bytes); }
+double psnrOf(const TableRow& row) { return row.metrics->psnrBox; }
+bool isOurs(const TableRow& row) { return row.group == kOurGroup; }
+bool isExact(const TableRow& row) { return std::isinf(psnrOf(row)); }
+
+bool isRivalOf(const TableRow& ours, const TableRow& row) {
+  if (isOurs(row) || !row.bytes || !row.metrics) return false;
+  return isExact(ours) ? isExact(row) : bytesOf(row) <= (1.0 + kSameSize) * bytesOf(ours);
+}
+
+bool isBetter(const TableRow& row, const TableRow& than) {
+  if (psnrOf(row) != psnrOf(than)) return psnrOf(row) > psnrOf(than);
+  return *row.bytes < *than.bytes;
+}
+
+const TableRow* bestRival(const TableRow& ours, const std::vector<TableRow>& rows) {
+  const TableRow* best = nullptr;
+  for (const auto& row : rows)
+    if (isRivalOf(ours, row) && (!best || isBetter(row, *best))) best = &row;
+  return best;
+}
+
+/// A number with one decimal.
+std::string oneDecimal(double value) {
+  std::array<char, 64> text;
+  std::snprintf(text.data(), text.size(), "%.1f", value);
+  return text.data();
+}
+std::string decibels(double value) { return oneDecimal(value) + " dB"; }
+
+std::string bestRivalName(const Duel& duel) { return "the best rival, " + duel.rival->name; }
+
+std::string leadText(const Duel& duel) {
+  if (!duel.rival) return "; no other row is that small.";
+  if (isExact(*duel.rival)) return "; " + bestRivalName(duel) + ", has no error.";
+  const double lead = leadOf(duel);
+  if (std::abs(lead) < kVisible) return ", as much as " + bestRivalName(duel) + ".";
+  return ", " + decibels(std::abs(lead)) + (lead > 0 ? " more than " : " less than ") +
+         bestRivalName(duel) + ".";
+}
+
+std::string sentenceOf(const Duel& duel) {
+  return "At " + bytesText(bytesOf(*duel.ours)) + ", ESVR has a PSNR of " +
+         decibels(psnrOf(*duel.ours)) + leadText(duel);
+}
+
+std::string exactSentence(const Duel& duel) {
+  const std::string text =
+      "ESVR stores the volume without an error in " + bytesText(bytesOf(*duel.ours));
+  if (!duel.rival) return text + ".";
+  const std::string size = bytesText(bytesOf(*duel.rival));
+  if (*duel.rival->bytes == *duel.ours->bytes)
+    return text + ", as does " + bestRivalName(duel) + ".";
+  return text + ", " + bestRivalName(duel) + ", in " + size + ".";
+}
+
+/// The smallest and the largest lead, or nothing if a rival has no error.
+std::string rangeOf(const std::vector<Duel>& duels, bool signs) {
+  const auto less = [](const Duel& a, const Duel& b) { return leadOf(a) < leadOf(b); };
+  const auto [least, most] = std::minmax_element(duels.begin(), duels.end(), less);
+  if (!std::isfinite(leadOf(*least))) return "";
+  if (!signs) return ", by " + oneDecimal(leadOf(*least)) + " to " + decibels(leadOf(*most));
+  return "; the difference is between " + decibels(leadOf(*least)) + " and " +
+         decibels(leadOf(*most));
+}
+
+/// \param duels  at least two, which have rivals, by size
+std::string sentenceOf(const std::vector<Duel>& duels) {
+  const auto wins = std::size_t(std::count_if(
+      duels.begin(), duels.end(), [](const Duel& duel) { return leadOf(duel) >= kVisible; }));
+  const bool all = wins == duels.size();
+  const std::string count = wins == 0 ? "none" : std::to_string(wins);
+  return "ESVR has a higher PSNR than the best rival for " + (all ? "all" : count + " of") + " " +
+         std::to_string(duels.size()) + " files, from " + bytesText(bytesOf(*duels.front().ours)) +
+         " to " + bytesText(bytesOf(*duels.back().ours)) + rangeOf(duels, !all) + ".";
+}
+
+/// Files without a rival are smaller than those that have one.
+std::string sentenceOfUncontested(std::size_t files) {
+  if (files == 0) return "";
+  return " No other row is as small as its " +
+         (files == 1 ? "smallest file." : std::to_string(files) + " smallest files.");
+}
+
+}  // namespace
+
+double leadOf(const Duel& duel) { return psnrOf(*duel.ours) - psnrOf(*duel.rival); }
+
+std::vector<Duel> duelsOf(const TableRecord& record) {
+  std::vector<Duel> duels;
+  for (const auto& row : record.rows)
+    if (isOurs(row) && row.bytes && row.metrics)
+      duels.push_back({&row, bestRival(row, record.rows)});
+  std::stable_sort(duels.begin(), duels.end(),
+                   [](const Duel& a, const Duel& b) { return *a.ours->bytes < *b.ours->bytes; });
+  return duels;
+}
+
+std::string findingOf(const TableRecord& record) {
+  std::vector<Duel> lossy, contested, exact;
+  for (const auto& duel : duelsOf(record)) {
+    (isExact(*duel.ours) ? exact : lossy).push_back(duel);
+    if (!isExact(*duel.ours) && duel.rival) contested.push_back(duel);
+  }
+  std::string text;
+  if (contested.size() > 1)
+    text = sentenceOf(contested);
+  else if (!lossy.empty())
+    text = sentenceOf(contested.empty() ? lossy.back() : contested.front());
+  if (!contested.empty()) text += sentenceOfUncontested(lossy.size() - contested.size());
+  if (exact.empty()) return text;
+  return text + (text.empty() ? "" : " ") + exactSentence(exact.front());
+}
+
+}  // namespace esvr::compare
