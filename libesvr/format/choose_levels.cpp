@@ -17,7 +17,7 @@ namespace esvr::format {
 namespace {
 
 /// An overlap exceeds kMinOverlap by this, so that rounding on another machine does not matter.
-constexpr double kMargin = 1e-4;
+constexpr double kOverlapMargin = 1e-4;
 
 /// What an edge between bricks is worth, as a multiple of one between blocks (docs/lab-notes.md,
 /// "Thresholds of blocks").
@@ -34,19 +34,19 @@ struct BlockCounts {
 };
 
 /// The costs and the voxels of the blocks of some bricks.
-struct Tally {
+struct BlockTally {
   std::vector<Coord> bricks;  ///< coordinates of the bricks
   std::vector<LevelCosts> costs;
   std::vector<BlockCounts> counts;
 };
 
-class Counter {
+class BlockCounter {
  public:
-  explicit Counter(const LevelTask& task) : task_(task) {
+  explicit BlockCounter(const LevelTask& task) : task_(task) {
     for (int k = 0; k < kLevelCount; ++k) thresholds_[std::size_t(k)] = thresholdAt(task.base, k);
   }
 
-  Tally run() {
+  BlockTally run() {
     const auto& corners = task_.place.bricks;
     tally_.costs.resize(corners.size() * kBlocksOfBrick);
     tally_.counts.resize(corners.size() * kBlocksOfBrick);
@@ -111,17 +111,17 @@ class Counter {
 
   const LevelTask& task_;
   std::array<float, kLevelCount> thresholds_{};
-  Tally tally_;
+  BlockTally tally_;
 };
 
-std::vector<LevelCosts> costsOfBricks(const Tally& tally) {
+std::vector<LevelCosts> costsOfBricks(const BlockTally& tally) {
   std::vector<LevelCosts> costs(tally.bricks.size());
   for (std::size_t i = 0; i < tally.costs.size(); ++i)
     for (std::size_t k = 0; k < kLevelCount; ++k) costs[i / kBlocksOfBrick][k] += tally.costs[i][k];
   return costs;
 }
 
-std::vector<Coord> placesOfBlocks(const Tally& tally) {
+std::vector<Coord> placesOfBlocks(const BlockTally& tally) {
   std::vector<Coord> places;
   for (const Coord brick : tally.bricks)
     for (int n = 0; n < kBlocksOfBrick; ++n)
@@ -134,7 +134,7 @@ std::vector<Coord> placesOfBlocks(const Tally& tally) {
 /// Solves for the levels of bricks first, so that the blocks of a brick differ only where it pays.
 class LevelSearch {
  public:
-  LevelSearch(const LevelTask& task, const Tally& tally)
+  LevelSearch(const LevelTask& task, const BlockTally& tally)
       : tally_(tally),
         sourceActive_(activeVoxelCount(task.source)),
         brickCosts_(costsOfBricks(tally)),
@@ -182,7 +182,7 @@ class LevelSearch {
     for (std::size_t i = 0; i < levels.size(); ++i)
       levels[i] = isExpected(i) ? expected_[i] : ofBricks[i / kBlocksOfBrick];
     blocks_.improve(price, levels);
-    if (!(overlapOf(levels).iou() > kMinOverlap + kMargin)) return std::nullopt;
+    if (!(overlapOf(levels).iou() > kMinOverlap + kOverlapMargin)) return std::nullopt;
     return levels;
   }
 
@@ -220,7 +220,7 @@ class LevelSearch {
     return false;
   }
 
-  const Tally& tally_;
+  const BlockTally& tally_;
   std::uint64_t sourceActive_;
   std::vector<LevelCosts> brickCosts_;
   LevelGraph bricks_, blocks_;
@@ -231,7 +231,7 @@ class LevelSearch {
 }  // namespace
 
 std::optional<Levels> chooseLevels(const LevelTask& task) {
-  const Tally tally = Counter(task).run();
+  const BlockTally tally = BlockCounter(task).run();
   return LevelSearch(task, tally).run();
 }
 
