@@ -24,7 +24,7 @@ constexpr double kOverlapMargin = 1e-4;
 constexpr double kEdgeOfBricks = 0.5;
 
 // The price of an edge, in voxels in the wrong state: a high one gives few bytes and a small overlap.
-constexpr double kHighestPrice = 16.0, kLowestPrice = 0.1, kPriceFactor = 0.5;
+constexpr double kFirstPrice = 4.0, kHighestPrice = 16.0, kLowestPrice = 0.1, kPriceFactor = 2.0;
 /// Halvings of the interval, on a log scale, between a price that suffices and one that does not.
 constexpr int kPriceBisections = 3;
 
@@ -144,18 +144,23 @@ class LevelSearch {
   }
 
   std::optional<Levels> run() {
-    double price = kHighestPrice;
-    auto found = sufficient(price);
-    while (!found && price > kLowestPrice) found = sufficient(price *= kPriceFactor);
-    if (!found) return std::nullopt;
-    double low = price, high = price / kPriceFactor;
-    for (int n = 0; n < kPriceBisections; ++n) {
-      const double middle = std::sqrt(low * high);
-      auto now = sufficient(middle);
-      (now ? low : high) = middle;
+    double low = 0.0, high = 0.0;  // prices that suffice and do not; 0: none is known
+    std::optional<std::vector<std::uint8_t>> found;
+    int bisections = 0;
+    for (double price = kFirstPrice; bisections <= kPriceBisections;) {
+      auto now = sufficient(price);
+      (now ? low : high) = price;
       if (now) found = std::move(now);
+      if (low > 0.0 && high > 0.0) {
+        price = std::sqrt(low * high);
+        ++bisections;
+      } else if (price < kLowestPrice || price > kHighestPrice) {
+        break;
+      } else {
+        price *= low > 0.0 ? kPriceFactor : 1.0 / kPriceFactor;
+      }
     }
-    return levelsOf(*found);
+    return found ? std::optional(levelsOf(*found)) : std::nullopt;
   }
 
  private:

@@ -66,14 +66,25 @@ std::uint8_t LevelGraph::best(std::size_t node, double price,
   return found;
 }
 
+/// True if a neighbour of a node has changed in a round or after it.
+bool LevelGraph::isDue(std::size_t node, int round, const std::vector<int>& changes) const {
+  return round < 0 || std::ranges::any_of(near_[node], [&](std::uint32_t other) {
+           return other != BrickIndex::kNone && changes[other] >= round;
+         });
+}
+
 void LevelGraph::improve(double price, std::vector<std::uint8_t>& levels) const {
+  std::vector<int> changes(levels.size(), -1);  // the last round in which each node has changed
   for (int round = 0; round < kMaxRounds; ++round) {
     std::atomic<bool> changed = false;
     for (const auto& nodes : byColor_)
       tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t n) {
-        const std::uint8_t level = best(nodes[n], price, levels);
-        if (level == levels[nodes[n]]) return;
-        levels[nodes[n]] = level;
+        const std::size_t node = nodes[n];
+        if (!isDue(node, round - 1, changes)) return;
+        const std::uint8_t level = best(node, price, levels);
+        if (level == levels[node]) return;
+        levels[node] = level;
+        changes[node] = round;
         changed.store(true, std::memory_order_relaxed);
       });
     if (!changed) return;

@@ -38,6 +38,7 @@ class LevelGraph {
   [[nodiscard]] bool isExpected(std::size_t node) const {
     return !expected_.empty() && expected_[node] != kNoLevel;
   }
+  [[nodiscard]] bool isDue(std::size_t node, int round, const std::vector<int>& changes) const;
   [[nodiscard]] std::uint8_t best(std::size_t node, double price,
                                   const std::vector<std::uint8_t>& levels) const;
   [[nodiscard]] double costOf(std::size_t node, std::uint8_t level, double price,
