@@ -35,7 +35,7 @@ bool hasSigns(const StoredGrid& grid) {
   });
 }
 
-/// The smallest number of ellipsoids that can be divided into two layers or chunks.
+/// The smallest number of ellipsoids that can be divided into two layers.
 constexpr std::size_t kDivisible = 2;
 
 PartState lacking(bool stored, bool possible, const char* why) {
@@ -65,42 +65,6 @@ PartState stateOfLayers(const StoredGrid& grid) {
                          grid.quantised[0].size() >= kDivisible &&
                          grid.quantised[0].continues.empty();
   return lacking(layerCount(grid) > 1, divisible, "only two quantised ellipsoids can be divided");
-}
-
-PartState stateOfChunks(const StoredGrid& grid) {
-  const bool divisible = grid.field.ellipsoidCount() >= kDivisible &&
-                         (grid.quantised.empty() || grid.quantised[0].continues.empty());
-  return lacking(grid.field.chunks.size() > 1, divisible, "one ellipsoid cannot be divided");
-}
-
-/// Quantised ellipsoids [first, last) in one layer.
-QuantisedEllipsoids sliceOf(const QuantisedEllipsoids& q, std::size_t first, std::size_t last) {
-  QuantisedEllipsoids made;
-  made.lattice = q.lattice;
-  const auto cut = [&](const auto& from, auto& to) {
-    to.assign(from.begin() + std::ptrdiff_t(first), from.begin() + std::ptrdiff_t(last));
-  };
-  for (std::size_t a = 0; a < 3; ++a) {
-    cut(q.position[a], made.position[a]);
-    cut(q.scale[a], made.scale[a]);
-    cut(q.rotation[a], made.rotation[a]);
-  }
-  cut(q.precision, made.precision);
-  cut(q.intensity, made.intensity);
-  return made;
-}
-
-Ellipsoids sliceOf(const Ellipsoids& e, std::size_t first, std::size_t last) {
-  Ellipsoids made;
-  const auto cut = [&](const auto& from, auto& to) {
-    to.assign(from.begin() + std::ptrdiff_t(first), from.begin() + std::ptrdiff_t(last));
-  };
-  for (std::size_t a = 0; a < 3; ++a)
-    cut(e.center[a], made.center[a]), cut(e.logScale[a], made.logScale[a]);
-  for (std::size_t a = 0; a < 4; ++a) cut(e.rotation[a], made.rotation[a]);
-  cut(e.intensity, made.intensity);
-  if (!e.kappa.empty()) cut(e.kappa, made.kappa);
-  return made;
 }
 
 /// A quaternion and its negative are the same rotation, and only one of them is the identity that
@@ -139,15 +103,10 @@ void forceLayers(StoredGrid& grid) {
   q.layerEnds = {q.size() / 2, q.size()};
 }
 
+/// The second chunk is empty, so that the sum keeps its order.
 void forceChunks(StoredGrid& grid) {
-  const Chunk whole = grid.field.chunks.front();
-  const std::size_t n = whole.ellipsoids.size(), half = n / 2;
-  grid.field.chunks = {{whole.origin, sliceOf(whole.ellipsoids, 0, half)},
-                       {whole.origin, sliceOf(whole.ellipsoids, half, n)}};
-  grid.layerErrors.clear();  // the halves have one layer each
-  if (grid.quantised.empty()) return;
-  const QuantisedEllipsoids q = grid.quantised.front();
-  grid.quantised = {sliceOf(q, 0, half), sliceOf(q, half, n)};
+  grid.field.chunks.push_back({grid.field.chunks.front().origin, {}});
+  if (!grid.quantised.empty()) grid.quantised.emplace_back();
 }
 
 }  // namespace
@@ -177,7 +136,7 @@ PartState stateOf(const StoredGrid& grid, Part part) {
     case Part::kLayers:
       return stateOfLayers(grid);
     case Part::kChunks:
-      return stateOfChunks(grid);
+      return {grid.field.chunks.size() > 1};
   }
   return {};
 }
