@@ -18,6 +18,7 @@ import pathlib
 import random
 import statistics
 import subprocess
+import sys
 import tempfile
 import textwrap
 import time
@@ -26,6 +27,7 @@ from run_program import run
 
 RUNS = 50  # of a command whose start is timed; the median counts
 NOT_MEASURED = "not measured"
+FIGURES = {"bytes_with", "bytes_without", "seconds"}  # of a decision in a report
 PARTS = ["rotations", "signs", "kappa", "residual", "mask", "layers", "chunk table"]
 DRAFT = ["--preset", "draft"]
 ELLIPSOIDS = ["--representation", "ellipsoids"]
@@ -79,7 +81,7 @@ def scenes(tools):
         ("smoke as ellipsoids", "the same, `--representation ellipsoids`", plume, ELLIPSOIDS),
         ("smoke, float32", "the same, `--count 1500 --storage float32`", plume,
          ["--count", "1500", "--storage", "float32", "--iterations", "200"]),
-        ("smoke in chunks", "the same, `--count 1500 --chunk-voxels 20000`", plume,
+        ("smoke, fitted in chunks", "the same, `--count 1500 --chunk-voxels 20000`", plume,
          ["--count", "1500", "--chunk-voxels", "20000", "--iterations", "200"]),
         ("smoke within a bound", "the same, `--max-error 3%`", plume, ["--max-error", "3%"]),
         ("faint smoke", "smoke1.vdb, `--count 20000`", tools.data / "smoke1.vdb",
@@ -104,7 +106,7 @@ def scenes(tools):
 def decisions(report):
     """What `left_out` of the report says, of the first grid of each file."""
     grids = report.get("grids", [])
-    return {entry["part"]: entry for entry in grids[0]["left_out"]} if grids else {}
+    return {entry["part"]: entry for entry in grids[0].get("left_out", [])} if grids else {}
 
 
 def measure_scene(tools, scene):
@@ -141,6 +143,15 @@ def milliseconds(words):
     return statistics.median(times)
 
 
+def empty_program(tools, libraries):
+    """A program that does nothing, linked with libraries. Its time is that of the dynamic linker."""
+    path = tools.folder / ("empty" + "".join(libraries))
+    source = tools.folder / "empty.cpp"
+    source.write_text("int main() {}\n")
+    run(["c++", source, "-o", path, "-Wl,--no-as-needed", *libraries])
+    return path
+
+
 def commands(tools):
     """Times the commands that need no device, on a small file of ellipsoids."""
     small = tools.folder / "small.esvr"
@@ -149,6 +160,8 @@ def commands(tools):
     words = {"esvr2vdb --list": ["esvr2vdb", "--list", small], "esvr2vdb --check": ["esvr2vdb", "--check", small]}
     words.update({f"{p} --help": [p, "--help"] for p in ["esvr2vdb", "vdb2esvr", "esvr-render", "esvr-compare"]})
     full = {name: [str(tools.program(w[0])), *map(str, w[1:])] for name, w in words.items()}
+    full.update({f"an empty program{text}": [str(empty_program(tools, libraries))]
+                 for text, libraries in {"": [], " with libopenvdb": ["-lopenvdb"]}.items()})
     return [{"command": name, "milliseconds": milliseconds(w), **loaded(w)} for name, w in full.items()]
 
 
@@ -157,7 +170,10 @@ def measure(arguments):
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
         tools = Tools(arguments, pathlib.Path(temporary))
-        measured = [spheres(tools)] + [measure_scene(tools, s) for s in scenes(tools)]
+        measured = [spheres(tools)]
+        for scene in scenes(tools):
+            print(scene[0], file=sys.stderr, flush=True)
+            measured.append(measure_scene(tools, scene))
         content = {"machine": arguments.machine, "scenes": measured, "commands": commands(tools)}
     (folder / f"{arguments.device}.json").write_text(json.dumps(content, indent=1) + "\n")
 
@@ -216,8 +232,8 @@ def times(measured):
                 f"{delta['encode']:+.1f} ms", f"{delta['decode']:+.1f} ms"]
     return "## What forcing costs\n\n" + paragraph(
         "Bytes and time that are added to the whole file if one part is forced in. The time is that of encoding the file and "
-        "of decoding the voxels of the grid, the fastest of three runs each; differences below a few milliseconds are noise, "
-        "and some are therefore negative.") + table(["scene", "part", "bytes", "share of the file", "encoding", "decoding"],
+        "of decoding the voxels of the grid, the fastest of five runs each. Such differences are within the noise of the machine "
+        "where they are negative, and positive ones of the same size are too.") + table(["scene", "part", "bytes", "share of the file", "encoding", "decoding"],
                                  [row(*r) for r in time_rows(measured)])
 
 
@@ -242,10 +258,10 @@ def decided(measured):
         return [scene["name"], part, "yes" if entry["used"] else "no", figure(entry, "bytes_with"),
                 figure(entry, "bytes_without"), seconds]
     rows = [row(s, p, s["decisions"][p]) for s in measured for p in ["clamp", "residual", "plateau", "representation"]
-            if p in s["decisions"]]
+            if p in s["decisions"] and FIGURES & s["decisions"][p].keys()]
     return "## Decisions of the conversion\n\n" + paragraph(
         "What the list `left_out` of the report says of the first grid ([report.md](report.md#what-the-conversion-decided)). "
-        "A figure that the conversion did not have to measure is marked so.") + table(
+        "Only decisions with a figure are listed. A single figure that was not needed is marked so.") + table(
             ["scene", "part", "used", "bytes with", "bytes without", "seconds to decide"], rows)
 
 
@@ -275,7 +291,9 @@ def starts(files):
         text += f"\nOn a machine with a GPU: **{NOT_MEASURED}**, because `docs/economy/cuda.json` does not exist.\n"
     return "## Start of the programs, and the GPU\n\n" + paragraph(
         f"Median of {RUNS} runs, process start included. `--list` and `--check` read a small file of ellipsoids. The CUDA "
-        "driver is loaded when a device is selected, and not before.") + text
+        "driver is loaded when a device is selected, and not before. No command of the table initialises OpenVDB, but all programs are "
+        "linked with libopenvdb, whose relocation by the dynamic linker takes most of the time: an empty program that is "
+        "linked with it takes about as long.") + text
 
 
 INTRODUCTION = """\
@@ -284,10 +302,10 @@ INTRODUCTION = """\
 *This page is made by `tests/bench/economy.py`; do not edit it.*
 
 What does a file leave out because its scene does not need it, and what would it cost to store it nevertheless?
-`bench_economy` adds a part to a grid of a finished file in a way that keeps all voxels: rotations whose quaternions are
--1 in place of 1, a sign for each intensity, a kappa for each ellipsoid, a residual of zeros, the mask of the decoded voxels,
-two layers, a second chunk without ellipsoids. It encodes both files, decodes both, and fails if a bit of a voxel differs. `vdb2esvr` itself
-has no option for this.
+`bench_economy` adds a part to a grid of a finished file in a way that keeps all voxels: rotations whose quaternions
+are -1 in place of 1, a sign for each intensity, a kappa for each ellipsoid, a residual of zeros, the mask of the
+decoded voxels, two layers, a second chunk without ellipsoids. It encodes both files, decodes both, and fails if a bit
+of a voxel differs. `vdb2esvr` itself has no option for this.
 
     python3 tests/bench/economy.py measure --bin build/release --data DATA --machine TEXT
     python3 tests/bench/economy.py page

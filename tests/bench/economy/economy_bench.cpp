@@ -26,7 +26,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kRuns = 3;  // of which the fastest counts
+constexpr int kRuns = 5;  // of which the fastest counts
 
 template <class Work>
 double secondsOf(Work work) {

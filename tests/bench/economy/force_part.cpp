@@ -64,7 +64,8 @@ PartState stateOfLayers(const StoredGrid& grid) {
   const bool divisible = single && grid.quantised.size() == 1 &&
                          grid.quantised[0].size() >= kDivisible &&
                          grid.quantised[0].continues.empty();
-  return lacking(layerCount(grid) > 1, divisible, "only two quantised ellipsoids can be divided");
+  return lacking(layerCount(grid) > 1, divisible,
+                 "only quantised ellipsoids have layers, and it takes two of them");
 }
 
 /// A quaternion and its negative are the same rotation, and only one of them is the identity that
