@@ -1,5 +1,6 @@
 #include "vdb2esvr/scene_notes.h"
 
+#include "esvr/container.h"
 #include "vdb2esvr/decision_notes.h"
 
 namespace esvr::vdb2esvr {
@@ -13,6 +14,17 @@ constexpr std::uint64_t kMaskBytes = sizeof(BrickMask);
 /// Bytes by which a candidate is smaller than another; 0 if it is not.
 std::uint64_t saved(const Candidate& taken, const std::optional<Candidate>& other) {
   return other && other->bytes > taken.bytes ? other->bytes - taken.bytes : 0;
+}
+
+constexpr const char* kCpu = "CPU";  // deviceName()
+
+/// Parts of the ellipsoids of a grid that take no raw bytes, so that only their absence is known.
+void addUnmeasured(const ConvertedGrid& grid, std::vector<LeftOut>& notes) {
+  if (layerCount(grid.stored()) == 1)
+    notes.push_back({"importance layers",
+                     "there are too few ellipsoids for several layers, or "
+                     "the storage has none"});
+  if (grid.device == kCpu) notes.push_back({"GPU", "the ellipsoids were fitted on the CPU"});
 }
 
 std::vector<LeftOut> partsLeftOut(const RunRecord& record, std::size_t g) {
@@ -52,6 +64,7 @@ std::vector<LeftOut> partsLeftOut(const RunRecord& record, std::size_t g) {
   if (lacks("curve") && !grid.conversion.fit.curve.empty())
     notes.push_back({"curve", "files with a wanted size or PSNR do not store it; the report has it",
                      grid.conversion.fit.curve.size() * sizeof(TimedCurvePoint)});
+  addUnmeasured(grid, notes);
   return notes;
 }
 

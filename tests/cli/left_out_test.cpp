@@ -91,6 +91,17 @@ TEST_F(LeftOut, saysWhetherTheSumIsClamped) {
   EXPECT_FALSE(entryOf(gridOf(band(), ellipsoids, {.background = kBandWidth}), "clamp")["used"]);
 }
 
+TEST_F(LeftOut, namesLayersAndTheGpuOnlyForEllipsoids) {
+  const Json ellipsoids =
+      gridOf(test::softBall({}), {"--count", "9", "--representation", "ellipsoids"});
+  EXPECT_FALSE(entryOf(ellipsoids, "importance layers")["used"]);
+  EXPECT_FALSE(entryOf(ellipsoids, "GPU")["used"]);
+  for (const auto& entry : gridOf(noise(), {"--lossless"})["left_out"]) {
+    EXPECT_NE(entry["part"], "importance layers");
+    EXPECT_NE(entry["part"], "GPU");
+  }
+}
+
 TEST_F(LeftOut, hasTheSecondsOfTheShortFitsThatAClampMakesPossible) {
   Voxels flat = test::softBall({});
   for (auto& voxel : flat) voxel.value = std::min(voxel.value, 0.5f);
