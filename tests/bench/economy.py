@@ -28,7 +28,8 @@ from run_program import run
 RUNS = 50  # of a command whose start is timed; the median counts
 NOT_MEASURED = "not measured"
 FIGURES = {"bytes_with", "bytes_without", "seconds"}  # of a decision in a report
-PARTS = ["rotations", "signs", "kappa", "residual", "mask", "layers", "chunk table"]
+PARTS = ["rotations", "signs", "kappa", "residual", "mask", "thresholds of blocks", "layers",
+         "chunk table"]
 DRAFT = ["--preset", "draft"]
 ELLIPSOIDS = ["--representation", "ellipsoids"]
 
@@ -304,7 +305,7 @@ INTRODUCTION = """\
 What does a file leave out because its scene does not need it, and what would it cost to store it nevertheless?
 `bench_economy` adds a part to a grid of a finished file in a way that keeps all voxels: rotations whose quaternions
 are -1 in place of 1, a sign for each intensity, a kappa for each ellipsoid, a residual of zeros, the mask of the
-decoded voxels, two layers, a second chunk without ellipsoids. It encodes both files, decodes both, and fails if a bit
+decoded voxels, the same threshold for each block, two layers, a second chunk without ellipsoids. It encodes both files, decodes both, and fails if a bit
 of a voxel differs. `vdb2esvr` itself has no option for this.
 
     python3 tests/bench/economy.py measure --bin build/release --data DATA --machine TEXT

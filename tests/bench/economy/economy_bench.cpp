@@ -174,7 +174,7 @@ void writeSpheres(const std::string& path) {
     if (source.values[v] > 0.0f) source.active[v / kBrickVoxels].set(int(v % kBrickVoxels));
   GridDescriptor descriptor;
   descriptor.name = "spheres";
-  writeEsvr(path, {{}, {makeStoredGrid(descriptor, source, field, Activity::kByValue)}},
+  writeEsvr(path, {{}, {makeStoredGrid(descriptor, source, field, {Activity::kByValue})}},
             {.overwrite = true});
 }
 

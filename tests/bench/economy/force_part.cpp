@@ -1,6 +1,7 @@
 #include "economy/force_part.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "esvr/grid_coding.h"
 
@@ -84,6 +85,11 @@ void forceSigns(StoredGrid& grid) {
   for (QuantisedEllipsoids& q : grid.quantised) q.lattice.signedIntensity = true;
 }
 
+/// The threshold of level 0 with which the middle level has that of the grid.
+float baseOf(const StoredGrid& grid) {
+  return grid.activeThreshold / thresholdAt(1.0f, kMiddleLevel);
+}
+
 /// A residual that is 0 in every brick.
 void forceResidual(StoredGrid& grid, const SparseVolume& decoded) {
   VoxelLayer& layer = grid.residual.emplace();
@@ -95,6 +101,26 @@ void forceResidual(StoredGrid& grid, const SparseVolume& decoded) {
   all.setAll();
   layer.active.assign(decoded.brickCount(), all);
   layer.vacant.resize(decoded.brickCount());
+}
+
+PartState stateOfLevels(const StoredGrid& grid) {
+  if (grid.topology == TopologyKind::kBlocks) return {true};
+  if (grid.topology == TopologyKind::kMask) return {false, "a mask says which voxels are active"};
+  if (grid.topology == TopologyKind::kBricks) return {false, "a narrow band has one threshold"};
+  if (!std::isnormal(baseOf(grid)))
+    return {false, "levels need a threshold above 0 that can be divided"};
+  return {};
+}
+
+/// All blocks have the level of the grid's own threshold, whose base is a power of two below it.
+void forceLevels(StoredGrid& grid, const SparseVolume& decoded) {
+  grid.activeThreshold = baseOf(grid);
+  grid.topology = TopologyKind::kBlocks;
+  BlockLevels same;
+  same.of.fill(kMiddleLevel);
+  grid.levels.assign(decoded.brickCount(), same);
+  for (std::size_t b = 0; b < decoded.brickCount(); ++b)
+    grid.bricks.push_back(decoded.brickCorner(b));
 }
 
 /// Layers are usually sorted by weight. These halves are not, so that the order of the sum, and with
@@ -114,9 +140,10 @@ void forceChunks(StoredGrid& grid) {
 
 const std::vector<NamedPart>& allParts() {
   static const std::vector<NamedPart> parts{
-      {Part::kRotations, "rotations"}, {Part::kSigns, "signs"}, {Part::kKappas, "kappa"},
-      {Part::kResidual, "residual"},   {Part::kMask, "mask"},   {Part::kLayers, "layers"},
-      {Part::kChunks, "chunk table"}};
+      {Part::kRotations, "rotations"}, {Part::kSigns, "signs"},
+      {Part::kKappas, "kappa"},        {Part::kResidual, "residual"},
+      {Part::kMask, "mask"},           {Part::kLevels, "thresholds of blocks"},
+      {Part::kLayers, "layers"},       {Part::kChunks, "chunk table"}};
   return parts;
 }
 
@@ -134,6 +161,8 @@ PartState stateOf(const StoredGrid& grid, Part part) {
       return {grid.residual.has_value()};
     case Part::kMask:
       return {grid.topology == TopologyKind::kMask};
+    case Part::kLevels:
+      return stateOfLevels(grid);
     case Part::kLayers:
       return stateOfLayers(grid);
     case Part::kChunks:
@@ -159,6 +188,9 @@ StoredGrid forcedPart(const StoredGrid& grid, Part part, const SparseVolume& dec
       break;
     case Part::kMask:
       storeMask(decoded, decoded.active, made);
+      break;
+    case Part::kLevels:
+      forceLevels(made, decoded);
       break;
     case Part::kLayers:
       forceLayers(made);

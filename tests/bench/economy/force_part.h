@@ -10,7 +10,7 @@
 
 namespace esvr::economy {
 
-enum class Part { kRotations, kSigns, kKappas, kResidual, kMask, kLayers, kChunks };
+enum class Part { kRotations, kSigns, kKappas, kResidual, kMask, kLevels, kLayers, kChunks };
 
 struct NamedPart {
   Part part;
