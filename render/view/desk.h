@@ -22,6 +22,8 @@ class Desk {
 
  private:
   void serve(const std::shared_ptr<Outlet>& client, const nlohmann::json& message);
+  void drawPng(const std::shared_ptr<Outlet>& client, PictureRequest request);
+  void countValues(const std::shared_ptr<Outlet>& client, const GridPlace& place);
 
   const Collection& collection_;
   Studio& studio_;

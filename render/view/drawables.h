@@ -23,6 +23,17 @@ class Drawable {
   /// \throws DeviceError  as for SceneRenderer
   [[nodiscard]] Renderer& renderer(bool shaded);
 
+  /// Calls visit(volume) with the voxels, which are decoded for this if they are not stored.
+  /// \throws MemoryExceeded  they need too much memory
+  template <class Visit>
+  auto withVoxels(Visit&& visit) const {
+    if (const auto* grid = std::get_if<VolumeGrid>(&scenes_.front().content))
+      return visit(grid->volume);
+    const auto& memory = settings_.memory;
+    return visit(decodeGrid(*scenes_.front().encoded,
+                            {.maxBytes = memory.maxBytes, .memory = memory.voxels}));
+  }
+
  private:
   const std::vector<render::Scene> scenes_;
   const render::DrawSettings settings_;

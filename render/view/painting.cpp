@@ -1,5 +1,7 @@
 #include "render/view/painting.h"
 
+#include <utility>
+
 #include "render/render_options.h"
 #include "render/view/comparison_picture.h"
 
@@ -29,20 +31,24 @@ RenderOptions renderOptionsOf(const Collection& collection, const SceneWish& sce
   return render::renderOptions(options, collection.gridAt(scene.place).outline);
 }
 
-Painting::Part::Part(const Input& input, const GridPlace& place, RenderOptions options)
-    : drawable(input.drawables.get(place)) {
+Painting::Part::Part(const Input& input, const GridPlace& place, RenderOptions of)
+    : drawable(input.drawables.get(place)), options(std::move(of)) {
   if (drawable) {
     renderer = &drawable->renderer(options.shading.has_value());
-    passes.emplace(*renderer, std::move(options));
+    passes.emplace(*renderer, options);
   } else {
     constexpr std::size_t kChannels = 4;
-    blank = {input.size.width, input.size.height, {}};
-    blank.rgba.resize(kChannels * std::size_t(blank.width) * std::size_t(blank.height));
+    whole = Image{input.size.width, input.size.height, {}};
+    whole->rgba.resize(kChannels * std::size_t(whole->width) * std::size_t(whole->height));
   }
 }
 
 void Painting::Part::refine(double seconds) {
   if (passes) passes->refine(seconds);
+}
+
+void Painting::Part::complete() {
+  if (!isComplete()) whole = renderer->draw(options);
 }
 
 Painting::Painting(const Input& input)
@@ -58,8 +64,13 @@ void Painting::refine(double seconds) {
   if (reference_) reference_->refine(share);
 }
 
-bool Painting::complete() const {
-  return own_.complete() && (!reference_ || reference_->complete());
+void Painting::complete() {
+  own_.complete();
+  if (reference_) reference_->complete();
+}
+
+bool Painting::isComplete() const {
+  return own_.isComplete() && (!reference_ || reference_->isComplete());
 }
 
 Image Painting::picture() const {

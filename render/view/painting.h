@@ -34,7 +34,10 @@ class Painting {
   /// \throws Cancelled, DeviceError
   void refine(double seconds);
 
-  [[nodiscard]] bool complete() const;
+  /// Draws the picture itself instead of further passes.
+  /// \throws Cancelled, DeviceError
+  void complete();
+  [[nodiscard]] bool isComplete() const;
   /// The picture after the last pass. There must be one.
   [[nodiscard]] Image picture() const;
   /// Errors against the reference, of a complete picture.
@@ -47,13 +50,15 @@ class Painting {
   struct Part {
     Part(const Input& input, const GridPlace& place, RenderOptions options);
     void refine(double seconds);
-    [[nodiscard]] bool complete() const { return !passes || passes->complete(); }
-    [[nodiscard]] const Image& image() const { return passes ? *passes->image() : blank; }
+    void complete();
+    [[nodiscard]] bool isComplete() const { return whole || passes->complete(); }
+    [[nodiscard]] const Image& image() const { return whole ? *whole : *passes->image(); }
 
     std::shared_ptr<Drawable> drawable;
     Renderer* renderer = nullptr;
+    RenderOptions options;
     std::optional<ProgressivePicture> passes;
-    Image blank;
+    std::optional<Image> whole;  ///< a picture that was not drawn in passes
   };
   std::optional<Comparison> comparison_;
   Part own_;

@@ -34,7 +34,8 @@ struct Studio::Job {
 
 /// What a client waits for.
 struct Studio::Easel {
-  explicit Easel(std::shared_ptr<Outlet> to) : outlet(std::move(to)) {}
+  Easel(std::shared_ptr<Outlet> to, const CancelToken* stopping)
+      : outlet(std::move(to)), gone(stopping) {}
 
   /// The order in which clients are served; 0 if there is nothing to do.
   [[nodiscard]] int urgency() const {
@@ -44,6 +45,7 @@ struct Studio::Easel {
   }
 
   const std::shared_ptr<Outlet> outlet;
+  CancelToken gone;  ///< the client has left
   std::optional<DrawRequest> waiting;
   std::deque<Task> tasks;
   std::shared_ptr<Job> job;  ///< the picture that is drawn or refined
@@ -73,7 +75,7 @@ void Studio::stop() {
 Studio::Easel& Studio::easelOf(const std::shared_ptr<Outlet>& client) {
   for (const auto& easel : easels_)
     if (easel->outlet == client) return *easel;
-  easels_.push_back(std::make_shared<Easel>(client));
+  easels_.push_back(std::make_shared<Easel>(client, &stopping_));
   return *easels_.back();
 }
 
@@ -88,15 +90,15 @@ void Studio::draw(const std::shared_ptr<Outlet>& client, DrawRequest request) {
   changed_.notify_one();
 }
 
-bool Studio::add(const std::shared_ptr<Outlet>& client, Task task) {
+void Studio::add(const std::shared_ptr<Outlet>& client, Task task) {
   {
     const std::scoped_lock lock(mutex_);
+    if (stopped_) return;
     Easel& easel = easelOf(client);
-    if (stopped_ || easel.tasks.size() == kMostTasks) return false;
+    if (easel.tasks.size() == kMostTasks) throw BadInput("too many requests wait; ask again later");
     easel.tasks.push_back(std::move(task));
   }
   changed_.notify_one();
-  return true;
 }
 
 void Studio::leave(const Outlet& client) {
@@ -104,7 +106,7 @@ void Studio::leave(const Outlet& client) {
   const auto easel = std::find_if(easels_.begin(), easels_.end(),
                                   [&](const auto& e) { return e->outlet.get() == &client; });
   if (easel == easels_.end()) return;
-  if ((*easel)->job) (*easel)->job->cancel.cancel();
+  (*easel)->gone.cancel();
   easels_.erase(easel);
 }
 
@@ -141,7 +143,7 @@ std::optional<Studio::Work> Studio::next() {
     return work;
   }
   if (urgency > 2) {
-    easel->job = std::make_shared<Job>(std::move(*easel->waiting), &stopping_);
+    easel->job = std::make_shared<Job>(std::move(*easel->waiting), &easel->gone);
     easel->waiting.reset();
   }
   return Work{easel, {}, easel->job};
@@ -151,7 +153,7 @@ void Studio::perform(const Work& work) {
   Outlet& outlet = *work.easel->outlet;
   try {
     if (work.task)
-      work.task(drawables_, outlet);
+      work.task(drawables_, outlet, work.easel->gone);
     else
       drawPass(*work.job, outlet);
   } catch (const Cancelled&) {
@@ -174,7 +176,7 @@ void Studio::drawPass(Job& job, Outlet& outlet) {
   const Image image = job.painting->picture();
   const Rgb background = picture.scene.options.background.value_or(Rgb{});
   const std::string jpeg = encodeJpeg(image, {background, quality});
-  const bool last = moving || job.painting->complete();
+  const bool last = moving || job.painting->isComplete();
   nlohmann::json head{{"type", "picture"},
                       {"id", picture.id},
                       {"last", last},
@@ -187,7 +189,7 @@ void Studio::drawPass(Job& job, Outlet& outlet) {
                       {"stats",
                        {{"vramBytes", job.painting->deviceBytes()},
                         {"ellipsoids", collection_.gridAt(picture.scene.place).ellipsoids}}}};
-  if (job.painting->complete())
+  if (job.painting->isComplete())
     if (const auto errors = job.painting->errors()) {
       head["psnr"] = errors->psnr;  // null if the pictures are equal
       head["maxDifference"] = errors->maxError;

@@ -23,8 +23,9 @@ namespace esvr::view {
 /// first, then the first passes of other pictures, then tasks, and then refinements.
 class Studio {
  public:
-  /// A task that needs the grids. It gets the way to its client.
-  using Task = std::function<void(Drawables&, Outlet&)>;
+  /// A task that needs the grids. It gets the way to its client, and a token that is set when the
+  /// client leaves.
+  using Task = std::function<void(Drawables&, Outlet&, const CancelToken&)>;
 
   Studio(const Collection& collection, const render::DrawSettings& settings);
   ~Studio() { stop(); }
@@ -35,8 +36,8 @@ class Studio {
   /// refined is cancelled. The picture of a client that drags is shown nevertheless, because a client
   /// that sends requests faster than they are drawn would otherwise never see one.
   void draw(const std::shared_ptr<Outlet>& client, DrawRequest request);
-  /// \return false if the client has too many tasks that wait
-  [[nodiscard]] bool add(const std::shared_ptr<Outlet>& client, Task task);
+  /// \throws BadInput  the client has too many tasks that wait
+  void add(const std::shared_ptr<Outlet>& client, Task task);
   /// Forgets a client.
   void leave(const Outlet& client);
   /// To be called when a client is no longer busy.
