@@ -55,7 +55,7 @@ install(
 if(TARGET esvr_mpi)
   install(TARGETS esvr_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT programs)
 endif()
-foreach(program vdb2esvr esvr2vdb esvr-render esvr-compare esvr-sample swc2vdb raw2vdb)
+foreach(program vdb2esvr esvr2vdb esvr-render esvr-view esvr-compare esvr-sample swc2vdb raw2vdb)
   if(TARGET ${program})
     install(TARGETS ${program} COMPONENT programs)
   endif()

@@ -6,10 +6,10 @@
 #include <fstream>
 #include <limits>
 
+#include "cli/shell_word.h"
 #include "cli/stopwatch.h"
 #include "compare/external.h"
 #include "compare/shell_command.h"
-#include "compare/shell_word.h"
 #include "esvr/error.h"
 
 namespace esvr::compare {
@@ -99,7 +99,7 @@ void ExternalCodec::run(const char* job, const std::filesystem::path& from,
   std::string line = command_.command + " " + job;
   for (const auto& word : {from.string(), to.string(), std::to_string(side.x),
                            std::to_string(side.y), std::to_string(side.z), boundText(bound_)})
-    line += " " + shellWord(word);
+    line += " " + cli::shellWord(word);
   runCommand(line, kOption);
   if (!std::filesystem::exists(to))
     throw RuntimeFailure(std::string(kOption) + ": " + line + " wrote no file");

@@ -1,12 +1,12 @@
 #include "compare/measure.h"
 #include "compare/row_renderer.h"
-#include "compare/shell_word.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "cli/memory.h"
 #include "cli/names.h"
+#include "cli/shell_word.h"
 #include "cli/stopwatch.h"
 #include "cli/table.h"
 #include "compare/program.h"
@@ -170,8 +170,8 @@ void RowMaker::measureVoxels(const SparseVolume& volume, NanoValues values, Tabl
 
 std::string RowMaker::command(const std::string& arguments) const {
   const TableOptions& o = scene_.options;
-  std::string text = std::string(kProgram) + " table " + shellWord(o.reference.string());
-  if (o.grid) text += " -g " + shellWord(*o.grid);
+  std::string text = std::string(kProgram) + " table " + cli::shellWord(o.reference.string());
+  if (o.grid) text += " -g " + cli::shellWord(*o.grid);
   if (o.box) {
     const Coord a = o.box->min, b = o.box->max;
     text += " --box";
@@ -184,7 +184,7 @@ std::string RowMaker::command(const std::string& arguments) const {
 
 void RowMaker::measure(const BaselineSetting& setting, TableRow& row) {
   row.setting = toString(setting);
-  row.command = command("--row " + shellWord(row.setting));
+  row.command = command("--row " + cli::shellWord(row.setting));
   row.bytes = encoder_.encode(setting).bytes;  // also builds the method's input, not timed below
   const cli::MemoryMeter encoding;
   row.encode = timed(scene_.options.runs, [&] { return encoder_.encode(setting).seconds; });
@@ -232,7 +232,7 @@ TableRow RowMaker::psnrMatched(const BaselineSetting& like, double psnr) {
 
 TableRow RowMaker::external(const External& external) {
   TableRow row{.name = external.name, .group = kExternalGroup};
-  row.command = "--external " + shellWord(external.text);
+  row.command = "--external " + cli::shellWord(external.text);
   row.bytes = external.bytes;
   if (external.encodeSeconds) row.encode = once(*external.encodeSeconds);
   if (external.decodeSeconds) row.decode = once(*external.decodeSeconds);
@@ -285,7 +285,7 @@ TableRow RowMaker::sizeMatched(const ExternalCommand& external, std::uint64_t by
                  {.name = external.name,
                   .group = sizeGroup(bytes),
                   .command = command("--rows none --size " + size + " --external-command " +
-                                     shellWord(external.text)),
+                                     cli::shellWord(external.text)),
                   .matchedBytes = bytes},
                  [=](ExternalCodec& codec) { return matchSize(codec, bytes); });
 }
@@ -330,7 +330,7 @@ TableRow RowMaker::candidate(const std::filesystem::path& path) {
                    ": candidates must be .esvr files; --external takes other results");
   const std::size_t place = placeOf(*file.esvr(), path, scene_.gridName);
   row.bytes = bytesOf(file, path, place);
-  row.command = command(shellWord(path.string()) + " --rows none");
+  row.command = command(cli::shellWord(path.string()) + " --rows none");
   measureEsvr(path, row);
   return row;
 }

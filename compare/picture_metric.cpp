@@ -6,8 +6,8 @@
 
 #include "cli/bytes_file.h"
 #include "cli/number.h"
+#include "cli/shell_word.h"
 #include "compare/shell_command.h"
-#include "compare/shell_word.h"
 #include "esvr/error.h"
 #include "report/png_image.h"
 
@@ -38,8 +38,8 @@ PictureMetric::PictureMetric(std::string command, std::filesystem::path folder)
 
 double PictureMetric::of(const Image& reference, const Image& picture) const {
   const auto command = command_ + " " +
-                       shellWord(written(reference, folder_ / "reference.png").string()) + " " +
-                       shellWord(written(picture, folder_ / "picture.png").string());
+                       cli::shellWord(written(reference, folder_ / "reference.png").string()) +
+                       " " + cli::shellWord(written(picture, folder_ / "picture.png").string());
   return lastNumber(command_, outputOf(command, "--lpips"));
 }
 

@@ -50,23 +50,30 @@ void set(const std::string& key, const json& value, CameraWish& wish) {
 json parsed(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw BadInput("cannot read " + path.string());
-  json content = json::parse(file, nullptr, false);
-  if (!content.is_object()) throw BadInput(path.string() + ": no JSON object");
-  return content;
+  return json::parse(file, nullptr, false);
 }
 
 }  // namespace
 
-CameraWish readCamera(const std::filesystem::path& path) {
+CameraWish cameraWish(const json& content) {
+  if (!content.is_object()) throw BadInput("no JSON object");
   CameraWish wish;
-  const json content = parsed(path);
   if (content.contains("height")) wish.projection = Projection::kOrthographic;
   for (const auto& [key, value] : content.items()) try {
       set(key, value, wish);
     } catch (const BadInput& error) {
-      throw BadInput(path.string() + ": \"" + key + "\" " + error.what());
+      throw BadInput("\"" + key + "\" " + error.what());
     }
   return wish;
+}
+
+CameraWish readCamera(const std::filesystem::path& path) {
+  const json content = parsed(path);
+  try {
+    return cameraWish(content);
+  } catch (const BadInput& error) {
+    throw BadInput(path.string() + ": " + error.what());
+  }
 }
 
 }  // namespace esvr::render

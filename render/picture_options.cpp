@@ -4,6 +4,7 @@
 
 #include "cli/choice.h"
 #include "cli/number_list.h"
+#include "render/slice.h"
 #include "render/vector_option.h"
 
 namespace esvr::render {
@@ -38,17 +39,12 @@ std::optional<Rgb> backgroundOf(const Arguments& a) {
   return Rgb{(*color)[0], (*color)[1], (*color)[2]};
 }
 
-constexpr double kEverywhere = 1e9;  // voxels; larger than any coordinate in a grid
-
 PlaceBox sliceOf(const std::string& text) {
   const std::string axes = "xyz";
   const auto axis = text.size() > 2 && text[1] == '=' ? axes.find(text[0]) : std::string::npos;
   if (axis == std::string::npos)
     throw UsageError("--slice must be like z=12.5, not '" + text + "'");
-  const double place = cli::parseNumbers("slice", text.substr(2), 1)[0];
-  PlaceBox box{{-kEverywhere, -kEverywhere, -kEverywhere}, {kEverywhere, kEverywhere, kEverywhere}};
-  box.low[axis] = place - 0.5, box.high[axis] = place + 0.5;
-  return box;
+  return sliceBox(axis, cli::parseNumbers("slice", text.substr(2), 1)[0]);
 }
 
 std::optional<PlaceBox> clipOf(const Arguments& a) {

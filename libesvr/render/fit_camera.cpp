@@ -45,7 +45,8 @@ Camera aroundSphere(const Box& box, const CameraWish& wish, Resolution resolutio
   camera.height = wish.height.value_or(2.0 * radius / std::min(1.0, aspect));
   camera.center = pivotOf(box, wish);
   const double distance = fittingDistance(radius, camera.fov, aspect);
-  camera.eye = wish.eye.value_or(sum(camera.center, scaled(unit(kFromCenter), distance)));
+  const Vec3 direction = unit(wish.direction.value_or(kFromCenter));
+  camera.eye = wish.eye.value_or(sum(camera.center, scaled(direction, distance)));
   camera.up = wish.up.value_or(defaultUp(camera));
   return camera;
 }

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
@@ -13,17 +14,21 @@ namespace {
 
 using nlohmann::json;
 
-bool isXml(std::ifstream& file) {
-  file >> std::ws;
-  return file.peek() == '<';
-}
-
-json parsed(const std::filesystem::path& path) {
+std::string contentOf(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw BadInput("cannot read " + path.string());
-  if (isXml(file)) return presetsOfXml(path);
-  json content = json::parse(file, nullptr, false);
-  if (content.is_discarded()) throw BadInput(path.string() + ": not JSON");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+bool isXml(const std::string& text) {
+  const auto first = text.find_first_not_of(" \t\r\n");
+  return first != std::string::npos && text[first] == '<';
+}
+
+json parsed(const std::string& text, const std::string& source) {
+  if (isXml(text)) return presetsOfXml(text, source);
+  json content = json::parse(text, nullptr, false);
+  if (content.is_discarded()) throw BadInput(source + ": not JSON");
   return content.is_array() ? content : json::array({std::move(content)});
 }
 
@@ -122,6 +127,13 @@ TransferFunction functionOf(const json& preset) {
   return f;
 }
 
+/// The function of a preset, with its name in the text of errors.
+TransferFunction namedFunction(const json& preset, const std::string& source) try {
+  return functionOf(preset);
+} catch (const Error& error) {
+  throw BadInput(source + ": preset \"" + nameOf(preset) + "\": " + error.what());
+}
+
 const char* nameOf(ColorSpace space) {
   switch (space) {
     case ColorSpace::kRgb:
@@ -155,13 +167,18 @@ std::string paraViewPreset(const TransferFunction& function, const std::string& 
 }
 
 TransferFunction readParaViewPreset(const std::filesystem::path& path, const std::string& name) {
-  const json presets = parsed(path);
-  const json& preset = chosen(presets, name, path.string());
-  try {
-    return functionOf(preset);
-  } catch (const Error& error) {
-    throw BadInput(path.string() + ": preset \"" + nameOf(preset) + "\": " + error.what());
-  }
+  const json presets = parsed(contentOf(path), path.string());
+  return namedFunction(chosen(presets, name, path.string()), path.string());
+}
+
+std::vector<NamedTransferFunction> paraViewPresets(const std::string& text,
+                                                   const std::string& source) {
+  const json presets = parsed(text, source);
+  std::vector<NamedTransferFunction> functions;
+  for (const json& preset : presets)
+    if (hasColors(preset)) functions.push_back({nameOf(preset), namedFunction(preset, source)});
+  if (functions.empty()) throw BadInput(source + ": no preset with RGBPoints");
+  return functions;
 }
 
 }  // namespace esvr

@@ -2,6 +2,8 @@
 
 #include <boost/property_tree/ptree.hpp>
 #include <boost/property_tree/xml_parser.hpp>
+#include <cstddef>
+#include <sstream>
 
 #include "esvr/error.h"
 
@@ -11,12 +13,42 @@ namespace {
 using boost::property_tree::ptree;
 using nlohmann::json;
 
-ptree parsedXml(const std::filesystem::path& path) {
+/// The end of the tag that begins at `at`: the place of its '>', which is not within quotes.
+std::size_t endOfTag(const std::string& text, std::size_t at) {
+  char quote = 0;
+  for (; at < text.size(); ++at) {
+    const char c = text[at];
+    if (quote != 0)
+      quote = c == quote ? char(0) : quote;
+    else if (c == '"' || c == '\'')
+      quote = c;
+    else if (c == '>')
+      return at;
+  }
+  return text.size();
+}
+
+/// Refuses a text whose elements may be nested so deeply that the parser, which is recursive, has no
+/// stack left.
+void requireShallow(const std::string& text) {
+  constexpr int kMostHolders = 1000;
+  int holders = 0;
+  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos; ++at) {
+    const char next = at + 1 < text.size() ? text[at + 1] : '/';
+    if (next == '/' || next == '?' || next == '!') continue;
+    if (text[endOfTag(text, at) - 1] != '/' && ++holders > kMostHolders)
+      throw BadInput("more than " + std::to_string(kMostHolders) + " elements hold others");
+  }
+}
+
+ptree parsedXml(const std::string& text) {
+  requireShallow(text);
+  std::istringstream stream(text);
   ptree tree;
   try {
-    read_xml(path.string(), tree);
+    read_xml(stream, tree);
   } catch (const boost::property_tree::xml_parser_error& error) {
-    throw BadInput(path.string() + ": not XML: " + error.message());
+    throw BadInput("not XML: " + error.message());
   }
   return tree;
 }
@@ -68,14 +100,14 @@ void appendMaps(const ptree& tree, json& presets) {
 
 }  // namespace
 
-json presetsOfXml(const std::filesystem::path& path) {
+json presetsOfXml(const std::string& text, const std::string& source) try {
   json presets = json::array();
-  try {
-    appendMaps(parsedXml(path), presets);
-  } catch (const boost::property_tree::ptree_error& error) {
-    throw BadInput(path.string() + ": not a color map: " + error.what());
-  }
+  appendMaps(parsedXml(text), presets);
   return presets;
+} catch (const BadInput& error) {
+  throw BadInput(source + ": " + error.what());
+} catch (const boost::property_tree::ptree_error& error) {
+  throw BadInput(source + ": not a color map: " + error.what());
 }
 
 }  // namespace esvr

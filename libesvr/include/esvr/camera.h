@@ -46,6 +46,9 @@ struct CameraWish {
   Projection projection = Projection::kPerspective;
   Framing framing = Framing::kBox;
   double freeRight = 0.0;  ///< share of the width, below 0.4, that stays free at the right edge
+  /// Direction from the center to the eye if the eye is not given; the default is a little above and
+  /// to the right.
+  std::optional<Vec3> direction{};
 };
 
 /// The share of the picture's width or height, whichever is tighter, that a fitted box takes.

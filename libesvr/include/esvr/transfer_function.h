@@ -111,6 +111,16 @@ void checkTransferFunction(const TransferFunction& function);
 [[nodiscard]] TransferFunction readParaViewPreset(const std::filesystem::path& path,
                                                   const std::string& name = {});
 
+struct NamedTransferFunction {
+  std::string name;
+  TransferFunction function;
+};
+/// All presets of a text in one of these formats that have colors.
+/// \param source  name of the text for errors
+/// \throws BadInput  there is none; as for readParaViewPreset
+[[nodiscard]] std::vector<NamedTransferFunction> paraViewPresets(const std::string& text,
+                                                                 const std::string& source);
+
 /// The JSON text of a file with one preset. readParaViewPreset and ParaView can read it.
 /// \throws UsageError  see checkTransferFunction
 [[nodiscard]] std::string paraViewPreset(const TransferFunction& function, const std::string& name);

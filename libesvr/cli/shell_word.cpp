@@ -1,6 +1,6 @@
-#include "compare/shell_word.h"
+#include "cli/shell_word.h"
 
-namespace esvr::compare {
+namespace esvr::cli {
 
 std::string shellWord(const std::string& word) {
   const bool plain =
@@ -14,4 +14,4 @@ std::string shellWord(const std::string& word) {
   return text + "'";
 }
 
-}  // namespace esvr::compare
+}  // namespace esvr::cli

@@ -1,0 +1,130 @@
+#include "render/view/collection.h"
+
+#include <algorithm>
+
+#include "cli/names.h"
+#include "cli/sequence.h"
+#include "esvr/container.h"
+#include "esvr/error.h"
+#include "esvr/grid_names.h"
+#include "esvr/sequence_file.h"
+#include "esvr/vdb_io.h"
+
+namespace esvr::view {
+namespace {
+
+namespace fs = std::filesystem;
+
+ReadLimits limitsOf(const cli::HostMemory& memory) {
+  ReadLimits limits{memory.maxBytes, memory.voxels};
+  limits.carriedBytes = false;
+  return limits;
+}
+
+std::vector<std::string> namesOf(const EsvrFile& file) {
+  std::vector<std::string> names;
+  for (const StoredGrid& grid : file.grids) names.push_back(grid.descriptor.name);
+  return uniqueNames(names);
+}
+
+/// The grids of a file or of a frame that have something active.
+std::vector<ShownGrid> gridsOf(const EsvrFile& file, const EsvrSummary& summary,
+                               const render::SceneFile& from) {
+  std::vector<ShownGrid> grids;
+  const auto names = namesOf(file);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    render::SceneFile of = from;
+    of.grid = names[i];
+    auto outline = outlinesOf(file, of);
+    if (!outline) continue;
+    const StoredGrid& stored = file.grids[i];
+    grids.push_back({names[i], stored.voxels ? "voxels" : "ellipsoids",
+                     cli::nameOf(stored.descriptor.gridClass), std::move(*outline),
+                     stored.field.ellipsoidCount(), cli::storedBytes(summary, i),
+                     stored.activeVoxels});
+  }
+  return grids;
+}
+
+/// Widens the outlines of grids to those of another frame, which may have further grids.
+void enclose(std::vector<ShownGrid> frame, std::vector<ShownGrid>& all) {
+  for (ShownGrid& grid : frame) {
+    const auto same = std::find_if(all.begin(), all.end(),
+                                   [&](const ShownGrid& g) { return g.name == grid.name; });
+    if (same == all.end())
+      all.push_back(std::move(grid));
+    else
+      render::enclose(grid.outline, same->outline);
+  }
+}
+
+void showSequence(const render::SceneFile& from, ShownFile& file) {
+  SequenceReader reader(from.path, limitsOf(from.memory));
+  for (const SequenceFrame& frame : reader.frames()) {
+    file.frames.push_back(frame.number);
+    const EsvrSummary summary = reader.inspect(frame.number);
+    enclose(gridsOf(reader.read(frame.number), summary, from), file.grids);
+  }
+}
+
+/// Removes the voxels of a scene.
+std::vector<render::Scene> outlineOf(std::vector<render::Scene> scenes) {
+  for (render::Scene& scene : scenes) scene.content = VolumeGrid{}, scene.encoded.reset();
+  return scenes;
+}
+
+void showVdb(const render::SceneFile& from, ShownFile& file) {
+  for (const GridSummary& grid : inspectVdb(from.path).grids) {
+    if (!grid.skipReason.empty() || grid.activeVoxels == 0) continue;
+    render::SceneFile of = from;
+    of.grid = grid.uniqueName;
+    file.grids.push_back({grid.uniqueName, "vdb", cli::nameOf(grid.gridClass),
+                          outlineOf(readScenes(of)), 0, grid.storedBytes, grid.activeVoxels});
+  }
+}
+
+template <class List>
+const auto& at(const List& list, std::size_t index, const std::string& what) {
+  if (index < list.size()) return list[index];
+  throw BadInput("there is no " + what + " " + std::to_string(index));
+}
+
+}  // namespace
+
+ShownFile showFile(const fs::path& path, const cli::HostMemory& memory) {
+  ShownFile file{path, 0, {}, {}};
+  const render::SceneFile from{path, {}, {}, memory};
+  if (cli::framesInFile(path))
+    showSequence(from, file);
+  else if (path.extension() == ".esvr")
+    file.grids = gridsOf(readEsvr(path, limitsOf(memory)), inspectEsvr(path), from);
+  else
+    showVdb(from, file);
+  if (file.grids.empty()) throw BadInput(path.string() + ": no grid that can be drawn");
+  file.bytes = fs::file_size(path);
+  return file;
+}
+
+Collection::Collection(const std::vector<fs::path>& paths, const cli::HostMemory& memory) {
+  for (const fs::path& path : paths) files_.push_back(showFile(path, memory));
+}
+
+const ShownFile& Collection::fileAt(const GridPlace& place) const {
+  return at(files_, place.file, "file");
+}
+
+const ShownGrid& Collection::gridAt(const GridPlace& place) const {
+  const ShownFile& file = fileAt(place);
+  return at(file.grids, place.grid, "grid in " + file.path.filename().string() + " of number");
+}
+
+std::optional<cli::FrameNumber> Collection::frameAt(const GridPlace& place) const {
+  const ShownFile& file = fileAt(place);
+  if (file.frames.empty()) return std::nullopt;
+  if (!place.frame) return file.frames.front();
+  if (std::find(file.frames.begin(), file.frames.end(), *place.frame) == file.frames.end())
+    throw BadInput(file.path.filename().string() + " has no frame " + std::to_string(*place.frame));
+  return place.frame;
+}
+
+}  // namespace esvr::view

@@ -1,0 +1,25 @@
+#pragma once
+/// The command of esvr-render that makes the picture of a scene.
+
+#include <optional>
+#include <string>
+
+#include "render/view/collection.h"
+#include "render/view/scene_json.h"
+
+namespace esvr::view {
+
+/// The file that the command reads the transfer function from.
+inline constexpr const char* kTransferFile = "transfer.json";
+
+struct RenderCommand {
+  std::string text;
+  /// The text of kTransferFile, a ParaView preset; nothing if options say the transfer function.
+  std::optional<std::string> transfer;
+};
+
+/// \throws BadInput, UsageError  the scene names no grid
+[[nodiscard]] RenderCommand commandOf(const Collection& collection, const SceneWish& scene,
+                                      Resolution size);
+
+}  // namespace esvr::view

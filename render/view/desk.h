@@ -1,0 +1,33 @@
+#pragma once
+/// Takes the messages of clients: answers what needs no voxels, and passes the rest to the studio.
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "render/view/collection.h"
+#include "render/view/outlet.h"
+#include "render/view/studio.h"
+
+namespace esvr::view {
+
+class Desk {
+ public:
+  /// \param device  the name of the device that draws
+  Desk(const Collection& collection, Studio& studio, const std::string& device);
+
+  /// Takes a message of a client. A wrong message is answered by a text that says what is wrong.
+  /// \return false if it was wrong
+  bool receive(const std::shared_ptr<Outlet>& client, std::string_view message);
+
+ private:
+  void serve(const std::shared_ptr<Outlet>& client, const nlohmann::json& message);
+  void drawPng(const std::shared_ptr<Outlet>& client, PictureRequest request);
+  void countValues(const std::shared_ptr<Outlet>& client, const GridPlace& place);
+
+  const Collection& collection_;
+  Studio& studio_;
+  const std::string description_;
+};
+
+}  // namespace esvr::view

@@ -1,0 +1,64 @@
+#include "render/view/http_session.h"
+
+#include <boost/beast/http/error.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/write.hpp>
+#include <utility>
+
+namespace esvr::view {
+namespace {
+
+using boost::beast::error_code;
+
+}  // namespace
+
+HttpSession::HttpSession(boost::asio::ip::tcp::socket socket, HttpContext& context,
+                         std::shared_ptr<void> seat)
+    : stream_(std::move(socket)),
+      context_(context),
+      seat_(std::move(seat)),
+      buffer_(context.socket.limits.headBytes) {
+  parser_.header_limit(std::uint32_t(context.socket.limits.headBytes));
+}
+
+void HttpSession::run() {
+  stream_.expires_after(context_.socket.limits.requestTime);
+  http::async_read_header(
+      stream_, buffer_, parser_,
+      [self = shared_from_this()](error_code error, std::size_t) { self->onHead(error); });
+}
+
+void HttpSession::onHead(error_code error) {
+  if (!error) return serve(parser_.get());
+  if (error == http::error::header_limit || error == http::error::buffer_overflow)
+    return send(statusResponse(http::status::request_header_fields_too_large));
+  const bool isHttp =
+      error.category() == http::make_error_code(http::error::end_of_stream).category();
+  if (isHttp && error != http::error::end_of_stream && error != http::error::partial_message)
+    send(statusResponse(http::status::bad_request));
+}
+
+void HttpSession::serve(const Request& request) {
+  const Verdict verdict = judge(request, context_.site);
+  if (verdict.target == Target::kSocket) return openSocket(request);
+  if (verdict.target == Target::kNothing) return send(statusResponse(verdict.status));
+  const auto host = request[http::field::host];
+  send(pageResponse(context_.page, {host.data(), host.size()}));
+}
+
+void HttpSession::openSocket(Request request) {
+  auto seat = context_.clients.take();
+  if (!seat) return send(statusResponse(http::status::service_unavailable));
+  std::make_shared<SocketSession>(std::move(stream_), context_.socket, std::move(seat))
+      ->run(std::move(request));
+}
+
+void HttpSession::send(Response response) {
+  response_ = std::move(response);
+  http::async_write(stream_, response_, [self = shared_from_this()](error_code, std::size_t) {
+    error_code ignored;
+    self->stream_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, ignored);
+  });
+}
+
+}  // namespace esvr::view

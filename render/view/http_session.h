@@ -1,0 +1,46 @@
+#pragma once
+/// A connection before it opens a socket.
+
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <memory>
+#include <string_view>
+
+#include "render/view/request_rules.h"
+#include "render/view/responses.h"
+#include "render/view/seats.h"
+#include "render/view/socket_session.h"
+
+namespace esvr::view {
+
+/// What connections work with. It outlives them.
+struct HttpContext {
+  Site site;
+  std::string_view page;
+  SocketContext socket;
+  Seats clients;
+};
+
+/// Reads one request, and answers it or hands the connection to a SocketSession.
+class HttpSession : public std::enable_shared_from_this<HttpSession> {
+ public:
+  HttpSession(boost::asio::ip::tcp::socket socket, HttpContext& context,
+              std::shared_ptr<void> seat);
+  void run();
+
+ private:
+  void onHead(boost::beast::error_code error);
+  void serve(const Request& request);
+  void openSocket(Request request);
+  void send(Response response);
+
+  boost::beast::tcp_stream stream_;
+  HttpContext& context_;
+  const std::shared_ptr<void> seat_;
+  boost::beast::flat_buffer buffer_;
+  http::request_parser<http::empty_body> parser_;
+  Response response_;
+};
+
+}  // namespace esvr::view

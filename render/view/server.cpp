@@ -1,0 +1,42 @@
+#include "render/view/server.h"
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "esvr/error.h"
+
+namespace esvr::view {
+namespace {
+
+using boost::asio::ip::tcp;
+
+tcp::acceptor listeningAt(boost::asio::io_context& io, const tcp::endpoint& at) try {
+  return tcp::acceptor(io, at);
+} catch (const boost::system::system_error& error) {
+  throw RuntimeFailure("cannot listen at " + at.address().to_string() + ", port " +
+                       std::to_string(at.port()) + ": " + error.code().message());
+}
+
+}  // namespace
+
+Server::Server(boost::asio::io_context& io, const tcp::endpoint& at, HttpContext& context)
+    : acceptor_(listeningAt(io, at)),
+      endpoint_(acceptor_.local_endpoint()),
+      context_(context),
+      connections_(context.socket.limits.connections) {}
+
+void Server::run() {
+  acceptor_.async_accept([this](boost::system::error_code error, tcp::socket socket) {
+    if (!acceptor_.is_open()) return;
+    // A connection without a seat is closed at once.
+    if (auto seat = error ? nullptr : connections_.take()) {
+      boost::system::error_code ignored;
+      socket.set_option(tcp::no_delay(true), ignored);
+      std::make_shared<HttpSession>(std::move(socket), context_, std::move(seat))->run();
+    }
+    run();
+  });
+}
+
+}  // namespace esvr::view

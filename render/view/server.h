@@ -1,0 +1,29 @@
+#pragma once
+/// Accepts connections.
+
+#include <boost/asio/ip/tcp.hpp>
+
+#include "render/view/http_session.h"
+
+namespace esvr::view {
+
+/// Its functions, and those of its connections, are called by the thread that runs the context.
+class Server {
+ public:
+  /// Listens.
+  /// \throws RuntimeFailure  the address cannot be used
+  Server(boost::asio::io_context& io, const boost::asio::ip::tcp::endpoint& at,
+         HttpContext& context);
+
+  [[nodiscard]] boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
+  /// Begins to accept connections.
+  void run();
+
+ private:
+  boost::asio::ip::tcp::acceptor acceptor_;
+  boost::asio::ip::tcp::endpoint endpoint_;
+  HttpContext& context_;
+  Seats connections_;
+};
+
+}  // namespace esvr::view

@@ -1,0 +1,208 @@
+#include "render/view/studio.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "cli/failure.h"
+#include "cli/stopwatch.h"
+#include "esvr/error.h"
+#include "render/view/binary_message.h"
+#include "render/view/failed_message.h"
+#include "render/view/jpeg_file.h"
+
+namespace esvr::view {
+namespace {
+
+/// Time for the first picture of a request, in seconds. Further passes are drawn before it is shown
+/// if they are expected to end within this time.
+constexpr double kFirstBudget = 0.03;
+constexpr std::size_t kMostTasks = 8;  // that wait for one client
+constexpr double kMs = 1e3;            // milliseconds of a second
+
+}  // namespace
+
+/// A picture that is drawn. Only the studio's thread uses what may change.
+struct Studio::Job {
+  Job(DrawRequest of, const CancelToken* stopping) : request(std::move(of)), cancel(stopping) {}
+
+  const DrawRequest request;
+  CancelToken cancel;
+  std::optional<Painting> painting;
+  int passes = 0;
+};
+
+/// What a client waits for.
+struct Studio::Easel {
+  Easel(std::shared_ptr<Outlet> to, const CancelToken* stopping)
+      : outlet(std::move(to)), gone(stopping) {}
+
+  /// The order in which clients are served; 0 if there is nothing to do.
+  [[nodiscard]] int urgency() const {
+    if (outlet->busy()) return 0;
+    if (waiting) return waiting->moving ? 4 : 3;
+    return !tasks.empty() ? 2 : (job ? 1 : 0);
+  }
+
+  const std::shared_ptr<Outlet> outlet;
+  CancelToken gone;  ///< the client has left
+  std::optional<DrawRequest> waiting;
+  std::deque<Task> tasks;
+  std::shared_ptr<Job> job;  ///< the picture that is drawn or refined
+};
+
+/// A task, or a pass of a job.
+struct Studio::Work {
+  std::shared_ptr<Easel> easel;
+  Task task;
+  std::shared_ptr<Job> job;
+};
+
+Studio::Studio(const Collection& collection, const render::DrawSettings& settings)
+    : collection_(collection), drawables_(collection, settings), thread_([this] { loop(); }) {}
+
+void Studio::stop() {
+  stopping_.cancel();
+  {
+    const std::scoped_lock lock(mutex_);
+    stopped_ = true;
+  }
+  changed_.notify_one();
+  if (thread_.joinable()) thread_.join();
+  easels_.clear();
+}
+
+Studio::Easel& Studio::easelOf(const std::shared_ptr<Outlet>& client) {
+  for (const auto& easel : easels_)
+    if (easel->outlet == client) return *easel;
+  easels_.push_back(std::make_shared<Easel>(client, &stopping_));
+  return *easels_.back();
+}
+
+void Studio::draw(const std::shared_ptr<Outlet>& client, DrawRequest request) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (stopped_) return;
+    Easel& easel = easelOf(client);
+    if (easel.job && !easel.job->request.moving) easel.job->cancel.cancel(), easel.job.reset();
+    easel.waiting = std::move(request);
+  }
+  changed_.notify_one();
+}
+
+void Studio::add(const std::shared_ptr<Outlet>& client, Task task) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (stopped_) return;
+    Easel& easel = easelOf(client);
+    if (easel.tasks.size() == kMostTasks) throw BadInput("too many requests wait; ask again later");
+    easel.tasks.push_back(std::move(task));
+  }
+  changed_.notify_one();
+}
+
+void Studio::leave(const Outlet& client) {
+  const std::scoped_lock lock(mutex_);
+  const auto easel = std::find_if(easels_.begin(), easels_.end(),
+                                  [&](const auto& e) { return e->outlet.get() == &client; });
+  if (easel == easels_.end()) return;
+  (*easel)->gone.cancel();
+  easels_.erase(easel);
+}
+
+void Studio::wake() {
+  { const std::scoped_lock lock(mutex_); }  // so that it is not between its check and its sleep
+  changed_.notify_one();
+}
+
+void Studio::loop() {
+  for (;;) {
+    std::optional<Work> work;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [&] { return stopped_ || (work = next()); });
+      if (stopped_) return;
+    }
+    perform(*work);
+    end(*work);
+  }
+}
+
+/// The most urgent work. Its client then waits behind the others.
+std::optional<Studio::Work> Studio::next() {
+  const auto found =
+      std::max_element(easels_.begin(), easels_.end(),
+                       [](const auto& a, const auto& b) { return a->urgency() < b->urgency(); });
+  const int urgency = found == easels_.end() ? 0 : (*found)->urgency();
+  if (urgency == 0) return std::nullopt;
+  std::rotate(found, found + 1, easels_.end());
+  const auto& easel = easels_.back();
+  if (urgency == 2) {
+    Work work{easel, std::move(easel->tasks.front()), nullptr};
+    easel->tasks.pop_front();
+    return work;
+  }
+  if (urgency > 2) {
+    easel->job = std::make_shared<Job>(std::move(*easel->waiting), &easel->gone);
+    easel->waiting.reset();
+  }
+  return Work{easel, {}, easel->job};
+}
+
+void Studio::perform(const Work& work) {
+  Outlet& outlet = *work.easel->outlet;
+  try {
+    if (work.task)
+      work.task(drawables_, outlet, work.easel->gone);
+    else
+      drawPass(*work.job, outlet);
+  } catch (const Cancelled&) {
+    // The client has asked for another picture or has left.
+  } catch (...) {
+    if (work.job) work.job->cancel.cancel();
+    const auto id = work.job ? std::optional(work.job->request.picture.id) : std::nullopt;
+    outlet.answer(failedMessage(cli::currentFailure().what(), id));
+  }
+}
+
+void Studio::drawPass(Job& job, Outlet& outlet) {
+  const auto& [picture, quality, moving] = job.request;
+  cli::Stopwatch watch;
+  if (!job.painting)
+    job.painting.emplace(
+        Painting::Input{collection_, drawables_, picture.scene, picture.size, &job.cancel});
+  job.painting->refine(job.passes++ == 0 ? kFirstBudget : 0.0);
+  const double drawMs = kMs * watch.lap();
+  const Image image = job.painting->picture();
+  const Rgb background = picture.scene.options.background.value_or(Rgb{});
+  const std::string jpeg = encodeJpeg(image, {background, quality});
+  const bool last = moving || job.painting->isComplete();
+  nlohmann::json head{{"type", "picture"},
+                      {"id", picture.id},
+                      {"last", last},
+                      {"width", image.width},
+                      {"height", image.height},
+                      {"format", "jpeg"},
+                      {"drawMs", drawMs},
+                      {"encodeMs", kMs * watch.lap()},
+                      {"pass", job.passes},
+                      {"stats",
+                       {{"vramBytes", job.painting->deviceBytes()},
+                        {"ellipsoids", collection_.gridAt(picture.scene.place).ellipsoids}}}};
+  if (job.painting->isComplete())
+    if (const auto errors = job.painting->errors()) {
+      head["psnr"] = errors->psnr;  // null if the pictures are equal
+      head["maxDifference"] = errors->maxError;
+    }
+  outlet.deliver(binaryMessage(head, jpeg));
+  if (last) job.cancel.cancel();
+}
+
+/// Forgets a job that has ended.
+void Studio::end(const Work& work) {
+  if (!work.job || !work.job->cancel.cancelled()) return;
+  const std::scoped_lock lock(mutex_);
+  if (work.easel->job == work.job) work.easel->job.reset();
+}
+
+}  // namespace esvr::view

@@ -1,0 +1,69 @@
+#pragma once
+/// Draws the pictures of all clients on one thread.
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "esvr/progress.h"
+#include "render/view/drawables.h"
+#include "render/view/outlet.h"
+#include "render/view/painting.h"
+#include "render/view/requests.h"
+
+namespace esvr::view {
+
+/// One thread draws, because a picture uses the whole device, and because renderers then need to keep
+/// decoded voxels only once. Clients take turns, pass by pass. The passes of clients that drag come
+/// first, then the first passes of other pictures, then tasks, and then refinements.
+class Studio {
+ public:
+  /// A task that needs the grids. It gets the way to its client, and a token that is set when the
+  /// client leaves.
+  using Task = std::function<void(Drawables&, Outlet&, const CancelToken&)>;
+
+  Studio(const Collection& collection, const render::DrawSettings& settings);
+  ~Studio() { stop(); }
+  Studio(const Studio&) = delete;
+  Studio& operator=(const Studio&) = delete;
+
+  /// Replaces the client's picture: a request that waits is forgotten, and a picture that is being
+  /// refined is cancelled. The picture of a client that drags is shown nevertheless, because a client
+  /// that sends requests faster than they are drawn would otherwise never see one.
+  void draw(const std::shared_ptr<Outlet>& client, DrawRequest request);
+  /// \throws BadInput  the client has too many tasks that wait
+  void add(const std::shared_ptr<Outlet>& client, Task task);
+  /// Forgets a client.
+  void leave(const Outlet& client);
+  /// To be called when a client is no longer busy.
+  void wake();
+  /// Cancels everything and forgets all clients.
+  void stop();
+
+ private:
+  struct Job;
+  struct Easel;
+  struct Work;
+  [[nodiscard]] Easel& easelOf(const std::shared_ptr<Outlet>& client);
+  void loop();
+  [[nodiscard]] std::optional<Work> next();
+  void perform(const Work& work);
+  void drawPass(Job& job, Outlet& outlet);
+  void end(const Work& work);
+
+  const Collection& collection_;
+  Drawables drawables_;  ///< used by the thread only
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::shared_ptr<Easel>> easels_;  ///< the one that waits longest comes first
+  bool stopped_ = false;
+  CancelToken stopping_;
+  std::thread thread_;
+};
+
+}  // namespace esvr::view
