@@ -66,8 +66,9 @@ class Buffer {
             header_.content <= room && header_.block > 0 && header_.block <= header_.content &&
             header_.typeSize > 0);
     if (!header_.has(Header::kStored) && header_.flags >> 5 != Header::kZstd)
-      throw BadInput(where_ + ": compressed by another compressor of Blosc than Zstandard, which "
-                              "this decoder does not read");
+      throw BadInput(where_ +
+                     ": compressed by another compressor of Blosc than Zstandard, which "
+                     "this decoder does not read");
   }
 
   std::size_t copyStored(std::span<std::byte> to) const {

@@ -19,17 +19,16 @@ struct LengthCode {
 };
 // RFC 8878, section 3.1.1.3.2.1.1.
 constexpr std::array<LengthCode, 36> kLiteralLengths{
-    {{0, 0},     {1, 0},     {2, 0},      {3, 0},      {4, 0},      {5, 0},
-     {6, 0},     {7, 0},     {8, 0},      {9, 0},      {10, 0},     {11, 0},
-     {12, 0},    {13, 0},    {14, 0},     {15, 0},     {16, 1},     {18, 1},
-     {20, 1},    {22, 1},    {24, 2},     {28, 2},     {32, 3},     {40, 3},
-     {48, 4},    {64, 6},    {128, 7},    {256, 8},    {512, 9},    {1024, 10},
-     {2048, 11}, {4096, 12}, {8192, 13},  {16384, 14}, {32768, 15}, {65536, 16}}};
+    {{0, 0},     {1, 0},      {2, 0},      {3, 0},     {4, 0},   {5, 0},     {6, 0},     {7, 0},
+     {8, 0},     {9, 0},      {10, 0},     {11, 0},    {12, 0},  {13, 0},    {14, 0},    {15, 0},
+     {16, 1},    {18, 1},     {20, 1},     {22, 1},    {24, 2},  {28, 2},    {32, 3},    {40, 3},
+     {48, 4},    {64, 6},     {128, 7},    {256, 8},   {512, 9}, {1024, 10}, {2048, 11}, {4096, 12},
+     {8192, 13}, {16384, 14}, {32768, 15}, {65536, 16}}};
 constexpr std::size_t kPlainMatches = 32;  ///< codes of matches of 3, 4, ... bytes
 constexpr std::array<LengthCode, 21> kLongMatches{
-    {{35, 1},    {37, 1},    {39, 1},    {41, 1},     {43, 2},     {47, 2},    {51, 3},
-     {59, 3},    {67, 4},    {83, 4},    {99, 5},     {131, 7},    {259, 8},   {515, 9},
-     {1027, 10}, {2051, 11}, {4099, 12}, {8195, 13},  {16387, 14}, {32771, 15}, {65539, 16}}};
+    {{35, 1},    {37, 1},    {39, 1},    {41, 1},    {43, 2},     {47, 2},     {51, 3},
+     {59, 3},    {67, 4},    {83, 4},    {99, 5},    {131, 7},    {259, 8},    {515, 9},
+     {1027, 10}, {2051, 11}, {4099, 12}, {8195, 13}, {16387, 14}, {32771, 15}, {65539, 16}}};
 
 LengthCode matchCode(std::uint8_t code) {
   if (code < kPlainMatches) return {std::uint32_t(code) + 3, 0};
@@ -42,14 +41,13 @@ LengthCode literalCode(std::uint8_t code) {
 }
 
 // RFC 8878, section 3.1.1.3.2.2.
-constexpr std::int16_t kLiteralShares[] = {4, 3, 2, 2, 2, 2, 2, 2, 2, 2, 2,  2,
-                                           2, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2,  2,
+constexpr std::int16_t kLiteralShares[] = {4, 3, 2, 2, 2, 2, 2, 2, 2,  2,  2,  2,
+                                           2, 1, 1, 1, 2, 2, 2, 2, 2,  2,  2,  2,
                                            2, 3, 2, 1, 1, 1, 1, 1, -1, -1, -1, -1};
-constexpr std::int16_t kMatchShares[] = {1, 4, 3, 2, 2, 2, 2, 2, 2, 1, 1, 1, 1, 1,
-                                         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-                                         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-                                         1, 1, 1, 1, -1, -1, -1, -1, -1, -1, -1};
-constexpr std::int16_t kOffsetShares[] = {1, 1, 1, 1, 1, 1, 2, 2, 2, 1, 1, 1, 1, 1, 1,
+constexpr std::int16_t kMatchShares[] = {1, 4, 3, 2, 2, 2, 2, 2, 2, 1, 1,  1,  1,  1,  1,  1,  1, 1,
+                                         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,  1,  1,  1,  1,  1,  1, 1,
+                                         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, -1, -1, -1, -1, -1, -1, -1};
+constexpr std::int16_t kOffsetShares[] = {1, 1, 1, 1, 1, 1, 2, 2, 2, 1,  1,  1,  1,  1, 1,
                                           1, 1, 1, 1, 1, 1, 1, 1, 1, -1, -1, -1, -1, -1};
 
 /// One of the three codes of sequences: its usual table and limits.
@@ -96,10 +94,17 @@ class Frame {
     const auto head = std::uint32_t(in_.number(3));
     const std::size_t size = head >> 3;
     switch (head >> 1 & 3) {
-      case kRawBlock: append(in_.take(size)); break;
-      case kRepeatedBlock: fill(in_.take(1).front(), size); break;
-      case kCompressedBlock: readCompressed(Bytes(in_.take(size))); break;
-      default: require(false, "a block of an unknown kind");
+      case kRawBlock:
+        append(in_.take(size));
+        break;
+      case kRepeatedBlock:
+        fill(in_.take(1).front(), size);
+        break;
+      case kCompressedBlock:
+        readCompressed(Bytes(in_.take(size)));
+        break;
+      default:
+        require(false, "a block of an unknown kind");
     }
     return head & 1;
   }
@@ -183,10 +188,17 @@ class Frame {
 
   static void readTable(Bytes& in, std::uint32_t mode, const CodeKind& kind, FseTable& table) {
     switch (mode & 3) {
-      case kUsual: table = FseTable(kind.usual, kind.usualLog); break;
-      case kOneSymbol: table = FseTable(std::uint8_t(in.byte())); break;
-      case kDescribed: table = FseTable::read(in, kind.limits); break;
-      default: require(!table.empty(), "there is no table to repeat");
+      case kUsual:
+        table = FseTable(kind.usual, kind.usualLog);
+        break;
+      case kOneSymbol:
+        table = FseTable(std::uint8_t(in.byte()));
+        break;
+      case kDescribed:
+        table = FseTable::read(in, kind.limits);
+        break;
+      default:
+        require(!table.empty(), "there is no table to repeat");
     }
   }
 

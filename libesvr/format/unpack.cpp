@@ -20,7 +20,7 @@ std::vector<std::byte> decompress(std::span<const std::byte> stored, std::uint64
   std::vector<std::byte> raw(paddedForBlosc(rawBytes));
   std::span<std::byte> left(raw);
   while (!left.empty() || !stored.empty()) {
-    const auto buffer = stored.first(std::min(stored.size(), storedBytesOf(stored)));
+    const auto buffer = stored.first(std::min<std::uint64_t>(stored.size(), storedBytesOf(stored)));
     left = left.subspan(decompressBuffer(buffer, left, where));
     stored = stored.subspan(buffer.size());
   }

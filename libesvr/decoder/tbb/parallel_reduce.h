@@ -1,7 +1,7 @@
 #pragma once
 /// Reductions on one thread (blocked_range.h).
 
-#include "tbb/blocked_range.h"
+#include <tbb/blocked_range.h>
 
 namespace tbb {
 
