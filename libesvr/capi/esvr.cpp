@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <new>
 #include <optional>
 #include <span>
 #include <string>
 
-#include "core/brick_index.h"
+#include "capi/objects.h"
 #include "core/cell_corner.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
@@ -17,68 +16,12 @@
 #include "esvr/sparse_volume.h"
 #include "field/voxel_rule.h"
 
-struct esvr_file {
-  esvr::EsvrFile content;
-  std::string name;
-};
-
-struct esvr_volume {
-  explicit esvr_volume(esvr::SparseVolume decoded)
-      : voxels(std::move(decoded)), index(voxels.bricks) {}
-
-  esvr::SparseVolume voxels;
-  esvr::BrickIndex index;  ///< of the bricks relative to the origin
-};
-
 namespace esvr {
 namespace {
 
+using capi::require;
+
 static_assert(ESVR_BRICK_SIDE == kBrickSide && ESVR_BRICK_VOXELS == kBrickVoxels);
-
-thread_local std::string lastError;
-
-esvr_status fail(esvr_status status, const char* text) {
-  try {
-    lastError = text;
-  } catch (const std::bad_alloc&) {
-    lastError.clear();
-  }
-  return status;
-}
-
-esvr_status statusOf(ErrorKind kind) {
-  switch (kind) {
-    case ErrorKind::kUsage:
-      return ESVR_USAGE;
-    case ErrorKind::kBadInput:
-      return ESVR_BAD_INPUT;
-    case ErrorKind::kDevice:
-      return ESVR_MEMORY;
-    default:
-      return ESVR_FAILED;
-  }
-}
-
-/// Runs a task and makes a status of what it throws.
-template <class Task>
-esvr_status guarded(Task&& task) {
-  try {
-    task();
-    return ESVR_OK;
-  } catch (const Error& error) {
-    return fail(statusOf(error.kind()), error.what());
-  } catch (const std::bad_alloc&) {
-    return fail(ESVR_MEMORY, "there is not enough memory");
-  } catch (const std::length_error&) {
-    return fail(ESVR_MEMORY, "an array would be larger than the address space");
-  } catch (const std::exception& error) {
-    return fail(ESVR_FAILED, error.what());
-  }
-}
-
-void require(bool good, const char* otherwise) {
-  if (!good) throw UsageError(otherwise);
-}
 
 /// A limit of the caller, of which 0 stands for none. Where addresses have 32 bits, sizes in the
 /// code have, too, so that content stays below them.
@@ -248,12 +191,11 @@ void evaluate(const StoredGrid& grid, std::span<const Place> places, std::span<f
 }  // namespace esvr
 
 using namespace esvr;
+using capi::guarded;
 
 extern "C" {
 
 const char* esvr_version(void) { return ESVR_VERSION; }
-
-const char* esvr_error(void) { return lastError.c_str(); }
 
 esvr_status esvr_open(const char* path, uint64_t max_memory, esvr_file** file) {
   return guarded([&] {
