@@ -1,5 +1,7 @@
 #include "baselines/brick_stack.h"
 
+#include <algorithm>
+
 #include "esvr/error.h"
 
 namespace esvr::baselines {
@@ -31,17 +33,30 @@ constexpr std::uint64_t kOtherColumn = 0;
 
 }  // namespace
 
+Box StackShape::box() const {
+  return {{}, {kBrickSide - 1, int(rows) * kBrickSide - 1, int(length) * kBrickSide - 1}};
+}
+
+StackShape stackShape(std::size_t bricks) {
+  constexpr std::size_t kMaxLength = 65536 / kBrickSide;
+  const std::size_t rows = std::max<std::size_t>(1, (bricks + kMaxLength - 1) / kMaxLength);
+  return {rows, (bricks + rows - 1) / rows};
+}
+
 SparseVolume stackBricks(const SparseVolume& volume) {
   SparseVolume stack = volume;
   stack.origin = {};
-  for (std::size_t b = 0; b < stack.brickCount(); ++b) stack.bricks[b] = {0, 0, int(b)};
+  const std::size_t length = stackShape(stack.brickCount()).length;
+  for (std::size_t b = 0; b < stack.brickCount(); ++b)
+    stack.bricks[b] = {0, int(b / length), int(b % length)};
   return stack;
 }
 
 SparseVolume unstackBricks(const SparseVolume& stack, std::span<const Coord> bricks, Coord origin) {
   SparseVolume volume = stack;
   volume.origin = origin;
-  for (auto& brick : volume.bricks) brick = bricks[std::size_t(brick.z)];
+  const std::size_t length = stackShape(bricks.size()).length;
+  for (auto& brick : volume.bricks) brick = bricks[brick.y * length + brick.z];
   return volume;
 }
 

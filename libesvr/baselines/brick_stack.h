@@ -10,8 +10,17 @@
 
 namespace esvr::baselines {
 
-/// The bricks of a volume one above another: brick b is at the position (0, 0, b). An array of
-/// them has no empty space, and blocks of 4^3 voxels do not cross their borders.
+/// The arrangement of bricks in a stack: brick b is at (0, b / length, b % length). ZFP allows
+/// 65,536 voxels along an axis, which is why there may be several rows.
+struct StackShape {
+  std::size_t rows = 1, length = 0;
+
+  [[nodiscard]] Box box() const;  ///< the voxels of the stack
+};
+[[nodiscard]] StackShape stackShape(std::size_t bricks);
+
+/// The bricks of a volume side by side. An array of them has hardly any empty space, and blocks of
+/// 4^3 voxels do not cross their borders.
 [[nodiscard]] SparseVolume stackBricks(const SparseVolume& volume);
 
 /// The inverse of stackBricks.

@@ -23,7 +23,7 @@ void writeBytes(const std::filesystem::path& path, std::span<const std::byte> by
   if (!stream) throw RuntimeFailure("cannot write " + path.string());
 }
 
-/// The voxels as an array for ZFP: those of a box, or the bricks one above another.
+/// The voxels as an array for ZFP: those of a box, or the bricks side by side.
 struct ZfpArray {
   DenseBox dense;
   bool bricks = false;
@@ -33,7 +33,7 @@ ZfpArray arrayFor(const ZfpSetting& setting, const BaselineSource& source) {
   const SparseVolume& volume = source.grid.volume;
   if (!setting.bricks) return {baselines::densify(volume, source.box, source.maxDenseBytes)};
   const SparseVolume stack = baselines::stackBricks(volume);
-  const Box box{{}, {kBrickSide - 1, kBrickSide - 1, int(stack.brickCount()) * kBrickSide - 1}};
+  const Box box = baselines::stackShape(stack.brickCount()).box();
   return {baselines::densify(stack, box, source.maxDenseBytes), true};
 }
 

@@ -15,11 +15,28 @@ TEST(BrickStack, comesBackAsItWas) {
   const auto volume = test::randomVolume({.seed = 4, .brickShare = 0.4, .background = 0.25f});
   const SparseVolume stack = stackBricks(volume);
   EXPECT_NO_THROW(checkInvariants(stack));
-  EXPECT_EQ(stack.bricks.back(), (Coord{0, 0, int(volume.brickCount()) - 1}));
   const SparseVolume back = unstackBricks(stack, volume.bricks, volume.origin);
   EXPECT_EQ(back.origin, volume.origin);
   EXPECT_EQ(back.bricks, volume.bricks);
   EXPECT_EQ(back.values, volume.values);
+}
+
+TEST(BrickStack, hasRowsThatZfpAllows) {
+  for (const std::size_t bricks : {1, 8192, 8193, 1'000'000}) {
+    const StackShape shape = stackShape(bricks);
+    EXPECT_LE(shape.box().max.z, 65535);
+    EXPECT_GE(shape.rows * shape.length, bricks);
+    EXPECT_LT(shape.rows * shape.length, bricks + shape.rows) << "less than a brick in each row";
+  }
+  std::vector<BrickInput> many(8193);
+  for (int b = 0; b < 8193; ++b) {
+    many[b] = {.corner = {0, 8 * b, 0}, .values = {float(b)}, .active = {}};
+    many[b].active.set(0);
+  }
+  const SparseVolume volume = makeVolume(std::move(many), 0.0f);
+  const SparseVolume stack = stackBricks(volume);
+  EXPECT_EQ(activeBox(stack).max.y, kBrickSide) << "two rows";
+  EXPECT_EQ(unstackBricks(stack, volume.bricks, volume.origin).bricks, volume.bricks);
 }
 
 TEST(BrickStack, mayLackBricks) {
