@@ -22,6 +22,7 @@ struct Aim {
   std::function<bool(const ExternalStep&)> sufficient;  ///< may the search end with this trial?
   std::function<bool(const ExternalStep&, const ExternalStep&)> better;
   bool measuresAll = false;  ///< whether the PSNR of trials that are not allowed matters
+  bool active = false;       ///< whether the PSNR is that over the active voxels
 };
 
 class Search {
@@ -64,7 +65,10 @@ class Search {
 
   double psnr() {
     const ExternalSource& source = codec_.source();
-    return psnrOverBox(source.volume, codec_.decode(), {.box = source.box, .peak = source.peak});
+    const CompareOptions options{.box = source.box, .peak = source.peak};
+    const SparseVolume decoded = codec_.decode();
+    return aim_.active ? compareVolumes(source.volume, decoded, options).psnrActive
+                       : psnrOverBox(source.volume, decoded, options);
   }
 
   ExternalCodec& codec_;
@@ -86,13 +90,15 @@ ExternalMatch matchSize(ExternalCodec& codec, std::uint64_t bytes) {
   return Search(codec, aim).run();
 }
 
-ExternalMatch matchPsnr(ExternalCodec& codec, double psnr) {
+ExternalMatch matchPsnr(ExternalCodec& codec, const MatchGoal& goal) {
   using Step = ExternalStep;
+  const double psnr = goal.psnr;
   const Aim aim{.allowed = [=](const Step& s) { return s.psnr >= psnr; },
                 .tooFine = [=](const Step& s) { return s.psnr >= psnr; },
                 .sufficient = [=](const Step& s) { return s.psnr <= psnr + kSufficientExcess; },
                 .better = [](const Step& a, const Step& b) { return a.bytes < b.bytes; },
-                .measuresAll = true};
+                .measuresAll = true,
+                .active = goal.active};
   return Search(codec, aim).run();
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "compare/external_command.h"
+#include "esvr/baseline.h"
 
 namespace esvr::compare {
 
@@ -12,7 +13,7 @@ namespace esvr::compare {
 struct ExternalStep {
   double bound = 0.0;
   std::uint64_t bytes = 0;
-  double psnr = 0.0;  ///< dB over the box; NaN if the search did not need it
+  double psnr = 0.0;  ///< dB over the voxels of the search; NaN if it did not need it
 };
 
 struct ExternalMatch {
@@ -28,7 +29,7 @@ struct ExternalMatch {
 
 /// Searches the bound with the fewest bytes that reaches a PSNR, in the same way; the bisection
 /// ends at a file that exceeds the PSNR by at most 0.05 dB.
-/// \param psnr  dB over the box
-[[nodiscard]] ExternalMatch matchPsnr(ExternalCodec& codec, double psnr);
+/// MatchGoal::dropsVoxels has no meaning here.
+[[nodiscard]] ExternalMatch matchPsnr(ExternalCodec& codec, const MatchGoal& goal);
 
 }  // namespace esvr::compare

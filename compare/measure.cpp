@@ -126,7 +126,14 @@ std::string wordOf(const FitWish& wish) {
 }
 
 std::string sizeGroup(std::uint64_t bytes) { return "at " + std::to_string(bytes) + " bytes"; }
-std::string psnrGroup(double psnr) { return "at " + cli::decibels(psnr) + " dB"; }
+std::string psnrGroup(const MatchGoal& goal) {
+  return "at " + cli::decibels(goal.psnr) + (goal.active ? " dB over active voxels" : " dB");
+}
+
+/// The PSNR of a file of ESVR, beside which a row of the same PSNR over the box stands.
+std::optional<double> psnrOverBoxOf(const MatchGoal& goal) {
+  return goal.active ? std::nullopt : std::optional(goal.psnr);
+}
 
 std::uint64_t bytesOf(const GridFile& file, const std::filesystem::path& path, std::size_t grid) {
   return file.grids().size() == 1 ? file.bytes() : cli::storedBytes(inspectEsvr(path), grid);
@@ -137,8 +144,9 @@ std::uint64_t bytesOf(const GridFile& file, const std::filesystem::path& path, s
 std::string displayName(const BaselineSetting& setting) {
   if (const auto* packing = std::get_if<VoxelPacking>(&setting.how))
     return std::string(nameOf(packing->form)) + nameOf(packing->codec);
-  return std::get<ZfpSetting>(setting.how).mode == ZfpMode::kAccuracy ? "ZFP accuracy"
-                                                                      : "ZFP precision";
+  const auto& zfp = std::get<ZfpSetting>(setting.how);
+  const std::string name = zfp.mode == ZfpMode::kAccuracy ? "ZFP accuracy" : "ZFP precision";
+  return zfp.bricks ? name + " of bricks" : name;
 }
 
 RowMaker::RowMaker(const TableScene& scene)
@@ -224,9 +232,9 @@ TableRow RowMaker::sizeMatched(const BaselineSetting& like, std::uint64_t bytes)
   return row;
 }
 
-TableRow RowMaker::psnrMatched(const BaselineSetting& like, double psnr) {
-  TableRow row = matched(like, psnrGroup(psnr), [&] { return matchPsnr(encoder_, like, psnr); });
-  row.matchedPsnr = psnr;
+TableRow RowMaker::psnrMatched(const BaselineSetting& like, const MatchGoal& goal) {
+  TableRow row = matched(like, psnrGroup(goal), [&] { return matchPsnr(encoder_, like, goal); });
+  row.matchedPsnr = psnrOverBoxOf(goal);
   return row;
 }
 
@@ -290,9 +298,11 @@ TableRow RowMaker::sizeMatched(const ExternalCommand& external, std::uint64_t by
                  [=](ExternalCodec& codec) { return matchSize(codec, bytes); });
 }
 
-TableRow RowMaker::psnrMatched(const ExternalCommand& external, double psnr) {
-  return matched(external, {.name = external.name, .group = psnrGroup(psnr), .matchedPsnr = psnr},
-                 [=](ExternalCodec& codec) { return matchPsnr(codec, psnr); });
+TableRow RowMaker::psnrMatched(const ExternalCommand& external, const MatchGoal& goal) {
+  return matched(
+      external,
+      {.name = external.name, .group = psnrGroup(goal), .matchedPsnr = psnrOverBoxOf(goal)},
+      [=](ExternalCodec& codec) { return matchPsnr(codec, goal); });
 }
 
 void RowMaker::measureEsvr(const std::filesystem::path& path, TableRow& row) {

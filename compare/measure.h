@@ -41,11 +41,11 @@ class RowMaker {
                     const std::string& name);
   /// Searches the best setting of the form of `like` for a size or a PSNR.
   TableRow sizeMatched(const BaselineSetting& like, std::uint64_t bytes);
-  TableRow psnrMatched(const BaselineSetting& like, double psnr);
+  TableRow psnrMatched(const BaselineSetting& like, const MatchGoal& goal);
   TableRow external(const External& external);
   /// Searches the best bound of an external command for a size or a PSNR.
   TableRow sizeMatched(const ExternalCommand& command, std::uint64_t bytes);
-  TableRow psnrMatched(const ExternalCommand& command, double psnr);
+  TableRow psnrMatched(const ExternalCommand& command, const MatchGoal& goal);
   /// \throws BadInput  the candidate does not have the grid, or its voxels lie elsewhere
   TableRow candidate(const std::filesystem::path& path);
   /// Fits ellipsoids.

@@ -14,7 +14,9 @@ BaselineSetting packed(PackedForm form, PackedCodec codec, double tolerance = 0.
   return {.how = VoxelPacking{form, codec, tolerance}};
 }
 
-BaselineSetting zfp(ZfpMode mode) { return {.how = ZfpSetting{mode, 0.0}}; }
+BaselineSetting zfp(ZfpMode mode, bool bricks = false) {
+  return {.how = ZfpSetting{mode, 0.0, bricks}};
+}
 
 }  // namespace
 
@@ -68,6 +70,18 @@ std::vector<BaselineSetting> psnrForms(const TableOptions& options) {
   if (options.zfp && !zfpVersion().empty()) {
     forms.push_back(zfp(ZfpMode::kAccuracy));
     forms.push_back(zfp(ZfpMode::kPrecision));
+  }
+  return forms;
+}
+
+std::vector<BaselineSetting> activePsnrForms(const TableOptions& options) {
+  std::vector<BaselineSetting> forms;
+  if (!options.settings.empty()) return forms;
+  if (options.matched)
+    forms = {packed(PackedForm::kNanoFpN, kZip), packed(PackedForm::kNanoFp4, kZip)};
+  if (options.zfp && !zfpVersion().empty()) {
+    forms.push_back(zfp(ZfpMode::kAccuracy));
+    forms.push_back(zfp(ZfpMode::kAccuracy, true));
   }
   return forms;
 }

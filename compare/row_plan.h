@@ -25,5 +25,7 @@ struct NamedSetting {
 /// the baselines.
 [[nodiscard]] std::vector<BaselineSetting> sizeForms(const TableOptions& options);
 [[nodiscard]] std::vector<BaselineSetting> psnrForms(const TableOptions& options);
+/// Forms that are matched to a PSNR over the active voxels.
+[[nodiscard]] std::vector<BaselineSetting> activePsnrForms(const TableOptions& options);
 
 }  // namespace esvr::compare

@@ -77,8 +77,14 @@ class TableRun {
       for (const auto& command : options_.commands) add(maker_.sizeMatched(command, bytes));
     }
     for (const double psnr : psnrs) {
-      for (const auto& form : psnrForms(options_)) add(maker_.psnrMatched(form, psnr));
-      for (const auto& command : options_.commands) add(maker_.psnrMatched(command, psnr));
+      const MatchGoal goal{.psnr = psnr};
+      for (const auto& form : psnrForms(options_)) add(maker_.psnrMatched(form, goal));
+      for (const auto& command : options_.commands) add(maker_.psnrMatched(command, goal));
+    }
+    for (const double psnr : options_.psnrs) {
+      const MatchGoal goal{.psnr = psnr, .active = true, .dropsVoxels = true};
+      for (const auto& form : activePsnrForms(options_)) add(maker_.psnrMatched(form, goal));
+      for (const auto& command : options_.commands) add(maker_.psnrMatched(command, goal));
     }
   }
 

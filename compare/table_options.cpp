@@ -17,6 +17,7 @@ using cli::po::value;
 using Words = std::vector<std::string>;
 
 constexpr int kMaxRuns = 1000;
+constexpr double kMaxPsnr = 200.0;  // dB, more than rounding to floats leaves
 
 cli::ProgramText programText() {
   return {
@@ -73,6 +74,9 @@ cli::CommandLine makeCommandLine() {
      "use this baseline instead of --rows; the command of a row has its SETTING; may be repeated")
     ("size", value<Words>()->value_name("BYTES")->composing(),
      "also search for the best baselines of this size; may be repeated")
+    ("psnr-active", value<std::vector<double>>()->value_name("DB")->composing(),
+     "also search for the smallest baselines that reach this PSNR over the active voxels, some of "
+     "which may drop voxels near the background; may be repeated")
     ("fit", value<Words>()->value_name("BYTES")->composing(),
      "fit ellipsoids for a file of this size; --fit default fits with the default options, "
      "--fit paper by the paper's method; may be repeated")
@@ -127,6 +131,8 @@ void readRows(const Arguments& a, TableOptions& options) {
 void readSizes(const Arguments& a, TableOptions& options) {
   for (const auto& text : a.find<Words>("size").value_or(Words{}))
     options.sizes.push_back(cli::parseByteSize("size", text));
+  options.psnrs = a.find<std::vector<double>>("psnr-active").value_or(options.psnrs);
+  for (const double psnr : options.psnrs) cli::requireRange("psnr-active", psnr, 0.0, kMaxPsnr);
   for (const auto& text : a.find<Words>("fit").value_or(Words{})) {
     if (text == "default")
       options.fitDefault = true;
@@ -142,9 +148,11 @@ void readCommands(const Arguments& a, TableOptions& options) {
   for (const auto& text : a.find<Words>("external-command").value_or(Words{}))
     options.commands.push_back(parseExternalCommand(text));
   const bool hasAim = !options.candidates.empty() || !options.sizes.empty() ||
-                      !options.fits.empty() || options.fitDefault || options.fitPaper;
+                      !options.psnrs.empty() || !options.fits.empty() || options.fitDefault ||
+                      options.fitPaper;
   if (!options.commands.empty() && !hasAim)
-    throw UsageError("--external-command needs a size or a PSNR to match: CAND, --size or --fit");
+    throw UsageError(
+        "--external-command needs a size or a PSNR to match: CAND, --size, --psnr-active or --fit");
 }
 
 /// Reads a text like "viridis" or "viridis:tent".

@@ -146,13 +146,14 @@ std::vector<Key> densifyKeys(const PaperMethod& m) {
 std::vector<Key> pruneKeys(const PaperMethod& m) {
   return {
       {"prune-score", "full",
-       "full (coverage * intensity * FA), no-fa, only-fa, or contribution (the score of\n"
-       "LightGaussian)",
+       "full (coverage * intensity * FA), no-fa, only-fa, contribution (sum of values), or\n"
+       "rays (the score of LightGaussian: light and opacity over the rays of 360 views)",
        [](const Setting& s, PaperMethod& p) {
          p.score = wordOf<PruneScore>(s, {{"full", PruneScore::kFull},
                                           {"no-fa", PruneScore::kWithoutFa},
                                           {"only-fa", PruneScore::kOnlyFa},
-                                          {"contribution", PruneScore::kContribution}});
+                                          {"contribution", PruneScore::kContribution},
+                                          {"rays", PruneScore::kRays}});
        }},
       {"prune-share", text(m.prunes.front().share), "share of the ellipsoids that a pass removes",
        [](const Setting& s, PaperMethod& p) {

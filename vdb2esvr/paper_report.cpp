@@ -15,6 +15,8 @@ const char* nameOf(PruneScore score) {
       return "only-fa";
     case PruneScore::kContribution:
       return "contribution";
+    case PruneScore::kRays:
+      return "rays";
     case PruneScore::kFull:
       break;
   }

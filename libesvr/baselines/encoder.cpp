@@ -3,6 +3,7 @@
 #include <span>
 #include <utility>
 
+#include "baselines/brick_stack.h"
 #include "baselines/dense_box.h"
 #include "baselines/drop_voxels.h"
 #include "baselines/zfp_codec.h"
@@ -22,6 +23,20 @@ void writeBytes(const std::filesystem::path& path, std::span<const std::byte> by
   if (!stream) throw RuntimeFailure("cannot write " + path.string());
 }
 
+/// The voxels as an array for ZFP: those of a box, or the bricks side by side.
+struct ZfpArray {
+  DenseBox dense;
+  bool bricks = false;
+};
+
+ZfpArray arrayFor(const ZfpSetting& setting, const BaselineSource& source) {
+  const SparseVolume& volume = source.grid.volume;
+  if (!setting.bricks) return {baselines::densify(volume, source.box, source.maxDenseBytes)};
+  const SparseVolume stack = baselines::stackBricks(volume);
+  const Box box = baselines::stackShape(stack.brickCount()).box();
+  return {baselines::densify(stack, box, source.maxDenseBytes), true};
+}
+
 std::vector<std::byte> readBytes(const std::filesystem::path& path) {
   std::vector<std::byte> bytes(std::filesystem::file_size(path));
   std::ifstream stream(path, std::ios::binary);
@@ -32,7 +47,7 @@ std::vector<std::byte> readBytes(const std::filesystem::path& path) {
 
 }  // namespace
 
-/// Data that several settings share: the OpenVDB grid of the last threshold, and the array for ZFP.
+/// Data that several settings share: the OpenVDB grid of the last threshold, and ZFP's array.
 /// Each is made when it is first needed.
 struct BaselineEncoder::State {
   explicit State(const BaselineSource& s) : source(s) {}
@@ -40,7 +55,7 @@ struct BaselineEncoder::State {
   BaselineSource source;
   std::optional<double> packedThreshold;
   std::unique_ptr<VoxelPacker> packer;
-  std::optional<DenseBox> dense;
+  std::optional<ZfpArray> array;
   BaselineSetting last;
 
   [[nodiscard]] std::filesystem::path file() const {
@@ -58,13 +73,28 @@ struct BaselineEncoder::State {
     return *packer;
   }
   double encodeZfp(const ZfpSetting& setting) {
-    if (!dense) dense = baselines::densify(source.grid.volume, source.box, source.maxDenseBytes);
+    if (!array || array->bricks != setting.bricks) array = arrayFor(setting, source);
     return secondsOf([&] {
-      writeBytes(file(), baselines::compressZfp(*dense, setting, source.grid.descriptor.name));
+      std::vector<std::byte> bytes;
+      if (array->bricks) bytes = baselines::encodeBricks(source.grid.volume.bricks);
+      const auto stream =
+          baselines::compressZfp(array->dense, setting, source.grid.descriptor.name);
+      bytes.insert(bytes.end(), stream.begin(), stream.end());
+      writeBytes(file(), bytes);
     });
   }
-  void decodeZfp(DenseBox& into) const {
-    baselines::decompressZfp(readBytes(file()), file(), into);
+  struct ZfpVoxels {
+    DenseBox dense;
+    std::vector<Coord> bricks;  ///< empty for the voxels of a box
+  };
+  [[nodiscard]] ZfpVoxels emptyVoxels() const {
+    return {{array->dense.box, std::vector<float>(array->dense.values.size())}, {}};
+  }
+  void decodeZfp(ZfpVoxels& into) const {
+    const auto all = readBytes(file());
+    std::span<const std::byte> bytes = all;
+    if (array->bricks) into.bricks = baselines::decodeBricks(bytes);
+    baselines::decompressZfp(bytes, file(), into.dense);
   }
 };
 
@@ -94,8 +124,8 @@ BaselineEncoder::Encoded BaselineEncoder::encode(const BaselineSetting& setting)
 double BaselineEncoder::secondsToDecode() const {
   if (const auto* packing = std::get_if<VoxelPacking>(&state_->last.how))
     return secondsToRead(state_->file(), packing->form);
-  DenseBox dense{state_->dense->box, std::vector<float>(state_->dense->values.size())};
-  return secondsOf([&] { state_->decodeZfp(dense); });
+  auto voxels = state_->emptyVoxels();
+  return secondsOf([&] { state_->decodeZfp(voxels); });
 }
 
 SparseVolume BaselineEncoder::decode() const {
@@ -103,10 +133,13 @@ SparseVolume BaselineEncoder::decode() const {
     const auto name = inspectVdb(state_->file()).grids.front().uniqueName;
     return readGrid(state_->file(), name, {.allowEmpty = true}).volume;
   }
-  DenseBox dense{state_->dense->box, std::vector<float>(state_->dense->values.size())};
-  state_->decodeZfp(dense);
+  auto voxels = state_->emptyVoxels();
+  state_->decodeZfp(voxels);
   const SparseVolume& source = state_->source.grid.volume;
-  return baselines::sparsify(dense, source.background, baselines::activityThreshold(source));
+  const SparseVolume volume =
+      baselines::sparsify(voxels.dense, source.background, baselines::activityThreshold(source));
+  if (voxels.bricks.empty()) return volume;
+  return baselines::unstackBricks(volume, voxels.bricks, source.origin);
 }
 
 }  // namespace esvr

@@ -31,7 +31,8 @@ constexpr int kAccuracySteps = 40;  // number of accuracies, which are powers of
 /// Tries settings and keeps the best result.
 class Search {
  public:
-  explicit Search(BaselineEncoder& encoder) : encoder_(encoder) {}
+  explicit Search(BaselineEncoder& encoder, bool active = false)
+      : encoder_(encoder), active_(active) {}
 
   /// Encodes with a setting. \return the bytes
   std::uint64_t tryBytes(const BaselineSetting& setting) {
@@ -41,8 +42,12 @@ class Search {
   /// Measures the PSNR of the last setting.
   double measure() {
     const BaselineSource& source = encoder_.source();
-    return match_.steps.back().psnr = psnrOverBox(source.grid.volume, encoder_.decode(),
-                                                  {.box = source.box, .peak = source.peak});
+    const CompareOptions options{.box = source.box, .peak = source.peak};
+    const SparseVolume decoded = encoder_.decode();
+    const SparseVolume& reference = source.grid.volume;
+    return match_.steps.back().psnr = active_
+                                          ? compareVolumes(reference, decoded, options).psnrActive
+                                          : psnrOverBox(reference, decoded, options);
   }
   const MatchStep& last() const { return match_.steps.back(); }
 
@@ -51,6 +56,9 @@ class Search {
   }
   void keepIfSmaller() {
     if (!match_.found || last().bytes < match_.best.bytes) keep();
+  }
+  [[nodiscard]] std::uint64_t bestBytes() const {
+    return match_.found ? match_.best.bytes : std::numeric_limits<std::uint64_t>::max();
   }
   [[nodiscard]] double bestPsnr() const {
     return match_.found ? match_.best.psnr : -std::numeric_limits<double>::infinity();
@@ -65,6 +73,7 @@ class Search {
   }
 
   BaselineEncoder& encoder_;
+  bool active_;  ///< whether the PSNR is that over the active voxels
   Match match_;
 };
 
@@ -113,29 +122,31 @@ void matchToleranceAndThreshold(Search& search, const BaselineSetting& like,
 }
 
 /// ZFP's settings of a mode, from coarse to fine.
-std::vector<BaselineSetting> ladder(ZfpMode mode, double peak) {
+std::vector<BaselineSetting> ladder(ZfpSetting zfp, double peak) {
   std::vector<BaselineSetting> settings;
-  if (mode == ZfpMode::kPrecision) {
-    for (unsigned planes = 1; planes <= baselines::kMaxZfpPlanes; ++planes)
-      settings.push_back({.how = ZfpSetting{mode, double(planes)}});
+  const auto add = [&](double amount) {
+    zfp.amount = amount;
+    settings.push_back({.how = zfp});
+  };
+  if (zfp.mode == ZfpMode::kPrecision) {
+    for (unsigned planes = 1; planes <= baselines::kMaxZfpPlanes; ++planes) add(planes);
     return settings;
   }
   const int first = std::ilogb(peak) + 3;  // above the peak, since ZFP's errors are below its bound
-  for (int i = 0; i < kAccuracySteps; ++i)
-    settings.push_back({.how = ZfpSetting{mode, std::ldexp(1.0, first - i)}});
+  for (int i = 0; i < kAccuracySteps; ++i) add(std::ldexp(1.0, first - i));
   return settings;
 }
 
-void matchZfpSize(Search& search, ZfpMode mode, std::uint64_t bytes) {
-  for (const auto& setting : ladder(mode, search.source().peak)) {
+void matchZfpSize(Search& search, const ZfpSetting& zfp, std::uint64_t bytes) {
+  for (const auto& setting : ladder(zfp, search.source().peak)) {
     if (search.tryBytes(setting) > bytes) return;
     search.measure();
     search.keepIfCloser();
   }
 }
 
-void matchZfpPsnr(Search& search, ZfpMode mode, double psnr) {
-  for (const auto& setting : ladder(mode, search.source().peak)) {
+void matchZfpPsnr(Search& search, const ZfpSetting& zfp, double psnr) {
+  for (const auto& setting : ladder(zfp, search.source().peak)) {
     search.tryBytes(setting);
     if (search.measure() < psnr) continue;
     search.keepIfSmaller();
@@ -158,12 +169,61 @@ void matchTolerance(Search& search, BaselineSetting setting, double psnr) {
   }
 }
 
+/// Searches the highest threshold that reaches a PSNR, by bisection over the distinct deviations.
+/// \return false if the PSNR is not reached without a threshold
+bool matchThresholdToPsnr(Search& search, BaselineSetting setting,
+                          std::span<const float> thresholds, double psnr) {
+  constexpr double kSufficientExcess = 0.05;  // dB
+  const auto reached = [&](double threshold) {
+    setting.threshold = threshold;
+    search.tryBytes(setting);
+    if (search.measure() < psnr) return false;
+    search.keepIfSmaller();
+    return true;
+  };
+  if (!reached(0.0)) return false;
+  std::size_t low = 0, high = thresholds.size();  // the last threshold would drop all voxels
+  for (int i = 0; i < kMaxBisections && low + 1 < high; ++i) {
+    const std::size_t middle = low + (high - low) / 2;
+    const bool isReached = reached(thresholds[middle - 1]);
+    (isReached ? low : high) = middle;
+    if (isReached && search.last().psnr <= psnr + kSufficientExcess) break;
+  }
+  return true;
+}
+
+/// Tries FpN's tolerances from coarse to fine, each with the highest threshold.
+void matchToleranceAndThresholdToPsnr(Search& search, BaselineSetting setting,
+                                      std::span<const float> thresholds, double psnr) {
+  int worse = 0;
+  for (const double share : kTolerances) {
+    std::get<VoxelPacking>(setting.how).tolerance = share * search.source().peak;
+    const std::uint64_t before = search.bestBytes();
+    if (!matchThresholdToPsnr(search, setting, thresholds, psnr)) continue;
+    worse = search.bestBytes() < before ? 0 : worse + 1;
+    if (worse == kMaxWorseTolerances) return;
+  }
+}
+
+void matchPackingToPsnr(Search& search, const BaselineSetting& like, const MatchGoal& goal) {
+  const bool hasTolerance = std::get<VoxelPacking>(like.how).form == PackedForm::kNanoFpN;
+  if (!hasTolerance && !goal.dropsVoxels)
+    throw UsageError("only FpN and ZFP have a setting that can be matched to a PSNR");
+  if (hasTolerance) matchTolerance(search, like, goal.psnr);
+  if (!goal.dropsVoxels) return;
+  const auto thresholds = baselines::thresholds(search.source().grid);
+  if (hasTolerance)
+    matchToleranceAndThresholdToPsnr(search, like, thresholds, goal.psnr);
+  else
+    (void)matchThresholdToPsnr(search, like, thresholds, goal.psnr);
+}
+
 }  // namespace
 
 Match matchSize(BaselineEncoder& encoder, const BaselineSetting& like, std::uint64_t bytes) {
   Search search(encoder);
   if (const auto* zfp = std::get_if<ZfpSetting>(&like.how)) {
-    matchZfpSize(search, zfp->mode, bytes);
+    matchZfpSize(search, *zfp, bytes);
     return search.take();
   }
   const auto thresholds = baselines::thresholds(encoder.source().grid);
@@ -174,14 +234,12 @@ Match matchSize(BaselineEncoder& encoder, const BaselineSetting& like, std::uint
   return search.take();
 }
 
-Match matchPsnr(BaselineEncoder& encoder, const BaselineSetting& like, double psnr) {
-  Search search(encoder);
+Match matchPsnr(BaselineEncoder& encoder, const BaselineSetting& like, const MatchGoal& goal) {
+  Search search(encoder, goal.active);
   if (const auto* zfp = std::get_if<ZfpSetting>(&like.how))
-    matchZfpPsnr(search, zfp->mode, psnr);
-  else if (std::get<VoxelPacking>(like.how).form == PackedForm::kNanoFpN)
-    matchTolerance(search, like, psnr);
+    matchZfpPsnr(search, *zfp, goal.psnr);
   else
-    throw UsageError("only FpN and ZFP have a setting that can be matched to a PSNR");
+    matchPackingToPsnr(search, like, goal);
   return search.take();
 }
 

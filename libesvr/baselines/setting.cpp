@@ -31,8 +31,9 @@ constexpr std::array kCodecs{CodecWord{"-zip", PackedCodec::kZip},
                              CodecWord{"-blosc", PackedCodec::kBlosc},
                              CodecWord{"", PackedCodec::kNone}};
 
-constexpr const char *kZfp = "zfp", *kAccuracy = "accuracy", *kPrecision = "precision",
-                     *kTolerance = "tolerance", *kThreshold = "threshold";
+constexpr const char *kZfp = "zfp", *kZfpBricks = "zfp-bricks", *kAccuracy = "accuracy",
+                     *kPrecision = "precision", *kTolerance = "tolerance",
+                     *kThreshold = "threshold";
 
 /// The shortest text that represents the same number.
 std::string exactText(double value) {
@@ -77,9 +78,9 @@ void applyParameter(const std::string& text, const std::string& key, double valu
   else if (packing && packing->form == PackedForm::kNanoFpN && key == kTolerance)
     packing->tolerance = value;
   else if (zfp && key == kAccuracy)
-    *zfp = {ZfpMode::kAccuracy, value};
+    *zfp = {ZfpMode::kAccuracy, value, zfp->bricks};
   else if (zfp && key == kPrecision)
-    *zfp = {ZfpMode::kPrecision, value};
+    *zfp = {ZfpMode::kPrecision, value, zfp->bricks};
   else
     refuse(text, "it takes no " + key);
 }
@@ -111,21 +112,23 @@ std::string parameters(const BaselineSetting& setting) {
 }  // namespace
 
 std::string toString(const BaselineSetting& setting) {
-  const auto* packing = std::get_if<VoxelPacking>(&setting.how);
-  return (packing ? wordsOf(*packing) : kZfp) + parameters(setting);
+  if (const auto* packing = std::get_if<VoxelPacking>(&setting.how))
+    return wordsOf(*packing) + parameters(setting);
+  const bool bricks = std::get<ZfpSetting>(setting.how).bricks;
+  return (bricks ? kZfpBricks : kZfp) + parameters(setting);
 }
 
 BaselineSetting parseBaseline(const std::string& text) {
   const auto parts = splitText(text, ',');
   BaselineSetting setting;
-  if (parts.front() == kZfp)
-    setting.how = ZfpSetting{};
+  if (parts.front() == kZfp || parts.front() == kZfpBricks)
+    setting.how = ZfpSetting{.bricks = parts.front() == kZfpBricks};
   else if (const auto packing = packingOf(parts.front()))
     setting.how = *packing;
   else
     refuse(text,
            "it begins with vdb-float, vdb-half, nvdb-float, nvdb-fp16, nvdb-fp8, nvdb-fp4 or "
-           "nvdb-fpn, with -zip or -blosc, or with zfp");
+           "nvdb-fpn, with -zip or -blosc, or with zfp or zfp-bricks");
   for (const auto& part : std::span(parts).subspan(1)) {
     const std::size_t equals = std::min(part.find('='), part.size());
     const std::string number = part.substr(std::min(equals + 1, part.size()));

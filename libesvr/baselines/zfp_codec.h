@@ -16,7 +16,8 @@ inline constexpr unsigned kMaxZfpPlanes = 32;  ///< bit planes of a float
 
 /// Compresses an array to a ZFP stream with a header.
 /// \param grid  name of the array's grid, for messages
-/// \throws UsageError  the precision is out of range, or the build has no ZFP
+/// \throws UsageError  the precision is out of range, the box has more than 65,536 voxels along an
+///                     axis, or the build has no ZFP
 [[nodiscard]] std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& setting,
                                                  const std::string& grid);
 

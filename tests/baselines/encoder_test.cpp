@@ -74,6 +74,9 @@ TEST_F(Encoder, keepsZfpWithinItsAccuracy) {
   encoder_.encode(parseBaseline("zfp,accuracy=0.0625"));
   EXPECT_GT(encoder_.secondsToDecode(), 0.0);
   EXPECT_LE(compareVolumes(grid_.volume, encoder_.decode()).maxError, 0.0625);
+  encoder_.encode(parseBaseline("zfp-bricks,accuracy=0.0625"));
+  EXPECT_GT(encoder_.secondsToDecode(), 0.0);
+  EXPECT_LE(compareVolumes(grid_.volume, encoder_.decode()).maxError, 0.0625);
   const auto fine = encoder_.encode(parseBaseline("zfp,precision=30"));
   EXPECT_LT(compareVolumes(grid_.volume, encoder_.decode()).maxError, 1e-6);
   EXPECT_GT(fine.bytes, encoder_.encode(parseBaseline("zfp,precision=4")).bytes);

@@ -9,6 +9,7 @@
 #include "baselines/grids.h"
 #include "esvr/baseline.h"
 #include "esvr/error.h"
+#include "esvr/metrics.h"
 #include "vdb/test_files.h"
 
 namespace esvr {
@@ -71,7 +72,7 @@ TEST_F(Matching, looksForFpNsBestTolerance) {
 }
 
 TEST_F(Matching, reachesAPsnrWithFpN) {
-  const Match match = matchPsnr(encoder_, parseBaseline("nvdb-fpn-zip,tolerance=1"), 45.0);
+  const Match match = matchPsnr(encoder_, parseBaseline("nvdb-fpn-zip,tolerance=1"), {45.0});
   ASSERT_TRUE(match.found);
   EXPECT_GE(match.best.psnr, 45.0);
   for (const auto& step : match.steps) {
@@ -82,19 +83,54 @@ TEST_F(Matching, reachesAPsnrWithFpN) {
 
 TEST_F(Matching, matchesSizeAndPsnrWithZfp) {
   if (zfpVersion().empty()) GTEST_SKIP() << "built without ZFP";
-  for (const char* like : {"zfp,accuracy=1", "zfp,precision=1"}) {
+  for (const char* like : {"zfp,accuracy=1", "zfp,precision=1", "zfp-bricks,accuracy=1"}) {
     const Match size = matchSize(encoder_, parseBaseline(like), 6000);
     ASSERT_TRUE(size.found) << like;
     EXPECT_LE(size.best.bytes, 6000u);
     expectBestOfSteps(size);
-    const Match psnr = matchPsnr(encoder_, parseBaseline(like), 45.0);
+    const Match psnr = matchPsnr(encoder_, parseBaseline(like), {45.0});
     ASSERT_TRUE(psnr.found) << like;
     EXPECT_GE(psnr.best.psnr, 45.0);
   }
 }
 
+TEST_F(Matching, dropsVoxelsDownToAPsnrOverTheActiveVoxels) {
+  const MatchGoal goal{.psnr = 22.0, .active = true, .dropsVoxels = true};
+  const Match match = matchPsnr(encoder_, parseBaseline("nvdb-fp4-zip"), goal);
+  ASSERT_TRUE(match.found);
+  EXPECT_GT(match.best.setting.threshold, 0.0);
+  encoder_.encode(match.best.setting);
+  const auto metrics = compareVolumes(grid_.volume, encoder_.decode());
+  EXPECT_EQ(metrics.psnrActive, match.best.psnr) << "not that over the box";
+  EXPECT_GE(match.best.psnr, goal.psnr);
+  // The values of the ball are multiples of 1/144, of which at most two in a row are missing, as
+  // those of r^2 = 111 and 112, which are no sums of three squares.
+  auto next = match.best.setting;
+  next.threshold += 3.01 / 144;
+  encoder_.encode(next);
+  EXPECT_LT(compareVolumes(grid_.volume, encoder_.decode()).psnrActive, goal.psnr);
+}
+
+TEST_F(Matching, triesTolerancesWithThresholds) {
+  const auto like = parseBaseline("nvdb-fpn-zip,tolerance=1");
+  MatchGoal goal{.psnr = 22.0, .active = true};
+  const Match all = matchPsnr(encoder_, like, goal);
+  goal.dropsVoxels = true;
+  const Match some = matchPsnr(encoder_, like, goal);
+  ASSERT_TRUE(all.found && some.found);
+  EXPECT_LE(some.best.bytes, all.best.bytes);
+  EXPECT_GE(some.best.psnr, goal.psnr);
+  const auto hasThreshold = [](const MatchStep& step) { return step.setting.threshold > 0.0; };
+  EXPECT_TRUE(std::ranges::any_of(some.steps, hasThreshold));
+}
+
+TEST_F(Matching, findsNoThresholdWhereAllVoxelsAreTooCoarse) {
+  const MatchGoal goal{.psnr = 90.0, .active = true, .dropsVoxels = true};
+  EXPECT_FALSE(matchPsnr(encoder_, parseBaseline("nvdb-fp4-zip"), goal).found);
+}
+
 TEST_F(Matching, knowsNoPsnrOfOtherForms) {
-  EXPECT_THROW((void)matchPsnr(encoder_, parseBaseline("vdb-half-blosc"), 40.0), UsageError);
+  EXPECT_THROW((void)matchPsnr(encoder_, parseBaseline("vdb-half-blosc"), {40.0}), UsageError);
 }
 
 TEST_F(Matching, stopsWhenCancelled) {

@@ -22,7 +22,7 @@ INSTANTIATE_TEST_SUITE_P(All, SettingText,
                                          "nvdb-fp4,threshold=0.125",
                                          "nvdb-fpn-zip,tolerance=0.1,threshold=0.3",
                                          "nvdb-fpn,tolerance=1e-30", "zfp,accuracy=0.25",
-                                         "zfp,precision=6"));
+                                         "zfp-bricks,accuracy=0.25", "zfp,precision=6"));
 
 TEST(Setting, keepsAllDigits) {
   const double third = 1.0 / 3.0;

@@ -8,8 +8,8 @@
 
 The first three print the commands that they run; --dry-run prints them only, and --only names documents. Between `gpu`
 and `cpu`, OUT and the folder docs go from one machine to the other. A command that fails does not stop the others,
-and the exit code is then 1. `pages` writes the tables of resolution.md and of the paper's method to OUT, because their
-documents have text around them.
+and the exit code is then 1. `pages` writes the tables of the paper's method to OUT, because their document has text
+around them. DATA/swc has the skeletons of docs/data.md, and --sz3 names the program sz3 for the page of resolutions.
 
 `agree` compares the JSON files that stability.py and economy.py keep in docs. Bytes, numbers of ellipsoids and other
 figures that do not depend on time agree within 3 %, PSNR within 0.5 dB, and largest errors within a factor of 3, as the
@@ -24,6 +24,7 @@ import sys
 
 HERE = pathlib.Path(__file__).parent
 DOCUMENTS = ["stability", "economy", "comparison", "resolution", "paper"]
+SKELETONS = (754538881, 722817260, 1734350788)  # those of docs/data.md
 SHARE, DB, FACTOR = 0.03, 0.5, 3.0
 # Keys of errors that depend on a few voxels, and of figures that are times or say where they were measured.
 ERRORS = {"max", "rms", "max_error", "share_of_bound", "cancellation", "condition"}
@@ -34,8 +35,10 @@ def commands(arguments):
     """The document, the part and the words of each command."""
     out, data = arguments.out, ["--bin", arguments.bin, "--data", arguments.data]
     machine = ["--machine", arguments.machine]
-    swc = ["--bin", arguments.bin, "--swc", pathlib.Path(arguments.data) / "swc/m207.swc",
+    swc = ["--swc", *(pathlib.Path(arguments.data) / f"swc/hemibrain_{n}.swc" for n in SKELETONS),
            "--out", out / "resolution"]
+    series = [*swc, "--bin", arguments.bin]
+    sz3 = ["--sz3", arguments.sz3] if arguments.sz3 else []
     comparison = [*data, "--out", out / "comparison"]
     bench = ["--bin", arguments.bin, *machine]
     return [
@@ -48,7 +51,8 @@ def commands(arguments):
         ("comparison", "gpu", ["comparison.py", "fit", *comparison, "--device", "cuda"]),
         ("comparison", "cpu", ["comparison.py", "rivals", *comparison]),
         ("comparison", "pages", ["comparison.py", "page", *comparison, "--page", "docs/comparison.md"]),
-        ("resolution", "gpu", ["resolution_series.py", "fit", *swc, "--device", "cuda"]),
+        ("resolution", "gpu", ["resolution_series.py", "fit", *series, "--device", "cuda"]),
+        ("resolution", "cpu", ["resolution_series.py", "rivals", *series, *sz3]),
         ("resolution", "pages", ["resolution_series.py", "page", *swc]),
         ("paper", "gpu", ["paper_tables.py", "run", *data, "--out", out / "paper", "--jobs", "5"]),
         ("paper", "pages", ["paper_tables.py", "tables", "--out", out / "paper"]),
@@ -58,7 +62,7 @@ def commands(arguments):
 
 def output_of(arguments, name, words):
     """Where a command's text goes: the tables of documents that are written by hand go to OUT."""
-    is_table = name in ("resolution", "paper") and words[0] != "check_paper_page.py"
+    is_table = name == "paper" and words[0] != "check_paper_page.py"
     return arguments.out / f"{name}.md" if is_table and arguments.what == "pages" else None
 
 
@@ -142,6 +146,7 @@ def main():
         job.add_argument("--data", type=pathlib.Path, default=pathlib.Path("DATA"))
         job.add_argument("--out", type=pathlib.Path, required=True)
         job.add_argument("--machine", default="a machine that was not described")
+        job.add_argument("--sz3", type=pathlib.Path)
         job.add_argument("--only", nargs="+", choices=DOCUMENTS, default=DOCUMENTS)
         job.add_argument("--dry-run", action="store_true")
     job = jobs.add_parser("agree")

@@ -36,6 +36,12 @@ ESVR_HD inline Ellipsoid ellipsoidOf(const PaperEllipsoid& p, const KernelKind& 
   return unit;
 }
 
+/// The constants of an ellipsoid's kernel.
+inline KernelConstants<double> constantsOf(const PaperEllipsoid& p, const KernelKind& kind) {
+  const Kernel kernel = kernelOf(kind);
+  return kernelConstants<double>(kernel, kind.learnK ? p.k : double(kernel.kappa));
+}
+
 namespace paper_math {
 
 /// The derivatives by the angles of a turn about the ellipsoid's own axes. With the generator W of

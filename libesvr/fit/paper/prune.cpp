@@ -8,14 +8,10 @@
 
 #include "field/support.h"
 #include "fit/paper/paper_math.h"
+#include "fit/paper/ray_scores.h"
 
 namespace esvr::paper {
 namespace {
-
-KernelConstants<double> constantsOf(const PaperEllipsoid& p, const KernelKind& kind) {
-  const Kernel kernel = kernelOf(kind);
-  return kernelConstants<double>(kernel, kind.learnK ? p.k : double(kernel.kappa));
-}
 
 /// The voxels of a box that a support can reach.
 Box reachOf(const Support& s, const Box& box) {
@@ -96,9 +92,12 @@ Coverage coverageOf(const PaperEllipsoid& ellipsoid, const CoverageOptions& opti
 std::vector<double> pruneScores(std::span<const PaperEllipsoid> ellipsoids, PruneScore score,
                                 const CoverageOptions& options) {
   std::vector<double> scores(ellipsoids.size());
-  tbb::parallel_for(std::size_t(0), scores.size(),
-                    [&](std::size_t i) { scores[i] = scoreOf(ellipsoids[i], score, options); });
-  if (score != PruneScore::kContribution) return scores;
+  if (score == PruneScore::kRays)
+    scores = rayContributions(ellipsoids, options);
+  else
+    tbb::parallel_for(std::size_t(0), scores.size(),
+                      [&](std::size_t i) { scores[i] = scoreOf(ellipsoids[i], score, options); });
+  if (score != PruneScore::kContribution && score != PruneScore::kRays) return scores;
   const auto factors = volumeFactors(ellipsoids);
   for (std::size_t i = 0; i < scores.size(); ++i) scores[i] *= factors[i];
   return scores;

@@ -25,6 +25,9 @@ enum class ZfpMode {
 struct ZfpSetting {
   ZfpMode mode = ZfpMode::kAccuracy;
   double amount = 0.0;
+  /// True for an array of the bricks of 8^3 voxels that exist, and their positions. Otherwise it is
+  /// an array of the whole box.
+  bool bricks = false;
 };
 
 /// Version of ZFP, for example "ZFP 1.0.0"; empty if the library was built without it.
@@ -39,7 +42,8 @@ struct BaselineSetting {
 };
 
 /// The name of a setting on a command line, without loss of digits. Examples:
-/// "nvdb-fpn-zip,tolerance=0.35,threshold=0.6", "vdb-half-blosc", "zfp,accuracy=0.25".
+/// "nvdb-fpn-zip,tolerance=0.35,threshold=0.6", "vdb-half-blosc", "zfp,accuracy=0.25",
+/// "zfp-bricks,precision=9".
 [[nodiscard]] std::string toString(const BaselineSetting& setting);
 /// The inverse of toString.
 /// \throws UsageError  the text names no setting; the message lists the possible ones
@@ -50,7 +54,7 @@ struct BaselineSource {
   Box box;                          ///< box over which PSNR is measured; ZFP stores its voxels only
   double peak = 1.0;                ///< peak value of the PSNR
   std::filesystem::path folder;     ///< folder for temporary files
-  std::uint64_t maxDenseBytes = 0;  ///< limit on the box as an array of floats; 0: no limit
+  std::uint64_t maxDenseBytes = 0;  ///< limit on ZFP's array of floats; 0: no limit
   const CancelToken* cancel = nullptr;
 };
 
@@ -88,7 +92,7 @@ class BaselineEncoder {
 struct MatchStep {
   BaselineSetting setting;
   std::uint64_t bytes = 0;
-  double psnr = 0.0;  ///< dB over the box; NaN if the search did not need it
+  double psnr = 0.0;  ///< dB over the voxels of the search; NaN if it did not need it
 };
 
 struct Match {
@@ -103,10 +107,17 @@ struct Match {
 [[nodiscard]] Match matchSize(BaselineEncoder& encoder, const BaselineSetting& like,
                               std::uint64_t bytes);
 
-/// Searches for the setting with the fewest bytes that reaches a PSNR, by varying FpN's tolerance
-/// or ZFP's amount.
-/// \param psnr  dB over the box
-/// \throws UsageError  the form has neither a tolerance nor an amount
-[[nodiscard]] Match matchPsnr(BaselineEncoder& encoder, const BaselineSetting& like, double psnr);
+/// The PSNR that a search must reach.
+struct MatchGoal {
+  double psnr = 0.0;         ///< dB
+  bool active = false;       ///< over the active voxels of the source; otherwise over the box
+  bool dropsVoxels = false;  ///< whether VDB files may drop voxels near the background
+};
+
+/// Searches for the setting with the fewest bytes that reaches a PSNR. The search varies FpN's
+/// tolerance, ZFP's amount and, where voxels may be dropped, the threshold.
+/// \throws UsageError  the form has nothing that could vary
+[[nodiscard]] Match matchPsnr(BaselineEncoder& encoder, const BaselineSetting& like,
+                              const MatchGoal& goal);
 
 }  // namespace esvr
