@@ -1,0 +1,22 @@
+"""Sparse volumes as lists of ellipsoids.
+
+    import esvr
+    volume = esvr.Volume.from_vdb("smoke.vdb")
+    grid = esvr.fit(volume, psnr=40)
+    esvr.write("smoke.esvr", [grid])
+    grid.render()                       # a picture as an array
+
+All coordinates are those of the index space: voxel (i, j, k) lies at (i, j, k), and arrays have the axes
+x, y, z.
+"""
+from . import _html
+from ._core import (BadInput, Cancelled, DeviceError, Ellipsoids, Error, File, Grid, MemoryExceeded,
+                    Metrics, TargetMissed, UsageError, Volume, __version__, compare, fit, frames,
+                    read, write)
+
+__all__ = ["BadInput", "Cancelled", "DeviceError", "Ellipsoids", "Error", "File", "Grid",
+           "MemoryExceeded", "Metrics", "TargetMissed", "UsageError", "Volume", "__version__",
+           "compare", "fit", "frames", "read", "write"]
+
+Volume._repr_html_ = _html.of_volume
+Grid._repr_html_ = _html.of_grid

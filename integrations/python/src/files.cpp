@@ -1,0 +1,126 @@
+// esvr.File, and reading and writing.
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "esvr/error.h"
+#include "esvr/sequence_file.h"
+#include "python/src/objects.h"
+
+namespace esvr::python {
+namespace {
+
+/// A grid of a file, which keeps the whole file in memory.
+Grid gridOf(const File& self, std::size_t index) {
+  return {std::shared_ptr<const StoredGrid>(self.file, &self.file->grids[index])};
+}
+
+std::vector<Grid> gridsOf(const File& self) {
+  std::vector<Grid> grids;
+  for (std::size_t g = 0; g < self.file->grids.size(); ++g) grids.push_back(gridOf(self, g));
+  return grids;
+}
+
+Grid gridNamed(const File& self, const std::string& name) {
+  std::string known;
+  for (std::size_t g = 0; g < self.file->grids.size(); ++g) {
+    const std::string& other = self.file->grids[g].descriptor.name;
+    if (other == name) return gridOf(self, g);
+    known += (known.empty() ? "" : ", ") + other;
+  }
+  throw py::key_error("there is no grid '" + name + "'; there are: " + known);
+}
+
+std::vector<std::string> carriedNames(const File& self) {
+  std::vector<std::string> names;
+  for (const auto& grid : self.file->carried) names.push_back(grid.name);
+  return names;
+}
+
+struct Part {
+  std::optional<PlainBox> box;
+  std::optional<std::size_t> ellipsoids;
+  std::optional<std::int64_t> frame;
+
+  [[nodiscard]] bool isWhole() const { return !box && !ellipsoids; }
+};
+
+EsvrFile readFrame(const std::filesystem::path& path, const Part& part) {
+  if (!part.isWhole())
+    throw UsageError(path.string() + ": frames of a sequence are read as a whole");
+  return SequenceReader(path).read(*part.frame);
+}
+
+EsvrFile readPart(const std::filesystem::path& path, const Part& part) {
+  if (part.frame) return readFrame(path, part);
+  if (holdsSequence(path))
+    throw UsageError(path.string() + ": the file holds a sequence; name a frame (esvr.frames)");
+  if (part.isWhole()) return readEsvr(path);
+  ReadPart wanted{.ellipsoids = part.ellipsoids};
+  if (part.box) wanted.box = boxOf(*part.box);
+  return readEsvrPart(path, wanted).file;
+}
+
+File read(const std::filesystem::path& path, const std::optional<PlainBox>& box,
+          const std::optional<std::size_t>& ellipsoids, const std::optional<std::int64_t>& frame) {
+  const py::gil_scoped_release release;
+  return {std::make_shared<const EsvrFile>(readPart(path, {box, ellipsoids, frame}))};
+}
+
+std::vector<std::int64_t> framesOf(const std::filesystem::path& path) {
+  const py::gil_scoped_release release;
+  std::vector<std::int64_t> numbers;
+  if (!holdsSequence(path)) return numbers;
+  for (const auto& frame : SequenceReader(path).frames()) numbers.push_back(frame.number);
+  return numbers;
+}
+
+std::uint64_t writeFile(const std::filesystem::path& path, const File& file, bool overwrite) {
+  const py::gil_scoped_release release;
+  return writeEsvr(path, *file.file, {.overwrite = overwrite});
+}
+
+std::uint64_t writeGrids(const std::filesystem::path& path, const std::vector<Grid>& grids,
+                         bool overwrite) {
+  const py::gil_scoped_release release;
+  EsvrFile file;
+  for (const Grid& grid : grids) {
+    file.grids.push_back(*grid.grid);
+    // The other grid may not be there. It only made the voxels smaller.
+    file.grids.back().reference.reset();
+  }
+  return writeEsvr(path, file, {.overwrite = overwrite});
+}
+
+std::string represented(const File& self) {
+  std::string names;
+  for (const auto& grid : self.file->grids)
+    names += (names.empty() ? "" : ", ") + grid.descriptor.name;
+  return "<esvr.File: " + (names.empty() ? "no grid" : names) + ">";
+}
+
+}  // namespace
+
+void addFiles(py::module_& module) {
+  py::class_<File>(module, "File", "The content of an .esvr file.")
+      .def_property_readonly("grids", &gridsOf, "The grids in their order (list of esvr.Grid).")
+      .def_property_readonly("carried", &carriedNames,
+                             "Names of the grids that are kept as the bytes of their .vdb file.")
+      .def("__getitem__", &gridNamed, py::arg("name"), "The first grid of a name.")
+      .def("__len__", [](const File& f) { return f.file->grids.size(); })
+      .def("__repr__", &represented);
+  module.def(
+      "read", &read, py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
+      py::arg("ellipsoids") = py::none(), py::arg("frame") = py::none(),
+      "Reads an .esvr file, or a part of it.\n\n"
+      "box selects the ellipsoids that reach ((x0, y0, z0), (x1, y1, z1)); ellipsoids is the\n"
+      "number that a level of detail should have at least; frame is one of esvr.frames(path).");
+  module.def("frames", &framesOf, py::arg("path"),
+             "The numbers of the frames of a sequence; an empty list for a file of one frame.");
+  module.def("write", &writeFile, py::arg("path"), py::arg("file"), py::kw_only(),
+             py::arg("overwrite") = false, "Writes a file. Returns the number of bytes.");
+  module.def("write", &writeGrids, py::arg("path"), py::arg("grids"), py::kw_only(),
+             py::arg("overwrite") = false, "Writes a file of these grids.");
+}
+
+}  // namespace esvr::python

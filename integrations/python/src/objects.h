@@ -1,0 +1,64 @@
+#pragma once
+/// What the classes of the Python module hold.
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "esvr/container.h"
+#include "esvr/vdb_io.h"
+
+namespace esvr::python {
+
+namespace py = pybind11;
+
+/// esvr.Volume: voxels and the other properties of their grid. It does not change after it was made.
+struct Volume {
+  std::shared_ptr<const VolumeGrid> grid;
+};
+
+/// esvr.File: the content of an .esvr file.
+struct File {
+  std::shared_ptr<const EsvrFile> file;
+};
+
+/// esvr.Grid: a grid of a file, or of a fit. Those of one file share its memory.
+struct Grid {
+  std::shared_ptr<const StoredGrid> grid;
+};
+
+using Corner = std::array<std::int32_t, 3>;
+/// A box of voxels as Python has it: its first and its last voxel.
+using PlainBox = std::array<Corner, 2>;
+
+[[nodiscard]] inline Coord coordOf(const Corner& c) { return {c[0], c[1], c[2]}; }
+[[nodiscard]] inline Box boxOf(const PlainBox& b) { return {coordOf(b[0]), coordOf(b[1])}; }
+/// None for an empty box.
+[[nodiscard]] inline std::optional<PlainBox> plainBox(const Box& b) {
+  if (b.empty()) return std::nullopt;
+  return PlainBox{{{b.min.x, b.min.y, b.min.z}, {b.max.x, b.max.y, b.max.z}}};
+}
+
+/// The name of a class of grids: "fog volume", "level set", "staggered" or "unknown".
+[[nodiscard]] const char* className(GridClass gridClass);
+
+/// The matrix from index to world coordinates, for column vectors; None for a frustum.
+[[nodiscard]] py::object matrixOf(const Transform& transform);
+
+/// The voxels of a stored grid, with the GIL released.
+/// \throws UsageError  the box is empty
+[[nodiscard]] Volume decoded(const Grid& grid, const std::optional<PlainBox>& box);
+
+// Each adds its functions and classes to the module.
+void addErrors(py::module_& module);
+void addVolume(py::module_& module);
+void addGrid(py::module_& module);
+void addFiles(py::module_& module);
+void addFit(py::module_& module);
+void addRender(py::module_& module);
+void addCompare(py::module_& module);
+
+}  // namespace esvr::python

@@ -1,0 +1,160 @@
+// esvr.Grid.render and esvr.Volume.render.
+
+#include "esvr/renderer.h"
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "python/src/interruptible.h"
+
+namespace esvr::python {
+namespace {
+
+struct Look {
+  Resolution resolution;
+  CameraWish camera;
+  std::string colors, opacity, device;
+  std::optional<std::filesystem::path> transfer;
+  std::optional<std::array<float, 2>> range;
+  double step = 1.0, opacityLength = 1.0;
+  std::optional<std::array<double, 3>> background;
+};
+
+/// What a picture needs to know of a grid or a volume.
+struct Subject {
+  Box box;
+  ValueRange range;
+  float background = 0.0f;
+  bool isLevelSet = false;
+};
+
+/// The function of esvr-render: a level set is an opaque body unless something else is asked for.
+TransferFunction transferOf(const Look& look, const Subject& subject) {
+  if (look.transfer) {
+    const TransferFunction own = readParaViewPreset(*look.transfer);
+    return look.range ? rescaled(own, {(*look.range)[0], (*look.range)[1]}) : own;
+  }
+  if (!look.range && subject.isLevelSet && subject.background > 0.0f)
+    return levelSetSurface(double(subject.background));
+  ValueRange range = subject.range;
+  range.expand(subject.background);
+  if (look.range) range = {(*look.range)[0], (*look.range)[1]};
+  return rescaled({builtInColorMap(look.colors), builtInOpacity(look.opacity)}, range);
+}
+
+RenderOptions optionsOf(const Look& look, const Subject& subject) {
+  if (subject.box.empty()) throw UsageError("there is no active voxel to draw");
+  RenderOptions options;
+  options.resolution = look.resolution;
+  options.camera = fitCamera(subject.box, look.camera, look.resolution);
+  options.transfer = transferOf(look, subject);
+  options.step = look.step;
+  options.opacityLength = look.opacityLength;
+  return options;
+}
+
+/// The colors of a pixel in front of a background, or not premultiplied if there is none.
+std::array<float, 4> shown(const float* rgba, const Look& look) {
+  const float alpha = rgba[3];
+  if (!look.background) {
+    if (alpha <= 0.0f) return {};
+    return {rgba[0] / alpha, rgba[1] / alpha, rgba[2] / alpha, alpha};
+  }
+  const auto& behind = *look.background;
+  const auto over = [&](int c) { return rgba[c] + (1.0f - alpha) * float(behind[c]); };
+  return {over(0), over(1), over(2), 1.0f};
+}
+
+py::array_t<std::uint8_t> bytesOf(const Image& image, const Look& look) {
+  constexpr py::ssize_t kChannels = 4;
+  py::array_t<std::uint8_t> array({py::ssize_t(image.height), py::ssize_t(image.width), kChannels});
+  std::uint8_t* to = array.mutable_data();
+  for (std::size_t pixel = 0; pixel < image.rgba.size(); pixel += kChannels) {
+    const auto color = shown(&image.rgba[pixel], look);
+    for (int c = 0; c < kChannels; ++c)
+      *to++ = std::uint8_t(std::lround(255.0f * std::clamp(color[c], 0.0f, 1.0f)));
+  }
+  return array;
+}
+
+/// \param make  makes the renderer for a device
+template <class Make>
+py::array_t<std::uint8_t> drawn(const Look& look, const Subject& subject, const Make& make) {
+  const RenderOptions options = optionsOf(look, subject);
+  const Image image = interruptible([&](CancelToken& token) {
+    RenderOptions cancellable = options;
+    cancellable.cancel = &token;
+    return make(selectDevice(look.device))->draw(cancellable);
+  });
+  return bytesOf(image, look);
+}
+
+py::array_t<std::uint8_t> drawVolume(const Volume& self, const Look& look) {
+  const SparseVolume& volume = self.grid->volume;
+  const bool isLevelSet = self.grid->descriptor.gridClass == GridClass::kLevelSet;
+  return drawn(look, {activeBox(volume), activeRange(volume), volume.background, isLevelSet},
+               [&](const Device& device) { return makeVolumeRenderer(volume, device); });
+}
+
+py::array_t<std::uint8_t> drawGrid(const Grid& self, const Look& look) {
+  const StoredGrid& grid = *self.grid;
+  if (!followsFromEllipsoids(grid)) return drawVolume(decoded(self, std::nullopt), look);
+  const bool isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet;
+  const Subject subject{
+      grid.activeBox, {grid.valueMin, grid.valueMax}, grid.field.background, isLevelSet};
+  return drawn(look, subject, [&](const Device& device) {
+    return makeFieldRenderer(grid.field, device, {}, voxelRule(grid));
+  });
+}
+
+constexpr const char* kText =
+    "Draws a picture: sRGB, uint8 of shape (height, width, 4).\n\n"
+    "eye, center and up are in index coordinates; what is not given is chosen so that the picture\n"
+    "shows everything. colors and opacity are names of esvr-render, transfer a ParaView preset.\n"
+    "range has the values at the ends of the transfer function. Without a background (r, g, b), "
+    "the\n"
+    "alpha channel is the opacity, and colors are not premultiplied.";
+
+/// Adds the method `render` to a class.
+template <class Subject>
+void addRenderTo(py::handle type, py::array_t<std::uint8_t> (*draw)(const Subject&, const Look&)) {
+  using Point = std::optional<Vec3>;
+  auto method = py::cpp_function(
+      [draw](const Subject& self, int width, int height, const Point& eye, const Point& center,
+             const Point& up, std::optional<double> fov, const std::string& colors,
+             const std::string& opacity, const std::optional<std::filesystem::path>& transfer,
+             const std::optional<std::array<float, 2>>& range, double step, double opacityLength,
+             const std::optional<std::array<double, 3>>& background, const std::string& device) {
+        return draw(self, {{width, height},
+                           {.eye = eye, .center = center, .up = up, .fov = fov},
+                           colors,
+                           opacity,
+                           device,
+                           transfer,
+                           range,
+                           step,
+                           opacityLength,
+                           background});
+      },
+      py::name("render"), py::is_method(type), py::arg("width") = 800, py::arg("height") = 800,
+      py::kw_only(), py::arg("eye") = py::none(), py::arg("center") = py::none(),
+      py::arg("up") = py::none(), py::arg("fov") = py::none(), py::arg("colors") = "viridis",
+      py::arg("opacity") = "linear", py::arg("transfer") = py::none(),
+      py::arg("range") = py::none(), py::arg("step") = 1.0, py::arg("opacity_length") = 1.0,
+      py::arg("background") = py::none(), py::arg("device") = "auto", kText);
+  py::setattr(type, "render", method);
+}
+
+}  // namespace
+
+void addRender(py::module_& module) {
+  addRenderTo<Volume>(module.attr("Volume"), &drawVolume);
+  addRenderTo<Grid>(module.attr("Grid"), &drawGrid);
+}
+
+}  // namespace esvr::python

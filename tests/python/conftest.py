@@ -1,0 +1,35 @@
+"""Volumes that several tests need."""
+import os
+import pathlib
+
+import numpy as np
+import pytest
+
+import esvr
+
+
+@pytest.fixture(scope="session")
+def ball():
+    """A soft ball of radius 10 around (12, 12, 12), whose values fall from 1 to 0."""
+    x, y, z = np.mgrid[0:25, 0:25, 0:25]
+    r2 = (x - 12) ** 2 + (y - 12) ** 2 + (z - 12) ** 2
+    return np.maximum(0.0, 1.0 - r2 / 100.0).astype(np.float32)
+
+
+@pytest.fixture(scope="session")
+def volume(ball):
+    return esvr.Volume.from_numpy(ball, origin=(-3, 100, 7), voxel_size=0.5)
+
+
+@pytest.fixture(scope="session")
+def grid(volume):
+    return esvr.fit(volume, count=40, preset="draft", representation="ellipsoids", device="cpu")
+
+
+@pytest.fixture
+def data():
+    """The folder of real volumes; tests that need it are skipped without one."""
+    folder = os.environ.get("ESVR_DATA_DIR", "")
+    if not folder:
+        pytest.skip("ESVR_DATA_DIR is not set")
+    return pathlib.Path(folder)

@@ -1,0 +1,18 @@
+"""Every example of docs/python.md runs, in its order, in an empty folder."""
+import os
+import pathlib
+import re
+
+import esvr
+
+
+def test_examples_run(tmp_path, monkeypatch, volume):
+    monkeypatch.chdir(tmp_path)
+    volume.save("smoke.vdb")
+    text = (pathlib.Path(os.environ["ESVR_DOCS"]) / "python.md").read_text()
+    examples = re.findall(r"^```python\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+    assert len(examples) > 5
+    names = {}
+    for example in examples:
+        exec(compile(example, "docs/python.md", "exec"), names)
+    assert esvr.read("smoke.esvr")
