@@ -274,9 +274,23 @@ void projectTape(const PairTape& tape, const float* r, PairProjection& projectio
   projection = {sumLanes(rPhi), sumLanes(phi2)};
 }
 
+void addPlaces(const LineForm& f, const float corner[3], const KernelConstants<float>& k,
+               const PlaceBlock& places, float* sum) {
+  const float cx = f.center[0] - corner[0], cy = f.center[1] - corner[1],
+              cz = f.center[2] - corner[2];
+  for (int i = 0; i < places.count; i += kLanes) {
+    const Vec dx = load(places.x + i) - cx, dz = load(places.z + i) - cz;
+    const Vec pz[3] = {dz * f.pz[0], dz * f.pz[1], dz * f.pz[2]};
+    const Vec t = distanceAlong(f, load(places.y + i), cy, dx, dz);
+    const Vec phi = phiOf(k, squaredAt(f, closestSquared(f, dx, pz), t));
+    store(sum + i, load(sum + i) + f.intensity * phi);
+  }
+}
+
 }  // namespace
 
 extern const BrickKernels kKernels;
-const BrickKernels kKernels{ESVR_KERNEL_NAME, add, forward, backward, addTape, projectTape};
+const BrickKernels kKernels{ESVR_KERNEL_NAME, add,         forward,  backward,
+                            addTape,          projectTape, addPlaces};
 
 }  // namespace esvr::ESVR_KERNEL_NAMESPACE
