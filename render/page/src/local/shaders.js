@@ -233,10 +233,10 @@ void main() {
       continue;
     }
     vec3 slot = vec3(entry.xyz) * kSlotSide + 0.5;
+    vec3 texel = (start - low + slot) * uTexel, texelsApart = apart * uTexel;
     int end = min(count, i + samplesToLeave(p, perVoxel, low, low + kBrickSide));
     for (; i < end && OPEN; ++i) {
-      vec3 local = start + float(i) * apart - low;
-      float share = textureLod(uVoxels, (local + slot) * uTexel, 0.0).r;
+      float share = textureLod(uVoxels, texel + float(i) * texelsApart, 0.0).r;
       SHADE
       add(share, share * uPlaceScale + uPlaceOfBackground);
       NEXT_SHADE
@@ -263,7 +263,7 @@ export function fragmentShader({ mode, classification, shade, inTable }) {
     isLit ? kShading + "vec2 nowShade, lastShade;" : "",
     `#define LIT(light, shade) ${isLit ? "lit(light, shade)" : "light"}`,
     `#define OPEN ${composite ? "!(transmittance < uMinTransmittance)" : "true"}`,
-    `#define SHADE ${isLit ? "nowShade = shadeAt(clamp(local, 0.0, kBrickSide), slot, direction);" : ""}`,
+    `#define SHADE ${isLit ? "nowShade = shadeAt(clamp(start + float(i) * apart - low, 0.0, kBrickSide), slot, direction);" : ""}`,
     `#define NEXT_SHADE ${isLit ? "lastShade = nowShade;" : ""}`,
     composite ? kComposite : "",
     kModes[composite ? classification : mode],
