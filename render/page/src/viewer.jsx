@@ -117,9 +117,9 @@ export function Viewer({ backend, description, store, fitFirst }) {
       <main class="stage" aria-label="Picture">
         <Picture
           scene={scene} grid={grid} size={size} area={area} canvases={painting.canvases} onChange={set} onFit={() => fit()}
-          names={{ own: file.name, reference: reference?.name ?? "" }}
+          busy={painting.busy} names={{ own: file.name, reference: reference?.name ?? "" }}
         >
-          {painting.busy && <div class="progress" aria-hidden="true" />}
+          {painting.busy && !moving && <div class="progress" aria-hidden="true" />}
           <ColorBar transfer={scene.transfer} name={grid.name} unit={grid.unit} />
           <ViewButtons
             camera={scene.camera} onView={fit}

@@ -17,10 +17,11 @@ const kLabel =
  * @param {{main: any, reference: any}} props.canvases  refs
  * @param {(change: Partial<import("../types.js").Scene>, moving: boolean) => void} props.onChange
  * @param {() => void} props.onFit
+ * @param {boolean} props.busy  the picture is not complete
  * @param {{own: string, reference: string}} props.names
  * @param {any} props.children
  */
-export function Picture({ scene, grid, size, area, canvases, onChange, onFit, names, children }) {
+export function Picture({ scene, grid, size, area, canvases, onChange, onFit, busy, names, children }) {
   const surface = useRef(/** @type {any} */ (null));
   const target = useRef(/** @type {any} */ (null));
   target.current = { scene, onChange, onFit };
@@ -35,7 +36,7 @@ export function Picture({ scene, grid, size, area, canvases, onChange, onFit, na
   }), []);
   const split = scene.compare?.show === "split" ? scene.compare : null;
   return (
-    <div class="picture" ref={area}>
+    <div class="picture" ref={area} aria-busy={busy}>
       <div class="surface" ref={surface} tabIndex={0} role="application" aria-label={kLabel}>
         <canvas ref={canvases.main} aria-hidden="true" />
         <canvas
