@@ -22,12 +22,14 @@ constexpr double kMs = 1e3;            // milliseconds of a second
 
 }  // namespace
 
-/// A picture that is drawn. Only the studio's thread uses what may change.
+/// A picture that is drawn. Only the studio's thread uses what may change, except for the tokens.
 struct Studio::Job {
   Job(DrawRequest of, const CancelToken* stopping) : request(std::move(of)), cancel(stopping) {}
 
   const DrawRequest request;
   CancelToken cancel;
+  /// Cancels one pass. It is made anew for each pass, at the place that the painting knows.
+  std::optional<CancelToken> pass;
   std::optional<Painting> painting;
   int passes = 0;
 };
@@ -86,8 +88,14 @@ void Studio::draw(const std::shared_ptr<Outlet>& client, DrawRequest request) {
     Easel& easel = easelOf(client);
     if (easel.job && !easel.job->request.moving) easel.job->cancel.cancel(), easel.job.reset();
     easel.waiting = std::move(request);
+    interruptFor(easel);
   }
   changed_.notify_one();
+}
+
+/// Ends the refinement of another client.
+void Studio::interruptFor(const Easel& easel) {
+  if (refined_ && refined_ != easel.job) refined_->pass->cancel();
 }
 
 void Studio::add(const std::shared_ptr<Outlet>& client, Task task) {
@@ -146,6 +154,8 @@ std::optional<Studio::Work> Studio::next() {
     easel->job = std::make_shared<Job>(std::move(*easel->waiting), &easel->gone);
     easel->waiting.reset();
   }
+  easel->job->pass.emplace(&easel->job->cancel);
+  if (urgency == 1) refined_ = easel->job;
   return Work{easel, {}, easel->job};
 }
 
@@ -157,7 +167,7 @@ void Studio::perform(const Work& work) {
     else
       drawPass(*work.job, outlet);
   } catch (const Cancelled&) {
-    // The client has asked for another picture or has left.
+    // The client has asked for another picture or has left, or another client comes first.
   } catch (...) {
     if (work.job) work.job->cancel.cancel();
     const auto id = work.job ? std::optional(work.job->request.picture.id) : std::nullopt;
@@ -170,8 +180,9 @@ void Studio::drawPass(Job& job, Outlet& outlet) {
   cli::Stopwatch watch;
   if (!job.painting)
     job.painting.emplace(
-        Painting::Input{collection_, drawables_, picture.scene, picture.size, &job.cancel});
-  job.painting->refine(job.passes++ == 0 ? kFirstBudget : 0.0);
+        Painting::Input{collection_, drawables_, picture.scene, picture.size, &*job.pass});
+  job.painting->refine(job.passes == 0 ? kFirstBudget : 0.0);
+  ++job.passes;
   const double drawMs = kMs * watch.lap();
   const Image image = job.painting->picture();
   const Rgb background = picture.scene.options.background.value_or(Rgb{});
@@ -200,8 +211,9 @@ void Studio::drawPass(Job& job, Outlet& outlet) {
 
 /// Forgets a job that has ended.
 void Studio::end(const Work& work) {
-  if (!work.job || !work.job->cancel.cancelled()) return;
   const std::scoped_lock lock(mutex_);
+  refined_.reset();
+  if (!work.job || !work.job->cancel.cancelled()) return;
   if (work.easel->job == work.job) work.easel->job.reset();
 }
 
