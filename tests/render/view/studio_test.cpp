@@ -67,6 +67,7 @@ TEST_F(StudioTest, ANewPictureReplacesOneThatIsRefined) {
 // passes, and the fourth takes seconds unless it is interrupted.
 TEST_F(StudioTest, SlowRefinementsAreInterruptedByPicturesOfOthersAndGoOn) {
   DrawRequest slow = slowRequest(1);
+  slow.picture.size = {400, 400};
   slow.picture.scene.options.step = 0.05;
   studio_.draw(one_, slow);
   ASSERT_TRUE(one_->waitFor([](const json& head) { return head["pass"] == 3; }));
