@@ -1,13 +1,25 @@
 #include "render/view/service.h"
 
+#include <tbb/task_arena.h>
+
 #include "render/view/page.h"
 
 namespace esvr::view {
+namespace {
+
+std::string deviceText(const Device& device) {
+  if (device.kind != DeviceKind::kCpu) return deviceName(device);
+  const int threads = tbb::this_task_arena::max_concurrency();
+  return deviceName(device) + ", " + std::to_string(threads) + " thread" +
+         (threads == 1 ? "" : "s");
+}
+
+}  // namespace
 
 Service::Service(const Collection& collection, const Settings& settings)
     : io_(1),
       studio_(collection, settings.drawing),
-      desk_(collection, studio_, deviceName(settings.drawing.device)),
+      desk_(collection, studio_, deviceText(settings.drawing.device)),
       context_{settings.site,
                viewPage(),
                {desk_, studio_, settings.limits},
