@@ -1,0 +1,5 @@
+import "./page.css";
+import { ServerBackend } from "./server-backend.js";
+import { startPage } from "./app.jsx";
+
+startPage(new ServerBackend());
