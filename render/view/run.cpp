@@ -4,8 +4,11 @@
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
 #include <iostream>
+#include <optional>
 
+#include "cli/log.h"
 #include "esvr/error.h"
+#include "render/view/opened_page.h"
 #include "render/view/service.h"
 #include "render/view/token.h"
 
@@ -48,12 +51,17 @@ Service::Settings settingsOf(const Options& options) {
 }  // namespace
 
 void run(const Options& options) {
+  const cli::Log log(kProgram, options.verbosity);
   const Service::Settings settings = settingsOf(options);
   const Collection collection(options.inputs, options.memory);
   Service service(collection, settings);
   asio::signal_set signals(service.io(), SIGINT, SIGTERM);
   signals.async_wait([&](boost::system::error_code, int) { service.stop(); });
-  std::cout << urlOf(service.endpoint(), settings.site.token) << std::endl;
+  const std::string url = urlOf(service.endpoint(), settings.site.token);
+  std::cout << url << std::endl;
+  log.info("open this address in a browser; Ctrl-C ends the program");
+  std::optional<OpenedPage> opened;
+  if (options.open) opened.emplace(url);
   service.run();
 }
 

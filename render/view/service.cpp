@@ -1,6 +1,6 @@
 #include "render/view/service.h"
 
-#include <tbb/task_arena.h>
+#include <tbb/global_control.h>
 
 #include "render/view/page.h"
 
@@ -9,7 +9,8 @@ namespace {
 
 std::string deviceText(const Device& device) {
   if (device.kind != DeviceKind::kCpu) return deviceName(device);
-  const int threads = tbb::this_task_arena::max_concurrency();
+  using Control = tbb::global_control;
+  const std::size_t threads = Control::active_value(Control::max_allowed_parallelism);
   return deviceName(device) + ", " + std::to_string(threads) + " thread" +
          (threads == 1 ? "" : "s");
 }
