@@ -50,7 +50,7 @@ function Handle({ transfer, shown: [low, high], index, selected, width, onSelect
   return (
     <span
       class={selected ? "handle selected" : "handle"} style={{ left: `${100 * share}%`, background: hexOf(color) }}
-      role="slider" tabIndex={0} aria-label={`Color point ${index + 1} of ${transfer.colors.length}`}
+      role="slider" tabindex={0} aria-label={`Color point ${index + 1} of ${transfer.colors.length}`}
       aria-valuenow={value} aria-valuemin={low} aria-valuemax={high}
       aria-valuetext={`color ${hexOf(color)} at value ${shortText(value)}`}
       onPointerDown={onPointerDown} onKeyDown={onKeyDown} onFocus={onSelect}

@@ -37,7 +37,7 @@ export function Picture({ scene, grid, size, area, canvases, onChange, onFit, bu
   const split = scene.compare?.show === "split" ? scene.compare : null;
   return (
     <div class="picture" ref={area} aria-busy={busy}>
-      <div class="surface" ref={surface} tabIndex={0} role="application" aria-label={kLabel}>
+      <div class="surface" ref={surface} tabindex={0} role="application" aria-label={kLabel}>
         <canvas ref={canvases.main} aria-hidden="true" />
         <canvas
           ref={canvases.reference} hidden aria-hidden="true"
