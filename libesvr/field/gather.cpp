@@ -56,7 +56,7 @@ GatheredField gather(const Field& field) {
   return g;
 }
 
-std::vector<Support> supports(const Field& field) {
+std::vector<Support> supports(const Field& field, double slack) {
   std::vector<Support> all(field.ellipsoidCount());
   forEachEllipsoid(field, [&](std::size_t n, std::uint32_t, const Chunk& chunk, std::size_t i) {
     const Ellipsoids& e = chunk.ellipsoids;
@@ -64,7 +64,7 @@ std::vector<Support> supports(const Field& field) {
     center[0] += chunk.origin.x, center[1] += chunk.origin.y, center[2] += chunk.origin.z;
     const double radius =
         supportRadius(kernelConstants<double>(field.kernel, kappaOf(field, e, i)));
-    all[n] = makeSupport(center, unitFrame(e, i), radius, kRoundingSlack);
+    all[n] = makeSupport(center, unitFrame(e, i), radius, slack);
   });
   return all;
 }

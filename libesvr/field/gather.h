@@ -28,11 +28,11 @@ struct GatheredField {
 
 [[nodiscard]] GatheredField gather(const Field& field);
 
-/// The supports of all ellipsoids in index coordinates, widened by kRoundingSlack.
-[[nodiscard]] std::vector<Support> supports(const Field& field);
-
 /// Voxels by which supports are widened. The rounding of centers and forms to float32 is far
 /// smaller.
 inline constexpr double kRoundingSlack = 0.02;
+
+/// The supports of all ellipsoids in index coordinates, widened by `slack` voxels.
+[[nodiscard]] std::vector<Support> supports(const Field& field, double slack = kRoundingSlack);
 
 }  // namespace esvr

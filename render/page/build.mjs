@@ -1,12 +1,31 @@
 // Bundles each page into one HTML file: `node build.mjs` writes dist/, `node build.mjs --check` fails
 // if dist/ is not what it would write.
 import { build } from "esbuild";
+import { gunzipSync, gzipSync } from "node:zlib";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { dirname, join, relative } from "node:path";
 import { fileURLToPath } from "node:url";
 
 const root = dirname(fileURLToPath(import.meta.url));
-const pages = [{ entry: "src/main-view.js", out: "dist/view.html" }];
+const pages = [
+  { entry: "src/main-view.js", out: "dist/view.html", fill: viewPage },
+  { entry: "src/main-export.js", out: "dist/export.html", fill: exportPage },
+];
+
+/** `import text from "worker:./file.js"` gives the bundled text of a worker. */
+const workers = {
+  name: "workers",
+  setup({ onResolve, onLoad }) {
+    onResolve({ filter: /^worker:/ }, ({ path, resolveDir }) => ({
+      path: join(resolveDir, path.replace("worker:", "")),
+      namespace: "worker",
+    }));
+    onLoad({ filter: /./, namespace: "worker" }, async ({ path }) => {
+      const { outputFiles } = await bundle(path);
+      return { contents: outputFiles[0].text, loader: "text" };
+    });
+  },
+};
 
 /** Bundles an entry point and what it imports. */
 function bundle(entry) {
@@ -20,6 +39,7 @@ function bundle(entry) {
     jsx: "automatic",
     jsxImportSource: "preact",
     loader: { ".html": "text" },
+    plugins: [workers],
     legalComments: "none",
     charset: "utf8",
     metafile: true,
@@ -28,14 +48,39 @@ function bundle(entry) {
   });
 }
 
-/** The text of a page: a template whose places are filled with the style and the script. */
-async function pageText(result) {
-  const template = await readFile(join(root, "src/page.html"), "utf8");
-  const textOf = (ending) => result.outputFiles.find((f) => f.path.endsWith(ending)).text.trim();
+const textOf = (result, ending) => result.outputFiles.find((f) => f.path.endsWith(ending)).text.trim();
+
+/** A template of which places are filled. */
+async function filled(template, parts) {
+  let text = await readFile(join(root, template), "utf8");
   // A function as the second argument, because '$' has a meaning in a replacement text.
-  return template
-    .replace("/* STYLE */", () => textOf(".css"))
-    .replace("/* SCRIPT */", () => textOf(".js"));
+  for (const [place, part] of Object.entries(parts)) text = text.replace(`/* ${place} */`, () => part);
+  return text;
+}
+
+/** The page of esvr-view: the style and the script as they are. */
+function viewPage(result) {
+  return filled("src/page.html", { STYLE: textOf(result, ".css"), SCRIPT: textOf(result, ".js") });
+}
+
+const packed = (bytes) => gzipSync(bytes, { level: 9 }).toString("base64");
+
+/** The exported page: the style and the script are compressed, since pages are sent to people. */
+async function exportPage(result) {
+  const style = JSON.stringify(textOf(result, ".css"));
+  const program = `document.head.append(Object.assign(document.createElement("style"),{textContent:${style}}));`;
+  const start = await bundle("src/local/start.js");
+  return filled("src/export.html", {
+    DECODER: packed(await readFile(join(root, "wasm/page.wasm"))),
+    PROGRAM: packed(program + textOf(result, ".js")),
+    START: textOf(start, ".js"),
+  });
+}
+
+/** A page with its compressed parts unpacked, since versions of Node compress differently. */
+function unpacked(text) {
+  const packedPart = /(;gzip;base64">)([^<]*)/g;
+  return text.replace(packedPart, (_, tag, part) => tag + gunzipSync(Buffer.from(part, "base64")).toString("latin1"));
 }
 
 /** Folders of the packages that a bundle contains. */
@@ -60,9 +105,9 @@ async function licensesText(names) {
 async function outputs() {
   const files = new Map();
   const names = new Set();
-  for (const { entry, out } of pages) {
+  for (const { entry, out, fill } of pages) {
     const result = await bundle(entry);
-    files.set(out, await pageText(result));
+    files.set(out, await fill(result));
     packagesOf(result.metafile).forEach((name) => names.add(name));
   }
   return files.set("dist/licenses.txt", await licensesText(names));
@@ -70,8 +115,9 @@ async function outputs() {
 
 async function isUpToDate(path, text) {
   const stored = await readFile(path, "utf8").catch(() => null);
-  if (stored !== text) console.error(`${relative(root, path)} is out of date: run node build.mjs`);
-  return stored === text;
+  const same = stored !== null && unpacked(stored) === unpacked(text);
+  if (!same) console.error(`${relative(root, path)} is out of date: run node build.mjs`);
+  return same;
 }
 
 async function check(files) {

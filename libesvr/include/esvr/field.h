@@ -2,6 +2,7 @@
 /// Evaluates a Field on bricks. Each brick sums its ellipsoids in their order in the field, so the
 /// result is bit-identical for any number of threads (those of the calling TBB arena).
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -27,6 +28,16 @@ namespace esvr {
 /// \param corners  index corners of the bricks, multiples of 8
 /// \param out      kBrickVoxels values for each brick, in voxelOffset order
 void evaluateBricks(const Field& field, std::span<const Coord> corners, std::span<float> out);
+
+/// A place in index coordinates, which need not be a voxel.
+using Place = std::array<double, 3>;
+
+/// Evaluates V at any places in float32, without clamping. The error is that of evaluateBricks.
+/// \param places  finite coordinates within those of voxels
+/// \param out     a value for each place
+/// \throws UsageError  a place is not finite or lies outside the index space
+/// \throws MemoryExceeded  as for reachedBricks
+void evaluatePlaces(const Field& field, std::span<const Place> places, std::span<float> out);
 
 struct EllipsoidHits {
   std::uint64_t voxelPairs = 0;  ///< pairs of an ellipsoid and a voxel in its support

@@ -1,0 +1,36 @@
+// Builds the module of the exported page with Emscripten: `node make_wasm.mjs` writes wasm/page.wasm,
+// `node make_wasm.mjs --check` fails if it is not what it would write.
+import { spawnSync } from "node:child_process";
+import { readFileSync, writeFileSync } from "node:fs";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+
+const here = dirname(fileURLToPath(import.meta.url)), root = join(here, "../..");
+const folder = join(root, "build/wasm"), stored = join(here, "wasm/page.wasm");
+/** The version that page.wasm was built with; others give other bytes. */
+const kVersion = "3.1.6";
+
+function skip(why) {
+  console.log(`SKIPPED: page.wasm is not checked, because ${why}`);
+  process.exit(0);
+}
+
+function run(command, ...args) {
+  const { status, stdout, stderr } = spawnSync(command, args, { cwd: root, encoding: "utf8" });
+  if (status !== 0) throw new Error(`${command} ${args.join(" ")} failed:\n${stdout}${stderr}`);
+}
+
+const found = spawnSync("emcc", ["--version"], { encoding: "utf8" });
+const checks = process.argv.includes("--check");
+if (checks && found.error) skip("there is no emcc");
+if (checks && !found.stdout.includes(kVersion)) skip(`emcc is not version ${kVersion}`);
+
+const options = ["-DESVR_DECODER_ONLY=ON", "-DESVR_BUILD_TESTS=OFF", "-DCMAKE_BUILD_TYPE=MinSizeRel"];
+run("emcmake", "cmake", "-S", root, "-B", folder, "-G", "Ninja", ...options);
+run("cmake", "--build", folder);
+const bytes = readFileSync(join(folder, "render/page/wasm/page.wasm"));
+if (!checks) writeFileSync(stored, bytes), console.log(`wasm/page.wasm: ${bytes.length} bytes`);
+else if (!readFileSync(stored).equals(bytes)) {
+  console.error("wasm/page.wasm is out of date: run node make_wasm.mjs");
+  process.exitCode = 1;
+}

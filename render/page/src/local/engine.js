@@ -1,0 +1,230 @@
+/**
+ * Draws one file without a server: the decoder gives voxels and tables, and WebGL2 draws them. It runs
+ * in a worker, or on the page where workers cannot draw.
+ * @typedef {import("../types.js").Triple} Triple
+ * @typedef {import("../types.js").Scene} Scene
+ * @typedef {import("../types.js").Grid} Grid
+ * @typedef {import("../types.js").PictureHead} PictureHead
+ * @typedef {import("./ray-marcher.js").Frame} Frame
+ * @typedef {{width: number, height: number}} Size
+ * @typedef {{name: string, file: Uint8Array, wasm: BufferSource, canvas: OffscreenCanvas | HTMLCanvasElement}} Input
+ * @typedef {(head: PictureHead, canvas: OffscreenCanvas | HTMLCanvasElement) => Promise<void> | void} Show
+ */
+import { Decoder } from "./decoder.js";
+import { RayMarcher } from "./ray-marcher.js";
+import { difference, scaled, sum } from "./vectors.js";
+import { levelOf, lightOf, placeInLevel, viewOf } from "./view.js";
+
+const kBins = 256; // of a histogram
+const kMostTextureBytes = 512 * 2 ** 20;
+const kBandMs = 40; // between two looks for a newer request
+const kFirstPictureMs = 60; // a picture that takes longer has a coarse one before it
+const kCoarseScale = 0.35;
+/** @type {Record<string, Triple>} */
+const kDirections = { "+x": [1, 0, 0], "-x": [-1, 0, 0], "+y": [0, 1, 0], "-y": [0, -1, 0], "+z": [0, 0, 1], "-z": [0, 0, -1] };
+
+/** Lets messages arrive. */
+const turn = () => new Promise((resolve) => setTimeout(resolve, 0));
+
+/** A clip box or a slice as a box of places. @param {Scene} scene @returns {[Triple, Triple] | null} */
+function clipOf({ clip, slice }) {
+  if (!slice) return clip;
+  const box = /** @type {[Triple, Triple]} */ ([[-1e9, -1e9, -1e9], [1e9, 1e9, 1e9]]);
+  const axis = "xyz".indexOf(slice.axis);
+  box[0][axis] = slice.place - 0.5;
+  box[1][axis] = slice.place + 0.5;
+  return box;
+}
+
+/** Whether samples of a level cannot miss the clip box. @param {Scene} scene @param {number} level */
+function fits(scene, level) {
+  const clip = clipOf(scene), apart = 2 * 2 ** level * Math.max(scene.step, 1);
+  return !clip || difference(clip[1], clip[0]).every((side) => side >= apart);
+}
+
+export class Engine {
+  #decoder;
+  #canvas;
+  #marcher;
+  #device;
+  #file;
+  #input;
+  /** @type {Grid[]} */
+  #grids;
+  /** The grid whose volume is decoded. */
+  #decoded = { grid: -1, volume: 0 };
+  /** What the textures hold. */
+  #shown = { grid: -1, level: -1, tables: "" };
+  /** @type {{level: number, origin: number[], bricks: number[], count: number} | null} */
+  #atlas = null;
+  #latest = 0;
+  #msPerPixel = 0;
+
+  /** @param {Input} input @param {Decoder} decoder */
+  constructor(input, decoder) {
+    this.#input = input;
+    this.#decoder = decoder;
+    this.#canvas = input.canvas;
+    const options = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, preserveDrawingBuffer: true };
+    const gl = /** @type {WebGL2RenderingContext | null} */ (this.#canvas.getContext("webgl2", options));
+    if (!gl) throw new Error("This page draws with WebGL2, which this browser does not offer.");
+    const info = gl.getExtension("WEBGL_debug_renderer_info");
+    this.#device = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+    this.#marcher = new RayMarcher(gl);
+    this.#file = decoder.open(input.file, input.name);
+    this.#grids = decoder.grids(this.#file);
+    if (this.#grids.length === 0) throw new Error(`${input.name} has no grid that can be drawn.`);
+  }
+
+  /** @param {Input} input */
+  static async start(input) {
+    return new Engine(input, await Decoder.load(input.wasm));
+  }
+
+  describe() {
+    const { name, file } = this.#input, share = Math.round(file.length / this.#grids.length);
+    const grids = this.#grids.map((grid) => ({ ...grid, bytes: share }));
+    return {
+      program: `ESVR ${this.#decoder.version()}, exported page`,
+      device: `WebGL2, ${this.#device}`,
+      files: [{ name, bytes: file.length, frames: [], grids }],
+      ...this.#decoder.looks(),
+      carried: this.#decoder.carried(this.#file),
+    };
+  }
+
+  /** @param {import("../types.js").FitRequest} request */
+  fit({ grid, view, orthographic, width, height }) {
+    const direction = kDirections[view] ?? null;
+    return this.#decoder.fit(this.#gridAt(grid).box, { direction, orthographic, width, height });
+  }
+
+  /** @param {import("../types.js").Place} place */
+  histogram({ grid }) {
+    const range = this.#gridAt(grid).range;
+    const counts = this.#decoder.histogram(this.#volumeOf(grid), range, kBins);
+    return { low: range[0], high: range[1], counts };
+  }
+
+  /**
+   * Draws a picture, a coarse one before it if it takes long. A later call ends an earlier one.
+   * @param {import("../types.js").DrawRequest} request @param {Show} show
+   */
+  async draw({ id, width, height, moving, scene }, show) {
+    const number = ++this.#latest, size = { width, height };
+    await turn();
+    if (number !== this.#latest) return;
+    if (!moving && this.#msPerPixel * width * height > kFirstPictureMs) {
+      const small = { width: Math.ceil(width * kCoarseScale), height: Math.ceil(height * kCoarseScale) };
+      if (!(await this.#paint(scene, small, number, size))) return;
+      await this.#show({ id, last: false }, show);
+    }
+    if (await this.#paint(scene, size, number, size)) await this.#show({ id, last: true }, show);
+  }
+
+  /** Draws a picture that nothing interrupts. @param {{scene: Scene} & Size} request */
+  async png({ scene, width, height }) {
+    await this.#paint(scene, { width, height }, 0, { width, height });
+    this.#marcher.show();
+    const canvas = this.#canvas;
+    if ("convertToBlob" in canvas) return canvas.convertToBlob({ type: "image/png" });
+    return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
+  }
+
+  /** @param {number} grid */
+  #gridAt(grid) {
+    if (!this.#grids[grid]) throw new Error(`There is no grid ${grid}.`);
+    return this.#grids[grid];
+  }
+
+  #drawMs = 0;
+
+  /** @param {{id: number, last: boolean}} head @param {Show} show */
+  async #show(head, show) {
+    this.#marcher.show();
+    const stats = { vramBytes: this.#marcher.bytes, level: this.#atlas?.level ?? 0 };
+    await show({ ...head, drawMs: this.#drawMs, stats }, this.#canvas);
+  }
+
+  /**
+   * Draws a picture in bands, between which a newer request may end it.
+   * @param {Scene} scene @param {Size} size
+   * @param {number} number  of the request; 0: it cannot be ended
+   * @param {Size} full  size that decides the level of detail
+   * @returns {Promise<boolean>} whether the picture is complete
+   */
+  async #paint(scene, size, number, full) {
+    const frame = this.#prepare(scene, full), from = performance.now();
+    let rows = Math.max(1, Math.floor(kBandMs / Math.max(1e-9, this.#msPerPixel * size.width)));
+    this.#marcher.begin(frame, size);
+    for (let row = 0; row < size.height; row += rows) {
+      if (row > 0) {
+        await turn();
+        if (number !== 0 && number !== this.#latest) return false;
+        this.#marcher.begin(frame, size); // another picture may have been drawn meanwhile
+      }
+      rows = Math.min(rows, size.height - row);
+      this.#marcher.draw(row, rows);
+    }
+    this.#drawMs = performance.now() - from;
+    this.#msPerPixel = this.#drawMs / (size.width * size.height);
+    return true;
+  }
+
+  /** Makes the textures of a scene. @param {Scene} scene @param {Size} size @returns {Frame} */
+  #prepare(scene, size) {
+    this.#decoder.checkCamera(scene.camera, size);
+    const box = this.#gridAt(scene.grid).box;
+    const wanted = scene.lod === "auto" ? levelOf(scene.camera, size.height, scaled(sum(...box), 0.5)) : 0;
+    this.#useVolume(scene.grid, fits(scene, wanted) ? wanted : 0);
+    const { level, origin, bricks } = /** @type {NonNullable<typeof this.#atlas>} */ (this.#atlas);
+    this.#useTables(scene, level);
+    const first = /** @type {Triple} */ (origin);
+    const view = viewOf(scene.camera, size, level, first);
+    const clip = clipOf(scene)?.map((corner) => difference(placeInLevel(corner, level), first));
+    const high = bricks.map((n) => 8 * n);
+    return {
+      kind: { mode: scene.mode, classification: scene.classification, shade: scene.shade },
+      view,
+      low: /** @type {Triple} */ (clip ? clip[0].map((v) => Math.max(v, 0)) : [0, 0, 0]),
+      high: /** @type {Triple} */ (clip ? clip[1].map((v, a) => Math.min(v, high[a])) : high),
+      step: scene.step,
+      toLight: lightOf(view),
+      background: scene.background,
+    };
+  }
+
+  /** @param {number} grid */
+  #volumeOf(grid) {
+    if (this.#decoded.grid === grid) return this.#decoded.volume;
+    this.#decoder.freeVolume(this.#decoded.volume);
+    this.#decoded = { grid: -1, volume: 0 };
+    this.#decoded = { grid, volume: this.#decoder.decode(this.#file, grid) };
+    return this.#decoded.volume;
+  }
+
+  /** Uploads a grid in a level of detail, or in a coarser one if it is too large. */
+  #useVolume(grid, level) {
+    if (this.#shown.grid === grid && this.#shown.level === level) return;
+    const limits = { mostSide: this.#marcher.mostSide, mostBytes: kMostTextureBytes };
+    const atlas = this.#decoder.atlas(this.#volumeOf(grid), level, limits);
+    try {
+      this.#marcher.setAtlas(atlas);
+      this.#atlas = { level: atlas.level, origin: atlas.origin, bricks: atlas.bricks, count: atlas.count };
+      this.#shown = { ...this.#shown, grid, level };
+    } finally {
+      atlas.free();
+    }
+  }
+
+  /** @param {Scene} scene @param {number} level */
+  #useTables({ transfer, mode, classification, step, opacityLength }, level) {
+    const composite = mode === "composite";
+    const length = composite ? (step * 2 ** level) / opacityLength : 1;
+    const segments = composite && classification === "pre";
+    const key = JSON.stringify([transfer, length, segments]);
+    if (this.#shown.tables === key) return;
+    this.#marcher.setTables(this.#decoder.tables(transfer, { length, segments }));
+    this.#shown.tables = key;
+  }
+}

@@ -1,0 +1,266 @@
+/**
+ * The shaders of the ray marcher. They follow the library's renderer (libesvr/render: march_scene.h,
+ * brick_march.h, sample_rule.h, segment_table.h, transfer_table.h, shading.h), whose headers explain
+ * the rules; the same names mean the same things.
+ *
+ * A place in the transfer function's tables counts intervals from the lowest value. Since it depends
+ * linearly on the value, rays carry places in place of values.
+ */
+
+/** Texels of a row of the tables' textures. */
+export const kTableRow = 1024;
+
+/** A triangle that covers the picture. */
+export const kVertexShader = `#version 300 es
+void main() {
+  gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+}`;
+
+const kDeclarations = `
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler3D;
+precision highp usampler2D;
+precision highp usampler3D;
+
+uniform vec3 uEye, uRight, uUp, uForward;  // relative to the first brick of the table
+uniform bool uPerspective;
+uniform vec2 uPixel;  // size of a pixel
+uniform float uLeft, uTop, uHeight;
+uniform vec3 uLow, uHigh;    // all samples outside this box are empty space, or clipped
+uniform float uStep, uMinTransmittance;
+uniform usampler3D uBricks;  // bytes: the slot's place and 0, or the distance to the next brick
+uniform sampler3D uVoxels;   // (value - background) / scale
+uniform vec3 uTexel;         // size of a texel of uVoxels
+uniform float uPlaceScale, uPlaceOfBackground;
+uniform sampler2D uValues;
+uniform usampler2D uSegments;
+uniform float uUnit;
+uniform vec4 uBackground;    // behind the volume, premultiplied
+out vec4 color;
+
+const float kIntervals = 4096.0;
+const int kRow = ${kTableRow};
+const float kBrickSide = 8.0, kSlotSide = 9.0;
+`;
+
+const kTransferTable = `
+vec4 valueEntry(int i) { return texelFetch(uValues, ivec2(i % kRow, i / kRow), 0); }
+
+// The color and opacity of a value, premultiplied.
+vec4 classified(float place) {
+  float at = clamp(place, 0.0, kIntervals);
+  int i = min(int(at), int(kIntervals) - 1);
+  vec4 c = mix(valueEntry(i), valueEntry(i + 1), at - float(i));
+  // Below the first value, the first of several points at the same value counts.
+  if (!(place > 0.0)) c = valueEntry(0);
+  return vec4(c.rgb * c.a, c.a);
+}
+`;
+
+const kSegmentTable = `
+uvec4 segmentEntry(int i) { return texelFetch(uSegments, ivec2(i % kRow, i / kRow), 0); }
+uvec4 before(int interval) { return segmentEntry(2 * interval); }
+vec4 meanOf(int interval) { return uintBitsToFloat(segmentEntry(2 * interval + 1)); }
+
+int intervalAt(float place) { return int(floor(clamp(place, -1.0, kIntervals))) + 1; }
+
+// The means of the channels between two places; alpha is the extinction.
+vec4 meansBetween(float a, float b) {
+  float from = min(a, b), to = max(a, b);
+  int i = intervalAt(from), j = intervalAt(to);
+  vec4 last = meanOf(j);
+  if (i == j || to - from < 1e-6) return last;
+  float ofWhole = 1.0 / (to - from);
+  float inFirst = (float(i) - from) * ofWhole, inLast = (to - float(j - 1)) * ofWhole;
+  vec4 whole = vec4(before(j) - before(i + 1)) * (uUnit * ofWhole);
+  return inFirst * meanOf(i) + inLast * last + whole;
+}
+
+float absorbed(float t) {
+  return t < 1.0 / 64.0 ? t * (1.0 - t * (0.5 - t * (1.0 / 6.0))) : 1.0 - exp(-t);
+}
+
+void addPieceBehind(inout vec4 all, vec4 means, float size) {
+  if (!(means.a > 0.0)) return;
+  float alpha = (1.0 - all.a) * absorbed(means.a * size);
+  all += vec4(means.rgb * (alpha / means.a), alpha);
+}
+
+// The light of the segment from a sample to the next.
+vec4 segment(float a, float b) {
+  vec4 whole = meansBetween(a, b), all = vec4(0.0);
+  if (!(whole.a > 0.0)) return all;
+  float pieces = whole.a < 4.0 ? ceil(whole.a / 0.25) : 16.0;
+  if (pieces <= 1.0) {
+    addPieceBehind(all, whole, 1.0);
+    return all;
+  }
+  float size = 1.0 / pieces, apart = (b - a) * size;
+  for (float p = 0.0; p < pieces; ++p)
+    addPieceBehind(all, meansBetween(a + p * apart, a + (p + 1.0) * apart), size);
+  return all;
+}
+`;
+
+const kShading = `
+uniform vec3 uToLight;
+uniform float uWeakSquared;  // in places of the table
+const float kAmbient = 0.3, kDiffuse = 0.7, kSpecular = 0.25, kShininess = 25.0;
+
+float voxelAt(vec3 local, vec3 slot) { return textureLod(uVoxels, (local + slot) * uTexel, 0.0).r; }
+
+// Factor of the color, and the highlight.
+vec2 shadeAt(vec3 local, vec3 slot, vec3 direction) {
+  vec3 low = max(local - 0.5, 0.0), high = min(local + 0.5, kBrickSide);
+  vec3 g = uPlaceScale / (high - low) * vec3(
+    voxelAt(vec3(high.x, local.yz), slot) - voxelAt(vec3(low.x, local.yz), slot),
+    voxelAt(vec3(local.x, high.y, local.z), slot) - voxelAt(vec3(local.x, low.y, local.z), slot),
+    voxelAt(vec3(local.xy, high.z), slot) - voxelAt(vec3(local.xy, low.z), slot));
+  float squared = dot(g, g);
+  if (!(squared > 0.0)) return vec2(kAmbient + kDiffuse, 0.0);
+  float perLength = inversesqrt(squared);
+  vec3 halfway = uToLight - direction;
+  float facing = abs(dot(g, uToLight)) * perLength;
+  float mirrored = abs(dot(g, halfway)) * perLength / max(length(halfway), 1e-6);
+  float strength = squared / (squared + uWeakSquared);
+  return vec2(kAmbient + kDiffuse * (1.0 + strength * (facing - 1.0)),
+              strength * kSpecular * pow(mirrored, kShininess));
+}
+vec4 lit(vec4 c, vec2 shade) { return vec4(c.rgb * shade.x + shade.y * c.a, c.a); }
+`;
+
+/** The state of a ray, and what each mode does with a sample. */
+const kModes = {
+  maximum: `
+float largest;
+bool seen = false;
+void add(float place, int number) {
+  largest = seen ? max(largest, place) : place;
+  seen = true;
+}
+void finish() {}
+vec4 result() { return seen ? classified(largest) : vec4(0.0); }
+`,
+  average: `
+float total = 0.0, count = 0.0;
+void add(float place, int number) { total += place; ++count; }
+void finish() {}
+vec4 result() { return count > 0.0 ? classified(total / count) : vec4(0.0); }
+`,
+  post: `
+void add(float place, int number) { absorb(LIT(classified(place), nowShade)); }
+void finish() {}
+vec4 result() { return vec4(light, 1.0 - transmittance); }
+`,
+  pre: `
+const int kNone = -2;
+int last = kNone;
+float lastPlace;
+// Adds the segment into the empty space behind the last sample.
+void finish() {
+  if (last != kNone) absorb(LIT(segment(lastPlace, uPlaceOfBackground), lastShade));
+}
+void add(float place, int number) {
+  bool consecutive = last != kNone && number == last + 1;
+  if (!consecutive) finish();
+  absorb(LIT(segment(consecutive ? lastPlace : uPlaceOfBackground, place), nowShade));
+  last = number;
+  lastPlace = place;
+}
+vec4 result() { return vec4(light, 1.0 - transmittance); }
+`,
+};
+
+const kComposite = `
+vec3 light = vec3(0.0);
+float transmittance = 1.0;
+void absorb(vec4 c) {
+  light += transmittance * c.rgb;
+  transmittance *= 1.0 - c.a;
+}
+`;
+
+const kMarch = `
+// The part of a ray between two planes perpendicular to each axis.
+vec2 within(vec3 origin, vec3 direction) {
+  vec3 safe = mix(direction, vec3(1e-20), equal(direction, vec3(0.0)));
+  vec3 a = (uLow - origin) / safe, b = (uHigh - origin) / safe;
+  vec3 near = min(a, b), far = max(a, b);
+  return vec2(max(max(near.x, near.y), max(near.z, 0.0)), min(far.x, min(far.y, far.z)));
+}
+
+// Number of samples from a place to the first one outside a cube, at least 1.
+int samplesToLeave(vec3 p, vec3 perVoxel, vec3 low, vec3 high) {
+  vec3 faces = mix(low, high, greaterThan(perVoxel, vec3(0.0)));
+  vec3 ahead = mix((faces - p) * perVoxel, vec3(1e30), equal(perVoxel, vec3(0.0)));
+  return int(clamp(ceil(min(ahead.x, min(ahead.y, ahead.z)) - 1e-3), 1.0, 1e9));
+}
+
+void main() {
+  vec2 pixel = vec2(gl_FragCoord.x, uHeight - gl_FragCoord.y);
+  float x = uLeft + pixel.x * uPixel.x, y = uTop - pixel.y * uPixel.y;
+  vec3 across = uRight * x + uUp * y;
+  vec3 origin = uPerspective ? uEye : uEye + across;
+  vec3 direction = uPerspective ? normalize(uForward + across) : uForward;
+  vec2 range = within(origin, direction);
+  float first = ceil(range.x / uStep), final = floor(range.y / uStep);
+  vec3 start = origin + direction * (first * uStep), apart = direction * uStep;
+  vec3 perVoxel = mix(1.0 / apart, vec3(0.0), lessThan(abs(apart), vec3(1e-30)));
+  int count = first <= final ? int(final - first) + 1 : 0;
+  ivec3 size = textureSize(uBricks, 0);
+  int i = 0;
+  while (i < count && OPEN) {
+    vec3 p = start + float(i) * apart;
+    ivec3 brick = ivec3(floor(p / kBrickSide));
+    // Rounding can move a place beyond the box.
+    if (any(lessThan(brick, ivec3(0))) || any(greaterThanEqual(brick, size))) {
+      ++i;
+      continue;
+    }
+    uvec4 entry = texelFetch(uBricks, brick, 0);
+    vec3 low = vec3(brick) * kBrickSide;
+    if (entry.a != 0u) {
+      float room = (float(entry.a) - 1.0) * kBrickSide;
+      i += samplesToLeave(p, perVoxel, low - room, low + kBrickSide + room);
+      continue;
+    }
+    vec3 slot = vec3(entry.xyz) * kSlotSide + 0.5;
+    int end = min(count, i + samplesToLeave(p, perVoxel, low, low + kBrickSide));
+    for (; i < end && OPEN; ++i) {
+      vec3 local = start + float(i) * apart - low;
+      float share = textureLod(uVoxels, (local + slot) * uTexel, 0.0).r;
+      if (share == 0.0) continue;
+      SHADE
+      add(share * uPlaceScale + uPlaceOfBackground, i);
+      NEXT_SHADE
+    }
+  }
+  finish();
+  color = result();
+  color += (1.0 - color.a) * uBackground;
+}`;
+
+/**
+ * The fragment shader of a kind of picture.
+ * @param {{mode: "composite" | "maximum" | "average", classification: "pre" | "post", shade: boolean}} kind
+ */
+export function fragmentShader({ mode, classification, shade }) {
+  const composite = mode === "composite", isLit = composite && shade;
+  const parts = [
+    "#version 300 es",
+    kDeclarations,
+    kTransferTable,
+    composite ? kSegmentTable : "",
+    isLit ? kShading + "vec2 nowShade, lastShade;" : "",
+    `#define LIT(light, shade) ${isLit ? "lit(light, shade)" : "light"}`,
+    `#define OPEN ${composite ? "!(transmittance < uMinTransmittance)" : "true"}`,
+    `#define SHADE ${isLit ? "nowShade = shadeAt(clamp(local, 0.0, kBrickSide), slot, direction);" : ""}`,
+    `#define NEXT_SHADE ${isLit ? "lastShade = nowShade;" : ""}`,
+    composite ? kComposite : "",
+    kModes[composite ? classification : mode],
+    kMarch,
+  ];
+  return parts.join("\n");
+}

@@ -1,0 +1,62 @@
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "capi/objects.h"
+#include "page.h"
+#include "render/transfer_table.h"
+#include "render/value_extent.h"
+
+namespace esvr::page {
+namespace {
+
+TransferFunction functionOf(const page_transfer& t) {
+  TransferFunction f;
+  f.colors.space = ColorSpace(t.space);
+  for (const double* p = t.colors; p != t.colors + 4 * t.color_count; p += 4)
+    f.colors.points.push_back({p[0], {p[1], p[2], p[3]}});
+  for (const double* p = t.opacity; p != t.opacity + 4 * t.opacity_count; p += 4)
+    f.opacity.push_back({p[0], p[1], p[2], p[3]});
+  checkTransferFunction(f);
+  return f;
+}
+
+/// A gradient of 2 % of the range for each voxel has half of its effect (render/shading.cpp).
+float weakGradientSquared(const TransferFunction& f) {
+  constexpr double kWeakShare = 0.02;
+  const ValueExtent extent = extentOf(f);
+  return float(std::pow(kWeakShare * (extent.high - extent.low), 2.0));
+}
+
+/// The tables of the last call, and what their pointers point to.
+struct Tables {
+  Tables(const TransferFunction& f, const Sampling& sampling) : table(f, sampling) {
+    const TransferTableView view = table.view();
+    content.intervals = TransferTableView::kIntervals;
+    content.low = view.low, content.scale = view.scale;
+    content.segment_low = view.segments.low, content.segment_scale = view.segments.scale;
+    content.unit = view.segments.unit;
+    content.weak_gradient_squared = weakGradientSquared(f);
+    static_assert(sizeof(Classified) == 4 * sizeof(float));
+    static_assert(sizeof(SegmentEntry) == 8 * sizeof(float));
+    content.values = &view.entries->r;
+    content.entries = reinterpret_cast<const unsigned*>(view.segments.entries);
+  }
+  TransferTable table;
+  page_tables content{};
+};
+std::unique_ptr<Tables> last;
+
+}  // namespace
+}  // namespace esvr::page
+
+using namespace esvr;
+
+const page_tables* page_make_tables(const page_transfer* transfer, double length, int segments) {
+  const auto status = capi::guarded([&] {
+    page::last =
+        std::make_unique<page::Tables>(page::functionOf(*transfer), Sampling{length, segments != 0});
+  });
+  return status == ESVR_OK ? &page::last->content : nullptr;
+}
