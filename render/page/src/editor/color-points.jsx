@@ -50,7 +50,7 @@ function Handle({ transfer, shown: [low, high], index, selected, width, onSelect
   return (
     <span
       class={selected ? "handle selected" : "handle"} style={{ left: `${100 * share}%`, background: hexOf(color) }}
-      role="slider" tabIndex={0} aria-label={`Color point ${index + 1} of ${transfer.colors.length}`}
+      role="slider" tabindex={0} aria-label={`Color point ${index + 1} of ${transfer.colors.length}`}
       aria-valuenow={value} aria-valuemin={low} aria-valuemax={high}
       aria-valuetext={`color ${hexOf(color)} at value ${shortText(value)}`}
       onPointerDown={onPointerDown} onKeyDown={onKeyDown} onFocus={onSelect}
@@ -107,8 +107,13 @@ export function ColorPoints({ transfer, shown, unit, onChange }) {
         </p>
       )}
       {editable && (
-        <fieldset class="point-fields">
+        <fieldset class="point-fields titled">
           <legend>Color point {index + 1} of {colors.length}</legend>
+          <div class="row">
+            <span class="space" />
+            <button type="button" onClick={() => add((value + next[0]) / 2)}>Add</button>
+            <button type="button" disabled={colors.length < 2} onClick={() => remove(index)}>Remove</button>
+          </div>
           <div class="row">
             <NumberField label="Value" value={value} unit={unit} onChange={(v) => set(withPoint(colors, index, [v, ...color]))} />
             <label class="field">
@@ -118,9 +123,6 @@ export function ColorPoints({ transfer, shown, unit, onChange }) {
                 onInput={(e) => set(withPoint(colors, index, [value, ...tripleOf(e.currentTarget.value)]), true)}
               />
             </label>
-            <span class="space" />
-            <button type="button" onClick={() => add((value + next[0]) / 2)}>Add</button>
-            <button type="button" disabled={colors.length < 2} onClick={() => remove(index)}>Remove</button>
           </div>
         </fieldset>
       )}

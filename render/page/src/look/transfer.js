@@ -147,7 +147,7 @@ export function withoutPoint(points, index) {
 /**
  * Adds a point.
  * @template {number[]} P
- * @param {P[]} points @param {P} point
+ * @param {P[]} points @param {NoInfer<P>} point
  * @returns {{points: P[], index: number}}
  */
 export function withAddedPoint(points, point) {
