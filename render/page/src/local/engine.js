@@ -177,7 +177,7 @@ export class Engine {
     const box = this.#gridAt(scene.grid).box;
     const wanted = scene.lod === "auto" ? levelOf(scene.camera, size.height, scaled(sum(...box), 0.5)) : 0;
     this.#useVolume(scene.grid, fits(scene, wanted) ? wanted : 0);
-    const { level, origin, bricks } = /** @type {NonNullable<typeof this.#atlas>} */ (this.#atlas);
+    const { level, origin, bricks } = /** @type {any} */ (this.#atlas);
     this.#useTables(scene, level);
     const first = /** @type {Triple} */ (origin);
     const view = viewOf(scene.camera, size, level, first);
