@@ -93,7 +93,7 @@ export class LocalBackend {
     this.#engine = workersDraw() ? new RemoteEngine(content) : new PageEngine(content);
     this.#engine.onPicture = (picture) => {
       const drawing = this.#drawing;
-      if (drawing?.id === picture.id) drawing.onPicture(picture);
+      if (drawing && drawing.id === picture.id) drawing.onPicture(picture);
       else if (picture.bitmap instanceof ImageBitmap) picture.bitmap.close();
     };
   }
