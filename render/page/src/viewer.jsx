@@ -4,7 +4,7 @@ import { Editor } from "./editor/editor.jsx";
 import { ComparePanel, referencesOf } from "./panels/compare.jsx";
 import { CutPanel } from "./panels/cut.jsx";
 import { DrawingPanel } from "./panels/drawing.jsx";
-import { PresetFiles, useDroppedPreset } from "./panels/presets.jsx";
+import { PresetChoice, PresetFiles, usePresets } from "./panels/presets.jsx";
 import { SequenceBar } from "./panels/sequence.jsx";
 import { StatisticsPanel } from "./panels/statistics.jsx";
 import { Section } from "./parts/section.jsx";
@@ -106,11 +106,11 @@ export function Viewer({ backend, description, store, fitFirst }) {
   };
   const player = usePlaying(file.frames, () => store.scene.frame, painting.shownFrame, setFrame);
   const setTransfer = (/** @type {Scene["transfer"]} */ transfer, isMoving = false) => set({ transfer }, isMoving);
-  const preset = useDroppedPreset(backend, setTransfer, setToast);
+  const presets = usePresets(backend, () => store.scene.transfer, setTransfer, setToast);
   const comparable = backend.can.has("compare") && referencesOf(description, scene).length > 0;
   const reference = scene.compare && description.files[scene.compare.file];
   return (
-    <div class="viewer" {...preset.dropProps}>
+    <div class="viewer" {...presets.dropProps}>
       <Toolbar
         backend={backend} description={description} store={store} pixels={pixels} onGrid={chooseGrid} onMessage={setToast}
       />
@@ -120,7 +120,7 @@ export function Viewer({ backend, description, store, fitFirst }) {
           busy={painting.busy} names={{ own: file.name, reference: reference?.name ?? "" }}
         >
           {painting.busy && !moving && <div class="progress" aria-hidden="true" />}
-          <ColorBar transfer={scene.transfer} name={grid.name} unit={grid.unit} />
+          {scene.compare?.show !== "difference" && <ColorBar transfer={scene.transfer} name={grid.name} unit={grid.unit} />}
           <ViewButtons
             camera={scene.camera} onView={fit}
             onParallel={(parallel) => set({ camera: withParallelRays(scene.camera, parallel) })}
@@ -133,9 +133,9 @@ export function Viewer({ backend, description, store, fitFirst }) {
         <Section title="Colors and opacity" open>
           <Editor
             transfer={scene.transfer} description={description} grid={grid} histogram={histogram} onChange={setTransfer}
-            files={<PresetFiles backend={backend} transfer={scene.transfer} name={grid.name} onOpen={preset.open} />}
+            files={<PresetFiles backend={backend} transfer={scene.transfer} name={grid.name} onOpen={presets.open} />}
           />
-          {preset.chooser}
+          {presets.opened && <PresetChoice opened={presets.opened} onChange={presets.show} />}
         </Section>
         <DrawingPanel scene={scene} grid={grid} can={backend.can} onChange={set} />
         <CutPanel scene={scene} grid={grid} onChange={set} />

@@ -1,7 +1,7 @@
 // The controls beside the editor.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { bench, changeBy, differenceOf, openPage, pictureOf, rested, sceneOf, unfold } from "./support.mjs";
+import { bench, changeBy, differenceOf, litShare, openPage, pictureOf, rested, sceneOf, unfold } from "./support.mjs";
 
 const shared = bench();
 const kVisible = 0.05; // mean change of a picture, in 255ths
@@ -135,9 +135,16 @@ test("reference and difference are shown, with the PSNR of the picture", async (
 
 test("another volume is chosen with its own look and view", async (t) => {
   const page = await openPage(t, shared);
-  const chooser = page.getByLabel("Volume", { exact: true });
-  assert.ok((await changeBy(page, () => chooser.selectOption({ label: "rising.esvr: density" }))) > kVisible);
-  assert.equal(sceneOf(page).file, 2);
+  await page.getByRole("radio", { name: "Inferno" }).check();
+  await rested(page);
+  const before = sceneOf(page).camera;
+  await page.getByLabel("Volume", { exact: true }).selectOption({ label: "rising.esvr: density" });
+  await rested(page);
+  const scene = sceneOf(page);
+  assert.equal(scene.file, 2);
+  assert.equal(scene.transfer, undefined, "the usual look");
+  assert.notDeepEqual(scene.camera, before);
+  assert.ok(litShare(await pictureOf(page)) > 0.02);
   await page.getByRole("group", { name: "Sequence" }).waitFor();
 });
 

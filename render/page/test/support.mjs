@@ -6,7 +6,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before } from "node:test";
 
-const kFlags = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"];
+export const kFlags = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"];
 const kStartMs = 20_000;
 
 /** A program of the project; the build names it in the environment. */

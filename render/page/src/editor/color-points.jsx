@@ -107,8 +107,13 @@ export function ColorPoints({ transfer, shown, unit, onChange }) {
         </p>
       )}
       {editable && (
-        <fieldset class="point-fields">
+        <fieldset class="point-fields titled">
           <legend>Color point {index + 1} of {colors.length}</legend>
+          <div class="row">
+            <span class="space" />
+            <button type="button" onClick={() => add((value + next[0]) / 2)}>Add</button>
+            <button type="button" disabled={colors.length < 2} onClick={() => remove(index)}>Remove</button>
+          </div>
           <div class="row">
             <NumberField label="Value" value={value} unit={unit} onChange={(v) => set(withPoint(colors, index, [v, ...color]))} />
             <label class="field">
@@ -118,9 +123,6 @@ export function ColorPoints({ transfer, shown, unit, onChange }) {
                 onInput={(e) => set(withPoint(colors, index, [value, ...tripleOf(e.currentTarget.value)]), true)}
               />
             </label>
-            <span class="space" />
-            <button type="button" onClick={() => add((value + next[0]) / 2)}>Add</button>
-            <button type="button" disabled={colors.length < 2} onClick={() => remove(index)}>Remove</button>
           </div>
         </fieldset>
       )}

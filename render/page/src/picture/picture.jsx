@@ -44,16 +44,16 @@ export function Picture({ scene, grid, size, area, canvases, onChange, onFit, bu
           style={{ clipPath: `inset(0 0 0 ${100 * (split?.split ?? 0)}%)` }}
         />
       </div>
-      {scene.clip && size.width > 0 && (
-        <ClipHandles
-          camera={scene.camera} size={size} clip={scene.clip} limits={edgesOf(grid)}
-          onChange={(clip, moving) => onChange({ clip }, moving)}
-        />
-      )}
       {split && (
         <Divider
           share={split.split} left={names.own} right={names.reference}
           onChange={(share) => onChange({ compare: { ...split, split: share } }, true)}
+        />
+      )}
+      {scene.clip && size.width > 0 && (
+        <ClipHandles
+          camera={scene.camera} size={size} clip={scene.clip} limits={edgesOf(grid)}
+          onChange={(clip, moving) => onChange({ clip }, moving)}
         />
       )}
       {children}
