@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -17,14 +16,6 @@ namespace {
 constexpr int kMostSlots = 255;     ///< places along an axis that a byte of the table can hold
 constexpr int kTableBytes = 4;      ///< of a brick
 constexpr int kCoarsestLevel = 16;  ///< every volume is a single brick long before
-
-/// The nearest half float, away from zero if two are equally near. The number is at most 1.
-std::uint16_t halfOf(float value) {
-  constexpr float kMadeSmall = 0x1p-112f;  // the exponents of float32 become those of half floats
-  const auto bits = std::bit_cast<std::uint32_t>(value * kMadeSmall);
-  const std::uint32_t rounded = (bits & 0x7fffffffu) + 0x1000u;
-  return std::uint16_t((bits >> 16 & 0x8000u) | rounded >> 13);
-}
 
 /// The size of an atlas that is about a cube and has room for `count` slots; nothing if it would be
 /// too large.
@@ -89,7 +80,7 @@ class Distances {
 /// An atlas with the memory of its textures.
 struct Atlas : page_atlas {
   std::vector<std::uint8_t> bytes;
-  std::vector<std::uint16_t> halves;
+  std::vector<float> shares;
 };
 
 void set(int (&to)[3], Coord c) { to[0] = c.x, to[1] = c.y, to[2] = c.z; }
@@ -117,7 +108,9 @@ class AtlasMaker {
     a.scale = scaleOf(from_, background);
     fillTable();
     fillVoxels();
-    a.table = a.bytes.data(), a.voxels = a.halves.data();
+    const auto [least, most] = std::minmax_element(a.shares.begin(), a.shares.end());
+    a.least = *least, a.most = *most;
+    a.table = a.bytes.data(), a.voxels = a.shares.data();
     return std::move(atlas_);
   }
 
@@ -148,7 +141,7 @@ class AtlasMaker {
   void fillVoxels() {
     const int(&slots)[3] = atlas_->slots;
     width_ = std::size_t(slots[0] * kCellBrickSide), height_ = std::size_t(slots[1] * kCellBrickSide);
-    atlas_->halves.assign(width_ * height_ * std::size_t(slots[2] * kCellBrickSide), 0);
+    atlas_->shares.assign(width_ * height_ * std::size_t(slots[2] * kCellBrickSide), 0);
     for (std::size_t i = 0; i < from_.table.bricks.size(); ++i)
       fillSlot(&from_.values[i * kCellBrickVoxels], slotOf(i) * kCellBrickSide);
   }
@@ -160,8 +153,8 @@ class AtlasMaker {
         for (int z = 0; z < kCellBrickSide; ++z) {
           const Coord to = first + Coord{x, y, z};
           const float share = (*from++ - atlas_->background) * perScale;
-          atlas_->halves[(std::size_t(to.z) * height_ + std::size_t(to.y)) * width_ +
-                         std::size_t(to.x)] = halfOf(share);
+          atlas_->shares[(std::size_t(to.z) * height_ + std::size_t(to.y)) * width_ +
+                         std::size_t(to.x)] = share;
         }
   }
 
@@ -182,7 +175,7 @@ Box boxOf(const BrickAtlas& atlas) {
 std::unique_ptr<Atlas> atlasOf(const SparseVolume& volume, int level, int mostSide,
                                double mostBytes) {
   // The bricks of voxels tell early that an atlas would be too large. An atlas has more bricks.
-  const double perBrick = kCellBrickVoxels * sizeof(std::uint16_t);
+  const double perBrick = kCellBrickVoxels * sizeof(float);
   if (double(volume.brickCount()) * perBrick > mostBytes) return nullptr;
   const BrickAtlas bricks = makeBrickAtlas(volume);
   const Box box = boxOf(bricks);

@@ -26,7 +26,7 @@ void page_histogram(const esvr_volume* volume, double low, double high, int coun
 ///
 /// Bricks have 8 x 8 x 8 cells and store the 9 x 9 x 9 voxels at their corners, as in the library
 /// (render/brick_march.h). The atlas has room for slots[0] x slots[1] x slots[2] of them, x fastest;
-/// a voxel is the half float (value - background) / scale. The table has four bytes for each brick
+/// a voxel is (value - background) / scale. The table has four bytes for each brick
 /// of the box, x fastest: the place of its slot along x, y and z and 0, or 0, 0, 0 and the distance
 /// in bricks, at least 1, within which all bricks are empty (the distance 1 is the brick itself).
 struct page_atlas {
@@ -37,8 +37,9 @@ struct page_atlas {
   int count;             ///< number of slots that are used
   float background;
   float scale;
+  float least, most;     ///< smallest and largest stored voxel
   const unsigned char* table;
-  const unsigned short* voxels;
+  const float* voxels;
 };
 
 /// \param level      coarser level of detail to begin with
@@ -57,21 +58,25 @@ struct page_transfer {
   const double* opacity;  ///< value, opacity, midpoint, sharpness
 };
 
-/// The tables of the library's renderers (render/transfer_table.h, render/segment_table.h).
+/// The tables of the library's renderers (render/transfer_table.h, render/segment_table.h). Places
+/// count intervals from the lowest value of the transfer function.
 struct page_tables {
   int intervals;
-  float low, scale;                  ///< of the table of values; scale 0: it has no extent
-  float segment_low, segment_scale;  ///< of the table of segments
-  float unit;                        ///< what one unit of the integrals stands for
+  float low, scale;                  ///< lowest value and intervals per unit; scale 0: no extent
   float weak_gradient_squared;       ///< of shading
-  const float* values;     ///< intervals + 1 times red, green, blue, alpha
-  const unsigned* entries; ///< intervals + 2 times four integrals and four means (as floats)
+  const float* values;               ///< intervals + 1 times red, green, blue, alpha
+  /// side x side times the light of a segment as red, green, blue and alpha, premultiplied. Entry
+  /// (i, j), i fastest, is a segment from the place i d to the place j d with d = intervals / (side -
+  /// 1). Null if no segments are wanted.
+  const float* segments;
+  int side;
+  float below[4], above[4];          ///< colors and extinctions beyond the ends; alpha is the extinction
 };
 
-/// \param length    length of a step in units of the length that opacities are given for
-/// \param segments  whether the table of segments is wanted
+/// \param length  length of a step in units of the length that opacities are given for
+/// \param side    of the table of segments; 0: none is wanted
 /// \return null on failure
-const page_tables* page_make_tables(const page_transfer* transfer, double length, int segments);
+const page_tables* page_make_tables(const page_transfer* transfer, double length, int side);
 
 /// Fits a camera to a box of voxels.
 /// \param box        x0, y0, z0, x1, y1, z1

@@ -1,5 +1,5 @@
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <memory>
 #include <vector>
 
@@ -29,22 +29,35 @@ float weakGradientSquared(const TransferFunction& f) {
   return float(std::pow(kWeakShare * (extent.high - extent.low), 2.0));
 }
 
+void copy(const SegmentEntry& entry, float (&to)[4]) { std::copy_n(entry.mean.c, 4, to); }
+
 /// The tables of the last call, and what their pointers point to.
 struct Tables {
-  Tables(const TransferFunction& f, const Sampling& sampling) : table(f, sampling) {
+  Tables(const TransferFunction& f, const Sampling& sampling, int side) : table(f, sampling) {
     const TransferTableView view = table.view();
     content.intervals = TransferTableView::kIntervals;
     content.low = view.low, content.scale = view.scale;
-    content.segment_low = view.segments.low, content.segment_scale = view.segments.scale;
-    content.unit = view.segments.unit;
     content.weak_gradient_squared = weakGradientSquared(f);
     static_assert(sizeof(Classified) == 4 * sizeof(float));
-    static_assert(sizeof(SegmentEntry) == 8 * sizeof(float));
     content.values = &view.entries->r;
-    content.entries = reinterpret_cast<const unsigned*>(view.segments.entries);
+    if (sampling.segments) fillSegments(view.segments, side);
   }
   TransferTable table;
+  std::vector<PixelColor> segments{};
   page_tables content{};
+
+ private:
+  void fillSegments(const SegmentTableView& view, int side) {
+    const float apart = float(content.intervals) / float(side - 1) / view.scale;
+    segments.reserve(std::size_t(side) * std::size_t(side));
+    for (int j = 0; j < side; ++j)
+      for (int i = 0; i < side; ++i)
+        segments.push_back(view(view.low + float(i) * apart, view.low + float(j) * apart));
+    static_assert(sizeof(PixelColor) == 4 * sizeof(float));
+    content.segments = &segments.front().r, content.side = side;
+    copy(view.entries[0], content.below);
+    copy(view.entries[content.intervals + 1], content.above);
+  }
 };
 std::unique_ptr<Tables> last;
 
@@ -53,10 +66,10 @@ std::unique_ptr<Tables> last;
 
 using namespace esvr;
 
-const page_tables* page_make_tables(const page_transfer* transfer, double length, int segments) {
+const page_tables* page_make_tables(const page_transfer* transfer, double length, int side) {
   const auto status = capi::guarded([&] {
     page::last =
-        std::make_unique<page::Tables>(page::functionOf(*transfer), Sampling{length, segments != 0});
+        std::make_unique<page::Tables>(page::functionOf(*transfer), Sampling{length, side > 1}, side);
   });
   return status == ESVR_OK ? &page::last->content : nullptr;
 }

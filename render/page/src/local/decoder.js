@@ -7,17 +7,18 @@
  * @typedef {object} Atlas  The bricks of a volume as textures; the arrays are views of the module's memory.
  * @property {number} level @property {number[]} origin @property {number[]} bricks @property {number[]} slots
  * @property {number} count @property {number} background @property {number} scale
- * @property {Uint8Array} table @property {Uint16Array} voxels @property {() => void} free
+ * @property {number[]} shares  that of the smallest voxel, of the background and of the largest voxel
+ * @property {Uint8Array} table @property {Float32Array} voxels @property {() => void} free
  *
  * @typedef {object} Tables  The tables of a transfer function; views of the module's memory.
- * @property {number} intervals @property {number} low @property {number} scale @property {number} segmentLow
- * @property {number} segmentScale @property {number} unit @property {number} weakGradientSquared
- * @property {Float32Array} values @property {Uint32Array} entries
+ * @property {number} intervals @property {number} low @property {number} scale @property {number} weakGradientSquared
+ * @property {Float32Array} values @property {Float32Array | null} segments @property {number} side
+ * @property {number[]} below @property {number[]} above
  */
 
 const kSpaces = ["RGB", "HSV", "HSVWrap", "Lab", "Diverging", "Step"];
 const kWordBytes = 4, kDoubleBytes = 8;
-const kHalvesOfSlot = 9 * 9 * 9;
+const kVoxelsOfSlot = 9 * 9 * 9;
 
 /** Camera as ten numbers, the last of which is the field of view or the height. @param {Camera} camera */
 const numbersOf = ({ eye, center, up, fov, height }) => [...eye, ...center, ...up, height ?? fov ?? 30];
@@ -101,20 +102,24 @@ export class Decoder {
    */
   atlas(volume, level, { mostSide, mostBytes }) {
     const at = this.#orFail(this.#exports.page_make_atlas(volume, level, mostSide, mostBytes));
-    const words = [...new Int32Array(this.#memory, at, 15)];
-    const [background, scale] = new Float32Array(this.#memory, at + 11 * kWordBytes, 2);
+    const words = [...new Int32Array(this.#memory, at, 17)];
+    const [background, scale, least, most] = new Float32Array(this.#memory, at + 11 * kWordBytes, 4);
     const origin = words.slice(1, 4), bricks = words.slice(4, 7), slots = words.slice(7, 10);
     const size = (/** @type {number[]} */ sides) => sides[0] * sides[1] * sides[2];
     return {
-      level: words[0], origin, bricks, slots, count: words[10], background, scale,
-      table: new Uint8Array(this.#memory, words[13] >>> 0, 4 * size(bricks)),
-      voxels: new Uint16Array(this.#memory, words[14] >>> 0, kHalvesOfSlot * size(slots)),
+      level: words[0], origin, bricks, slots, count: words[10], background, scale, shares: [least, 0, most],
+      table: new Uint8Array(this.#memory, words[15] >>> 0, 4 * size(bricks)),
+      voxels: new Float32Array(this.#memory, words[16] >>> 0, kVoxelsOfSlot * size(slots)),
       free: () => this.#exports.page_free_atlas(at),
     };
   }
 
-  /** @param {Transfer} transfer @param {{length: number, segments: boolean}} sampling @returns {Tables} */
-  tables(transfer, { length, segments }) {
+  /**
+   * @param {Transfer} transfer
+   * @param {{length: number, side: number}} sampling  side: of the table of segments; 0: none is wanted
+   * @returns {Tables}
+   */
+  tables(transfer, { length, side }) {
     return this.#scoped((take) => {
       const head = take(5 * kWordBytes);
       const space = kSpaces.indexOf(transfer.space);
@@ -122,13 +127,14 @@ export class Decoder {
       const colors = this.#putNumbers(take, transfer.colors.flat());
       const opacity = this.#putNumbers(take, transfer.opacity.flat());
       this.#words(head, 5).set([space, transfer.colors.length, transfer.opacity.length, colors, opacity]);
-      const at = this.#orFail(this.#exports.page_make_tables(head, length, segments ? 1 : 0));
-      const [intervals, , , , , , , values, entries] = this.#words(at, 9);
-      const [low, scale, segmentLow, segmentScale, unit, weakGradientSquared] = new Float32Array(this.#memory, at + kWordBytes, 6);
+      const at = this.#orFail(this.#exports.page_make_tables(head, length, side));
+      const words = this.#words(at, 7), floats = [...new Float32Array(this.#memory, at, 15)];
+      const [intervals, , , , values, segments] = words;
       return {
-        intervals, low, scale, segmentLow, segmentScale, unit, weakGradientSquared,
+        intervals, low: floats[1], scale: floats[2], weakGradientSquared: floats[3], side,
         values: new Float32Array(this.#memory, values, 4 * (intervals + 1)),
-        entries: entries ? this.#words(entries, 8 * (intervals + 2)) : new Uint32Array(0),
+        segments: segments ? new Float32Array(this.#memory, segments, 4 * side * side) : null,
+        below: floats.slice(7, 11), above: floats.slice(11, 15),
       };
     });
   }

@@ -20,6 +20,8 @@ const kMostTextureBytes = 512 * 2 ** 20;
 const kBandMs = 40; // between two looks for a newer request
 const kFirstPictureMs = 60; // a picture that takes longer has a coarse one before it
 const kCoarseScale = 0.35;
+const kUsualSide = 256, kFineSide = 1024; // of the table of segments
+const kFineGap = 1 / 128; // between two points of a transfer function, as a share of its range
 /** @type {Record<string, Triple>} */
 const kDirections = { "+x": [1, 0, 0], "-x": [-1, 0, 0], "+y": [0, 1, 0], "-y": [0, -1, 0], "+z": [0, 0, 1], "-z": [0, 0, -1] };
 
@@ -217,14 +219,22 @@ export class Engine {
     }
   }
 
+  /** Entries of the table of segments: more if points of the transfer function are close. */
+  #sideOf({ colors, opacity }) {
+    const places = [...colors, ...opacity].map(([x]) => x).sort((a, b) => a - b);
+    const gaps = places.slice(1).map((x, i) => x - places[i]).filter((gap) => gap > 0);
+    const finest = Math.min(...gaps) / ((places.at(-1) ?? 0) - places[0]);
+    return finest < kFineGap ? kFineSide : kUsualSide;
+  }
+
   /** @param {Scene} scene @param {number} level */
   #useTables({ transfer, mode, classification, step, opacityLength }, level) {
     const composite = mode === "composite";
     const length = composite ? (step * 2 ** level) / opacityLength : 1;
-    const segments = composite && classification === "pre";
-    const key = JSON.stringify([transfer, length, segments]);
+    const side = composite && classification === "pre" ? this.#sideOf(transfer) : 0;
+    const key = JSON.stringify([transfer, length, side]);
     if (this.#shown.tables === key) return;
-    this.#marcher.setTables(this.#decoder.tables(transfer, { length, segments }));
+    this.#marcher.setTables(this.#decoder.tables(transfer, { length, side }));
     this.#shown.tables = key;
   }
 }

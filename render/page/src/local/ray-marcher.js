@@ -5,10 +5,11 @@
  * @typedef {import("./decoder.js").Atlas} Atlas
  * @typedef {import("./decoder.js").Tables} Tables
  * @typedef {{width: number, height: number}} Size
- * @typedef {{mode: "composite" | "maximum" | "average", classification: "pre" | "post", shade: boolean}} Kind
+ * @typedef {{mode: "composite" | "maximum" | "average", classification: "pre" | "post", shade: boolean, inTable: boolean}} Kind
+ *   inTable: all values lie within the range of the transfer function
  *
  * @typedef {object} Frame  What decides the pixels of a picture.
- * @property {Kind} kind
+ * @property {Omit<Kind, "inTable">} kind
  * @property {ReturnType<typeof import("./view.js").viewOf>} view
  * @property {Triple} low @property {Triple} high  the box to draw, relative to the atlas
  * @property {number} step
@@ -42,16 +43,17 @@ function linked(gl, fragment) {
   return program;
 }
 
-/** An array that fills the rows of a texture. @template {Float32Array | Uint32Array} T @param {T} values @returns {T} */
+/** An array that fills the rows of a texture. @param {Float32Array} values */
 function padded(values) {
-  const row = 4 * kTableRow, Kind = /** @type {any} */ (values.constructor);
-  const all = new Kind(Math.ceil(values.length / row) * row);
+  const row = 4 * kTableRow;
+  const all = new Float32Array(Math.ceil(values.length / row) * row);
   all.set(values);
   return all;
 }
 
 export class RayMarcher {
   #gl;
+  #floats;
   /** @type {Map<string, {program: WebGLProgram, places: Map<string, WebGLUniformLocation | null>}>} */
   #programs = new Map();
   #bricks;
@@ -70,6 +72,9 @@ export class RayMarcher {
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
     this.#gl = gl;
+    // Half floats can be filtered everywhere; floats are more precise, and faster on a CPU.
+    const filtersFloats = gl.getExtension("OES_texture_float_linear") !== null;
+    this.#floats = filtersFloats ? { red: gl.R32F, rgba: gl.RGBA32F } : { red: gl.R16F, rgba: gl.RGBA16F };
     this.#bricks = gl.createTexture();
     this.#voxels = gl.createTexture();
     this.#values = gl.createTexture();
@@ -96,22 +101,20 @@ export class RayMarcher {
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.texImage3D(gl.TEXTURE_3D, 0, gl.RGBA8UI, bx, by, bz, 0, gl.RGBA_INTEGER, gl.UNSIGNED_BYTE, table);
     this.#bind(1, gl.TEXTURE_3D, this.#voxels, gl.LINEAR);
-    gl.texImage3D(gl.TEXTURE_3D, 0, gl.R16F, sx, sy, sz, 0, gl.RED, gl.HALF_FLOAT, voxels);
+    gl.texImage3D(gl.TEXTURE_3D, 0, this.#floats.red, sx, sy, sz, 0, gl.RED, gl.FLOAT, voxels);
     if (gl.getError() === gl.OUT_OF_MEMORY) throw new Error("The volume does not fit into the memory of the graphics card.");
-    this.#bytes = table.byteLength + voxels.byteLength;
+    this.#bytes = table.byteLength + voxels.byteLength / (this.#floats.red === gl.R32F ? 1 : 2);
     this.#atlas = rest;
   }
 
   /** Uploads a transfer function. @param {Tables} tables */
   setTables(tables) {
-    const gl = this.#gl, { values, entries, ...rest } = tables;
-    const colors = padded(values), segments = padded(entries);
-    const rows = (/** @type {{length: number}} */ { length }) => length / (4 * kTableRow);
+    const gl = this.#gl, { values, segments, ...rest } = tables;
+    const colors = padded(values), side = tables.side;
     this.#bind(2, gl.TEXTURE_2D, this.#values, gl.NEAREST);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, kTableRow, rows(colors), 0, gl.RGBA, gl.FLOAT, colors);
-    this.#bind(3, gl.TEXTURE_2D, this.#segments, gl.NEAREST);
-    if (segments.length > 0)
-      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32UI, kTableRow, rows(segments), 0, gl.RGBA_INTEGER, gl.UNSIGNED_INT, segments);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, kTableRow, colors.length / (4 * kTableRow), 0, gl.RGBA, gl.FLOAT, colors);
+    this.#bind(3, gl.TEXTURE_2D, this.#segments, gl.LINEAR);
+    if (segments) gl.texImage2D(gl.TEXTURE_2D, 0, this.#floats.rgba, side, side, 0, gl.RGBA, gl.FLOAT, segments);
     this.#tables = rest;
   }
 
@@ -121,7 +124,7 @@ export class RayMarcher {
     this.#resize(size);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#target);
     gl.viewport(0, 0, size.width, size.height);
-    this.#setUniforms(this.#programOf(frame.kind), frame, size);
+    this.#setUniforms(this.#programOf({ ...frame.kind, inTable: this.#isInTable() }), frame, size);
   }
 
   /** Draws some rows of the picture, and waits for them. @param {number} first @param {number} count */
@@ -174,13 +177,21 @@ export class RayMarcher {
     return known;
   }
 
-  /** Places in the tables for shares of the atlas' scale: a factor and the place of the background. @param {Kind} kind */
-  #placesOf({ mode, classification }) {
+  /** Whether all values lie within the range of the transfer function. */
+  #isInTable() {
+    const { scale, background } = this.#places(), { shares } = /** @type {Atlas} */ (this.#atlas);
+    const last = /** @type {Tables} */ (this.#tables).intervals, slack = 1e-4 * last;
+    return shares.every((share) => {
+      const place = share * scale + background;
+      return place >= -slack && place <= last + slack;
+    });
+  }
+
+  /** Places in the tables for shares of the atlas' scale: a factor and the place of the background. */
+  #places() {
     const t = /** @type {Tables} */ (this.#tables), a = /** @type {Atlas} */ (this.#atlas);
-    const segments = mode === "composite" && classification === "pre";
-    if (!segments && t.scale === 0) return { scale: kFlat, background: a.background < t.low ? -kFlat : t.intervals };
-    const low = segments ? t.segmentLow : t.low, perValue = segments ? t.segmentScale : t.scale;
-    return { scale: a.scale * perValue, background: (a.background - low) * perValue };
+    if (t.scale === 0) return { scale: kFlat, background: a.background < t.low ? -kFlat : t.intervals };
+    return { scale: a.scale * t.scale, background: (a.background - t.low) * t.scale };
   }
 
   /**
@@ -195,7 +206,7 @@ export class RayMarcher {
     };
     const vector = (/** @type {string} */ name, /** @type {number[]} */ v) => gl.uniform3f(at(name), v[0], v[1], v[2]);
     const number = (/** @type {string} */ name, /** @type {number} */ v) => gl.uniform1f(at(name), v);
-    const place = this.#placesOf(frame.kind);
+    const place = this.#places();
     vector("uEye", view.eye);
     vector("uRight", view.right);
     vector("uUp", view.up);
@@ -212,7 +223,9 @@ export class RayMarcher {
     vector("uTexel", /** @type {Atlas} */ (this.#atlas).slots.map((n) => 1 / (n * kSlotSide)));
     number("uPlaceScale", place.scale);
     number("uPlaceOfBackground", place.background);
-    number("uUnit", tables.unit);
+    number("uSegmentSide", tables.side);
+    gl.uniform4fv(at("uBelow"), tables.below);
+    gl.uniform4fv(at("uAbove"), tables.above);
     vector("uToLight", frame.toLight);
     number("uWeakSquared", tables.weakGradientSquared * (place.scale / (this.#atlas?.scale ?? 1)) ** 2);
     gl.uniform4f(at("uBackground"), ...(frame.background ?? [0, 0, 0]), frame.background ? 1 : 0);

@@ -21,7 +21,6 @@ precision highp float;
 precision highp int;
 precision highp sampler2D;
 precision highp sampler3D;
-precision highp usampler2D;
 precision highp usampler3D;
 
 uniform vec3 uEye, uRight, uUp, uForward;  // relative to the first brick of the table
@@ -35,8 +34,9 @@ uniform sampler3D uVoxels;   // (value - background) / scale
 uniform vec3 uTexel;         // size of a texel of uVoxels
 uniform float uPlaceScale, uPlaceOfBackground;
 uniform sampler2D uValues;
-uniform usampler2D uSegments;
-uniform float uUnit;
+uniform sampler2D uSegments;
+uniform float uSegmentSide;
+uniform vec4 uBelow, uAbove;  // color and extinction beyond the ends of the table
 uniform vec4 uBackground;    // behind the volume, premultiplied
 out vec4 color;
 
@@ -59,48 +59,46 @@ vec4 classified(float place) {
 }
 `;
 
-const kSegmentTable = `
-uvec4 segmentEntry(int i) { return texelFetch(uSegments, ivec2(i % kRow, i / kRow), 0); }
-uvec4 before(int interval) { return segmentEntry(2 * interval); }
-vec4 meanOf(int interval) { return uintBitsToFloat(segmentEntry(2 * interval + 1)); }
-
-int intervalAt(float place) { return int(floor(clamp(place, -1.0, kIntervals))) + 1; }
-
-// The means of the channels between two places; alpha is the extinction.
-vec4 meansBetween(float a, float b) {
-  float from = min(a, b), to = max(a, b);
-  int i = intervalAt(from), j = intervalAt(to);
-  vec4 last = meanOf(j);
-  if (i == j || to - from < 1e-6) return last;
-  float ofWhole = 1.0 / (to - from);
-  float inFirst = (float(i) - from) * ofWhole, inLast = (to - float(j - 1)) * ofWhole;
-  vec4 whole = vec4(before(j) - before(i + 1)) * (uUnit * ofWhole);
-  return inFirst * meanOf(i) + inLast * last + whole;
+/** Software renderers compute both sides of a branch, so that rare cases have shaders of their own. */
+const kSegmentInTable = `
+// The light of a segment whose values lie in the table.
+vec4 segmentInTable(float a, float b) {
+  return textureLod(uSegments, (vec2(a, b) / kIntervals * (uSegmentSide - 1.0) + 0.5) / uSegmentSide, 0.0);
 }
+`;
 
+const kSegmentBeyondTable = `
 float absorbed(float t) {
   return t < 1.0 / 64.0 ? t * (1.0 - t * (0.5 - t * (1.0 / 6.0))) : 1.0 - exp(-t);
 }
 
-void addPieceBehind(inout vec4 all, vec4 means, float size) {
-  if (!(means.a > 0.0)) return;
-  float alpha = (1.0 - all.a) * absorbed(means.a * size);
-  all += vec4(means.rgb * (alpha / means.a), alpha);
+// The light of a part of constant value.
+vec4 constantPart(vec4 means, float size) {
+  if (!(means.a * size > 0.0)) return vec4(0.0);
+  float alpha = absorbed(means.a * size);
+  return vec4(means.rgb * (alpha / means.a), alpha);
+}
+vec4 beyond(float place) { return place < 0.0 ? uBelow : uAbove; }
+
+// The light of a share of a segment, as if its values were those of the whole one.
+vec4 partOf(vec4 whole, float size) {
+  if (!(whole.a > 0.0)) return vec4(0.0);
+  float alpha = whole.a < 1.0 ? absorbed(-size * log(1.0 - whole.a)) : 1.0;
+  return whole * (alpha / whole.a);
 }
 
-// The light of the segment from a sample to the next.
+// The light of the segment from a sample to the next. Values beyond the ends of the table have
+// constant colors.
 vec4 segment(float a, float b) {
-  vec4 whole = meansBetween(a, b), all = vec4(0.0);
-  if (!(whole.a > 0.0)) return all;
-  float pieces = whole.a < 4.0 ? ceil(whole.a / 0.25) : 16.0;
-  if (pieces <= 1.0) {
-    addPieceBehind(all, whole, 1.0);
-    return all;
-  }
-  float size = 1.0 / pieces, apart = (b - a) * size;
-  for (float p = 0.0; p < pieces; ++p)
-    addPieceBehind(all, meansBetween(a + p * apart, a + (p + 1.0) * apart), size);
-  return all;
+  float from = clamp(a, 0.0, kIntervals), to = clamp(b, 0.0, kIntervals);
+  vec4 whole = segmentInTable(from, to);
+  float all = max(abs(b - a), 1e-6), ahead = min(abs(from - a) / all, 1.0);
+  float behind = from == to ? 1.0 - ahead : abs(b - to) / all;
+  if (from == a && to == b) return whole;
+  vec4 inside = partOf(whole, 1.0 - ahead - behind), last = constantPart(beyond(b), behind);
+  vec4 light = constantPart(beyond(a), ahead);
+  light += (1.0 - light.a) * inside;
+  return light + (1.0 - light.a) * last;
 }
 `;
 
@@ -131,44 +129,51 @@ vec2 shadeAt(vec3 local, vec3 slot, vec3 direction) {
 vec4 lit(vec4 c, vec2 shade) { return vec4(c.rgb * shade.x + shade.y * c.a, c.a); }
 `;
 
-/** The state of a ray, and what each mode does with a sample. */
+/**
+ * The state of a ray, and what each mode does with the samples in bricks. A sample whose share is 0 is
+ * empty space; so are those between the bricks, before which leave() is called.
+ */
 const kModes = {
   maximum: `
 float largest;
 bool seen = false;
-void add(float place, int number) {
+void add(float share, float place) {
+  if (share == 0.0) return;
   largest = seen ? max(largest, place) : place;
   seen = true;
 }
-void finish() {}
+void leave() {}
 vec4 result() { return seen ? classified(largest) : vec4(0.0); }
 `,
   average: `
 float total = 0.0, count = 0.0;
-void add(float place, int number) { total += place; ++count; }
-void finish() {}
+void add(float share, float place) {
+  if (share == 0.0) return;
+  total += place;
+  ++count;
+}
+void leave() {}
 vec4 result() { return count > 0.0 ? classified(total / count) : vec4(0.0); }
 `,
   post: `
-void add(float place, int number) { absorb(LIT(classified(place), nowShade)); }
-void finish() {}
+void add(float share, float place) {
+  if (share != 0.0) absorb(LIT(classified(place), nowShade));
+}
+void leave() {}
 vec4 result() { return vec4(light, 1.0 - transmittance); }
 `,
   pre: `
-const int kNone = -2;
-int last = kNone;
-float lastPlace;
-// Adds the segment into the empty space behind the last sample.
-void finish() {
-  if (last != kNone) absorb(LIT(segment(lastPlace, uPlaceOfBackground), lastShade));
-}
-void add(float place, int number) {
-  bool consecutive = last != kNone && number == last + 1;
-  if (!consecutive) finish();
-  absorb(LIT(segment(consecutive ? lastPlace : uPlaceOfBackground, place), nowShade));
-  last = number;
+float lastShare = 0.0, lastPlace;
+void add(float share, float place) {
+  // Nothing is drawn between two samples in empty space.
+  if (share != 0.0 || lastShare != 0.0) {
+    float from = lastShare != 0.0 ? lastPlace : uPlaceOfBackground;
+    absorb(LIT(SEGMENT(from, place), share != 0.0 ? nowShade : lastShade));
+  }
+  lastShare = share;
   lastPlace = place;
 }
+void leave() { add(0.0, uPlaceOfBackground); }
 vec4 result() { return vec4(light, 1.0 - transmittance); }
 `,
 };
@@ -224,39 +229,41 @@ void main() {
     if (entry.a != 0u) {
       float room = (float(entry.a) - 1.0) * kBrickSide;
       i += samplesToLeave(p, perVoxel, low - room, low + kBrickSide + room);
+      leave();
       continue;
     }
     vec3 slot = vec3(entry.xyz) * kSlotSide + 0.5;
+    vec3 texel = (start - low + slot) * uTexel, texelsApart = apart * uTexel;
     int end = min(count, i + samplesToLeave(p, perVoxel, low, low + kBrickSide));
     for (; i < end && OPEN; ++i) {
-      vec3 local = start + float(i) * apart - low;
-      float share = textureLod(uVoxels, (local + slot) * uTexel, 0.0).r;
-      if (share == 0.0) continue;
+      float share = textureLod(uVoxels, texel + float(i) * texelsApart, 0.0).r;
       SHADE
-      add(share * uPlaceScale + uPlaceOfBackground, i);
+      add(share, share * uPlaceScale + uPlaceOfBackground);
       NEXT_SHADE
     }
   }
-  finish();
+  leave();
   color = result();
   color += (1.0 - color.a) * uBackground;
 }`;
 
 /**
  * The fragment shader of a kind of picture.
- * @param {{mode: "composite" | "maximum" | "average", classification: "pre" | "post", shade: boolean}} kind
+ * @param {import("./ray-marcher.js").Kind} kind
  */
-export function fragmentShader({ mode, classification, shade }) {
+export function fragmentShader({ mode, classification, shade, inTable }) {
   const composite = mode === "composite", isLit = composite && shade;
   const parts = [
     "#version 300 es",
     kDeclarations,
     kTransferTable,
-    composite ? kSegmentTable : "",
+    composite ? kSegmentInTable : "",
+    composite && !inTable ? kSegmentBeyondTable : "",
+    `#define SEGMENT ${inTable ? "segmentInTable" : "segment"}`,
     isLit ? kShading + "vec2 nowShade, lastShade;" : "",
     `#define LIT(light, shade) ${isLit ? "lit(light, shade)" : "light"}`,
     `#define OPEN ${composite ? "!(transmittance < uMinTransmittance)" : "true"}`,
-    `#define SHADE ${isLit ? "nowShade = shadeAt(clamp(local, 0.0, kBrickSide), slot, direction);" : ""}`,
+    `#define SHADE ${isLit ? "nowShade = shadeAt(clamp(start + float(i) * apart - low, 0.0, kBrickSide), slot, direction);" : ""}`,
     `#define NEXT_SHADE ${isLit ? "lastShade = nowShade;" : ""}`,
     composite ? kComposite : "",
     kModes[composite ? classification : mode],
