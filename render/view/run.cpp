@@ -8,6 +8,7 @@
 
 #include "cli/log.h"
 #include "esvr/error.h"
+#include "render/view/exported_page.h"
 #include "render/view/opened_page.h"
 #include "render/view/service.h"
 #include "render/view/token.h"
@@ -48,9 +49,7 @@ Service::Settings settingsOf(const Options& options) {
   return settings;
 }
 
-}  // namespace
-
-void run(const Options& options) {
+void serve(const Options& options) {
   const cli::Log log(kProgram, options.verbosity);
   const Service::Settings settings = settingsOf(options);
   const Collection collection(options.inputs, options.memory);
@@ -63,6 +62,16 @@ void run(const Options& options) {
   std::optional<OpenedPage> opened;
   if (options.open) opened.emplace(url);
   service.run();
+}
+
+}  // namespace
+
+void run(const Options& options) {
+  if (options.exported.empty()) return serve(options);
+  exportPage({options.inputs.front(), options.exported, options.overwrite, options.memory});
+  const auto bytes = std::to_string(std::filesystem::file_size(options.exported));
+  cli::Log(kProgram, options.verbosity)
+      .info(options.exported.string() + ": a page of " + bytes + " bytes");
 }
 
 }  // namespace esvr::view

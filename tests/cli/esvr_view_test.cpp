@@ -17,6 +17,7 @@
 #include "esvr/device.h"
 #include "render/view/view_client.h"
 #include "render/view/view_files.h"
+#include "report/base64.h"
 #include "support/search_path.h"
 
 namespace esvr::test {
@@ -211,6 +212,43 @@ TEST_F(EsvrView, RefusesWhatItCannotServe) {
   expectRefused({at("blob.esvr"), "--device", "tpu"}, 2, "tpu");
   expectRefused({at("blob.vdb"), "--max-memory", "1KB"}, 5, "blob.vdb");
   expectRefused({at("blob.vdb"), "--scratch", at("nowhere")}, 2, "nowhere");
+}
+
+using EsvrViewExport = EsvrView;
+
+TEST_F(EsvrViewExport, WritesAPageWithTheFile) {
+  const ProgramRun run = runProgram(ESVR_VIEW, {"--export", at("page.html"), at("blob.esvr")});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("page.html"));
+  const std::string page = readText(at("page.html"));
+  // The magic number of .esvr files and the first byte of their version, in base64.
+  const std::string magic = readText(at("blob.esvr")).substr(0, 6);
+  EXPECT_THAT(page, HasSubstr("data-name=\"blob.esvr\">" + report::base64(magic)));
+  // Nothing is loaded from elsewhere.
+  for (const char* loads : {"src=\"", "<link rel=\"stylesheet\"", "@import"})
+    EXPECT_THAT(page, testing::Not(HasSubstr(loads)));
+}
+
+TEST_F(EsvrViewExport, KeepsAPageThatIsThereUnlessForced) {
+  writeText(at("page.html"), "mine");
+  expectRefused({"--export", at("page.html"), at("blob.esvr")}, 1, "page.html");
+  EXPECT_EQ(readText(at("page.html")), "mine");
+  EXPECT_EQ(runProgram(ESVR_VIEW, {"--export", at("page.html"), at("blob.esvr"), "-f"}).exitCode,
+            0);
+  EXPECT_NE(readText(at("page.html")), "mine");
+}
+
+TEST_F(EsvrViewExport, RefusesWhatAPageCannotShow) {
+  const std::string page = at("page.html");
+  expectRefused({"--export", page, at("blob.vdb")}, 2, "make one by vdb2esvr");
+  expectRefused({"--export", page, at("frames.esvr")}, 2, "frames.esvr holds a sequence");
+  expectRefused({"--export", page, at("none.esvr")}, 3, "none.esvr");
+  expectRefused({"--export", page, at("blob.esvr"), at("frames.esvr")}, 2, "one FILE.esvr");
+  expectRefused({"--export", page, at("blob.esvr"), "--open"}, 2, "--open");
+  expectRefused({"--export", at("page.txt"), at("blob.esvr")}, 2, ".html");
+  writeText(at("damaged.esvr"), "no ellipsoids");
+  expectRefused({"--export", page, at("damaged.esvr")}, 3, "damaged.esvr");
+  EXPECT_FALSE(fs::exists(page));
 }
 
 }  // namespace

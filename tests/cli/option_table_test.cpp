@@ -157,6 +157,8 @@ Table viewTests() {
   return {{"--bind", "EsvrView.ListensAtTheGivenPortAndAddress"},
           {"--clients", "EsvrView.SendsClientsAwayThatAreTooMany"},
           {"--device", "EsvrView.DrawsOnTheNumberOfThreadsAndTheDeviceThatAreAsked"},
+          {"--export", "EsvrViewExport.WritesAPageWithTheFile"},
+          {"--force", "EsvrViewExport.KeepsAPageThatIsThereUnlessForced"},
           {"--help", "EsvrView.HelpAndVersionNeedNoFiles"},
           {"--max-memory", "EsvrView.RefusesWhatItCannotServe"},
           {"--open", "EsvrView.OpensThePageByAFileThatOnlyItsOwnerCanRead"},

@@ -194,6 +194,17 @@ test("a link reproduces the view", async (t) => {
   assert.equal(differenceOf(await pictureOf(page), await pictureOf(other)), 0);
 });
 
+test("an address that is changed by hand shows what it says", async (t) => {
+  const page = await openPage(t, shared);
+  const before = sceneOf(page).camera;
+  await page.evaluate(() => (location.hash = "#file=1&grid=0&step=2"));
+  await rested(page);
+  const { file, step, camera } = sceneOf(page);
+  assert.deepEqual([file, step], [1, 2]);
+  assert.ok(Math.abs(camera.eye[0] - before.eye[0]) < 3, "the view is fitted to a volume of the same size");
+  assert.ok(litShare(await pictureOf(page)) > 0.05);
+});
+
 test("a damaged link shows the usual view", async (t) => {
   const usual = await openPage(t, shared);
   for (const hash of ["#camera=1&transfer=[]&file=99", "#clip={}&step=%22x%22&compare=7&background=[1]", "#%%%"]) {
