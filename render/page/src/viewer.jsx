@@ -80,6 +80,9 @@ export function Viewer({ backend, description, store, fitFirst }) {
   const grid = gridOf(description, scene), file = description.files[scene.file];
   const painting = usePainting(backend, { scene, moving, size: pixels, connection: connection.count });
   const histogram = useHistogram(backend, grid, scene, !moving);
+  useEffect(() => {
+    document.title = `${grid.name} of ${file.name} – ESVR viewer`;
+  }, [grid, file]);
   const set = (/** @type {Partial<Scene>} */ change, isMoving = false) => store.set(change, { moving: isMoving });
 
   const fit = async (view = "default", changes = /** @type {Partial<Scene>} */ ({})) => {

@@ -60,6 +60,21 @@ test("Delete and a right click remove a point", async (t) => {
   assert.equal(await points(page).count(), 2);
 });
 
+test("a finger that taps adds a point, and one that scrolls does not", async (t) => {
+  const page = await openPage(t, shared, { hasTouch: true, viewport: { width: 390, height: 700 } });
+  await page.touchscreen.tap(...(await placeIn(page, 0.5, 0.4)));
+  assert.equal(await points(page).count(), 3);
+  const devtools = await page.context().newCDPSession(page);
+  const [x, y] = await placeIn(page, 0.3, 0.8);
+  const touch = (type, touchPoints) => devtools.send("Input.dispatchTouchEvent", { type, touchPoints });
+  await touch("touchStart", [{ x, y }]);
+  for (let i = 1; i < 6; ++i) await touch("touchMove", [{ x, y: y - 20 * i }]);
+  await touch("touchEnd", []);
+  await rested(page);
+  assert.equal(await points(page).count(), 3);
+  assert.ok((await page.evaluate(() => scrollY)) > 20);
+});
+
 test("arrow keys move a point, with Shift in finer steps", async (t) => {
   const page = await withThreePoints(t);
   await point(page, 1).focus();
@@ -125,7 +140,9 @@ test("the axis of values can be zoomed by buttons and by the wheel", async (t) =
   await page.getByRole("button", { name: "Show more values" }).click();
   assert.equal(await points(page).count(), 2);
   await page.mouse.move(...(await placeIn(page, 0.5, 0.5)));
+  await page.keyboard.down("Control");
   await page.mouse.wheel(0, -600);
+  await page.keyboard.up("Control");
   await page.waitForFunction(() => document.querySelectorAll(".point").length === 0);
 });
 

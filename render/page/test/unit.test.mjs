@@ -97,7 +97,7 @@ test("ticks are round numbers within the range", () => {
 });
 
 test("numbers are short", () => {
-  assert.deepEqual([0, 0.5, 1.23456, 1e-5, 1234567].map((v) => shortText(v)), ["0", "0.5", "1.235", "1.00e-5", "1.23e+6"]);
+  assert.deepEqual([0, 0.5, 1.23456, 1e-5, 1234567].map((v) => shortText(v)), ["0", "0.5", "1.235", "1e-5", "1.23e+6"]);
   assert.deepEqual([12, 50216, 2511715].map(bytesText), ["12 bytes", "50.2 KB", "2.51 MB"]);
 });
 

@@ -47,7 +47,7 @@ export function CurvePoint({ transfer, index, selected, scales, onSelect, onMove
       aria-label={`Opacity point ${index + 1} of ${transfer.opacity.length}`}
       aria-valuenow={opacity} aria-valuemin={0} aria-valuemax={1}
       aria-valuetext={`opacity ${shortText(opacity)} at value ${shortText(value)}`}
-      onPointerDown={onPointerDown} onKeyDown={onKeyDown} onFocus={onSelect}
+      onPointerDown={onPointerDown} onClick={(/** @type {Event} */ event) => event.stopPropagation()} onKeyDown={onKeyDown} onFocus={onSelect}
       onContextMenu={(/** @type {Event} */ event) => (event.preventDefault(), onRemove())}
     >
       <circle class="reach" r="14" />

@@ -1,4 +1,4 @@
-import { useEffect } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import { hexOf } from "../look/css-color.js";
 import { colorAt, withAddedPoint, withPoint, withoutPoint } from "../look/transfer.js";
 import { follow } from "../parts/drag.js";
@@ -21,10 +21,14 @@ function Gradient({ transfer, scales: { left, width, low, high } }) {
   );
 }
 
-/** Calls back for turns of the wheel, which otherwise would scroll the panel. */
+/** Calls back for turns of the wheel with Ctrl, as which trackpads send pinches. Others scroll the panel. */
 function useWheel(ref, onWheel) {
   useEffect(() => {
-    const listen = (/** @type {WheelEvent} */ event) => (event.preventDefault(), onWheel(event));
+    const listen = (/** @type {WheelEvent} */ event) => {
+      if (!event.ctrlKey && !event.metaKey) return;
+      event.preventDefault();
+      onWheel(event);
+    };
     ref.current.addEventListener("wheel", listen, { passive: false });
     return () => ref.current?.removeEventListener("wheel", listen);
   });
@@ -62,20 +66,28 @@ export function Plot({ transfer, histogram, shown, countScale, opacityScale, sel
     onChange(withoutPoint(points, index), false);
     onSelect(Math.min(index, points.length - 2));
   };
-  const add = (/** @type {PointerEvent} */ event) => {
-    if (event.button !== 0) return;
+  const add = (/** @type {MouseEvent} */ event) => {
     const { value, opacity } = placeOf(event);
     const added = withAddedPoint(points, [value, opacity, 0.5, 0]);
     onSelect(added.index);
     onChange(added.points, true);
+    return added;
+  };
+  const pointerType = useRef("");
+  const onPointerDown = (/** @type {PointerEvent} */ event) => {
+    pointerType.current = event.pointerType;
+    // A finger may want to scroll: it adds a point when it is lifted at the same place.
+    if (event.button !== 0 || event.pointerType === "touch") return;
+    const added = add(event);
     follow(event, (e) => {
       const to = placeOf(e);
       move(added.points, added.index)(to.value, to.opacity);
     });
   };
+  const onClick = (/** @type {MouseEvent} */ event) => void (pointerType.current === "touch" && add(event));
   const path = curvePath(points, scales);
   return (
-    <svg ref={ref} class="plot" role="group" aria-label="Opacity curve over the histogram" onPointerDown={add}>
+    <svg ref={ref} class="plot" role="group" aria-label="Opacity curve over the histogram" onPointerDown={onPointerDown} onClick={onClick}>
       <defs>
         <Gradient transfer={transfer} scales={scales} />
         <clipPath id="plot-inside"><rect x={scales.left} y={0} width={scales.width} height={scales.top + scales.height} /></clipPath>
