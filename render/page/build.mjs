@@ -1,6 +1,7 @@
 // Bundles each page into one HTML file: `node build.mjs` writes dist/, `node build.mjs --check` fails
 // if dist/ is not what it would write.
 import { build } from "esbuild";
+import { decoded, encoded } from "./src/local/base91.js";
 import { gunzipSync, gzipSync } from "node:zlib";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { dirname, join, relative } from "node:path";
@@ -63,7 +64,7 @@ function viewPage(result) {
   return filled("src/page.html", { STYLE: textOf(result, ".css"), SCRIPT: textOf(result, ".js") });
 }
 
-const packed = (bytes) => gzipSync(bytes, { level: 9 }).toString("base64");
+const packed = (bytes) => encoded(gzipSync(bytes, { level: 9 }));
 
 /** The exported page: the style and the script are compressed, since pages are sent to people. */
 async function exportPage(result) {
@@ -79,8 +80,8 @@ async function exportPage(result) {
 
 /** A page with its compressed parts unpacked, since versions of Node compress differently. */
 function unpacked(text) {
-  const packedPart = /(;gzip;base64">)([^<]*)/g;
-  return text.replace(packedPart, (_, tag, part) => tag + gunzipSync(Buffer.from(part, "base64")).toString("latin1"));
+  const packedPart = /(;gzip;base91">)([^<]*)/g;
+  return text.replace(packedPart, (_, tag, part) => tag + gunzipSync(decoded(part)).toString("latin1"));
 }
 
 /** Folders of the packages that a bundle contains. */

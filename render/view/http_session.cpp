@@ -3,9 +3,11 @@
 #include <boost/beast/http/error.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
+#include <limits>
 #include <utility>
 
 namespace esvr::view {
+
 namespace {
 
 using boost::beast::error_code;
@@ -19,6 +21,8 @@ HttpSession::HttpSession(boost::asio::ip::tcp::socket socket, HttpContext& conte
       seat_(std::move(seat)),
       buffer_(context.socket.limits.headBytes) {
   parser_.header_limit(std::uint32_t(context.socket.limits.headBytes));
+  // No body is read, and judge() refuses requests with one.
+  parser_.body_limit(std::numeric_limits<std::uint64_t>::max());
 }
 
 void HttpSession::run() {
@@ -58,7 +62,17 @@ void HttpSession::send(Response response) {
   http::async_write(stream_, response_, [self = shared_from_this()](error_code, std::size_t) {
     error_code ignored;
     self->stream_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, ignored);
+    self->drain();
   });
+}
+
+/// Reads until the client closes or its time is over. If a connection is closed before all was read,
+/// the client may lose the answer.
+void HttpSession::drain() {
+  stream_.async_read_some(boost::asio::buffer(rest_),
+                          [self = shared_from_this()](error_code error, std::size_t) {
+                            if (!error) self->drain();
+                          });
 }
 
 }  // namespace esvr::view

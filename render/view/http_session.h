@@ -1,6 +1,7 @@
 #pragma once
 /// A connection before it opens a socket.
 
+#include <array>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/parser.hpp>
@@ -34,6 +35,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   void serve(const Request& request);
   void openSocket(Request request);
   void send(Response response);
+  void drain();
 
   boost::beast::tcp_stream stream_;
   HttpContext& context_;
@@ -41,6 +43,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   boost::beast::flat_buffer buffer_;
   http::request_parser<http::empty_body> parser_;
   Response response_;
+  std::array<char, 4096> rest_{};  ///< bytes that nobody reads
 };
 
 }  // namespace esvr::view

@@ -14,8 +14,8 @@ struct ServerLimits {
   int wrongMessages = 20;  ///< of a socket before it is closed
   /// Messages of a socket in a second, and how many may come at once. Further ones are read later.
   double messagesPerSecond = 200.0, messageBurst = 200.0;
-  std::chrono::seconds requestTime{10};  ///< from the connection to the answer
-  std::chrono::seconds idleTime{60};     ///< of a socket; one that is alive answers pings
+  std::chrono::milliseconds requestTime{10'000};  ///< from the connection to the answer
+  std::chrono::milliseconds idleTime{60'000};     ///< of a socket; one that is alive answers pings
 };
 
 }  // namespace esvr::view

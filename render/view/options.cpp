@@ -18,7 +18,9 @@ cli::ProgramText programText() {
       .purpose =
           "Shows .esvr files and VDB files in a browser: orbit, edit the transfer function over\n"
           "the histogram, compare with a reference. This program draws, and serves the page.",
-      .usage = "  esvr-view FILE.esvr|FILE.vdb... [OPTION]...",
+      .usage =
+          "  esvr-view FILE.esvr|FILE.vdb... [OPTION]...\n"
+          "  esvr-view --export PAGE.html FILE.esvr [--force]",
       .notes =
           "The program prints an address; open it in a browser. The address has a secret, which\n"
           "every request needs, and is valid until the program ends by Ctrl-C.\n"
@@ -30,12 +32,17 @@ cli::ProgramText programText() {
           "\n"
           "Clients can see the files of the command line, and no others.\n"
           "\n"
-          "Exit codes: 0 ended by Ctrl-C, 1 failure, 2 wrong options, 3 input that is damaged or\n"
+          "--export writes a page that contains the file and draws it in the browser. It needs no\n"
+          "server and no network, and can be sent by mail or opened from a disk.\n"
+          "\n"
+          "Exit codes: 0 ended by Ctrl-C or page written, 1 failure, 2 wrong options, 3 input that "
+          "is damaged or\n"
           "cannot be used, 5 no such device or not enough memory.",
       .examples =
           "  esvr-view smoke.esvr\n"
           "  esvr-view smoke.esvr smoke.vdb      the original, to compare\n"
-          "  esvr-view smoke.esvr --open"};
+          "  esvr-view smoke.esvr --open\n"
+          "  esvr-view --export smoke.html smoke.esvr"};
 }
 
 cli::CommandLine commandLine() {
@@ -49,11 +56,23 @@ cli::CommandLine commandLine() {
      "address to listen at; others than the default are reached from other machines")
     ("open", bool_switch(), "open the page in the browser of this machine")
     ("clients", value<int>()->value_name("N")->default_value(int(ServerLimits{}.clients)),
-     "largest number of pages at a time");
+     "largest number of pages at a time")
+    ("export", value<std::string>()->value_name("PAGE.html"),
+     "write a page that contains FILE.esvr and needs no server, see the notes")
+    ("force,f", bool_switch(), "replace PAGE.html if it exists");
   // clang-format on
   cli::addDevice(line.options());
   cli::addHostMemory(line);
   return line;
+}
+
+void readExport(const cli::Arguments& a, Options& options) {
+  const auto page = a.find<std::string>("export");
+  if (!page) return;
+  if (options.inputs.size() != 1) throw UsageError("--export takes one FILE.esvr");
+  if (options.open) throw UsageError("--open cannot be given with --export");
+  options.exported = *page;
+  options.overwrite = a.get<bool>("force");
 }
 
 }  // namespace
@@ -72,6 +91,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.open = a.get<bool>("open");
   options.clients = a.get<int>("clients");
   cli::requireRange("clients", options.clients, 1, kMostClients);
+  readExport(a, options);
   options.device = cli::deviceOf(a);
   options.memory = cli::hostMemoryOf(a);
   options.threads = a.threads;

@@ -16,6 +16,8 @@ inline constexpr const char* kProgram = "esvr-view";
 
 struct Options {
   std::vector<std::filesystem::path> inputs;
+  std::filesystem::path exported;  ///< page to write instead of serving; empty: none
+  bool overwrite = false;
   std::string bind = "127.0.0.1";  ///< address to listen at
   int port = 0;                    ///< 0: one that is free
   bool open = false;               ///< open the page in a browser

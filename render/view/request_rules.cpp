@@ -13,10 +13,12 @@ namespace {
 
 std::string_view view(boost::beast::string_view text) { return {text.data(), text.size()}; }
 
-/// The host of "host", "host:port", "[address]" or "[address]:port".
+/// The host of "host", "host:port", "[address]" or "[address]:port"; empty if the text is none of
+/// these.
 std::string hostOf(std::string_view text) {
-  if (text.starts_with('[')) return std::string(text.substr(1, text.find(']') - 1));
-  return std::string(text.substr(0, text.find(':')));
+  if (!text.starts_with('[')) return std::string(text.substr(0, text.find(':')));
+  const auto end = text.find(']');
+  return end == std::string_view::npos ? "" : std::string(text.substr(1, end - 1));
 }
 
 bool isAddress(const std::string& host) {

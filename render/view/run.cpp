@@ -1,14 +1,16 @@
 #include "render/view/run.h"
 
-#include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
 #include <iostream>
+#include <optional>
 
+#include "cli/log.h"
 #include "esvr/error.h"
-#include "render/view/page.h"
-#include "render/view/server.h"
+#include "render/view/exported_page.h"
+#include "render/view/opened_page.h"
+#include "render/view/service.h"
 #include "render/view/token.h"
 
 namespace esvr::view {
@@ -40,39 +42,36 @@ std::string urlOf(const tcp::endpoint& at, const std::string& token) {
   return "http://" + host + ":" + std::to_string(at.port()) + "/" + token + "/";
 }
 
-ServerLimits limitsOf(const Options& options) {
-  ServerLimits limits;
-  limits.clients = std::size_t(options.clients);
-  return limits;
+Service::Settings settingsOf(const Options& options) {
+  Service::Settings settings{endpointOf(options), siteOf(options), {}, {}};
+  settings.limits.clients = std::size_t(options.clients);
+  settings.drawing = {selectDevice(options.device), options.limits, {}, false, options.memory};
+  return settings;
 }
 
-/// Ends the studio before the connections to which it sends.
-struct StopAtEnd {
-  Studio& studio;
-  ~StopAtEnd() { studio.stop(); }
-};
-
-void serve(const Options& options, Studio& studio, Desk& desk) {
-  const ServerLimits limits = limitsOf(options);
-  HttpContext context{siteOf(options), viewPage(), {desk, studio, limits}, Seats(limits.clients)};
-  asio::io_context io(1);
-  const StopAtEnd stop{studio};
-  Server server(io, endpointOf(options), context);
-  asio::signal_set signals(io, SIGINT, SIGTERM);
-  signals.async_wait([&](boost::system::error_code, int) { io.stop(); });
-  server.run();
-  std::cout << urlOf(server.endpoint(), context.site.token) << std::endl;
-  io.run();
+void serve(const Options& options) {
+  const cli::Log log(kProgram, options.verbosity);
+  const Service::Settings settings = settingsOf(options);
+  const Collection collection(options.inputs, options.memory);
+  Service service(collection, settings);
+  asio::signal_set signals(service.io(), SIGINT, SIGTERM);
+  signals.async_wait([&](boost::system::error_code, int) { service.stop(); });
+  const std::string url = urlOf(service.endpoint(), settings.site.token);
+  std::cout << url << std::endl;
+  log.info("open this address in a browser; Ctrl-C ends the program");
+  std::optional<OpenedPage> opened;
+  if (options.open) opened.emplace(url);
+  service.run();
 }
 
 }  // namespace
 
 void run(const Options& options) {
-  const Device device = selectDevice(options.device);
-  const Collection collection(options.inputs, options.memory);
-  Studio studio(collection, {device, options.limits, {}, false, options.memory});
-  Desk desk(collection, studio, deviceName(device));
-  serve(options, studio, desk);
+  if (options.exported.empty()) return serve(options);
+  exportPage({options.inputs.front(), options.exported, options.overwrite, options.memory});
+  const auto bytes = std::to_string(std::filesystem::file_size(options.exported));
+  cli::Log(kProgram, options.verbosity)
+      .info(options.exported.string() + ": a page of " + bytes + " bytes");
 }
 
 }  // namespace esvr::view

@@ -5,7 +5,7 @@
 
 namespace esvr::view {
 
-/// Serves the page until SIGINT or SIGTERM.
+/// Writes a page if one is to be exported; otherwise serves the page until SIGINT or SIGTERM.
 /// \throws Error
 void run(const Options& options);
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::int64_t kMostGridsAndFiles = 1'000'000;
 constexpr std::int64_t kLargestFrame = 1'000'000'000'000'000;
-constexpr double kMinStep = 1e-3, kMaxStep = 1e6;                    // voxels
+constexpr double kMinStep = 0.05, kMaxStep = 1e6;                    // voxels
 constexpr double kMinOpacityLength = 1e-6, kMaxOpacityLength = 1e6;  // voxels
 constexpr double kMaxGain = 1e6;
 

@@ -22,20 +22,30 @@ tcp::acceptor listeningAt(boost::asio::io_context& io, const tcp::endpoint& at) 
 
 Server::Server(boost::asio::io_context& io, const tcp::endpoint& at, HttpContext& context)
     : acceptor_(listeningAt(io, at)),
+      pause_(io),
       endpoint_(acceptor_.local_endpoint()),
       context_(context),
       connections_(context.socket.limits.connections) {}
 
 void Server::run() {
   acceptor_.async_accept([this](boost::system::error_code error, tcp::socket socket) {
-    if (!acceptor_.is_open()) return;
+    if (error) return runLater();
     // A connection without a seat is closed at once.
-    if (auto seat = error ? nullptr : connections_.take()) {
+    if (auto seat = connections_.take()) {
       boost::system::error_code ignored;
       socket.set_option(tcp::no_delay(true), ignored);
       std::make_shared<HttpSession>(std::move(socket), context_, std::move(seat))->run();
     }
     run();
+  });
+}
+
+/// Waits a moment, because the error, such as too many open files, would occur again at once.
+void Server::runLater() {
+  constexpr std::chrono::milliseconds kPause{100};
+  pause_.expires_after(kPause);
+  pause_.async_wait([this](boost::system::error_code error) {
+    if (!error) run();
   });
 }
 

@@ -2,6 +2,7 @@
 /// Accepts connections.
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
 
 #include "render/view/http_session.h"
 
@@ -20,7 +21,10 @@ class Server {
   void run();
 
  private:
+  void runLater();
+
   boost::asio::ip::tcp::acceptor acceptor_;
+  boost::asio::steady_timer pause_;
   boost::asio::ip::tcp::endpoint endpoint_;
   HttpContext& context_;
   Seats connections_;

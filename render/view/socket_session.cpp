@@ -4,6 +4,8 @@
 #include <string_view>
 #include <utility>
 
+#include "render/view/failed_message.h"
+
 namespace esvr::view {
 namespace {
 
@@ -73,11 +75,18 @@ void SocketSession::read() {
 void SocketSession::onRead() {
   const auto data = buffer_.cdata();
   const std::string_view text(static_cast<const char*>(data.data()), data.size());
-  if (socket_.got_binary() || !context_.desk.receive(shared_from_this(), text)) ++wrongMessages_;
+  if (!take(text)) ++wrongMessages_;
   buffer_.consume(buffer_.size());
   if (wrongMessages_ <= context_.limits.wrongMessages) return readLater();
   socket_.async_close(websocket::close_code::policy_error,
                       [self = shared_from_this()](error_code) { self->close(); });
+}
+
+/// \return false if the message was wrong
+bool SocketSession::take(std::string_view message) {
+  if (!socket_.got_binary()) return context_.desk.receive(shared_from_this(), message);
+  answer(failedMessage("messages must be text, and this one is binary"));
+  return false;
 }
 
 /// Reads the next message when the rate allows it and answers do not pile up.

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "render/view/desk.h"
 #include "render/view/limits.h"
@@ -50,6 +51,7 @@ class SocketSession : public Outlet, public std::enable_shared_from_this<SocketS
   void enqueue(Message message);
   void read();
   void onRead();
+  [[nodiscard]] bool take(std::string_view message);
   void readLater();
   void write();
   void onWritten();

@@ -20,14 +20,24 @@ constexpr double kFirstBudget = 0.03;
 constexpr std::size_t kMostTasks = 8;  // that wait for one client
 constexpr double kMs = 1e3;            // milliseconds of a second
 
+/// Kinds of work; more urgent ones have larger values.
+enum class Urgency { kNone, kRefinement, kTask, kFirstPass, kDrag };
+
+Urgency urgencyOf(const DrawRequest& request) {
+  return request.moving ? Urgency::kDrag : Urgency::kFirstPass;
+}
+
 }  // namespace
 
-/// A picture that is drawn. Only the studio's thread uses what may change.
+/// A picture that is drawn. Only the studio's thread uses what may change, except for the tokens.
 struct Studio::Job {
   Job(DrawRequest of, const CancelToken* stopping) : request(std::move(of)), cancel(stopping) {}
 
   const DrawRequest request;
   CancelToken cancel;
+  /// Cancels one pass. It is made anew for each pass, at the place that the painting knows.
+  std::optional<CancelToken> pass;
+  Urgency urgency = urgencyOf(request);  ///< of the next pass; the mutex protects it
   std::optional<Painting> painting;
   int passes = 0;
 };
@@ -37,11 +47,11 @@ struct Studio::Easel {
   Easel(std::shared_ptr<Outlet> to, const CancelToken* stopping)
       : outlet(std::move(to)), gone(stopping) {}
 
-  /// The order in which clients are served; 0 if there is nothing to do.
-  [[nodiscard]] int urgency() const {
-    if (outlet->busy()) return 0;
-    if (waiting) return waiting->moving ? 4 : 3;
-    return !tasks.empty() ? 2 : (job ? 1 : 0);
+  [[nodiscard]] Urgency urgency() const {
+    if (outlet->busy()) return Urgency::kNone;
+    if (waiting) return urgencyOf(*waiting);
+    return std::max(tasks.empty() ? Urgency::kNone : Urgency::kTask,
+                    job ? job->urgency : Urgency::kNone);
   }
 
   const std::shared_ptr<Outlet> outlet;
@@ -86,8 +96,15 @@ void Studio::draw(const std::shared_ptr<Outlet>& client, DrawRequest request) {
     Easel& easel = easelOf(client);
     if (easel.job && !easel.job->request.moving) easel.job->cancel.cancel(), easel.job.reset();
     easel.waiting = std::move(request);
+    interrupt();
   }
   changed_.notify_one();
+}
+
+/// Gives up the pass that is drawn if more urgent work waits.
+void Studio::interrupt() {
+  const auto precedes = [&](const auto& easel) { return easel->urgency() > drawn_->urgency; };
+  if (drawn_ && std::any_of(easels_.begin(), easels_.end(), precedes)) drawn_->pass->cancel();
 }
 
 void Studio::add(const std::shared_ptr<Outlet>& client, Task task) {
@@ -97,6 +114,7 @@ void Studio::add(const std::shared_ptr<Outlet>& client, Task task) {
     Easel& easel = easelOf(client);
     if (easel.tasks.size() == kMostTasks) throw BadInput("too many requests wait; ask again later");
     easel.tasks.push_back(std::move(task));
+    interrupt();
   }
   changed_.notify_one();
 }
@@ -111,7 +129,10 @@ void Studio::leave(const Outlet& client) {
 }
 
 void Studio::wake() {
-  { const std::scoped_lock lock(mutex_); }  // so that it is not between its check and its sleep
+  {
+    const std::scoped_lock lock(mutex_);
+    interrupt();
+  }
   changed_.notify_one();
 }
 
@@ -133,19 +154,21 @@ std::optional<Studio::Work> Studio::next() {
   const auto found =
       std::max_element(easels_.begin(), easels_.end(),
                        [](const auto& a, const auto& b) { return a->urgency() < b->urgency(); });
-  const int urgency = found == easels_.end() ? 0 : (*found)->urgency();
-  if (urgency == 0) return std::nullopt;
+  const Urgency urgency = found == easels_.end() ? Urgency::kNone : (*found)->urgency();
+  if (urgency == Urgency::kNone) return std::nullopt;
   std::rotate(found, found + 1, easels_.end());
   const auto& easel = easels_.back();
-  if (urgency == 2) {
+  if (urgency == Urgency::kTask) {
     Work work{easel, std::move(easel->tasks.front()), nullptr};
     easel->tasks.pop_front();
     return work;
   }
-  if (urgency > 2) {
+  if (easel->waiting) {
     easel->job = std::make_shared<Job>(std::move(*easel->waiting), &easel->gone);
     easel->waiting.reset();
   }
+  easel->job->pass.emplace(&easel->job->cancel);
+  drawn_ = easel->job;
   return Work{easel, {}, easel->job};
 }
 
@@ -157,7 +180,7 @@ void Studio::perform(const Work& work) {
     else
       drawPass(*work.job, outlet);
   } catch (const Cancelled&) {
-    // The client has asked for another picture or has left.
+    // The client has asked for another picture or has left, or another client comes first.
   } catch (...) {
     if (work.job) work.job->cancel.cancel();
     const auto id = work.job ? std::optional(work.job->request.picture.id) : std::nullopt;
@@ -170,8 +193,9 @@ void Studio::drawPass(Job& job, Outlet& outlet) {
   cli::Stopwatch watch;
   if (!job.painting)
     job.painting.emplace(
-        Painting::Input{collection_, drawables_, picture.scene, picture.size, &job.cancel});
-  job.painting->refine(job.passes++ == 0 ? kFirstBudget : 0.0);
+        Painting::Input{collection_, drawables_, picture.scene, picture.size, &*job.pass});
+  job.painting->refine(job.passes == 0 ? kFirstBudget : 0.0);
+  ++job.passes;
   const double drawMs = kMs * watch.lap();
   const Image image = job.painting->picture();
   const Rgb background = picture.scene.options.background.value_or(Rgb{});
@@ -198,11 +222,13 @@ void Studio::drawPass(Job& job, Outlet& outlet) {
   if (last) job.cancel.cancel();
 }
 
-/// Forgets a job that has ended.
+/// After a pass, forgets a job that has ended.
 void Studio::end(const Work& work) {
-  if (!work.job || !work.job->cancel.cancelled()) return;
   const std::scoped_lock lock(mutex_);
-  if (work.easel->job == work.job) work.easel->job.reset();
+  drawn_.reset();
+  if (!work.job) return;
+  if (work.job->passes > 0) work.job->urgency = Urgency::kRefinement;
+  if (work.job->cancel.cancelled() && work.easel->job == work.job) work.easel->job.reset();
 }
 
 }  // namespace esvr::view

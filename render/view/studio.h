@@ -20,7 +20,9 @@ namespace esvr::view {
 
 /// One thread draws, because a picture uses the whole device, and because renderers then need to keep
 /// decoded voxels only once. Clients take turns, pass by pass. The passes of clients that drag come
-/// first, then the first passes of other pictures, then tasks, and then refinements.
+/// first, then the first passes of other pictures, then tasks, and then refinements. A pass is given up
+/// and repeated later if a more urgent one of another client waits, because it may take long on a CPU.
+/// Tasks are not given up.
 class Studio {
  public:
   /// A task that needs the grids. It gets the way to its client, and a token that is set when the
@@ -54,6 +56,7 @@ class Studio {
   [[nodiscard]] std::optional<Work> next();
   void perform(const Work& work);
   void drawPass(Job& job, Outlet& outlet);
+  void interrupt();
   void end(const Work& work);
 
   const Collection& collection_;
@@ -61,6 +64,7 @@ class Studio {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::shared_ptr<Easel>> easels_;  ///< the one that waits longest comes first
+  std::shared_ptr<Job> drawn_;                  ///< the job of which a pass is drawn at this moment
   bool stopped_ = false;
   CancelToken stopping_;
   std::thread thread_;

@@ -153,6 +153,23 @@ Table renderTests() {
           {"--with", "EsvrRenderGrids.EachPartOfALookChangesThePicture"}};
 }
 
+Table viewTests() {
+  return {{"--bind", "EsvrView.ListensAtTheGivenPortAndAddress"},
+          {"--clients", "EsvrView.SendsClientsAwayThatAreTooMany"},
+          {"--device", "EsvrView.DrawsOnTheNumberOfThreadsAndTheDeviceThatAreAsked"},
+          {"--export", "EsvrViewExport.WritesAPageWithTheFile"},
+          {"--force", "EsvrViewExport.KeepsAPageThatIsThereUnlessForced"},
+          {"--help", "EsvrView.HelpAndVersionNeedNoFiles"},
+          {"--max-memory", "EsvrView.RefusesWhatItCannotServe"},
+          {"--open", "EsvrView.OpensThePageByAFileThatOnlyItsOwnerCanRead"},
+          {"--port", "EsvrView.ListensAtTheGivenPortAndAddress"},
+          {"--quiet", "EsvrView.PrintsTheAddressAloneWhereQuiet"},
+          {"--scratch", "EsvrView.RefusesWhatItCannotServe"},
+          {"--threads", "EsvrView.DrawsOnTheNumberOfThreadsAndTheDeviceThatAreAsked"},
+          {"--verbose", "EsvrView.PrintsTheAddressAloneWhereQuiet"},
+          {"--version", "EsvrView.HelpAndVersionNeedNoFiles"}};
+}
+
 Table checkTests() {
   return {{"--baseline", "CompareCheck.holdsARunAgainstItsBaseline"},
           {"--box", "CompareOption.checkTakesTheGridTheBoxAndThePeak"},
@@ -239,6 +256,7 @@ std::vector<Program> programs() {
   return {{"vdb2esvr", VDB2ESVR, "", vdb2esvrTests()},
           {"esvr2vdb", ESVR2VDB, "", esvr2vdbTests()},
           {"render", ESVR_RENDER, "", renderTests()},
+          {"view", ESVR_VIEW, "", viewTests()},
           {"check", ESVR_COMPARE, "check", checkTests()},
           {"table", ESVR_COMPARE, "table", tableTests()},
           {"curves", ESVR_COMPARE, "curves", curvesTests()},

@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 extern char** environ;
 
@@ -42,66 +43,65 @@ int exitCodeOf(int status) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : kSignalBase + WTERMSIG(status);
 }
 
-/// A program that runs, and the files of its output.
-class Process {
- public:
-  Process(const fs::path& program, const std::vector<std::string>& arguments)
-      : out_(folder_ / "out"), err_(folder_ / "err") {
-    SpawnActions actions;
-    actions.open(STDIN_FILENO, "/dev/null", O_RDONLY);
-    actions.open(STDOUT_FILENO, out_, O_WRONLY | O_CREAT);
-    actions.open(STDERR_FILENO, err_, O_WRONLY | O_CREAT);
-    std::string name = program.string();
-    std::vector<std::string> words = arguments;
-    std::vector<char*> argv{name.data()};
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    const int error = posix_spawn(&id_, name.c_str(), actions.get(), nullptr, argv.data(), environ);
-    if (error != 0) throw std::runtime_error(name + ": " + std::generic_category().message(error));
-  }
-
-  [[nodiscard]] bool runs() const {
-    siginfo_t info{};
-    return ::waitid(P_PID, id_t(id_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
-  }
-  [[nodiscard]] std::string err() const { return readText(err_); }
-  void interrupt() const { ::kill(id_, SIGINT); }
-
-  /// True if the program has a handler for SIGINT (proc(5), SigCgt).
-  [[nodiscard]] bool handlesInterrupts() const {
-    std::ifstream status("/proc/" + std::to_string(id_) + "/status");
-    for (std::string line; std::getline(status, line);)
-      if (line.starts_with("SigCgt:"))
-        return (std::stoull(line.substr(line.find('\t')), nullptr, 16) >> (SIGINT - 1)) & 1u;
-    return false;
-  }
-
-  ProgramRun wait() {
-    int status = 0;
-    ::waitpid(id_, &status, 0);
-    return {exitCodeOf(status), readText(out_), err()};
-  }
-
- private:
-  TemporaryFolder folder_;
-  std::string out_, err_;
-  pid_t id_ = 0;
-};
+constexpr const char *kOut = "out", *kErr = "err";
 
 }  // namespace
 
+RunningProgram::RunningProgram(const fs::path& program, const std::vector<std::string>& arguments) {
+  SpawnActions actions;
+  actions.open(STDIN_FILENO, "/dev/null", O_RDONLY);
+  actions.open(STDOUT_FILENO, folder_ / kOut, O_WRONLY | O_CREAT);
+  actions.open(STDERR_FILENO, folder_ / kErr, O_WRONLY | O_CREAT);
+  std::string name = program.string();
+  std::vector<std::string> words = arguments;
+  std::vector<char*> argv{name.data()};
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  const int error = posix_spawn(&id_, name.c_str(), actions.get(), nullptr, argv.data(), environ);
+  if (error != 0) throw std::runtime_error(name + ": " + std::generic_category().message(error));
+}
+
+RunningProgram::~RunningProgram() {
+  if (id_ == 0) return;
+  send(SIGKILL);
+  (void)wait();
+}
+
+bool RunningProgram::runs() const {
+  siginfo_t info{};
+  return ::waitid(P_PID, id_t(id_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
+}
+
+std::string RunningProgram::out() const { return readText(folder_ / kOut); }
+std::string RunningProgram::err() const { return readText(folder_ / kErr); }
+void RunningProgram::send(int signal) const { ::kill(id_, signal); }
+
+bool RunningProgram::handlesInterrupts() const {
+  std::ifstream status("/proc/" + std::to_string(id_) + "/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("SigCgt:"))
+      return (std::stoull(line.substr(line.find('\t')), nullptr, 16) >> (SIGINT - 1)) & 1u;
+  return false;
+}
+
+ProgramRun RunningProgram::wait() {
+  int status = 0;
+  ::waitpid(std::exchange(id_, 0), &status, 0);
+  return {exitCodeOf(status), out(), err()};
+}
+
 ProgramRun runProgram(const fs::path& program, const std::vector<std::string>& arguments) {
-  return Process(program, arguments).wait();
+  return RunningProgram(program, arguments).wait();
 }
 
 ProgramRun runInterrupted(const fs::path& program, const std::vector<std::string>& arguments,
                           const std::string& sign) {
-  Process process(program, arguments);
+  RunningProgram process(program, arguments);
   const auto ready = [&] {
     return process.handlesInterrupts() && process.err().find(sign) != std::string::npos;
   };
   while (process.runs() && !ready()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  process.interrupt();
+  process.send(SIGINT);
   return process.wait();
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 /// Runs a program for the tests as a user does.
 
+#include <sys/types.h>
+
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -14,7 +16,32 @@ struct ProgramRun {
   std::string out, err;
 };
 
-/// Runs without a shell, so that the arguments arrive unchanged. The standard input is empty.
+/// A program that runs without a shell, so that the arguments arrive unchanged. The standard input is
+/// empty.
+class RunningProgram {
+ public:
+  RunningProgram(const std::filesystem::path& program, const std::vector<std::string>& arguments);
+  /// Kills the program if nobody has waited for it.
+  ~RunningProgram();
+  RunningProgram(const RunningProgram&) = delete;
+  RunningProgram& operator=(const RunningProgram&) = delete;
+
+  [[nodiscard]] bool runs() const;
+  /// What it has printed so far.
+  [[nodiscard]] std::string out() const;
+  [[nodiscard]] std::string err() const;
+  void send(int signal) const;
+  /// True if the program has a handler for SIGINT (proc(5), SigCgt).
+  [[nodiscard]] bool handlesInterrupts() const;
+  /// Waits for the end.
+  ProgramRun wait();
+
+ private:
+  TemporaryFolder folder_;
+  pid_t id_ = 0;
+};
+
+/// Runs a program until it ends.
 ProgramRun runProgram(const std::filesystem::path& program,
                       const std::vector<std::string>& arguments);
 

@@ -49,7 +49,7 @@ TEST_F(Start, doesNotLookForADriverWithoutADevice) {
 }
 
 TEST_F(Start, doesNotLookForADriverForHelp) {
-  for (const char* program : {VDB2ESVR, ESVR2VDB, ESVR_RENDER, ESVR_COMPARE})
+  for (const char* program : {VDB2ESVR, ESVR2VDB, ESVR_RENDER, ESVR_VIEW, ESVR_COMPARE})
     EXPECT_THAT(librariesOf(program, {"--help"}), Not(HasSubstr(kDriver))) << program;
 }
 

@@ -4,7 +4,6 @@
  */
 import { render } from "preact";
 import { useEffect, useState } from "preact/hooks";
-import { gridOf } from "./state/scene.js";
 import { sceneOf } from "./state/link.js";
 import { Store } from "./state/store.js";
 import { Viewer } from "./viewer.jsx";
@@ -19,7 +18,6 @@ async function begin(backend) {
   const { file, grid, frame } = scene;
   const usual = () => backend.fit({ file, grid, frame, ...firstSize(), view: "default", orthographic: false });
   const store = new Store({ ...scene, camera: camera ?? (await usual()) });
-  document.title = `${gridOf(description, scene).name} of ${description.files[file].name}: ESVR viewer`;
   return { description, store, fitFirst: camera === undefined };
 }
 

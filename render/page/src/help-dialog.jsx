@@ -14,7 +14,7 @@ const kHelp = [
     ["Click", "add a point"],
     ["Drag, or arrow keys", "move a point; with Shift, arrow keys make finer steps"],
     ["Delete, or right click", "remove a point"],
-    ["Wheel", "zoom the axis of values"],
+    ["Ctrl and wheel", "zoom the axis of values"],
   ]],
   ["Everywhere", [
     ["Ctrl+Z, Ctrl+Shift+Z", "undo and redo a change of settings"],

@@ -1,5 +1,6 @@
 import { useEffect, useState } from "preact/hooks";
 import { HelpDialog } from "./help-dialog.jsx";
+import { SelectField } from "./parts/fields.jsx";
 import { Icon } from "./parts/icon.jsx";
 import { copyText } from "./parts/save-file.js";
 import { SaveDialog } from "./save-dialog.jsx";
@@ -48,7 +49,8 @@ export function Toolbar({ backend, description, store, pixels, onGrid, onMessage
   const [dialog, setDialog] = useState("");
   useUndoKeys(store);
   const { scene } = store;
-  const grids = description.files.flatMap(({ name, grids: all }, f) => all.map((grid, g) => ({ key: `${f}/${g}`, text: `${name}: ${grid.name}` })));
+  const grids = description.files.flatMap(({ name, grids: all }, f) =>
+    all.map((grid, g) => /** @type {[string, string]} */ ([`${f}/${g}`, `${name}: ${grid.name}`])));
   const choose = (/** @type {string} */ key) => onGrid(.../** @type {[number, number]} */ (key.split("/").map(Number)));
   const copyLink = async () =>
     onMessage((await copyText(location.href)) ? "The link to this view is on the clipboard." : "The address of this page is the link to this view.");
@@ -57,12 +59,9 @@ export function Toolbar({ backend, description, store, pixels, onGrid, onMessage
   return (
     <header class="toolbar">
       <h1>ESVR<span> viewer</span></h1>
-      <label class="field grids">
-        <span class="unseen">Volume</span>
-        <select value={`${scene.file}/${scene.grid}`} onChange={(event) => choose(event.currentTarget.value)}>
-          {grids.map(({ key, text }) => <option key={key} value={key}>{text}</option>)}
-        </select>
-      </label>
+      <div class="grids">
+        <SelectField label="Volume" hideLabel value={`${scene.file}/${scene.grid}`} options={grids} onChange={choose} />
+      </div>
       <span class="space" />
       <div class="tools" role="toolbar" aria-label="Tools">
         <Tool label="Undo" icon="undo" disabled={!store.canUndo} onClick={() => store.undo()} />

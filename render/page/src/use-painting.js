@@ -34,7 +34,7 @@ export function usePainting(backend, { scene, moving, size, connection }) {
   const [speed, setSpeed] = useState(/** @type {any} */ (null));
   const [errors, setErrors] = useState(/** @type {ReturnType<typeof errorsOf>} */ (null));
   const [failure, setFailure] = useState("");
-  const [busy, setBusy] = useState(false);
+  const [busy, setBusy] = useState(true);
   const shownFrame = useRef(/** @type {number | null | undefined} */ (undefined));
   const onShown = (/** @type {Shown} */ shown) => {
     const { picture, layer, wish } = shown;
@@ -42,7 +42,9 @@ export function usePainting(backend, { scene, moving, size, connection }) {
     setSpeed((before) => speedAfter(before, shown, performance.now()));
     setFailure("");
     shownFrame.current = wish.scene.frame;
-    if (picture.last && !wish.moving && layer !== "own") setErrors(errorsOf(picture.head)), setBusy(false);
+    // A later wish may already wait.
+    const isLatest = wish.scene === scene && wish.width === size.width && wish.height === size.height;
+    if (picture.last && !wish.moving && isLatest && layer !== "own") setErrors(errorsOf(picture.head)), setBusy(false);
     showPicture({ main: canvases.main.current, reference: canvases.reference.current }, shown);
   };
   const painter = useRef(/** @type {Painter | null} */ (null));
@@ -51,7 +53,7 @@ export function usePainting(backend, { scene, moving, size, connection }) {
   handlers.current = { onShown, onError: (/** @type {Error} */ e) => (setFailure(e.message), setBusy(false)) };
   useEffect(() => {
     if (!size.width || !size.height) return;
-    if (painter.current?.paint({ scene, moving, ...size })) setBusy(!moving);
+    if (painter.current?.paint({ scene, moving, ...size })) setBusy(true);
   }, [scene, moving, size.width, size.height, connection]);
   return { canvases, speed, errors: scene.compare ? errors : null, failure, busy, shownFrame };
 }

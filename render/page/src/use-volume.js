@@ -2,7 +2,7 @@
  * What the page knows about the grid that is shown.
  * @typedef {import("./types.js").Histogram} Histogram
  */
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 
 /**
  * The histogram of a grid; null until it is there.
@@ -12,13 +12,14 @@ import { useEffect, useState } from "preact/hooks";
  */
 export function useHistogram(backend, grid, { file, grid: index, frame }, still) {
   const [histogram, setHistogram] = useState(grid.histogram);
+  const asked = useRef("");
   useEffect(() => {
-    if (!still || grid.histogram) return;
-    let wanted = true;
-    const show = (/** @type {Histogram | null} */ found) => wanted && setHistogram(found);
+    const place = `${file}/${index}/${frame}`;
+    if (!still || grid.histogram || asked.current === place) return;
+    asked.current = place;
+    const show = (/** @type {Histogram | null} */ found) => asked.current === place && setHistogram(found);
     // The editor works without one.
     backend.histogram({ file, grid: index, frame }).then(show, () => show(null));
-    return () => void (wanted = false);
   }, [file, index, frame, still]);
   return grid.histogram ?? histogram;
 }

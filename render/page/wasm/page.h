@@ -66,17 +66,21 @@ struct page_tables {
   float weak_gradient_squared;       ///< of shading
   const float* values;               ///< intervals + 1 times red, green, blue, alpha
   /// side x side times the light of a segment as red, green, blue and alpha, premultiplied. Entry
-  /// (i, j), i fastest, is a segment from the place i d to the place j d with d = intervals / (side -
-  /// 1). Null if no segments are wanted.
+  /// (i, j), i fastest, is a segment from the value i to the value j of `side` values at equal distances
+  /// from the first to the last. Null if no segments are wanted.
   const float* segments;
-  int side;
   float below[4], above[4];          ///< colors and extinctions beyond the ends; alpha is the extinction
 };
 
-/// \param length  length of a step in units of the length that opacities are given for
-/// \param side    of the table of segments; 0: none is wanted
+/// What the tables are made for.
+struct page_sampling {
+  double length;       ///< length of a step in units of the length that opacities are given for
+  double first, last;  ///< range of values of the table of segments
+  int side;            ///< of the table of segments; 0: none is wanted
+};
+
 /// \return null on failure
-const page_tables* page_make_tables(const page_transfer* transfer, double length, int side);
+const page_tables* page_make_tables(const page_transfer* transfer, const page_sampling* sampling);
 
 /// Fits a camera to a box of voxels.
 /// \param box        x0, y0, z0, x1, y1, z1

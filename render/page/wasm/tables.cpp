@@ -33,28 +33,29 @@ void copy(const SegmentEntry& entry, float (&to)[4]) { std::copy_n(entry.mean.c,
 
 /// The tables of the last call, and what their pointers point to.
 struct Tables {
-  Tables(const TransferFunction& f, const Sampling& sampling, int side) : table(f, sampling) {
+  Tables(const TransferFunction& f, const page_sampling& sampling)
+      : table(f, Sampling{sampling.length, sampling.side > 1}) {
     const TransferTableView view = table.view();
     content.intervals = TransferTableView::kIntervals;
     content.low = view.low, content.scale = view.scale;
     content.weak_gradient_squared = weakGradientSquared(f);
     static_assert(sizeof(Classified) == 4 * sizeof(float));
     content.values = &view.entries->r;
-    if (sampling.segments) fillSegments(view.segments, side);
+    if (sampling.side > 1) fillSegments(view.segments, sampling);
   }
   TransferTable table;
   std::vector<PixelColor> segments{};
   page_tables content{};
 
  private:
-  void fillSegments(const SegmentTableView& view, int side) {
-    const float apart = float(content.intervals) / float(side - 1) / view.scale;
-    segments.reserve(std::size_t(side) * std::size_t(side));
-    for (int j = 0; j < side; ++j)
-      for (int i = 0; i < side; ++i)
-        segments.push_back(view(view.low + float(i) * apart, view.low + float(j) * apart));
+  void fillSegments(const SegmentTableView& view, const page_sampling& sampling) {
+    const double apart = (sampling.last - sampling.first) / (sampling.side - 1);
+    const auto valueAt = [&](int i) { return float(sampling.first + i * apart); };
+    segments.reserve(std::size_t(sampling.side) * std::size_t(sampling.side));
+    for (int j = 0; j < sampling.side; ++j)
+      for (int i = 0; i < sampling.side; ++i) segments.push_back(view(valueAt(i), valueAt(j)));
     static_assert(sizeof(PixelColor) == 4 * sizeof(float));
-    content.segments = &segments.front().r, content.side = side;
+    content.segments = &segments.front().r;
     copy(view.entries[0], content.below);
     copy(view.entries[content.intervals + 1], content.above);
   }
@@ -66,10 +67,9 @@ std::unique_ptr<Tables> last;
 
 using namespace esvr;
 
-const page_tables* page_make_tables(const page_transfer* transfer, double length, int side) {
+const page_tables* page_make_tables(const page_transfer* transfer, const page_sampling* sampling) {
   const auto status = capi::guarded([&] {
-    page::last =
-        std::make_unique<page::Tables>(page::functionOf(*transfer), Sampling{length, side > 1}, side);
+    page::last = std::make_unique<page::Tables>(page::functionOf(*transfer), *sampling);
   });
   return status == ESVR_OK ? &page::last->content : nullptr;
 }

@@ -29,7 +29,7 @@ export function heightAtCenter({ eye, center, fov, height }) {
  */
 export function orbited(camera, sideways, upwards) {
   const { forward, right, up } = frameOf(camera);
-  const elevation = Math.asin(Math.min(1, Math.max(-1, -dot(forward, kUpright))));
+  const elevation = Math.atan2(-dot(forward, kUpright), dot(up, kUpright));
   const tilt = Math.min(kHalfTurn, Math.max(-kHalfTurn, elevation + upwards)) - elevation;
   const moved = (/** @type {Triple} */ v) => turned(turned(v, right, -tilt), kUpright, -sideways);
   return { ...camera, eye: plus(camera.center, moved(minus(camera.eye, camera.center))), up: moved(up) };

@@ -43,11 +43,11 @@ export function CurvePoint({ transfer, index, selected, scales, onSelect, onMove
   };
   return (
     <g
-      class={selected ? "point selected" : "point"} transform={`translate(${x},${y})`} tabIndex={0} role="slider"
+      class={selected ? "point selected" : "point"} transform={`translate(${x},${y})`} tabindex={0} role="slider"
       aria-label={`Opacity point ${index + 1} of ${transfer.opacity.length}`}
       aria-valuenow={opacity} aria-valuemin={0} aria-valuemax={1}
       aria-valuetext={`opacity ${shortText(opacity)} at value ${shortText(value)}`}
-      onPointerDown={onPointerDown} onKeyDown={onKeyDown} onFocus={onSelect}
+      onPointerDown={onPointerDown} onClick={(/** @type {Event} */ event) => event.stopPropagation()} onKeyDown={onKeyDown} onFocus={onSelect}
       onContextMenu={(/** @type {Event} */ event) => (event.preventDefault(), onRemove())}
     >
       <circle class="reach" r="14" />

@@ -51,6 +51,13 @@ export function Editor({ transfer, description, grid, histogram, onChange, files
     <div class="editor">
       <div class="row">
         <SegmentedField label="Histogram" value={countScale} onChange={setCountScale} options={[["linear", "Linear"], ["log", "Log"]]} />
+        <span class="space" />
+        <span class="buttons" role="group" aria-label="Zoom of the value axis">
+          <button type="button" aria-label="Show fewer values" title="Show fewer values" onClick={() => zoom(2)}>+</button>
+          <button type="button" aria-label="Show more values" title="Show more values" disabled={!part} onClick={() => zoom(0.5)}>−</button>
+        </span>
+      </div>
+      <div class="row">
         <SegmentedField label="Opacity axis" value={opacityScale} onChange={setOpacityScale} options={[["linear", "Linear"], ["fine", "Fine near 0"]]} />
       </div>
       <Plot
@@ -58,14 +65,10 @@ export function Editor({ transfer, description, grid, histogram, onChange, files
         opacityScale={/** @type {any} */ (opacityScale)} selected={index} onSelect={setChosen} onChange={setOpacity} onZoom={zoom}
       />
       <ColorPoints transfer={transfer} shown={shown} unit={grid.unit} onChange={onChange} />
-      <div class="row">
-        <span class="hint">Click into the diagram to add a point; drag it; Delete removes it.</span>
-        <span class="space" />
-        <span class="buttons" role="group" aria-label="Zoom of the value axis">
-          <button type="button" aria-label="Show fewer values" title="Show fewer values" onClick={() => zoom(2)}>+</button>
-          <button type="button" aria-label="Show more values" title="Show more values" disabled={!part} onClick={() => zoom(0.5)}>−</button>
-        </span>
-      </div>
+      <p class="hint">
+        The line is the opacity of each value; the grey area counts the voxels of each value. Click to add a point, drag it to move
+        it, press Delete to remove it.
+      </p>
       <PointFields points={transfer.opacity} index={index} unit={grid.unit} onSelect={setChosen} onChange={setOpacity} />
       <SelectField
         label="Opacity curve" value={curve} options={curve === kCustom ? [[kCustom, "Own points"], ...curves] : curves}

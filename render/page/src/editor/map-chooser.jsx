@@ -19,7 +19,7 @@ export function MapChooser({ maps, value, onChange }) {
   const name = useId();
   return (
     <fieldset class="maps">
-      <legend>Color map</legend>
+      <legend>Color map{value === "" && ": own colors"}</legend>
       {Object.entries(maps).map(([key, { space, points }]) => (
         <label key={key}>
           <input type="radio" name={name} value={key} checked={key === value} onChange={() => onChange(key)} />

@@ -1,7 +1,10 @@
 import { withAddedPoint, withPoint, withoutPoint, opacityAt } from "../look/transfer.js";
 import { NumberField } from "../parts/number-field.jsx";
 
-/** A new point halfway to the next point, or to the one before. */
+/**
+ * A new point halfway to the next point, or to the one before.
+ * @param {import("../types.js").OpacityPoint[]} points @param {number} index
+ */
 function newPoint(points, index) {
   const other = points[index + 1] ?? points[index - 1] ?? points[index];
   const value = (points[index][0] + other[0]) / 2;

@@ -34,12 +34,14 @@ export function scalesOf({ width, height }, [low, high], scale) {
   };
 }
 
+const kDenser = 0.8; // ticks may be closer than asked for, if their numbers are rounder then
+
 /** Round numbers from low to high, about `count` of them. @param {Range} range @param {number} count */
 export function ticksOf([low, high], count) {
   const rough = (high - low) / count;
   if (!(rough > 0)) return [low];
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * ([1, 2, 5].find((m) => m * power >= rough) ?? 10);
+  const step = power * ([1, 2, 5].find((m) => m * power >= kDenser * rough) ?? 10);
   const first = Math.ceil(low / step), last = Math.floor(high / step + 1e-9);
   return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step);
 }

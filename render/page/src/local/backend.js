@@ -92,7 +92,8 @@ export class LocalBackend {
   constructor(content) {
     this.#engine = workersDraw() ? new RemoteEngine(content) : new PageEngine(content);
     this.#engine.onPicture = (picture) => {
-      if (this.#drawing?.id === picture.id) this.#drawing.onPicture(picture);
+      const drawing = this.#drawing;
+      if (drawing && drawing.id === picture.id) drawing.onPicture(picture);
       else if (picture.bitmap instanceof ImageBitmap) picture.bitmap.close();
     };
   }

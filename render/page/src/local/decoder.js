@@ -12,7 +12,8 @@
  *
  * @typedef {object} Tables  The tables of a transfer function; views of the module's memory.
  * @property {number} intervals @property {number} low @property {number} scale @property {number} weakGradientSquared
- * @property {Float32Array} values @property {Float32Array | null} segments @property {number} side
+ * @property {Float32Array} values @property {Float32Array | null} segments
+ * @property {[number, number]} range @property {number} side  of the table of segments
  * @property {number[]} below @property {number[]} above
  */
 
@@ -116,10 +117,11 @@ export class Decoder {
 
   /**
    * @param {Transfer} transfer
-   * @param {{length: number, side: number}} sampling  side: of the table of segments; 0: none is wanted
+   * @param {{length: number, range: [number, number], side: number}} sampling
+   *   range and side: of the table of segments; a side of 0: none is wanted
    * @returns {Tables}
    */
-  tables(transfer, { length, side }) {
+  tables(transfer, { length, range, side }) {
     return this.#scoped((take) => {
       const head = take(5 * kWordBytes);
       const space = kSpaces.indexOf(transfer.space);
@@ -127,14 +129,16 @@ export class Decoder {
       const colors = this.#putNumbers(take, transfer.colors.flat());
       const opacity = this.#putNumbers(take, transfer.opacity.flat());
       this.#words(head, 5).set([space, transfer.colors.length, transfer.opacity.length, colors, opacity]);
-      const at = this.#orFail(this.#exports.page_make_tables(head, length, side));
-      const words = this.#words(at, 7), floats = [...new Float32Array(this.#memory, at, 15)];
+      const sampling = this.#putNumbers(take, [length, ...range, 0]);
+      this.#words(sampling + 3 * kDoubleBytes, 1)[0] = side;
+      const at = this.#orFail(this.#exports.page_make_tables(head, sampling));
+      const words = this.#words(at, 6), floats = [...new Float32Array(this.#memory, at, 14)];
       const [intervals, , , , values, segments] = words;
       return {
-        intervals, low: floats[1], scale: floats[2], weakGradientSquared: floats[3], side,
+        intervals, low: floats[1], scale: floats[2], weakGradientSquared: floats[3], range, side,
         values: new Float32Array(this.#memory, values, 4 * (intervals + 1)),
         segments: segments ? new Float32Array(this.#memory, segments, 4 * side * side) : null,
-        below: floats.slice(7, 11), above: floats.slice(11, 15),
+        below: floats.slice(6, 10), above: floats.slice(10, 14),
       };
     });
   }

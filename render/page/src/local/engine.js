@@ -8,6 +8,10 @@
  * @typedef {import("./ray-marcher.js").Frame} Frame
  * @typedef {{width: number, height: number}} Size
  * @typedef {{name: string, file: Uint8Array, wasm: BufferSource, canvas: OffscreenCanvas | HTMLCanvasElement}} Input
+ * @typedef {{level: number, origin: number[], bricks: number[], count: number}} Shape  of an atlas
+ * @typedef {{scene: Scene, size: Size, full: Size, number: number, steps: number}} Job
+ *   full: size that decides the level of detail; number: of the request, or kUninterrupted; steps: of the
+ *   scene between two samples
  * @typedef {(head: PictureHead, canvas: OffscreenCanvas | HTMLCanvasElement) => Promise<void> | void} Show
  */
 import { Decoder } from "./decoder.js";
@@ -19,9 +23,12 @@ const kBins = 256; // of a histogram
 const kMostTextureBytes = 512 * 2 ** 20;
 const kBandMs = 40; // between two looks for a newer request
 const kFirstPictureMs = 60; // a picture that takes longer has a coarse one before it
-const kCoarseScale = 0.35;
-const kUsualSide = 256, kFineSide = 1024; // of the table of segments
-const kFineGap = 1 / 128; // between two points of a transfer function, as a share of its range
+const kCoarseScale = 0.35; // of the size of a coarse picture
+const kMovingMs = 50; // pictures of drags that would take longer have fewer samples
+const kMostMovingSteps = 3; // between these samples
+const kUsualSide = 128, kMostSide = 1024; // of the table of segments
+const kEntriesOfGap = 2; // of the table of segments, between two points of a transfer function
+const kUninterrupted = 0;
 /** @type {Record<string, Triple>} */
 const kDirections = { "+x": [1, 0, 0], "-x": [-1, 0, 0], "+y": [0, 1, 0], "-y": [0, -1, 0], "+z": [0, 0, 1], "-z": [0, 0, -1] };
 
@@ -57,9 +64,11 @@ export class Engine {
   #decoded = { grid: -1, volume: 0 };
   /** What the textures hold. */
   #shown = { grid: -1, level: -1, tables: "" };
-  /** @type {{level: number, origin: number[], bricks: number[], count: number} | null} */
+  /** @type {Shape | null} */
   #atlas = null;
   #latest = 0;
+  #drawMs = 0; // of the last picture
+  /** Time of a pixel at the scene's step. */
   #msPerPixel = 0;
 
   /** @param {Input} input @param {Decoder} decoder */
@@ -116,17 +125,20 @@ export class Engine {
     const number = ++this.#latest, size = { width, height };
     await turn();
     if (number !== this.#latest) return;
-    if (!moving && this.#msPerPixel * width * height > kFirstPictureMs) {
+    const expectedMs = this.#msPerPixel * width * height;
+    const steps = moving ? Math.min(kMostMovingSteps, Math.max(1, Math.ceil(expectedMs / kMovingMs))) : 1;
+    if (!moving && expectedMs > kFirstPictureMs) {
       const small = { width: Math.ceil(width * kCoarseScale), height: Math.ceil(height * kCoarseScale) };
-      if (!(await this.#paint(scene, small, number, size))) return;
+      if (!(await this.#paint({ scene, size: small, full: size, number, steps }))) return;
       await this.#show({ id, last: false }, show);
     }
-    if (await this.#paint(scene, size, number, size)) await this.#show({ id, last: true }, show);
+    if (await this.#paint({ scene, size, full: size, number, steps })) await this.#show({ id, last: true }, show);
   }
 
   /** Draws a picture that nothing interrupts. @param {{scene: Scene} & Size} request */
   async png({ scene, width, height }) {
-    await this.#paint(scene, { width, height }, 0, { width, height });
+    const size = { width, height };
+    await this.#paint({ scene, size, full: size, number: kUninterrupted, steps: 1 });
     this.#marcher.show();
     const canvas = this.#canvas;
     if ("convertToBlob" in canvas) return canvas.convertToBlob({ type: "image/png" });
@@ -139,8 +151,6 @@ export class Engine {
     return this.#grids[grid];
   }
 
-  #drawMs = 0;
-
   /** @param {{id: number, last: boolean}} head @param {Show} show */
   async #show(head, show) {
     this.#marcher.show();
@@ -150,26 +160,24 @@ export class Engine {
 
   /**
    * Draws a picture in bands, between which a newer request may end it.
-   * @param {Scene} scene @param {Size} size
-   * @param {number} number  of the request; 0: it cannot be ended
-   * @param {Size} full  size that decides the level of detail
+   * @param {Job} job
    * @returns {Promise<boolean>} whether the picture is complete
    */
-  async #paint(scene, size, number, full) {
-    const frame = this.#prepare(scene, full), from = performance.now();
-    let rows = Math.max(1, Math.floor(kBandMs / Math.max(1e-9, this.#msPerPixel * size.width)));
+  async #paint({ scene, size, full, number, steps }) {
+    const frame = this.#prepare({ ...scene, step: scene.step * steps }, full), from = performance.now();
+    let rows = Math.max(1, Math.floor((kBandMs * steps) / Math.max(1e-9, this.#msPerPixel * size.width)));
     this.#marcher.begin(frame, size);
     for (let row = 0; row < size.height; row += rows) {
       if (row > 0) {
         await turn();
-        if (number !== 0 && number !== this.#latest) return false;
+        if (number !== kUninterrupted && number !== this.#latest) return false;
         this.#marcher.begin(frame, size); // another picture may have been drawn meanwhile
       }
       rows = Math.min(rows, size.height - row);
       this.#marcher.draw(row, rows);
     }
     this.#drawMs = performance.now() - from;
-    this.#msPerPixel = this.#drawMs / (size.width * size.height);
+    this.#msPerPixel = (this.#drawMs * steps) / (size.width * size.height);
     return true;
   }
 
@@ -179,7 +187,7 @@ export class Engine {
     const box = this.#gridAt(scene.grid).box;
     const wanted = scene.lod === "auto" ? levelOf(scene.camera, size.height, scaled(sum(...box), 0.5)) : 0;
     this.#useVolume(scene.grid, fits(scene, wanted) ? wanted : 0);
-    const { level, origin, bricks } = /** @type {NonNullable<typeof this.#atlas>} */ (this.#atlas);
+    const { level, origin, bricks } = /** @type {Shape} */ (this.#atlas);
     this.#useTables(scene, level);
     const first = /** @type {Triple} */ (origin);
     const view = viewOf(scene.camera, size, level, first);
@@ -219,22 +227,32 @@ export class Engine {
     }
   }
 
-  /** Entries of the table of segments: more if points of the transfer function are close. */
-  #sideOf({ colors, opacity }) {
+  /**
+   * The table of segments covers the values of the volume and those of the transfer function. Its entries
+   * lie so close that a curve between two points of the function has several of them; beyond a limit, the
+   * table covers the transfer function alone, which takes longer to draw.
+   * @param {import("../types.js").Transfer} transfer
+   */
+  #segmentsOf({ colors, opacity }) {
     const places = [...colors, ...opacity].map(([x]) => x).sort((a, b) => a - b);
+    const low = places[0], high = places[places.length - 1];
     const gaps = places.slice(1).map((x, i) => x - places[i]).filter((gap) => gap > 0);
-    const finest = Math.min(...gaps) / ((places.at(-1) ?? 0) - places[0]);
-    return finest < kFineGap ? kFineSide : kUsualSide;
+    const entries = Math.max(kUsualSide, kEntriesOfGap * ((high - low) / Math.min(...gaps)));
+    const values = this.#marcher.values, first = Math.min(low, ...values), last = Math.max(high, ...values);
+    const side = Math.ceil((entries * (last - first)) / (high - low));
+    const own = /** @type {[number, number]} */ ([low, high]), all = /** @type {[number, number]} */ ([first, last]);
+    return side <= kMostSide ? { range: all, side } : { range: own, side: Math.ceil(Math.min(kMostSide, entries)) };
   }
 
   /** @param {Scene} scene @param {number} level */
   #useTables({ transfer, mode, classification, step, opacityLength }, level) {
     const composite = mode === "composite";
     const length = composite ? (step * 2 ** level) / opacityLength : 1;
-    const side = composite && classification === "pre" ? this.#sideOf(transfer) : 0;
-    const key = JSON.stringify([transfer, length, side]);
+    const none = { range: /** @type {[number, number]} */ ([0, 1]), side: 0 };
+    const segments = composite && classification === "pre" ? this.#segmentsOf(transfer) : none;
+    const key = JSON.stringify([transfer, length, segments]);
     if (this.#shown.tables === key) return;
-    this.#marcher.setTables(this.#decoder.tables(transfer, { length, side }));
+    this.#marcher.setTables(this.#decoder.tables(transfer, { length, ...segments }));
     this.#shown.tables = key;
   }
 }

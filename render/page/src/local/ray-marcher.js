@@ -6,7 +6,7 @@
  * @typedef {import("./decoder.js").Tables} Tables
  * @typedef {{width: number, height: number}} Size
  * @typedef {{mode: "composite" | "maximum" | "average", classification: "pre" | "post", shade: boolean, inTable: boolean}} Kind
- *   inTable: all values lie within the range of the transfer function
+ *   inTable: all values lie within the table of segments
  *
  * @typedef {object} Frame  What decides the pixels of a picture.
  * @property {Omit<Kind, "inTable">} kind
@@ -51,6 +51,11 @@ function padded(values) {
   return all;
 }
 
+/** Places of the ends of the table of segments. @param {Pick<Tables, "low" | "scale" | "range">} tables @returns {[number, number]} */
+function segmentPlaces({ low, scale, range: [first, last] }) {
+  return [(first - low) * (scale || kFlat), (last - low) * (scale || kFlat)];
+}
+
 export class RayMarcher {
   #gl;
   #floats;
@@ -65,7 +70,7 @@ export class RayMarcher {
   #size = { width: 0, height: 0 };
   /** @type {Omit<Atlas, "table" | "voxels" | "free"> | null} */
   #atlas = null;
-  /** @type {Omit<Tables, "values" | "entries"> | null} */
+  /** @type {Omit<Tables, "values" | "segments"> | null} */
   #tables = null;
   #bytes = 0;
 
@@ -177,14 +182,16 @@ export class RayMarcher {
     return known;
   }
 
-  /** Whether all values lie within the range of the transfer function. */
+  /** Smallest and largest value of the volume, and its background. */
+  get values() {
+    const { shares, scale, background } = /** @type {Atlas} */ (this.#atlas);
+    return shares.map((share) => share * scale + background);
+  }
+
+  /** Whether all values lie within the table of segments. */
   #isInTable() {
-    const { scale, background } = this.#places(), { shares } = /** @type {Atlas} */ (this.#atlas);
-    const last = /** @type {Tables} */ (this.#tables).intervals, slack = 1e-4 * last;
-    return shares.every((share) => {
-      const place = share * scale + background;
-      return place >= -slack && place <= last + slack;
-    });
+    const [first, last] = /** @type {Tables} */ (this.#tables).range, slack = 1e-4 * (last - first);
+    return this.values.every((value) => value >= first - slack && value <= last + slack);
   }
 
   /** Places in the tables for shares of the atlas' scale: a factor and the place of the background. */
@@ -223,6 +230,7 @@ export class RayMarcher {
     vector("uTexel", /** @type {Atlas} */ (this.#atlas).slots.map((n) => 1 / (n * kSlotSide)));
     number("uPlaceScale", place.scale);
     number("uPlaceOfBackground", place.background);
+    gl.uniform2f(at("uSegmentPlaces"), ...segmentPlaces(tables));
     number("uSegmentSide", tables.side);
     gl.uniform4fv(at("uBelow"), tables.below);
     gl.uniform4fv(at("uAbove"), tables.above);

@@ -35,6 +35,7 @@ uniform vec3 uTexel;         // size of a texel of uVoxels
 uniform float uPlaceScale, uPlaceOfBackground;
 uniform sampler2D uValues;
 uniform sampler2D uSegments;
+uniform vec2 uSegmentPlaces;  // places of the first and the last row of uSegments
 uniform float uSegmentSide;
 uniform vec4 uBelow, uAbove;  // color and extinction beyond the ends of the table
 uniform vec4 uBackground;    // behind the volume, premultiplied
@@ -63,7 +64,8 @@ vec4 classified(float place) {
 const kSegmentInTable = `
 // The light of a segment whose values lie in the table.
 vec4 segmentInTable(float a, float b) {
-  return textureLod(uSegments, (vec2(a, b) / kIntervals * (uSegmentSide - 1.0) + 0.5) / uSegmentSide, 0.0);
+  vec2 share = (vec2(a, b) - uSegmentPlaces.x) / (uSegmentPlaces.y - uSegmentPlaces.x);
+  return textureLod(uSegments, (share * (uSegmentSide - 1.0) + 0.5) / uSegmentSide, 0.0);
 }
 `;
 
@@ -214,29 +216,30 @@ void main() {
   vec3 start = origin + direction * (first * uStep), apart = direction * uStep;
   vec3 perVoxel = mix(1.0 / apart, vec3(0.0), lessThan(abs(apart), vec3(1e-30)));
   int count = first <= final ? int(final - first) + 1 : 0;
-  ivec3 size = textureSize(uBricks, 0);
+  ivec3 last = textureSize(uBricks, 0) - 1;
   int i = 0;
   while (i < count && OPEN) {
-    vec3 p = start + float(i) * apart;
-    ivec3 brick = ivec3(floor(p / kBrickSide));
-    // Rounding can move a place beyond the box.
-    if (any(lessThan(brick, ivec3(0))) || any(greaterThanEqual(brick, size))) {
-      ++i;
-      continue;
-    }
-    uvec4 entry = texelFetch(uBricks, brick, 0);
-    vec3 low = vec3(brick) * kBrickSide;
-    if (entry.a != 0u) {
+    vec3 p, low;
+    uvec4 entry;
+    bool skipped = false;
+    // Software renderers run all of a loop's body for every pixel, so that this loop is a short one.
+    for (; i < count; skipped = true) {
+      p = start + float(i) * apart;
+      // Rounding can move a place beyond the box.
+      ivec3 brick = clamp(ivec3(floor(p / kBrickSide)), ivec3(0), last);
+      low = vec3(brick) * kBrickSide;
+      entry = texelFetch(uBricks, brick, 0);
+      if (entry.a == 0u) break;
       float room = (float(entry.a) - 1.0) * kBrickSide;
       i += samplesToLeave(p, perVoxel, low - room, low + kBrickSide + room);
-      leave();
-      continue;
     }
+    if (skipped) leave();
+    if (i >= count) break;
     vec3 slot = vec3(entry.xyz) * kSlotSide + 0.5;
+    vec3 texel = (start - low + slot) * uTexel, texelsApart = apart * uTexel;
     int end = min(count, i + samplesToLeave(p, perVoxel, low, low + kBrickSide));
     for (; i < end && OPEN; ++i) {
-      vec3 local = start + float(i) * apart - low;
-      float share = textureLod(uVoxels, (local + slot) * uTexel, 0.0).r;
+      float share = textureLod(uVoxels, texel + float(i) * texelsApart, 0.0).r;
       SHADE
       add(share, share * uPlaceScale + uPlaceOfBackground);
       NEXT_SHADE
@@ -263,7 +266,7 @@ export function fragmentShader({ mode, classification, shade, inTable }) {
     isLit ? kShading + "vec2 nowShade, lastShade;" : "",
     `#define LIT(light, shade) ${isLit ? "lit(light, shade)" : "light"}`,
     `#define OPEN ${composite ? "!(transmittance < uMinTransmittance)" : "true"}`,
-    `#define SHADE ${isLit ? "nowShade = shadeAt(clamp(local, 0.0, kBrickSide), slot, direction);" : ""}`,
+    `#define SHADE ${isLit ? "nowShade = shadeAt(clamp(start + float(i) * apart - low, 0.0, kBrickSide), slot, direction);" : ""}`,
     `#define NEXT_SHADE ${isLit ? "lastShade = nowShade;" : ""}`,
     composite ? kComposite : "",
     kModes[composite ? classification : mode],

@@ -1,10 +1,9 @@
 /** Unpacks the program of the exported page and runs it. */
+import { partOf } from "./packed.js";
+
 async function start() {
-  const packed = document.getElementById("esvr-program")?.textContent ?? "";
-  const bytes = Uint8Array.from(atob(packed.trim()), (c) => c.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   const script = document.createElement("script");
-  script.src = URL.createObjectURL(await new Response(stream).blob());
+  script.src = URL.createObjectURL(new Blob([await partOf("esvr-program")], { type: "text/javascript" }));
   document.body.append(script);
 }
 

@@ -4,7 +4,7 @@
 export function shortText(v, digits = 4) {
   if (v === 0) return "0";
   const size = Math.abs(v);
-  return size >= 1e6 || size < 1e-4 ? v.toExponential(digits - 2) : String(Number(v.toPrecision(digits)));
+  return size >= 1e6 || size < 1e-4 ? v.toExponential(digits - 2).replace(/\.?0+e/, "e") : String(Number(v.toPrecision(digits)));
 }
 
 /** @param {number} bytes */

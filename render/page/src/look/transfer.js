@@ -125,7 +125,7 @@ export function withFewerColors(transfer, count) {
 /**
  * Changes a point; its value stays between those of its neighbours.
  * @template {number[]} P
- * @param {P[]} points @param {number} index @param {P} point
+ * @param {P[]} points @param {number} index @param {NoInfer<P>} point
  * @returns {P[]}
  */
 export function withPoint(points, index, point) {
@@ -147,7 +147,7 @@ export function withoutPoint(points, index) {
 /**
  * Adds a point.
  * @template {number[]} P
- * @param {P[]} points @param {P} point
+ * @param {P[]} points @param {NoInfer<P>} point
  * @returns {{points: P[], index: number}}
  */
 export function withAddedPoint(points, point) {

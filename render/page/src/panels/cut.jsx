@@ -20,10 +20,11 @@ function ClipFields({ scene, limits, onChange }) {
     <>
       <p class="hint">Drag the handles in the picture, or enter places in voxels.</p>
       {kAxes.map((name, axis) => (
-        <div class="row" key={name}>
-          <NumberField label={`${name.toUpperCase()} from`} value={clip[0][axis]} step={1} onChange={set(0, axis)} />
-          <NumberField label={`to`} value={clip[1][axis]} step={1} onChange={set(1, axis)} />
-        </div>
+        <fieldset class="axis-fields" key={name}>
+          <legend>{name.toUpperCase()}</legend>
+          <NumberField label="from" value={clip[0][axis]} step={1} onChange={set(0, axis)} />
+          <NumberField label="to" value={clip[1][axis]} step={1} onChange={set(1, axis)} />
+        </fieldset>
       ))}
       <button type="button" onClick={() => onChange({ clip: limits })}>Reset the box</button>
     </>

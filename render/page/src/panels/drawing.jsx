@@ -13,7 +13,7 @@ const kModes = [
 /** @type {[string, string][]} */
 const kClassifications = [["pre", "Smooth: colors integrated between samples"], ["post", "Color of each sample alone"]];
 /** @type {[string, string][]} */
-const kLevels = [["auto", "Coarser voxels where they are smaller than pixels"], ["off", "Full voxels everywhere"]];
+const kLevels = [["auto", "Fewer, larger voxels where pixels are larger"], ["off", "Full voxels everywhere"]];
 /** @type {[string, string][]} */
 const kBetween = [["auto", "As the file says"], ["voxels", "Interpolate decoded voxels"], ["sum", "Add up the ellipsoids exactly"]];
 
@@ -49,7 +49,7 @@ export function DrawingPanel({ scene, grid, can, onChange }) {
   const select = (/** @type {keyof typeof scene} */ name) => (/** @type {string} */ value) => onChange({ [name]: value });
   return (
     <Section title="Rendering">
-      <SelectField label="Show" value={scene.mode} options={kModes} onChange={select("mode")} />
+      <SelectField stacked label="Show" value={scene.mode} options={kModes} onChange={select("mode")} />
       <div class="grid">
         <NumberField
           label="Opacity length" value={scene.opacityLength} min={1e-6} max={1e6} unit="voxels"
@@ -66,11 +66,11 @@ export function DrawingPanel({ scene, grid, can, onChange }) {
       )}
       <Background scene={scene} onChange={onChange} />
       {can.has("classification") && (
-        <SelectField label="Colors between samples" value={scene.classification} options={kClassifications} onChange={select("classification")} />
+        <SelectField stacked label="Colors between samples" value={scene.classification} options={kClassifications} onChange={select("classification")} />
       )}
-      {can.has("lod") && <SelectField label="Levels of detail" value={scene.lod} options={kLevels} onChange={select("lod")} />}
+      {can.has("lod") && <SelectField stacked label="Levels of detail" value={scene.lod} options={kLevels} onChange={select("lod")} />}
       {can.has("between") && grid.kind === "ellipsoids" && (
-        <SelectField label="Values between voxels" value={scene.between} options={kBetween} onChange={select("between")} />
+        <SelectField stacked label="Values between voxels" value={scene.between} options={kBetween} onChange={select("between")} />
       )}
     </Section>
   );

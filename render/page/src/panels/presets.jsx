@@ -1,12 +1,16 @@
 import { useRef, useState } from "preact/hooks";
-import { extentOf, rangeOf, withRange } from "../look/transfer.js";
 import { paraViewText } from "../look/paraview.js";
+import { rangeOf, withRange } from "../look/transfer.js";
+import { SegmentedField, SelectField } from "../parts/fields.jsx";
 import { saveText } from "../parts/save-file.js";
 
 /**
  * @typedef {import("../types.js").Backend} Backend
  * @typedef {import("../types.js").Transfer} Transfer
  * @typedef {import("../types.js").Preset} Preset
+ * @typedef {import("../look/transfer.js").Range} Range
+ * @typedef {{name: string, presets: Preset[], index: number, ownRange: boolean, before: Range}} Opened
+ *   A file that was opened; `before` is the range that was shown then.
  */
 
 /**
@@ -43,34 +47,59 @@ export function PresetFiles({ backend, transfer, name, onOpen }) {
   );
 }
 
-/** Presets over 0 to 1, as most are, cover the present range. @param {Transfer} preset @param {Transfer} present */
-function placed(preset, present) {
-  const [low, high] = extentOf(preset.colors);
-  return low === 0 && high === 1 ? withRange(preset, rangeOf(present)) : preset;
+/** @param {Opened} opened @returns {Transfer} */
+function transferOf({ presets, index, ownRange, before }) {
+  const { transfer } = presets[index];
+  return ownRange ? transfer : withRange(transfer, before);
+}
+
+/**
+ * What is shown of a file that was opened. As in ParaView, a preset covers the range that was shown
+ * before, unless its own is wanted.
+ * @param {{opened: Opened, onChange: (opened: Opened) => void}} props
+ */
+export function PresetChoice({ opened, onChange }) {
+  const { name, presets, index, ownRange } = opened;
+  return (
+    <fieldset class="preset-choice">
+      <legend>Preset from {name}</legend>
+      {presets.length > 1 && (
+        <SelectField
+          label="Preset of the file" value={String(index)} options={presets.map((p, i) => [String(i), p.name])}
+          onChange={(value) => onChange({ ...opened, index: Number(value) })}
+        />
+      )}
+      <SegmentedField
+        label="Range of values" value={ownRange ? "own" : "before"} options={[["before", "As before"], ["own", "Of the preset"]]}
+        onChange={(value) => onChange({ ...opened, ownRange: value === "own" })}
+      />
+    </fieldset>
+  );
 }
 
 /**
  * Opens presets, also those that are dropped onto the page.
- * @param {Backend} backend @param {(transfer: Transfer) => void} onTransfer @param {(text: string) => void} onMessage
+ * @param {Backend} backend @param {() => Transfer} present @param {(transfer: Transfer) => void} onTransfer
+ * @param {(text: string) => void} onMessage
  */
-export function useDroppedPreset(backend, onTransfer, onMessage) {
-  const [presets, setPresets] = useState(/** @type {Preset[]} */ ([]));
+export function usePresets(backend, present, onTransfer, onMessage) {
+  const [opened, setOpened] = useState(/** @type {Opened | null} */ (null));
   const [over, setOver] = useState(false);
-  const take = (/** @type {Preset} */ { name, transfer }) => {
-    onTransfer(transfer);
-    onMessage(`The preset "${name}" is shown.`);
+  const show = (/** @type {Opened} */ next) => {
+    setOpened(next);
+    onTransfer(transferOf(next));
+    onMessage(`The preset "${next.presets[next.index].name}" is shown.`);
   };
   const open = async (/** @type {File} */ file) => {
     try {
-      const found = await backend.preset(await file.text());
-      setPresets(found.length > 1 ? found : []);
-      take(found[0]);
+      const presets = await backend.preset(await file.text());
+      show({ name: file.name, presets, index: 0, ownRange: false, before: rangeOf(present()) });
     } catch (error) {
       onMessage(`${file.name}: ${/** @type {Error} */ (error).message}`);
     }
   };
   const drag = (/** @type {boolean} */ inside) => (/** @type {DragEvent} */ event) => {
-    if (!event.dataTransfer?.types.includes("Files")) return;
+    if (!backend.can.has("preset") || !event.dataTransfer?.types.includes("Files")) return;
     event.preventDefault();
     setOver(inside);
   };
@@ -79,14 +108,6 @@ export function useDroppedPreset(backend, onTransfer, onMessage) {
     const file = event.dataTransfer?.files[0];
     if (file && backend.can.has("preset")) open(file);
   };
-  const chooser = presets.length > 0 && (
-    <label class="field">
-      <span>Preset of the file</span>
-      <select onChange={(event) => take(presets[event.currentTarget.selectedIndex])}>
-        {presets.map(({ name }) => <option key={name}>{name}</option>)}
-      </select>
-    </label>
-  );
   const dropProps = { onDragOver: drag(true), onDragLeave: drag(false), onDrop, "data-dropping": over || undefined };
-  return { open, chooser, dropProps, placed };
+  return { open, opened, show, dropProps };
 }

@@ -25,7 +25,7 @@ export function StatisticsPanel({ description, scene, grid, speed }) {
     ["Time to draw the last picture", speed && `${shortText(speed.drawMs, 3)} ms`],
     ["Time until it was shown", speed && `${shortText(speed.ms, 3)} ms`],
     ["Pixels of the last picture", speed && `${speed.width} × ${speed.height}`],
-    ["Memory of the device", speed && bytesText(speed.vramBytes)],
+    ["Memory of the GPU", speed && speed.vramBytes > 0 && bytesText(speed.vramBytes)],
     ["Drawn on", description.device],
     ["Program", description.program],
   ];

@@ -7,12 +7,13 @@ import { useId } from "preact/hooks";
  * @param {readonly (readonly [string, string])[]} props.options  value and text of each
  * @param {(value: string) => void} props.onChange
  * @param {boolean} [props.hideLabel]
+ * @param {boolean} [props.stacked]  the label is above
  * @param {string} [props.hint]
  */
-export function SelectField({ label, value, options, onChange, hideLabel, hint }) {
+export function SelectField({ label, value, options, onChange, hideLabel, stacked, hint }) {
   const id = useId();
   return (
-    <span class="field" title={hint}>
+    <span class={stacked ? "field stacked" : "field"} title={hint}>
       <label for={id} class={hideLabel ? "unseen" : undefined}>{label}</label>
       <select id={id} value={value} onChange={(event) => onChange(event.currentTarget.value)}>
         {options.map(([key, text]) => <option key={key} value={key}>{text}</option>)}

@@ -55,7 +55,7 @@ function Handle({ box, limits, side, axis, project, onChange }) {
   };
   return (
     <g
-      class={`clip-handle axis-${kAxes[axis]}`} transform={`translate(${at[0]},${at[1]})`} role="slider" tabIndex={0}
+      class={`clip-handle axis-${kAxes[axis]}`} transform={`translate(${at[0]},${at[1]})`} role="slider" tabindex={0}
       aria-label={`Clip box: ${side ? "upper" : "lower"} end of ${kAxes[axis]}`}
       aria-valuenow={place} aria-valuemin={limits[0][axis]} aria-valuemax={limits[1][axis]} aria-valuetext={shortText(place)}
       onPointerDown={onPointerDown} onKeyDown={onKeyDown}

@@ -21,7 +21,7 @@ export function Divider({ share, left, right, onChange }) {
   };
   return (
     <div
-      class="divider" style={{ left: `${100 * share}%` }} role="slider" tabIndex={0}
+      class="divider" style={{ left: `${100 * share}%` }} role="slider" tabindex={0}
       aria-label="Border between the volume and the reference" aria-valuenow={Math.round(100 * share)}
       aria-valuemin={0} aria-valuemax={100} aria-valuetext={`${Math.round(100 * share)} % of the width`}
       onPointerDown={onPointerDown} onKeyDown={onKeyDown}

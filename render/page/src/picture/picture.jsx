@@ -17,10 +17,11 @@ const kLabel =
  * @param {{main: any, reference: any}} props.canvases  refs
  * @param {(change: Partial<import("../types.js").Scene>, moving: boolean) => void} props.onChange
  * @param {() => void} props.onFit
+ * @param {boolean} props.busy  the picture is not complete
  * @param {{own: string, reference: string}} props.names
  * @param {any} props.children
  */
-export function Picture({ scene, grid, size, area, canvases, onChange, onFit, names, children }) {
+export function Picture({ scene, grid, size, area, canvases, onChange, onFit, busy, names, children }) {
   const surface = useRef(/** @type {any} */ (null));
   const target = useRef(/** @type {any} */ (null));
   target.current = { scene, onChange, onFit };
@@ -35,24 +36,24 @@ export function Picture({ scene, grid, size, area, canvases, onChange, onFit, na
   }), []);
   const split = scene.compare?.show === "split" ? scene.compare : null;
   return (
-    <div class="picture" ref={area}>
-      <div class="surface" ref={surface} tabIndex={0} role="application" aria-label={kLabel}>
+    <div class="picture" ref={area} aria-busy={busy}>
+      <div class="surface" ref={surface} tabindex={0} role="application" aria-label={kLabel}>
         <canvas ref={canvases.main} aria-hidden="true" />
         <canvas
           ref={canvases.reference} hidden aria-hidden="true"
           style={{ clipPath: `inset(0 0 0 ${100 * (split?.split ?? 0)}%)` }}
         />
       </div>
-      {scene.clip && size.width > 0 && (
-        <ClipHandles
-          camera={scene.camera} size={size} clip={scene.clip} limits={edgesOf(grid)}
-          onChange={(clip, moving) => onChange({ clip }, moving)}
-        />
-      )}
       {split && (
         <Divider
           share={split.split} left={names.own} right={names.reference}
           onChange={(share) => onChange({ compare: { ...split, split: share } }, true)}
+        />
+      )}
+      {scene.clip && size.width > 0 && (
+        <ClipHandles
+          camera={scene.camera} size={size} clip={scene.clip} limits={edgesOf(grid)}
+          onChange={(clip, moving) => onChange({ clip }, moving)}
         />
       )}
       {children}

@@ -4,6 +4,7 @@
  * @typedef {import("../types.js").Scene} Scene
  * @typedef {import("../types.js").Description} Description
  */
+import { kChecks } from "./checks.js";
 import { startOf } from "./scene.js";
 
 /** @param {Scene} scene @param {Description} description */
@@ -40,10 +41,14 @@ export function sceneOf(hash, description) {
   const members = new URLSearchParams(hash.slice(1));
   const file = indexBelow(parsed(members.get("file")), description.files.length);
   const grid = indexBelow(parsed(members.get("grid")), description.files[file].grids.length);
-  const scene = /** @type {Record<string, unknown>} */ (startOf(description, file, grid));
-  for (const name of [...Object.keys(scene), "camera"]) {
+  const scene = /** @type {Record<string, any>} */ (startOf(description, file, grid));
+  for (const [name, isGood] of Object.entries(kChecks)) {
     const value = parsed(members.get(name));
-    if (value !== undefined && name !== "file" && name !== "grid") scene[name] = value;
+    if (value !== undefined && isGood(value)) scene[name] = value;
   }
+  const { frame, compare } = scene, { frames } = description.files[file];
+  if (!frames.includes(frame)) scene.frame = frames[0] ?? null;
+  if (compare && !description.files[compare.file]?.grids[compare.grid]) scene.compare = null;
+  if (scene.clip && scene.slice) scene.slice = null; // a scene has one of them
   return /** @type {any} */ (scene);
 }

@@ -31,9 +31,13 @@ export function startOf(description, file, grid) {
   return { ...kDefaults, file, grid, frame, transfer: { space, colors, opacity } };
 }
 
-/** Corners of the volume, including the half voxel around its outermost voxels. @param {Grid} grid */
+/**
+ * Corners of what is drawn: up to one voxel outside the outermost voxels, because values are
+ * interpolated up to there.
+ * @param {Grid} grid @returns {[Triple, Triple]}
+ */
 export function edgesOf({ box: [low, high] }) {
   const moved = (/** @type {Triple} */ corner, /** @type {number} */ by) =>
     /** @type {Triple} */ (corner.map((v) => v + by));
-  return /** @type {[Triple, Triple]} */ ([moved(low, -0.5), moved(high, 0.5)]);
+  return [moved(low, -1), moved(high, 1)];
 }

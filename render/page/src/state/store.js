@@ -65,7 +65,7 @@ export class Store {
   #remember() {
     const before = this.#before;
     this.#before = null;
-    if (!before || sameButCamera(before, this.scene)) return;
+    if (!before || sameSettings(before, this.scene)) return;
     this.#past.push(before);
     this.#future = [];
   }
@@ -85,8 +85,9 @@ export class Store {
   }
 }
 
+/** Moving the camera and choosing a frame is no change of settings. @param {Scene} scene */
+const settingsOf = ({ camera, frame, compare, ...rest }) =>
+  JSON.stringify({ ...rest, compare: compare && { ...compare, frame: null, split: 0 } });
+
 /** @param {Scene} a @param {Scene} b */
-function sameButCamera(a, b) {
-  const text = (/** @type {Scene} */ scene) => JSON.stringify({ ...scene, camera: null });
-  return text(a) === text(b);
-}
+const sameSettings = (a, b) => settingsOf(a) === settingsOf(b);

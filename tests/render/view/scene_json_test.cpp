@@ -1,0 +1,102 @@
+// Plan: scenes become the options that esvr-render would have; missing members have its defaults.
+
+#include "render/view/scene_json.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "esvr/error.h"
+
+namespace esvr::view {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(SceneJson, HasTheDefaultsOfEsvrRender) {
+  const SceneWish wish = sceneOf(json::object());
+  const render::Options usual;
+  EXPECT_EQ(wish.place, GridPlace{});
+  EXPECT_FALSE(wish.options.camera.eye);
+  EXPECT_FALSE(wish.options.look.transfer);
+  EXPECT_EQ(wish.options.step, usual.step);
+  EXPECT_EQ(wish.options.opacityLength, usual.opacityLength);
+  EXPECT_EQ(wish.options.mode, usual.mode);
+  EXPECT_EQ(wish.options.classification, usual.classification);
+  EXPECT_EQ(wish.options.lod, usual.lod);
+  EXPECT_FALSE(wish.options.between || wish.options.shading || wish.options.clip ||
+               wish.options.background || wish.compare);
+}
+
+TEST(SceneJson, HasItsMembers) {
+  const SceneWish wish = sceneOf(json::parse(R"({
+      "file": 1, "grid": 2, "frame": -3, "step": 0.5, "opacityLength": 4, "mode": "average",
+      "classification": "post", "shade": true, "lod": "off", "between": "sum",
+      "camera": {"eye": [1, 2, 3], "center": [4, 5, 6], "height": 7},
+      "background": [0.25, 0.5, 1], "clip": [[0, 1, 2], [3, 4, 5]],
+      "compare": {"file": 3, "grid": 1, "show": "difference", "gain": 20, "split": 0.25}})"));
+  EXPECT_EQ(wish.place, (GridPlace{1, 2, -3}));
+  const render::Options& o = wish.options;
+  EXPECT_EQ(o.step, 0.5);
+  EXPECT_EQ(o.opacityLength, 4.0);
+  EXPECT_EQ(o.mode, RenderMode::kAverage);
+  EXPECT_EQ(o.classification, Classification::kPost);
+  EXPECT_EQ(o.lod, LevelOfDetail::kOff);
+  EXPECT_EQ(o.between, Between::kSum);
+  EXPECT_TRUE(o.shading.has_value());
+  EXPECT_EQ(o.camera.eye, (Vec3{1, 2, 3}));
+  EXPECT_EQ(o.camera.height, 7.0);
+  EXPECT_EQ(o.camera.projection, Projection::kOrthographic);
+  EXPECT_EQ(o.background->g, 0.5);
+  EXPECT_EQ(o.clip->high, (Vec3{3, 4, 5}));
+  ASSERT_TRUE(wish.compare);
+  EXPECT_EQ(wish.compare->with, (GridPlace{3, 1, std::nullopt}));
+  EXPECT_EQ(wish.compare->show, CompareShow::kDifference);
+  EXPECT_EQ(wish.compare->gain, 20.0);
+  EXPECT_EQ(wish.compare->split, 0.25);
+}
+
+TEST(SceneJson, OfASliceHasTheRaysOfEsvrRender) {
+  const SceneWish wish = sceneOf(json::parse(R"({"slice": {"axis": "y", "place": 12.5}})"));
+  EXPECT_EQ(wish.sliceAxis, 1u);
+  EXPECT_EQ(wish.slicePlace, 12.5);
+  EXPECT_EQ(wish.options.clip->low[1], 12.0);
+  EXPECT_EQ(wish.options.clip->high[1], 13.0);
+  EXPECT_EQ(wish.options.classification, Classification::kPost);
+  EXPECT_EQ(wish.options.lod, LevelOfDetail::kOff);
+}
+
+TEST(SceneJson, IsRefusedByItsMember) {
+  for (const auto& [text, why] : std::vector<std::pair<const char*, const char*>>{
+           {R"({"file": -1})", "\"scene.file\""},
+           {R"({"frame": 0.5})", "\"scene.frame\" must be a whole number"},
+           {R"({"camera": 1})", "\"scene.camera\""},
+           {R"({"camera": {"eye": [1, 2]}})", "\"scene.camera\""},
+           {R"({"camera": {"path": "x"}})", "\"scene.camera\""},
+           {R"({"mode": "best"})", "\"scene.mode\" must be one of composite, maximum, average"},
+           {R"({"shade": 1})", "\"scene.shade\" must be true or false"},
+           {R"({"background": [0, 0, 2]})", "\"scene.background\""},
+           {R"({"clip": [[0, 0, 0]]})", "\"scene.clip\""},
+           {R"({"slice": {"axis": "w", "place": 1}})", "\"scene.slice.axis\""},
+           {R"({"slice": {"axis": "x"}})", "\"scene.slice.place\" is missing"},
+           {R"({"slice": {"axis": "x", "place": 1}, "clip": [[0,0,0],[1,1,1]]})", "not both"},
+           {R"({"compare": {"split": 2}})", "\"scene.compare.split\""},
+           {R"({"compare": {"path": "x"}})", "\"scene.compare.path\" is not known"}})
+    EXPECT_THAT([text = text] { (void)sceneOf(json::parse(text)); },
+                ThrowsMessage<Error>(HasSubstr(why)));
+}
+
+TEST(CameraJson, ComesBackAsTheSameCamera) {
+  Camera camera{{1.5, 2, 3}, {4, 5, 6}, {0, 0, 1}, Projection::kPerspective, 40.0, 1.0};
+  const SceneWish wish = sceneOf({{"camera", jsonOf(camera)}});
+  EXPECT_EQ(wish.options.camera.eye, camera.eye);
+  EXPECT_EQ(wish.options.camera.center, camera.center);
+  EXPECT_EQ(wish.options.camera.up, camera.up);
+  EXPECT_EQ(wish.options.camera.fov, camera.fov);
+}
+
+}  // namespace
+}  // namespace esvr::view
