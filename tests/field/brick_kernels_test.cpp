@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "esvr/sparse_volume.h"
 #include "random_field.h"
 
 namespace esvr {
@@ -76,6 +77,24 @@ TEST(BrickKernels, AddIsForwardWithoutItsTape) {
     brickKernels().add(form, kCorner.data(), k, sum.data());
     EXPECT_EQ(sum, pass.sum);
   }
+}
+
+// Voxels as places have the values of a brick's rows, up to the rounding of t.
+TEST(BrickKernels, PlacesAtVoxelsHaveTheirValues) {
+  const auto k = kernelConstants<float>(Kernel{});
+  alignas(64) std::array<float, 512> x, y, z;
+  for (int v = 0; v < 512; ++v) {
+    const Coord local = voxelLocal(v);
+    x[v] = float(local.x), y[v] = float(local.y), z[v] = float(local.z);
+  }
+  const PlaceBlock places{x.data(), y.data(), z.data(), 512};
+  for (const BrickKernels* set : runnableKernels())
+    for (const LineForm& form : forms(Kernel{}.kappa)) {
+      alignas(64) std::array<float, 512> expected{}, sum{};
+      set->add(form, kCorner.data(), k, expected.data());
+      set->addPlaces(form, kCorner.data(), k, places, sum.data());
+      for (int v = 0; v < 512; ++v) ASSERT_NEAR(sum[v], expected[v], 1e-5) << set->name;
+    }
 }
 
 // The two sums of moments may be contracted to fused operations in different ways: 512 roundings.
