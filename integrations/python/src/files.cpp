@@ -71,7 +71,8 @@ std::vector<std::int64_t> framesOf(const std::filesystem::path& path) {
   const py::gil_scoped_release release;
   std::vector<std::int64_t> numbers;
   if (!holdsSequence(path)) return numbers;
-  for (const auto& frame : SequenceReader(path).frames()) numbers.push_back(frame.number);
+  const SequenceReader reader(path);
+  for (const auto& frame : reader.frames()) numbers.push_back(frame.number);
   return numbers;
 }
 
