@@ -42,7 +42,9 @@ export function usePainting(backend, { scene, moving, size, connection }) {
     setSpeed((before) => speedAfter(before, shown, performance.now()));
     setFailure("");
     shownFrame.current = wish.scene.frame;
-    if (picture.last && !wish.moving && layer !== "own") setErrors(errorsOf(picture.head)), setBusy(false);
+    // A later wish may already wait.
+    const isLatest = wish.scene === scene && wish.width === size.width && wish.height === size.height;
+    if (picture.last && !wish.moving && isLatest && layer !== "own") setErrors(errorsOf(picture.head)), setBusy(false);
     showPicture({ main: canvases.main.current, reference: canvases.reference.current }, shown);
   };
   const painter = useRef(/** @type {Painter | null} */ (null));

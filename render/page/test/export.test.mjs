@@ -32,8 +32,8 @@ function makeVolumes(folder) {
   };
   return {
     ellipsoids: volume("plume", "plume", "--count", "300", "--representation", "ellipsoids"),
-    voxels: volume("vessels", "vessels", "--lossless"),
-    surface: volume("sphere", "ball", "--psnr", "40"),
+    voxels: volume("tree", "tree", "--lossless"),
+    surface: volume("levelset", "surface", "--psnr", "40"),
   };
 }
 
