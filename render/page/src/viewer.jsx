@@ -62,13 +62,14 @@ export function Viewer({ backend, description, store, fitFirst }) {
   const [message, setMessage] = useState("");
   const area = useSize(), pixels = pixelsOf(area.size);
   const connection = useConnection(backend);
-  const { scene, moving } = store;
+  const [playing, setPlaying] = useState(false);
+  const { scene } = store, moving = store.moving || playing;
   const file = description.files[scene.file], grid = gridOf(description, scene);
   const actions = actionsOf({ backend, description, store, pixels, onMessage: setMessage });
   const ready = useFirstFit(fitFirst, area.size.width, actions.fit);
   const painting = usePainting(backend, { scene, moving, size: ready ? pixels : kNothing, connection: connection.count });
   const histogram = useHistogram(backend, grid, scene, !moving);
-  const player = usePlaying(file.frames, () => store.scene.frame, painting.shownFrame, actions.setFrame);
+  const player = usePlaying(playing, file.frames, () => store.scene.frame, painting.shownFrame, actions.setFrame);
   const presets = usePresets(backend, () => store.scene.transfer, actions.setTransfer, setMessage);
   useAddress(store, description, (found) => actions.fit("default", found));
   useTitle(grid.name, file.name);
@@ -78,10 +79,10 @@ export function Viewer({ backend, description, store, fitFirst }) {
         backend={backend} description={description} store={store} pixels={pixels} onGrid={actions.chooseGrid} onMessage={setMessage}
       />
       <main class="stage" aria-label="Picture">
-        <Stage description={description} store={store} area={area} actions={actions} painting={painting}>
+        <Stage description={description} scene={scene} moving={moving} area={area} actions={actions} painting={painting}>
           <Messages failure={painting.failure} message={message} open={connection.open} onClose={() => setMessage("")} />
         </Stage>
-        {file.frames.length > 1 && backend.can.has("frames") && <SequenceBar {...player} frames={file.frames} frame={scene.frame} onFrame={actions.setFrame} />}
+        {file.frames.length > 1 && backend.can.has("frames") && <SequenceBar {...player} playing={playing} onPlay={setPlaying} frames={file.frames} frame={scene.frame} onFrame={actions.setFrame} />}
       </main>
       <Panel
         backend={backend} description={description} scene={scene} histogram={histogram} actions={actions} presets={presets} painting={painting}
