@@ -78,13 +78,31 @@ void CommandLine::helpTopic(const std::string& name, const std::string& text) {
   helpTopics_[name] = text;
 }
 
+/// The arguments without a dash.
+std::vector<std::string> CommandLine::words(const po::variables_map& values) const {
+  std::vector<std::string> all;
+  for (const Argument& argument : arguments_)
+    if (values.count(argument.name) != 0) all.push_back(values[argument.name].as<std::string>());
+  if (values.count(rest_) != 0)
+    for (const auto& word : values[rest_].as<std::vector<std::string>>()) all.push_back(word);
+  return all;
+}
+
+std::vector<OptionGroup> CommandLine::groups() const {
+  return {{"OPTIONS", &own_}, {"COMMON OPTIONS", &common_}};
+}
+
+std::optional<std::string> CommandLine::topic(const std::string& name) const {
+  if (name == "man") return manPage(text_, groups());
+  if (name == "options") return optionNames(groups());
+  const auto found = helpTopics_.find(name);
+  return found == helpTopics_.end() ? std::nullopt : std::optional(found->second);
+}
+
 /// The text of the topic that follows --help, or the whole help.
 std::string CommandLine::helpAskedFor(const po::variables_map& values) const {
-  for (const Argument& argument : arguments_) {
-    if (values.count(argument.name) == 0) continue;
-    const auto topic = helpTopics_.find(values[argument.name].as<std::string>());
-    if (topic != helpTopics_.end()) return topic->second;
-  }
+  for (const auto& word : words(values))
+    if (const auto text = topic(word)) return *text;
   return helpText();
 }
 

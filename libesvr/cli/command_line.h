@@ -17,20 +17,13 @@
 #include <vector>
 
 #include "cli/log.h"
+#include "cli/man_page.h"
+#include "cli/program_text.h"
 #include "esvr/error.h"
 
 namespace esvr::cli {
 
 namespace po = boost::program_options;
-
-/// The texts of a program's --help, which are printed unchanged.
-struct ProgramText {
-  std::string name;      ///< "esvr-sample"
-  std::string purpose;   ///< what the program does
-  std::string usage;     ///< command lines that begin with the name
-  std::string notes;     ///< input, output and exit codes; may be empty
-  std::string examples;  ///< commands, each with a few words of explanation
-};
 
 /// The arguments of a run, including the options that all programs have.
 struct Arguments {
@@ -66,7 +59,8 @@ class CommandLine {
   /// Adds an argument for all remaining ones. Its value is a std::vector<std::string>.
   void repeatedArgument(const std::string& name);
 
-  /// Adds a text that `--help NAME` prints instead of the whole help.
+  /// Adds a text that `--help NAME` prints instead of the whole help. Every program has the topics
+  /// `man`, its man page, and `options`, the names of its options.
   void helpTopic(const std::string& name, const std::string& text);
 
   /// \return nothing if --help or --version was printed to stdout
@@ -83,6 +77,9 @@ class CommandLine {
   [[nodiscard]] po::variables_map parseValues(int argc, const char* const* argv) const;
   void requireArguments(const po::variables_map& values) const;
   [[nodiscard]] std::string helpAskedFor(const po::variables_map& values) const;
+  [[nodiscard]] std::vector<std::string> words(const po::variables_map& values) const;
+  [[nodiscard]] std::optional<std::string> topic(const std::string& name) const;
+  [[nodiscard]] std::vector<OptionGroup> groups() const;
 
   ProgramText text_;
   po::options_description own_, common_;

@@ -1,0 +1,95 @@
+#include "cli/man_page.h"
+
+#include <algorithm>
+#include <boost/program_options/cmdline.hpp>
+#include <sstream>
+
+namespace esvr::cli {
+namespace {
+
+/// Text for man(7): backslashes and hyphens are escaped, and no line begins with a control
+/// character.
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    const bool beginsLine = out.empty() || out.back() == '\n';
+    if (beginsLine && (c == '.' || c == '\'')) out += "\\&";
+    if (c == '\\')
+      out += "\\e";
+    else if (c == '-')
+      out += "\\-";
+    else
+      out += c;
+  }
+  return out;
+}
+
+/// The name of a page: that of a program, or of a program and its command with a hyphen.
+std::string pageName(std::string program) {
+  std::ranges::replace(program, ' ', '-');
+  return program;
+}
+
+std::string inCapitals(std::string name) {
+  std::ranges::transform(name, name.begin(),
+                         [](char c) { return c >= 'a' && c <= 'z' ? char(c - 'a' + 'A') : c; });
+  return name;
+}
+
+/// The first sentence on one line, without its full stop. A full stop in ".esvr" ends no sentence.
+std::string firstSentence(std::string text) {
+  std::ranges::replace(text, '\n', ' ');
+  std::string sentence = text.substr(0, text.find(". "));
+  if (sentence.ends_with('.')) sentence.pop_back();
+  return sentence;
+}
+
+void addText(std::ostream& out, const char* title, const std::string& text) {
+  if (!text.empty()) out << ".SH " << title << '\n' << escaped(text) << '\n';
+}
+
+/// Adds text whose lines and columns have a meaning.
+void addLines(std::ostream& out, const char* title, const std::string& text) {
+  if (!text.empty()) out << ".SH " << title << "\n.nf\n" << escaped(text) << "\n.fi\n";
+}
+
+/// The name of an option for a man page: "-g, --grid NAME".
+std::string titleOf(const boost::program_options::option_description& option) {
+  const std::string shortName = option.canonical_display_name(
+      boost::program_options::command_line_style::allow_dash_for_short);
+  std::string title = "\\fB\\-\\-" + escaped(option.long_name()) + "\\fR";
+  if (shortName.size() == 2 && shortName.front() == '-')
+    title = "\\fB" + escaped(shortName) + "\\fR, " + title;
+  const std::string parameter = option.format_parameter();
+  return parameter.empty() ? title : title + " \\fI" + escaped(parameter) + "\\fR";
+}
+
+}  // namespace
+
+std::string manPage(const ProgramText& text, const std::vector<OptionGroup>& groups) {
+  std::ostringstream out;
+  const std::string name = pageName(text.name);
+  out << ".TH " << inCapitals(name) << " 1 \"\" \"esvr " << ESVR_VERSION << "\" ESVR\n"
+      << ".SH NAME\n"
+      << escaped(name) << " \\- " << escaped(firstSentence(text.purpose)) << '\n';
+  addLines(out, "SYNOPSIS", text.usage);
+  addText(out, "DESCRIPTION", text.purpose);
+  for (const auto& group : groups) {
+    if (group.options->options().empty()) continue;
+    out << ".SH " << group.title << '\n';
+    for (const auto& option : group.options->options())
+      out << ".TP\n" << titleOf(*option) << '\n' << escaped(option->description()) << '\n';
+  }
+  addLines(out, "NOTES", text.notes);
+  addLines(out, "EXAMPLES", text.examples);
+  return out.str();
+}
+
+std::string optionNames(const std::vector<OptionGroup>& groups) {
+  std::string names;
+  for (const auto& group : groups)
+    for (const auto& option : group.options->options()) names += "--" + option->long_name() + '\n';
+  return names;
+}
+
+}  // namespace esvr::cli

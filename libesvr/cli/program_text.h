@@ -1,0 +1,17 @@
+#pragma once
+/// What a program says of itself.
+
+#include <string>
+
+namespace esvr::cli {
+
+/// The texts of a program's --help, which are printed unchanged.
+struct ProgramText {
+  std::string name;      ///< "esvr-sample"
+  std::string purpose;   ///< what the program does
+  std::string usage;     ///< command lines that begin with the name
+  std::string notes;     ///< input, output and exit codes; may be empty
+  std::string examples;  ///< commands, each with a few words of explanation
+};
+
+}  // namespace esvr::cli
