@@ -8,14 +8,15 @@ import { gridOf } from "./state/scene.js";
  * The picture, and what lies over it.
  * @param {object} props
  * @param {import("./types.js").Description} props.description
- * @param {import("./state/store.js").Store} props.store
+ * @param {import("./types.js").Scene} props.scene
+ * @param {boolean} props.moving
  * @param {ReturnType<typeof import("./parts/use-size.js").useSize>} props.area
  * @param {ReturnType<typeof import("./use-actions.js").actionsOf>} props.actions
  * @param {ReturnType<typeof import("./use-painting.js").usePainting>} props.painting
  * @param {any} props.children
  */
-export function Stage({ description, store, area, actions, painting, children }) {
-  const { scene, moving } = store, { set, fit } = actions;
+export function Stage({ description, scene, moving, area, actions, painting, children }) {
+  const { set, fit } = actions;
   const { files } = description, grid = gridOf(description, scene);
   const names = { own: files[scene.file].name, reference: scene.compare ? files[scene.compare.file].name : "" };
   return (

@@ -1,4 +1,4 @@
-import { useEffect, useReducer, useRef, useState } from "preact/hooks";
+import { useEffect, useReducer, useState } from "preact/hooks";
 import { Messages } from "./messages.jsx";
 import { Panel } from "./panel.jsx";
 import { usePresets } from "./panels/presets.jsx";
@@ -15,6 +15,7 @@ import { usePlaying } from "./use-playing.js";
 import { useHistogram } from "./use-volume.js";
 
 const kMostPixels = 4096; // a side, as esvr-view allows
+const kNothing = Object.freeze({ width: 0, height: 0 });
 
 /** Pixels of the screen for an element. @param {{width: number, height: number}} size */
 function pixelsOf({ width, height }) {
@@ -28,14 +29,17 @@ function useStore(store) {
   useEffect(() => store.subscribe(() => redraw(0)), []);
 }
 
-/** Fits the first camera to the picture's size, which is not known before. @param {boolean} wanted */
+/**
+ * Fits the first camera to the picture's size, which is not known before.
+ * @param {boolean} wanted @param {number} width @param {() => Promise<void>} fit
+ * @returns {boolean} whether there is something to draw
+ */
 function useFirstFit(wanted, width, fit) {
-  const done = useRef(!wanted);
+  const [ready, setReady] = useState(!wanted);
   useEffect(() => {
-    if (done.current || !width) return;
-    done.current = true;
-    fit();
-  }, [width]);
+    if (!ready && width > 0) fit().then(() => setReady(true));
+  }, [width > 0]);
+  return ready;
 }
 
 /** @param {string} grid @param {string} file */
@@ -58,14 +62,15 @@ export function Viewer({ backend, description, store, fitFirst }) {
   const [message, setMessage] = useState("");
   const area = useSize(), pixels = pixelsOf(area.size);
   const connection = useConnection(backend);
-  const { scene, moving } = store;
+  const [playing, setPlaying] = useState(false);
+  const { scene } = store, moving = store.moving || playing;
   const file = description.files[scene.file], grid = gridOf(description, scene);
   const actions = actionsOf({ backend, description, store, pixels, onMessage: setMessage });
-  const painting = usePainting(backend, { scene, moving, size: pixels, connection: connection.count });
+  const ready = useFirstFit(fitFirst, area.size.width, actions.fit);
+  const painting = usePainting(backend, { scene, moving, size: ready ? pixels : kNothing, connection: connection.count });
   const histogram = useHistogram(backend, grid, scene, !moving);
-  const player = usePlaying(file.frames, () => store.scene.frame, painting.shownFrame, actions.setFrame);
+  const player = usePlaying(playing, file.frames, () => store.scene.frame, painting.shownFrame, actions.setFrame);
   const presets = usePresets(backend, () => store.scene.transfer, actions.setTransfer, setMessage);
-  useFirstFit(fitFirst, area.size.width, actions.fit);
   useAddress(store, description, (found) => actions.fit("default", found));
   useTitle(grid.name, file.name);
   return (
@@ -74,10 +79,10 @@ export function Viewer({ backend, description, store, fitFirst }) {
         backend={backend} description={description} store={store} pixels={pixels} onGrid={actions.chooseGrid} onMessage={setMessage}
       />
       <main class="stage" aria-label="Picture">
-        <Stage description={description} store={store} area={area} actions={actions} painting={painting}>
+        <Stage description={description} scene={scene} moving={moving} area={area} actions={actions} painting={painting}>
           <Messages failure={painting.failure} message={message} open={connection.open} onClose={() => setMessage("")} />
         </Stage>
-        {file.frames.length > 1 && <SequenceBar {...player} frames={file.frames} frame={scene.frame} onFrame={actions.setFrame} />}
+        {file.frames.length > 1 && backend.can.has("frames") && <SequenceBar {...player} playing={playing} onPlay={setPlaying} frames={file.frames} frame={scene.frame} onFrame={actions.setFrame} />}
       </main>
       <Panel
         backend={backend} description={description} scene={scene} histogram={histogram} actions={actions} presets={presets} painting={painting}

@@ -36,6 +36,30 @@ test("the picture is the one of the command that the page shows", async (t) => {
   assert.ok(differenceOf(await pictureOf(page), await pixelsOf(page, png)) < kJpegError);
 });
 
+const kSettings = {
+  transfer: {
+    space: "Lab",
+    colors: [[0, 0.1, 0.2, 0.4], [0.7, 1, 0.9, 0.6]],
+    opacity: [[0, 0, 0.5, 0], [0.2, 0.02, 0.4, 0.3], [0.7, 0.9, 0.5, 0]],
+  },
+  opacityLength: 2, step: 0.5, shade: true, background: [0.2, 0.3, 0.4], clip: [[14, 5, 14], [30, 40, 33]],
+};
+
+test("the command makes the picture with other settings, too", async (t) => {
+  const hash = "#" + new URLSearchParams(Object.entries(kSettings).map(([name, value]) => [name, JSON.stringify(value)]));
+  const page = await openPage(t, shared, { hash });
+  await page.getByRole("button", { name: "Save picture" }).click();
+  const [download] = await Promise.all([
+    page.waitForEvent("download"), page.getByRole("button", { name: "Save transfer.json" }).click(),
+  ]);
+  await download.saveAs(join(shared.folder, "transfer.json"));
+  await page.getByRole("button", { name: "Close" }).click();
+  const drawn = await pictureOf(page), made = await pixelsOf(page, runCommand(await commandOf(page), shared.folder));
+  assert.ok(differenceOf(drawn, made) < kJpegError);
+  const usual = await openPage(t, shared);
+  assert.ok(differenceOf(drawn, await pictureOf(usual)) > 5 * kJpegError, "the settings matter");
+});
+
 test("a downloaded PNG has the pixels of esvr-render", async (t) => {
   const page = await openPage(t, shared);
   const command = await commandOf(page);
