@@ -25,7 +25,10 @@ export function Panel({ backend, description, scene, histogram, actions, presets
   return (
     <aside class="panel" aria-label="Settings">
       <Section title="Colors and opacity" open>
-        <Editor transfer={scene.transfer} description={description} grid={grid} histogram={histogram} onChange={setTransfer} files={files} />
+        <Editor
+          key={`${scene.file}/${scene.grid}`} transfer={scene.transfer} description={description} grid={grid} histogram={histogram}
+          onChange={setTransfer} files={files}
+        />
         {presets.opened && <PresetChoice opened={presets.opened} onChange={presets.show} />}
       </Section>
       <DrawingPanel scene={scene} grid={grid} can={backend.can} onChange={set} />
