@@ -13,9 +13,8 @@ install(
 set_target_properties(esvr_decoder PROPERTIES EXPORT_NAME decoder)
 
 if(EMSCRIPTEN)
-  add_subdirectory(render/page/wasm)
+  add_subdirectory(libesvr/page)
 elseif(ESVR_BUILD_TESTS)
-  enable_language(C)
   enable_testing()
   add_subdirectory(tests/capi)
 endif()

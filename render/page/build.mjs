@@ -72,7 +72,7 @@ async function exportPage(result) {
   const program = `document.head.append(Object.assign(document.createElement("style"),{textContent:${style}}));`;
   const start = await bundle("src/local/start.js");
   return filled("src/export.html", {
-    DECODER: packed(await readFile(join(root, "wasm/page.wasm"))),
+    DECODER: packed(await readFile(join(root, "decoder.wasm"))),
     PROGRAM: packed(program + textOf(result, ".js")),
     START: textOf(start, ".js"),
   });

@@ -1,4 +1,4 @@
-// Builds the module of the exported page with Emscripten: `node make_wasm.mjs` writes wasm/page.wasm,
+// Builds the module of the exported page with Emscripten: `node make_wasm.mjs` writes decoder.wasm,
 // `node make_wasm.mjs --check` fails if it is not what it would write.
 import { spawnSync } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
@@ -6,12 +6,12 @@ import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 
 const here = dirname(fileURLToPath(import.meta.url)), root = join(here, "../..");
-const folder = join(root, "build/wasm"), stored = join(here, "wasm/page.wasm");
-/** The version that page.wasm was built with; others give other bytes. */
+const folder = join(root, "build/wasm"), stored = join(here, "decoder.wasm");
+/** The version that decoder.wasm was built with; others give other bytes. */
 const kVersion = "3.1.6";
 
 function skip(why) {
-  console.log(`SKIPPED: page.wasm is not checked, because ${why}`);
+  console.log(`skipped: decoder.wasm is not checked, because ${why}`);
   process.exit(0);
 }
 
@@ -28,9 +28,9 @@ if (checks && !found.stdout.includes(kVersion)) skip(`emcc is not version ${kVer
 const options = ["-DESVR_DECODER_ONLY=ON", "-DESVR_BUILD_TESTS=OFF", "-DCMAKE_BUILD_TYPE=MinSizeRel"];
 run("emcmake", "cmake", "-S", root, "-B", folder, "-G", "Ninja", ...options);
 run("cmake", "--build", folder);
-const bytes = readFileSync(join(folder, "render/page/wasm/page.wasm"));
-if (!checks) writeFileSync(stored, bytes), console.log(`wasm/page.wasm: ${bytes.length} bytes`);
+const bytes = readFileSync(join(folder, "libesvr/page/page.wasm"));
+if (!checks) writeFileSync(stored, bytes), console.log(`decoder.wasm: ${bytes.length} bytes`);
 else if (!readFileSync(stored).equals(bytes)) {
-  console.error("wasm/page.wasm is out of date: run node make_wasm.mjs");
+  console.error("decoder.wasm is out of date: run node make_wasm.mjs");
   process.exitCode = 1;
 }

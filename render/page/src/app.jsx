@@ -6,6 +6,7 @@ import { render } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { sceneOf } from "./state/link.js";
 import { Store } from "./state/store.js";
+import { applyTheme, storedTheme } from "./theme.js";
 import { Viewer } from "./viewer.jsx";
 
 /** The size for which the first camera is fitted: most of the window is the picture. */
@@ -39,6 +40,7 @@ function Page({ backend }) {
 /** @param {Backend} backend */
 export function startPage(backend) {
   const root = /** @type {HTMLElement} */ (document.getElementById("page"));
+  applyTheme(storedTheme());
   root.replaceChildren();
   render(<Page backend={backend} />, root);
 }

@@ -10,13 +10,14 @@ const kSizes = [["1024 × 1024", 1024, 1024], ["1920 × 1080", 1920, 1080], ["38
 /**
  * The command that makes the picture; asked again when the size changes.
  * @param {import("./types.js").Backend} backend @param {import("./types.js").Scene} scene
+ * @param {{width: number, height: number}} size @param {(text: string) => void} onMessage
  */
-function useCommand(backend, scene, { width, height }) {
+function useCommand(backend, scene, { width, height }, onMessage) {
   const [command, setCommand] = useState(/** @type {import("./types.js").Command | null} */ (null));
   useEffect(() => {
     let wanted = true;
     if (backend.can.has("command"))
-      backend.command({ scene, width, height }).then((c) => wanted && setCommand(c), (e) => wanted && setCommand({ text: e.message, transfer: null }));
+      backend.command({ scene, width, height }).then((c) => wanted && setCommand(c), (e) => onMessage(e.message));
     return () => void (wanted = false);
   }, [scene, width, height]);
   return command;
@@ -61,7 +62,7 @@ export function SaveDialog({ backend, scene, pixels, name, onClose, onMessage })
   const [size, setSize] = useState(pixels);
   const [saving, setSaving] = useState(false);
   const [message, setMessage] = useState("");
-  const command = useCommand(backend, scene, size);
+  const command = useCommand(backend, scene, size, setMessage);
   const save = async () => {
     setSaving(true);
     try {

@@ -31,9 +31,8 @@ const Tool = ({ label, icon, wide, disabled, onClick }) => (
 
 function ThemeTool() {
   const [theme, setTheme] = useState(storedTheme);
-  useEffect(() => applyTheme(theme), [theme]);
   const next = kThemes[(kThemes.indexOf(/** @type {any} */ (theme)) + 1) % kThemes.length];
-  return <Tool label={`Theme: ${theme}. Change to ${next}`} icon="theme" onClick={() => setTheme(next)} />;
+  return <Tool label={`Theme: ${theme}. Change to ${next}`} icon="theme" onClick={() => (applyTheme(next), setTheme(next))} />;
 }
 
 /**

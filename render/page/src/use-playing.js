@@ -2,13 +2,13 @@ import { useEffect, useState } from "preact/hooks";
 
 /**
  * Plays a sequence: the next frame comes after a time, but not before the present one was shown.
+ * @param {boolean} playing
  * @param {number[]} frames
  * @param {() => number | null} frame  the present one
  * @param {{current: number | null | undefined}} shownFrame
  * @param {(frame: number) => void} onFrame
  */
-export function usePlaying(frames, frame, shownFrame, onFrame) {
-  const [playing, setPlaying] = useState(false);
+export function usePlaying(playing, frames, frame, shownFrame, onFrame) {
   const [speed, setSpeed] = useState(12);
   useEffect(() => {
     if (!playing) return;
@@ -20,5 +20,5 @@ export function usePlaying(frames, frame, shownFrame, onFrame) {
     const timer = setInterval(advance, 1000 / speed);
     return () => clearInterval(timer);
   }, [playing, speed, frames]);
-  return { playing, speed, onPlay: setPlaying, onSpeed: setSpeed };
+  return { speed, onSpeed: setSpeed };
 }

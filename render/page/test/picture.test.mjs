@@ -36,6 +36,30 @@ test("the picture is the one of the command that the page shows", async (t) => {
   assert.ok(differenceOf(await pictureOf(page), await pixelsOf(page, png)) < kJpegError);
 });
 
+const kSettings = {
+  transfer: {
+    space: "Lab",
+    colors: [[0, 0.1, 0.2, 0.4], [0.7, 1, 0.9, 0.6]],
+    opacity: [[0, 0, 0.5, 0], [0.2, 0.02, 0.4, 0.3], [0.7, 0.9, 0.5, 0]],
+  },
+  opacityLength: 2, step: 0.5, shade: true, background: [0.2, 0.3, 0.4], clip: [[14, 5, 14], [30, 40, 33]],
+};
+
+test("the command makes the picture with other settings, too", async (t) => {
+  const hash = "#" + new URLSearchParams(Object.entries(kSettings).map(([name, value]) => [name, JSON.stringify(value)]));
+  const page = await openPage(t, shared, { hash });
+  await page.getByRole("button", { name: "Save picture" }).click();
+  const [download] = await Promise.all([
+    page.waitForEvent("download"), page.getByRole("button", { name: "Save transfer.json" }).click(),
+  ]);
+  await download.saveAs(join(shared.folder, "transfer.json"));
+  await page.getByRole("button", { name: "Close" }).click();
+  const drawn = await pictureOf(page), made = await pixelsOf(page, runCommand(await commandOf(page), shared.folder));
+  assert.ok(differenceOf(drawn, made) < kJpegError);
+  const usual = await openPage(t, shared);
+  assert.ok(differenceOf(drawn, await pictureOf(usual)) > 5 * kJpegError, "the settings matter");
+});
+
 test("a downloaded PNG has the pixels of esvr-render", async (t) => {
   const page = await openPage(t, shared);
   const command = await commandOf(page);
@@ -192,6 +216,17 @@ test("a link reproduces the view", async (t) => {
   await rested(page);
   const other = await openPage(t, shared, { hash: new URL(page.url()).hash });
   assert.equal(differenceOf(await pictureOf(page), await pictureOf(other)), 0);
+});
+
+test("an address that is changed by hand shows what it says", async (t) => {
+  const page = await openPage(t, shared);
+  const before = sceneOf(page).camera;
+  await page.evaluate(() => (location.hash = "#file=1&grid=0&step=2"));
+  await rested(page);
+  const { file, step, camera } = sceneOf(page);
+  assert.deepEqual([file, step], [1, 2]);
+  assert.ok(Math.abs(camera.eye[0] - before.eye[0]) < 3, "the view is fitted to a volume of the same size");
+  assert.ok(litShare(await pictureOf(page)) > 0.05);
 });
 
 test("a damaged link shows the usual view", async (t) => {

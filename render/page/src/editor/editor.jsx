@@ -23,6 +23,37 @@ function zoomedRange(shown, full, factor, value) {
   return [low, low + extent];
 }
 
+/** @type {[string, string][]} */
+const kCountScales = [["linear", "Linear"], ["log", "Log"]];
+/** @type {[string, string][]} */
+const kOpacityScales = [["linear", "Linear"], ["fine", "Fine near 0"]];
+
+/**
+ * How the axes of the diagram are divided.
+ * @param {object} props
+ * @param {string} props.countScale
+ * @param {string} props.opacityScale
+ * @param {boolean} props.zoomed
+ * @param {(scale: string) => void} props.onCountScale
+ * @param {(scale: string) => void} props.onOpacityScale
+ * @param {(factor: number) => void} props.onZoom
+ */
+function AxisFields({ countScale, opacityScale, zoomed, onCountScale, onOpacityScale, onZoom }) {
+  return (
+    <>
+      <div class="row">
+        <SegmentedField label="Histogram" value={countScale} options={kCountScales} onChange={onCountScale} />
+        <span class="space" />
+        <span class="buttons" role="group" aria-label="Zoom of the value axis">
+          <button type="button" aria-label="Show fewer values" title="Show fewer values" onClick={() => onZoom(2)}>+</button>
+          <button type="button" aria-label="Show more values" title="Show more values" disabled={!zoomed} onClick={() => onZoom(0.5)}>−</button>
+        </span>
+      </div>
+      <SegmentedField label="Opacity axis" value={opacityScale} options={kOpacityScales} onChange={onOpacityScale} />
+    </>
+  );
+}
+
 /**
  * Edits a transfer function.
  * @param {object} props
@@ -49,17 +80,10 @@ export function Editor({ transfer, description, grid, histogram, onChange, files
   const curves = /** @type {[string, string][]} */ (Object.keys(description.opacities).map((name) => [name, titleOf(name)]));
   return (
     <div class="editor">
-      <div class="row">
-        <SegmentedField label="Histogram" value={countScale} onChange={setCountScale} options={[["linear", "Linear"], ["log", "Log"]]} />
-        <span class="space" />
-        <span class="buttons" role="group" aria-label="Zoom of the value axis">
-          <button type="button" aria-label="Show fewer values" title="Show fewer values" onClick={() => zoom(2)}>+</button>
-          <button type="button" aria-label="Show more values" title="Show more values" disabled={!part} onClick={() => zoom(0.5)}>−</button>
-        </span>
-      </div>
-      <div class="row">
-        <SegmentedField label="Opacity axis" value={opacityScale} onChange={setOpacityScale} options={[["linear", "Linear"], ["fine", "Fine near 0"]]} />
-      </div>
+      <AxisFields
+        countScale={countScale} opacityScale={opacityScale} zoomed={part !== null}
+        onCountScale={setCountScale} onOpacityScale={setOpacityScale} onZoom={zoom}
+      />
       <Plot
         transfer={transfer} histogram={histogram} shown={shown} countScale={/** @type {any} */ (countScale)}
         opacityScale={/** @type {any} */ (opacityScale)} selected={index} onSelect={setChosen} onChange={setOpacity} onZoom={zoom}

@@ -1,13 +1,13 @@
-import { useEffect, useRef } from "preact/hooks";
 import { hexOf } from "../look/css-color.js";
 import { colorAt, withAddedPoint, withPoint, withoutPoint } from "../look/transfer.js";
-import { follow } from "../parts/drag.js";
 import { useSize } from "../parts/use-size.js";
+import { useWheel } from "../parts/use-wheel.js";
 import { Axes } from "./axes.jsx";
 import { CurvePoint } from "./curve-point.jsx";
 import { areaBelow, curvePath } from "./curve-path.js";
 import { histogramPath } from "./histogram-path.js";
 import { scalesOf } from "./scales.js";
+import { useAdding } from "./use-adding.js";
 
 const kStops = 48; // of the gradient below the curve
 
@@ -21,17 +21,33 @@ function Gradient({ transfer, scales: { left, width, low, high } }) {
   );
 }
 
-/** Calls back for turns of the wheel with Ctrl, as which trackpads send pinches. Others scroll the panel. */
-function useWheel(ref, onWheel) {
-  useEffect(() => {
-    const listen = (/** @type {WheelEvent} */ event) => {
-      if (!event.ctrlKey && !event.metaKey) return;
-      event.preventDefault();
-      onWheel(event);
-    };
-    ref.current.addEventListener("wheel", listen, { passive: false });
-    return () => ref.current?.removeEventListener("wheel", listen);
-  });
+/**
+ * A curve with a point elsewhere.
+ * @param {import("../types.js").OpacityPoint[]} points @param {number} index
+ * @param {number} value @param {number} opacity
+ */
+function withMoved(points, index, value, opacity) {
+  const [, , midpoint, sharpness] = points[index];
+  return withPoint(points, index, [value, opacity, midpoint, sharpness]);
+}
+
+/**
+ * What is behind the points.
+ * @param {object} props
+ * @param {import("../types.js").Transfer} props.transfer
+ * @param {import("./scales.js").Scales} props.scales
+ * @param {import("../types.js").Histogram | null} props.histogram
+ * @param {import("./histogram-path.js").CountScale} props.countScale
+ */
+function Curve({ transfer, scales, histogram, countScale }) {
+  const path = curvePath(transfer.opacity, scales);
+  return (
+    <g clip-path="url(#plot-inside)">
+      {histogram && <path class="histogram" d={histogramPath(histogram, countScale, scales)} />}
+      <path class="area" d={areaBelow(path, scales)} fill="url(#curve-colors)" />
+      <path class="curve-back" d={path} /><path class="curve" d={path} />
+    </g>
+  );
 }
 
 /**
@@ -56,53 +72,33 @@ export function Plot({ transfer, histogram, shown, countScale, opacityScale, sel
   };
   useWheel(ref, (/** @type {WheelEvent} */ event) => onZoom(Math.exp(-event.deltaY / 500), placeOf(event).value));
   const points = transfer.opacity;
-  const move = (/** @type {typeof points} */ from, /** @type {number} */ index) =>
-    (/** @type {number} */ value, /** @type {number} */ opacity) => {
-      const [, , midpoint, sharpness] = from[index];
-      onChange(withPoint(from, index, [value, opacity, midpoint, sharpness]), true);
-    };
   const remove = (/** @type {number} */ index) => {
     if (points.length < 2) return;
     onChange(withoutPoint(points, index), false);
     onSelect(Math.min(index, points.length - 2));
   };
-  const add = (/** @type {MouseEvent} */ event) => {
-    const { value, opacity } = placeOf(event);
+  const add = (/** @type {import("./use-adding.js").Place} */ { value, opacity }) => {
     const added = withAddedPoint(points, [value, opacity, 0.5, 0]);
     onSelect(added.index);
     onChange(added.points, true);
-    return added;
+    return (/** @type {import("./use-adding.js").Place} */ to) =>
+      onChange(withMoved(added.points, added.index, to.value, to.opacity), true);
   };
-  const pointerType = useRef("");
-  const onPointerDown = (/** @type {PointerEvent} */ event) => {
-    pointerType.current = event.pointerType;
-    // A finger may want to scroll: it adds a point when it is lifted at the same place.
-    if (event.button !== 0 || event.pointerType === "touch") return;
-    const added = add(event);
-    follow(event, (e) => {
-      const to = placeOf(e);
-      move(added.points, added.index)(to.value, to.opacity);
-    });
-  };
-  const onClick = (/** @type {MouseEvent} */ event) => void (pointerType.current === "touch" && add(event));
-  const path = curvePath(points, scales);
+  const adding = useAdding(placeOf, add);
   return (
-    <svg ref={ref} class="plot" role="group" aria-label="Opacity curve over the histogram" onPointerDown={onPointerDown} onClick={onClick}>
+    <svg ref={ref} class="plot" role="group" aria-label="Opacity curve over the histogram" {...adding}>
       <defs>
         <Gradient transfer={transfer} scales={scales} />
         <clipPath id="plot-inside"><rect x={scales.left} y={0} width={scales.width} height={scales.top + scales.height} /></clipPath>
       </defs>
       <rect class="paper" x={scales.left} y={scales.top} width={scales.width} height={scales.height} />
       <Axes scales={scales} opacityScale={opacityScale} />
-      <g clip-path="url(#plot-inside)">
-        {histogram && <path class="histogram" d={histogramPath(histogram, countScale, scales)} />}
-        <path class="area" d={areaBelow(path, scales)} fill="url(#curve-colors)" />
-        <path class="curve-back" d={path} /><path class="curve" d={path} />
-      </g>
+      <Curve transfer={transfer} scales={scales} histogram={histogram} countScale={countScale} />
       {points.map(([value], index) => value >= scales.low && value <= scales.high && (
         <CurvePoint
           key={index} transfer={transfer} index={index} selected={index === selected} scales={scales}
-          onSelect={() => onSelect(index)} onMove={move(points, index)} onRemove={() => remove(index)}
+          onSelect={() => onSelect(index)} onRemove={() => remove(index)}
+          onMove={(v, opacity) => onChange(withMoved(points, index, v, opacity), true)}
         />
       ))}
     </svg>

@@ -1,5 +1,5 @@
 /**
- * The library's decoder as WebAssembly (wasm/page.h): files, volumes and the tables of drawing.
+ * The library's decoder as WebAssembly (libesvr/page/page.h): files, volumes and the tables of drawing.
  * @typedef {import("../types.js").Triple} Triple
  * @typedef {import("../types.js").Transfer} Transfer
  * @typedef {import("../types.js").Camera} Camera
@@ -14,7 +14,7 @@
  * @property {number} intervals @property {number} low @property {number} scale @property {number} weakGradientSquared
  * @property {Float32Array} values @property {Float32Array | null} segments
  * @property {[number, number]} range @property {number} side  of the table of segments
- * @property {number[]} below @property {number[]} above
+ * @property {number[]} below @property {number[]} above @property {() => void} free
  */
 
 const kSpaces = ["RGB", "HSV", "HSVWrap", "Lab", "Diverging", "Step"];
@@ -59,12 +59,12 @@ export class Decoder {
 
   /** @param {number} file @returns {import("../types.js").Grid[]} */
   grids(file) {
-    return JSON.parse(this.#text(this.#orFail(this.#exports.page_grids(file))));
+    return this.#json(this.#exports.page_grids(file));
   }
 
   /** @returns {{colormaps: object, opacities: object}} */
   looks() {
-    return JSON.parse(this.#text(this.#orFail(this.#exports.page_looks())));
+    return this.#json(this.#exports.page_looks());
   }
 
   /** Names of grids that only OpenVDB can read. @param {number} file @returns {string[]} */
@@ -138,7 +138,7 @@ export class Decoder {
         intervals, low: floats[1], scale: floats[2], weakGradientSquared: floats[3], range, side,
         values: new Float32Array(this.#memory, values, 4 * (intervals + 1)),
         segments: segments ? new Float32Array(this.#memory, segments, 4 * side * side) : null,
-        below: floats.slice(6, 10), above: floats.slice(10, 14),
+        below: floats.slice(6, 10), above: floats.slice(10, 14), free: () => this.#exports.page_free_tables(at),
       };
     });
   }
@@ -182,6 +182,13 @@ export class Decoder {
   #text(at) {
     const bytes = new Uint8Array(this.#memory, at);
     return new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0)));
+  }
+
+  /** The content of a text that is not needed any more. @param {number} at */
+  #json(at) {
+    const content = JSON.parse(this.#text(this.#orFail(at)));
+    this.#exports.free(at);
+    return content;
   }
 
   /** Gives memory to a task, and takes it back. @template T @param {(take: (bytes: number) => number) => T} task @returns {T} */

@@ -252,7 +252,9 @@ export class Engine {
     const segments = composite && classification === "pre" ? this.#segmentsOf(transfer) : none;
     const key = JSON.stringify([transfer, length, segments]);
     if (this.#shown.tables === key) return;
-    this.#marcher.setTables(this.#decoder.tables(transfer, { length, ...segments }));
+    const tables = this.#decoder.tables(transfer, { length, ...segments });
+    this.#marcher.setTables(tables);
+    tables.free();
     this.#shown.tables = key;
   }
 }

@@ -70,7 +70,7 @@ export class RayMarcher {
   #size = { width: 0, height: 0 };
   /** @type {Omit<Atlas, "table" | "voxels" | "free"> | null} */
   #atlas = null;
-  /** @type {Omit<Tables, "values" | "segments"> | null} */
+  /** @type {Omit<Tables, "values" | "segments" | "free"> | null} */
   #tables = null;
   #bytes = 0;
 
@@ -114,7 +114,7 @@ export class RayMarcher {
 
   /** Uploads a transfer function. @param {Tables} tables */
   setTables(tables) {
-    const gl = this.#gl, { values, segments, ...rest } = tables;
+    const gl = this.#gl, { values, segments, free, ...rest } = tables;
     const colors = padded(values), side = tables.side;
     this.#bind(2, gl.TEXTURE_2D, this.#values, gl.NEAREST);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, kTableRow, colors.length / (4 * kTableRow), 0, gl.RGBA, gl.FLOAT, colors);

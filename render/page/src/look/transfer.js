@@ -125,7 +125,7 @@ export function withFewerColors(transfer, count) {
 /**
  * Changes a point; its value stays between those of its neighbours.
  * @template {number[]} P
- * @param {P[]} points @param {number} index @param {P} point
+ * @param {P[]} points @param {number} index @param {NoInfer<P>} point
  * @returns {P[]}
  */
 export function withPoint(points, index, point) {

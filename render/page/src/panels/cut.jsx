@@ -1,9 +1,8 @@
-import { CheckField, SegmentedField, SliderField } from "../parts/fields.jsx";
+import { SegmentedField, SliderField } from "../parts/fields.jsx";
 import { NumberField } from "../parts/number-field.jsx";
 import { Section } from "../parts/section.jsx";
 import { withFace } from "../picture/clip-handles.jsx";
-import { kDefaults } from "../state/scene.js";
-import { edgesOf } from "../state/scene.js";
+import { edgesOf, kDefaults } from "../state/scene.js";
 
 /** @typedef {import("../types.js").Scene} Scene */
 

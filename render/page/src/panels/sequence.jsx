@@ -29,7 +29,7 @@ export function SequenceBar({ frames, frame, playing, speed, onFrame, onPlay, on
         label="Frame" hideLabel value={index} min={0} max={frames.length - 1} step={1} text={`frame ${frames[index]}`}
         onChange={(i, moving) => onFrame(frames[i], moving)}
       />
-      <output>{frames[index]} <span class="unit">of {frames[0]}–{frames[frames.length - 1]}</span></output>
+      <output>Frame {frames[index]} <span class="unit">({frames[0]} to {frames[frames.length - 1]})</span></output>
       <SelectField label="Speed" hideLabel value={String(speed)} options={kSpeeds} onChange={(v) => onSpeed(Number(v))} />
     </div>
   );

@@ -39,7 +39,7 @@ export function NumberField({ label, value, onChange, min = -Infinity, max = Inf
       <span class="number">
         <input
           id={id} type="text" inputMode="decimal" autoComplete="off" spellcheck={false}
-          value={text ?? shortText(value, 6)}
+          aria-description={hint} value={text ?? shortText(value, 6)}
           onInput={(event) => setText(event.currentTarget.value)}
           onBlur={commit} onKeyDown={onKeyDown}
           onFocus={(event) => event.currentTarget.select()}

@@ -1,6 +1,7 @@
 /**
  * Moves the camera by mouse, pen, touch, wheel and keys.
  * @typedef {import("../types.js").Camera} Camera
+ * @typedef {{x: number, y: number}} Place
  * @typedef {{camera: () => Camera, move: (camera: Camera) => void, fit: () => void}} Target
  */
 import { orbited, panned, zoomed, zoomedAt } from "../camera/orbit.js";
@@ -10,13 +11,17 @@ const kWheelPixels = 500; // for a zoom by e
 const kLinePixels = 16; // a line of a wheel that counts lines
 const kKeyTurn = Math.PI / 24, kKeyShift = 0.05, kKeyZoom = 1.15;
 
-/** Shares of the element's height, to the right and upwards. @returns {[number, number]} */
+/**
+ * Shares of the element's height, to the right and upwards.
+ * @param {HTMLElement} element @param {number} dx @param {number} dy
+ * @returns {[number, number]}
+ */
 function shareOf(element, dx, dy) {
   const height = element.clientHeight || 1;
   return [dx / height, -dy / height];
 }
 
-/** A place relative to the middle of the element. */
+/** A place relative to the middle of the element. @param {HTMLElement} element @param {number} x @param {number} y */
 function placeIn(element, x, y) {
   const box = element.getBoundingClientRect();
   return shareOf(element, x - box.left - box.width / 2, y - box.top - box.height / 2);
@@ -25,13 +30,19 @@ function placeIn(element, x, y) {
 /** @param {PointerEvent} event */
 const pans = (event) => event.buttons & 6 || event.shiftKey || event.ctrlKey || event.metaKey;
 
-/** One pointer turns or shifts. */
+/**
+ * One pointer turns or shifts.
+ * @param {Camera} camera @param {HTMLElement} element @param {PointerEvent} event @param {Place} from
+ */
 function dragged(camera, element, event, from) {
   const [x, y] = shareOf(element, event.clientX - from.x, event.clientY - from.y);
   return pans(event) ? panned(camera, x, y) : orbited(camera, x * kTurnPerHeight, -y * kTurnPerHeight);
 }
 
-/** Two pointers zoom and shift. */
+/**
+ * Two pointers zoom and shift.
+ * @param {Camera} camera @param {HTMLElement} element @param {any} before @param {any} after  two places each
+ */
 function pinched(camera, element, before, after) {
   const middle = ([a, b]) => ({ x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 });
   const apart = ([a, b]) => Math.max(1, Math.hypot(a.x - b.x, a.y - b.y));
@@ -42,7 +53,7 @@ function pinched(camera, element, before, after) {
 
 /** @param {HTMLElement} element @param {Target} target @param {AbortSignal} signal */
 function listenToPointers(element, target, signal) {
-  /** @type {Map<number, {x: number, y: number}>} */
+  /** @type {Map<number, Place>} */
   const pointers = new Map();
   const on = (type, act) => element.addEventListener(type, act, { signal });
   const release = (event) => pointers.delete(event.pointerId);

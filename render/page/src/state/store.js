@@ -5,6 +5,7 @@
 
 /** A scene that did not change for so long is drawn completely. */
 const kRestMs = 180;
+const kMostUndone = 200;
 
 export class Store {
   /** @type {Scene} */
@@ -67,6 +68,7 @@ export class Store {
     this.#before = null;
     if (!before || sameSettings(before, this.scene)) return;
     this.#past.push(before);
+    if (this.#past.length > kMostUndone) this.#past.shift();
     this.#future = [];
   }
 

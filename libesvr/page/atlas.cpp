@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "capi/objects.h"
-#include "page.h"
+#include "page/page.h"
 #include "render/brick_atlas.h"
 #include "render/voxel_levels.h"
 
@@ -32,8 +32,7 @@ std::optional<Coord> slotsFor(std::size_t count, int mostSide) {
 class Distances {
  public:
   Distances(Coord size, const std::vector<Coord>& occupied)
-      : size_(size),
-        of_(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z), kFar) {
+      : size_(size), of_(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z), kFar) {
     for (const Coord brick : occupied) of_[at(brick)] = 0;
     // The largest of three distances along axes: one pass for each axis and direction suffices,
     // because a step along an axis may be combined with steps along the axes before it.
@@ -140,7 +139,8 @@ class AtlasMaker {
 
   void fillVoxels() {
     const int(&slots)[3] = atlas_->slots;
-    width_ = std::size_t(slots[0] * kCellBrickSide), height_ = std::size_t(slots[1] * kCellBrickSide);
+    width_ = std::size_t(slots[0] * kCellBrickSide),
+    height_ = std::size_t(slots[1] * kCellBrickSide);
     atlas_->shares.assign(width_ * height_ * std::size_t(slots[2] * kCellBrickSide), 0);
     for (std::size_t i = 0; i < from_.table.bricks.size(); ++i)
       fillSlot(&from_.values[i * kCellBrickVoxels], slotOf(i) * kCellBrickSide);
@@ -205,9 +205,8 @@ using namespace esvr;
 page_atlas* page_make_atlas(const esvr_volume* volume, int level, int most_side,
                             double most_bytes) {
   std::unique_ptr<page::Atlas> atlas;
-  (void)capi::guarded([&] {
-    atlas = page::makeAtlas(volume->voxels, level, most_side, most_bytes);
-  });
+  (void)capi::guarded(
+      [&] { atlas = page::makeAtlas(volume->voxels, level, most_side, most_bytes); });
   return atlas.release();
 }
 

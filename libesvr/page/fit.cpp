@@ -2,7 +2,7 @@
 
 #include "capi/objects.h"
 #include "esvr/camera.h"
-#include "page.h"
+#include "page/page.h"
 
 using namespace esvr;
 

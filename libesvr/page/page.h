@@ -4,8 +4,7 @@
 /// it is the library's own code, so that the page draws what esvr-render draws.
 ///
 /// The functions are called from JavaScript (src/local/decoder.js), which reads the structs. All their
-/// members have four bytes there, pointers too. Texts and arrays are valid until the next call of the
-/// same function, or until their object is freed.
+/// members have four bytes there, pointers too. The caller frees texts by free().
 
 #include "esvr/esvr.h"
 
@@ -13,10 +12,11 @@ extern "C" {
 
 /// A JSON text: the member "grids" of a file in the viewer's protocol, with a usual look.
 /// \return null on failure (esvr_error)
-const char* page_grids(const esvr_file* file);
+char* page_grids(const esvr_file* file);
 
 /// A JSON text: the members "colormaps" and "opacities" of the viewer's description.
-const char* page_looks();
+/// \return null on failure
+char* page_looks();
 
 /// Counts the active voxels of a volume in `count` intervals from `low` to `high`. Values outside
 /// count in the first or the last one.
@@ -30,14 +30,14 @@ void page_histogram(const esvr_volume* volume, double low, double high, int coun
 /// of the box, x fastest: the place of its slot along x, y and z and 0, or 0, 0, 0 and the distance
 /// in bricks, at least 1, within which all bricks are empty (the distance 1 is the brick itself).
 struct page_atlas {
-  int level;             ///< voxels are means of 2^level x 2^level x 2^level voxels
-  int origin[3];         ///< first voxel of the table's first brick, in voxels of the level
-  int bricks[3];         ///< size of the table
-  int slots[3];          ///< size of the atlas
-  int count;             ///< number of slots that are used
+  int level;      ///< voxels are means of 2^level x 2^level x 2^level voxels
+  int origin[3];  ///< first voxel of the table's first brick, in voxels of the level
+  int bricks[3];  ///< size of the table
+  int slots[3];   ///< size of the atlas
+  int count;      ///< number of slots that are used
   float background;
   float scale;
-  float least, most;     ///< smallest and largest stored voxel
+  float least, most;  ///< smallest and largest stored voxel
   const unsigned char* table;
   const float* voxels;
 };
@@ -62,14 +62,14 @@ struct page_transfer {
 /// count intervals from the lowest value of the transfer function.
 struct page_tables {
   int intervals;
-  float low, scale;                  ///< lowest value and intervals per unit; scale 0: no extent
-  float weak_gradient_squared;       ///< of shading
-  const float* values;               ///< intervals + 1 times red, green, blue, alpha
+  float low, scale;             ///< lowest value and intervals per unit; scale 0: no extent
+  float weak_gradient_squared;  ///< of shading
+  const float* values;          ///< intervals + 1 times red, green, blue, alpha
   /// side x side times the light of a segment as red, green, blue and alpha, premultiplied. Entry
   /// (i, j), i fastest, is a segment from the value i to the value j of `side` values at equal distances
   /// from the first to the last. Null if no segments are wanted.
   const float* segments;
-  float below[4], above[4];          ///< colors and extinctions beyond the ends; alpha is the extinction
+  float below[4], above[4];  ///< colors and extinctions beyond the ends; alpha is the extinction
 };
 
 /// What the tables are made for.
@@ -80,7 +80,8 @@ struct page_sampling {
 };
 
 /// \return null on failure
-const page_tables* page_make_tables(const page_transfer* transfer, const page_sampling* sampling);
+page_tables* page_make_tables(const page_transfer* transfer, const page_sampling* sampling);
+void page_free_tables(page_tables* tables);
 
 /// Fits a camera to a box of voxels.
 /// \param box        x0, y0, z0, x1, y1, z1

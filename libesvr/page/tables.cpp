@@ -1,12 +1,11 @@
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <vector>
 
 #include "capi/objects.h"
-#include "page.h"
+#include "page/page.h"
+#include "render/shading.h"
 #include "render/transfer_table.h"
-#include "render/value_extent.h"
 
 namespace esvr::page {
 namespace {
@@ -22,54 +21,51 @@ TransferFunction functionOf(const page_transfer& t) {
   return f;
 }
 
-/// A gradient of 2 % of the range for each voxel has half of its effect (render/shading.cpp).
 float weakGradientSquared(const TransferFunction& f) {
-  constexpr double kWeakShare = 0.02;
-  const ValueExtent extent = extentOf(f);
-  return float(std::pow(kWeakShare * (extent.high - extent.low), 2.0));
+  return lightRule({}, View({}, {}), f).weakSquared;  // the same for every view
 }
 
 void copy(const SegmentEntry& entry, float (&to)[4]) { std::copy_n(entry.mean.c, 4, to); }
 
-/// The tables of the last call, and what their pointers point to.
-struct Tables {
+/// Tables, and what their pointers point to.
+struct Tables : page_tables {
   Tables(const TransferFunction& f, const page_sampling& sampling)
-      : table(f, Sampling{sampling.length, sampling.side > 1}) {
+      : page_tables{}, table(f, Sampling{sampling.length, sampling.side > 1}) {
     const TransferTableView view = table.view();
-    content.intervals = TransferTableView::kIntervals;
-    content.low = view.low, content.scale = view.scale;
-    content.weak_gradient_squared = weakGradientSquared(f);
+    intervals = TransferTableView::kIntervals;
+    low = view.low, scale = view.scale;
+    weak_gradient_squared = weakGradientSquared(f);
     static_assert(sizeof(Classified) == 4 * sizeof(float));
-    content.values = &view.entries->r;
+    values = &view.entries->r;
     if (sampling.side > 1) fillSegments(view.segments, sampling);
   }
   TransferTable table;
-  std::vector<PixelColor> segments{};
-  page_tables content{};
+  std::vector<PixelColor> lights{};
 
  private:
   void fillSegments(const SegmentTableView& view, const page_sampling& sampling) {
     const double apart = (sampling.last - sampling.first) / (sampling.side - 1);
     const auto valueAt = [&](int i) { return float(sampling.first + i * apart); };
-    segments.reserve(std::size_t(sampling.side) * std::size_t(sampling.side));
+    lights.reserve(std::size_t(sampling.side) * std::size_t(sampling.side));
     for (int j = 0; j < sampling.side; ++j)
-      for (int i = 0; i < sampling.side; ++i) segments.push_back(view(valueAt(i), valueAt(j)));
+      for (int i = 0; i < sampling.side; ++i) lights.push_back(view(valueAt(i), valueAt(j)));
     static_assert(sizeof(PixelColor) == 4 * sizeof(float));
-    content.segments = &segments.front().r;
-    copy(view.entries[0], content.below);
-    copy(view.entries[content.intervals + 1], content.above);
+    segments = &lights.front().r;
+    copy(view.entries[0], below);
+    copy(view.entries[intervals + 1], above);
   }
 };
-std::unique_ptr<Tables> last;
 
 }  // namespace
 }  // namespace esvr::page
 
 using namespace esvr;
 
-const page_tables* page_make_tables(const page_transfer* transfer, const page_sampling* sampling) {
-  const auto status = capi::guarded([&] {
-    page::last = std::make_unique<page::Tables>(page::functionOf(*transfer), *sampling);
-  });
-  return status == ESVR_OK ? &page::last->content : nullptr;
+page_tables* page_make_tables(const page_transfer* transfer, const page_sampling* sampling) {
+  std::unique_ptr<page::Tables> tables;
+  (void)capi::guarded(
+      [&] { tables = std::make_unique<page::Tables>(page::functionOf(*transfer), *sampling); });
+  return tables.release();
 }
+
+void page_free_tables(page_tables* tables) { delete static_cast<page::Tables*>(tables); }

@@ -1,10 +1,12 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <string>
 
 #include "capi/objects.h"
 #include "esvr/transfer_function.h"
-#include "page.h"
+#include "page/page.h"
 
 namespace esvr::page {
 namespace {
@@ -114,7 +116,8 @@ void putVoxelSize(Json& json, const Transform& transform) {
 void putBox(Json& json, const Box& box) {
   json.raw("[");
   for (const Coord corner : {box.min, box.max})
-    json.next().list(std::initializer_list<double>{double(corner.x), double(corner.y), double(corner.z)});
+    json.next().list(
+        std::initializer_list<double>{double(corner.x), double(corner.y), double(corner.z)});
   json.raw("]");
 }
 
@@ -157,19 +160,22 @@ std::string looksText() {
   return json.raw("}}").text();
 }
 
-std::string lastText;
+/// A copy that the caller frees; null if there is no memory.
+char* copyOf(const std::string& text) { return strdup(text.c_str()); }
 
 }  // namespace
 }  // namespace esvr::page
 
 using namespace esvr;
 
-const char* page_grids(const esvr_file* file) {
-  const auto status = capi::guarded([&] { page::lastText = page::gridsText(file->content); });
-  return status == ESVR_OK ? page::lastText.c_str() : nullptr;
+char* page_grids(const esvr_file* file) {
+  char* text = nullptr;
+  (void)capi::guarded([&] { text = page::copyOf(page::gridsText(file->content)); });
+  return text;
 }
 
-const char* page_looks() {
-  const auto status = capi::guarded([&] { page::lastText = page::looksText(); });
-  return status == ESVR_OK ? page::lastText.c_str() : nullptr;
+char* page_looks() {
+  char* text = nullptr;
+  (void)capi::guarded([&] { text = page::copyOf(page::looksText()); });
+  return text;
 }

@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "capi/objects.h"
-#include "page.h"
+#include "page/page.h"
 
 using namespace esvr;
 
