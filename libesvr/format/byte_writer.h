@@ -38,7 +38,9 @@ class ByteWriter {
     put(std::uint32_t(bytes.size()));
     putAll(bytes);
   }
-  void putSized(std::string_view text) { putSized(std::as_bytes(std::span(text.data(), text.size()))); }
+  void putSized(std::string_view text) {
+    putSized(std::as_bytes(std::span(text.data(), text.size())));
+  }
 
   void padTo(std::uint64_t size) { bytes_.resize(size); }
 

@@ -27,9 +27,9 @@ namespace esvr {
 /// The score by which pruning ranks ellipsoids. Omega is the set of voxels of the volume where
 /// |I| phi is at least 1/255 of the range of values; FA is the fractional anisotropy of Sigma.
 enum class PruneScore {
-  kFull,         ///< |Omega| |I| FA, the paper's score
-  kWithoutFa,    ///< |Omega| |I|
-  kOnlyFa,       ///< FA
+  kFull,          ///< |Omega| |I| FA, the paper's score
+  kWithoutFa,     ///< |Omega| |I|
+  kOnlyFa,        ///< FA
   kContribution,  ///< sum over Omega of |I| phi, times volume^0.1
   /// LightGaussian's score: the sum over the rays of 360 views of the opacity times the
   /// transmittance in front of it, times volume^0.1. The volume is relative to the 90th percentile of

@@ -55,12 +55,13 @@
  * @property {FileEntry[]} files
  * @property {Record<string, ColorMap>} colormaps
  * @property {Record<string, OpacityPoint[]>} opacities
+ * @property {string[]} [carried]  names of grids that cannot be drawn
  *
  * @typedef {object} PictureHead
  * @property {number} id
  * @property {boolean} last
  * @property {number} drawMs
- * @property {{vramBytes?: number, ellipsoids?: number}} stats
+ * @property {{vramBytes?: number, ellipsoids?: number, level?: number}} stats
  * @property {number | null} [psnr]  null: the pictures are equal
  * @property {number} [maxDifference]
  *

@@ -17,7 +17,7 @@ function speedAfter(before, { picture, wish, ms }, now) {
   const rate = 1000 / interval;
   const fps = fits ? (before.fps ? before.fps + kSmoothing * (rate - before.fps) : rate) : (before?.fps ?? null);
   const { width, height } = picture.bitmap;
-  return { at: now, fps, ms, width, height, drawMs: picture.head.drawMs, vramBytes: picture.head.stats.vramBytes ?? 0 };
+  return { at: now, fps, ms, width, height, drawMs: picture.head.drawMs, vramBytes: picture.head.stats.vramBytes ?? 0, level: picture.head.stats.level ?? 0 };
 }
 
 /** @param {import("./types.js").PictureHead} head */

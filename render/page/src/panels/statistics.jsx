@@ -9,7 +9,7 @@ const sizeText = ({ box: [low, high] }) => low.map((v, i) => high[i] - v + 1).jo
  * @param {import("../types.js").Description} props.description
  * @param {import("../types.js").Scene} props.scene
  * @param {import("../types.js").Grid} props.grid
- * @param {{fps: number | null, drawMs: number, ms: number, vramBytes: number, width: number, height: number} | null} props.speed
+ * @param {{fps: number | null, drawMs: number, ms: number, vramBytes: number, width: number, height: number, level: number} | null} props.speed
  */
 export function StatisticsPanel({ description, scene, grid, speed }) {
   const facts = [
@@ -26,6 +26,8 @@ export function StatisticsPanel({ description, scene, grid, speed }) {
     ["Time until it was shown", speed && `${shortText(speed.ms, 3)} ms`],
     ["Pixels of the last picture", speed && `${speed.width} × ${speed.height}`],
     ["Memory of the GPU", speed && speed.vramBytes > 0 && bytesText(speed.vramBytes)],
+    ["Drawn from", speed && speed.level > 0 && `means of ${2 ** speed.level} × ${2 ** speed.level} × ${2 ** speed.level} voxels`],
+    ["Not drawn, because only OpenVDB reads them", description.carried?.join(", ")],
     ["Drawn on", description.device],
     ["Program", description.program],
   ];
