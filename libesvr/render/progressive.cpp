@@ -69,7 +69,7 @@ ProgressivePicture::ProgressivePicture(Renderer& renderer, RenderOptions options
   checkRenderOptions(options_, options_.further.size() + 1);  // the renderer checks their number
 }
 
-bool ProgressivePicture::refine(double seconds) {
+bool ProgressivePicture::refine(double seconds) try {
   const auto begin = std::chrono::steady_clock::now();
   for (double last = 0.0; !complete();) {
     drawPass();
@@ -79,15 +79,27 @@ bool ProgressivePicture::refine(double seconds) {
     last = passed.count();
     if (last + next > seconds) break;
   }
+  show();
   return complete();
+} catch (...) {
+  show();
+  throw;
 }
 
 void ProgressivePicture::drawPass() {
   RenderOptions pass = options_;
   pass.resolution = coarser(options_.resolution, side_);
-  const Image drawn = renderer_.draw(pass);
-  image_ = side_ == 1 ? drawn : Enlarged(drawn, options_.camera, options_.resolution).take();
+  drawn_ = renderer_.draw(pass);
   side_ /= 2;
+}
+
+/// Enlarges the last pass. It is done once for all passes of a call, because it takes longer than
+/// drawing where a GPU draws.
+void ProgressivePicture::show() {
+  if (!drawn_) return;
+  image_ = complete() ? std::move(*drawn_)
+                      : Enlarged(*drawn_, options_.camera, options_.resolution).take();
+  drawn_.reset();
 }
 
 }  // namespace esvr

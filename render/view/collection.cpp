@@ -21,7 +21,7 @@ ReadLimits limitsOf(const cli::HostMemory& memory) {
   return limits;
 }
 
-std::vector<std::string> namesOf(const EsvrFile& file) {
+std::vector<std::string> gridNamesOf(const EsvrFile& file) {
   std::vector<std::string> names;
   for (const StoredGrid& grid : file.grids) names.push_back(grid.descriptor.name);
   return uniqueNames(names);
@@ -31,7 +31,7 @@ std::vector<std::string> namesOf(const EsvrFile& file) {
 std::vector<ShownGrid> gridsOf(const EsvrFile& file, const EsvrSummary& summary,
                                const render::SceneFile& from) {
   std::vector<ShownGrid> grids;
-  const auto names = namesOf(file);
+  const auto names = gridNamesOf(file);
   for (std::size_t i = 0; i < names.size(); ++i) {
     render::SceneFile of = from;
     of.grid = names[i];

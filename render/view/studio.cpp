@@ -20,14 +20,14 @@ constexpr double kFirstBudget = 0.03;
 constexpr std::size_t kMostTasks = 8;  // that wait for one client
 constexpr double kMs = 1e3;            // milliseconds of a second
 
-/// Kinds of work; more urgent ones have larger values.
-enum class Urgency { kNone, kRefinement, kTask, kFirstPass, kDrag };
+}  // namespace
 
-Urgency urgencyOf(const DrawRequest& request) {
+/// Kinds of work; more urgent ones have larger values.
+enum class Studio::Urgency { kNone, kRefinement, kTask, kFirstPass, kDrag };
+
+Studio::Urgency Studio::urgencyOf(const DrawRequest& request) {
   return request.moving ? Urgency::kDrag : Urgency::kFirstPass;
 }
-
-}  // namespace
 
 /// A picture that is drawn. Only the studio's thread uses what may change, except for the tokens.
 struct Studio::Job {

@@ -51,6 +51,8 @@ class Studio {
   struct Job;
   struct Easel;
   struct Work;
+  enum class Urgency;
+  [[nodiscard]] static Urgency urgencyOf(const DrawRequest& request);
   [[nodiscard]] Easel& easelOf(const std::shared_ptr<Outlet>& client);
   void loop();
   [[nodiscard]] std::optional<Work> next();

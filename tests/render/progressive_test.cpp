@@ -94,6 +94,33 @@ TEST(ProgressivePicture, ACancelledPassLeavesTheLastOne) {
   EXPECT_FALSE(picture.complete());
 }
 
+/// Fails after a number of pictures of the value 1.
+class FailingRenderer final : public Renderer {
+ public:
+  explicit FailingRenderer(int pictures) : left_(pictures) {}
+  Image draw(const RenderOptions& o) override {
+    if (left_-- == 0) throw DeviceError("the device is gone");
+    const Resolution r = o.resolution;
+    return {
+        r.width, r.height,
+        std::vector<float>(std::size_t(4) * std::size_t(r.width) * std::size_t(r.height), 1.0f)};
+  }
+  void drawOnDevice(const RenderOptions& o) override { (void)draw(o); }
+  FrameStats stats() const override { return {}; }
+
+ private:
+  int left_;
+};
+
+TEST(ProgressivePicture, AFailureLeavesTheLastPassOfTheSameCall) {
+  FailingRenderer renderer(2);
+  ProgressivePicture picture(renderer, options());
+  EXPECT_THROW(picture.refine(1000.0), DeviceError);
+  ASSERT_TRUE(picture.image());
+  EXPECT_EQ(picture.image()->width, 96);
+  EXPECT_EQ(picture.image()->rgba, std::vector<float>(std::size_t(4) * 96 * 64, 1.0f));
+}
+
 TEST(ProgressivePicture, RefusesWrongOptionsAtOnce) {
   WaitingRenderer renderer;
   RenderOptions o = options();

@@ -32,9 +32,11 @@ class ProgressivePicture {
 
  private:
   void drawPass();
+  void show();
 
   Renderer& renderer_;
   RenderOptions options_;
+  std::optional<Image> drawn_;  ///< the last pass before it is enlarged
   std::optional<Image> image_;
   int side_ = 8;  ///< pixels of the picture along the side of a pixel of the next pass; 0: complete
 };
