@@ -37,14 +37,6 @@ struct PairProjection {
   float rPhi, phi2;
 };
 
-/// Places in a brick, relative to its first voxel. The arrays are 64-byte aligned.
-struct PlaceBlock {
-  static constexpr int kMultiple = 16;  ///< `count` is a multiple of it, which fills all registers
-
-  const float *x, *y, *z;
-  int count;
-};
-
 struct BrickKernels {
   const char* name;
   /// Adds intensity * phi to the kBrickVoxels values of `sum`.
@@ -61,9 +53,6 @@ struct BrickKernels {
   /// an earlier forward pass with the same shapes.
   void (*addTape)(const PairTape& tape, float intensity, float* sum);
   void (*projectTape)(const PairTape& tape, const float* r, PairProjection& projection);
-  /// Adds intensity * phi to the sum of each place. \param corner  as for add
-  void (*addPlaces)(const LineForm& f, const float corner[3], const KernelConstants<float>& k,
-                    const PlaceBlock& places, float* sum);
 };
 
 /// The kernels for all instruction sets that this processor has, the best first.

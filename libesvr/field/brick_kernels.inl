@@ -7,6 +7,7 @@
 
 #include "field/brick_kernels.h"
 #include "field/line_math.h"
+#include "field/place_kernels.h"
 
 namespace esvr::ESVR_KERNEL_NAMESPACE {
 namespace {
@@ -290,7 +291,8 @@ void addPlaces(const LineForm& f, const float corner[3], const KernelConstants<f
 }  // namespace
 
 extern const BrickKernels kKernels;
-const BrickKernels kKernels{ESVR_KERNEL_NAME, add,         forward,  backward,
-                            addTape,          projectTape, addPlaces};
+const BrickKernels kKernels{ESVR_KERNEL_NAME, add, forward, backward, addTape, projectTape};
+extern const AddPlaces kAddPlaces;
+const AddPlaces kAddPlaces = addPlaces;
 
 }  // namespace esvr::ESVR_KERNEL_NAMESPACE

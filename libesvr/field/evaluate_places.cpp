@@ -6,8 +6,8 @@
 #include "core/brick_index.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
-#include "field/brick_kernels.h"
 #include "field/evaluate_plan.h"
+#include "field/place_kernels.h"
 
 namespace esvr {
 namespace {
@@ -132,7 +132,7 @@ class PlaceEvaluator {
       const std::uint32_t i = pairs_.ellipsoid[pair];
       const Coord corner = brick * kBrickSide - field_.origins[field_.chunkOf[i]];
       const float inFrame[3] = {float(corner.x), float(corner.y), float(corner.z)};
-      kernels_.addPlaces(field_.forms[i], inFrame, field_.kernel(i), block.places(), block.sum);
+      add_(field_.forms[i], inFrame, field_.kernel(i), block.places(), block.sum);
     }
   }
 
@@ -140,7 +140,7 @@ class PlaceEvaluator {
   BrickPairs pairs_;
   BrickIndex index_;
   float background_;
-  const BrickKernels& kernels_ = brickKernels();
+  AddPlaces add_ = placeKernel();
 };
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "esvr/sparse_volume.h"
+#include "field/place_kernels.h"
 #include "random_field.h"
 
 namespace esvr {
@@ -88,12 +89,15 @@ TEST(BrickKernels, PlacesAtVoxelsHaveTheirValues) {
     x[v] = float(local.x), y[v] = float(local.y), z[v] = float(local.z);
   }
   const PlaceBlock places{x.data(), y.data(), z.data(), 512};
-  for (const BrickKernels* set : runnableKernels())
+  const auto sets = runnableKernels();
+  const auto placeKernels = runnablePlaceKernels();
+  ASSERT_EQ(placeKernels.size(), sets.size());
+  for (std::size_t set = 0; set < sets.size(); ++set)
     for (const LineForm& form : forms(Kernel{}.kappa)) {
       alignas(64) std::array<float, 512> expected{}, sum{};
-      set->add(form, kCorner.data(), k, expected.data());
-      set->addPlaces(form, kCorner.data(), k, places, sum.data());
-      for (int v = 0; v < 512; ++v) ASSERT_NEAR(sum[v], expected[v], 1e-5) << set->name;
+      sets[set]->add(form, kCorner.data(), k, expected.data());
+      placeKernels[set](form, kCorner.data(), k, places, sum.data());
+      for (int v = 0; v < 512; ++v) ASSERT_NEAR(sum[v], expected[v], 1e-5) << sets[set]->name;
     }
 }
 
