@@ -36,7 +36,7 @@ class Agree(unittest.TestCase):
 
 class Commands(unittest.TestCase):
     def test_run_scripts_that_exist(self):
-        arguments = types.SimpleNamespace(out=pathlib.Path("OUT"), bin="BUILD", data="DATA", machine="TEXT")
+        arguments = types.SimpleNamespace(out=pathlib.Path("OUT"), bin="BUILD", data="DATA", machine="TEXT", sz3=None)
         names = set()
         for name, part, words in all_figures.commands(arguments):
             self.assertTrue((all_figures.HERE / words[0]).exists(), words[0])

@@ -243,6 +243,18 @@ TEST_F(CompareTableCommand, isSearchedForThePsnrOfACandidate) {
   EXPECT_EQ(rows, 1);
 }
 
+TEST_F(CompareTableCommand, isSearchedForAPsnrOverTheActiveVoxels) {
+  constexpr double kPsnr = 30.0;
+  const auto report = reportOf({"--rows", "matched", "--psnr-active", std::to_string(kPsnr),
+                                "--external-command", option()});
+  for (const char* name : {"NanoVDB FpN Zip", "NanoVDB Fp4 Zip", "Rounding"}) {
+    const json* row = rowOf(report, name, "at 30.00 dB over active voxels");
+    ASSERT_NE(row, nullptr) << name;
+    ASSERT_TRUE(row->contains("psnr_active")) << row->dump();
+    EXPECT_GE((*row)["psnr_active"].get<double>(), kPsnr) << name;
+  }
+}
+
 TEST_F(CompareTableCommand, leavesTheReasonWhereItFails) {
   const auto report =
       reportOf({"--rows", "none", "--size", "1KB", "--external-command",
@@ -446,6 +458,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"DIR/ref.vdb", "--external", "A=DIR/no.raw:1:9x9x9:uint8"}, 3, "no.raw"},
         Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1"}, 3, "out.raw"},
         Refusal{{"DIR/ref.vdb", "--external-command", "A=true"}, 2, "--size"},
+        Refusal{{"DIR/ref.vdb", "--psnr-active", "-1"}, 2, "--psnr-active"},
+        Refusal{{"DIR/ref.vdb", "--psnr-active", "nan"}, 2, "--psnr-active"},
         Refusal{{"DIR/ref.vdb", "--size", "1KB", "--external-command", "true"}, 2, "NAME=COMMAND"},
         Refusal{{"DIR/ref.vdb", "DIR/far.esvr"}, 3, "do not meet"},
         Refusal{{"DIR/ref.vdb", "DIR/far.vdb"}, 3, "--external"},
