@@ -23,20 +23,6 @@ void writeBytes(const std::filesystem::path& path, std::span<const std::byte> by
   if (!stream) throw RuntimeFailure("cannot write " + path.string());
 }
 
-/// The voxels as an array for ZFP: those of a box, or the bricks side by side.
-struct ZfpArray {
-  DenseBox dense;
-  bool bricks = false;
-};
-
-ZfpArray arrayFor(const ZfpSetting& setting, const BaselineSource& source) {
-  const SparseVolume& volume = source.grid.volume;
-  if (!setting.bricks) return {baselines::densify(volume, source.box, source.maxDenseBytes)};
-  const SparseVolume stack = baselines::stackBricks(volume);
-  const Box box = baselines::stackShape(stack.brickCount()).box();
-  return {baselines::densify(stack, box, source.maxDenseBytes), true};
-}
-
 std::vector<std::byte> readBytes(const std::filesystem::path& path) {
   std::vector<std::byte> bytes(std::filesystem::file_size(path));
   std::ifstream stream(path, std::ios::binary);
@@ -51,6 +37,12 @@ std::vector<std::byte> readBytes(const std::filesystem::path& path) {
 /// Each is made when it is first needed.
 struct BaselineEncoder::State {
   explicit State(const BaselineSource& s) : source(s) {}
+
+  /// The voxels as an array for ZFP: those of a box, or the bricks side by side.
+  struct ZfpArray {
+    DenseBox dense;
+    bool bricks = false;
+  };
 
   BaselineSource source;
   std::optional<double> packedThreshold;
@@ -72,8 +64,15 @@ struct BaselineEncoder::State {
     }
     return *packer;
   }
+  [[nodiscard]] ZfpArray arrayFor(const ZfpSetting& setting) const {
+    const SparseVolume& volume = source.grid.volume;
+    if (!setting.bricks) return {baselines::densify(volume, source.box, source.maxDenseBytes)};
+    const SparseVolume stack = baselines::stackBricks(volume);
+    const Box box = baselines::stackShape(stack.brickCount()).box();
+    return {baselines::densify(stack, box, source.maxDenseBytes), true};
+  }
   double encodeZfp(const ZfpSetting& setting) {
-    if (!array || array->bricks != setting.bricks) array = arrayFor(setting, source);
+    if (!array || array->bricks != setting.bricks) array = arrayFor(setting);
     return secondsOf([&] {
       std::vector<std::byte> bytes;
       if (array->bricks) bytes = baselines::encodeBricks(source.grid.volume.bricks);
