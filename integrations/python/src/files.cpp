@@ -81,8 +81,8 @@ std::uint64_t writeFile(const std::filesystem::path& path, const File& file, boo
   return writeEsvr(path, *file.file, {.overwrite = overwrite});
 }
 
-std::uint64_t writeGrids(const std::filesystem::path& path, const std::vector<Grid>& grids,
-                         bool overwrite) {
+std::uint64_t writeGridList(const std::filesystem::path& path, const std::vector<Grid>& grids,
+                            bool overwrite) {
   const py::gil_scoped_release release;
   EsvrFile file;
   for (const Grid& grid : grids) {
@@ -93,7 +93,7 @@ std::uint64_t writeGrids(const std::filesystem::path& path, const std::vector<Gr
   return writeEsvr(path, file, {.overwrite = overwrite});
 }
 
-std::string represented(const File& self) {
+std::string fileText(const File& self) {
   std::string names;
   for (const auto& grid : self.file->grids)
     names += (names.empty() ? "" : ", ") + grid.descriptor.name;
@@ -109,7 +109,7 @@ void addFiles(py::module_& module) {
                              "Names of the grids that are kept as the bytes of their .vdb file.")
       .def("__getitem__", &gridNamed, py::arg("name"), "The first grid of a name.")
       .def("__len__", [](const File& f) { return f.file->grids.size(); })
-      .def("__repr__", &represented);
+      .def("__repr__", &fileText);
   module.def(
       "read", &read, py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
       py::arg("ellipsoids") = py::none(), py::arg("frame") = py::none(),
@@ -120,7 +120,7 @@ void addFiles(py::module_& module) {
              "The numbers of the frames of a sequence; an empty list for a file of one frame.");
   module.def("write", &writeFile, py::arg("path"), py::arg("file"), py::kw_only(),
              py::arg("overwrite") = false, "Writes a file. Returns the number of bytes.");
-  module.def("write", &writeGrids, py::arg("path"), py::arg("grids"), py::kw_only(),
+  module.def("write", &writeGridList, py::arg("path"), py::arg("grids"), py::kw_only(),
              py::arg("overwrite") = false, "Writes a file of these grids.");
 }
 

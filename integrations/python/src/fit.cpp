@@ -111,7 +111,7 @@ Grid fitVolume(const Volume& volume, const ConvertOptions& options, const Progre
   return {std::make_shared<const StoredGrid>(std::move(conversion.grid))};
 }
 
-constexpr const char* kText =
+constexpr const char* kFitText =
     "Converts a volume to a Grid. One of the goals may be given:\n\n"
     "psnr: the smallest grid of this PSNR over the box, dB; max_error: a bound on the error of\n"
     "every voxel; size: the best grid of this number of bytes; count: a number of ellipsoids;\n"
@@ -148,7 +148,7 @@ void addFit(py::module_& module) {
       py::arg("count") = py::none(), py::arg("lossless") = false, py::arg("preset") = "standard",
       py::arg("representation") = "auto", py::arg("storage") = "compact",
       py::arg("fit_for") = "voxels", py::arg("device") = "auto", py::arg("seed") = 1,
-      py::arg("progress") = py::none(), kText);
+      py::arg("progress") = py::none(), kFitText);
 }
 
 }  // namespace esvr::python

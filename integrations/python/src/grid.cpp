@@ -89,7 +89,7 @@ std::string kindOf(const StoredGrid& grid) {
   return grid.residual ? "ellipsoids with a residual" : "ellipsoids";
 }
 
-std::string represented(const Grid& self) {
+std::string gridText(const Grid& self) {
   const StoredGrid& grid = *self.grid;
   const std::size_t ellipsoids = grid.field.ellipsoidCount();
   std::string text = "<esvr.Grid '" + grid.descriptor.name + "': ";
@@ -187,7 +187,7 @@ void addGrid(py::module_& module) {
       .def_property_readonly(
           "bytes", [](const Grid& g) { return bytesAdded(*g.grid); },
           "Largest number of bytes that the grid adds to a file.")
-      .def("__repr__", &represented);
+      .def("__repr__", &gridText);
 }
 
 }  // namespace esvr::python

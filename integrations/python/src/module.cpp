@@ -5,7 +5,7 @@
 
 namespace {
 
-constexpr const char* kText =
+constexpr const char* kModuleText =
     "Sparse volumes as lists of ellipsoids. All coordinates are those of the index space: voxel\n"
     "(i, j, k) lies at (i, j, k), and arrays have the axes x, y, z.";
 
@@ -13,7 +13,7 @@ constexpr const char* kText =
 
 PYBIND11_MODULE(_core, module) {
   using namespace esvr::python;
-  module.doc() = kText;
+  module.doc() = kModuleText;
   module.attr("__version__") = ESVR_VERSION;
   addErrors(module);
   addVolume(module);

@@ -112,7 +112,7 @@ py::array_t<std::uint8_t> drawGrid(const Grid& self, const Look& look) {
   });
 }
 
-constexpr const char* kText =
+constexpr const char* kRenderText =
     "Draws a picture: sRGB, uint8 of shape (height, width, 4).\n\n"
     "eye, center and up are in index coordinates; what is not given is chosen so that the picture\n"
     "shows everything. colors and opacity are names of esvr-render, transfer a ParaView preset.\n"
@@ -146,7 +146,7 @@ void addRenderTo(py::handle type, py::array_t<std::uint8_t> (*draw)(const Subjec
       py::arg("up") = py::none(), py::arg("fov") = py::none(), py::arg("colors") = "viridis",
       py::arg("opacity") = "linear", py::arg("transfer") = py::none(),
       py::arg("range") = py::none(), py::arg("step") = 1.0, py::arg("opacity_length") = 1.0,
-      py::arg("background") = py::none(), py::arg("device") = "auto", kText);
+      py::arg("background") = py::none(), py::arg("device") = "auto", kRenderText);
   py::setattr(type, "render", method);
 }
 
