@@ -21,7 +21,10 @@ paths = [str(build / "python"), str(PLUGIN / "debian12")]
 environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "ESVR_PLUGIN": str(PLUGIN / "esvr_reader.py"),
                "ESVR_BIN": str(build)}
 with tempfile.TemporaryDirectory() as folder:
-    done = subprocess.run(["xvfb-run", "-a", "pvbatch", str(HERE / "reader_check.py")], cwd=folder, env=environment, text=True,
+    # ParaView opens and closes a connection before that of its window. Without -noreset, the server begins
+    # anew in between and may refuse the second one.
+    server = ["xvfb-run", "-a", "-s", "-screen 0 800x600x24 -noreset"]
+    done = subprocess.run([*server, "pvbatch", str(HERE / "reader_check.py")], cwd=folder, env=environment, text=True,
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=300)
 print(done.stdout)
 # pvbatch may end with 0 after an exception, so that the last line decides.
