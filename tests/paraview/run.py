@@ -16,7 +16,7 @@ PLUGIN = HERE.parents[1] / "integrations/paraview"
 if not shutil.which("pvbatch") or not shutil.which("xvfb-run"):
     print("skipped: there is no pvbatch (Debian: paraview) or no xvfb-run (Debian: xvfb)")
     sys.exit(77)
-build = pathlib.Path(sys.argv[1])
+build = pathlib.Path(sys.argv[1]).resolve()
 paths = [str(build / "python"), str(PLUGIN / "debian12")]
 environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "ESVR_PLUGIN": str(PLUGIN / "esvr_reader.py"),
                "ESVR_BIN": str(build)}
