@@ -1,4 +1,4 @@
-# Makes the man pages of the programs from their own --help.
+# Makes the man pages of ESVR_PROGRAMS (EsvrInstall.cmake) from their own --help.
 set(manPages)
 function(esvr_man_page page program)
   if(NOT TARGET ${program})
@@ -14,7 +14,7 @@ function(esvr_man_page page program)
   set(manPages ${manPages} ${file} PARENT_SCOPE)
 endfunction()
 
-foreach(program vdb2esvr esvr2vdb esvr-render esvr-view esvr-compare esvr-sample swc2vdb raw2vdb)
+foreach(program ${ESVR_PROGRAMS})
   esvr_man_page(${program} ${program})
 endforeach()
 foreach(command check table curves stability)

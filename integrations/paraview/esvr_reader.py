@@ -15,6 +15,9 @@ from vtkmodules.vtkCommonMath import vtkMatrix3x3
 import esvr
 
 
+NOWHERE = ((0, 0, 0), (0, 0, 0))  # a box whose grids have hardly any ellipsoids, but all their properties
+
+
 def extent_of(box):
     """The extent of VTK (x0, x1, y0, y1, z0, z1) of a box."""
     return [side for pair in zip(*box) for side in pair]
@@ -85,7 +88,7 @@ class ESVRReader(VTKPythonAlgorithmBase):
         time = info.Get(Pipeline.UPDATE_TIME_STEP()) if info.Has(Pipeline.UPDATE_TIME_STEP()) else self._frames[0]
         return max((frame for frame in self._frames if frame <= time), default=self._frames[0])
 
-    def _read(self, frame, box=None):
+    def _read(self, frame, box):
         if frame is not None:
             return esvr.read(self._path, frame=frame)
         return esvr.read(self._path, box=box, ellipsoids=self._ellipsoids or None)
@@ -114,7 +117,7 @@ class ESVRReader(VTKPythonAlgorithmBase):
             return 1
         info = outputs.GetInformationObject(0)
         self._frames = esvr.frames(self._path)
-        file = self._read(self._frame_at(info))
+        file = self._read(self._frame_at(info), NOWHERE)
         self._offer(tuple(dict.fromkeys(grid.name for grid in file.grids)))
         grids = self._chosen(file)
         boxes = np.array([grid.box for grid in grids])

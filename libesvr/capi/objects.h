@@ -21,7 +21,7 @@ struct esvr_volume {
       : voxels(std::move(decoded)), index(voxels.bricks) {}
 
   esvr::SparseVolume voxels;
-  esvr::BrickIndex index;  ///< of the bricks relative to the origin
+  esvr::BrickIndex index;  ///< finds bricks by their positions relative to the origin
 };
 
 namespace esvr::capi {

@@ -224,7 +224,7 @@ class Frame {
 
   struct Sequence {
     std::size_t literals, match;
-    std::uint64_t offset;  ///< as it is coded
+    std::uint64_t offset;  ///< the offset in its coded form
   };
   static Sequence readSequence(BackwardBits& bits, std::uint8_t literal, std::uint8_t offset,
                                std::uint8_t length) {

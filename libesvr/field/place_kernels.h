@@ -1,7 +1,7 @@
 #pragma once
-/// The inner loop over one ellipsoid and places between the voxels of a brick. It is compiled with those
-/// of brick_kernels.h, but stands by itself, so that a program that evaluates no places does not
-/// contain it.
+/// The inner loop over one ellipsoid and places between the voxels of a brick. It is compiled with the
+/// loops of brick_kernels.h. Its table is a separate one, so that a program that evaluates no places
+/// does not contain the loop.
 
 #include <vector>
 

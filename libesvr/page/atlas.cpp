@@ -14,7 +14,7 @@ namespace esvr::page {
 namespace {
 
 constexpr int kMostSlots = 255;     ///< places along an axis that a byte of the table can hold
-constexpr int kTableBytes = 4;      ///< of a brick
+constexpr int kTableBytes = 4;      ///< bytes of a brick's entry in the table
 constexpr int kCoarsestLevel = 16;  ///< every volume is a single brick long before
 
 /// The size of an atlas that is about a cube and has room for `count` slots; nothing if it would be

@@ -16,7 +16,7 @@ namespace {
 struct Ellipsoids {
   py::array_t<double> mu;
   py::array_t<float> scale, quaternion, intensity, kappa;
-  double epsilon = 0.0;  ///< that of the kernel (kernel.h)
+  double epsilon = 0.0;  ///< the kernel's epsilon (kernel.h)
 };
 
 /// Copies the ellipsoids of a chunk to row `first` and those after it.

@@ -92,7 +92,7 @@ esvr_status esvr_get_grid(const esvr_file* file, size_t grid, esvr_grid* descrip
 /// An ellipsoid adds intensity * phi(m) with m = |S^-1 R^T (x - center)|^2 (docs/format.md).
 typedef struct esvr_ellipsoid {
   double center[3];
-  float scale[3];     ///< in voxels: the diagonal of S
+  float scale[3];     ///< the diagonal of S, voxels
   float rotation[4];  ///< unit quaternion w, x, y, z of R
   float intensity;
   float kappa;  ///< edge of the kernel phi
