@@ -98,8 +98,7 @@ def sequence_facts(volume):
     }
 
 
-def volume_facts(path):
-    volume = import_volume(path)
+def facts_of(volume):
     volume.data.grids.load()
     bpy.context.view_layer.update()
     grids = volume.data.grids
@@ -117,9 +116,10 @@ def volume_facts(path):
 
 def main():
     arguments = sys.argv[sys.argv.index("--") + 1:]
-    facts = [volume_facts(path) for path in arguments[1:]]
+    facts = [facts_of(import_volume(path)) for path in arguments[1:]]
     with open(arguments[0], "w", encoding="utf-8") as file:
         json.dump(facts, file, indent=1)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -93,10 +93,9 @@ def entry_in(folder):
     """The entry of a folder; None if it is not complete."""
     try:
         with open(os.path.join(folder, RECORD), encoding="utf-8") as file:
-            names = json.load(file)["files"]
-    except (OSError, ValueError, KeyError, TypeError):
+            files = {None if frame == "" else int(frame): str(name) for frame, name in json.load(file)["files"]}
+    except (OSError, ValueError, KeyError, TypeError):  # missing or damaged
         return None
-    files = {None if frame == "" else int(frame): name for frame, name in names}
     complete = files and all(os.path.isfile(os.path.join(folder, name)) for name in files.values())
     return Entry(folder, files) if complete else None
 
