@@ -68,14 +68,16 @@ class Job:
         `watch` is called with that text again and again. An exit code that is not accepted raises JobFailed. The
         program is ended if the job is cancelled or `watch` raises.
         """
-        with tempfile.TemporaryFile() as log, started(words, folder, log) as process:
-            try:
-                while not ended(process):
-                    self.report(self.fraction, self.text)
-                    watch(text_of(log))
-            except BaseException:
-                end(process)
-                raise
+        with tempfile.TemporaryDirectory() as place:
+            log = os.path.join(place, "log")  # a file rather than a pipe, which blocks a program when it is full
+            with started(words, folder, log) as process:
+                try:
+                    while not ended(process):
+                        self.report(self.fraction, self.text)
+                        watch(text_of(log))
+                except BaseException:
+                    end(process)
+                    raise
             text = text_of(log)
         if process.returncode not in accepted:
             raise JobFailed(failure_text(words[0], process.returncode, text))
@@ -84,8 +86,9 @@ class Job:
 
 def started(words, folder, log):
     try:
-        return subprocess.Popen([str(word) for word in words], cwd=folder, stdin=subprocess.DEVNULL, stdout=log,
-                                stderr=subprocess.STDOUT, creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0))
+        with open(log, "wb") as output:
+            return subprocess.Popen([str(word) for word in words], cwd=folder, stdin=subprocess.DEVNULL, stdout=output,
+                                    stderr=subprocess.STDOUT, creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0))
     except OSError as error:
         raise JobFailed(f"{words[0]} cannot be started: {error.strerror}") from error
 
@@ -108,8 +111,8 @@ def end(process):
 
 
 def text_of(log):
-    log.seek(0)
-    return log.read().decode("utf-8", errors="replace")
+    with open(log, encoding="utf-8", errors="replace") as file:
+        return file.read()
 
 
 def failure_text(program, code, text):

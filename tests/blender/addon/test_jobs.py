@@ -32,7 +32,16 @@ def python(code):
 
 
 def test_the_text_of_a_program_comes_back():
-    assert finished(python("print('böse')")).result.strip() in ("böse", "b\ufffd\ufffdse", "b\ufffdse")
+    assert finished(python("import sys; sys.stdout.buffer.write('böse'.encode())")).result == "böse"
+    assert finished(python("import sys; sys.stdout.buffer.write(bytes([255]))")).result == "\ufffd"
+
+
+def test_the_text_is_seen_while_the_program_runs_and_is_whole_afterwards():
+    code = "import time\nfor i in range(20): print('line', i, flush=True); time.sleep(0.02)"
+    seen = []
+    job = finished(lambda job: job.run_program([sys.executable, "-c", code], os.getcwd(), seen.append))
+    assert job.result.splitlines() == [f"line {i}" for i in range(20)]
+    assert any(0 < len(text.splitlines()) < 20 for text in seen)
 
 
 def test_a_program_that_fails_tells_why():
