@@ -23,10 +23,12 @@ def matrix_rows(matrix):
 
 def import_volume(path):
     """Imports a file, or all files of a sequence, and returns the object."""
-    files = sorted(glob.glob(path.replace("#", "[0-9]"))) if "#" in path else [path]
+    folder, name = os.path.split(path)
+    pattern = os.path.join(glob.escape(folder), name.replace("#", "[0-9]"))
+    files = sorted(glob.glob(pattern)) if "#" in name else [path]
     bpy.ops.object.volume_import(
         filepath=files[0],
-        directory=os.path.dirname(path),
+        directory=folder,
         files=[{"name": os.path.basename(file)} for file in files],
         use_sequence_detection=True,
         align="WORLD",

@@ -78,7 +78,7 @@ def input_words(source):
         raise jobs.JobFailed(f"{source.path}: the name has no number of a frame")
     first, last = source.frames
     pattern = match["head"] + places_for(match["digits"]) + match["tail"]
-    return [os.path.join(folder, pattern), "--frames", f"{first}-{last}"]
+    return [os.path.join(folder, pattern), "--frames", f"{first}-{last}", "--missing", "skip"]  # as Blender shows it
 
 
 def tell_progress(job, log):

@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 import pytest
-from conftest import FRAMES, Programs
+from conftest import BUILD, FRAMES, Programs
 
 HERE = pathlib.Path(__file__).resolve().parent
 PACK = HERE.parents[2] / "integrations/blender/pack.py"
@@ -20,7 +20,8 @@ class Blender:
     def __init__(self, folder):
         self.folder = folder
         self.cache = folder / "decoded files"
-        self.environment = {**os.environ, "BLENDER_USER_SCRIPTS": str(folder / "scripts"),
+        modules = os.pathsep.join([str(BUILD / "python"), os.environ.get("PYTHONPATH", "")])
+        self.environment = {**os.environ, "PYTHONPATH": modules, "BLENDER_USER_SCRIPTS": str(folder / "scripts"),
                             "BLENDER_USER_CONFIG": str(folder / "config"), "XDG_CACHE_HOME": str(folder / "home")}
         for name in ("scripts", "config"):
             (folder / name).mkdir()
