@@ -66,9 +66,13 @@ def pictures(esvr, vdb, folder):
     render_pictures.set_up_cycles(scene)
     render_pictures.set_up_picture(scene)
     material = render_pictures.set_up_scene(scene, vdb, render_pictures.DENSITY)
-    first = render_pictures.render(scene, material, import_facts.import_volume(vdb), os.path.join(folder, "vdb.exr"))
-    second = render_pictures.render(scene, material, import_esvr(esvr), os.path.join(folder, "esvr.exr"))
-    return {"differences": sum(a != b for a, b in zip(first, second)), "lit": sum(value > 0.1 for value in first)}
+    def render(volume, name):
+        return render_pictures.render(scene, material, volume, os.path.join(folder, name))
+
+    first, again = (render(import_facts.import_volume(vdb), name) for name in ("vdb.exr", "again.exr"))
+    imported = render(import_esvr(esvr), "esvr.exr")
+    return {"psnr": render_pictures.psnr(first, imported), "psnr_of_again": render_pictures.psnr(first, again),
+            "psnr_of_black": render_pictures.psnr(first, [0.0] * len(first))}
 
 
 def chosen_files(folder, names):

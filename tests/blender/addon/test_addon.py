@@ -112,7 +112,9 @@ def test_a_volume_of_houdini_is_turned(blender, data, tmp_path):
 
 def test_a_picture_is_that_of_the_vdb_file(blender, files, vdb, tmp_path):
     result = blender.run("pictures", esvr=files.file, vdb=vdb, folder=tmp_path)
-    assert result["differences"] == 0 and result["lit"] > 1000
+    # Two pictures of one file have about 108 dB, because Cycles rounds differently in each.
+    assert result["psnr"] > 90 and result["psnr_of_again"] > 90
+    assert result["psnr_of_black"] < 30
 
 
 def test_part_of_a_file_is_imported(blender, files, tmp_path):
