@@ -60,19 +60,16 @@ def facts(esvr, vdb, options):
             "shown": shown(volume)}
 
 
-def pictures(esvr, vdb, folder):
+def picture(shown, camera_of, output):
+    """The numbers of a picture of a file, .vdb or .esvr, from the camera that is placed for a .vdb file."""
     render_pictures.SIDE, render_pictures.SAMPLES = SIDE, SAMPLES
     scene = bpy.context.scene
     render_pictures.set_up_cycles(scene)
     render_pictures.set_up_picture(scene)
-    material = render_pictures.set_up_scene(scene, vdb, render_pictures.DENSITY)
-    def render(volume, name):
-        return render_pictures.render(scene, material, volume, os.path.join(folder, name))
-
-    first, again = (render(import_facts.import_volume(vdb), name) for name in ("vdb.exr", "again.exr"))
-    imported = render(import_esvr(esvr), "esvr.exr")
-    return {"psnr": render_pictures.psnr(first, imported), "psnr_of_again": render_pictures.psnr(first, again),
-            "psnr_of_black": render_pictures.psnr(first, [0.0] * len(first))}
+    material = render_pictures.set_up_scene(scene, camera_of, render_pictures.DENSITY)
+    volume = import_esvr(shown) if shown.endswith(".esvr") else import_facts.import_volume(shown)
+    volume.name = volume.data.name = "shown"  # Cycles draws another name with other random numbers
+    return render_pictures.render(scene, material, volume, output)
 
 
 def chosen_files(folder, names):
@@ -117,8 +114,11 @@ def open_without_source(esvr, blend):
     return {"grids": len(import_facts.facts_of(volume)["grids"]), "error": call(bpy.ops.esvr.reload)}
 
 
-def export(vdb, esvr, options):
-    import_facts.import_volume(vdb)
+def export(vdb, esvr, options, frames=None):
+    """`frames` is the number of frames, because Blender's import ends a sequence at the first gap."""
+    volume = import_facts.import_volume(vdb)
+    if frames:
+        volume.data.frame_duration = frames
     return {"error": call(bpy.ops.export_volume.esvr, filepath=esvr, **options)}
 
 

@@ -110,11 +110,12 @@ def test_a_volume_of_houdini_is_turned(blender, data, tmp_path):
     assert result["esvr"]["matrix_world"][1][1] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_picture_is_that_of_the_vdb_file(blender, files, vdb, tmp_path):
-    result = blender.run("pictures", esvr=files.file, vdb=vdb, folder=tmp_path)
-    # Two pictures of one file have about 108 dB, because Cycles rounds differently in each.
-    assert result["psnr"] > 90 and result["psnr_of_again"] > 90
-    assert result["psnr_of_black"] < 30
+def test_a_picture_is_that_of_the_vdb_file(blender, files, tmp_path):
+    plume, direct = files.folder / f"n.{FRAMES[-1]:04d}.esvr", tmp_path / "direct.vdb"
+    Programs.run(Programs.esvr2vdb, plume, direct)
+    first, second = (blender.run("picture", shown=shown, camera_of=direct, output=tmp_path / f"{shown.name}.exr")
+                     for shown in (direct, plume))
+    assert first == second and max(first) > 0.5
 
 
 def test_part_of_a_file_is_imported(blender, files, tmp_path):
@@ -192,7 +193,8 @@ def test_an_export_gives_a_file(blender, files, tmp_path, options):
 
 def test_an_export_of_a_sequence_gives_one_file(blender, files, tmp_path):
     pattern = files.folder / "s_####.vdb"
-    assert blender.run("export", vdb=pattern, esvr=tmp_path / "a.esvr", options={}) == {"error": ""}
+    frames = FRAMES[-1] - FRAMES[0] + 1
+    assert blender.run("export", vdb=pattern, esvr=tmp_path / "a.esvr", options={}, frames=frames) == {"error": ""}
     assert f"{len(FRAMES)} frames" in Programs.run(Programs.esvr2vdb, "--list", tmp_path / "a.esvr")
 
 
