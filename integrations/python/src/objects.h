@@ -55,6 +55,7 @@ struct SavedPart {
 /// Writes the voxels of all grids of a file to a .vdb or .nvdb file.
 /// \return the names of the carried grids that were left out because they cannot be cut
 /// \throws UsageError  the box is empty, or a number is 0
+/// \throws BadInput  all grids would be left out
 std::vector<std::string> saveFile(const File& file, const std::filesystem::path& path,
                                   const SavedPart& part, bool overwrite);
 

@@ -54,6 +54,8 @@ Chosen choose(const EsvrFile& file, const SavedPart& part) {
       chosen.leftOut.push_back(nameOf(file, grid));
     else
       chosen.grids.push_back(grid);
+  if (chosen.grids.empty() && !chosen.leftOut.empty())
+    throw BadInput("no grid is left to write, because carried grids cannot be cut");
   return chosen;
 }
 
