@@ -7,13 +7,10 @@ import pytest
 import esvr
 from esvr import _openvdb
 
-vdb = None
-for name in _openvdb.MODULES:
-    try:
-        vdb = __import__(name)
-        break
-    except ImportError:
-        pass
+try:
+    vdb = _openvdb.openvdb()
+except ImportError:
+    vdb = None
 needs_openvdb = pytest.mark.skipif(vdb is None, reason="OpenVDB's Python module is missing (Debian: python3-openvdb)")
 
 
@@ -135,6 +132,14 @@ def test_a_voxel_that_is_not_finite_is_named():
     grid.getAccessor().setValueOn((1, 2, 3), float("nan"))
     with pytest.raises(esvr.BadInput, match=r"\(1, 2, 3\)"):
         esvr.Volume.from_pyopenvdb(grid)
+
+
+@needs_openvdb
+def test_a_folder_with_the_name_of_the_module_is_passed_over(volume, tmp_path, monkeypatch):
+    (tmp_path / "openvdb").mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "openvdb", raising=False)
+    assert volume.to_pyopenvdb().name == "density"
 
 
 def test_without_openvdb_the_package_is_named(volume, monkeypatch):

@@ -108,10 +108,10 @@ class ReloadESVR(JobOperator, bpy.types.Operator):
     bl_label = "Reload"
     bl_options = {"UNDO"}
 
-    volumes: StringProperty(description="Names of volumes on lines of their own; that of the active object if empty",
-                            options={"HIDDEN", "SKIP_SAVE"})
+    names: StringProperty(description="Names of volumes on lines of their own; that of the active object if empty",
+                          options={"HIDDEN", "SKIP_SAVE"})
 
-    _names = ()
+    _changed = ()
 
     def execute(self, context):
         requests = {}
@@ -123,17 +123,17 @@ class ReloadESVR(JobOperator, bpy.types.Operator):
                 self.report({"ERROR"}, f"{volume.name}: {error}")
         if not requests:
             return {"FINISHED"}
-        self._names = list(requests)  # names, because a volume may be removed in the meantime
+        self._changed = list(requests)  # names, because a volume may be removed in the meantime
         return self.run(context, Job(lambda job: decode_all(job, requests.values())))
 
     def finish(self, context, result):
-        for name, entry in zip(self._names, result):
+        for name, entry in zip(self._changed, result):
             if name in bpy.data.volumes and not isinstance(entry, JobFailed):
                 volumes.show(bpy.data.volumes[name], entry)
         return report_failures(self, result)
 
     def _wanted(self, context):
-        names = self.volumes.split("\n") if self.volumes else []
+        names = self.names.split("\n") if self.names else []
         active = context.active_object
         if not names and active and active.type == "VOLUME":
             names = [active.data.name]
@@ -211,8 +211,7 @@ class ExportESVR(JobOperator, bpy.types.Operator, ExportHelper):
     def execute(self, context):
         try:
             wanted = Export(preferences.exporter(), input_of(context.active_object.data),
-                            absolute(self.filepath), self._goal(), self.topology,
-                            self.representation)
+                            absolute(self.filepath), self._goal(), self.topology, self.representation)
         except JobFailed as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -240,7 +239,7 @@ def input_of(volume):
     """The files of a volume."""
     if not volume.filepath:
         raise JobFailed(f"The volume '{volume.name}' has no .vdb file")
-    path = os.path.abspath(bpy.path.abspath(volume.filepath, library=volume.library))
+    path = absolute(volume.filepath, volume.library)
     if not volume.is_sequence:
         return Input(path)
     return Input(path, (volume.frame_offset + 1, volume.frame_offset + volume.frame_duration))

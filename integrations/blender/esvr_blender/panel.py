@@ -46,7 +46,7 @@ class DATA_PT_esvr(bpy.types.Panel):
             layout.prop(properties, "frame_first")
             layout.prop(properties, "frame_last")
         layout.label(text=state_of(context.volume))
-        layout.operator("esvr.reload", icon="FILE_REFRESH").volumes = context.volume.name
+        layout.operator("esvr.reload", icon="FILE_REFRESH").names = context.volume.name
 
 
 def register():

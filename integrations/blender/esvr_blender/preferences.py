@@ -51,8 +51,10 @@ def get():
     return bpy.context.preferences.addons[__package__].preferences
 
 
-def absolute(path):
-    return os.path.abspath(bpy.path.abspath(path)) if path else ""
+def absolute(path, library=None):
+    """An absolute path; empty for an empty one. `library` is the .blend file that a relative path belongs to, if it is not
+    the opened one."""
+    return os.path.abspath(bpy.path.abspath(path, library=library)) if path else ""
 
 
 def cache_root():

@@ -16,7 +16,7 @@ def is_ours(volume):
 
 
 def source_of(volume):
-    return Source(preferences.absolute(volume.esvr.source))
+    return Source(preferences.absolute(volume.esvr.source, volume.library))
 
 
 def request_of(volume):
@@ -24,7 +24,7 @@ def request_of(volume):
 
 
 def shown_folder(volume):
-    return os.path.dirname(preferences.absolute(volume.filepath))
+    return os.path.dirname(preferences.absolute(volume.filepath, volume.library))
 
 
 def is_current(volume):

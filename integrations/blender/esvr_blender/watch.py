@@ -29,7 +29,7 @@ def reload_waiting():
     windows = bpy.context.window_manager.windows
     if names and windows:
         with bpy.context.temp_override(window=windows[0]):
-            bpy.ops.esvr.reload("INVOKE_DEFAULT", volumes="\n".join(names))
+            bpy.ops.esvr.reload("INVOKE_DEFAULT", names="\n".join(names))
     return None
 
 
@@ -38,7 +38,7 @@ def reload_after_load(*_):
     names = [volume.name for volume in bpy.data.volumes if volume.esvr.source]
     if bpy.app.background and names:
         try:
-            bpy.ops.esvr.reload(volumes="\n".join(names))
+            bpy.ops.esvr.reload(names="\n".join(names))
         except RuntimeError as error:  # the scene is opened all the same
             print(error)
     for name in names:

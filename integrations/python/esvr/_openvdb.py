@@ -17,10 +17,13 @@ def openvdb():
     """OpenVDB's module."""
     for name in MODULES:
         try:
-            return importlib.import_module(name)
+            module = importlib.import_module(name)
         except ModuleNotFoundError as missing:
             if missing.name != name:
                 raise
+        else:
+            if hasattr(module, "FloatGrid"):  # otherwise it is a folder of this name, which Python takes for a package
+                return module
     raise ImportError("OpenVDB's Python module is not installed (Debian and Ubuntu: python3-openvdb)")
 
 
