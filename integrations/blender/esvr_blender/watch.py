@@ -29,18 +29,34 @@ def reload_waiting():
     windows = bpy.context.window_manager.windows
     if names and windows:
         with bpy.context.temp_override(window=windows[0]):
-            bpy.ops.esvr.reload("INVOKE_DEFAULT", names="\n".join(names))
+            reload(names, "INVOKE_DEFAULT")
     return None
+
+
+def reload(names, context="EXEC_DEFAULT"):
+    """Errors do not stop Blender: volumes whose source is missing go on showing what was decoded."""
+    try:
+        bpy.ops.esvr.reload(context, names="\n".join(names))
+    except RuntimeError as error:
+        print(error)
+        if not bpy.app.background:
+            show_error(str(error))
+
+
+def show_error(text):
+    """Shows a text at the mouse, because nobody has called the operator and would see its report."""
+    def draw(menu, _):
+        for line in text.splitlines():
+            menu.layout.label(text=line)
+
+    bpy.context.window_manager.popup_menu(draw, title="ESVR", icon="ERROR")
 
 
 @persistent
 def reload_after_load(*_):
     names = [volume.name for volume in bpy.data.volumes if volume.esvr.source]
     if bpy.app.background and names:
-        try:
-            bpy.ops.esvr.reload(names="\n".join(names))
-        except RuntimeError as error:  # the scene is opened all the same
-            print(error)
+        reload(names)
     for name in names:
         schedule(name)
 

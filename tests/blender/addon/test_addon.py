@@ -47,7 +47,7 @@ class Blender:
     def _run(self, words, result):
         result.unlink(missing_ok=True)
         done = subprocess.run(words, text=True, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                              timeout=120)
+                              timeout=300)
         assert result.exists(), done.stdout
         return json.loads(result.read_text())
 
@@ -227,6 +227,7 @@ def test_in_a_window_changes_are_decoded_and_escape_cancels(blender, files, tmp_
     assert result["import"] == ["RUNNING_MODAL"]
     assert result["first"] != result["second"] == result["third"]
     assert result["text"] == "Decoding two words"
+    assert "two words.esvr.missing: there is no such file" in result["error"]
 
 
 def test_a_disabled_add_on_leaves_nothing(blender):

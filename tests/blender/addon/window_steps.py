@@ -19,9 +19,19 @@ bpy.ops.preferences.addon_enable(module=ADDON)
 preferences = bpy.context.preferences.addons[ADDON].preferences
 for name, value in arguments["preferences"].items():
     setattr(preferences, name, value)
-from esvr_blender import modal  # noqa: E402 (enabling the add-on makes it known)
+from esvr_blender import modal, watch  # noqa: E402 (enabling the add-on makes them known)
 
 result = {}
+errors = []  # that are shown in a window
+show_error = watch.show_error
+
+
+def noted_error(text):
+    errors.append(text)
+    show_error(text)
+
+
+watch.show_error = noted_error
 
 
 def window():
@@ -58,6 +68,9 @@ def story():
     press_escape()
     yield lambda: not modal.running and not leftovers()
     result["third"] = volume.filepath
+    volume.esvr.source = arguments["esvr"] + ".missing"
+    yield lambda: errors
+    result["error"] = errors[0]
 
 
 def tick(steps=story(), wait=[lambda: True, 0]):
