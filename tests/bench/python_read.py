@@ -3,8 +3,8 @@
 
     PYTHONPATH=BUILD/python python3 tests/bench/python_read.py BUILD FILE.esvr [REPEATS]
 
-They take turns. Python has imported the module before; "new Python" is a new process that imports it, too. esvr2vdb is a
-new process each time, and writes a .vdb file into a temporary folder. Prints the medians and their quotients.
+They take turns. Python has imported the module before; "new Python" is a new process that imports it, too. esvr2vdb is
+a new process each time, and writes a .vdb file into a temporary folder. Prints the medians and their quotients.
 """
 import os
 import statistics

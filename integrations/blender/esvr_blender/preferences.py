@@ -52,8 +52,7 @@ def get():
 
 
 def absolute(path, library=None):
-    """An absolute path; empty for an empty one. `library` is the .blend file that a relative path belongs to, if it is not
-    the opened one."""
+    """An absolute path; empty for an empty one. A relative path belongs to the opened .blend file or to a library."""
     return os.path.abspath(bpy.path.abspath(path, library=library)) if path else ""
 
 

@@ -1,7 +1,8 @@
-"""Exchange with the grids of OpenVDB's own Python module, which is called openvdb since OpenVDB 12 and pyopenvdb before.
+"""Exchange with the grids of OpenVDB's own Python module, which is called openvdb since OpenVDB 12 and pyopenvdb
+before.
 
-A grid passes through a temporary .vdb file. The arrays of OpenVDB's module (copyToArray, copyFromArray) are dense, they do
-not tell active voxels from others, and a grid would lose its metadata and the transform of a frustum.
+A grid passes through a temporary .vdb file. The arrays of OpenVDB's module (copyToArray, copyFromArray) are dense, they
+do not tell active voxels from others, and a grid would lose its metadata and the transform of a frustum.
 """
 import importlib
 import os

@@ -42,7 +42,7 @@ class Blender:
         words, result = self.folder / "arguments.json", self.folder / "result.json"
         words.write_text(json.dumps({"preferences": self.preferences, **arguments}, default=str))
         return self._run(["xvfb-run", "-a", "-s", "-screen 0 1024x768x24", "blender", "--factory-startup",
-                          "--enable-event-simulate", "--python", HERE / "window_steps.py", "--", words, result], result)
+                          "--enable-event-simulate", "--python-exit-code", "1", "--python", HERE / "window_steps.py", "--", words, result], result)
 
     def _run(self, words, result):
         result.unlink(missing_ok=True)
@@ -119,7 +119,8 @@ def test_a_picture_is_that_of_the_vdb_file(blender, files, tmp_path):
 
 
 def test_part_of_a_file_is_imported(blender, files, tmp_path):
-    Programs.run(Programs.esvr2vdb, files.file, tmp_path / "part.vdb", "--bbox", "3,3,3,12,12,12", "--max-ellipsoids", "30")
+    part = ["--bbox", "3,3,3,12,12,12", "--max-ellipsoids", "30"]
+    Programs.run(Programs.esvr2vdb, files.file, tmp_path / "part.vdb", *part)
     options = {"use_box": True, "box_min": (3, 3, 3), "box_max": (12, 12, 12), "max_ellipsoids": 30}
     result = blender.run("facts", esvr=files.file, vdb=tmp_path / "part.vdb", options=options)
     assert result["esvr"] == result["vdb"]
@@ -139,7 +140,8 @@ def test_a_sequence_in_one_file_shows_its_frames(blender, files, tmp_path, decod
 
 
 def test_numbered_files_that_are_chosen_together_are_a_sequence(blender, files):
-    result = blender.run("chosen_files", folder=f"{files.folder}/", names=["n.0007.esvr", "n.0008.esvr", "two words.esvr"])
+    names = ["n.0007.esvr", "n.0008.esvr", "two words.esvr"]
+    result = blender.run("chosen_files", folder=f"{files.folder}/", names=names)
     sequence, single = sorted(result, key=lambda volume: volume["name"])
     assert sequence["source"] == files.numbered and sequence["sequence"]["frame_duration"] == 2
     assert [frame["error"] for frame in sequence["sequence"]["frames"]] == ["", ""]
@@ -182,7 +184,8 @@ def test_before_the_first_save_files_are_in_the_cache_of_the_user(blender, files
     assert result["shown"]["file"].startswith(str(tmp_path / "home/esvr_blender"))
 
 
-@pytest.mark.parametrize("options", [{}, {"goal": "LOSSLESS"}, {"goal": "MAX_ERROR", "max_error": 2.0, "topology": "exact"}])
+@pytest.mark.parametrize("options", [{}, {"goal": "LOSSLESS"},
+                                     {"goal": "MAX_ERROR", "max_error": 2.0, "topology": "exact"}])
 def test_an_export_gives_a_file(blender, files, tmp_path, options):
     output = tmp_path / "ein Würfel.esvr"
     assert blender.run("export", vdb=files.vdb, esvr=output, options=options) == {"error": ""}
@@ -212,7 +215,8 @@ def test_a_missing_program_is_an_error_that_names_it(blender, files, tmp_path):
     missing = {"esvr2vdb": "/no/such/esvr2vdb", "vdb2esvr": "/no/such/vdb2esvr"}
     result = blender.run("refused", missing, esvr=files.file)
     assert "/no/such/esvr2vdb" in result["error"] and result["volumes"] == 0
-    assert "/no/such/vdb2esvr" in blender.run("export", missing, vdb=files.vdb, esvr=tmp_path / "a.esvr", options={})["error"]
+    result = blender.run("export", missing, vdb=files.vdb, esvr=tmp_path / "a.esvr", options={})
+    assert "/no/such/vdb2esvr" in result["error"]
 
 
 def test_clearing_the_cache_keeps_what_is_shown(blender, files):

@@ -1,4 +1,4 @@
-"""Names of cached folders follow from everything that decides about their content, and folders are complete or not there."""
+"""Names of cached folders follow from everything that decides about their content; folders are complete or not there."""
 import os
 
 import pytest

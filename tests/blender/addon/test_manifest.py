@@ -1,4 +1,4 @@
-"""The manifest follows the rules of Blender's documentation, and agrees with bl_info and with the version of the project."""
+"""The manifest follows the rules of Blender's documentation, and agrees with bl_info and the version of the project."""
 import pathlib
 import tomllib
 

@@ -2,7 +2,7 @@
 
     blender --factory-startup --enable-event-simulate --python window_steps.py -- ARGUMENTS.json RESULT.json
 
-The arguments are `preferences`, the file `esvr`, and `slow`, a program that takes the place of esvr2vdb and does not end.
+The arguments are `preferences`, the file `esvr`, and `slow`, a program that stands for esvr2vdb and does not end.
 """
 import json
 import os
