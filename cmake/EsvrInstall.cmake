@@ -52,6 +52,14 @@ install(
   DESTINATION ${packageDir}
   COMPONENT library)
 
+# A shared library loads this module; of a static one, the programs do.
+if(TARGET esvr_vdb)
+  set(component programs)
+  if(NOT ESVR_STATIC)
+    set(component library)
+  endif()
+  install(TARGETS esvr_vdb LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${component})
+endif()
 if(TARGET esvr_mpi)
   install(TARGETS esvr_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT programs)
 endif()

@@ -158,7 +158,8 @@ def commands(tools):
     small = tools.folder / "small.esvr"
     run([tools.program("vdb2esvr"), tools.sample("plume", 96), small, "--device", "cpu", "--force", "--quiet"]
         + ELLIPSOIDS + DRAFT)
-    words = {"esvr2vdb --list": ["esvr2vdb", "--list", small], "esvr2vdb --check": ["esvr2vdb", "--check", small]}
+    words = {"esvr2vdb --list": ["esvr2vdb", "--list", small], "esvr2vdb --check": ["esvr2vdb", "--check", small],
+             "esvr2vdb --list of a .vdb file": ["esvr2vdb", "--list", tools.sample("plume", 96)]}
     words.update({f"{p} --help": [p, "--help"] for p in ["esvr2vdb", "vdb2esvr", "esvr-render", "esvr-compare"]})
     full = {name: [str(tools.program(w[0])), *map(str, w[1:])] for name, w in words.items()}
     full.update({f"an empty program{text}": [str(empty_program(tools, libraries))]
@@ -305,9 +306,8 @@ def starts(files):
         text += f"\nOn a machine with a GPU: **{NOT_MEASURED}**, because `docs/economy/cuda.json` does not exist.\n"
     return "## Start of the programs, and the GPU\n\n" + paragraph(
         f"Median of {RUNS} runs, process start included. `--list` and `--check` read a small file of ellipsoids. The CUDA "
-        "driver is loaded when a device is selected, and not before. No command of the table initialises OpenVDB, but all programs are "
-        "linked with libopenvdb, whose relocation by the dynamic linker takes most of the time: an empty program that is "
-        "linked with it takes about as long.") + text
+        "driver is loaded when a device is selected, and OpenVDB when a VDB file or a carried grid is read or written, and "
+        "not before. An empty program that is linked with libopenvdb shows what loading it costs.") + text
 
 
 INTRODUCTION = """\
