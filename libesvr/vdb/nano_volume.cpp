@@ -23,9 +23,11 @@ openvdb::GridBase::Ptr asFloats(const VolumeGrid& from) {
   return vdb::makeOpenVdbGrid(grid, options);
 }
 
+std::size_t bytesOf(const vdb::NanoHandle& handle) { return handle.buffer().size(); }
+
 std::shared_ptr<const std::byte[]> copied(const vdb::NanoHandle& handle) {
-  auto* bytes = static_cast<std::byte*>(::operator new[](handle.size(), kAlignment));
-  std::memcpy(bytes, handle.data(), handle.size());
+  auto* bytes = static_cast<std::byte*>(::operator new[](bytesOf(handle), kAlignment));
+  std::memcpy(bytes, handle.data(), bytesOf(handle));
   return {bytes,
           [](const std::byte* p) { ::operator delete[](const_cast<std::byte*>(p), kAlignment); }};
 }
@@ -44,7 +46,7 @@ Box leavesOf(const SparseVolume& volume) {
 NanoVolume makeNanoVolume(const VolumeGrid& grid, NanoValues values) {
   vdb::initializeOpenVdb();
   const auto handle = vdb::makeNano(*asFloats(grid), {values});
-  return {values, copied(handle), handle.size(), grid.volume.background, leavesOf(grid.volume)};
+  return {values, copied(handle), bytesOf(handle), grid.volume.background, leavesOf(grid.volume)};
 }
 
 }  // namespace esvr
