@@ -14,6 +14,7 @@ function(list_component component)
   endif()
   file(GLOB_RECURSE found RELATIVE ${scratch}/${component} ${scratch}/${component}/*)
   list(REMOVE_ITEM found share/doc/esvr/LICENSE)
+  list(FILTER found EXCLUDE REGEX "^share/esvr/") # add-ons of other programs, which builds may leave out
   set(files ${found} PARENT_SCOPE)
 endfunction()
 
@@ -53,6 +54,6 @@ check(programs ${binaries} ${pages} ${completions} "share/bash-completion/comple
       "share/man/man1/esvr-compare-[a-z]+[.]1(.gz)?" "share/man/man5/esvr[.]5(.gz)?"
       "share/zsh/(site-functions|vendor-completions)/_esvr")
 if(withPython)
-  check(python "lib/python3/dist-packages/esvr/(__init__[.]py|_html[.]py|_core[.]pyi|py[.]typed)"
+  check(python "lib/python3/dist-packages/esvr/([a-z_]+[.]py|_core[.]pyi|py[.]typed)"
         "lib/python3/dist-packages/esvr/_core[.][a-z0-9_-]+[.]so")
 endif()
