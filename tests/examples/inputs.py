@@ -53,13 +53,13 @@ def ball():
 
 
 def tiff_page(side, at):
-    """A page of bytes of a TIFF file that begins at a byte, without a page after it."""
-    entries = [(256, side), (257, side), (258, 8), (262, 1), (273, at + 8 + 12 * 8), (277, 1),
-               (278, side), (279, side * side)]
+    """A page of 16-bit values of a TIFF file that begins at a byte, without a page after it."""
+    entries = [(256, side), (257, side), (258, 16), (262, 1), (273, at + 8 + 12 * 8), (277, 1),
+               (278, side), (279, 2 * side * side)]
     directory = struct.pack("<H", len(entries))
     directory += b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in entries)
     directory += struct.pack("<I", 0)
-    return directory.ljust(8 + 12 * 8, b"\0") + bytes([200]) * (side * side)
+    return directory.ljust(8 + 12 * 8, b"\0") + struct.pack("<H", 400) * (side * side)
 
 
 def tiff():
