@@ -44,9 +44,8 @@ def quickened(words):
 
 def output_of(words):
     """The output of a converter is its second word, after the input."""
-    if words[0] in CONVERTERS and len(words) > 2 and not words[2].startswith("-"):
-        return words[2]
-    return None
+    begins_with_files = len(words) > 2 and not any(word.startswith("-") for word in words[1:3])
+    return words[2] if words[0] in CONVERTERS and begins_with_files else None
 
 
 def serve(words, folder):
