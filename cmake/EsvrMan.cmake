@@ -2,8 +2,8 @@
 # format, esvr(5), from docs/format.md. Packages have compressed pages.
 set(manPages)
 
-# esvr_man_file(<page> COMMAND <command>... DEPENDS <files>...) makes a page in the folder of its section by a command that
-# prints it.
+# esvr_man_file(<page> COMMAND <command>... DEPENDS <files>...) makes a page in the folder of its
+# section by a command that prints it.
 function(esvr_man_file page)
   cmake_parse_arguments(PARSE_ARGV 1 man "" "" "COMMAND;DEPENDS")
   string(REGEX MATCH "[0-9]$" section ${page})

@@ -28,7 +28,7 @@ run(${CMAKE_COMMAND} -S ${consumer} -B ${scratch}/build -G ${generator}
     -D CMAKE_DISABLE_FIND_PACKAGE_CUDAToolkit=ON)
 run(${CMAKE_COMMAND} --build ${scratch}/build)
 run(${scratch}/build/consumer)
-set(byCMake ${out})
+set(byCMake "${out}")
 if(expectCuda)
   set(expected "active box (-2, 5, 10) to (14, 5, 10), CUDA built in, package says TRUE\n")
 else()
