@@ -3,13 +3,15 @@
 
 Each example runs in a shell, in a folder of its own that has the files which the example reads
 (inputs.py). A name that inputs.py does not know is an error of the program that is run. Numbers that
-set the amount of work are replaced by smaller ones, and nothing else is changed. An example must exit
-with 0, and a converter must write a file.
+set the amount of work are replaced by smaller ones, pictures are small, and nothing else is changed. An
+example must exit with 0, and a converter must write a file. Where ffmpeg is missing, a line says that
+examples of videos were not run.
 """
 import os
 import pathlib
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -39,7 +41,8 @@ def quickened(words):
         quick.update({"--resolution": "48", "--frames": str(FRAMES)})
     else:
         quick["--frames"] = f"1-{FRAMES}"
-    return [quick.get(before, word) for before, word in zip([""] + words, words)]
+    picture = ["--resolution", "64x64"] if words[0] == "esvr-render" else []
+    return [quick.get(before, word) for before, word in zip([""] + words, words)] + picture
 
 
 def output_of(words):
@@ -75,12 +78,18 @@ def run(words, folder):
 
 def check(example, inputs, folder):
     words = quickened(shlex.split(example, comments=True))
+    if any(word.endswith(".mp4") for word in words) and not shutil.which("ffmpeg"):
+        print(f"not run, because ffmpeg is missing: {example}")
+        return True
     is_sequence = any("#" in word for word in words)
     for word in words[1:]:
         for name in re.split("[=: ]", word):
             if name != output_of(words):
                 inputs.provide(name, folder, is_sequence)
-    wrong = run(words, folder)
+    try:
+        wrong = run(words, folder)
+    except subprocess.TimeoutExpired:
+        wrong = f"it took more than {LIMIT_S} s"
     print(f"{'FAILED' if wrong else 'ok'}: {example}" + (f"\n{shlex.join(words)}: {wrong}" if wrong else ""))
     return not wrong
 
