@@ -24,9 +24,11 @@ openvdb::GridBase::Ptr asFloats(const VolumeGrid& from) {
   return makeOpenVdbGrid(grid, options);
 }
 
+std::size_t bytesOf(const NanoHandle& handle) { return handle.buffer().size(); }
+
 std::shared_ptr<const std::byte[]> copied(const NanoHandle& handle) {
-  auto* bytes = static_cast<std::byte*>(::operator new[](handle.size(), kAlignment));
-  std::memcpy(bytes, handle.data(), handle.size());
+  auto* bytes = static_cast<std::byte*>(::operator new[](bytesOf(handle), kAlignment));
+  std::memcpy(bytes, handle.data(), bytesOf(handle));
   return {bytes,
           [](const std::byte* p) { ::operator delete[](const_cast<std::byte*>(p), kAlignment); }};
 }
@@ -45,7 +47,7 @@ Box leavesOf(const SparseVolume& volume) {
 NanoVolume OpenVdb::makeNanoVolume(const VolumeGrid& grid, NanoValues values) const {
   initializeOpenVdb();
   const auto handle = makeNano(*asFloats(grid), {values});
-  return {values, copied(handle), handle.size(), grid.volume.background, leavesOf(grid.volume)};
+  return {values, copied(handle), bytesOf(handle), grid.volume.background, leavesOf(grid.volume)};
 }
 
 }  // namespace esvr::vdb
