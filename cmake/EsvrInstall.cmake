@@ -55,7 +55,7 @@ install(
 if(TARGET esvr_mpi)
   install(TARGETS esvr_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT programs)
 endif()
-set(ESVR_PROGRAMS vdb2esvr esvr2vdb esvr-render esvr-view esvr-compare esvr-sample swc2vdb raw2vdb)
+set(ESVR_PROGRAMS vdb2esvr esvr2vdb esvr-render esvr-view esvr-compare esvr-sample swc2vdb image2vdb)
 foreach(program ${ESVR_PROGRAMS})
   if(TARGET ${program})
     install(TARGETS ${program} COMPONENT programs)

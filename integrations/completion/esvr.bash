@@ -12,4 +12,4 @@ _esvr() {
   [[ $word == -* ]] || return # files are completed by the shell
   mapfile -t COMPREPLY < <(compgen -W "$("$program" $command --help options 2> /dev/null)" -- "$word")
 }
-complete -o default -F _esvr vdb2esvr esvr2vdb esvr-render esvr-view esvr-compare esvr-sample swc2vdb raw2vdb
+complete -o default -F _esvr vdb2esvr esvr2vdb esvr-render esvr-view esvr-compare esvr-sample swc2vdb image2vdb

@@ -1,4 +1,4 @@
-// raw2vdb: converts dense images (RAW and NRRD) to VDB.
+// image2vdb: converts dense images (RAW and NRRD) to VDB.
 
 #include <charconv>
 #include <limits>
@@ -23,24 +23,24 @@ namespace {
 using namespace esvr;
 namespace po = cli::po;
 
-constexpr const char* kName = "raw2vdb";
+constexpr const char* kName = "image2vdb";
 constexpr const char* kRawOptions[] = {"dims", "type", "endian", "skip", "voxel-size"};
 
 cli::CommandLine commandLine() {
   cli::CommandLine line(
       {.name = kName,
        .purpose = "Converts a dense image, RAW or NRRD, to a sparse VDB grid.",
-       .usage = "  raw2vdb IN.raw OUT.vdb --dims X,Y,Z --type TYPE [options]\n"
-                "  raw2vdb IN.nrrd|IN.nhdr OUT.vdb [options]",
+       .usage = "  image2vdb IN.raw OUT.vdb --dims X,Y,Z --type TYPE [options]\n"
+                "  image2vdb IN.nrrd|IN.nhdr OUT.vdb [options]",
        .notes =
            "TYPE is uint8, int8, uint16, int16, uint32, int32, float32 or float64. In the file, x\n"
            "varies fastest. The values of the grid are 32-bit floats. A voxel is active if it is\n"
            "not below the threshold, or, without a threshold, if it differs from the background.\n"
            "The transform of the grid follows from the space directions, origin and spacings of\n"
            "an NRRD image.",
-       .examples = "  raw2vdb aneurism_256x256x256_uint8.raw aneurism.vdb --dims 256,256,256 \\\n"
+       .examples = "  image2vdb aneurism_256x256x256_uint8.raw aneurism.vdb --dims 256,256,256 \\\n"
                    "      --type uint8 --threshold 32 --normalise\n"
-                   "  raw2vdb ct.nhdr ct.vdb --threshold 300"});
+                   "  image2vdb ct.nhdr ct.vdb --threshold 300"});
   line.argument("input", "IN");
   line.argument("output", "OUT.vdb");
   // clang-format off

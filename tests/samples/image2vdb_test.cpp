@@ -1,4 +1,4 @@
-// Plan: raw2vdb is run as a separate process. The tests check RAW and NRRD images, their options,
+// Plan: image2vdb is run as a separate process. The tests check RAW and NRRD images, their options,
 // and the exit codes and messages of refused input.
 
 #include <gmock/gmock.h>
@@ -21,12 +21,12 @@ std::string ramp() {
   return bytes;
 }
 
-TEST(Raw2Vdb, bringsInRawWithThresholdAndNormalised) {
+TEST(Image2Vdb, bringsInRawWithThresholdAndNormalised) {
   const TemporaryFolder folder;
   test::writeText(folder / "a.raw", ramp());
   const std::string out = folder / "a.vdb";
   const auto run = runProgram(
-      RAW2VDB, {folder / "a.raw", out, "--dims", "4,3,2", "--type", "uint8", "--threshold", "100",
+      IMAGE2VDB, {folder / "a.raw", out, "--dims", "4,3,2", "--type", "uint8", "--threshold", "100",
                 "--normalise", "--voxel-size", "0.5", "--name", "ct"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const VolumeGrid grid = readGrid(out, "ct");
@@ -37,7 +37,7 @@ TEST(Raw2Vdb, bringsInRawWithThresholdAndNormalised) {
   EXPECT_EQ(grid.descriptor.transform.affine.value()[0], 0.5);
 }
 
-TEST(Raw2Vdb, bringsInNrrdWithItsTransform) {
+TEST(Image2Vdb, bringsInNrrdWithItsTransform) {
   const TemporaryFolder folder;
   test::writeText(folder / "a.raw", ramp());
   test::writeText(
@@ -45,7 +45,7 @@ TEST(Raw2Vdb, bringsInNrrdWithItsTransform) {
       "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 3 2\nencoding: raw\nspacings: 1 2 3\n"
       "data file: a.raw\n");
   const std::string out = folder / "a.vdb";
-  const auto run = runProgram(RAW2VDB, {folder / "a.nhdr", out});
+  const auto run = runProgram(IMAGE2VDB, {folder / "a.nhdr", out});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const VolumeGrid grid = readGrid(out, "density");
   EXPECT_EQ(activeVoxelCount(grid.volume), 23u) << "all but the voxel that is 0";
@@ -68,7 +68,7 @@ TEST_P(RefusedImage, leavesNoOutput) {
   std::vector<std::string> arguments{folder / GetParam().file, folder / "out.vdb"};
   const auto& options = GetParam().options;
   arguments.insert(arguments.end(), options.begin(), options.end());
-  const auto run = runProgram(RAW2VDB, arguments);
+  const auto run = runProgram(IMAGE2VDB, arguments);
   EXPECT_EQ(run.exitCode, GetParam().code) << run.err;
   EXPECT_THAT(run.err, HasSubstr(GetParam().message));
   EXPECT_THAT(folder.names(), testing::ElementsAre(GetParam().file));
@@ -106,19 +106,19 @@ INSTANTIATE_TEST_SUITE_P(
         RawRefusal{"a.nrrd", kFlatNrrd, {}, 3, "linearly dependent"},
         RawRefusal{"a.nrrd", kFlatNrrd, {"--dims", "1,1,1"}, 2, "--dims is for RAW"}));
 
-TEST(Raw2Vdb, refusesAnImageThatIsNotThere) {
+TEST(Image2Vdb, refusesAnImageThatIsNotThere) {
   const TemporaryFolder folder;
   const auto run = runProgram(
-      RAW2VDB, {folder / "none.raw", folder / "out.vdb", "--dims", "1,1,1", "--type", "uint8"});
+      IMAGE2VDB, {folder / "none.raw", folder / "out.vdb", "--dims", "1,1,1", "--type", "uint8"});
   EXPECT_EQ(run.exitCode, 3);
   EXPECT_THAT(run.err, HasSubstr("No such file"));
 }
 
-TEST(Raw2Vdb, replacesWhatIsNotFiniteWhenAskedAndSaysHowMuch) {
+TEST(Image2Vdb, replacesWhatIsNotFiniteWhenAskedAndSaysHowMuch) {
   const TemporaryFolder folder;
   test::writeText(folder / "a.raw", kNan + std::string("\0\0\x80\x3f", 4));
   const std::string out = folder / "a.vdb";
-  const auto run = runProgram(RAW2VDB, {folder / "a.raw", out, "--dims", "2,1,1", "--type",
+  const auto run = runProgram(IMAGE2VDB, {folder / "a.raw", out, "--dims", "2,1,1", "--type",
                                         "float32", "--nonfinite", "zero"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.err, HasSubstr("warning: 1 voxels"));
