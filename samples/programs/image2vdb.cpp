@@ -1,19 +1,23 @@
-// image2vdb: converts dense images (RAW and NRRD) to VDB.
+// image2vdb: converts dense images to VDB.
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <limits>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/command_line.h"
 #include "cli/interrupts.h"
+#include "cli/number_list.h"
 #include "cli/output.h"
 #include "cli/run_main.h"
 #include "cli/thread_limit.h"
-#include "images/image_source.h"
+#include "images/image_files.h"
+#include "images/image_format.h"
 #include "images/image_volume.h"
+#include "images/open_image.h"
 #include "kinds/density_grid.h"
 #include "programs/memory_limit.h"
 #include "programs/write_output.h"
@@ -24,25 +28,40 @@ using namespace esvr;
 namespace po = cli::po;
 
 constexpr const char* kName = "image2vdb";
-constexpr const char* kRawOptions[] = {"dims", "type", "endian", "skip", "voxel-size"};
+constexpr const char* kRawOptions[] = {"dims", "type", "endian", "skip"};
 
 cli::CommandLine commandLine() {
   cli::CommandLine line(
       {.name = kName,
-       .purpose = "Converts a dense image, RAW or NRRD, to a sparse VDB grid.",
-       .usage = "  image2vdb IN.raw OUT.vdb --dims X,Y,Z --type TYPE [options]\n"
-                "  image2vdb IN.nrrd|IN.nhdr OUT.vdb [options]",
+       .purpose = "Converts a dense image to a sparse VDB grid.",
+       .usage = "  image2vdb IN OUT.vdb [options]              TIFF, NIfTI, VTI, HDF5 or NRRD\n"
+                "  image2vdb SLICE.tif... OUT.vdb [options]    a TIFF file for each slice\n"
+                "  image2vdb IN.raw OUT.vdb --dims X,Y,Z --type TYPE [options]",
        .notes =
-           "TYPE is uint8, int8, uint16, int16, uint32, int32, float32 or float64. In the file, x\n"
-           "varies fastest. The values of the grid are 32-bit floats. A voxel is active if it is\n"
-           "not below the threshold, or, without a threshold, if it differs from the background.\n"
-           "The transform of the grid follows from the space directions, origin and spacings of\n"
-           "an NRRD image.",
-       .examples = "  image2vdb aneurism_256x256x256_uint8.raw aneurism.vdb --dims 256,256,256 \\\n"
-                   "      --type uint8 --threshold 32 --normalise\n"
-                   "  image2vdb ct.nhdr ct.vdb --threshold 300"});
+           samples::textOfFormats() +
+           "\nThe format of IN follows from its content, or else from its name. The slices of a "
+           "TIFF\n"
+           "stack are the pages of one file, files in the order given, the TIFF files of a "
+           "folder,\n"
+           "or those of a pattern such as 'slice_####.tif'. TYPE is uint8, int8, uint16, int16,\n"
+           "uint32, int32, uint64, int64, float16, float32 or float64; in a RAW file, x varies\n"
+           "fastest.\n\n"
+           "The values of the grid are 32-bit floats. A voxel is active if it is not below the\n"
+           "threshold, or, without a threshold, if it differs from the background. The transform\n"
+           "of the grid is that of the image: the space directions and origin of NRRD, sform or\n"
+           "qform of NIfTI, origin, spacing and direction of VTI, the sizes of voxels that ImageJ "
+           "or\n"
+           "OME wrote into TIFF, and element_size_um of HDF5.",
+       .examples =
+           "  image2vdb scan.tif scan.vdb\n"
+           "  image2vdb 'slices/ct_####.tif' ct.vdb --voxel-size 0.5,0.5,2 --threshold 300\n"
+           "  image2vdb brain.nii.gz brain.vdb --threshold 40\n"
+           "  image2vdb pressure.vti pressure.vdb --dataset p --background 1\n"
+           "  image2vdb cells.h5 cells.vdb --dataset /volumes/raw --normalise\n"
+           "  image2vdb aneurism_256x256x256_uint8.raw aneurism.vdb --dims 256,256,256 \\\n"
+           "      --type uint8 --threshold 32 --normalise"});
   line.argument("input", "IN");
-  line.argument("output", "OUT.vdb");
+  line.repeatedArgument("more");
   // clang-format off
   line.options().add_options()
     ("dims", po::value<std::string>()->value_name("X,Y,Z"), "RAW: number of voxels along each axis")
@@ -51,8 +70,12 @@ cli::CommandLine commandLine() {
      "RAW: byte order (default: little)")
     ("skip", po::value<std::int64_t>()->value_name("BYTES"),
      "RAW: length of a header (default: 0)")
-    ("voxel-size", po::value<double>()->value_name("S"),
-     "RAW: edge of a voxel in world units (default: 1)")
+    ("voxel-size", po::value<std::string>()->value_name("S|X,Y,Z"),
+     "edges of a voxel in world units, instead of the transform of the image")
+    ("component", po::value<std::int64_t>()->value_name("K"),
+     "which of several colors, channels, directions or times, from 0 on")
+    ("dataset", po::value<std::string>()->value_name("PATH"),
+     "HDF5: path of the dataset; VTI: name of the array")
     ("threshold", po::value<double>()->value_name("T"),
      "smallest value of active voxels, in the image's units")
     ("background", po::value<double>()->value_name("B")->default_value(0.0),
@@ -94,31 +117,48 @@ bool isSecond(const cli::Arguments& arguments, const std::string& option, const 
   return given == second;
 }
 
-samples::RawLayout layoutFrom(const cli::Arguments& arguments) {
-  if (!arguments.has("dims") || !arguments.has("type"))
-    throw UsageError(
-        "a RAW image needs --dims and --type (a file ending in .nrrd or .nhdr does not)");
+/// The edges of voxels that the user gives, as one number or three.
+std::optional<std::array<double, 3>> voxelSize(const cli::Arguments& arguments) {
   constexpr double kSmallest = 1e-4, kLargest = 1e30;  // OpenVDB treats volumes of 1e-15 as 0
-  const auto skip = arguments.find<std::int64_t>("skip").value_or(0);
-  cli::requireRange("skip", skip, std::int64_t{0}, std::numeric_limits<std::int64_t>::max());
-  samples::RawLayout layout{.size = parseDims(arguments.get<std::string>("dims")),
-                            .type = arguments.get<std::string>("type"),
-                            .bigEndian = isSecond(arguments, "endian", "little", "big"),
-                            .headerBytes = std::uint64_t(skip),
-                            .voxelSize = arguments.find<double>("voxel-size").value_or(1.0)};
-  cli::requireRange("voxel-size", layout.voxelSize, kSmallest, kLargest);
-  return layout;
+  constexpr const char* kOption = "voxel-size";
+  const auto text = arguments.find<std::string>(kOption);
+  if (!text) return std::nullopt;
+  const bool isOne = text->find(',') == std::string::npos;
+  const auto edges = cli::parseNumbers(kOption, *text, isOne ? 1 : 3);
+  for (const double edge : edges) cli::requireRange(kOption, edge, kSmallest, kLargest);
+  return std::array{edges.front(), edges[edges.size() / 2], edges.back()};
 }
 
-std::unique_ptr<samples::ImageSource> openImage(const cli::Arguments& arguments) {
-  const std::filesystem::path path = arguments.get<std::string>("input");
-  if (path.extension() != ".nrrd" && path.extension() != ".nhdr")
-    return samples::openRaw(path, layoutFrom(arguments));
-  for (const char* option : kRawOptions)
-    if (arguments.has(option))
-      throw UsageError("--" + std::string(option) +
-                       " is for RAW images only; an NRRD has its own header");
-  return samples::openNrrd(path);
+/// The layout of a RAW image; nothing if no option of one is given.
+std::optional<samples::RawLayout> layoutFrom(const cli::Arguments& arguments) {
+  const auto given =
+      std::ranges::count_if(kRawOptions, [&](const char* option) { return arguments.has(option); });
+  if (given == 0) return std::nullopt;
+  if (!arguments.has("dims") || !arguments.has("type"))
+    throw UsageError("a RAW image needs --dims and --type");
+  const auto skip = arguments.find<std::int64_t>("skip").value_or(0);
+  cli::requireRange("skip", skip, std::int64_t{0}, std::numeric_limits<std::int64_t>::max());
+  return samples::RawLayout{.size = parseDims(arguments.get<std::string>("dims")),
+                            .type = arguments.get<std::string>("type"),
+                            .bigEndian = isSecond(arguments, "endian", "little", "big"),
+                            .headerBytes = std::uint64_t(skip)};
+}
+
+/// The arguments without a dash: the files of the image, then the output.
+std::vector<std::string> fileArguments(const cli::Arguments& arguments) {
+  std::vector<std::string> files{arguments.get<std::string>("input")};
+  const auto more = arguments.find<std::vector<std::string>>("more");
+  if (!more) throw UsageError("missing argument OUT.vdb");
+  files.insert(files.end(), more->begin(), more->end());
+  return files;
+}
+
+samples::ImageRequest requestFrom(const cli::Arguments& arguments,
+                                  const samples::ImageFiles& files) {
+  return {.paths = files.paths,
+          .raw = layoutFrom(arguments),
+          .choice = {.component = arguments.find<std::int64_t>("component"),
+                     .dataset = arguments.find<std::string>("dataset")}};
 }
 
 samples::ImageOptions imageOptions(const cli::Arguments& arguments) {
@@ -133,11 +173,14 @@ samples::ImageOptions imageOptions(const cli::Arguments& arguments) {
   return options;
 }
 
-Transform transformOf(const samples::ImageSource& image, const std::string& input) {
+Transform transformOf(const cli::Arguments& arguments, const samples::ImageSource& image) {
+  const auto edges = voxelSize(arguments);
   try {
-    return affineTransform(image.indexToWorld());
+    return affineTransform(edges ? samples::scaleMatrix(*edges) : image.indexToWorld());
   } catch (const UsageError& error) {
-    throw BadInput(input + ": the axes are linearly dependent: " + error.what());
+    throw BadInput(arguments.get<std::string>("input") +
+                   ": the axes are linearly dependent, or voxels are too small for OpenVDB: " +
+                   error.what() + " (--voxel-size gives others)");
   }
 }
 
@@ -145,13 +188,18 @@ int run(int argc, char** argv) {
   const auto arguments = commandLine().parse(argc, argv);
   if (!arguments) return 0;
   const samples::ImageOptions options = imageOptions(*arguments);
-  const samples::Output output{arguments->get<std::string>("output"),
-                               arguments->get<bool>("force")};
+  auto names = fileArguments(*arguments);
+  const samples::Output output{names.back(), arguments->get<bool>("force")};
+  names.pop_back();
   cli::checkOutput(output.path, {".vdb", ".nvdb"}, output.overwrite);
-  const auto image = openImage(*arguments);
-  const Transform transform = transformOf(*image, arguments->get<std::string>("input"));
+  const samples::ImageFiles files = samples::imageFiles(names);
+  const auto image = samples::openImage(requestFrom(*arguments, files));
+  const Transform transform = transformOf(*arguments, *image);
 
   const cli::Log log(kName, arguments->verbosity);
+  if (files.outOfOrder)
+    log.warning(
+        "the slices are in the order given, which is not that of the numbers in their names");
   const cli::ThreadLimit threads(arguments->threads);
   const cli::Interrupts interrupts;
   samples::ImageVolume made = volumeOf(
