@@ -46,7 +46,7 @@ void decodeAs(const EncodedValues& values, std::span<float> out) {
 }
 
 template <class T>
-ElementType typeOf(const char* name) {
+ElementType typeWithName(const char* name) {
   std::optional<double> maximum;
   if constexpr (std::is_integral_v<T>) maximum = double(std::numeric_limits<T>::max());
   return {name, sizeof(T), maximum, decodeAs<T>};
@@ -54,12 +54,12 @@ ElementType typeOf(const char* name) {
 
 std::span<const ElementType> allTypes() {
   static const ElementType kTypes[] = {
-      typeOf<std::uint8_t>("uint8"),   typeOf<std::int8_t>("int8"),
-      typeOf<std::uint16_t>("uint16"), typeOf<std::int16_t>("int16"),
-      typeOf<std::uint32_t>("uint32"), typeOf<std::int32_t>("int32"),
-      typeOf<std::uint64_t>("uint64"), typeOf<std::int64_t>("int64"),
-      typeOf<Half>("float16"),         typeOf<float>("float32"),
-      typeOf<double>("float64")};
+      typeWithName<std::uint8_t>("uint8"),   typeWithName<std::int8_t>("int8"),
+      typeWithName<std::uint16_t>("uint16"), typeWithName<std::int16_t>("int16"),
+      typeWithName<std::uint32_t>("uint32"), typeWithName<std::int32_t>("int32"),
+      typeWithName<std::uint64_t>("uint64"), typeWithName<std::int64_t>("int64"),
+      typeWithName<Half>("float16"),         typeWithName<float>("float32"),
+      typeWithName<double>("float64")};
   return kTypes;
 }
 

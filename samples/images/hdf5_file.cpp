@@ -10,7 +10,7 @@ namespace esvr::samples {
 namespace {
 
 constexpr const char* kOther = "other";
-constexpr double kByteBits = 8.0;
+constexpr std::size_t kBitsOfByte = 8;
 
 /// Keeps the library from printing its errors.
 void keepQuiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
@@ -21,7 +21,7 @@ herr_t takeReason(unsigned, const H5E_error2_t* error, void* reason) {
   return 0;
 }
 
-std::string lastReason() {
+std::string hdf5Reason() {
   std::string reason = "unknown error";
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_DOWNWARD, takeReason, &reason);
   return reason;
@@ -29,7 +29,7 @@ std::string lastReason() {
 
 /// A type as the name of its numbers, for example "uint16".
 std::string numberName(hid_t type) {
-  const auto bits = std::to_string(H5Tget_size(type) * std::size_t(kByteBits));
+  const auto bits = std::to_string(H5Tget_size(type) * kBitsOfByte);
   switch (H5Tget_class(type)) {
     case H5T_INTEGER:
       return (H5Tget_sign(type) == H5T_SGN_NONE ? "uint" : "int") + bits;
@@ -94,7 +94,7 @@ Hdf5File::Hdf5File(std::filesystem::path path) : path_(std::move(path)) {
 }
 
 void Hdf5File::fail(const std::string& what) const {
-  throw BadInput("cannot read " + path_.string() + ": " + what + ": " + lastReason());
+  throw BadInput("cannot read " + path_.string() + ": " + what + ": " + hdf5Reason());
 }
 
 std::vector<Hdf5Dataset> Hdf5File::datasets() const {

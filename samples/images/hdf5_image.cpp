@@ -10,12 +10,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kAxes = 3;
+constexpr std::size_t kVolumeAxes = 3;
 
 /// Leaves out leading axes of length 1, as long as there are more than three.
 std::vector<std::uint64_t> usedAxes(const Hdf5Dataset& dataset) {
   auto begin = dataset.axes.begin();
-  while (dataset.axes.end() - begin > std::ptrdiff_t(kAxes) && *begin == 1) ++begin;
+  while (dataset.axes.end() - begin > std::ptrdiff_t(kVolumeAxes) && *begin == 1) ++begin;
   return {begin, dataset.axes.end()};
 }
 
@@ -38,7 +38,7 @@ Hdf5Dataset namedDataset(const fs::path& path, const std::vector<Hdf5Dataset>& d
 
 Hdf5Dataset onlyVolume(const fs::path& path, const std::vector<Hdf5Dataset>& datasets) {
   const auto isVolume = [](const Hdf5Dataset& dataset) {
-    return dataset.isOfNumbers() && usedAxes(dataset).size() == kAxes;
+    return dataset.isOfNumbers() && usedAxes(dataset).size() == kVolumeAxes;
   };
   if (std::ranges::count_if(datasets, isVolume) == 1)
     return *std::ranges::find_if(datasets, isVolume);
@@ -55,20 +55,20 @@ Hdf5Dataset chosenDataset(const fs::path& path, const Hdf5File& file, const Imag
 }
 
 /// The roles of a dataset's axes, which are counted from the slowest one on.
-struct Axes {
+struct Hdf5Axes {
   std::size_t z = 0;
   std::optional<std::size_t> component;
 };
 
-Axes axesOf(const fs::path& path, const Hdf5Dataset& dataset) {
+Hdf5Axes axesOf(const fs::path& path, const Hdf5Dataset& dataset) {
   const auto used = usedAxes(dataset);
   const std::size_t left = dataset.axes.size() - used.size();
-  if (dataset.isOfNumbers() && used.size() == kAxes) return {left, std::nullopt};
-  if (!dataset.isOfNumbers() || used.size() != kAxes + 1)
+  if (dataset.isOfNumbers() && used.size() == kVolumeAxes) return {left, std::nullopt};
+  if (!dataset.isOfNumbers() || used.size() != kVolumeAxes + 1)
     throw BadInput(path.string() + ": " + textOf(dataset) +
                    " is no volume of numbers, which has three axes, or four with components");
   if (used.front() < used.back()) return {left + 1, left};
-  return {left, left + kAxes};
+  return {left, left + kVolumeAxes};
 }
 
 class Hdf5Image : public ImageSource {
@@ -119,7 +119,7 @@ class Hdf5Image : public ImageSource {
   fs::path path_;
   Hdf5File file_;
   Hdf5Dataset dataset_;
-  Axes axes_;
+  Hdf5Axes axes_;
   Coord size_;
   std::size_t component_ = 0;
   Hdf5Handle opened_;

@@ -27,7 +27,7 @@ TEST(Image2Vdb, bringsInRawWithThresholdAndNormalised) {
   const std::string out = folder / "a.vdb";
   const auto run = runProgram(
       IMAGE2VDB, {folder / "a.raw", out, "--dims", "4,3,2", "--type", "uint8", "--threshold", "100",
-                "--normalise", "--voxel-size", "0.5", "--name", "ct"});
+                  "--normalise", "--voxel-size", "0.5", "--name", "ct"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const VolumeGrid grid = readGrid(out, "ct");
   EXPECT_EQ(activeVoxelCount(grid.volume), 14u);
@@ -119,7 +119,7 @@ TEST(Image2Vdb, replacesWhatIsNotFiniteWhenAskedAndSaysHowMuch) {
   test::writeText(folder / "a.raw", kNan + std::string("\0\0\x80\x3f", 4));
   const std::string out = folder / "a.vdb";
   const auto run = runProgram(IMAGE2VDB, {folder / "a.raw", out, "--dims", "2,1,1", "--type",
-                                        "float32", "--nonfinite", "zero"});
+                                          "float32", "--nonfinite", "zero"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.err, HasSubstr("warning: 1 voxels"));
   EXPECT_EQ(activeVoxelCount(readGrid(out, "density").volume), 1u);

@@ -40,7 +40,8 @@ TEST(IsBefore, comparesNumbersByTheirValues) {
 TEST(ImageFiles, ofAFolderAreItsTiffFilesInTheOrderOfTheirNumbers) {
   const TemporaryFolder folder;
   touch(folder, {"s10.tif", "s9.TIFF", "s1.tif", "notes.txt"});
-  EXPECT_THAT(namesOf(imageFiles({folder.path().string()})), ElementsAre("s1.tif", "s9.TIFF", "s10.tif"));
+  EXPECT_THAT(namesOf(imageFiles({folder.path().string()})),
+              ElementsAre("s1.tif", "s9.TIFF", "s10.tif"));
 }
 
 TEST(ImageFiles, ofAPatternAreInTheOrderOfTheirNumbers) {
@@ -52,7 +53,8 @@ TEST(ImageFiles, ofAPatternAreInTheOrderOfTheirNumbers) {
 TEST(ImageFiles, mayHaveNumbersInEvenSteps) {
   const TemporaryFolder folder;
   touch(folder, {"s00.tif", "s05.tif", "s10.tif"});
-  EXPECT_THAT(namesOf(imageFiles({folder / "s##.tif"})), ElementsAre("s00.tif", "s05.tif", "s10.tif"));
+  EXPECT_THAT(namesOf(imageFiles({folder / "s##.tif"})),
+              ElementsAre("s00.tif", "s05.tif", "s10.tif"));
 }
 
 TEST(ImageFiles, withAGapAreRefused) {

@@ -17,14 +17,16 @@ using test::TemporaryFolder;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-struct Content {
+struct FormatExample {
   const char* name;
   std::string bytes;
   ImageFormat format;
 };
-std::ostream& operator<<(std::ostream& out, const Content& content) { return out << content.name; }
+std::ostream& operator<<(std::ostream& out, const FormatExample& content) {
+  return out << content.name;
+}
 
-class FormatOf : public testing::TestWithParam<Content> {};
+class FormatOf : public testing::TestWithParam<FormatExample> {};
 
 TEST_P(FormatOf, followsFromTheContentAndThenFromTheName) {
   const TemporaryFolder folder;
@@ -37,24 +39,29 @@ std::string niftiHead(const char* sign) { return std::string(344, '\0') + std::s
 INSTANTIATE_TEST_SUITE_P(
     All, FormatOf,
     testing::Values(
-        Content{"a.raw", std::string("II*\0", 4), ImageFormat::kTiff},
-        Content{"b.raw", std::string("MM\0*", 4), ImageFormat::kTiff},
-        Content{"c.dat", std::string("II+\0", 4), ImageFormat::kTiff},
-        Content{"d.dat", std::string("MM\0+", 4), ImageFormat::kTiff},
-        Content{"e.tif", "NRRD0004\n", ImageFormat::kNrrd},
-        Content{"f.tif", "\x89HDF\r\n\x1a\n", ImageFormat::kHdf5},
-        Content{"g.mat", std::string(512, 'x') + "\x89HDF\r\n\x1a\n", ImageFormat::kHdf5},
-        Content{"h.raw", niftiHead("n+1"), ImageFormat::kNifti},
-        Content{"i.hdr", niftiHead("ni1"), ImageFormat::kNifti},
-        Content{"j.raw", std::string("\0\0\2\x1cn+2\0\r\n\x1a\n", 12), ImageFormat::kNifti},
-        Content{"k.xml", "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\">", ImageFormat::kVti},
-        Content{"l.TIF", "broken", ImageFormat::kTiff}, Content{"m.Tiff", "", ImageFormat::kTiff},
-        Content{"n.nii", "broken", ImageFormat::kNifti},
-        Content{"o.nii.gz", "broken", ImageFormat::kNifti},
-        Content{"p.vti", "", ImageFormat::kVti}, Content{"q.h5", "", ImageFormat::kHdf5},
-        Content{"r.hdf5", "", ImageFormat::kHdf5}, Content{"s.nhdr", "", ImageFormat::kNrrd},
-        Content{"t.nrrd", "", ImageFormat::kNrrd}, Content{"u.raw", "II", ImageFormat::kRaw},
-        Content{"v", "", ImageFormat::kRaw}));
+        FormatExample{"a.raw", std::string("II*\0", 4), ImageFormat::kTiff},
+        FormatExample{"b.raw", std::string("MM\0*", 4), ImageFormat::kTiff},
+        FormatExample{"c.dat", std::string("II+\0", 4), ImageFormat::kTiff},
+        FormatExample{"d.dat", std::string("MM\0+", 4), ImageFormat::kTiff},
+        FormatExample{"e.tif", "NRRD0004\n", ImageFormat::kNrrd},
+        FormatExample{"f.tif", "\x89HDF\r\n\x1a\n", ImageFormat::kHdf5},
+        FormatExample{"g.mat", std::string(512, 'x') + "\x89HDF\r\n\x1a\n", ImageFormat::kHdf5},
+        FormatExample{"h.raw", niftiHead("n+1"), ImageFormat::kNifti},
+        FormatExample{"i.hdr", niftiHead("ni1"), ImageFormat::kNifti},
+        FormatExample{"j.raw", std::string("\0\0\2\x1cn+2\0\r\n\x1a\n", 12), ImageFormat::kNifti},
+        FormatExample{"k.xml", "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\">",
+                      ImageFormat::kVti},
+        FormatExample{"l.TIF", "broken", ImageFormat::kTiff},
+        FormatExample{"m.Tiff", "", ImageFormat::kTiff},
+        FormatExample{"n.nii", "broken", ImageFormat::kNifti},
+        FormatExample{"o.nii.gz", "broken", ImageFormat::kNifti},
+        FormatExample{"p.vti", "", ImageFormat::kVti},
+        FormatExample{"q.h5", "", ImageFormat::kHdf5},
+        FormatExample{"r.hdf5", "", ImageFormat::kHdf5},
+        FormatExample{"s.nhdr", "", ImageFormat::kNrrd},
+        FormatExample{"t.nrrd", "", ImageFormat::kNrrd},
+        FormatExample{"u.raw", "II", ImageFormat::kRaw},
+        FormatExample{"v", "", ImageFormat::kRaw}));
 
 TEST(ImageFormat, seesNiftiThroughItsCompression) {
   const TemporaryFolder folder;
@@ -68,14 +75,16 @@ TEST(ImageFormat, seesNiftiThroughItsCompression) {
 
 TEST(ImageFormat, namesAFileThatDoesNotExist) {
   EXPECT_THAT([] { (void)imageFormat("/nowhere/a.tif"); },
-              ThrowsMessage<BadInput>(testing::AllOf(HasSubstr("/nowhere/a.tif"), HasSubstr("No such file"))));
+              ThrowsMessage<BadInput>(
+                  testing::AllOf(HasSubstr("/nowhere/a.tif"), HasSubstr("No such file"))));
 }
 
 TEST(ImageFormat, thatIsNotBuiltIsRefusedWithItsPackage) {
   const std::string text = textOfFormats();
-  for (const auto& [format, package] :
-       {std::pair{ImageFormat::kTiff, "libtiff-dev"}, {ImageFormat::kNifti, "libnifti-dev"},
-        {ImageFormat::kVti, "libexpat1-dev"}, {ImageFormat::kHdf5, "libhdf5-dev"}}) {
+  for (const auto& [format, package] : {std::pair{ImageFormat::kTiff, "libtiff-dev"},
+                                        {ImageFormat::kNifti, "libnifti-dev"},
+                                        {ImageFormat::kVti, "libexpat1-dev"},
+                                        {ImageFormat::kHdf5, "libhdf5-dev"}}) {
     EXPECT_EQ(text.find(package) == std::string::npos, isBuilt(format)) << text;
     EXPECT_THAT(text, HasSubstr(nameOf(format)));
     if (isBuilt(format))

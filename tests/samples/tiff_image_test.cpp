@@ -27,7 +27,7 @@ constexpr std::uint32_t kWidth = 21, kHeight = 19;  // no multiples of a tile
 constexpr std::size_t kArea = kWidth * kHeight;
 
 /// How pages are written.
-struct Form {
+struct TiffForm {
   std::uint16_t bits = 8, kind = SAMPLEFORMAT_UINT, samples = 1, compression = COMPRESSION_NONE;
   std::uint16_t planes = PLANARCONFIG_CONTIG;
   bool tiled = false;
@@ -36,7 +36,7 @@ struct Form {
   float resolution = 0.0f;
 };
 
-void setTags(TIFF* file, const Form& form) {
+void setTiffTags(TIFF* file, const TiffForm& form) {
   TIFFSetField(file, TIFFTAG_IMAGEWIDTH, kWidth);
   TIFFSetField(file, TIFFTAG_IMAGELENGTH, kHeight);
   TIFFSetField(file, TIFFTAG_BITSPERSAMPLE, form.bits);
@@ -44,7 +44,8 @@ void setTags(TIFF* file, const Form& form) {
   TIFFSetField(file, TIFFTAG_SAMPLESPERPIXEL, form.samples);
   TIFFSetField(file, TIFFTAG_COMPRESSION, form.compression);
   TIFFSetField(file, TIFFTAG_PLANARCONFIG, form.planes);
-  TIFFSetField(file, TIFFTAG_PHOTOMETRIC, form.samples == 3 ? PHOTOMETRIC_RGB : PHOTOMETRIC_MINISBLACK);
+  TIFFSetField(file, TIFFTAG_PHOTOMETRIC,
+               form.samples == 3 ? PHOTOMETRIC_RGB : PHOTOMETRIC_MINISBLACK);
   if (!form.text.empty()) TIFFSetField(file, TIFFTAG_IMAGEDESCRIPTION, form.text.c_str());
   if (form.resolution > 0.0f) {
     TIFFSetField(file, TIFFTAG_XRESOLUTION, form.resolution);
@@ -59,7 +60,7 @@ void setTags(TIFF* file, const Form& form) {
 }
 
 /// Writes the rows of a page, or its tiles; `sample` is the plane.
-void writePlane(TIFF* file, const Form& form, const std::string& page, std::uint16_t sample) {
+void writePlane(TIFF* file, const TiffForm& form, const std::string& page, std::uint16_t sample) {
   const std::size_t pixel = page.size() / kArea;
   if (!form.tiled) {
     for (std::uint32_t y = 0; y < kHeight; ++y) {
@@ -79,11 +80,12 @@ void writePlane(TIFF* file, const Form& form, const std::string& page, std::uint
 }
 
 /// Writes pages of bytes. With separate planes, a page has one after the other.
-void writeTiff(const fs::path& path, const Form& form, const std::vector<std::string>& pages) {
-  const std::unique_ptr<TIFF, decltype(&TIFFClose)> file(TIFFOpen(path.c_str(), form.mode), TIFFClose);
+void writeTiff(const fs::path& path, const TiffForm& form, const std::vector<std::string>& pages) {
+  const std::unique_ptr<TIFF, decltype(&TIFFClose)> file(TIFFOpen(path.c_str(), form.mode),
+                                                         TIFFClose);
   ASSERT_TRUE(file);
   for (const std::string& page : pages) {
-    setTags(file.get(), form);
+    setTiffTags(file.get(), form);
     const std::uint16_t planes = form.planes == PLANARCONFIG_SEPARATE ? form.samples : 1;
     for (std::uint16_t p = 0; p < planes; ++p)
       writePlane(file.get(), form, page.substr(page.size() / planes * p, page.size() / planes), p);
@@ -99,7 +101,7 @@ std::vector<std::string> threePages(const std::vector<T>& values) {
 }
 
 template <class T>
-void expectReads(Form form, std::optional<double> maximum) {
+void expectTiffReads(TiffForm form, std::optional<double> maximum) {
   const TemporaryFolder folder;
   form.bits = sizeof(T) * 8;
   const auto values = countingValues<T>(3 * kArea);
@@ -107,21 +109,22 @@ void expectReads(Form form, std::optional<double> maximum) {
   const auto image = openTiff({folder / "a.tif"}, {});
   EXPECT_EQ(image->size(), (Coord{kWidth, kHeight, 3}));
   EXPECT_EQ(image->typeMaximum(), maximum);
-  EXPECT_EQ(wholeImage(*image), asFloats(values)) << form.bits << ' ' << form.kind << ' ' << form.mode;
+  EXPECT_EQ(wholeImage(*image), asFloats(values))
+      << form.bits << ' ' << form.kind << ' ' << form.mode;
 }
 
 TEST(OpenTiff, readsEveryTypeInBothByteOrdersAndInBigFiles) {
   for (const char* mode : {"wl", "wb", "wl8", "wb8"}) {
-    expectReads<std::uint8_t>({.mode = mode}, 255.0);
-    expectReads<std::uint16_t>({.mode = mode}, 65535.0);
-    expectReads<std::uint32_t>({.mode = mode}, 4294967295.0);
-    expectReads<std::uint64_t>({.mode = mode}, 18446744073709551615.0);
-    expectReads<std::int8_t>({.kind = SAMPLEFORMAT_INT, .mode = mode}, 127.0);
-    expectReads<std::int16_t>({.kind = SAMPLEFORMAT_INT, .mode = mode}, 32767.0);
-    expectReads<std::int32_t>({.kind = SAMPLEFORMAT_INT, .mode = mode}, 2147483647.0);
-    expectReads<std::int64_t>({.kind = SAMPLEFORMAT_INT, .mode = mode}, 9223372036854775807.0);
-    expectReads<float>({.kind = SAMPLEFORMAT_IEEEFP, .mode = mode}, std::nullopt);
-    expectReads<double>({.kind = SAMPLEFORMAT_IEEEFP, .mode = mode}, std::nullopt);
+    expectTiffReads<std::uint8_t>({.mode = mode}, 255.0);
+    expectTiffReads<std::uint16_t>({.mode = mode}, 65535.0);
+    expectTiffReads<std::uint32_t>({.mode = mode}, 4294967295.0);
+    expectTiffReads<std::uint64_t>({.mode = mode}, 18446744073709551615.0);
+    expectTiffReads<std::int8_t>({.kind = SAMPLEFORMAT_INT, .mode = mode}, 127.0);
+    expectTiffReads<std::int16_t>({.kind = SAMPLEFORMAT_INT, .mode = mode}, 32767.0);
+    expectTiffReads<std::int32_t>({.kind = SAMPLEFORMAT_INT, .mode = mode}, 2147483647.0);
+    expectTiffReads<std::int64_t>({.kind = SAMPLEFORMAT_INT, .mode = mode}, 9223372036854775807.0);
+    expectTiffReads<float>({.kind = SAMPLEFORMAT_IEEEFP, .mode = mode}, std::nullopt);
+    expectTiffReads<double>({.kind = SAMPLEFORMAT_IEEEFP, .mode = mode}, std::nullopt);
   }
 }
 
@@ -129,7 +132,7 @@ TEST(OpenTiff, readsTilesStripsAndCompressedData) {
   for (const std::uint16_t compression :
        {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE, COMPRESSION_PACKBITS})
     for (const bool tiled : {false, true})
-      expectReads<std::uint16_t>({.compression = compression, .tiled = tiled}, 65535.0);
+      expectTiffReads<std::uint16_t>({.compression = compression, .tiled = tiled}, 65535.0);
 }
 
 TEST(OpenTiff, readsBitsThatArePacked) {
@@ -138,8 +141,9 @@ TEST(OpenTiff, readsBitsThatArePacked) {
   writeTiff(folder / "a.tif", {.bits = 1},
             {std::string(kArea, '\0')});  // the rows are replaced below
   {
-    const std::unique_ptr<TIFF, decltype(&TIFFClose)> file(TIFFOpen((folder / "a.tif").c_str(), "w"), TIFFClose);
-    setTags(file.get(), {.bits = 1});
+    const std::unique_ptr<TIFF, decltype(&TIFFClose)> file(
+        TIFFOpen((folder / "a.tif").c_str(), "w"), TIFFClose);
+    setTiffTags(file.get(), {.bits = 1});
     for (std::uint32_t y = 0; y < kHeight; ++y) {
       std::string copy = row;
       ASSERT_EQ(TIFFWriteScanline(file.get(), copy.data(), y, 0), 1);
@@ -157,7 +161,8 @@ TEST(OpenTiff, readsAColorThatIsChosen) {
     for (const bool tiled : {false, true}) {
       const TemporaryFolder folder;
       const auto values = countingValues<std::uint16_t>(3 * kArea);
-      writeTiff(folder / "a.tif", {.bits = 16, .samples = 3, .planes = planes, .tiled = tiled}, {bytesOf(values)});
+      writeTiff(folder / "a.tif", {.bits = 16, .samples = 3, .planes = planes, .tiled = tiled},
+                {bytesOf(values)});
       const auto green = wholeImage(*openTiff({folder / "a.tif"}, {.component = 1}));
       ASSERT_EQ(green.size(), kArea);
       for (std::size_t i = 0; i < kArea; ++i)
@@ -179,8 +184,9 @@ TEST(OpenTiff, refusesColorsWithoutAChoice) {
 TEST(OpenTiff, readsAChannelAndTheSpacingOfImageJ) {
   const TemporaryFolder folder;
   const std::string text = "ImageJ=1.53t\nimages=4\nchannels=2\nslices=2\nspacing=3\nunit=micron\n";
-  writeTiff(folder / "a.tif", {.text = text, .resolution = 4.0f},
-            {std::string(kArea, 1), std::string(kArea, 2), std::string(kArea, 3), std::string(kArea, 4)});
+  writeTiff(
+      folder / "a.tif", {.text = text, .resolution = 4.0f},
+      {std::string(kArea, 1), std::string(kArea, 2), std::string(kArea, 3), std::string(kArea, 4)});
   const auto image = openTiff({folder / "a.tif"}, {.component = 1});
   EXPECT_EQ(image->size().z, 2);
   const auto values = wholeImage(*image);
@@ -193,16 +199,18 @@ TEST(OpenTiff, readsAChannelAndTheSpacingOfImageJ) {
 /// A big-endian file with one page of 2 x 1 values of 16 bits, written byte by byte. Data lies behind
 /// the directory.
 std::string imageJStack(const std::string& text, const std::string& data) {
-  const auto entry = [](std::uint16_t tag, std::uint16_t type, std::uint32_t count, std::string value) {
+  const auto entry = [](std::uint16_t tag, std::uint16_t type, std::uint32_t count,
+                        std::string value) {
     value.resize(4, '\0');
     return bytesOf(tag, true) + bytesOf(type, true) + bytesOf(count, true) + value;
   };
   const auto number = [](std::uint16_t value) { return bytesOf(value, true); };
   const std::uint32_t directory = 8, entries = 9, textAt = directory + 2 + entries * 12 + 4;
   const auto dataAt = std::uint32_t(textAt + text.size());
-  return std::string("MM\0*", 4) + bytesOf(directory, true) + number(entries) + entry(256, 3, 1, number(2)) +
-         entry(257, 3, 1, number(1)) + entry(258, 3, 1, number(16)) + entry(259, 3, 1, number(1)) +
-         entry(262, 3, 1, number(1)) + entry(270, 2, std::uint32_t(text.size()), bytesOf(textAt, true)) +
+  return std::string("MM\0*", 4) + bytesOf(directory, true) + number(entries) +
+         entry(256, 3, 1, number(2)) + entry(257, 3, 1, number(1)) + entry(258, 3, 1, number(16)) +
+         entry(259, 3, 1, number(1)) + entry(262, 3, 1, number(1)) +
+         entry(270, 2, std::uint32_t(text.size()), bytesOf(textAt, true)) +
          entry(273, 4, 1, bytesOf(dataAt, true)) + entry(277, 3, 1, number(1)) +
          entry(279, 4, 1, bytesOf(std::uint32_t{4}, true)) + std::string(4, '\0') + text + data;
 }
@@ -217,7 +225,8 @@ TEST(OpenTiff, readsPagesThatImageJWroteBehindTheFirstOne) {
   EXPECT_EQ(wholeImage(*image), asFloats(values));
   EXPECT_EQ(image->indexToWorld()[10], 2.0);
   test::writeText(folder / "cut.tif", imageJStack(text, bytesOf(values, true).substr(1)));
-  EXPECT_THAT([&] { (void)openTiff({folder / "cut.tif"}, {}); }, ThrowsMessage<BadInput>(HasSubstr("cut.tif")));
+  EXPECT_THAT([&] { (void)openTiff({folder / "cut.tif"}, {}); },
+              ThrowsMessage<BadInput>(HasSubstr("cut.tif")));
 }
 
 TEST(OpenTiff, joinsTheFilesOfAStack) {
@@ -233,8 +242,11 @@ TEST(OpenTiff, refusesPagesAndFilesThatDiffer) {
   const TemporaryFolder folder;
   writeTiff(folder / "a.tif", {.bits = 16}, {std::string(2 * kArea, 'x')});
   writeTiff(folder / "b.tif", {.bits = 8}, {std::string(kArea, 'x')});
-  EXPECT_THAT([&] { (void)openTiff({folder / "a.tif", folder / "b.tif"}, {}); },
-              ThrowsMessage<BadInput>(AllOf(HasSubstr("b.tif"), HasSubstr("uint8"), HasSubstr("uint16"))));
+  EXPECT_THAT(
+      [&] {
+        (void)openTiff({folder / "a.tif", folder / "b.tif"}, {});
+      },
+      ThrowsMessage<BadInput>(AllOf(HasSubstr("b.tif"), HasSubstr("uint8"), HasSubstr("uint16"))));
   writeTiff(folder / "a.tif", {.bits = 8, .mode = "a"}, {std::string(kArea, 'x')});
   EXPECT_THAT([&] { (void)openTiff({folder / "a.tif"}, {}); },
               ThrowsMessage<BadInput>(AllOf(HasSubstr("a.tif"), HasSubstr("page 2"))));
@@ -261,7 +273,8 @@ TEST(OpenTiff, leavesOutReducedCopies) {
 
 TEST(OpenTiff, namesTheFileThatIsCutOrDamaged) {
   const TemporaryFolder folder;
-  for (const std::uint16_t compression : {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE}) {
+  for (const std::uint16_t compression :
+       {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE}) {
     writeTiff(folder / "a.tif", {.bits = 16, .compression = compression},
               threePages(countingValues<std::uint16_t>(3 * kArea)));
     const std::string whole = test::readText(folder / "a.tif");
@@ -275,7 +288,8 @@ TEST(OpenTiff, namesTheFileThatIsCutOrDamaged) {
         EXPECT_THAT(error.what(), HasSubstr("cut.tif"));
       }
     }
-    EXPECT_GT(refused, int(whole.size() / 13) - 20) << "only the end of the last directory may be missing";
+    EXPECT_GT(refused, int(whole.size() / 13) - 20)
+        << "only the end of the last directory may be missing";
   }
 }
 
@@ -284,7 +298,7 @@ TEST(OpenTiff, refusesSizesThatDoNotFitIntoMemory) {
   const fs::path path = folder / "a.tif";
   {
     const std::unique_ptr<TIFF, decltype(&TIFFClose)> file(TIFFOpen(path.c_str(), "w"), TIFFClose);
-    setTags(file.get(), {});
+    setTiffTags(file.get(), {});
     TIFFSetField(file.get(), TIFFTAG_IMAGEWIDTH, 2'000'000'000);
     TIFFSetField(file.get(), TIFFTAG_IMAGELENGTH, 2'000'000'000);
     TIFFSetField(file.get(), TIFFTAG_ROWSPERSTRIP, 2'000'000'000);

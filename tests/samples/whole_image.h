@@ -17,7 +17,8 @@ inline std::vector<float> wholeImage(ImageSource& image) {
   std::vector<float> values(area * std::size_t(size.z));
   for (std::int32_t z = 0; z < size.z; z += 2) {
     const std::int32_t slices = std::min(2, size.z - z);
-    image.read({z, slices}, std::span(values).subspan(std::size_t(z) * area, std::size_t(slices) * area));
+    image.read({z, slices},
+               std::span(values).subspan(std::size_t(z) * area, std::size_t(slices) * area));
   }
   return values;
 }
@@ -42,7 +43,8 @@ std::string bytesOf(const std::vector<T>& values, bool big = false) {
 template <class T>
 std::vector<T> countingValues(std::size_t count) {
   std::vector<T> values;
-  for (std::size_t i = 0; i < count; ++i) values.push_back(T(double(i) - (T(-1) < T(0) ? 3.0 : 0.0)));
+  for (std::size_t i = 0; i < count; ++i)
+    values.push_back(T(double(i) - (T(-1) < T(0) ? 3.0 : 0.0)));
   return values;
 }
 
