@@ -82,8 +82,8 @@ Hdf5Handle& Hdf5Handle::operator=(Hdf5Handle&& other) noexcept {
 
 std::string textOf(const Hdf5Dataset& dataset) {
   std::string text = dataset.path + " (";
-  for (const std::uint64_t length : dataset.axes)
-    text += (&length == dataset.axes.data() ? "" : " x ") + std::to_string(length);
+  for (std::size_t i = 0; i < dataset.axes.size(); ++i)
+    text += (i ? " x " : "") + std::to_string(dataset.axes[i]);
   return text + (dataset.axes.empty() ? "" : " ") + dataset.type + ")";
 }
 

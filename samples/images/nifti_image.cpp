@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
 #include "esvr/error.h"
@@ -21,8 +22,35 @@ struct HeaderDeleter {
 };
 using HeaderPointer = std::unique_ptr<nifti_image, HeaderDeleter>;
 
+struct MemoryDeleter {
+  void operator()(void* memory) const { std::free(memory); }
+};
+
+template <class Header>
+void requireUsable(const fs::path& path, const Header& header) {
+  if (header.dim[0] < 1 || header.dim[0] > 7 || header.dim[1] < 1)
+    throw BadInput("cannot read " + path.string() + ": its sizes are damaged");
+  if (!nifti_is_valid_datatype(header.datatype))
+    throw BadInput("cannot read " + path.string() + ": it has values of the unknown type " +
+                   std::to_string(header.datatype));
+}
+
+/// Refuses what the library would print a message about.
+void requireUsable(const fs::path& path) {
+  int version = 0, swapped = 0;
+  const std::unique_ptr<void, MemoryDeleter> raw(nifti_read_header(path.c_str(), &version, 0));
+  if (!raw || (version != 1 && version != 2)) return;
+  // Other than these, the function above leaves the byte order as it is.
+  const std::unique_ptr<void, MemoryDeleter> header(
+      version == 1 ? static_cast<void*>(nifti_read_n1_hdr(path.c_str(), &swapped, 0))
+                   : nifti_read_n2_hdr(path.c_str(), &swapped, 0));
+  if (header && version == 1) requireUsable(path, *static_cast<nifti_1_header*>(header.get()));
+  if (header && version == 2) requireUsable(path, *static_cast<nifti_2_header*>(header.get()));
+}
+
 HeaderPointer readHeader(const fs::path& path) {
   nifti_set_debug_level(0);  // the library is not to print
+  requireUsable(path);
   HeaderPointer header(nifti_image_read(path.c_str(), 0));
   if (!header)
     throw BadInput("cannot read " + path.string() +

@@ -100,7 +100,10 @@ TEST(OpenHdf5, readsEveryTypeInBothByteOrders) {
 TEST(OpenHdf5, readsTruthValues) {
   const TemporaryFolder folder;
   const hid_t truth = H5Tenum_create(H5T_NATIVE_INT8);
-  for (std::int8_t value : {0, 1}) H5Tenum_insert(truth, value ? "TRUE" : "FALSE", &value);
+  for (const bool isTrue : {false, true}) {
+    const std::int8_t value = isTrue;
+    H5Tenum_insert(truth, isTrue ? "TRUE" : "FALSE", &value);
+  }
   const std::int8_t values[] = {0, 1, 1, 0};
   Hdf5Writer(folder / "a.h5").add("/mask", {1, 2, 2}, truth, truth, values);
   H5Tclose(truth);

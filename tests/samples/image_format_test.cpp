@@ -90,7 +90,7 @@ TEST(ImageFormat, thatIsNotBuiltIsRefusedWithItsPackage) {
     if (isBuilt(format))
       EXPECT_NO_THROW(requireBuilt(format, "a.x"));
     else
-      EXPECT_THAT([&, f = format] { requireBuilt(f, "a.x"); },
+      EXPECT_THAT([f = format] { requireBuilt(f, "a.x"); },
                   ThrowsMessage<BadInput>(testing::AllOf(HasSubstr("a.x"), HasSubstr(package))));
   }
 }

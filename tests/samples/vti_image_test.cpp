@@ -252,7 +252,7 @@ TEST(OpenVti, refusesWhatItCannotRead) {
   refuses(replaced("Extent=\"0 1 0 2 0 4\">", "Extent=\"0 1 0 2 0 3\">"), "WholeExtent");
   refuses(replaced("</Piece>", "</Piece><Piece Extent=\"0 1 0 2 0 4\"/>"), "more than one piece");
   refuses(replaced("UInt8", "String"), "String");
-  refuses(replaced("_", "x"), "underscore");
+  refuses(replaced("   _", "   x"), "underscore");
   refuses(replaced("offset=\"0\"", "offset=\"99999999\""), "missing");
   refuses(vtiText({.data = vtiEncoded(std::string(29, 1), {})}), "30 bytes");
   refuses(vtiText({.form = {.format = "binary"}, .data = "AAA!"}), "base64");
@@ -280,14 +280,20 @@ TEST(OpenVti, namesTheFileThatIsCutOrDamaged) {
 TEST(OpenVti, findsDamagedBlocks) {
   const TemporaryFolder folder;
   const VtiForm form{.zipped = true};
-  const std::string data = vtiEncoded(bytesOf(countingValues<std::uint8_t>(30)), form);
+  const auto values = countingValues<std::uint8_t>(30);
+  const std::string data = vtiEncoded(bytesOf(values), form);
+  std::size_t refused = 0;
   for (std::size_t at = 0; at < data.size(); ++at) {
     std::string damaged = data;
     damaged[at] = char(damaged[at] ^ 0x10);
-    EXPECT_THROW((void)wholeImage(*openVtiText(folder, vtiText({.form = form, .data = damaged}))),
-                 BadInput)
-        << at;
+    try {
+      const auto image = openVtiText(folder, vtiText({.form = form, .data = damaged}));
+      EXPECT_EQ(wholeImage(*image), asFloats(values)) << "a bit that means nothing";
+    } catch (const BadInput&) {
+      ++refused;
+    }
   }
+  EXPECT_GT(refused, data.size() - 4);
 }
 
 TEST(OpenVti, refusesSizesThatDoNotFitIntoMemory) {
