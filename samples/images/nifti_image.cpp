@@ -40,7 +40,7 @@ void requireUsable(const fs::path& path) {
   int version = 0, swapped = 0;
   const std::unique_ptr<void, MemoryDeleter> raw(nifti_read_header(path.c_str(), &version, 0));
   if (!raw || (version != 1 && version != 2)) return;
-  // Other than these, the function above leaves the byte order as it is.
+  // nifti_read_header leaves the byte order of the file.
   const std::unique_ptr<void, MemoryDeleter> header(
       version == 1 ? static_cast<void*>(nifti_read_n1_hdr(path.c_str(), &swapped, 0))
                    : nifti_read_n2_hdr(path.c_str(), &swapped, 0));

@@ -45,9 +45,6 @@ std::unique_ptr<ImageSource> openImage(const ImageRequest& request) {
   const ImageFormat format = commonFormat(request.paths);
   const fs::path& path = request.paths.front();
   if (format == ImageFormat::kRaw) return openRawImage(request);
-  if (request.raw)
-    throw UsageError("--dims and --type are for RAW images only, and " + path.string() + " is a " +
-                     nameOf(format) + " image");
   requireBuilt(format, path);
   // The functions of a library that is missing are not there, so that they must not be called.
   if constexpr (ESVR_HAS_TIFF)

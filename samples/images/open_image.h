@@ -13,7 +13,7 @@ namespace esvr::samples {
 
 struct ImageRequest {
   std::vector<std::filesystem::path> paths;  ///< several only for TIFF
-  std::optional<RawLayout> raw;              ///< given for RAW images only
+  std::optional<RawLayout> raw;              ///< needed for a RAW image; others do not use it
   ImageChoice choice;
 };
 

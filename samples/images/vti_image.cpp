@@ -45,7 +45,7 @@ VtiArray defaultArray(const fs::path& path, const VtiHeader& header) {
 VtiArray chosenArray(const fs::path& path, const VtiHeader& header, const ImageChoice& choice) {
   const VtiArray array =
       choice.dataset ? namedArray(path, header, *choice.dataset) : defaultArray(path, header);
-  constexpr std::uint64_t kMost = 1 << 16;
+  constexpr std::uint64_t kMost = 1 << 12;
   if (array.components < 1 || array.components > kMost)
     throw BadInput(path.string() + ": array " + textOf(array) +
                    " has an impossible number of components");

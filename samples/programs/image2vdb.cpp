@@ -1,6 +1,5 @@
 // image2vdb: converts dense images to VDB.
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <limits>
@@ -129,19 +128,25 @@ std::optional<std::array<double, 3>> voxelSize(const cli::Arguments& arguments) 
   return std::array{edges.front(), edges[edges.size() / 2], edges.back()};
 }
 
-/// The layout of a RAW image; nothing if no option of one is given.
+/// The layout of a RAW image; nothing if it is not given.
 std::optional<samples::RawLayout> layoutFrom(const cli::Arguments& arguments) {
-  const auto given =
-      std::ranges::count_if(kRawOptions, [&](const char* option) { return arguments.has(option); });
-  if (given == 0) return std::nullopt;
-  if (!arguments.has("dims") || !arguments.has("type"))
-    throw UsageError("a RAW image needs --dims and --type");
+  if (!arguments.has("dims") || !arguments.has("type")) return std::nullopt;
   const auto skip = arguments.find<std::int64_t>("skip").value_or(0);
   cli::requireRange("skip", skip, std::int64_t{0}, std::numeric_limits<std::int64_t>::max());
   return samples::RawLayout{.size = parseDims(arguments.get<std::string>("dims")),
                             .type = arguments.get<std::string>("type"),
                             .bigEndian = isSecond(arguments, "endian", "little", "big"),
                             .headerBytes = std::uint64_t(skip)};
+}
+
+void refuseRawOptions(const cli::Arguments& arguments, const samples::ImageFiles& files) {
+  const samples::ImageFormat format = samples::imageFormat(files.paths.front());
+  if (format == samples::ImageFormat::kRaw) return;
+  for (const char* option : kRawOptions)
+    if (arguments.has(option))
+      throw UsageError("--" + std::string(option) + " is for RAW images only, and " +
+                       files.paths.front().string() + " is a " + samples::nameOf(format) +
+                       " image");
 }
 
 /// The arguments without a dash: the files of the image, then the output.
@@ -155,6 +160,7 @@ std::vector<std::string> fileArguments(const cli::Arguments& arguments) {
 
 samples::ImageRequest requestFrom(const cli::Arguments& arguments,
                                   const samples::ImageFiles& files) {
+  refuseRawOptions(arguments, files);
   return {.paths = files.paths,
           .raw = layoutFrom(arguments),
           .choice = {.component = arguments.find<std::int64_t>("component"),

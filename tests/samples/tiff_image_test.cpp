@@ -280,7 +280,7 @@ TEST(OpenTiff, namesTheFileThatIsCutOrDamaged) {
               threePages(countingValues<std::uint16_t>(3 * kArea)));
     const std::string whole = test::readText(folder / "a.tif");
     int refused = 0;
-    for (std::size_t length = 0; length < whole.size(); length += 13) {
+    for (std::size_t length = 0; length < whole.size(); length += 101) {
       test::writeText(folder / "cut.tif", whole.substr(0, length));
       try {
         (void)wholeImage(*openTiff({folder / "cut.tif"}, {}));
@@ -289,7 +289,7 @@ TEST(OpenTiff, namesTheFileThatIsCutOrDamaged) {
         EXPECT_THAT(error.what(), HasSubstr("cut.tif"));
       }
     }
-    EXPECT_GT(refused, int(whole.size() / 13) - 20)
+    EXPECT_GT(refused, int(whole.size() / 101) - 5)
         << "only the end of the last directory may be missing";
   }
 }
