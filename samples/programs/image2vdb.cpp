@@ -13,6 +13,7 @@
 #include "cli/output.h"
 #include "cli/run_main.h"
 #include "cli/thread_limit.h"
+#include "images/element_type.h"
 #include "images/image_files.h"
 #include "images/image_format.h"
 #include "images/image_volume.h"
@@ -42,9 +43,11 @@ cli::CommandLine commandLine() {
            "TIFF\n"
            "stack are the pages of one file, files in the order given, the TIFF files of a "
            "folder,\n"
-           "or those of a pattern such as 'slice_####.tif'. TYPE is uint8, int8, uint16, int16,\n"
-           "uint32, int32, uint64, int64, float16, float32 or float64; in a RAW file, x varies\n"
-           "fastest.\n\n"
+           "or those of a pattern such as 'slice_####.tif'. In a RAW file, x varies fastest, and "
+           "TYPE is\n"
+           "one of " +
+           samples::elementTypeNames() +
+           ".\n\n"
            "The values of the grid are 32-bit floats. A voxel is active if it is not below the\n"
            "threshold, or, without a threshold, if it differs from the background. The transform\n"
            "of the grid is that of the image: the space directions and origin of NRRD, sform or\n"
