@@ -77,7 +77,8 @@ bool isBefore(const std::string& a, const std::string& b) {
       ++i, ++j;
     }
   }
-  return a.size() - i < b.size() - j;
+  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
+  return a < b;  // they differ in zeros before numbers
 }
 
 ImageFiles imageFiles(const std::vector<std::string>& names) {

@@ -128,7 +128,7 @@ bool isBuilt(ImageFormat format) { return infoOf(format).isBuilt; }
 void requireBuilt(ImageFormat format, const fs::path& path) {
   const FormatInfo& info = infoOf(format);
   if (!info.isBuilt)
-    throw BadInput(path.string() + " is a " + info.name + " image, but this build has no " +
+    throw BadInput(path.string() + " has the format " + info.name + ", but this build has no " +
                    info.library + " (" + info.package + " was not found)");
 }
 

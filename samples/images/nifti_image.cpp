@@ -37,15 +37,15 @@ void requireUsable(const fs::path& path, const Header& header) {
 
 /// Refuses what the library would print a message about.
 void requireUsable(const fs::path& path) {
-  int version = 0, swapped = 0;
+  int version = 0, swapped = 0;  // version 0 is that of ANALYZE 7.5, which has the header of 1
   const std::unique_ptr<void, MemoryDeleter> raw(nifti_read_header(path.c_str(), &version, 0));
-  if (!raw || (version != 1 && version != 2)) return;
+  if (!raw || version < 0 || version > 2) return;
   // nifti_read_header leaves the byte order of the file.
   const std::unique_ptr<void, MemoryDeleter> header(
-      version == 1 ? static_cast<void*>(nifti_read_n1_hdr(path.c_str(), &swapped, 0))
-                   : nifti_read_n2_hdr(path.c_str(), &swapped, 0));
-  if (header && version == 1) requireUsable(path, *static_cast<nifti_1_header*>(header.get()));
+      version == 2 ? static_cast<void*>(nifti_read_n2_hdr(path.c_str(), &swapped, 0))
+                   : nifti_read_n1_hdr(path.c_str(), &swapped, 0));
   if (header && version == 2) requireUsable(path, *static_cast<nifti_2_header*>(header.get()));
+  if (header && version < 2) requireUsable(path, *static_cast<nifti_1_header*>(header.get()));
 }
 
 HeaderPointer readHeader(const fs::path& path) {

@@ -108,10 +108,11 @@ class TiffImage : public ImageSource {
 /// Nothing for other files.
 std::unique_ptr<ImageSource> openPagesBehind(const fs::path& path, const ImageChoice& choice) {
   TiffFile file(path);
-  const auto pages = file.pages();
-  file.open(pages.front());
   const std::size_t images = imageJPages(file.stackFile(1).text).value_or(1);
-  if (pages.size() != 1 || images < 2 || file.plainData() == 0) return nullptr;
+  if (images < 2 || file.plainData() == 0) return nullptr;
+  const auto pages = file.pages();
+  if (pages.size() != 1) return nullptr;
+  file.open(pages.front());
   const StackLayout layout = stackLayout(file.stackFile(images));
   if (layout.channels != 1)
     throw BadInput(path.string() + " has " + std::to_string(layout.channels) +

@@ -148,8 +148,7 @@ void refuseRawOptions(const cli::Arguments& arguments, const samples::ImageFiles
   for (const char* option : kRawOptions)
     if (arguments.has(option))
       throw UsageError("--" + std::string(option) + " is for RAW images only, and " +
-                       files.paths.front().string() + " is a " + samples::nameOf(format) +
-                       " image");
+                       files.paths.front().string() + " has the format " + samples::nameOf(format));
 }
 
 /// The arguments without a dash: the files of the image, then the output.

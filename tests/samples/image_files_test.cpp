@@ -33,6 +33,8 @@ TEST(IsBefore, comparesNumbersByTheirValues) {
   EXPECT_TRUE(isBefore("a", "a1"));
   EXPECT_TRUE(isBefore("2/a99", "10/a1"));
   EXPECT_TRUE(isBefore("a99999999999999999998", "a99999999999999999999"));
+  EXPECT_TRUE(isBefore("a01", "a1"));
+  EXPECT_FALSE(isBefore("a1", "a01"));
   EXPECT_FALSE(isBefore("a1", "a1"));
   EXPECT_FALSE(isBefore("b1", "a2"));
 }
