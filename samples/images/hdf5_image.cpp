@@ -100,8 +100,8 @@ class Hdf5Image : public ImageSource {
     if (axes_.component) first[*axes_.component] = component_;
     const Hdf5Handle from(H5Dget_space(opened_.id()), H5Sclose);
     H5Sselect_hyperslab(from.id(), H5S_SELECT_SET, first.data(), nullptr, count.data(), nullptr);
-    const hsize_t all = out.size();
-    const Hdf5Handle to(H5Screate_simple(1, &all, nullptr), H5Sclose);
+    // With the same axes as the selection, the library copies rows instead of single numbers.
+    const Hdf5Handle to(H5Screate_simple(int(count.size()), count.data(), nullptr), H5Sclose);
     if (H5Dread(opened_.id(), H5T_NATIVE_FLOAT, to.id(), from.id(), H5P_DEFAULT, out.data()) < 0)
       file_.fail(dataset_.path + " at slice " + std::to_string(slab.firstZ));
   }
