@@ -42,7 +42,7 @@ class Tools:
 
     def program(self, name):
         folders = {"vdb2esvr": "vdb2esvr", "esvr2vdb": "esvr2vdb", "esvr-render": "render", "esvr-compare": "compare",
-                   "esvr-sample": "samples", "raw2vdb": "samples", "bench_economy": "tests/bench/economy"}
+                   "esvr-sample": "samples", "image2vdb": "samples", "bench_economy": "tests/bench/economy"}
         return self.bin / folders[name] / name
 
     def sample(self, kind, resolution):
@@ -55,7 +55,7 @@ class Tools:
         raw, path = self.folder / f"{name}.raw", self.folder / f"{name}.vdb"
         values = array.array("f", (value(x, y, z) for z in range(side) for y in range(side) for x in range(side)))
         raw.write_bytes(values.tobytes())
-        run([self.program("raw2vdb"), raw, path, "--dims", f"{side},{side},{side}", "--type", "float32", "-f", "-q"]
+        run([self.program("image2vdb"), raw, path, "--dims", f"{side},{side},{side}", "--type", "float32", "-f", "-q"]
             + ([] if threshold is None else ["--threshold", threshold]))
         return path
 
