@@ -7,6 +7,7 @@
 
 #include "cli/names.h"
 #include "cli/table.h"
+#include "esvr/grid_names.h"
 
 namespace esvr::compare {
 namespace {
@@ -92,8 +93,7 @@ std::vector<Difference> compareMetadata(std::span<const MetaItem> reference,
 std::vector<Difference> compareDescriptors(const GridDescriptor& a, const GridDescriptor& b) {
   Differences differences;
   differences.add(DifferenceKind::kName, "name", '"' + a.name + '"', '"' + b.name + '"');
-  differences.add(DifferenceKind::kClass, "class", cli::nameOf(a.gridClass),
-                  cli::nameOf(b.gridClass));
+  differences.add(DifferenceKind::kClass, "class", className(a.gridClass), className(b.gridClass));
   differences.add(DifferenceKind::kValueType, "value type", cli::nameOf(a.valueType),
                   cli::nameOf(b.valueType));
   if (a.background != b.background)

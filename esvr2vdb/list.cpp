@@ -7,6 +7,7 @@
 #include "cli/table.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "esvr/sequence_file.h"
 #include "esvr/vdb_io.h"
 #include "esvr2vdb/choose_grids.h"
@@ -74,7 +75,7 @@ std::vector<std::string> rowOfVector(const Listing& listing, const NamedGrid& na
   }
   const GridDescriptor& descriptor = listing.file.grids[vector.first].descriptor;
   return {named.name,
-          cli::nameOf(descriptor.gridClass),
+          className(descriptor.gridClass),
           vectorsOf(descriptor.valueType),
           std::to_string(voxels),
           std::to_string(ellipsoids),
@@ -90,7 +91,7 @@ std::vector<std::string> rowOfStored(const Listing& listing, const NamedGrid& na
   const std::uint64_t bytes = cli::storedBytes(listing.summary, named.grid.index);
   const std::uint64_t ellipsoids = listing.ellipsoids[named.grid.index];
   return {named.name,
-          cli::nameOf(grid.descriptor.gridClass),
+          className(grid.descriptor.gridClass),
           cli::nameOf(grid.descriptor.valueType),
           std::to_string(grid.activeVoxels),
           std::to_string(ellipsoids),
@@ -112,7 +113,7 @@ std::vector<std::string> rowOfCarried(const Listing& listing, const NamedGrid& n
   const GridSummary grid = summaryOf(listing.options, listing.file.carried[named.grid.index]);
   const std::size_t number = listing.numberOf(named.grid);
   return {named.name,
-          cli::nameOf(grid.gridClass),
+          className(grid.gridClass),
           cli::valuesOf(grid),
           cli::activeVoxelsOf(grid),
           "carried",

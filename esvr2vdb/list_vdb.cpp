@@ -4,6 +4,7 @@
 #include "cli/names.h"
 #include "cli/printable.h"
 #include "cli/table.h"
+#include "esvr/grid_names.h"
 #include "esvr/vdb_io.h"
 #include "esvr2vdb/jobs.h"
 
@@ -13,7 +14,7 @@ namespace {
 void printGrids(const VdbSummary& file) {
   cli::Table table({"grid", "class", "values", "active voxels", "bytes"});
   for (const auto& grid : file.grids)
-    table.add({grid.uniqueName, cli::nameOf(grid.gridClass), cli::valuesOf(grid),
+    table.add({grid.uniqueName, className(grid.gridClass), cli::valuesOf(grid),
                cli::activeVoxelsOf(grid), std::to_string(grid.storedBytes)});
   table.print(std::cout);
 }

@@ -8,6 +8,7 @@
 #include "cli/names.h"
 #include "cli/stability_json.h"
 #include "cli/version_json.h"
+#include "esvr/grid_names.h"
 #include "vdb2esvr/left_out_report.h"
 #include "vdb2esvr/paper_report.h"
 #include "vdb2esvr/scene_notes.h"
@@ -150,7 +151,7 @@ namespace {
 
 Json sourceOf(const ConvertedGrid& grid) {
   const StoredGrid& stored = grid.stored();
-  return {{"class", cli::nameOf(stored.descriptor.gridClass)},
+  return {{"class", className(stored.descriptor.gridClass)},
           {"value_type", cli::nameOf(stored.descriptor.valueType)},
           {"background", stored.descriptor.background},
           {"map", stored.descriptor.transform.mapType},

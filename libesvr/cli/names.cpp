@@ -4,20 +4,6 @@
 
 namespace esvr::cli {
 
-std::string nameOf(GridClass gridClass) {
-  switch (gridClass) {
-    case GridClass::kLevelSet:
-      return "level set";
-    case GridClass::kFogVolume:
-      return "fog volume";
-    case GridClass::kStaggered:
-      return "staggered";
-    case GridClass::kUnknown:
-      break;
-  }
-  return "unknown";
-}
-
 std::string nameOf(ValueType type) {
   switch (type) {
     case ValueType::kHalf:

@@ -10,8 +10,6 @@
 
 namespace esvr::cli {
 
-/// OpenVDB's names: "level set", "fog volume", "staggered", "unknown".
-[[nodiscard]] std::string nameOf(GridClass gridClass);
 /// "float", "half" or "double".
 [[nodiscard]] std::string nameOf(ValueType type);
 /// "continuous" or "paper".

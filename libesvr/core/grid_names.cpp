@@ -30,6 +30,20 @@ std::size_t firstWhere(std::span<const std::string> names, const std::string& wa
 
 }  // namespace
 
+const char* className(GridClass gridClass) {
+  switch (gridClass) {
+    case GridClass::kLevelSet:
+      return "level set";
+    case GridClass::kFogVolume:
+      return "fog volume";
+    case GridClass::kStaggered:
+      return "staggered";
+    case GridClass::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
 std::vector<std::string> uniqueNames(std::span<const std::string> names) {
   std::map<std::string, std::size_t> total, seen;
   for (const auto& name : names) ++total[name];

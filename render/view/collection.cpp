@@ -39,7 +39,7 @@ std::vector<ShownGrid> gridsOf(const EsvrFile& file, const EsvrSummary& summary,
     if (!outline) continue;
     const StoredGrid& stored = file.grids[i];
     grids.push_back({names[i], stored.voxels ? "voxels" : "ellipsoids",
-                     cli::nameOf(stored.descriptor.gridClass), std::move(*outline),
+                     className(stored.descriptor.gridClass), std::move(*outline),
                      stored.field.ellipsoidCount(), cli::storedBytes(summary, i),
                      stored.activeVoxels});
   }
@@ -78,7 +78,7 @@ void showVdb(const render::SceneFile& from, ShownFile& file) {
     if (!grid.skipReason.empty() || grid.activeVoxels == 0) continue;
     render::SceneFile of = from;
     of.grid = grid.uniqueName;
-    file.grids.push_back({grid.uniqueName, "vdb", cli::nameOf(grid.gridClass),
+    file.grids.push_back({grid.uniqueName, "vdb", className(grid.gridClass),
                           outlineOf(readScenes(of)), 0, grid.storedBytes, grid.activeVoxels});
   }
 }

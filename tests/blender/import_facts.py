@@ -23,10 +23,12 @@ def matrix_rows(matrix):
 
 def import_volume(path):
     """Imports a file, or all files of a sequence, and returns the object."""
-    files = sorted(glob.glob(path.replace("#", "[0-9]"))) if "#" in path else [path]
+    folder, name = os.path.split(path)
+    pattern = os.path.join(glob.escape(folder), name.replace("#", "[0-9]"))
+    files = sorted(glob.glob(pattern)) if "#" in name else [path]
     bpy.ops.object.volume_import(
         filepath=files[0],
-        directory=os.path.dirname(path),
+        directory=folder,
         files=[{"name": os.path.basename(file)} for file in files],
         use_sequence_detection=True,
         align="WORLD",
@@ -98,8 +100,7 @@ def sequence_facts(volume):
     }
 
 
-def volume_facts(path):
-    volume = import_volume(path)
+def facts_of(volume):
     volume.data.grids.load()
     bpy.context.view_layer.update()
     grids = volume.data.grids
@@ -117,9 +118,10 @@ def volume_facts(path):
 
 def main():
     arguments = sys.argv[sys.argv.index("--") + 1:]
-    facts = [volume_facts(path) for path in arguments[1:]]
+    facts = [facts_of(import_volume(path)) for path in arguments[1:]]
     with open(arguments[0], "w", encoding="utf-8") as file:
         json.dump(facts, file, indent=1)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -133,9 +133,8 @@ def set_up_scene(scene, first, grid):
     return make_material(diagonal, grid)
 
 
-def render(scene, material, path, picture):
-    """Returns the numbers of all pixels."""
-    volume = import_volume(path)
+def render(scene, material, volume, picture):
+    """Returns the numbers of all pixels, and removes the volume."""
     volume.data.materials.append(material)
     scene.render.filepath = picture
     bpy.ops.render.render(write_still=True)
@@ -155,7 +154,8 @@ def main():
     set_up_cycles(scene)
     set_up_picture(scene)
     material = set_up_scene(scene, paths[0], grid)
-    first, *others = [render(scene, material, *pair) for pair in zip(paths[::2], paths[1::2])]
+    first, *others = [render(scene, material, import_volume(path), picture)
+                      for path, picture in zip(paths[::2], paths[1::2])]
     figures = {
         "psnr": [psnr(first, other) for other in others],
         "psnr_of_black": psnr(first, [0.0] * len(first)),
@@ -164,4 +164,5 @@ def main():
         json.dump(figures, file, indent=1)
 
 
-main()
+if __name__ == "__main__":
+    main()

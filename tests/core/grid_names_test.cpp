@@ -43,5 +43,12 @@ TEST(GridNames, AreListedForAnUnknownName) {
   EXPECT_THAT([&] { (void)findGrid(Names{}, "a"); }, ThrowsMessage<BadInput>(HasSubstr("none")));
 }
 
+TEST(ClassNames, AreThoseOfOpenVdb) {
+  EXPECT_STREQ(className(GridClass::kLevelSet), "level set");
+  EXPECT_STREQ(className(GridClass::kFogVolume), "fog volume");
+  EXPECT_STREQ(className(GridClass::kStaggered), "staggered");
+  EXPECT_STREQ(className(GridClass::kUnknown), "unknown");
+}
+
 }  // namespace
 }  // namespace esvr

@@ -144,7 +144,7 @@ class Inputs:
     def image(self, path):
         header = self.folder / "ct.nhdr"
         self.header(header)
-        name = "image2vdb" if shutil.which("image2vdb") else "raw2vdb"
+        name = "image2vdb"
         program(name, header, path, "--threshold", "-1")
 
     def fit(self, path, source):

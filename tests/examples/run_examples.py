@@ -24,7 +24,7 @@ LIMIT_S = 120
 QUICK = {"--seconds": "1", "--count": "200", "--turntable": "3", "--psnr": "40", "--fps": "32",
          "--min-radius": "0.5"}
 SAMPLERS = ("esvr-sample", "swc2vdb")
-CONVERTERS = SAMPLERS + ("vdb2esvr", "esvr2vdb", "esvr-render", "raw2vdb", "image2vdb")
+CONVERTERS = SAMPLERS + ("vdb2esvr", "esvr2vdb", "esvr-render", "image2vdb")
 
 
 def examples_of(program):

@@ -1,9 +1,18 @@
-"""Every example of docs/python.md runs, in its order, in an empty folder."""
+"""Every example of docs/python.md runs, in its order, in an empty folder.
+
+The example with grids of OpenVDB's Python module is left out where that is missing.
+"""
+import importlib.util
 import os
 import pathlib
 import re
 
 import esvr
+from esvr import _openvdb
+
+
+def has_openvdb():
+    return any(importlib.util.find_spec(name) for name in _openvdb.MODULES)
 
 
 def test_examples_run(tmp_path, monkeypatch, volume):
@@ -14,5 +23,7 @@ def test_examples_run(tmp_path, monkeypatch, volume):
     assert len(examples) > 5
     names = {}
     for example in examples:
+        if "to_pyopenvdb" in example and not has_openvdb():
+            continue
         exec(compile(example, "docs/python.md", "exec"), names)
     assert esvr.read("smoke.esvr")

@@ -9,14 +9,16 @@
 All coordinates are those of the index space: voxel (i, j, k) lies at (i, j, k), and arrays have the axes
 x, y, z.
 """
-from . import _html
+from . import _html, _openvdb
 from ._core import (BadInput, Cancelled, DeviceError, Ellipsoids, Error, File, Grid, MemoryExceeded,
-                    Metrics, TargetMissed, UsageError, Volume, __version__, compare, fit, frames,
+                    Metrics, Sequence, TargetMissed, UsageError, Volume, __version__, compare, fit, frames,
                     read, write)
 
 __all__ = ["BadInput", "Cancelled", "DeviceError", "Ellipsoids", "Error", "File", "Grid",
-           "MemoryExceeded", "Metrics", "TargetMissed", "UsageError", "Volume", "__version__",
+           "MemoryExceeded", "Metrics", "Sequence", "TargetMissed", "UsageError", "Volume", "__version__",
            "compare", "fit", "frames", "read", "write"]
 
 Volume._repr_html_ = _html.of_volume
 Grid._repr_html_ = _html.of_grid
+Volume.from_pyopenvdb = staticmethod(_openvdb.volume_of)
+Volume.to_pyopenvdb = _openvdb.grid_of

@@ -3,6 +3,8 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <mutex>
+
 #include "esvr/error.h"
 #include "esvr/sequence_file.h"
 #include "python/src/objects.h"
@@ -67,13 +69,30 @@ File read(const std::filesystem::path& path, const std::optional<PlainBox>& box,
   return {std::make_shared<const EsvrFile>(readPart(path, {box, ellipsoids, frame}))};
 }
 
-std::vector<std::int64_t> framesOf(const std::filesystem::path& path) {
-  const py::gil_scoped_release release;
+std::vector<std::int64_t> numbersOf(const SequenceReader& reader) {
   std::vector<std::int64_t> numbers;
-  if (!holdsSequence(path)) return numbers;
-  const SequenceReader reader(path);
   for (const auto& frame : reader.frames()) numbers.push_back(frame.number);
   return numbers;
+}
+
+std::vector<std::int64_t> framesOf(const std::filesystem::path& path) {
+  const py::gil_scoped_release release;
+  if (!holdsSequence(path)) return {};
+  return numbersOf(SequenceReader(path));
+}
+
+/// A reader that threads of Python may share.
+struct Sequence {
+  explicit Sequence(const std::filesystem::path& path) : reader(path) {}
+
+  SequenceReader reader;
+  std::mutex reads;
+};
+
+File readOfSequence(Sequence& self, std::int64_t frame) {
+  const py::gil_scoped_release release;
+  const std::lock_guard lock(self.reads);
+  return {std::make_shared<const EsvrFile>(self.reader.read(frame))};
 }
 
 std::uint64_t writeFile(const std::filesystem::path& path, const File& file, bool overwrite) {
@@ -108,8 +127,36 @@ void addFiles(py::module_& module) {
       .def_property_readonly("carried", &carriedNames,
                              "Names of the grids that are kept as the bytes of their .vdb file.")
       .def("__getitem__", &gridNamed, py::arg("name"), "The first grid of a name.")
+      .def(
+          "save",
+          [](const File& file, const std::filesystem::path& path,
+             const std::optional<PlainBox>& box, const std::optional<std::size_t>& layers,
+             const std::optional<std::size_t>& maxEllipsoids, bool overwrite) {
+            const py::gil_scoped_release release;
+            return saveFile(file, path, {box, layers, maxEllipsoids}, overwrite);
+          },
+          py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
+          py::arg("layers") = py::none(), py::arg("max_ellipsoids") = py::none(),
+          py::arg("overwrite") = false,
+          "Writes the voxels of all grids to a .vdb or .nvdb file, as esvr2vdb does.\n\n"
+          "box ((x0, y0, z0), (x1, y1, z1)), layers and max_ellipsoids are --bbox, --lod and\n"
+          "--max-ellipsoids of esvr2vdb. With one of them, carried grids are left out, because\n"
+          "they cannot be cut. Returns the names of the grids that were left out.")
       .def("__len__", [](const File& f) { return f.file->grids.size(); })
       .def("__repr__", &fileText);
+  py::class_<Sequence>(
+      module, "Sequence",
+      "A file that holds a sequence. Reading its frames in their order decodes each\n"
+      "of them once; esvr.read(path, frame=...) decodes those before it again.")
+      .def(py::init([](const std::filesystem::path& path) {
+             const py::gil_scoped_release release;
+             return std::make_unique<Sequence>(path);
+           }),
+           py::arg("path"))
+      .def_property_readonly(
+          "frames", [](const Sequence& s) { return numbersOf(s.reader); },
+          "The numbers of the frames, which increase.")
+      .def("read", &readOfSequence, py::arg("frame"), "Reads a frame (esvr.File).");
   module.def(
       "read", &read, py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
       py::arg("ellipsoids") = py::none(), py::arg("frame") = py::none(),

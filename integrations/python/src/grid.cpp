@@ -7,6 +7,7 @@
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "python/src/interruptible.h"
 
 namespace esvr::python {
@@ -117,20 +118,6 @@ void addEllipsoids(py::module_& module) {
 }
 
 }  // namespace
-
-const char* className(GridClass gridClass) {
-  switch (gridClass) {
-    case GridClass::kLevelSet:
-      return "level set";
-    case GridClass::kFogVolume:
-      return "fog volume";
-    case GridClass::kStaggered:
-      return "staggered";
-    case GridClass::kUnknown:
-      break;
-  }
-  return "unknown";
-}
 
 py::object matrixOf(const Transform& transform) {
   if (!transform.affine) return py::none();

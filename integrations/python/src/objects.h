@@ -7,6 +7,8 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "esvr/container.h"
 #include "esvr/vdb_io.h"
@@ -42,8 +44,20 @@ using PlainBox = std::array<Corner, 2>;
   return PlainBox{{{b.min.x, b.min.y, b.min.z}, {b.max.x, b.max.y, b.max.z}}};
 }
 
-/// The name of a class of grids: "fog volume", "level set", "staggered" or "unknown".
-[[nodiscard]] const char* className(GridClass gridClass);
+/// A part of the content of a file that is saved as VDB.
+struct SavedPart {
+  std::optional<PlainBox> box;
+  std::optional<std::size_t> layers, maxEllipsoids;
+
+  [[nodiscard]] bool isWhole() const { return !box && !layers && !maxEllipsoids; }
+};
+
+/// Writes the voxels of all grids of a file to a .vdb or .nvdb file.
+/// \return the names of the carried grids that were left out because they cannot be cut
+/// \throws UsageError  the box is empty, or a number is 0
+/// \throws BadInput  all grids would be left out
+std::vector<std::string> saveFile(const File& file, const std::filesystem::path& path,
+                                  const SavedPart& part, bool overwrite);
 
 /// The matrix from index to world coordinates, for column vectors; None for a frustum.
 [[nodiscard]] py::object matrixOf(const Transform& transform);

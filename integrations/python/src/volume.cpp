@@ -4,9 +4,11 @@
 #include <pybind11/stl/filesystem.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
@@ -129,22 +131,33 @@ py::array_t<float> toNumpy(const Volume& self, const std::optional<PlainBox>& pl
   return array;
 }
 
-Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name) {
-  const py::gil_scoped_release release;
-  std::string chosen = name.value_or("");
-  if (!name) {
-    const VdbSummary summary = inspectVdb(path);
-    for (const auto& grid : summary.grids)
-      if (chosen.empty() && grid.skipReason.empty()) chosen = grid.uniqueName;
-    if (chosen.empty()) throw BadInput(path.string() + ": no grid of numbers has an active voxel");
-  }
-  return {std::make_shared<const VolumeGrid>(readGrid(path, chosen))};
+/// The unique name, which may be empty, of the first grid that a fit can take.
+std::string firstOfNumbers(const std::filesystem::path& path) {
+  const VdbSummary summary = inspectVdb(path);
+  const auto& grids = summary.grids;
+  const auto first = std::find_if(grids.begin(), grids.end(),
+                                  [](const GridSummary& g) { return g.skipReason.empty(); });
+  if (first == grids.end())
+    throw BadInput(path.string() + ": no grid of numbers has an active voxel");
+  return first->uniqueName;
 }
 
-void save(const Volume& self, const std::filesystem::path& path, bool overwrite) {
+Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name) {
+  const py::gil_scoped_release release;
+  return {std::make_shared<const VolumeGrid>(readGrid(path, name ? *name : firstOfNumbers(path)))};
+}
+
+/// The only grid of a file, which may have no active voxel.
+Volume fromOnlyGrid(const std::filesystem::path& path) {
+  const py::gil_scoped_release release;
+  const std::string name = inspectVdb(path).grids.at(0).uniqueName;
+  return {std::make_shared<const VolumeGrid>(readGrid(path, name, {.allowEmpty = true}))};
+}
+
+void write(const Volume& self, const std::filesystem::path& path, const WriteOptions& options) {
   const py::gil_scoped_release release;
   const GridToWrite grid = self.grid.get();
-  writeGrids(path, {}, std::span(&grid, 1), {.overwrite = overwrite});
+  writeGrids(path, {}, std::span(&grid, 1), options);
 }
 
 }  // namespace
@@ -169,8 +182,21 @@ void addVolume(py::module_& module) {
       .def("to_numpy", &toNumpy, py::arg("box") = py::none(),
            "The voxels of a box ((x0, y0, z0), (x1, y1, z1)), both inclusive, as float32 of shape\n"
            "(nx, ny, nz); by default those of Volume.box.")
-      .def("save", &save, py::arg("path"), py::kw_only(), py::arg("overwrite") = false,
-           "Writes a .vdb or .nvdb file with this grid.")
+      .def(
+          "save",
+          [](const Volume& v, const std::filesystem::path& path, bool overwrite) {
+            write(v, path, {.overwrite = overwrite});
+          },
+          py::arg("path"), py::kw_only(), py::arg("overwrite") = false,
+          "Writes a .vdb or .nvdb file with this grid.")
+      // For esvr/_openvdb.py.
+      .def_static("_from_only_grid", &fromOnlyGrid, py::arg("path"))
+      .def(
+          "_save_as_float",
+          [](const Volume& v, const std::filesystem::path& path) {
+            write(v, path, {.half = HalfMode::kOff});
+          },
+          py::arg("path"))
       .def_property_readonly("name", [](const Volume& v) { return v.grid->descriptor.name; })
       .def_property_readonly(
           "grid_class", [](const Volume& v) { return className(v.grid->descriptor.gridClass); },

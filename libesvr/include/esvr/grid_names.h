@@ -1,6 +1,6 @@
 #pragma once
-/// Finds the grids of a file by the names that users give. Several grids may share a name or have
-/// none.
+/// Names of grids and of their classes. Users give names to find the grids of a file; several grids
+/// may share a name or have none.
 
 #include <cstddef>
 #include <filesystem>
@@ -8,7 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "esvr/grid_descriptor.h"
+
 namespace esvr {
+
+/// OpenVDB's names: "level set", "fog volume", "staggered", "unknown".
+[[nodiscard]] const char* className(GridClass gridClass);
 
 /// The names that --grid takes: each grid's name, with "[i]" (i from 0, in file order) if several
 /// grids share it.

@@ -1,0 +1,31 @@
+"""The manifest follows the rules of Blender's documentation, and agrees with bl_info and with the version of the project."""
+import pathlib
+import tomllib
+
+import esvr
+import esvr_blender
+
+FOLDER = pathlib.Path(esvr_blender.__file__).resolve().parent
+MANIFEST = tomllib.loads((FOLDER / "blender_manifest.toml").read_text())
+LONGEST_TEXT = 64
+
+
+def test_everything_that_is_required_is_there():
+    assert MANIFEST["schema_version"] == "1.0.0" and MANIFEST["type"] == "add-on"
+    assert MANIFEST["id"] == FOLDER.name and MANIFEST["name"] == esvr_blender.bl_info["name"]
+    assert MANIFEST["maintainer"] and MANIFEST["license"] == ["SPDX:GPL-3.0-or-later"]
+    assert MANIFEST["blender_version_min"] == "4.2.0"  # the first version with extensions
+
+
+def test_short_texts_are_short_and_end_without_punctuation():
+    for text in (MANIFEST["tagline"], MANIFEST["permissions"]["files"]):
+        assert len(text) <= LONGEST_TEXT and text[-1].isalnum()
+
+
+def test_the_versions_agree():
+    assert MANIFEST["version"] == esvr.__version__ == ".".join(map(str, esvr_blender.bl_info["version"]))
+
+
+def test_every_file_names_its_licence():
+    for path in [*FOLDER.glob("*.py"), *FOLDER.glob("*.toml"), FOLDER.parent / "pack.py"]:
+        assert "SPDX-License-Identifier: GPL-3.0-or-later" in path.read_text(), path

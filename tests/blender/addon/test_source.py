@@ -1,0 +1,65 @@
+"""A source is a file or a pattern; chosen files become sources; what is missing is named."""
+import pytest
+from esvr_blender.source import Source, SourceError, grouped
+
+
+def touch(folder, *names):
+    for name in names:
+        (folder / name).touch()
+
+
+def test_a_file_is_one_source(tmp_path):
+    touch(tmp_path, "smoke.esvr")
+    source = Source(str(tmp_path / "smoke.esvr"))
+    assert source.files() == {None: source.text} and source.stem == "smoke"
+
+
+def test_a_pattern_has_the_files_of_its_very_names(tmp_path):
+    touch(tmp_path, "s.0007.esvr", "s.0010.esvr", "s.12345.esvr", "s.9.esvr", "s.00011.esvr", "s.0012.esvr.bak", "s.-003.esvr")
+    source = Source(str(tmp_path / "s.####.esvr"))
+    assert list(source.files()) == [7, 10, 12345]
+    assert source.files((8, 100)) == {10: str(tmp_path / "s.0010.esvr")}
+    assert source.stem == "s"
+
+
+@pytest.mark.parametrize("pattern, name", [("s#.esvr", "s0003.esvr"), ("s@.esvr", "s3.esvr"), ("s@@.esvr", "s03.esvr"),
+                                           ("s##.esvr", "s03.esvr")])
+def test_patterns_mean_what_they_mean_to_the_programs(tmp_path, pattern, name):
+    touch(tmp_path, name)
+    assert Source(str(tmp_path / pattern)).files() == {3: str(tmp_path / name)}
+
+
+def test_a_file_whose_name_looks_like_a_pattern_is_a_file(tmp_path):
+    touch(tmp_path, "take#2.esvr", "take0002.esvr")
+    source = Source(str(tmp_path / "take#2.esvr"))
+    assert not source.is_numbered and source.files() == {None: source.text}
+
+
+@pytest.mark.parametrize("name", ["none.esvr", "none.####.esvr"])
+def test_missing_files_are_named(tmp_path, name):
+    with pytest.raises(SourceError, match=name):
+        Source(str(tmp_path / name)).files()
+
+
+def test_a_range_without_files_is_named(tmp_path):
+    touch(tmp_path, "s.0007.esvr")
+    with pytest.raises(SourceError, match="frames 8 to 9"):
+        Source(str(tmp_path / "s.####.esvr")).files((8, 9))
+
+
+def group(tmp_path, *names):
+    return [(source.text[len(str(tmp_path)) + 1:], frames) for source, frames in grouped(tmp_path / name for name in names)]
+
+
+def test_chosen_files_that_differ_in_their_number_are_a_sequence(tmp_path):
+    assert group(tmp_path, "a1.0007.esvr", "b.esvr", "a1.0009.esvr", "c_1.esvr") == [
+        ("a1.####.esvr", (7, 9)), ("b.esvr", None), ("c_1.esvr", None)]
+
+
+def test_numbers_of_different_lengths_have_the_pattern_of_the_shortest(tmp_path):
+    assert group(tmp_path, "a10.esvr", "a9.esvr") == [("a@.esvr", (9, 10))]
+    assert group(tmp_path, "a100.esvr", "a99.esvr") == [("a##.esvr", (99, 100))]
+
+
+def test_names_that_would_become_another_pattern_are_no_sequence(tmp_path):
+    assert group(tmp_path, "a1#.esvr", "a2#.esvr") == [("a1#.esvr", None), ("a2#.esvr", None)]
