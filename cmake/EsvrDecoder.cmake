@@ -11,6 +11,8 @@ install(
   FILE esvrDecoderConfig.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/esvrDecoder)
 set_target_properties(esvr_decoder PROPERTIES EXPORT_NAME decoder)
+include(EsvrPkgConfig)
+esvr_pkg_config(esvr_decoder esvr_decoder "")
 
 if(EMSCRIPTEN)
   add_subdirectory(libesvr/page)

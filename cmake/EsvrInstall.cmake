@@ -1,5 +1,6 @@
-# Installs the library, its headers and the package for find_package(esvr). The component `library`
-# has everything that another project needs; the component `programs` has the programs.
+# Installs the library, its headers, the package for find_package(esvr) and the file for pkg-config.
+# The component `library` has a shared library, `development` has everything else that another
+# project needs, `programs` has the programs, and `python` has the Python module.
 include(CMakePackageConfigHelpers)
 
 set(packageDir ${CMAKE_INSTALL_LIBDIR}/cmake/esvr)
@@ -7,17 +8,21 @@ set(packageDir ${CMAKE_INSTALL_LIBDIR}/cmake/esvr)
 install(
   TARGETS esvr
   EXPORT esvrTargets
-  COMPONENT library)
-install(DIRECTORY libesvr/include/esvr TYPE INCLUDE COMPONENT library)
+  ARCHIVE COMPONENT development
+  LIBRARY COMPONENT library NAMELINK_COMPONENT development)
+set_target_properties(esvr PROPERTIES INSTALL_RPATH "$ORIGIN")
+install(DIRECTORY libesvr/include/esvr TYPE INCLUDE COMPONENT development)
 install(
   EXPORT esvrTargets
   NAMESPACE esvr::
   DESTINATION ${packageDir}
-  COMPONENT library)
+  COMPONENT development)
 
-foreach(component library programs)
-  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT ${component})
-endforeach()
+if(NOT ESVR_DEB) # a package has its own file of this kind (EsvrPackages.cmake)
+  foreach(component library development programs)
+    install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT ${component})
+  endforeach()
+endif()
 
 get_target_property(libraryType esvr TYPE)
 string(COMPARE EQUAL ${libraryType} STATIC_LIBRARY ESVR_STATIC)
@@ -28,7 +33,7 @@ if(ESVR_WITH_CUDA)
     get_target_property(cudart CUDA::cudart_static IMPORTED_LOCATION)
     file(REAL_PATH ${cudart} cudart) # because a link would be installed as a link
     install(FILES ${cudart} DESTINATION ${CMAKE_INSTALL_LIBDIR} RENAME ${ESVR_CUDART}
-            COMPONENT library)
+            COMPONENT development)
   endif()
 else()
   set(ESVR_CUDA_IN FALSE)
@@ -50,12 +55,37 @@ install(
   FILES ${PROJECT_BINARY_DIR}/esvrConfig.cmake ${PROJECT_BINARY_DIR}/esvrConfigVersion.cmake
         cmake/EsvrDependencies.cmake ${findModules}
   DESTINATION ${packageDir}
-  COMPONENT library)
+  COMPONENT development)
 
-if(TARGET esvr_mpi)
-  install(TARGETS esvr_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT programs)
+include(EsvrPkgConfig)
+set(privateLibraries "")
+if(ESVR_STATIC)
+  set(privateLibraries -lopenvdb -ltbb -lblosc -lz -lxxhash)
+  if(OpenVDB_Imath_LIBRARY)
+    list(APPEND privateLibraries -lImath)
+  endif()
+  if(ESVR_WITH_ZFP)
+    list(APPEND privateLibraries -lzfp)
+  endif()
+  if(ESVR_WITH_CUDA)
+    list(APPEND privateLibraries -lesvr_cudart_static -lrt)
+  endif()
 endif()
-set(ESVR_PROGRAMS vdb2esvr esvr2vdb esvr-render esvr-view esvr-compare esvr-sample swc2vdb raw2vdb)
+esvr_pkg_config(esvr esvr "${privateLibraries}")
+
+# A shared library loads this module; of a static one, the programs do.
+if(TARGET esvr_vdb)
+  set(component programs)
+  if(NOT ESVR_STATIC)
+    set(component library)
+  endif()
+  install(TARGETS esvr_vdb LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${component})
+endif()
+if(TARGET esvr_mpi)
+  install(TARGETS esvr_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT mpi)
+endif()
+set(ESVR_PROGRAMS vdb2esvr esvr2vdb esvr-render esvr-view esvr-compare esvr-sample swc2vdb image2vdb)
+set(ESVR_COMPARE_COMMANDS check table curves stability)
 foreach(program ${ESVR_PROGRAMS})
   if(TARGET ${program})
     install(TARGETS ${program} COMPONENT programs)

@@ -57,7 +57,7 @@ cli::ProgramText programText() {
       .examples =
           "  esvr-compare table smoke.vdb smoke.esvr\n"
           "  esvr-compare table smoke.vdb smoke.esvr --html page.html --markdown table.md\n"
-          "  esvr-compare table ct.vdb ct.esvr --external SZ3=out.raw:48915:256x256x256:float32\n"
+          "  esvr-compare table ct.vdb ct.esvr --external SZ3=out.raw:48915:64x64x64:float32\n"
           "  esvr-compare table ct.vdb --size 50KB --external-command SZ3='compressors/sz3 "
           "bin/sz3'\n"
           "  esvr-compare table smoke.vdb --row nvdb-fpn-zip,tolerance=0.01,threshold=0.002"};

@@ -46,27 +46,25 @@ const char* whyNot(const GridOfFile& grid, const Options& options) {
   return nullptr;
 }
 
-/// The numbers of the named grids, to which only the records of the file are read. Nothing: one of
-/// them is carried, so that the whole file is read.
-std::optional<std::vector<std::size_t>> namedNumbers(const Options& options) {
-  ReadPart records;
-  records.grids.emplace();
-  records.limits = limitsOf(options);
-  const EsvrFile file = readEsvrPart(options.input, records).file;
-  std::vector<std::size_t> numbers;
+/// Restricts what is read to the named grids. Only the records of the file are read for this.
+void restrictToNamed(const Options& options, ReadPart& wanted) {
+  wanted.grids.emplace();
+  const EsvrFile file = readEsvrPart(options.input, wanted).file;
   for (const auto& [grid, name] : chooseGrids(options.input, file, options.grids)) {
-    if (grid.isCarried) return std::nullopt;
+    if (grid.isCarried) {
+      wanted.carriedBytes = true;
+      continue;
+    }
     const std::size_t first = grid.isVector ? file.vectors[grid.index].first : grid.index;
     for (std::size_t c = 0; c < (grid.isVector ? kComponents : 1); ++c)
-      numbers.push_back(first + c);
+      wanted.grids->push_back(first + c);
   }
-  return numbers;
 }
 
 EsvrFile read(const Options& options, const cli::Log& log) {
   ReadPart wanted = options.part;
   wanted.limits = limitsOf(options);
-  if (!options.grids.empty()) wanted.grids = namedNumbers(options);
+  if (!options.grids.empty()) restrictToNamed(options, wanted);
   if (readsAll(options) && !wanted.grids) return readEsvr(options.input, wanted.limits);
   PartOfFile part = readEsvrPart(options.input, wanted);
   // Small files are read once for the names of the grids, and once more for the grids.

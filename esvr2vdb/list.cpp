@@ -20,13 +20,14 @@ std::string textOf(const Kernel& kernel) {
   return cli::nameOf(kernel.form) + " " + cli::shortNumber(kernel.kappa);
 }
 
-std::string bytesPerEllipsoid(std::uint64_t bytes, std::size_t ellipsoids) {
+std::string bytesPerEllipsoid(std::uint64_t bytes, std::uint64_t ellipsoids) {
   return ellipsoids == 0 ? "-" : cli::shortNumber(double(bytes) / double(ellipsoids));
 }
 
 struct Listing {
   const Options& options;
   EsvrFile file;
+  std::vector<std::uint64_t> ellipsoids;  ///< number of ellipsoids of each of the file's grids
   EsvrSummary summary;
   std::vector<NamedGrid> grids;    ///< in file order
   std::vector<NamedGrid> parts{};  ///< the same, with the components in place of vectors
@@ -37,8 +38,8 @@ struct Listing {
   }
 };
 
-const char* purposeOf(const Field& field) {
-  if (field.ellipsoidCount() == 0) return "-";
+const char* purposeOf(const Field& field, std::uint64_t ellipsoids) {
+  if (ellipsoids == 0) return "-";
   return field.fitFor == FitFor::kDrawing ? "drawing" : "voxels";
 }
 
@@ -66,11 +67,10 @@ std::string vectorsOf(ValueType component) {
 /// The row of a grid of vectors. The rows of its components follow.
 std::vector<std::string> rowOfVector(const Listing& listing, const NamedGrid& named) {
   const StoredVector& vector = listing.file.vectors[named.grid.index];
-  std::uint64_t voxels = 0, bytes = 0;
-  std::size_t ellipsoids = 0;
+  std::uint64_t voxels = 0, bytes = 0, ellipsoids = 0;
   for (std::size_t g = vector.first; g < vector.first + kComponents; ++g) {
     voxels = std::max(voxels, listing.file.grids[g].activeVoxels);
-    ellipsoids += listing.file.grids[g].field.ellipsoidCount();
+    ellipsoids += listing.ellipsoids[g];
     bytes += cli::ownBytes(listing.summary, g);
   }
   const GridDescriptor& descriptor = listing.file.grids[vector.first].descriptor;
@@ -89,13 +89,13 @@ std::vector<std::string> rowOfVector(const Listing& listing, const NamedGrid& na
 std::vector<std::string> rowOfStored(const Listing& listing, const NamedGrid& named) {
   const StoredGrid& grid = listing.file.grids[named.grid.index];
   const std::uint64_t bytes = cli::storedBytes(listing.summary, named.grid.index);
-  const std::size_t ellipsoids = grid.field.ellipsoidCount();
+  const std::uint64_t ellipsoids = listing.ellipsoids[named.grid.index];
   return {named.name,
           className(grid.descriptor.gridClass),
           cli::nameOf(grid.descriptor.valueType),
           std::to_string(grid.activeVoxels),
           std::to_string(ellipsoids),
-          purposeOf(grid.field),
+          purposeOf(grid.field, ellipsoids),
           textOf(grid.field.kernel),
           cli::nameOf(grid.topology),
           std::to_string(cli::ownBytes(listing.summary, named.grid.index)),
@@ -229,14 +229,23 @@ void printDetails(const Listing& listing) {
       printStoredDetails(listing, name, listing.file.grids[grid.index]);
 }
 
+/// Reads a file. A table of its grids needs their records only; details need all of it.
+PartOfFile readForList(const Options& options) {
+  ReadPart wanted{.carriedBytes = true, .limits = limitsOf(options)};
+  if (options.verbosity != cli::Verbosity::kVerbose) wanted.grids.emplace();
+  return readEsvrPart(options.input, wanted);
+}
+
 }  // namespace
 
 void list(const Options& options) {
   const auto extension = options.input.extension();
   if (extension == ".vdb" || extension == ".nvdb") return listVdb(options);
   if (holdsSequence(options.input)) return listSequence(options);
+  PartOfFile part = readForList(options);
   Listing listing{options,
-                  readEsvr(options.input, {options.memory.maxBytes, options.memory.voxels}),
+                  std::move(part.file),
+                  std::move(part.ellipsoidsInFile),
                   inspectEsvr(options.input),
                   {}};
   listing.grids = namedGrids(listing.file);

@@ -52,11 +52,11 @@ cli::ProgramText programText() {
           "frame that failed.",
       .examples =
           "  esvr2vdb smoke.esvr smoke.vdb\n"
-          "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   also print the errors\n"
+          "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   # also print the errors\n"
           "  esvr2vdb smoke.esvr density.nvdb -g density\n"
-          "  esvr2vdb smoke.esvr coarse.vdb --lod 1               a preview\n"
-          "  esvr2vdb smoke.esvr part.vdb --bbox 0,0,0,63,63,63   a part of the voxels\n"
-          "  esvr2vdb smoke.esvr 'back.####.vdb' --frames 10-20   frames of a sequence\n"
+          "  esvr2vdb smoke.esvr coarse.vdb --lod 1               # a preview\n"
+          "  esvr2vdb smoke.esvr part.vdb --bbox 0,0,0,63,63,63   # a part of the voxels\n"
+          "  esvr2vdb smoke.esvr 'back.####.vdb' --frames 10-20   # frames of a sequence\n"
           "  esvr2vdb --list smoke.vdb"};
 }
 

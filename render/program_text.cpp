@@ -96,15 +96,15 @@ cli::ProgramText programText() {
           .notes = notes(),
           .examples =
               "  esvr-render smoke.esvr smoke.png\n"
-              "  esvr-render smoke.vdb reference.png              the original, to compare\n"
+              "  esvr-render smoke.vdb reference.png              # the original, to compare\n"
               "  esvr-render smoke.esvr smoke.png --colors inferno --opacity-length 4\n"
               "  esvr-render smoke.esvr smoke.png --tf presets.json --preset Smoke\n"
-              "  esvr-render fire.esvr fire.png --grid density --colors grayscale\n"
+              "  esvr-render fire.esvr fire.png --grid density --colors grayscale \\\n"
               "              --with temperature:colors=black-body:emission\n"
-              "  esvr-render smoke.esvr turn.png --turntable 36   turn.0000.png to turn.0035.png\n"
+              "  esvr-render smoke.esvr turn.png --turntable 36   # turn.0000.png to turn.0035.png\n"
               "  esvr-render smoke.esvr turn.mp4 --turntable 120 --fps 24\n"
-              "  esvr-render smoke.esvr 'out.####.png' --frames 1-100   frames of a sequence\n"
-              "  esvr-render smoke.esvr --bench --ref smoke.vdb   speed, memory, quality"};
+              "  esvr-render smoke.esvr 'out.####.png' --frames 1-100   # frames of a sequence\n"
+              "  esvr-render smoke.esvr --bench --ref smoke.vdb   # speed, memory, quality"};
 }
 
 }  // namespace esvr::render

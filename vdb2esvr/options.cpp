@@ -102,16 +102,16 @@ cli::ProgramText programText() {
           "4 --psnr not reached (the file is written), 5 no such device or not enough memory\n"
           "(--max-memory, --max-vram).",
       .examples =
-          "  vdb2esvr smoke.vdb smoke.esvr                       a small file of good quality\n"
-          "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          the best file of 100 KB\n"
-          "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             the smallest file with 45 dB\n"
+          "  vdb2esvr smoke.vdb smoke.esvr                       # a small file of good quality\n"
+          "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          # the best file of 100 KB\n"
+          "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             # the smallest file with 45 dB\n"
           "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report fit.json\n"
-          "  vdb2esvr frame.vdb frame.esvr --skip velocity       all grids but one\n"
-          "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            every voxel within the bound\n"
+          "  vdb2esvr frame.vdb frame.esvr --skip velocity       # all grids but one\n"
+          "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            # every voxel within the bound\n"
           "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4 --resume\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255\n"
           "  vdb2esvr 'smoke.####.vdb' 'smoke.####.esvr' --frames 1-100 --missing hold\n"
-          "  vdb2esvr 'smoke.####.vdb' smoke.esvr                all frames in one file"};
+          "  vdb2esvr 'smoke.####.vdb' smoke.esvr                # all frames in one file"};
 }
 
 void addGoalOptions(cli::po::options_description& options) {

@@ -47,11 +47,7 @@ EsvrFile readEsvr(const std::filesystem::path& path, const ReadLimits& limits) {
 }
 
 PartOfFile readEsvrPart(const std::filesystem::path& path, const ReadPart& part) {
-  const format::FileSource source(path);
-  PartOfFile result;
-  result.file = format::decodePart(source, part);
-  result.bytesRead = source.bytesRead();
-  return result;
+  return format::decodePart(format::FileSource(path), part);
 }
 
 EsvrSummary inspectEsvr(const std::filesystem::path& path) {

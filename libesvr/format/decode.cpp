@@ -61,13 +61,15 @@ class GridDecoder {
       : sections_(file.sections), records_(file.records), g_(grid), part_(file.part) {}
 
   /// The record alone.
-  StoredGrid decodeRecord() { return readRecord().grid; }
+  StoredGrid decodeRecord() { return readRecords().grid; }
+
+  /// Number of the grid's ellipsoids in the file, once its record was read.
+  [[nodiscard]] std::uint64_t ellipsoidsInFile() const { return ellipsoidsInFile_; }
 
   /// \param before  the grids before this one
   StoredGrid decode(std::span<const StoredGrid> before) {
-    GridRecord record = readRecord();
+    GridRecord record = readRecords();
     StoredGrid grid = std::move(record.grid);
-    if (record.chunkCount > 1) record.chunks = readChunkTable(record.chunkCount);
     readChunks(record.chunks, grid);
     if (grid.topology == TopologyKind::kBricks) readBricks(grid);
     if (grid.topology == TopologyKind::kMask) readMask(grid);
@@ -105,6 +107,14 @@ class GridDecoder {
     GridRecord record = getGrid(in);
     in.finish();
     refuse(faultOf(record.grid));
+    return record;
+  }
+
+  /// The record of the grid, with those of its chunks.
+  GridRecord readRecords() {
+    GridRecord record = readRecord();
+    if (record.chunkCount > 1) record.chunks = readChunkTable(record.chunkCount);
+    for (const ChunkRecord& chunk : record.chunks) ellipsoidsInFile_ += chunk.count;
     return record;
   }
 
@@ -304,7 +314,8 @@ class GridDecoder {
   std::uint32_t g_;
   const ReadPart* part_;
   std::size_t layers_ = kAllLayers;  ///< number of layers to read
-  std::size_t layersInFile_ = 0;     ///< largest number of layers of a chunk that was opened
+  std::uint64_t ellipsoidsInFile_ = 0;
+  std::size_t layersInFile_ = 0;  ///< largest number of layers of a chunk that was opened
 };
 
 std::vector<MetaItem> readFileMetadata(SectionReader& sections) {
@@ -406,15 +417,20 @@ std::vector<bool> neededGrids(const SectionReader& sections, std::size_t count,
 }
 
 /// Reads the grids of a file that stands alone, and its layout.
-void readGrids(SectionReader& sections, const ReadPart* part, EsvrFile& file) {
+/// \return for each grid, the number of its ellipsoids in the file
+std::vector<std::uint64_t> readGrids(SectionReader& sections, const ReadPart* part,
+                                     EsvrFile& file) {
   if (sections.count(SectionKind::kGridRecords) + sections.count(SectionKind::kPacked) > 0)
     file.layout = FileLayout::kCompact;
   GridRecords records(sections);
   const auto needed = neededGrids(sections, records.count(), part);
+  std::vector<std::uint64_t> ellipsoids;
   for (std::uint32_t g = 0; g < needed.size(); ++g) {
     GridDecoder decoder({sections, records, part}, g);
     file.grids.push_back(needed[g] ? decoder.decode(file.grids) : decoder.decodeRecord());
+    ellipsoids.push_back(decoder.ellipsoidsInFile());
   }
+  return ellipsoids;
 }
 
 /// Reads the grids of a frame that refers to the previous one, and its layout.
@@ -464,14 +480,17 @@ EsvrFile decodeShort(std::span<const std::byte> bytes, const std::string& name,
   return file;
 }
 
-EsvrFile decodePart(const ByteSource& source, const ReadPart& part) {
+PartOfFile decodePart(const ByteSource& source, const ReadPart& part) {
   SectionReader sections(source, part.limits);
-  EsvrFile file{readFileMetadata(sections), {}};
-  readGrids(sections, &part, file);
-  readCarriedGrids(sections, CarriedBytes::kNothing, file);
+  PartOfFile result;
+  EsvrFile& file = result.file;
+  file.metadata = readFileMetadata(sections);
+  result.ellipsoidsInFile = readGrids(sections, &part, file);
+  readCarriedGrids(sections, part.carriedBytes ? CarriedBytes::kAll : CarriedBytes::kNothing, file);
   readVectors(sections, file);
   checkOrder(sections, file);
-  return file;
+  result.bytesRead = source.bytesRead();
+  return result;
 }
 
 }  // namespace format

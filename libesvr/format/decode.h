@@ -19,6 +19,6 @@ namespace esvr::format {
                                    const ReadLimits& limits, const EsvrFile& previous);
 
 /// Decodes a part of a container. \throws BadInput, MemoryExceeded
-[[nodiscard]] EsvrFile decodePart(const ByteSource& source, const ReadPart& part);
+[[nodiscard]] PartOfFile decodePart(const ByteSource& source, const ReadPart& part);
 
 }  // namespace esvr::format

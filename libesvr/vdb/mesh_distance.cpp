@@ -13,10 +13,11 @@
 #include <optional>
 #include <vector>
 
+#include "vdb/open_vdb.h"
 #include "vdb/transform.h"
 #include "vdb/volume_to_tree.h"
 
-namespace esvr {
+namespace esvr::vdb {
 namespace {
 
 using openvdb::Vec3d;
@@ -43,7 +44,7 @@ openvdb::math::Transform::Ptr identity() {
 Mesh surfaceOf(const VolumeGrid& grid) {
   VolumeGrid floats{.descriptor = grid.descriptor, .volume = grid.volume};
   floats.descriptor.valueType = ValueType::kFloat;
-  const auto made = vdb::makeOpenVdbGrid(floats, {.half = HalfMode::kOff, .constantTiles = false});
+  const auto made = makeOpenVdbGrid(floats, {.half = HalfMode::kOff, .constantTiles = false});
   made->setTransform(identity());
   Mesh mesh;
   openvdb::tools::volumeToMesh(*openvdb::gridConstPtrCast<openvdb::FloatGrid>(made), mesh.points,
@@ -122,13 +123,13 @@ MeshDistance directed(const Mesh& from, const Mesh& to, const openvdb::math::Tra
 
 }  // namespace
 
-MeshDistance meshDistance(const VolumeGrid& reference, const VolumeGrid& candidate) {
-  vdb::initializeOpenVdb();
+MeshDistance OpenVdb::meshDistance(const VolumeGrid& reference, const VolumeGrid& candidate) const {
+  initializeOpenVdb();
   const Mesh a = surfaceOf(reference), b = surfaceOf(candidate);
   if (a.quads.empty() && b.quads.empty()) return {};
   if (a.quads.empty() || b.quads.empty()) return kApart;
-  const auto world = vdb::toOpenVdb(reference.descriptor.transform);
+  const auto world = toOpenVdb(reference.descriptor.transform);
   return larger(directed(a, b, *world), directed(b, a, *world));
 }
 
-}  // namespace esvr
+}  // namespace esvr::vdb

@@ -34,7 +34,7 @@ class NanoTree {
     constexpr std::uint64_t kTreeAt = sizeof(nanovdb::GridData);
     using TreeData = std::remove_cvref_t<decltype(*std::declval<Grid>().tree().data())>;
     if (buffer.size() < kTreeAt + sizeof(TreeData)) damaged("a grid without a tree");
-    if (gridData(buffer).mGridType != nanovdb::mapToGridType<Build>())
+    if (gridData(buffer).mGridType != nanovdb::ESVR_NANOVDB_GRID_TYPE<Build>())
       damaged("a grid of another type than its directory says");
     const auto& tree = *reinterpret_cast<const TreeData*>(buffer.data() + kTreeAt);
     root_ = node<Root>(&tree, std::int64_t(tree.mNodeOffset[kRootLevel]));

@@ -4,9 +4,10 @@
 #include <new>
 
 #include "vdb/make_nano.h"
+#include "vdb/open_vdb.h"
 #include "vdb/volume_to_tree.h"
 
-namespace esvr {
+namespace esvr::vdb {
 namespace {
 
 constexpr std::align_val_t kAlignment{32};
@@ -20,12 +21,14 @@ openvdb::GridBase::Ptr asFloats(const VolumeGrid& from) {
   WriteOptions options;
   options.half = HalfMode::kOff;
   options.constantTiles = false;
-  return vdb::makeOpenVdbGrid(grid, options);
+  return makeOpenVdbGrid(grid, options);
 }
 
-std::shared_ptr<const std::byte[]> copied(const vdb::NanoHandle& handle) {
-  auto* bytes = static_cast<std::byte*>(::operator new[](handle.size(), kAlignment));
-  std::memcpy(bytes, handle.data(), handle.size());
+std::size_t bytesOf(const NanoHandle& handle) { return handle.buffer().size(); }
+
+std::shared_ptr<const std::byte[]> copied(const NanoHandle& handle) {
+  auto* bytes = static_cast<std::byte*>(::operator new[](bytesOf(handle), kAlignment));
+  std::memcpy(bytes, handle.data(), bytesOf(handle));
   return {bytes,
           [](const std::byte* p) { ::operator delete[](const_cast<std::byte*>(p), kAlignment); }};
 }
@@ -41,10 +44,10 @@ Box leavesOf(const SparseVolume& volume) {
 
 }  // namespace
 
-NanoVolume makeNanoVolume(const VolumeGrid& grid, NanoValues values) {
-  vdb::initializeOpenVdb();
-  const auto handle = vdb::makeNano(*asFloats(grid), {values});
-  return {values, copied(handle), handle.size(), grid.volume.background, leavesOf(grid.volume)};
+NanoVolume OpenVdb::makeNanoVolume(const VolumeGrid& grid, NanoValues values) const {
+  initializeOpenVdb();
+  const auto handle = makeNano(*asFloats(grid), {values});
+  return {values, copied(handle), bytesOf(handle), grid.volume.background, leavesOf(grid.volume)};
 }
 
-}  // namespace esvr
+}  // namespace esvr::vdb

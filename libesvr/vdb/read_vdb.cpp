@@ -10,6 +10,7 @@
 #include "vdb/errors.h"
 #include "vdb/grid_names.h"
 #include "vdb/metadata.h"
+#include "vdb/open_vdb.h"
 #include "vdb/tree_reader.h"
 
 namespace esvr::vdb {
@@ -190,29 +191,25 @@ VectorGrid readOpenVdbVector(InputFile& file, const std::string& name, const Rea
   return readListedVector(listed, findGrid(listed.grids, name), options);
 }
 
+GridSummary OpenVdb::inspectCarried(const CarriedGrid& grid) const {
+  return inGrid(grid.name, [&] {
+    InputFile file(std::span(grid.bytes));
+    return listGrids(Archive(file, grid)).grids.front();
+  });
+}
+
+VolumeGrid OpenVdb::readGrid(const CarriedGrid& grid, const ReadOptions& options) const {
+  return inGrid(grid.name, [&] {
+    InputFile file(std::span(grid.bytes));
+    ListedArchive listed = listGrids(Archive(file, grid));
+    return readListedGrid(listed, 0, options);
+  });
+}
+
+VectorGrid OpenVdb::readVector(const CarriedGrid& grid, const ReadOptions& options) const {
+  InputFile file(std::span(grid.bytes));
+  ListedArchive listed = listGrids(Archive(file, grid));
+  return readListedVector(listed, 0, options);
+}
+
 }  // namespace esvr::vdb
-
-namespace esvr {
-
-GridSummary inspectCarried(const CarriedGrid& grid) {
-  return vdb::inGrid(grid.name, [&] {
-    vdb::InputFile file(std::span(grid.bytes));
-    return vdb::listGrids(vdb::Archive(file, grid)).grids.front();
-  });
-}
-
-VolumeGrid readGrid(const CarriedGrid& grid, const ReadOptions& options) {
-  return vdb::inGrid(grid.name, [&] {
-    vdb::InputFile file(std::span(grid.bytes));
-    vdb::ListedArchive listed = vdb::listGrids(vdb::Archive(file, grid));
-    return vdb::readListedGrid(listed, 0, options);
-  });
-}
-
-VectorGrid readVector(const CarriedGrid& grid, const ReadOptions& options) {
-  vdb::InputFile file(std::span(grid.bytes));
-  vdb::ListedArchive listed = vdb::listGrids(vdb::Archive(file, grid));
-  return vdb::readListedVector(listed, 0, options);
-}
-
-}  // namespace esvr

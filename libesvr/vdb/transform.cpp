@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "esvr/error.h"
-#include "esvr/vdb_io.h"
+#include "vdb/open_vdb.h"
 
 namespace esvr::vdb {
 namespace {
@@ -87,28 +87,24 @@ math::Transform::Ptr toOpenVdb(const Transform& transform) {
   return result;
 }
 
-}  // namespace esvr::vdb
-
-namespace esvr {
-
-Transform uniformTransform(double voxelSize) {
+Transform OpenVdb::uniformTransform(double voxelSize) const {
   if (!(voxelSize > 0.0) || !std::isfinite(voxelSize))
     throw UsageError("a voxel size must be positive and finite");
   try {
-    return vdb::fromMap(openvdb::math::UniformScaleMap(voxelSize));
+    return fromMap(openvdb::math::UniformScaleMap(voxelSize));
   } catch (const openvdb::Exception& e) {  // OpenVDB treats a scale below about 1e-5 as singular
     throw UsageError("a voxel size of " + std::to_string(voxelSize) + ": " + e.what());
   }
 }
 
-Transform affineTransform(const std::array<double, 16>& matrix) {
+Transform OpenVdb::affineTransform(const std::array<double, 16>& matrix) const {
   for (const double element : matrix)
     if (!std::isfinite(element)) throw UsageError("a transform's matrix must be finite");
   try {
-    return vdb::fromMatrix(openvdb::math::Mat4d(matrix.data()));
+    return fromMatrix(openvdb::math::Mat4d(matrix.data()));
   } catch (const openvdb::Exception& e) {
     throw UsageError(std::string("not an invertible affine transform: ") + e.what());
   }
 }
 
-}  // namespace esvr
+}  // namespace esvr::vdb

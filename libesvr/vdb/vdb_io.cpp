@@ -1,24 +1,23 @@
-#include "esvr/vdb_io.h"
-
 #include "core/atomic_file.h"
 #include "esvr/error.h"
 #include "vdb/archive.h"
 #include "vdb/carry.h"
 #include "vdb/errors.h"
 #include "vdb/nano_file.h"
+#include "vdb/open_vdb.h"
 #include "vdb/read_nvdb.h"
 #include "vdb/read_vdb.h"
 #include "vdb/write_nvdb.h"
 #include "vdb/write_vdb.h"
 
-namespace esvr {
+namespace esvr::vdb {
 namespace {
 
 enum class FileFormat { kOpenVdb, kNanoVdb };
 
-FileFormat formatOf(vdb::InputFile& file) {
-  if (vdb::beginsAsVdb(file)) return FileFormat::kOpenVdb;
-  if (vdb::beginsAsNanoVdb(file)) return FileFormat::kNanoVdb;
+FileFormat formatOf(InputFile& file) {
+  if (beginsAsVdb(file)) return FileFormat::kOpenVdb;
+  if (beginsAsNanoVdb(file)) return FileFormat::kNanoVdb;
   throw BadInput("is neither an OpenVDB nor a NanoVDB file");
 }
 
@@ -30,20 +29,19 @@ FileFormat formatNamedBy(const std::filesystem::path& path) {
 
 }  // namespace
 
-VdbSummary inspectVdb(const std::filesystem::path& path) {
-  return vdb::whileReading(path, [&] {
-    vdb::InputFile file(path);
-    return formatOf(file) == FileFormat::kOpenVdb ? vdb::inspectOpenVdb(file)
-                                                  : vdb::inspectNanoVdb(file);
+VdbSummary OpenVdb::inspectVdb(const std::filesystem::path& path) const {
+  return whileReading(path, [&] {
+    InputFile file(path);
+    return formatOf(file) == FileFormat::kOpenVdb ? inspectOpenVdb(file) : inspectNanoVdb(file);
   });
 }
 
-VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
-                    const ReadOptions& options) {
-  return vdb::whileReading(path, [&] {
-    vdb::InputFile file(path);
-    return formatOf(file) == FileFormat::kOpenVdb ? vdb::readOpenVdbGrid(file, name, options)
-                                                  : vdb::readNanoVdbGrid(file, name, options);
+VolumeGrid OpenVdb::readGrid(const std::filesystem::path& path, const std::string& name,
+                             const ReadOptions& options) const {
+  return whileReading(path, [&] {
+    InputFile file(path);
+    return formatOf(file) == FileFormat::kOpenVdb ? readOpenVdbGrid(file, name, options)
+                                                  : readNanoVdbGrid(file, name, options);
   });
 }
 
@@ -52,8 +50,8 @@ namespace {
 /// Opens a file whose grids may be vectors. NanoVDB's vectors are not read.
 template <class Read>
 auto readVectors(const std::filesystem::path& path, const Read& read) {
-  return vdb::whileReading(path, [&] {
-    vdb::InputFile file(path);
+  return whileReading(path, [&] {
+    InputFile file(path);
     if (formatOf(file) != FileFormat::kOpenVdb)
       throw BadInput("is a NanoVDB file, whose grids of vectors cannot be read");
     return read(file);
@@ -62,46 +60,37 @@ auto readVectors(const std::filesystem::path& path, const Read& read) {
 
 }  // namespace
 
-VolumeGrid readComponent(const std::filesystem::path& path, const std::string& name,
-                         std::size_t component, const ReadOptions& options) {
-  return readVectors(path, [&](vdb::InputFile& file) {
-    return vdb::readOpenVdbComponent(file, name, component, options);
-  });
-}
-
-VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
-                      const ReadOptions& options) {
+VolumeGrid OpenVdb::readComponent(const std::filesystem::path& path, const std::string& name,
+                                  std::size_t component, const ReadOptions& options) const {
   return readVectors(
-      path, [&](vdb::InputFile& file) { return vdb::readOpenVdbVector(file, name, options); });
+      path, [&](InputFile& file) { return readOpenVdbComponent(file, name, component, options); });
 }
 
-std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
-                                     std::span<const std::size_t> places,
-                                     const ReadOptions& options) {
-  return vdb::whileReading(path, [&] {
-    vdb::InputFile file(path);
-    return vdb::readOpenVdbCarried(file, places, options);
+VectorGrid OpenVdb::readVector(const std::filesystem::path& path, const std::string& name,
+                               const ReadOptions& options) const {
+  return readVectors(path, [&](InputFile& file) { return readOpenVdbVector(file, name, options); });
+}
+
+std::vector<CarriedGrid> OpenVdb::readCarried(const std::filesystem::path& path,
+                                              std::span<const std::size_t> places,
+                                              const ReadOptions& options) const {
+  return whileReading(path, [&] {
+    InputFile file(path);
+    return readOpenVdbCarried(file, places, options);
   });
 }
 
-void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
-                std::span<const VolumeGrid> grids, const WriteOptions& options) {
-  std::vector<GridToWrite> all;
-  for (const auto& grid : grids) all.emplace_back(&grid);
-  writeGrids(path, fileMetadata, all, options);
-}
-
-void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
-                std::span<const GridToWrite> grids, const WriteOptions& options) {
+void OpenVdb::writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
+                         std::span<const GridToWrite> grids, const WriteOptions& options) const {
   const FileFormat format = formatNamedBy(path);
   AtomicFile file(path, options.overwrite);
-  vdb::whileWriting(path, [&] {
+  whileWriting(path, [&] {
     if (format == FileFormat::kOpenVdb)
-      vdb::writeOpenVdb(file.path(), fileMetadata, grids, options);
+      writeOpenVdb(file.path(), fileMetadata, grids, options);
     else
-      vdb::writeNanoVdb(file.path(), grids, options);
+      writeNanoVdb(file.path(), grids, options);
   });
   file.commit();
 }
 
-}  // namespace esvr
+}  // namespace esvr::vdb

@@ -5,17 +5,13 @@
 
 #include <string>
 
-#include "esvr/vdb_io.h"
+#include "vdb/open_vdb.h"
 
-namespace esvr {
-
-namespace vdb {
+namespace esvr::vdb {
 
 void initializeOpenVdb() { openvdb::initialize(); }
 
-}  // namespace vdb
-
-std::string vdbVersions() {
+std::string OpenVdb::vdbVersions() const {
   const auto dotted = [](int major, int minor, int patch) {
     return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(patch);
   };
@@ -24,4 +20,4 @@ std::string vdbVersions() {
                 NANOVDB_PATCH_VERSION_NUMBER);
 }
 
-}  // namespace esvr
+}  // namespace esvr::vdb

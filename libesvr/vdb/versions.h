@@ -14,18 +14,20 @@
 #error "ESVR needs OpenVDB 10 or newer"
 #endif
 
-// The headers of NanoVDB's writers for `#include ESVR_NANOVDB_...`, their namespace, and whether
-// they contain createNanoGrid().
+// The headers of NanoVDB's writers for `#include ESVR_NANOVDB_...`, their namespace, whether they
+// contain createNanoGrid(), and the function that gives the GridType of a type of values.
 #if __has_include(<nanovdb/io/IO.h>)  // OpenVDB 12 and up
 #define ESVR_NANOVDB_IO <nanovdb/io/IO.h>
 #define ESVR_NANOVDB_CREATE <nanovdb/tools/CreateNanoGrid.h>
 #define ESVR_NANOVDB_HAS_CREATE
+#define ESVR_NANOVDB_GRID_TYPE toGridType
 namespace nanovdb::tools {}
 namespace esvr::vdb {
 namespace nanotools = nanovdb::tools;
 }
 #else
 #define ESVR_NANOVDB_IO <nanovdb/util/IO.h>
+#define ESVR_NANOVDB_GRID_TYPE mapToGridType
 #if __has_include(<nanovdb/util/CreateNanoGrid.h>)  // OpenVDB 11
 #define ESVR_NANOVDB_CREATE <nanovdb/util/CreateNanoGrid.h>
 #define ESVR_NANOVDB_HAS_CREATE

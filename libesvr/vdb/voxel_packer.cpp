@@ -8,11 +8,12 @@
 #include "esvr/error.h"
 #include "vdb/errors.h"
 #include "vdb/make_nano.h"
+#include "vdb/open_vdb.h"
 #include "vdb/scalar_trees.h"
 #include "vdb/stream_archive.h"
 #include "vdb/volume_to_tree.h"
 
-namespace esvr {
+namespace esvr::vdb {
 namespace {
 
 nanovdb::io::Codec nanoCodec(PackedCodec codec) {
@@ -58,76 +59,61 @@ bool fitsHalf(const SparseVolume& volume) {
 
 openvdb::FloatGrid::Ptr makeFloatGrid(VolumeGrid grid) {
   grid.descriptor.valueType = ValueType::kFloat;  // that of the volume, even for a double source
-  return openvdb::gridPtrCast<openvdb::FloatGrid>(
-      vdb::makeOpenVdbGrid(grid, {.half = HalfMode::kOff}));
+  return openvdb::gridPtrCast<openvdb::FloatGrid>(makeOpenVdbGrid(grid, {.half = HalfMode::kOff}));
 }
 
 void writeOpenVdb(openvdb::FloatGrid& source, const VoxelPacking& packing, std::ostream& stream) {
   const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(source.copyGrid());  // shares the tree
   grid->setSaveFloatAsHalf(packing.form == PackedForm::kOpenVdbHalf);
   if (packing.codec == PackedCodec::kZip) grid->setGridClass(openvdb::GRID_UNKNOWN);
-  vdb::StreamArchive(openVdbFlags(packing.codec)).writeTo(stream, {grid}, {});
+  StreamArchive(openVdbFlags(packing.codec)).writeTo(stream, {grid}, {});
 }
 
 void writeNano(const openvdb::FloatGrid& source, const VoxelPacking& packing,
                std::ostream& stream) {
-  const auto handle = vdb::makeNano(source, {nanoValues(packing.form), float(packing.tolerance)});
+  const auto handle = makeNano(source, {nanoValues(packing.form), float(packing.tolerance)});
   nanovdb::io::writeGrid(stream, handle, nanoCodec(packing.codec));
 }
 
-}  // namespace
+class TreePacker final : public Packer {
+ public:
+  explicit TreePacker(const VolumeGrid& grid)
+      : grid_(makeFloatGrid(grid)),
+        descriptor_(grid.descriptor),
+        fitsHalf_(fitsHalf(grid.volume)) {}
 
-bool isNanoVdb(PackedForm form) {
-  return form != PackedForm::kOpenVdbFloat && form != PackedForm::kOpenVdbHalf;
-}
-
-NanoValues nanoValues(PackedForm form) {
-  switch (form) {
-    case PackedForm::kNanoFp16:
-      return NanoValues::kFp16;
-    case PackedForm::kNanoFp8:
-      return NanoValues::kFp8;
-    case PackedForm::kNanoFp4:
-      return NanoValues::kFp4;
-    case PackedForm::kNanoFpN:
-      return NanoValues::kFpN;
-    default:
-      return NanoValues::kFloat;
+  double write(const std::filesystem::path& path, const VoxelPacking& packing) const override {
+    checkPacking(packing, descriptor_);
+    if (packing.form == PackedForm::kOpenVdbHalf && !fitsHalf_)
+      throw UsageError("has values beyond 65504, the largest that half precision holds");
+    return whileWriting(path, [&] { return secondsOf([&] { writeForm(path, packing); }); });
   }
-}
 
-struct VoxelPacker::Source {
-  openvdb::FloatGrid::Ptr grid;
-  GridDescriptor descriptor;
-  bool fitsHalf = true;
+ private:
+  void writeForm(const std::filesystem::path& path, const VoxelPacking& packing) const {
+    std::ofstream stream(path, std::ios::binary);
+    stream.exceptions(std::ios::badbit | std::ios::failbit);
+    if (isNanoVdb(packing.form))
+      writeNano(*grid_, packing, stream);
+    else
+      writeOpenVdb(*grid_, packing, stream);
+    stream.close();
+  }
+
+  openvdb::FloatGrid::Ptr grid_;
+  GridDescriptor descriptor_;
+  bool fitsHalf_;
 };
 
-VoxelPacker::VoxelPacker(const VolumeGrid& grid)
-    : source_(std::make_unique<Source>(
-          Source{makeFloatGrid(grid), grid.descriptor, fitsHalf(grid.volume)})) {}
+}  // namespace
 
-VoxelPacker::~VoxelPacker() = default;
-
-double VoxelPacker::write(const std::filesystem::path& path, const VoxelPacking& packing) const {
-  checkPacking(packing, source_->descriptor);
-  if (packing.form == PackedForm::kOpenVdbHalf && !source_->fitsHalf)
-    throw UsageError("has values beyond 65504, the largest that half precision holds");
-  return vdb::whileWriting(path, [&] {
-    return secondsOf([&] {
-      std::ofstream stream(path, std::ios::binary);
-      stream.exceptions(std::ios::badbit | std::ios::failbit);
-      if (isNanoVdb(packing.form))
-        writeNano(*source_->grid, packing, stream);
-      else
-        writeOpenVdb(*source_->grid, packing, stream);
-      stream.close();
-    });
-  });
+std::unique_ptr<const Packer> OpenVdb::makePacker(const VolumeGrid& grid) const {
+  return std::make_unique<TreePacker>(grid);
 }
 
-double secondsToRead(const std::filesystem::path& path, PackedForm form) {
-  vdb::initializeOpenVdb();
-  return vdb::whileReading(path, [&] {
+double OpenVdb::secondsToRead(const std::filesystem::path& path, PackedForm form) const {
+  initializeOpenVdb();
+  return whileReading(path, [&] {
     return secondsOf([&] {
       if (isNanoVdb(form)) {
         (void)nanovdb::io::readGrid(path.string());
@@ -141,4 +127,4 @@ double secondsToRead(const std::filesystem::path& path, PackedForm form) {
   });
 }
 
-}  // namespace esvr
+}  // namespace esvr::vdb

@@ -40,7 +40,7 @@ cli::ProgramText programText() {
           "cannot be used, 5 no such device or not enough memory.",
       .examples =
           "  esvr-view smoke.esvr\n"
-          "  esvr-view smoke.esvr smoke.vdb      the original, to compare\n"
+          "  esvr-view smoke.esvr smoke.vdb      # the original, to compare\n"
           "  esvr-view smoke.esvr --open\n"
           "  esvr-view --export smoke.html smoke.esvr"};
 }

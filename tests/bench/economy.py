@@ -42,7 +42,7 @@ class Tools:
 
     def program(self, name):
         folders = {"vdb2esvr": "vdb2esvr", "esvr2vdb": "esvr2vdb", "esvr-render": "render", "esvr-compare": "compare",
-                   "esvr-sample": "samples", "raw2vdb": "samples", "bench_economy": "tests/bench/economy"}
+                   "esvr-sample": "samples", "image2vdb": "samples", "bench_economy": "tests/bench/economy"}
         return self.bin / folders[name] / name
 
     def sample(self, kind, resolution):
@@ -55,7 +55,7 @@ class Tools:
         raw, path = self.folder / f"{name}.raw", self.folder / f"{name}.vdb"
         values = array.array("f", (value(x, y, z) for z in range(side) for y in range(side) for x in range(side)))
         raw.write_bytes(values.tobytes())
-        run([self.program("raw2vdb"), raw, path, "--dims", f"{side},{side},{side}", "--type", "float32", "-f", "-q"]
+        run([self.program("image2vdb"), raw, path, "--dims", f"{side},{side},{side}", "--type", "float32", "-f", "-q"]
             + ([] if threshold is None else ["--threshold", threshold]))
         return path
 
@@ -158,7 +158,8 @@ def commands(tools):
     small = tools.folder / "small.esvr"
     run([tools.program("vdb2esvr"), tools.sample("plume", 96), small, "--device", "cpu", "--force", "--quiet"]
         + ELLIPSOIDS + DRAFT)
-    words = {"esvr2vdb --list": ["esvr2vdb", "--list", small], "esvr2vdb --check": ["esvr2vdb", "--check", small]}
+    words = {"esvr2vdb --list": ["esvr2vdb", "--list", small], "esvr2vdb --check": ["esvr2vdb", "--check", small],
+             "esvr2vdb --list of a .vdb file": ["esvr2vdb", "--list", tools.sample("plume", 96)]}
     words.update({f"{p} --help": [p, "--help"] for p in ["esvr2vdb", "vdb2esvr", "esvr-render", "esvr-compare"]})
     full = {name: [str(tools.program(w[0])), *map(str, w[1:])] for name, w in words.items()}
     full.update({f"an empty program{text}": [str(empty_program(tools, libraries))]
@@ -305,9 +306,8 @@ def starts(files):
         text += f"\nOn a machine with a GPU: **{NOT_MEASURED}**, because `docs/economy/cuda.json` does not exist.\n"
     return "## Start of the programs, and the GPU\n\n" + paragraph(
         f"Median of {RUNS} runs, process start included. `--list` and `--check` read a small file of ellipsoids. The CUDA "
-        "driver is loaded when a device is selected, and not before. No command of the table initialises OpenVDB, but all programs are "
-        "linked with libopenvdb, whose relocation by the dynamic linker takes most of the time: an empty program that is "
-        "linked with it takes about as long.") + text
+        "driver is loaded when a device is selected, and OpenVDB when a VDB file or a carried grid is read or written, and "
+        "not before. An empty program that is linked with libopenvdb shows what loading it costs.") + text
 
 
 INTRODUCTION = """\

@@ -253,6 +253,22 @@ Table stabilityTests() {
       {"--scratch", "CompareStability.refusesWhatHasNoEllipsoidsAndWhatIsTooLarge"}};
 }
 
+Table image2vdbTests() {
+  return {{"--background", "Image2Vdb.bringsInVtiWithABackground"},
+          {"--component", "Image2Vdb.bringsInAComponentThatIsChosen"},
+          {"--dataset", "Image2Vdb.bringsInADatasetThatIsChosen"},
+          {"--dims", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
+          {"--endian", "Image2Vdb.bringsInRawBehindAHeaderInEitherByteOrder"},
+          {"--force", "Image2Vdb.replacesAFileWhereForced"},
+          {"--name", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
+          {"--nonfinite", "Image2Vdb.replacesWhatIsNotFiniteWhenAskedAndSaysHowMuch"},
+          {"--normalise", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
+          {"--skip", "Image2Vdb.bringsInRawBehindAHeaderInEitherByteOrder"},
+          {"--threshold", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
+          {"--type", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
+          {"--voxel-size", "Image2Vdb.takesTheEdgesOfVoxelsThatAreGiven"}};
+}
+
 std::vector<Program> programs() {
   return {{"vdb2esvr", VDB2ESVR, "", vdb2esvrTests()},
           {"esvr2vdb", ESVR2VDB, "", esvr2vdbTests()},
@@ -261,7 +277,8 @@ std::vector<Program> programs() {
           {"check", ESVR_COMPARE, "check", checkTests()},
           {"table", ESVR_COMPARE, "table", tableTests()},
           {"curves", ESVR_COMPARE, "curves", curvesTests()},
-          {"stability", ESVR_COMPARE, "stability", stabilityTests()}};
+          {"stability", ESVR_COMPARE, "stability", stabilityTests()},
+          {"image2vdb", IMAGE2VDB, "", image2vdbTests()}};
 }
 
 /// The short name of each long name, such as "-g" for "--grid"; empty if there is none.
@@ -279,10 +296,12 @@ std::map<std::string, std::string> optionsOf(const Program& program) {
 const std::vector<std::string>& testSources() {
   static const std::vector<std::string> kSources = [] {
     std::vector<std::string> sources;
-    for (const auto& file : std::filesystem::directory_iterator(ESVR_SOURCE_DIR "/tests/cli"))
-      if (file.path().string().ends_with("_test.cpp") &&
-          file.path().filename() != "option_table_test.cpp")
-        sources.push_back(test::readText(file.path()));
+    for (const char* folder : {"/tests/cli", "/tests/samples"})
+      for (const auto& file :
+           std::filesystem::directory_iterator(ESVR_SOURCE_DIR + std::string(folder)))
+        if (file.path().string().ends_with("_test.cpp") &&
+            file.path().filename() != "option_table_test.cpp")
+          sources.push_back(test::readText(file.path()));
     return sources;
   }();
   return kSources;
@@ -292,7 +311,7 @@ const std::vector<std::string>& testSources() {
 std::string sourceOf(const std::string& test) {
   const std::string suite = test.substr(0, test.find('.')), name = test.substr(suite.size() + 1);
   for (const std::string& source : testSources())
-    for (const char* macro : {"TEST_F(", "TEST_P("}) {
+    for (const char* macro : {"TEST(", "TEST_F(", "TEST_P("}) {
       const std::size_t begin = source.find(macro + suite + ", " + name + ")");
       if (begin == std::string::npos) continue;
       const std::size_t end = source.find("\nTEST", begin), fixture = source.find("class " + suite);

@@ -126,6 +126,7 @@ TEST_F(CarriedFile, CanBeReadWithoutTheBytes) {
   EXPECT_EQ(namesInOrder(read), namesInOrder(file));
   EXPECT_TRUE(read.carried[0].bytes.empty());
   EXPECT_EQ(readEsvrPart(path(), {.layers = 1}).file.carried, read.carried);
+  EXPECT_EQ(readEsvrPart(path(), {.carriedBytes = true}).file.carried, file.carried);
   EXPECT_THAT([&] { (void)encodeEsvr(read); },
               ThrowsMessage<RuntimeFailure>(HasSubstr("its bytes were not read")));
 }

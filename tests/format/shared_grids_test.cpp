@@ -418,5 +418,20 @@ TEST(ReadPart, OfNoGridHasTheRecords) {
   EXPECT_FALSE(file.grids[0].voxels || file.grids[1].voxels);
 }
 
+TEST(ReadPart, CountsTheEllipsoidsOfGridsThatAreNotRead) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "f.esvr";
+  EsvrFile file = twoAlike();
+  file.grids.push_back(test::quantisedGrid(2000));
+  file.grids.push_back(test::layeredGrid(500));
+  const std::uint64_t bytes = writeEsvr(path, file);
+  const PartOfFile part = readEsvrPart(path, {.grids = std::vector<std::size_t>{}});
+  EXPECT_THAT(part.ellipsoidsInFile,
+              testing::ElementsAre(0u, 0u, file.grids[2].field.ellipsoidCount(),
+                                   file.grids[3].field.ellipsoidCount()));
+  EXPECT_EQ(readEsvrPart(path, {.layers = 1}).ellipsoidsInFile, part.ellipsoidsInFile);
+  EXPECT_LT(4 * part.bytesRead, bytes);
+}
+
 }  // namespace
 }  // namespace esvr

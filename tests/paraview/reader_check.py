@@ -1,7 +1,8 @@
-"""What pvbatch runs for run.py: the reader's voxels, extents, transform, levels of detail and frames.
+"""What pvbatch runs for run.py: the reader's voxels, extents, transform, levels of detail, frames and picture.
 
 The voxels must be those of esvr2vdb, bit for bit.
 """
+import json
 import os
 import pathlib
 import subprocess
@@ -10,6 +11,7 @@ import numpy as np
 import paraview.simple as pv
 from paraview import servermanager
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOImage import vtkPNGReader
 
 import esvr
 
@@ -96,23 +98,73 @@ def check_frames():
         assert np.array_equal(arrays["density"], grid.to_volume().to_numpy(box_of(image))), frame
 
 
-def check_picture():
+SIDE = 200  # of a picture, pixels
+FIELD_OF_VIEW = 30  # degrees
+SAME_PICTURE = 30  # dB
+
+
+def pixels_of(path):
+    """A PNG in front of black, from 0 to 1."""
+    picture = vtkPNGReader()
+    picture.SetFileName(path)
+    picture.Update()
+    pixels = vtk_to_numpy(picture.GetOutput().GetPointData().GetScalars()) / 255
+    return pixels[:, :3] * pixels[:, 3:] if pixels.shape[1] == 4 else pixels
+
+
+def camera_of(low, high):
+    """Center and eye in index coordinates. A sphere around the box fills the picture."""
+    center = (np.add(low, high) / 2).tolist()
+    distance = np.linalg.norm(np.subtract(high, low)) / 2 / np.sin(np.radians(FIELD_OF_VIEW / 2))
+    return center, [center[0] + 0.6 * distance, center[1], center[2] + 0.8 * distance]
+
+
+def draw_with_esvr(center, eye):
+    def vector(numbers):
+        return ",".join(map(str, numbers))
+    camera = ["--eye=" + vector(eye), "--center=" + vector(center), "--up=0,1,0", "--fov", FIELD_OF_VIEW]
+    run("render/esvr-render", "tree.esvr", "first.png", "-q", "--device", "cpu", "--range", "0,1", "--colors", "viridis",
+        "--opacity", "linear", "--tf-save", "preset.json")
+    run("render/esvr-render", "tree.esvr", "esvr.png", "-q", "--device", "cpu", "--tf", "preset.json", "--lod", "off",
+        "--resolution", f"{SIDE}x{SIDE}", *camera)
+
+
+def draw_with_paraview(reader, transform, center, eye):
     view = pv.CreateView("RenderView")
-    view.ViewSize = [200, 200]
+    view.ViewSize = [SIDE, SIDE]
     view.UseColorPaletteForBackground = 0
     view.Background = [0.0, 0.0, 0.0]
     view.OrientationAxesVisibility = 0
-    display = pv.Show(pv.ESVRReader(FileName="tree.esvr"), view)
+    display = pv.Show(reader, view)
     display.SetRepresentationType("Volume")
     pv.ColorBy(display, ("POINTS", "density"))
-    pv.ResetCamera(view)
-    pv.SaveScreenshot("tree.png", view, TransparentBackground=0)
-    from vtkmodules.vtkIOImage import vtkPNGReader
-    picture = vtkPNGReader()
-    picture.SetFileName("tree.png")
-    picture.Update()
-    pixels = vtk_to_numpy(picture.GetOutput().GetPointData().GetScalars())
-    assert (pixels.max(axis=1) > 40).sum() > 500, "the picture is empty"
+    display.SetScalarBarVisibility(view, False)
+    display.VolumeRenderingMode = "Ray Cast Only"
+    display.ScalarOpacityUnitDistance = transform[0, 0]  # a voxel, as in esvr-render
+    display.Shade = 0
+    preset = json.loads(pathlib.Path("preset.json").read_text())[0]
+    colors = pv.GetColorTransferFunction("density")
+    colors.ColorSpace = preset["ColorSpace"]
+    colors.RGBPoints = preset["RGBPoints"]
+    pv.GetOpacityTransferFunction("density").Points = preset["Points"]
+    view.CameraPosition = (transform @ [*eye, 1])[:3].tolist()
+    view.CameraFocalPoint = (transform @ [*center, 1])[:3].tolist()
+    view.CameraViewUp = [0.0, 1.0, 0.0]
+    view.CameraViewAngle = FIELD_OF_VIEW
+    pv.SaveScreenshot("paraview.png", view, ImageResolution=view.ViewSize, TransparentBackground=0)
+
+
+def check_picture():
+    """The same preset and camera give the same picture as esvr-render."""
+    reader = pv.ESVRReader(FileName="tree.esvr")
+    center, eye = camera_of(*box_of(fetched(reader)[0]))
+    draw_with_esvr(center, eye)
+    draw_with_paraview(reader, esvr.read("tree.esvr")["density"].transform, center, eye)
+    ours, theirs = pixels_of("esvr.png"), pixels_of("paraview.png")
+    assert ((theirs.max(axis=1) > 0.15).sum() > 500), "the picture is empty"
+    psnr = -10 * np.log10(np.mean((ours - theirs) ** 2))
+    print(f"ParaView's picture has {psnr:.2f} dB against that of esvr-render")
+    assert psnr > SAME_PICTURE, psnr
 
 
 for check in (check_voxels, check_extents, check_choice, check_levels_of_detail, check_frames, check_picture):

@@ -7,12 +7,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include "cli/run_program.h"
 #include "esvr/error.h"
 #include "generators/hash_noise.h"
+#include "samples/whole_image.h"
 
 namespace esvr::samples {
 namespace {
@@ -122,18 +122,6 @@ TEST(VolumeOf, stopsAtItsLimits) {
 }
 
 template <class T>
-std::string bytesOf(const std::vector<T>& values, bool swap) {
-  std::string bytes;
-  for (const T& value : values) {
-    std::string one(sizeof(T), '\0');
-    std::memcpy(one.data(), &value, sizeof(T));
-    if (swap) std::reverse(one.begin(), one.end());
-    bytes += one;
-  }
-  return bytes;
-}
-
-template <class T>
 void expectRawReads(const char* type, std::optional<double> maximum) {
   const std::vector<T> values{
       T(1), T(2), T(100), std::numeric_limits<T>::lowest(), std::numeric_limits<T>::max(), T(7)};
@@ -157,6 +145,8 @@ TEST(OpenRaw, readsEveryTypeInBothByteOrders) {
   expectRawReads<std::int16_t>("int16", 32767.0);
   expectRawReads<std::uint32_t>("uint32", 4294967295.0);
   expectRawReads<std::int32_t>("int32", 2147483647.0);
+  expectRawReads<std::uint64_t>("uint64", 18446744073709551615.0);
+  expectRawReads<std::int64_t>("int64", 9223372036854775807.0);
   expectRawReads<float>("float32", std::nullopt);
 }
 

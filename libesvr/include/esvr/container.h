@@ -186,8 +186,7 @@ struct ReadLimits {
 [[nodiscard]] EsvrFile readEsvr(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// Selects a part of a file. A reader finds the part by the section table, the chunk records and
-/// the directories of blocks. A grid that is stored as voxels is read completely. Of carried grids,
-/// everything but their bytes is read.
+/// the directories of blocks. A grid that is stored as voxels is read completely.
 struct ReadPart {
   /// Selects every ellipsoid whose support meets the box; the result may contain others.
   std::optional<Box> box{};
@@ -198,11 +197,14 @@ struct ReadPart {
   /// are read; of other grids, everything but their ellipsoids, voxels and masks is read. Nothing:
   /// all grids are wanted.
   std::optional<std::vector<std::size_t>> grids{};
-  ReadLimits limits{};
+  bool carriedBytes = false;  ///< whether the bytes of carried grids are read, too
+  ReadLimits limits{};        ///< ReadLimits::carriedBytes has no effect
 };
 
 struct PartOfFile {
   EsvrFile file;  ///< the part that was read, as a file; it has layer errors only without a box
+  /// For each of `file.grids`, the number of its ellipsoids in the file, whether they were read or not.
+  std::vector<std::uint64_t> ellipsoidsInFile;
   std::uint64_t bytesRead = 0;
 };
 

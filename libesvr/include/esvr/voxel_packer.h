@@ -12,6 +12,10 @@
 
 namespace esvr {
 
+namespace vdb {
+class Packer;
+}
+
 enum class PackedForm {
   kOpenVdbFloat,
   kOpenVdbHalf,
@@ -52,8 +56,7 @@ class VoxelPacker {
   double write(const std::filesystem::path& path, const VoxelPacking& packing) const;
 
  private:
-  struct Source;
-  std::unique_ptr<Source> source_;
+  std::unique_ptr<const vdb::Packer> packer_;
 };
 
 /// Seconds that the form's own library takes to read a file's grid into memory, as OpenVDB's tree

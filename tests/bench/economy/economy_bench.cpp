@@ -15,9 +15,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "economy/force_part.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
+#include "esvr/forced_part.h"
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
 

@@ -1,11 +1,11 @@
-#include "economy/force_part.h"
+#include "esvr/forced_part.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "esvr/grid_coding.h"
 
-namespace esvr::economy {
+namespace esvr {
 namespace {
 
 bool anyChunk(const StoredGrid& grid, bool (*has)(const Ellipsoids&)) {
@@ -202,4 +202,11 @@ StoredGrid forcedPart(const StoredGrid& grid, Part part, const SparseVolume& dec
   return made;
 }
 
-}  // namespace esvr::economy
+std::optional<PartBytes> bytesWithPart(const StoredGrid& grid, Part part,
+                                       const SparseVolume& decoded) {
+  const PartState state = stateOf(grid, part);
+  if (state.stored || !state.why.empty()) return std::nullopt;
+  return PartBytes{bytesAdded(forcedPart(grid, part, decoded)), bytesAdded(grid)};
+}
+
+}  // namespace esvr

@@ -1,0 +1,10 @@
+#include "vdb/open_vdb.h"
+
+namespace esvr::vdb {
+
+const Library& library() {
+  static const OpenVdb linked;
+  return linked;
+}
+
+}  // namespace esvr::vdb
