@@ -144,8 +144,7 @@ class Inputs:
     def image(self, path):
         header = self.folder / "ct.nhdr"
         self.header(header)
-        name = "image2vdb"
-        program(name, header, path, "--threshold", "-1")
+        program("image2vdb", header, path, "--threshold", "-1")
 
     def fit(self, path, source):
         """Ellipsoids with the quality that examples of limits ask for."""
