@@ -116,11 +116,12 @@ void TiffFile::fail() const { throw BadInput("cannot read " + path_.string() + "
 
 std::vector<std::uint64_t> TiffFile::pages() {
   std::vector<std::uint64_t> found;
-  const TiffFormat first = format();
+  TiffFormat first;
   reason_->clear();
   do {
     const auto subfile = tagOf<std::uint32_t>(file_.get(), TIFFTAG_SUBFILETYPE, 0);
     if (subfile & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) continue;
+    if (found.empty()) first = format();
     if (format() != first)
       throw BadInput(path_.string() + ": page " + std::to_string(found.size() + 1) + " has " +
                      textOf(format()) + ", but the first one has " + textOf(first));

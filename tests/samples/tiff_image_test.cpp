@@ -254,22 +254,28 @@ TEST(OpenTiff, refusesPagesAndFilesThatDiffer) {
               ThrowsMessage<BadInput>(AllOf(HasSubstr("a.tif"), HasSubstr("page 2"))));
 }
 
+/// Adds a page of one pixel that is marked as a reduced copy.
+void addReducedCopy(const fs::path& path) {
+  const std::unique_ptr<TIFF, decltype(&TIFFClose)> file(TIFFOpen(path.c_str(), "a"), TIFFClose);
+  TIFFSetField(file.get(), TIFFTAG_SUBFILETYPE, FILETYPE_REDUCEDIMAGE);
+  TIFFSetField(file.get(), TIFFTAG_IMAGEWIDTH, 1);
+  TIFFSetField(file.get(), TIFFTAG_IMAGELENGTH, 1);
+  TIFFSetField(file.get(), TIFFTAG_BITSPERSAMPLE, 8);
+  TIFFSetField(file.get(), TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+  char pixel = 9;
+  ASSERT_EQ(TIFFWriteScanline(file.get(), &pixel, 0, 0), 1);
+}
+
 TEST(OpenTiff, leavesOutReducedCopies) {
   const TemporaryFolder folder;
   const fs::path path = folder / "a.tif";
-  writeTiff(path, {}, {std::string(kArea, 5)});
-  {
-    const std::unique_ptr<TIFF, decltype(&TIFFClose)> file(TIFFOpen(path.c_str(), "a"), TIFFClose);
-    TIFFSetField(file.get(), TIFFTAG_SUBFILETYPE, FILETYPE_REDUCEDIMAGE);
-    TIFFSetField(file.get(), TIFFTAG_IMAGEWIDTH, 1);
-    TIFFSetField(file.get(), TIFFTAG_IMAGELENGTH, 1);
-    TIFFSetField(file.get(), TIFFTAG_BITSPERSAMPLE, 8);
-    TIFFSetField(file.get(), TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
-    char pixel = 9;
-    ASSERT_EQ(TIFFWriteScanline(file.get(), &pixel, 0, 0), 1);
-  }
+  addReducedCopy(path);
+  EXPECT_THAT([&] { (void)openTiff({path}, {}); },
+              ThrowsMessage<BadInput>(HasSubstr("only reduced copies")));
+  writeTiff(path, {.mode = "a"}, {std::string(kArea, 5)});
+  addReducedCopy(path);
   const auto image = openTiff({path}, {});
-  EXPECT_EQ(image->size().z, 1);
+  EXPECT_EQ(image->size(), (Coord{kWidth, kHeight, 1}));
   EXPECT_THAT(wholeImage(*image), Each(5.0f));
 }
 

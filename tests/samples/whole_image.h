@@ -1,8 +1,10 @@
 #pragma once
 /// What the tests of image formats share.
 
-#include <bit>
+#include <algorithm>
+#include <cstdint>
 #include <cstring>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -39,12 +41,12 @@ std::string bytesOf(const std::vector<T>& values, bool big = false) {
   return bytes;
 }
 
-/// 0, 1, 2, ... as numbers of a type; a signed one begins below 0.
+/// 0, 1, 2, ... as numbers of a type, which may be cut to its bits; a signed one begins at -3.
 template <class T>
-std::vector<T> countingValues(std::size_t count) {
+std::vector<T> countingValues(std::int64_t count) {
+  const std::int64_t first = T(-1) < T(0) ? -3 : 0;
   std::vector<T> values;
-  for (std::size_t i = 0; i < count; ++i)
-    values.push_back(T(double(i) - (T(-1) < T(0) ? 3.0 : 0.0)));
+  for (std::int64_t i = 0; i < count; ++i) values.push_back(T(first + i));
   return values;
 }
 
