@@ -75,7 +75,6 @@ and metadata of grids are kept.
 esvr_package(library libesvr0 libs "sparse volumes as ellipsoids - shared library
 ${about}This package has the shared library. It uses a GPU where a driver of
 CUDA is installed, and needs none.")
-set(CPACK_DEBIAN_LIBRARY_PACKAGE_GENERATE_SHLIBS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/triggers)
 
