@@ -149,7 +149,7 @@ class Inputs:
 
     def fit(self, path, source):
         """Ellipsoids with the quality that examples of limits ask for."""
-        self.convert(path, source, "--psnr", "47", "--topology", "exact", "--representation", "ellipsoids")
+        self.convert(path, source, "--psnr", "50", "--topology", "exact", "--representation", "ellipsoids")
 
     def convert(self, path, source, *options):
         folder = self.folder / ("of-" + path.name)
