@@ -111,6 +111,7 @@ if(TARGET esvr_mpi)
 ${about}This package has a module that the programs load where MPI has started
 them, so that they need no MPI themselves.")
   set(CPACK_COMPONENT_MPI_DEPENDS library)
+  set(CPACK_DEBIAN_MPI_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/triggers)
 endif()
 
 include(CPack)
