@@ -75,7 +75,6 @@ and metadata of grids are kept.
 esvr_package(library libesvr0 libs "sparse volumes as ellipsoids - shared library
 ${about}This package has the shared library. It uses a GPU where a driver of
 CUDA is installed, and needs none.")
-set(CPACK_DEBIAN_LIBRARY_PACKAGE_GENERATE_SHLIBS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/triggers)
 
@@ -112,6 +111,7 @@ if(TARGET esvr_mpi)
 ${about}This package has a module that the programs load where MPI has started
 them, so that they need no MPI themselves.")
   set(CPACK_COMPONENT_MPI_DEPENDS library)
+  set(CPACK_DEBIAN_MPI_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/triggers)
 endif()
 
 include(CPack)

@@ -126,8 +126,9 @@ class Inputs:
         path.chmod(0o755)
 
     def grids(self, path, names):
-        program("esvr-sample", "plume", self.folder / "plume.vdb", "--resolution", PLUME, "--force")
-        program(self.copy_grids, self.folder / "plume.vdb", path, *names)
+        source = self.folder / "of-plume.vdb"
+        program("esvr-sample", "plume", source, "--resolution", PLUME, "--force")
+        program(self.copy_grids, source, path, *names)
 
     def frames(self, path):
         program("esvr-sample", "plume", path, "--resolution", PLUME, "--frames", FRAMES)
@@ -142,22 +143,23 @@ class Inputs:
         path.write_text(NRRD)
 
     def image(self, path):
-        header = self.folder / "ct.nhdr"
+        header = self.folder / "of-ct.vdb/ct.nhdr"
+        header.parent.mkdir(exist_ok=True)
         self.header(header)
         program("image2vdb", header, path, "--threshold", "-1")
 
     def fit(self, path, source):
         """Ellipsoids with the quality that examples of limits ask for."""
-        self.convert(path, source, "--psnr", "47", "--topology", "exact", "--representation", "ellipsoids")
+        self.convert(path, source, "--psnr", "50", "--topology", "exact", "--representation", "ellipsoids")
 
     def convert(self, path, source, *options):
-        folder = self.folder / ("of-" + path.name)
+        folder = self.folder / ("for-" + path.name)
         folder.mkdir(exist_ok=True)
         self.maker(source)(folder / source)
         program("vdb2esvr", folder / source, path, *options)
 
     def back(self, path):
-        near = self.folder / "near.esvr"
+        near = self.folder / "of-near.esvr"
         self.convert(near, "smoke.vdb", "--max-error", "0.5%")
         program("esvr2vdb", near, path)
 
