@@ -82,29 +82,30 @@ std::string notes() {
 }  // namespace
 
 cli::ProgramText programText() {
-  return {.name = kProgram,
-          .purpose =
-              "Draws a picture of an .esvr file, or of a VDB for comparison, through a transfer\n"
-              "function. The ellipsoids of an .esvr file are drawn directly, without decoding the\n"
-              "whole grid to voxels first.",
-          .usage =
-              "  esvr-render IN.esvr OUT.png|OUT.exr [OPTION]...\n"
-              "  esvr-render IN.vdb OUT.png|OUT.exr [OPTION]...\n"
-              "  esvr-render IN.esvr OUT.####.png|OUT.mp4 [--frames 1-100] [OPTION]...\n"
-              "  esvr-render IN OUT.mp4|OUT.webm|FOLDER/ --turntable N [OPTION]...\n"
-              "  esvr-render IN.esvr --bench [--ref IN.vdb] [--report FILE.json] [OPTION]...",
-          .notes = notes(),
-          .examples =
-              "  esvr-render smoke.esvr smoke.png\n"
-              "  esvr-render smoke.vdb reference.png              # the original, to compare\n"
-              "  esvr-render smoke.esvr smoke.png --colors inferno --opacity-length 4\n"
-              "  esvr-render smoke.esvr smoke.png --tf presets.json --preset Smoke\n"
-              "  esvr-render fire.esvr fire.png --grid density --colors grayscale \\\n"
-              "              --with temperature:colors=black-body:emission\n"
-              "  esvr-render smoke.esvr turn.png --turntable 36   # turn.0000.png to turn.0035.png\n"
-              "  esvr-render smoke.esvr turn.mp4 --turntable 120 --fps 24\n"
-              "  esvr-render smoke.esvr 'out.####.png' --frames 1-100   # frames of a sequence\n"
-              "  esvr-render smoke.esvr --bench --ref smoke.vdb   # speed, memory, quality"};
+  return {
+      .name = kProgram,
+      .purpose =
+          "Draws a picture of an .esvr file, or of a VDB for comparison, through a transfer\n"
+          "function. The ellipsoids of an .esvr file are drawn directly, without decoding the\n"
+          "whole grid to voxels first.",
+      .usage =
+          "  esvr-render IN.esvr OUT.png|OUT.exr [OPTION]...\n"
+          "  esvr-render IN.vdb OUT.png|OUT.exr [OPTION]...\n"
+          "  esvr-render IN.esvr OUT.####.png|OUT.mp4 [--frames 1-100] [OPTION]...\n"
+          "  esvr-render IN OUT.mp4|OUT.webm|FOLDER/ --turntable N [OPTION]...\n"
+          "  esvr-render IN.esvr --bench [--ref IN.vdb] [--report FILE.json] [OPTION]...",
+      .notes = notes(),
+      .examples =
+          "  esvr-render smoke.esvr smoke.png\n"
+          "  esvr-render smoke.vdb reference.png              # the original, to compare\n"
+          "  esvr-render smoke.esvr smoke.png --colors inferno --opacity-length 4\n"
+          "  esvr-render smoke.esvr smoke.png --tf presets.json --preset Smoke\n"
+          "  esvr-render fire.esvr fire.png --grid density --colors grayscale \\\n"
+          "              --with temperature:colors=black-body:emission\n"
+          "  esvr-render smoke.esvr turn.png --turntable 36   # turn.0000.png to turn.0035.png\n"
+          "  esvr-render smoke.esvr turn.mp4 --turntable 120 --fps 24\n"
+          "  esvr-render smoke.esvr 'out.####.png' --frames 1-100   # frames of a sequence\n"
+          "  esvr-render smoke.esvr --bench --ref smoke.vdb   # speed, memory, quality"};
 }
 
 }  // namespace esvr::render
