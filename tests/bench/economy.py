@@ -3,6 +3,7 @@
 
     economy.py measure --bin BUILD --data DATA --machine TEXT   writes docs/economy/cpu.json
     economy.py measure ... --device cuda                        writes docs/economy/cuda.json
+    economy.py starts ...                                       measures the start of the programs only
     economy.py page                                             writes docs/economy.md
 
 BUILD has the programs and bench_economy (target of that name, with -DESVR_BUILD_BENCHMARKS=ON). DATA is the folder of
@@ -165,6 +166,15 @@ def commands(tools):
     full.update({f"an empty program{text}": [str(empty_program(tools, libraries))]
                  for text, libraries in {"": [], " with libopenvdb": ["-lopenvdb"]}.items()})
     return [{"command": name, "milliseconds": milliseconds(w), **loaded(w)} for name, w in full.items()]
+
+
+def starts_again(arguments):
+    """Replaces the times of the commands in a file that measure() has written."""
+    path = arguments.docs / "economy" / f"{arguments.device}.json"
+    content = json.loads(path.read_text())
+    with tempfile.TemporaryDirectory() as temporary:
+        content["commands"] = commands(Tools(arguments, pathlib.Path(temporary)))
+    path.write_text(json.dumps(content, indent=1) + "\n")
 
 
 def measure(arguments):
@@ -347,7 +357,7 @@ def page(arguments):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    jobs = {"measure": measure, "page": page}
+    jobs = {"measure": measure, "starts": starts_again, "page": page}
     parser.add_argument("what", choices=jobs)
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
     parser.add_argument("--data", type=pathlib.Path, default=pathlib.Path("DATA"))
