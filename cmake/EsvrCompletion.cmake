@@ -10,14 +10,12 @@ foreach(program ${ESVR_PROGRAMS})
   file(CREATE_LINK esvr ${completionFolder}/bash/${program} SYMBOLIC)
 endforeach()
 
-if(ESVR_BUILD_PROGRAMS)
-  # Debian keeps the folder site-functions for what is not from a package.
-  set(zshFolder site-functions)
-  if(ESVR_DEB)
-    set(zshFolder vendor-completions)
-  endif()
-  install(DIRECTORY ${completionFolder}/bash/ COMPONENT programs
-          DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
-  install(FILES ${completionFolder}/_esvr COMPONENT programs
-          DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/${zshFolder})
+# Debian keeps the folder site-functions for what is not from a package.
+set(zshFolder site-functions)
+if(ESVR_DEB)
+  set(zshFolder vendor-completions)
 endif()
+install(DIRECTORY ${completionFolder}/bash/ COMPONENT programs
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+install(FILES ${completionFolder}/_esvr COMPONENT programs
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/${zshFolder})

@@ -65,7 +65,8 @@ StoredGrid quantisedGrid() {
 }
 
 /// Forces every part that a grid can have. \return the names of these parts
-std::vector<std::string> forceAll(const StoredGrid& grid) {
+std::vector<std::string> forceAll(const StoredGrid& source) {
+  const StoredGrid grid = readBack(source);  // in the order of a file, which the sums keep
   const SparseVolume decoded = decodeGrid(grid);
   std::vector<std::string> forced;
   for (const auto& [part, name] : allParts()) {
@@ -85,8 +86,8 @@ std::vector<std::string> forceAll(const StoredGrid& grid) {
 }
 
 TEST(ForcedPart, TakesBytesAndKeepsTheVoxelsOfFloatEllipsoids) {
-  EXPECT_THAT(forceAll(floatGrid()),
-              testing::ElementsAre("rotations", "kappa", "residual", "mask", "chunk table"));
+  EXPECT_THAT(forceAll(floatGrid()), testing::ElementsAre("rotations", "kappa", "residual", "mask",
+                                                          "thresholds of blocks", "chunk table"));
 }
 
 TEST(ForcedPart, TakesBytesAndKeepsTheVoxelsOfQuantisedEllipsoids) {

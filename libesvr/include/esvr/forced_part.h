@@ -2,6 +2,9 @@
 /// Adds a part to a stored grid that it does not need, without changing its voxels, to measure what
 /// leaving the part out saves (docs/economy.md, `left_out` of the reports). Conversions never store
 /// such parts.
+///
+/// Ellipsoids are stored in the order of their centers. The voxels stay the same bit for bit if the
+/// grid was read from a file; in another order of the ellipsoids, sums are rounded in another way.
 
 #include <cstdint>
 #include <optional>
