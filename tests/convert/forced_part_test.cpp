@@ -79,7 +79,8 @@ std::vector<std::string> forceAll(const StoredGrid& source) {
     EXPECT_TRUE(sameBits(decodeGrid(made), decoded)) << name;
     EXPECT_EQ(bytes->with, bytesAdded(forcedPart(grid, part, decoded))) << name;
     EXPECT_EQ(bytes->without, bytesAdded(grid)) << name;
-    EXPECT_GT(bytes->with, bytes->without) << name;
+    // Signs that are all the same take less than a byte, which padding may hide.
+    EXPECT_GE(bytes->with, bytes->without + (part == Part::kSigns ? 0 : 1)) << name;
     forced.emplace_back(name);
   }
   return forced;
@@ -92,7 +93,7 @@ TEST(ForcedPart, TakesBytesAndKeepsTheVoxelsOfFloatEllipsoids) {
 
 TEST(ForcedPart, TakesBytesAndKeepsTheVoxelsOfQuantisedEllipsoids) {
   EXPECT_THAT(forceAll(quantisedGrid()),
-              testing::IsSupersetOf({"residual", "mask", "chunk table"}));
+              testing::IsSupersetOf({"signs", "residual", "layers", "chunk table"}));
 }
 
 TEST(ForcedPart, IsNotForcedWhereTheGridHasIt) {
