@@ -86,7 +86,8 @@ ImageFiles imageFiles(const std::vector<std::string>& names) {
     const std::vector<fs::path> paths(names.begin(), names.end());
     return {paths, !std::ranges::is_sorted(paths, comesBefore)};
   }
-  std::error_code ignored;  // what cannot be looked at cannot be read either
+  // A path that cannot be examined is refused later, when it is opened.
+  std::error_code ignored;
   const fs::path path = names.front();
   if (fs::is_directory(path, ignored)) return {filesOfFolder(path)};
   const auto pattern =

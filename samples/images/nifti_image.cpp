@@ -15,7 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kBigEndian = 2;  // in nifti_image::byteorder; the library hides its own name for it
+/// The value of nifti_image::byteorder for big-endian files. The library does not publish its name.
+constexpr int kBigEndian = 2;
 
 struct HeaderDeleter {
   void operator()(nifti_image* header) const { nifti_image_free(header); }

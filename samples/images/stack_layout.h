@@ -20,7 +20,7 @@ struct StackLayout {
 
 /// Properties of a file that its text refers to.
 struct StackFile {
-  std::filesystem::path path;  ///< for messages
+  std::filesystem::path path;  ///< the file, which messages name
   std::string text;            ///< ImageDescription of the first page; may be empty
   std::size_t pages = 1;
   /// Pixels per unit of length along x and y; 0 where it is missing.

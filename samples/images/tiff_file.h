@@ -19,7 +19,7 @@ namespace esvr::samples {
 /// What the pages of one stack have in common.
 struct TiffFormat {
   std::uint32_t width = 0, height = 0;
-  std::uint16_t bits = 1;     ///< of a value
+  std::uint16_t bits = 1;     ///< bits of a value
   std::uint16_t samples = 1;  ///< values of a pixel
   std::uint16_t colors = 1;   ///< samples without those for opacity and the like
   std::uint16_t kind = 0;     ///< SAMPLEFORMAT_*
@@ -71,7 +71,8 @@ class TiffFile {
   std::span<const std::byte> load(bool tiled, std::uint32_t index);
 
   std::filesystem::path path_;
-  std::unique_ptr<std::string> reason_;  ///< of libtiff's last error; at a place that stays
+  /// The text of libtiff's last error. libtiff keeps its address, so that it must not move.
+  std::unique_ptr<std::string> reason_;
   std::unique_ptr<TIFF, Closer> file_;
   std::vector<std::byte> bytes_;
 };

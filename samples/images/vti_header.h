@@ -26,11 +26,11 @@ struct VtiHeader {
   std::array<double, 3> origin{}, spacing{1.0, 1.0, 1.0};
   std::array<double, 9> direction{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};  ///< row by row
   bool bigEndian = false;
-  std::size_t lengthBytes = 4;  ///< of the numbers before binary data
+  std::size_t lengthBytes = 4;  ///< bytes of each number before binary data
   bool compressed = false;      ///< binary and appended data is compressed by zlib
   std::vector<VtiArray> arrays;
   std::string activeOfPoints, activeOfCells;  ///< names of arrays; may be empty
-  std::uint64_t appended = 0;                 ///< where the appended data begins
+  std::uint64_t appended = 0;                 ///< place in the file where the appended data begins
   bool appendedAsBase64 = false;
 };
 

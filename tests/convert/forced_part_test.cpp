@@ -66,7 +66,8 @@ StoredGrid quantisedGrid() {
 
 /// Forces every part that a grid can have. \return the names of these parts
 std::vector<std::string> forceAll(const StoredGrid& source) {
-  const StoredGrid grid = readBack(source);  // in the order of a file, which the sums keep
+  // A reader gets the ellipsoids in the order of the file, in which they are always summed.
+  const StoredGrid grid = readBack(source);
   const SparseVolume decoded = decodeGrid(grid);
   std::vector<std::string> forced;
   for (const auto& [part, name] : allParts()) {

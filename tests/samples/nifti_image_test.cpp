@@ -32,7 +32,7 @@ struct NiftiHeader {
   std::array<double, 3> spacing{1.0, 1.0, 1.0};
   double slope = 0.0, offset = 0.0;
   std::vector<double> sform{};                   ///< three rows of four
-  std::array<double, 3> quaternion{}, origin{};  ///< of the qform, if `hasQform`
+  std::array<double, 3> quaternion{}, origin{};  ///< those of the qform, if `hasQform`
   bool hasQform = false, big = false;
   bool isPair = false;
 };
