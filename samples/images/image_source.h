@@ -88,7 +88,8 @@ struct RawLayout {
 
 /// Opens a dataset of an HDF5 file. The last axis is x. Leading axes of length 1 are left out. Of four
 /// remaining axes, the shorter one of the first and the last (the last if they are equal) is that
-/// of the components. The attribute element_size_um of the dataset, if there is one, gives the edges of voxels.
+/// of the components. The attribute element_size_um of the dataset, if there is one, gives the edges
+/// of voxels.
 /// \param choice  dataset: its path, which need not be given if there is only one with three axes
 /// \throws BadInput  the file is not readable (the text says why)
 /// \throws UsageError  the choice does not fit; the text lists the datasets

@@ -69,10 +69,12 @@ TEST_F(Start, loadsOpenVdbForVdbFilesOnly) {
 
 TEST_F(Start, saysThatTheModuleOfOpenVdbCannotBeLoaded) {
   std::ofstream(at("esvr_vdb.so")) << "This is not a library.";
-  ::setenv("LD_LIBRARY_PATH", at("").c_str(), 1);
-  const auto esvr = test::esvr2vdb({"--list", at("in.esvr")});
-  const auto vdb = test::esvr2vdb({"--list", at("in.vdb")});
-  ::unsetenv("LD_LIBRARY_PATH");
+  const char* const others = std::getenv("LD_LIBRARY_PATH");
+  const std::string first = "LD_LIBRARY_PATH=" + at("") + (others ? ":" + std::string(others) : "");
+  const auto list = [&](const std::string& file) {
+    return test::runProgram("/usr/bin/env", {first, ESVR2VDB, "--list", at(file)});
+  };
+  const auto esvr = list("in.esvr"), vdb = list("in.vdb");
   EXPECT_EQ(esvr.exitCode, 0) << esvr.err;
   EXPECT_EQ(vdb.exitCode, 1);
   EXPECT_THAT(vdb.err, testing::AllOf(HasSubstr("OpenVDB is needed but cannot be loaded"),

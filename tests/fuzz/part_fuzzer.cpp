@@ -32,6 +32,7 @@ ReadPart partFrom(const std::uint8_t* choice) {
   if (choice[0] & 2) part.ellipsoids = 1 + choice[2];
   if (choice[0] & 4) part.box = boxFrom(choice);
   if (choice[0] & 8) part.grids = std::vector<std::size_t>{choice[1] % std::size_t{4}};
+  part.carriedBytes = (choice[0] & 16) != 0;
   return part;
 }
 
