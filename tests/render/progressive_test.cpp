@@ -67,16 +67,15 @@ class WaitingRenderer final : public Renderer {
 
 TEST(ProgressivePicture, KeepsToItsBudget) {
   // The passes wait for 6, 25, 100 and 410 ms; other work and late wake-ups make them longer only.
+  // A loaded machine can thus leave out a pass, but never draw one more.
   WaitingRenderer renderer;
-  const auto after = [&](double seconds) {
-    ProgressivePicture picture(renderer, options({640, 640}));
-    const auto begin = std::chrono::steady_clock::now();
-    picture.refine(seconds);
-    EXPECT_EQ(picture.complete(), seconds > 100.0);
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  };
-  EXPECT_LT(after(0.3), 0.54) << "the last pass alone takes 0.41 s, and all 0.54 s";
-  EXPECT_GE(after(1000.0), 0.54);
+  ProgressivePicture picture(renderer, options({640, 640}));
+  EXPECT_FALSE(picture.refine(0.3)) << "the last pass alone takes 0.41 s";
+  EXPECT_FALSE(picture.complete());
+  EXPECT_TRUE(picture.image());
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_TRUE(picture.refine(1000.0));
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(400));
 }
 
 TEST(ProgressivePicture, ACancelledPassLeavesTheLastOne) {
