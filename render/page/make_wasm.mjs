@@ -28,7 +28,11 @@ if (checks && !found.stdout.includes(kVersion)) skip(`emcc is not version ${kVer
 const options = ["-DESVR_DECODER_ONLY=ON", "-DESVR_BUILD_TESTS=OFF", "-DCMAKE_BUILD_TYPE=MinSizeRel"];
 run("emcmake", "cmake", "-S", root, "-B", folder, "-G", "Ninja", ...options);
 run("cmake", "--build", folder);
-const bytes = readFileSync(join(folder, "libesvr/page/page.wasm"));
+// emcc has run this optimiser once. The second run makes the compressed module 1 % smaller.
+const built = join(folder, "libesvr/page/page.wasm"), small = join(folder, "decoder.wasm");
+const features = ["simd", "exception-handling", "bulk-memory", "sign-ext", "mutable-globals", "nontrapping-float-to-int"];
+run("wasm-opt", "-Oz", ...features.map((feature) => `--enable-${feature}`), built, "-o", small);
+const bytes = readFileSync(small);
 if (!checks) writeFileSync(stored, bytes), console.log(`decoder.wasm: ${bytes.length} bytes`);
 else if (!readFileSync(stored).equals(bytes)) {
   console.error("decoder.wasm is out of date: run node make_wasm.mjs");
