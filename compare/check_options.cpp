@@ -21,31 +21,30 @@ cli::ProgramText programText() {
   return {
       .name = std::string(kProgram) + " check",
       .purpose =
-          "Compares the grids of a file with the grids of the same names in a reference file,\n"
-          "and fails if a grid exceeds the given limits.",
+          "Compares the grids of a file with the grids of the same names in a reference file, and "
+          "fails if a grid exceeds the given limits.",
       .usage =
           "  esvr-compare check REF CAND [--min-psnr DB] [--max-error E] [--max-bytes SIZE] ...\n"
           "  esvr-compare check REF CAND --baseline FILE.json [--update]",
       .notes =
-          "REF and CAND may each be a .vdb, .nvdb or .esvr file. Grids are compared and not the\n"
-          "bytes of files, because the bytes of a .vdb file differ whenever it is written. Voxels\n"
-          "are compared in index space. Different transforms, names, classes, value types,\n"
-          "backgrounds and metadata are listed, and the check fails if --fail-on names them. It\n"
-          "always fails if only one of the files has a grid, if a grid has become one of another\n"
-          "type, or if the bounding boxes of the active voxels of the two grids do not intersect.\n"
-          "Grids that are not of floats or doubles are compared bit for bit. --ignore-grids\n"
+          "REF and CAND may each be a .vdb, .nvdb or .esvr file. Grids are compared and not the "
+          "bytes of files, because the bytes of a .vdb file differ whenever it is written. Voxels "
+          "are compared in index space. Different transforms, names, classes, value types, "
+          "backgrounds and metadata are listed, and the check fails if --fail-on names them. It "
+          "always fails if only one of the files has a grid, if a grid has become one of another "
+          "type, or if the bounding boxes of the active voxels of the two grids do not intersect. "
+          "Grids that are not of floats or doubles are compared bit for bit. --ignore-grids "
           "excludes a grid from all of this.\n"
           "\n"
-          "REF and CAND may both be sequences: a pattern such as smoke.####.vdb, or an .esvr file\n"
-          "that holds a sequence. Each frame is compared, and 'temporal' is the PSNR of the "
-          "change\n"
+          "REF and CAND may both be sequences: a pattern such as smoke.####.vdb, or an .esvr file "
+          "that holds a sequence. Each frame is compared, and 'temporal' is the PSNR of the change "
           "from the frame before it. A frame that only one of them has makes the check fail.\n"
           "\n"
-          "A baseline holds figures and their tolerances. --update writes the figures of this\n"
-          "run and keeps the tolerances of the file.\n"
+          "A baseline holds figures and their tolerances. --update writes the figures of this run "
+          "and keeps the tolerances of the file.\n"
           "\n"
-          "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 unusable input,\n"
-          "4 a limit was missed, 5 not enough memory (--max-memory).",
+          "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 unusable input, 4 a "
+          "limit was missed, 5 not enough memory (--max-memory).",
       .examples =
           "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45 --min-iou 0.98\n"
           "  esvr-compare check smoke.vdb back.vdb --max-error 1% --fail-on transform,metadata\n"

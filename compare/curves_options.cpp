@@ -20,20 +20,20 @@ cli::ProgramText programText() {
   return {
       .name = std::string(kProgram) + " curves",
       .purpose =
-          "Plots error over run time, error over bytes and pictures per second over bytes, for\n"
+          "Plots error over run time, error over bytes and pictures per second over bytes, for "
           ".esvr files and for VDB and ZFP files of the same sizes.",
       .usage = "  esvr-compare curves REF.vdb [CAND.esvr ...] --output PREFIX [--fit BYTES]...",
       .notes =
-          "The program writes every point to PREFIX.csv and PREFIX.json. It writes the plots\n"
-          "PREFIX-seconds, PREFIX-bytes and, with --fps, PREFIX-fps as .svg and .png files. The\n"
+          "The program writes every point to PREFIX.csv and PREFIX.json. It writes the plots "
+          "PREFIX-seconds, PREFIX-bytes and, with --fps, PREFIX-fps as .svg and .png files. The "
           "page PREFIX.html has all of them.\n"
           "\n"
-          "Without CAND and --fit, the program fits ellipsoids for six sizes: the size of the\n"
-          "half-float Blosc VDB divided by 10, 20, 50, 100, 200 and 400. PREFIX-seconds shows the\n"
-          "fits that this run makes: the time of the optimisation, and the whole time from the\n"
+          "Without CAND and --fit, the program fits ellipsoids for six sizes: the size of the "
+          "half-float Blosc VDB divided by 10, 20, 50, 100, 200 and 400. PREFIX-seconds shows the "
+          "fits that this run makes: the time of the optimisation, and the whole time from the "
           "voxels to the file.\n"
           "\n"
-          "Exit codes: 0 done, 1 failure or interrupted (finished points are written), 2 wrong\n"
+          "Exit codes: 0 done, 1 failure or interrupted (finished points are written), 2 wrong "
           "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
       .examples =
           "  esvr-compare curves smoke.vdb --output curves\n"

@@ -19,26 +19,26 @@ cli::ProgramText programText() {
   return {
       .name = std::string(kProgram) + " stability",
       .purpose =
-          "Compares the float32 evaluation of the ellipsoids of a file with their definition in\n"
+          "Compares the float32 evaluation of the ellipsoids of a file with their definition in "
           "float64, and fails if a grid differs too much.",
       .usage = "  esvr-compare stability FILE.esvr [--max-difference X] [--report FILE.json]",
       .notes =
-          "FILE is an .esvr file, or a sequence: a pattern such as smoke.####.esvr, or an .esvr\n"
-          "file that holds a sequence. Each grid is evaluated on bricks of 8^3 voxels that are\n"
-          "spread over its volume, and on those in which its most extreme ellipsoids are\n"
-          "centered. The sum of the ellipsoids is compared with its definition at all voxels of\n"
-          "these bricks, after both were clamped as a reader clamps them. The peak of a grid is\n"
-          "the largest magnitude of its source's values, background included. Grids that are\n"
-          "stored as voxels have no sum; they are listed, and never fail.\n"
+          "FILE is an .esvr file, or a sequence: a pattern such as smoke.####.esvr, or an .esvr "
+          "file that holds a sequence. Each grid is evaluated on bricks of 8^3 voxels that are "
+          "spread over its volume, and on those in which its most extreme ellipsoids are centered. "
+          "The sum of the ellipsoids is compared with its definition at all voxels of these "
+          "bricks, after both were clamped as a reader clamps them. The peak of a grid is the "
+          "largest magnitude of its source's values, background included. Grids that are stored as "
+          "voxels have no sum; they are listed, and never fail.\n"
           "\n"
-          "The table has the largest and the root mean square difference, the bound that follows\n"
-          "from the arithmetic (docs/math.md), the correct decimal digits below the peak, and\n"
-          "what makes a sum difficult: extreme scales and aspect ratios, the condition number of\n"
-          "Sigma, kappa, overlap (ellipsoids at a voxel) and cancellation (sum of the magnitudes\n"
-          "of the terms, divided by the magnitude of their sum).\n"
+          "The table has the largest and the root mean square difference, the bound that follows "
+          "from the arithmetic (docs/math.md), the correct decimal digits below the peak, and what "
+          "makes a sum difficult: extreme scales and aspect ratios, the condition number of Sigma, "
+          "kappa, overlap (ellipsoids at a voxel) and cancellation (sum of the magnitudes of the "
+          "terms, divided by the magnitude of their sum).\n"
           "\n"
-          "Exit codes: 0 within the limit, 1 failure, 2 wrong options, 3 unusable input,\n"
-          "4 a grid differs too much, 5 no such device or not enough memory (--max-memory).",
+          "Exit codes: 0 within the limit, 1 failure, 2 wrong options, 3 unusable input, 4 a grid "
+          "differs too much, 5 no such device or not enough memory (--max-memory).",
       .examples =
           "  esvr-compare stability smoke.esvr\n"
           "  esvr-compare stability smoke.esvr --max-difference 1e-6 --device cpu\n"

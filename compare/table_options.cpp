@@ -23,36 +23,35 @@ cli::ProgramText programText() {
   return {
       .name = std::string(kProgram) + " table",
       .purpose =
-          "Compares .esvr files with other ways to store the volume: OpenVDB and NanoVDB files,\n"
-          "lossless, quantised or reduced to the same size, and ZFP. All rows are measured on the\n"
-          "same voxels, box and peak and timed in the same way. Each row names the command that\n"
+          "Compares .esvr files with other ways to store the volume: OpenVDB and NanoVDB files, "
+          "lossless, quantised or reduced to the same size, and ZFP. All rows are measured on the "
+          "same voxels, box and peak and timed in the same way. Each row names the command that "
           "makes only this row.",
       .usage =
           "  esvr-compare table REF.vdb [CAND.esvr ...] [--size 50KB]... [--external X]...\n"
           "  esvr-compare table REF.vdb --row SETTING",
       .notes =
-          "For each CAND and each --size, the program searches for the best file of each baseline\n"
-          "that is not larger. For VDB files, voxels near the background are dropped, empty\n"
-          "leaves are removed, and the other voxels are quantised. The search varies the\n"
-          "threshold until the file is at most 2 % smaller than the size, and takes the tolerance\n"
-          "of FpN and the setting of ZFP with the highest PSNR. For the PSNR of each CAND, it\n"
-          "searches for the smallest FpN and ZFP files. -v shows the searches, and --report\n"
-          "includes them.\n"
+          "For each CAND and each --size, the program searches for the best file of each baseline "
+          "that is not larger. For VDB files, voxels near the background are dropped, empty leaves "
+          "are removed, and the other voxels are quantised. The search varies the threshold until "
+          "the file is at most 2 % smaller than the size, and takes the tolerance of FpN and the "
+          "setting of ZFP with the highest PSNR. For the PSNR of each CAND, it searches for the "
+          "smallest FpN and ZFP files. -v shows the searches, and --report includes them.\n"
           "\n"
           "--external-command takes any compressor of arrays. COMMAND is run in a shell as\n"
           "  COMMAND encode RAW PACKED NX NY NZ BOUND\n"
           "  COMMAND decode PACKED RAW NX NY NZ BOUND\n"
-          "RAW has NX x NY x NZ float32 values (little-endian, x fastest). BOUND is an error in\n"
-          "units of the values; the program searches for the largest one that suits. PACKED may\n"
+          "RAW has NX x NY x NZ float32 values (little-endian, x fastest). BOUND is an error in "
+          "units of the values; the program searches for the largest one that suits. PACKED may "
           "have any form; its size is that of the row.\n"
           "\n"
-          "The ratio is the size of the half-float Blosc VDB of the same grid divided by the size\n"
-          "of the row. Times are medians of --runs runs after a warm-up run. Encoding goes from\n"
-          "OpenVDB's tree (ZFP: from an array) to the file. Decoding goes from the file to\n"
-          "OpenVDB's tree, NanoVDB's buffer, an array (ZFP) or a sparse volume (.esvr). Memory is\n"
+          "The ratio is the size of the half-float Blosc VDB of the same grid divided by the size "
+          "of the row. Times are medians of --runs runs after a warm-up run. Encoding goes from "
+          "OpenVDB's tree (ZFP: from an array) to the file. Decoding goes from the file to "
+          "OpenVDB's tree, NanoVDB's buffer, an array (ZFP) or a sparse volume (.esvr). Memory is "
           "the larger of what encoding and decoding allocate.\n"
           "\n"
-          "Exit codes: 0 done, 1 failure or interrupted (finished rows are printed), 2 wrong\n"
+          "Exit codes: 0 done, 1 failure or interrupted (finished rows are printed), 2 wrong "
           "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
       .examples =
           "  esvr-compare table smoke.vdb smoke.esvr\n"

@@ -18,38 +18,36 @@ cli::ProgramText programText() {
   return {
       .name = kProgram,
       .purpose =
-          "Converts an .esvr file back to VDB. Names, transforms, metadata and background\n"
-          "are exactly those of the source; voxels have the accuracy that was chosen when\n"
-          "the file was made. Grids that vdb2esvr carried unchanged come back bit for bit, and\n"
-          "all grids in their order. --list lists the contents of a file, --check verifies it.",
+          "Converts an .esvr file back to VDB. Names, transforms, metadata and background are "
+          "exactly those of the source; voxels have the accuracy that was chosen when the file was "
+          "made. Grids that vdb2esvr carried unchanged come back bit for bit, and all grids in "
+          "their order. --list lists the contents of a file, --check verifies it.",
       .usage =
           "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
           "  esvr2vdb IN.####.esvr|IN.esvr OUT.####.vdb [--frames 1-100] ...\n"
           "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
           "  esvr2vdb --check IN.esvr",
       .notes =
-          "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of\n"
-          "the file and of its grids, and it gets no grids of vectors and no carried grids. "
-          "--lod,\n"
-          "--max-ellipsoids and --bbox do not write carried grids either, because they cannot be\n"
-          "cut. A warning names each grid that is left out, and naming such a grid with -g is an\n"
+          "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of the "
+          "file and of its grids, and it gets no grids of vectors and no carried grids. --lod, "
+          "--max-ellipsoids and --bbox do not write carried grids either, because they cannot be "
+          "cut. A warning names each grid that is left out, and naming such a grid with -g is an "
           "error.\n"
           "\n"
-          "A voxel is active where it differs from the background by more than a threshold,\n"
-          "which was chosen when the file was made, or where the file has a mask that says so.\n"
-          "No voxel outside the bounds of the source's active voxels is active. In a level set,\n"
-          "the voxels of the narrow band are active.\n"
+          "A voxel is active where it differs from the background by more than a threshold, which "
+          "was chosen when the file was made, or where the file has a mask that says so. No voxel "
+          "outside the bounds of the source's active voxels is active. In a level set, the voxels "
+          "of the narrow band are active.\n"
           "\n"
-          "--list counts bytes that several grids share for the first of them only. The table\n"
-          "of sections names the grid with which a section is shared.\n"
+          "--list counts bytes that several grids share for the first of them only. The table of "
+          "sections names the grid with which a section is shared.\n"
           "\n"
-          "If IN.esvr holds a sequence, OUT needs a pattern such as #### for the number of the\n"
-          "frame. --list prints its frames and groups, and --check names each frame that is "
-          "lost.\n"
+          "If IN.esvr holds a sequence, OUT needs a pattern such as #### for the number of the "
+          "frame. --list prints its frames and groups, and --check names each frame that is lost.\n"
           "\n"
-          "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot\n"
-          "be used, 5 not enough memory (--max-memory). A sequence has the code of its first\n"
-          "frame that failed.",
+          "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot be "
+          "used, 5 not enough memory (--max-memory). A sequence has the code of its first frame "
+          "that failed.",
       .examples =
           "  esvr2vdb smoke.esvr smoke.vdb\n"
           "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   # also print the errors\n"

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "cli/version_text.h"
+#include "cli/wrapped_text.h"
 
 namespace esvr::cli {
 namespace {
@@ -63,11 +64,11 @@ void CommandLine::repeatedArgument(const std::string& name) { rest_ = name; }
 
 std::string CommandLine::helpText() const {
   std::ostringstream out;
-  out << text_.purpose << "\n\n";
+  out << wrapped(text_.purpose, kLineLength) << "\n\n";
   appendSection(out, "Usage:", text_.usage);
   if (!own_.options().empty()) out << own_ << '\n';
   out << common_ << '\n';
-  appendSection(out, "Notes:", text_.notes);
+  appendSection(out, "Notes:", wrapped(text_.notes, kLineLength));
   appendSection(out, "Examples:", text_.examples);
   std::string help = out.str();
   help.pop_back();  // removes the empty line after the last section

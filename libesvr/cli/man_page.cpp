@@ -36,21 +36,29 @@ std::string inCapitals(std::string name) {
   return name;
 }
 
-/// The first sentence on one line, without its full stop. A full stop in ".esvr" ends no sentence.
-std::string firstSentence(std::string text) {
-  std::ranges::replace(text, '\n', ' ');
+/// The first sentence without its full stop. A full stop in ".esvr" ends no sentence.
+std::string firstSentence(const std::string& text) {
   std::string sentence = text.substr(0, text.find(". "));
   if (sentence.ends_with('.')) sentence.pop_back();
   return sentence;
 }
 
-void addText(std::ostream& out, const char* title, const std::string& text) {
-  if (!text.empty()) out << ".SH " << title << '\n' << escaped(text) << '\n';
-}
-
 /// Adds text whose lines and columns have a meaning.
 void addLines(std::ostream& out, const char* title, const std::string& text) {
   if (!text.empty()) out << ".SH " << title << "\n.nf\n" << escaped(text) << "\n.fi\n";
+}
+
+/// Adds text whose lines are paragraphs, but for those that begin with a space.
+void addParagraphs(std::ostream& out, const char* title, const std::string& text) {
+  if (text.empty()) return;
+  out << ".SH " << title << '\n';
+  std::istringstream lines(text);
+  const char* before = "";  // the first paragraph follows its title at once
+  for (std::string line; std::getline(lines, line); before = ".PP\n")
+    if (line.starts_with(' '))
+      out << ".nf\n" << escaped(line) << "\n.fi\n";
+    else if (!line.empty())
+      out << before << escaped(line) << '\n';
 }
 
 /// The name of an option for a man page: "-g, --grid NAME".
@@ -73,14 +81,14 @@ std::string manPage(const ProgramText& text, const std::vector<OptionGroup>& gro
       << ".SH NAME\n"
       << escaped(name) << " \\- " << escaped(firstSentence(text.purpose)) << '\n';
   addLines(out, "SYNOPSIS", text.usage);
-  addText(out, "DESCRIPTION", text.purpose);
+  addParagraphs(out, "DESCRIPTION", text.purpose);
   for (const auto& group : groups) {
     if (group.options->options().empty()) continue;
     out << ".SH " << group.title << '\n';
     for (const auto& option : group.options->options())
       out << ".TP\n" << titleOf(*option) << '\n' << escaped(option->description()) << '\n';
   }
-  addLines(out, "NOTES", text.notes);
+  addParagraphs(out, "NOTES", text.notes);
   addLines(out, "EXAMPLES", text.examples);
   return out.str();
 }

@@ -5,7 +5,9 @@
 
 namespace esvr::cli {
 
-/// The texts of a program's --help, which are printed unchanged.
+/// The texts of a program's --help. In `purpose` and `notes`, each line is a paragraph, which is
+/// broken into lines where it is printed; lines that begin with a space have columns, and stay as
+/// they are. The other texts are printed unchanged.
 struct ProgramText {
   std::string name;      ///< "esvr-sample"
   std::string purpose;   ///< what the program does

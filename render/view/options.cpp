@@ -16,28 +16,27 @@ cli::ProgramText programText() {
   return {
       .name = kProgram,
       .purpose =
-          "Shows .esvr files and VDB files in a browser: orbit, edit the transfer function over\n"
+          "Shows .esvr files and VDB files in a browser: orbit, edit the transfer function over "
           "the histogram, compare with a reference. This program draws, and serves the page.",
       .usage =
           "  esvr-view FILE.esvr|FILE.vdb... [OPTION]...\n"
           "  esvr-view --export PAGE.html FILE.esvr [--force]",
       .notes =
-          "The program prints an address; open it in a browser. The address has a secret, which\n"
+          "The program prints an address; open it in a browser. The address has a secret, which "
           "every request needs, and is valid until the program ends by Ctrl-C.\n"
           "\n"
           "It listens to this machine only. From another machine, forward the port:\n"
           "  ssh -L 8080:127.0.0.1:8080 HOST esvr-view FILE.esvr --port 8080\n"
-          "The connection is not encrypted by itself; SSH does that. With --bind, anyone who can\n"
+          "The connection is not encrypted by itself; SSH does that. With --bind, anyone who can "
           "read the network can read the pictures and the secret.\n"
           "\n"
           "Clients can see the files of the command line, and no others.\n"
           "\n"
-          "--export writes a page that contains the file and draws it in the browser. It needs no\n"
+          "--export writes a page that contains the file and draws it in the browser. It needs no "
           "server and no network, and can be sent by mail or opened from a disk.\n"
           "\n"
           "Exit codes: 0 ended by Ctrl-C or page written, 1 failure, 2 wrong options, 3 input that "
-          "is damaged or\n"
-          "cannot be used, 5 no such device or not enough memory.",
+          "is damaged or cannot be used, 5 no such device or not enough memory.",
       .examples =
           "  esvr-view smoke.esvr\n"
           "  esvr-view smoke.esvr smoke.vdb      # the original, to compare\n"

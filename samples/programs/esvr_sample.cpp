@@ -38,12 +38,12 @@ std::string listOfKinds() {
 cli::CommandLine commandLine() {
   cli::CommandLine line(
       {.name = kName,
-       .purpose = "Generates a sparse volume and writes it as VDB. The same kind, resolution and\n"
+       .purpose = "Generates a sparse volume and writes it as VDB. The same kind, resolution and "
                   "seed give the same voxels on every machine.",
        .usage = "  esvr-sample KIND OUT.vdb [--resolution N] [--seed N] [-f]\n"
                 "  esvr-sample plume 'OUT.####.vdb' --frames N [--frame K]",
        .notes = "KIND is one of\n" + listOfKinds() +
-                "Time and memory are proportional to the active voxels, so resolutions of several\n"
+                "Time and memory are proportional to the active voxels, so resolutions of several "
                 "thousand are possible.",
        .examples = "  esvr-sample tree tree.vdb\n"
                    "  esvr-sample plume smoke.vdb --resolution 512 --seed 7\n"

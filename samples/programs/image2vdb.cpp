@@ -39,17 +39,18 @@ cli::CommandLine commandLine() {
                 "  image2vdb IN.raw OUT.vdb --dims X,Y,Z --type TYPE [options]",
        .notes =
            samples::textOfFormats() +
-           "\nThe format of IN follows from its content, or else from its name. The slices of a\n"
-           "TIFF stack are the pages of one file, files in the order given, the TIFF files of a\n"
-           "folder, or those of a pattern such as 'slice_####.tif'. In a RAW file, x varies\n"
-           "fastest, and TYPE is one of\n" +
+           " The format of IN follows from its content, or else from its name. The slices of a "
+           "TIFF stack are the pages of one file, files in the order given, the TIFF files of "
+           "a folder, or those of a pattern such as 'slice_####.tif'. In a RAW file, x varies "
+           "fastest, and TYPE is one of " +
            samples::elementTypeNames() +
-           ".\n\n"
-           "The values of the grid are 32-bit floats. A voxel is active if it is not below the\n"
-           "threshold, or, without a threshold, if it differs from the background. The transform\n"
-           "of the grid is that of the image: the space directions and origin of NRRD, the sform\n"
-           "or qform of NIfTI, the origin, spacing and direction of VTI, the sizes of voxels that\n"
-           "ImageJ or OME wrote into TIFF, and element_size_um of HDF5.",
+           ".\n"
+           "\n"
+           "The values of the grid are 32-bit floats. A voxel is active if it is not below "
+           "the threshold, or, without a threshold, if it differs from the background. The "
+           "transform of the grid is that of the image: the space directions and origin of "
+           "NRRD, the sform or qform of NIfTI, the origin, spacing and direction of VTI, the "
+           "sizes of voxels that ImageJ or OME wrote into TIFF, and element_size_um of HDF5.",
        .examples =
            "  image2vdb scan.tif scan.vdb\n"
            "  image2vdb 'slices/ct_####.tif' ct.vdb --voxel-size 0.5,0.5,2 --threshold 300\n"

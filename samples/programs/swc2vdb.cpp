@@ -35,7 +35,7 @@ cli::CommandLine commandLine() {
            "Converts a neuron skeleton (SWC) to a VDB of soft-edged tubes: 1 inside, 0 outside.",
        .usage = "  swc2vdb IN.swc OUT.vdb [--resolution N] [--min-radius R] [--longest K]",
        .notes =
-           "The grid 'density' has the position and the units of the skeleton. The radius changes\n"
+           "The grid 'density' has the position and the units of the skeleton. The radius changes "
            "linearly between two nodes. Time and memory are proportional to the active voxels.",
        .examples = "  swc2vdb neuron.swc neuron.vdb --resolution 1024\n"
                    "  swc2vdb neuron.swc large.vdb --resolution 8192 --min-radius 2"});

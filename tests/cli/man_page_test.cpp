@@ -26,9 +26,9 @@ class ManPage : public testing::Test {
   }
   po::options_description own_;
   ProgramText text_{.name = "esvr-example table",
-                    .purpose = "Converts an .esvr file\nback. It says so.",
+                    .purpose = "Converts an .esvr file back. It says so.",
                     .usage = "  esvr-example table IN",
-                    .notes = "'quoted' \\ note",
+                    .notes = "'quoted' \\ note\n\n  a  table\nmore",
                     .examples = ""};
 };
 
@@ -51,6 +51,12 @@ TEST_F(ManPage, escapesWhatBeginsACommand) {
   const std::string page = manPage(text_, {{"OPTIONS", &own_}});
   EXPECT_THAT(page, HasSubstr("write this grid\n\\&.only"));
   EXPECT_THAT(page, HasSubstr("\\&'quoted' \\e note"));
+}
+
+TEST_F(ManPage, keepsTheColumnsOfLinesThatBeginWithASpace) {
+  const std::string page = manPage(text_, {{"OPTIONS", &own_}});
+  EXPECT_THAT(page, HasSubstr(".SH NOTES\n\\&'quoted'"));
+  EXPECT_THAT(page, HasSubstr("\n.nf\n  a  table\n.fi\n.PP\nmore\n"));
 }
 
 TEST_F(ManPage, namesOptionsForCompletion) {
