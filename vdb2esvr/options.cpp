@@ -5,12 +5,12 @@
 #include "cli/box_option.h"
 #include "cli/byte_size.h"
 #include "cli/choice.h"
-#include "cli/command_line.h"
 #include "cli/device_option.h"
 #include "cli/error_bound.h"
 #include "cli/host_memory.h"
 #include "cli/number.h"
 #include "cli/table.h"
+#include "vdb2esvr/command_line.h"
 #include "vdb2esvr/frame_options.h"
 #include "vdb2esvr/paper_options.h"
 #include "vdb2esvr/part_options.h"
@@ -21,8 +21,6 @@ namespace {
 
 using cli::Arguments;
 using cli::requireRange;
-using cli::po::bool_switch;
-using cli::po::value;
 
 constexpr std::int64_t kMaxIterations = 10'000'000;
 constexpr double kLongestRun = 1e9;  // seconds
@@ -30,201 +28,6 @@ constexpr double kLargestRatio = 1e9;
 constexpr double kMaxLoss = 20.0;                  // dB
 constexpr double kMinVram = 1e-3, kMaxVram = 1e6;  // GB
 constexpr float kLargestKappa = 1e4f;              // kernel.h
-
-cli::ProgramText programText() {
-  return {
-      .name = kProgram,
-      .purpose =
-          "Fits ellipsoids to the sparse grids of a VDB file and writes them to an .esvr file.\n"
-          "A pattern such as smoke.####.vdb stands for the files of a sequence.\n"
-          "esvr2vdb converts the file back to VDB. Transforms, names and metadata are then\n"
-          "exactly those of the source, and voxels have the chosen accuracy.",
-      .usage =
-          "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]\n"
-          "  vdb2esvr IN.####.vdb OUT.####.esvr [--frames 1-100x2] ...\n"
-          "  vdb2esvr IN.####.vdb OUT.esvr [--frames 1-100x2] [--gop N] ...",
-      .notes =
-          "Without -g, all grids are converted. Grids of vectors are fitted by components, unless\n"
-          "they take fewer bytes unchanged. Grids that are not fitted come back bit for bit: "
-          "those\n"
-          "that are not of floats, doubles or vectors of them (integers, masks, strings, points),\n"
-          "those without an active voxel, and those that --keep names are carried in the file as\n"
-          "the bytes that OpenVDB wrote. --skip leaves grids out, and the summary says what was\n"
-          "fitted, carried and left out. A grid of a .nvdb file cannot be carried; a file with "
-          "one\n"
-          "that cannot be fitted either is refused, unless --skip names it. --size and --ratio\n"
-          "count the bytes of carried grids.\n"
-          "Without a goal, each grid gets the quality of --preset in as few bytes as\n"
-          "were found; a grid of more than 33 million voxels in bricks gets a single fit instead.\n"
-          "--size and --ratio search for the best file that is not larger. Several\n"
-          "grids share the bytes in proportion to their active voxels. --psnr searches for the\n"
-          "smallest file that reaches the PSNR; --count then limits the number of ellipsoids.\n"
-          "In all these cases, the program chooses for each grid between ellipsoids and quantised\n"
-          "voxels. It makes only a short fit if that shows that voxels are better. Grids of more\n"
-          "than 33 million voxels are stored as ellipsoids or exact voxels.\n"
-          "--representation prescribes one of them.\n"
-          "With --count, --seconds, --iterations or --storage-loss there is a single fit. Its\n"
-          "ellipsoids are stored unless exact voxels take no more bytes. With --psnr and\n"
-          "--seconds, it ends as soon as it reaches the PSNR.\n"
-          "Grids with the same voxels are converted and stored once. The voxels of other grids of\n"
-          "one transform refer to each other where that takes fewer bytes, such as those of a\n"
-          "temperature to a density, and small parts of the file are stored together (--share).\n"
-          "The program prints a table on stdout. Its PSNR and largest error are measured on the\n"
-          "voxels that are decoded from the written file.\n"
-          "\n"
-          "Ctrl-C ends the fit, and the exit code is 1. --on-cancel chooses whether the best\n"
-          "result so far is written. A second Ctrl-C ends the program at once. OUT.esvr is never\n"
-          "incomplete. With --resume, the same command continues a run that was interrupted.\n"
-          "\n"
-          "If OUT has a pattern, each frame of a sequence is converted as a file of its own, "
-          "which\n"
-          "does not depend on other frames. Otherwise, OUT.esvr holds all frames, in groups of "
-          "--gop\n"
-          "frames. A frame whose grids differ from those of the frame before it begins a group.\n"
-          "Until it is complete, the file has the name OUT.esvr.partial. Without a goal, all "
-          "frames have the PSNR of --preset, whatever their "
-          "size.\n"
-          "In a pattern, #, #### and %04d are four digits, and @ is as many as needed. Frames are\n"
-          "converted at the same time on the threads of --threads, or up to four on each GPU of "
-          "--device,\n"
-          "as far as --max-memory allows. A frame that fails is named, and does not stop the "
-          "others\n"
-          "(--on-error stop); the exit code is that of the first one. Ctrl-C keeps the frames "
-          "that\n"
-          "are complete, or the groups that are complete in one file. With --resume, they are not\n"
-          "converted again.\n"
-          "\n"
-          "mpirun -n N vdb2esvr ... fits the chunks of a volume on N processes, if the program "
-          "was\n"
-          "built with MPI. All devices and processes together write the bytes that one writes.\n"
-          "\n"
-          "Exit codes: 0 done, 1 failure or interrupted, 2 wrong options, 3 unusable input,\n"
-          "4 --psnr not reached (the file is written), 5 no such device or not enough memory\n"
-          "(--max-memory, --max-vram).",
-      .examples =
-          "  vdb2esvr smoke.vdb smoke.esvr                       # a small file of good quality\n"
-          "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          # the best file of 100 KB\n"
-          "  vdb2esvr smoke.vdb smoke.esvr --psnr 45             # the smallest file with 45 dB\n"
-          "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report fit.json\n"
-          "  vdb2esvr frame.vdb frame.esvr --skip velocity       # all grids but one\n"
-          "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            # every voxel within the bound\n"
-          "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4 --resume\n"
-          "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255\n"
-          "  vdb2esvr 'smoke.####.vdb' 'smoke.####.esvr' --frames 1-100 --missing hold\n"
-          "  vdb2esvr 'smoke.####.vdb' smoke.esvr                # all frames in one file"};
-}
-
-void addGoalOptions(cli::po::options_description& options) {
-  // clang-format off
-  options.add_options()
-    ("count", value<std::int64_t>()->value_name("N"),
-     "number of ellipsoids; with --psnr, the largest number")
-    ("size", value<std::string>()->value_name("BYTES"),
-     "write the best file of at most this size: 50000, 50KB, 2.6MB")
-    ("ratio", value<double>()->value_name("R"),
-     "write the best file of at most the size of IN.vdb divided by R")
-    ("psnr", value<std::string>()->value_name("DB"),
-     "write the smallest file that reaches this PSNR over the box; NAME=DB is that of one grid: "
-     "density=50,temperature=40, or 40,density=50 with 40 for all others")
-    ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
-    ("max-error", value<std::string>()->value_name("E"),
-     "keep the error of every voxel within E, or within E% of the range of values; NAME=E is the "
-     "bound of one grid, as with --psnr; if ellipsoids are stored, they have a residual; a sample of "
-     "the grid shows whether they may be smaller")
-    ("representation", value<std::string>()->value_name("R")->default_value("auto"),
-     "ellipsoids, voxels, or auto (whichever are better or smaller)")
-    ("topology", value<std::string>()->value_name("T")->default_value("auto"),
-     "how active voxels are stored. threshold: by their values; exact: by their mask; auto: by "
-     "their values, with one threshold or one for each block of 4^3 voxels, if the overlap with "
-     "those of IN.vdb is then above 0.95, otherwise by a simplified mask with which it is, unless "
-     "that takes more than a quarter of --size");
-  // clang-format on
-}
-
-void addFitOptions(cli::po::options_description& options) {
-  const double defaultLoss = CompactOptions::kDefaultLoss;
-  // clang-format off
-  options.add_options()
-    ("seconds", value<double>()->value_name("S"), "end the fit of each grid after this time")
-    ("iterations", value<std::int64_t>()->value_name("N"), "number of iterations of a fit")
-    ("preset", value<std::string>()->value_name("P")->default_value("standard"),
-     "quality without another target: draft, standard or high stand for a PSNR of 32, 40 or 50 dB "
-     "over the active voxels; in a single fit, the count and the iterations that are not given")
-    ("fit-for", value<std::string>()->value_name("F")->default_value("voxels"),
-     "voxels: fit the voxels; drawing: fit the values between voxels too, so that esvr-render can "
-     "draw the sum of ellipsoids itself; the error at the voxels is then larger; level sets are "
-     "always fitted for their voxels")
-    ("voxel-share", value<double>()->value_name("S")
-         ->default_value(FitOptions{}.voxelShare, cli::shortNumber(FitOptions{}.voxelShare)),
-     "with --fit-for drawing: share of the iterations, 0 to 1, that compare at the voxels; the "
-     "others compare between them")
-    ("kappa", value<float>()->value_name("K"),
-     "edge of the kernel (default: it is fitted with the ellipsoids)")
-    ("box", value<std::string>()->value_name("BOX"),
-     "box of voxels x0,y0,z0,x1,y1,z1 over which PSNR is measured (default: the bounding box of "
-     "the active voxels)")
-    ("seed", value<std::int64_t>()->value_name("N")->default_value(std::int64_t(FitOptions{}.seed)),
-     "seed of the random choices; the same seed gives the same file")
-    ("storage", value<std::string>()->value_name("S")->default_value("compact"),
-     "compact (quantised, 7 to 12 bytes per ellipsoid) or float32 (about 34)")
-    ("storage-loss",
-     value<double>()->value_name("DB")->default_value(defaultLoss, cli::shortNumber(defaultLoss)),
-     "PSNR that --storage compact may lose in a single fit; --size, --psnr and --max-error ignore "
-     "this option")
-    ("paper", value<std::vector<std::string>>()->value_name("KEY=VALUE,...")->composing(),
-     "fit by the paper's method, for comparison; --help paper lists the keys");
-  // clang-format on
-  cli::addDevice(options, {}, "; cuda:0,1 or cuda:all fit the chunks of a volume on several GPUs");
-  // clang-format off
-  options.add_options()
-    ("max-vram", value<double>()->value_name("GB"),
-     "GPU memory to use (default: all free memory); a volume that does not fit is fitted in chunks")
-    ("chunk-voxels", value<std::int64_t>()->value_name("N"),
-     "fit the volume in chunks of about N active voxels (default: one chunk if it fits)");
-  // clang-format on
-}
-
-void addFileOptions(cli::po::options_description& options) {
-  // clang-format off
-  options.add_options()
-    ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
-     "convert this grid only; may be repeated; 'density[1]' is the second grid of that name")
-    ("keep", value<std::vector<std::string>>()->value_name("NAME")->composing(),
-     "carry this grid unchanged instead of fitting it; may be repeated; with -g, in addition to the "
-     "grids that -g names")
-    ("skip", value<std::vector<std::string>>()->value_name("NAME")->composing(),
-     "leave this grid out; may be repeated")
-    ("share", value<std::string>()->value_name("W")->default_value("auto"),
-     "auto: grids of one transform refer to each other where that makes the file smaller, and small "
-     "parts of the file are stored together; off: each grid is stored on its own, as with --size and "
-     "--ratio; or the names of the grids that may share, as density,temperature")
-    ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
-     "refuse: fail on NaN or infinite voxels; zero: replace them by 0")
-    ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
-     "keep or discard the best result so far if the run is interrupted (with --resume: discard, "
-     "because the finished parts are kept)")
-    ("report", value<std::string>()->value_name("FILE"),
-     "write a JSON report to FILE, whose name ends in .json; '-' is stdout")
-    ("progress", value<std::string>()->value_name("P")->default_value("text"),
-     "text: a bar on a terminal, and lines in a log with --verbose; json: lines of JSON on stderr")
-    ("hits", bool_switch(), "report the average number of ellipsoids that reach a voxel")
-    ("force,f", bool_switch(), "replace OUT.esvr and the report if they exist");
-  // clang-format on
-}
-
-cli::CommandLine commandLine() {
-  cli::CommandLine line(programText());
-  line.argument("input", "IN.vdb");
-  line.argument("output", "OUT.esvr");
-  addFileOptions(line.options());
-  addFrameOptions(line.options());
-  addGoalOptions(line.options());
-  addFitOptions(line.options());
-  addPartOptions(line.options());
-  cli::addHostMemory(line);
-  line.helpTopic("paper", paperHelp());
-  return line;
-}
 
 /// An option's number, which must be within [low, high], converted to another type.
 template <class To, class From>

@@ -9,7 +9,7 @@
 #include "esvr/device_workers.h"
 #include "esvr/error.h"
 #include "esvr/rank_workers.h"
-#include "vdb2esvr/report.h"
+#include "vdb2esvr/asked_report.h"
 
 namespace esvr::vdb2esvr {
 namespace {

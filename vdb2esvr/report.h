@@ -24,9 +24,6 @@ struct ReportSchema {
 /// \param schema  its name and its version
 [[nodiscard]] nlohmann::ordered_json reportHead(const Options& options, const ReportSchema& schema);
 
-/// The options that affect the conversion, with those of its speed (`asked` in the report).
-[[nodiscard]] nlohmann::ordered_json askedJson(const Options& options);
-
 /// The report of a run that failed: its options and the error.
 [[nodiscard]] nlohmann::ordered_json makeFailureReport(const Options& options, const Error& error);
 
