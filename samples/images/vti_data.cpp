@@ -157,7 +157,8 @@ std::unique_ptr<VtiData> openVtiData(const fs::path& path, const VtiHeader& head
     return std::make_unique<AsciiData>(std::move(bytes), selection.component, components);
   if (array.format != "binary" && array.format != "appended")
     throw BadInput("array '" + array.name + "' has the format '" + array.format + "'");
-  const ElementType& type = elementType(elementNameOf(array));
+  const std::string name = elementNameOf(array);
+  const ElementType& type = elementType(name);
   auto data = std::make_unique<BinaryData>(std::move(bytes), type,
                                            EncodedValues{.bytes = {},
                                                          .bigEndian = header.bigEndian,
