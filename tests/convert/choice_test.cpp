@@ -148,7 +148,7 @@ TEST(ChoiceForAPreset, StoresAConstantInAFewBytes) {
   EXPECT_LT(bytesAdded(conversion.grid), 600u);
 }
 
-TEST(Choice, VoxelsKeepTheMaskOfALevelSetOnly) {
+TEST(Choice, SlowVoxelsKeepTheMaskOfALevelSetOnly) {
   const SparseVolume band = test::levelSetVolume();
   const auto iou = [&](GridClass gridClass, const Goal& goal) {
     GridDescriptor descriptor;
@@ -204,7 +204,7 @@ TEST_F(VoxelSearch, SlowDoesNotFitWhereLittleCanBeSaved) {
   EXPECT_TRUE(worthless.choice->ellipsoids && worthless.choice->ellipsoids->estimated);
 }
 
-TEST_F(VoxelSearch, ReachesAPsnrAndLittleMore) {
+TEST_F(VoxelSearch, SlowReachesAPsnrAndLittleMore) {
   for (const double psnr : {20.0, 40.0, 60.0}) {
     const auto found = convert::voxelsForPsnr(job_, {psnr});
     EXPECT_GE(found.psnr, psnr);

@@ -75,7 +75,7 @@ TEST_F(Continued, FrameReachesItsPsnrWithFewerBytes) {
   EXPECT_GT(double(grid.quantised[0].continues.size()), 0.8 * double(grid.quantised[0].size()));
 }
 
-TEST_F(Continued, FramesFollowEachOther) {
+TEST_F(Continued, SlowFramesFollowEachOther) {
   StoredGrid previous = *first_;
   for (int frame = 1; frame <= 3; ++frame) {
     const SparseVolume volume = movedFrame(frame);
@@ -86,7 +86,7 @@ TEST_F(Continued, FramesFollowEachOther) {
   }
 }
 
-TEST_F(Continued, MotionsOfTheEllipsoidsAreThoseOfTheBlobs) {
+TEST_F(Continued, SlowMotionsOfTheEllipsoidsAreThoseOfTheBlobs) {
   const StoredGrid grid = convertedFrame(movedFrame(1.0), first_.get());
   ASSERT_TRUE(continuesFrame(grid));
   std::vector<std::int32_t> along = grid.quantised[0].motion[0];
@@ -97,22 +97,22 @@ TEST_F(Continued, MotionsOfTheEllipsoidsAreThoseOfTheBlobs) {
   EXPECT_NEAR(*middle / 256.0, 1.9, 0.4);
 }
 
-TEST_F(Continued, PresetsContinueToo) {
+TEST_F(Continued, SlowPresetsContinueToo) {
   EXPECT_TRUE(continuesFrame(convertedFrame(movedFrame(0.5), first_.get(), PresetGoal{})));
 }
 
-TEST_F(Continued, OtherGoalsDoNot) {
+TEST_F(Continued, SlowOtherGoalsDoNot) {
   EXPECT_FALSE(continuesFrame(convertedFrame(movedFrame(0.5), first_.get(), SizeGoal{900})));
 }
 
-TEST_F(Continued, AFrameWithoutLikenessIsFittedAnew) {
+TEST_F(Continued, SlowAFrameWithoutLikenessIsFittedAnew) {
   const SparseVolume other = test::tubeVolume();
   const StoredGrid grid = convertedFrame(other, first_.get(), PsnrGoal{30.0});
   EXPECT_GE(psnrOverBox(other, decodeGrid(grid)), 30.0);
   EXPECT_LE(bytesInFrame(grid, first_.get()), bytesAdded(grid));
 }
 
-TEST_F(Continued, AFrameFarAwayIsFittedAnew) {
+TEST_F(Continued, SlowAFrameFarAwayIsFittedAnew) {
   SparseVolume far = movedFrame(0.0);
   far.origin = far.origin + Coord{1 << 20, 0, 0};
   const StoredGrid grid = convertedFrame(far, first_.get());
@@ -120,7 +120,7 @@ TEST_F(Continued, AFrameFarAwayIsFittedAnew) {
   EXPECT_GE(psnrOverBox(far, decodeGrid(grid)), kFramePsnr);
 }
 
-TEST_F(Continued, BytesDoNotDependOnThreads) {
+TEST_F(Continued, SlowBytesDoNotDependOnThreads) {
   const auto bytes = [&] {
     const EsvrFile file{{}, {convertedFrame(movedFrame(1.0), first_.get())}};
     const EsvrFile before{{}, {*first_}};

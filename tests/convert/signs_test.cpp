@@ -71,7 +71,7 @@ convert::Attempt withBetterSigns(const SparseVolume& volume, double count,
       input, attempt({input, options}, count, convert::FitLength::kShort), options);
 }
 
-TEST(Signs, AreChosenAfterAShortFit) {
+TEST(Signs, SlowAreChosenAfterAShortFit) {
   ConvertOptions options = searching(PsnrGoal{40.0});
   const auto first = withBetterSigns(gyroidVolume(), 800, options);
   EXPECT_TRUE(options.fit.bothSigns.value_or(false));

@@ -112,7 +112,7 @@ struct TwoVolumes {
   }
 };
 
-TEST(RenderGrids, SolveTheEquationOfEmissionAndAbsorption) {
+TEST(RenderGrids, SlowSolveTheEquationOfEmissionAndAbsorption) {
   TwoVolumes two;
   const auto error = [&] {
     return largestDifference(two.drawn(), reference({&two.first, &two.second}, two.options));

@@ -114,7 +114,7 @@ TEST_F(LevelSetFile, SlowRealFileOfACubeKeepsAllSigns) {
     EXPECT_EQ(signErrors(*grid, *throughAFile(converted(source, goal))), 0u);
 }
 
-TEST(MeshDistance, OfASphereThatMovedIsTheLengthOfItsMove) {
+TEST(MeshDistance, SlowOfASphereThatMovedIsTheLengthOfItsMove) {
   const test::TemporaryFolder folder;
   const auto gridOf = [&](const Sphere& sphere) {
     test::save(folder / "sphere.vdb", {sphereOf(sphere)});
