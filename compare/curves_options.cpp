@@ -25,13 +25,12 @@ cli::ProgramText programText() {
       .usage = "  esvr-compare curves REF.vdb [CAND.esvr ...] --output PREFIX [--fit BYTES]...",
       .notes =
           "The program writes every point to PREFIX.csv and PREFIX.json. It writes the plots "
-          "PREFIX-seconds, PREFIX-bytes and, with --fps, PREFIX-fps as .svg and .png files. The "
-          "page PREFIX.html has all of them.\n"
+          "PREFIX-bytes, PREFIX-seconds if this run makes fits, and PREFIX-fps with --fps, as .svg "
+          "and .png files. The page PREFIX.html has all of them.\n"
           "\n"
           "Without CAND and --fit, the program fits ellipsoids for six sizes: the size of the "
           "half-float Blosc VDB divided by 10, 20, 50, 100, 200 and 400. PREFIX-seconds shows the "
-          "fits that this run makes: the time of the optimisation, and the whole time from the "
-          "voxels to the file.\n"
+          "time of the optimisation, and the whole time from the voxels to the file.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted (finished points are written), 2 wrong "
           "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",

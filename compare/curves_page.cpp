@@ -43,8 +43,7 @@ std::vector<report::Emphasis> emphasisOfFiles(const TableRecord& record) {
 
 Html chartsOf(const std::vector<NamedPlot>& plots) {
   Html charts;
-  for (const auto& [ending, plot] : plots)
-    if (!plot.series.empty()) charts += report::toHtml(plot);
+  for (const auto& [ending, plot] : plots) charts += report::toHtml(plot);
   return report::element("div", {{"class", "charts"}}, charts);
 }
 

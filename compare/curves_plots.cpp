@@ -78,6 +78,7 @@ bool hasFps(const TableRecord& record) {
 std::vector<NamedPlot> curvePlots(const TableRecord& record) {
   std::vector<NamedPlot> plots{{"-seconds", overSeconds(record)}, {"-bytes", overBytes(record)}};
   if (hasFps(record)) plots.push_back({"-fps", fpsOverBytes(record)});
+  std::erase_if(plots, [](const NamedPlot& named) { return named.plot.series.empty(); });
   return plots;
 }
 

@@ -15,7 +15,7 @@ struct NamedPlot {
   report::Plot plot;
 };
 
-/// Error over run time, error over bytes and, if it was measured, speed over bytes.
+/// Error over run time, error over bytes and speed over bytes, as far as they were measured.
 [[nodiscard]] std::vector<NamedPlot> curvePlots(const TableRecord& record);
 
 }  // namespace esvr::compare

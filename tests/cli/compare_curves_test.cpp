@@ -95,6 +95,8 @@ TEST_F(CompareCurves, showsOnlyThePlotsThatHaveCurves) {
   const std::string page = test::readText(at("c.html"));
   EXPECT_THAT(page, testing::AllOf(HasSubstr("Error over bytes"), HasSubstr("class=\"row ours\""),
                                    testing::Not(HasSubstr("Error over run time"))));
+  EXPECT_THAT(folder_.names(), testing::ElementsAre("c-bytes.png", "c-bytes.svg", "c.csv", "c.html",
+                                                    "c.json", "fit.esvr", "ref.vdb"));
 }
 
 TEST_F(CompareCurves, refusesWhatTakesMoreMemoryThanAllowed) {
