@@ -92,9 +92,9 @@ bool isPointTree(const std::string& treeType) {
 
 std::string whyNotCarried(const std::string& treeType, std::uint32_t vdbVersion) {
   const std::string version = "the version of its VDB format, " + std::to_string(vdbVersion) + ", ";
-  if (vdbVersion < kOldestFileVersion || vdbVersion > openvdb::OPENVDB_FILE_VERSION)
+  if (vdbVersion < kOldestFileVersion || vdbVersion > kNewestFileVersion)
     return version + "is not between " + std::to_string(kOldestFileVersion) + " and " +
-           std::to_string(openvdb::OPENVDB_FILE_VERSION);
+           std::to_string(kNewestFileVersion);
   // The bytes of all other trees are the same in the versions that can be read.
   if (isPointTree(treeType) && vdbVersion < openvdb::OPENVDB_FILE_VERSION_MULTIPASS_IO)
     return version +

@@ -62,8 +62,7 @@ class StreamedGrid : public openvdb::Grid<Tree> {
 
   /// The bytes that the grid takes where it is read again, with its voxels.
   [[nodiscard]] openvdb::Index64 memUsage() const override {
-    const openvdb::Index64 leaves = this->tree().leafCount();
-    return openvdb::Grid<Tree>::memUsage() + leaves * Leaf::SIZE * sizeof(Value);
+    return openvdb::tools::memUsageIfLoaded(this->tree());
   }
 
   void writeBuffers(std::ostream& stream) const override {

@@ -8,6 +8,7 @@
 
 #include <openvdb/version.h>
 
+#include <algorithm>
 #include <cstdint>
 
 #if OPENVDB_LIBRARY_MAJOR_VERSION_NUMBER < 10
@@ -49,5 +50,11 @@ void initializeOpenVdb();
 /// each node.
 inline constexpr std::uint32_t kOldestFileVersion =
     openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
+
+/// The newest file format whose bytes are known. Format 225 of OpenVDB 13 has one more type of grids
+/// than format 224, and stores all others in the same way, so that older versions of OpenVDB can read
+/// and write their bytes.
+inline constexpr std::uint32_t kNewestFileVersion =
+    std::max<std::uint32_t>(225, openvdb::OPENVDB_FILE_VERSION);
 
 }  // namespace esvr::vdb

@@ -8,6 +8,7 @@
 
 #include "cli/converters.h"
 #include "esvr/vdb_io.h"
+#include "vdb/carried_bytes.h"
 
 namespace esvr {
 namespace {
@@ -40,7 +41,8 @@ class EdgeFile : public testing::Test {
     EXPECT_THAT(run.err, HasSubstr("no grid is fitted; the output has carried grids only"));
     ASSERT_EQ(back().grids.size(), 1u);
     const std::size_t place = 0;
-    EXPECT_EQ(readCarried(folder_ / "back.vdb", {&place, 1}), readCarried(path(name), {&place, 1}));
+    EXPECT_EQ(test::withoutVersion(readCarried(folder_ / "back.vdb", {&place, 1})),
+              test::withoutVersion(readCarried(path(name), {&place, 1})));
   }
 
   test::TemporaryFolder folder_;

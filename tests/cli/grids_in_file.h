@@ -4,9 +4,11 @@
 #include <cstddef>
 #include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "esvr/vdb_io.h"
+#include "vdb/carried_bytes.h"
 
 namespace esvr::test {
 
@@ -16,7 +18,7 @@ inline std::vector<std::string> namesIn(const std::string& path) {
   return names;
 }
 
-/// The grids of a .vdb file as bytes, without their places.
+/// The grids of a .vdb file as bytes, without their places and the version of the format.
 inline std::vector<CarriedGrid> bytesIn(const std::string& path,
                                         std::vector<std::size_t> places = {}) {
   if (places.empty()) {
@@ -25,7 +27,7 @@ inline std::vector<CarriedGrid> bytesIn(const std::string& path,
   }
   auto grids = readCarried(path, places);
   for (auto& grid : grids) grid.place = 0;
-  return grids;
+  return withoutVersion(std::move(grids));
 }
 
 }  // namespace esvr::test
