@@ -1,13 +1,6 @@
 # cmake -P: installs the decoder of `buildTree` below `scratch`, and builds and runs `program`, which
 # is written in C, with what pkg-config says of it.
-function(run)
-  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE out ERROR_VARIABLE out)
-  if(NOT result EQUAL 0)
-    list(JOIN ARGN " " command)
-    message(FATAL_ERROR "${command}\n${out}")
-  endif()
-  set(out "${out}" PARENT_SCOPE)
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/run.cmake)
 
 file(REMOVE_RECURSE ${scratch})
 run(${CMAKE_COMMAND} --install ${buildTree} --prefix ${scratch}/prefix)
