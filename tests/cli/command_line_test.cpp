@@ -8,6 +8,7 @@
 
 #include <csignal>
 #include <new>
+#include <sstream>
 #include <thread>
 
 #include "cli/interrupts.h"
@@ -116,6 +117,23 @@ TEST(CommandLine, helpSaysAllAndNeedsNoArguments) {
                            "--threads", "--version", "Examples:"})
     EXPECT_THAT(help, HasSubstr(part));
   EXPECT_THAT(help, testing::Not(HasSubstr("Notes:"))) << "an empty section is left out";
+}
+
+TEST(CommandLine, helpBreaksTheLinesOfParagraphs) {
+  std::string words;
+  for (int i = 0; i < 40; ++i) words += "word ";
+  const CommandLine line({.name = "esvr-example",
+                          .purpose = words,
+                          .usage = "  esvr-example",
+                          .notes = words + "\n  a  table\n" + words,
+                          .examples = ""});
+  const char* const given[] = {"esvr-example", "--help"};
+  CaptureStdout();
+  EXPECT_FALSE(line.parse(2, given));
+  const std::string help = GetCapturedStdout();
+  EXPECT_THAT(help, HasSubstr("word\n  a  table\nword"));
+  std::istringstream lines(help);
+  for (std::string text; std::getline(lines, text);) EXPECT_LE(text.size(), 80u) << text;
 }
 
 TEST(CommandLine, versionNamesEveryPart) {
