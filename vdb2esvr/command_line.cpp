@@ -115,8 +115,8 @@ void addGoalOptions(cli::po::options_description& options) {
     ("topology", value<std::string>()->value_name("T")->default_value("auto"),
      "how active voxels are stored. threshold: by their values; exact: by their mask; auto: by "
      "their values, with one threshold or one for each block of 4^3 voxels, if the overlap with "
-     "those of IN.vdb is then above 0.95, otherwise by a simplified mask with which it is, unless "
-     "that takes more than a quarter of --size");
+     "those of IN.vdb is then above 0.95, otherwise by a simplified mask with which it is; neither "
+     "takes more than a quarter of --size");
   // clang-format on
 }
 

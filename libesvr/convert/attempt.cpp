@@ -9,6 +9,7 @@
 #include "core/add_seconds.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "format/level_section.h"
 #include "format/mask_section.h"
 
 namespace esvr::convert {
@@ -73,8 +74,8 @@ std::optional<Attempt> betterSigned(const Job& job, double count, const Attempt&
   return found;
 }
 
-/// Largest share of a size that a mask may take.
-constexpr double kMaxMaskShare = 0.25;
+/// Largest share of a size that a mask, or the thresholds of blocks, may take.
+constexpr double kMaxActivityShare = 0.25;
 /// Error of the values for which the bytes of a mask are measured, as a share of their peak: 40 dB.
 constexpr double kErrorOfMask = 0.01;
 
@@ -119,7 +120,13 @@ Activity voxelActivity(const Job& job) {
 Activity activityForSize(const Job& job, std::uint64_t bytes) {
   const Activity wanted = job.options.storage.activity;
   if (wanted != Activity::kAuto || job.options.fit.narrowBand) return wanted;
-  return kMaxMaskShare * double(bytes) < double(maskBytes(job)) ? Activity::kNoMask : wanted;
+  return kMaxActivityShare * double(bytes) < double(maskBytes(job)) ? Activity::kNoMask : wanted;
+}
+
+bool levelsTakeTooMuch(const StoredGrid& grid, std::uint64_t bytes) {
+  if (grid.topology != TopologyKind::kBlocks) return false;
+  const std::size_t levels = format::putLevels({grid.bricks, grid.levels}).size();
+  return kMaxActivityShare * double(bytes) < double(levels);
 }
 
 RoundedSigns voxelSigns(const Job& job) {

@@ -43,6 +43,9 @@ struct Job {
 /// would be left for the values.
 [[nodiscard]] Activity activityForSize(const Job& job, std::uint64_t bytes);
 
+/// True if the thresholds of a grid's blocks take more than a quarter of a size, as for a mask.
+[[nodiscard]] bool levelsTakeTooMuch(const StoredGrid& grid, std::uint64_t bytes);
+
 /// How voxels are rounded: with their signs if the grid is a narrow band.
 [[nodiscard]] RoundedSigns voxelSigns(const Job& job);
 

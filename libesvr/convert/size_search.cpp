@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "esvr/grid_coding.h"
 #include "format/layout.h"
 
 namespace esvr::convert {
@@ -13,6 +14,7 @@ constexpr double kMaxUsefulLoss = 2.5;  // loss, dB, above which fewer ellipsoid
 constexpr double kRepairFactor = 1.25;  // smallest growth of the bytes per ellipsoid by a repair
 constexpr int kMaxRepairs = 3;
 constexpr std::uint64_t kRefillDivisor = 100;  // a hundredth of the bytes unused: search again
+constexpr double kRefitFactor = 1.25;  // growth of the bytes for ellipsoids that is worth a fit
 
 /// Largest padding of the ellipsoids' sections, of which each chunk has one.
 std::uint64_t paddingOf(const StoredGrid& grid) {
@@ -36,20 +38,23 @@ class SizeSearch {
     const double expected = last.psnr + kShortFitBehind - kUsualLoss;
     if (above_ && !last.cancelled() && expected + kUncertainty < *above_)
       return {std::nullopt, 0, expected};
-    const CompactResult first = compacted(job_, last, {});
+    const CompactResult first = compactFor(last, {});
     if (!reserve(bytesBesides(first))) return refused();
     double each = priceOf(last, first) / kShortFitPrice;
     for (int repairs = 0; !last.cancelled(); ++repairs) {
-      last = attempt(job_, double(left_) / each, FitLength::kWhole);
+      const std::uint64_t before = left_;
+      last = attempt(job_, double(before) / each, FitLength::kWhole);
       CompactResult now = filled(last);
       if (besides_ >= bytes_) return refused();
+      const bool isLast = repairs + 1 >= kMaxRepairs;
+      if (!isLast && !last.cancelled() && double(left_) > kRefitFactor * double(before)) continue;
       const bool fits = now.bytes <= left_;
-      if (fits && (now.loss <= kMaxUsefulLoss || repairs + 1 >= kMaxRepairs))
+      if (fits && (now.loss <= kMaxUsefulLoss || isLast))
         return {stored(std::move(last.fit), std::move(now)), 0, expected};
       if (!fits && last.asked == 1) return {std::nullopt, besides_ + now.bytes, expected};
-      each = std::max(priceOf(last, compacted(job_, last, {})), kRepairFactor * each);
+      each = std::max(priceOf(last, compactFor(last, {})), kRepairFactor * each);
     }
-    CompactResult compact = compactFor(last);
+    CompactResult compact = compactFor(last, {.bytes = left_});
     return {stored(std::move(last.fit), std::move(compact)), 0, expected};
   }
 
@@ -69,18 +74,40 @@ class SizeSearch {
 
   [[nodiscard]] SizeResult refused() const { return {std::nullopt, besides_, 0.0}; }
 
-  [[nodiscard]] CompactResult compactFor(const Attempt& attempt) const {
-    return compacted(job_, attempt, {.bytes = left_});
+  /// Gives this grid and all later ones a single threshold.
+  void dropLevels(Attempt& attempt) {
+    options_.storage.activity = Activity::kByValue;
+    attempt.grid = withOneThreshold(std::move(attempt.grid));
+  }
+
+  /// Compacts an attempt. The thresholds of its blocks are dropped if they take too much of the size.
+  CompactResult compactFor(Attempt& attempt, const StorageTarget& target) {
+    CompactResult now = compacted(job_, attempt, target);
+    if (!levelsTakeTooMuch(now.grid, bytes_)) return now;
+    dropLevels(attempt);
+    return compacted(job_, attempt, target);
+  }
+
+  /// True if blocks have thresholds for which no bytes were reserved, and the ellipsoids would have to
+  /// make so much room for them that these thresholds are not worth it.
+  [[nodiscard]] bool levelsDisplace(const CompactResult& now) const {
+    const double left = double(bytes_) - double(bytesBesides(now));
+    return now.grid.topology == TopologyKind::kBlocks && kRefitFactor * left < double(left_);
   }
 
   /// Compacts an attempt to the bytes that remain. The other sections of a full fit's grid may be
   /// larger or smaller than the short fit's; the bytes are then reserved again.
-  CompactResult filled(const Attempt& attempt) {
-    CompactResult now = compactFor(attempt);
+  CompactResult filled(Attempt& attempt) {
+    CompactResult now = compactFor(attempt, {.bytes = left_});
+    if (levelsDisplace(now)) {
+      dropLevels(attempt);
+      now = compactFor(attempt, {.bytes = left_});
+    }
     const std::uint64_t besides = bytesBesides(now), padding = paddingOf(now.grid);
     const bool larger = besides > besides_ + padding;
     const bool muchSmaller = besides_ > besides + padding + bytes_ / kRefillDivisor;
-    if ((larger || muchSmaller) && reserve(besides)) now = compactFor(attempt);
+    if ((larger || muchSmaller) && reserve(besides))
+      now = compactFor(attempt, {.bytes = left_});
     return now;
   }
 

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -82,6 +83,34 @@ TEST(RegionOfConversion, HasNoMaskInASmallSize) {
     const Box box = activeBox(source), own = activeBox(decodeGrid(grid));
     EXPECT_TRUE(box.contains(own.min) && box.contains(own.max));
   }
+}
+
+/// A bumpy body of one value with a soft edge, whose voxels a threshold for each block finds.
+SparseVolume bumpyBody() {
+  return test::volumeOf({}, 8, 0.0f, [](Coord v) {
+    const double x = v.x - 31.5, y = v.y - 31.5, z = v.z - 31.5;
+    const double bumps = 3.0 * (std::sin(0.5 * x) + std::sin(0.45 * y) + std::sin(0.4 * z));
+    const double depth = 24.0 + bumps - std::sqrt(x * x + y * y + z * z);
+    return float(std::clamp(0.5 * depth, 0.0, 1.0));
+  });
+}
+
+double psnrInSize(const SparseVolume& source, std::uint64_t bytes, Activity activity) {
+  ConvertOptions options = regionOptions(SizeGoal{bytes}, Representation::kEllipsoids);
+  options.storage.activity = activity;
+  const StoredGrid grid = convertVolume({kRegionDescriptor, source}, options).grid;
+  EXPECT_LE(bytesAdded(grid), bytes);
+  return compareVolumes(source, decodeGrid(grid)).psnrBox;
+}
+
+// In a small size, the thresholds of the blocks do not displace the ellipsoids. Fits of different
+// numbers of ellipsoids differ by less than 1 dB here.
+TEST(RegionOfConversion, HasOneThresholdInASmallSize) {
+  const SparseVolume source = bumpyBody();
+  for (const std::uint64_t bytes : {600u, 800u, 1000u, 1200u})
+    EXPECT_GT(psnrInSize(source, bytes, Activity::kAuto),
+              psnrInSize(source, bytes, Activity::kByValue) - 1.0)
+        << bytes;
 }
 
 TEST(RegionOfConversion, StaysFarFromTheOrigin) {

@@ -89,7 +89,8 @@ struct StorageOptions {
   /// PSNR over the box, in dB, that kCompact may lose for a FitGoal. The other goals ignore it.
   double loss = CompactOptions::kDefaultLoss;
   /// How active voxels are stored. For Activity::kAuto, a SizeGoal takes kNoMask where a simplified
-  /// mask would take more than a quarter of the size. Level sets that are stored as voxels always
+  /// mask would take more than a quarter of the size, and kByValue where the thresholds of blocks
+  /// would. Level sets that are stored as voxels always
   /// take kExact.
   Activity activity = Activity::kAuto;
 };
