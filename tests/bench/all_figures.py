@@ -49,6 +49,7 @@ def commands(arguments):
         ("economy", "cpu", ["economy.py", "measure", *data, *machine]),
         ("economy", "pages", ["economy.py", "page"]),
         ("comparison", "gpu", ["comparison.py", "fit", *comparison, "--device", "cuda"]),
+        ("comparison", "gpu", ["comparison.py", "tables", *comparison, "--device", "cuda"]),
         ("comparison", "cpu", ["comparison.py", "rivals", *comparison]),
         ("comparison", "pages", ["comparison.py", "page", *comparison, "--page", "docs/comparison.md"]),
         ("resolution", "gpu", ["resolution_series.py", "fit", *series, "--device", "cuda"]),

@@ -3,14 +3,14 @@
 
     comparison.py sizes  --bin BUILD --data DATA
     comparison.py fit    --bin BUILD --data DATA --out OUT [--device cuda]
+    comparison.py tables --bin BUILD --data DATA --out OUT [--device cuda]
     comparison.py rivals --bin BUILD --data DATA --out OUT
-    comparison.py page   --bin BUILD --data DATA --out OUT --page docs/comparison.md [--device cuda]
-                         [--unseen SECTION.md]
+    comparison.py page   --bin BUILD --data DATA --out OUT --page docs/comparison.md [--unseen SECTION.md]
 
 `sizes` prints the sizes of every volume: the size of its half-float Blosc VDB divided by 200, 50, 25, 10 and
-4. `fit` makes the .esvr files and their reports. `rivals` measures the other rows at these sizes. `page`
-measures the rows of the full tables, with pictures, and writes the page; SECTION.md comes from unseen.py. No job
-repeats what OUT already holds.
+4. `fit` makes the .esvr files and their reports. `tables` measures the rows of the full tables, with pictures, and
+`rivals` the other rows at all sizes. `page` writes the page; SECTION.md comes from unseen.py. No job repeats what
+OUT already holds.
 
 Rows of compressors that esvr-compare does not run come from external_points.csv (external_points.md).
 """
@@ -44,8 +44,10 @@ class Size:
                 r['name'].endswith(' raw')]
 
     def better(self, key, rows, ours=None):
-        mine = psnr(ours or self.ours, key)
-        return [r for r in rows if psnr(r, key) is not None and psnr(r, key) >= mine]
+        """Rows that are as good or better. If the figures are equal, the larger file is worse."""
+        ours = ours or self.ours
+        mine = (psnr(ours, key), -ours['bytes'])
+        return [r for r in rows if psnr(r, key) is not None and (psnr(r, key), -r['bytes']) >= mine]
 
     def less_flip(self):
         return [r for r in self.rows if 'flip' in r and r['flip'] <= self.ours['flip']]
@@ -99,10 +101,7 @@ def wins(part, sizes):
                       lambda s: s.externals),
              won_psnr(sizes, f'PSNR over the box at {at}, against OpenVDB, NanoVDB in memory and ZFP',
                       Size.built_in),
-             won(sizes, f'PSNR of pictures at {at}, drawn from decoded voxels', lambda s: s.rows,
-                 Size.better_pictures),
-             won(sizes, f'PSNR of pictures at {at}, drawn as ellipsoids', lambda s: s.rows,
-                 Size.better_than_ellipsoids)]
+             won(sizes, f'PSNR of pictures at {at}', lambda s: s.rows, Size.better_pictures)]
     if alone:
         lines.append(f'- Not counted at {at}, since no other row exists at that size: {", ".join(alone)}')
     return lines
@@ -170,9 +169,10 @@ INTRODUCTION = """\
 `tests/bench/comparison.py` makes this page from real volumes:
 
     tests/bench/comparison.py fit    --bin BUILD --data DATA --out OUT --device cuda
+    tests/bench/comparison.py tables --bin BUILD --data DATA --out OUT --device cuda
     tests/bench/comparison.py rivals --bin BUILD --data DATA --out OUT
     tests/bench/unseen.py            --bin BUILD --data DATA --out UNSEEN --section UNSEEN/section.md PROGRAMS
-    tests/bench/comparison.py page   --bin BUILD --data DATA --out OUT --device cuda --page docs/comparison.md \\
+    tests/bench/comparison.py page   --bin BUILD --data DATA --out OUT --page docs/comparison.md \\
                                      --unseen UNSEEN/section.md
     PROGRAMS: --sperr 0.8.5=sperr3d --sz3 3.3.2=sz3
 
@@ -251,8 +251,9 @@ def page(options):
 
 
 def job_of_volume(options, volume):
-    if options.job == 'rivals':
-        print(volume.name, len(volume.rivals['rows']), 'rows', flush=True)
+    if options.job in ('rivals', 'tables'):
+        measured = volume.rivals if options.job == 'rivals' else volume.table()
+        print(volume.name, len(measured['rows']), 'rows', flush=True)
         return
     for part, size in volume.sizes.items():
         print(volume.name, part, size, flush=True)
@@ -263,7 +264,7 @@ def job_of_volume(options, volume):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('job', choices=('sizes', 'fit', 'rivals', 'page'))
+    parser.add_argument('job', choices=('sizes', 'fit', 'tables', 'rivals', 'page'))
     parser.add_argument('--bin', type=pathlib.Path, required=True, help='the build folder')
     parser.add_argument('--data', type=pathlib.Path, required=True)
     parser.add_argument('--out', type=pathlib.Path)

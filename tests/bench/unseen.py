@@ -37,18 +37,10 @@ class Unseen(Volume):
     def measure(self, compressors):
         print(self.name, self.sizes, flush=True)
         for part in self.sizes:
-            self.fit_or_refuse(part)
+            self.fit(part)
         kept(self.points_file, lambda path: path.write_text(json.dumps(external.all_points(
             compressors, external.dense(self.path), list(self.sizes.values())), indent=1)))
         return self.rivals
-
-    def fit_or_refuse(self, part):
-        """A size may be too small for the grid. The report of vdb2esvr then holds the error."""
-        try:
-            self.fit(part)
-        except SystemExit:
-            if not self.report(part).exists():
-                raise
 
     @property
     def points_file(self):

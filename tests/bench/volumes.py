@@ -52,9 +52,15 @@ class Volume:
         return self.esvr(part).with_suffix('.report.json')
 
     def fit(self, part):
-        if not self.report(part).exists():
+        """A size may be too small for the grid. The report of vdb2esvr then holds the error."""
+        if self.report(part).exists():
+            return
+        try:
             run([self.options.bin / 'vdb2esvr/vdb2esvr', self.path, self.esvr(part), *self.box,
                  '--size', self.sizes[part], '--device', self.options.device, '--report', self.report(part), '-f'])
+        except SystemExit:
+            if not self.report(part).exists():
+                raise
 
     def time_of(self, part):
         """The seconds and the device of the fit."""
