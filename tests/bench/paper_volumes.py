@@ -6,8 +6,8 @@
 
 A stand-in has the character of the volume that it is named after, the same shares of voxels that are not zero and of
 voxels above 10 % of the maximum, and a lower resolution. It is not the volume: figures measured with it say how a format
-treats volumes of this kind, and cannot be compared with the paper's. The two neurons of the Hemibrain are rasterised from
-skeletons of this data set; all other stand-ins are synthetic, with values of 8 bits. The aneurysm is the original.
+treats volumes of this kind, and cannot be compared with the paper's. The two volumes of the Hemibrain are rasterised
+from skeletons of this data set; all other stand-ins are synthetic, with values of 8 bits. The aneurysm is the original.
 
 `make` writes OUT/NAME.vdb, and keeps a file that exists. `statistics` prints a table with the statistics of the paper
 beside those of the stand-ins. Needs numpy and pyopenvdb (Debian: python3-numpy, python3-openvdb).
@@ -16,6 +16,7 @@ import argparse
 import dataclasses
 import json
 import pathlib
+import tempfile
 import typing
 import zlib
 
@@ -33,7 +34,9 @@ voxels above 10 % of the maximum, %: original / stand-in | screen occupancy, %: 
 NOTES = f"""\
 Screen occupancy is the share of pixels that are not background. The paper's is a mean over the views of its own camera.
 That of the stand-ins is a mean over {VIEWS} pictures of a full turn, {SIDE} x {SIDE} pixels, with the default camera and
-transfer function of `esvr-render`; as the camera differs, the two cannot be compared closely."""
+transfer function of `esvr-render`; as the camera differs, the two cannot be compared closely: the
+aneurysm, which is the original, shows by how much they differ. In the volumes of the Hemibrain, the paper has all
+neurons of a type, at ten times the resolution; the stand-ins have copies of one neuron with thickened branches."""
 
 
 # Fields. Lengths are in parts of the longest side, so that a smaller volume shows the same things.
@@ -350,18 +353,40 @@ class Dense:
         return ','.join(str(n) for n in (0, 0, 0, *(n - 1 for n in self.resolution)))
 
 
+def turned(nodes, rng, copies):
+    """The rows of a skeleton (number, label, x, y, z, radius, parent) and of copies, each turned about its middle."""
+    numbers = np.unique(nodes[:, 0])
+    middle, found = (nodes[:, 2:5].min(axis=0) + nodes[:, 2:5].max(axis=0)) / 2, [nodes]
+    for k in range(1, copies):
+        turn, triangle = np.linalg.qr(rng.normal(size=(3, 3)))
+        turn *= np.sign(np.diag(triangle))
+        turn[:, 0] *= np.linalg.det(turn)  # no mirror image
+        copy = nodes.copy()
+        copy[:, 2:5] = (nodes[:, 2:5] - middle) @ turn.T + middle
+        copy[:, 0] += k * (numbers[-1] + 1)
+        copy[:, 6] = np.where(nodes[:, 6] < 0, -1, nodes[:, 6] + k * (numbers[-1] + 1))
+        found.append(copy)
+    return np.concatenate(found)
+
+
 @dataclasses.dataclass(frozen=True)
-class Skeleton:
-    """A stand-in that swc2vdb rasterises from DATA/swc/NAME.swc."""
+class Skeletons:
+    """A stand-in that swc2vdb rasterises from turned copies of DATA/swc/NAME.swc."""
     title: str
     what: str
     original: Statistics
     name: str
+    copies: int
+    seed: int
     options: tuple
     box = None  # that of the active voxels
 
     def make(self, options, path):
-        run([options.bin / 'samples/swc2vdb', options.data / f'swc/{self.name}.swc', path, *self.options])
+        nodes = np.loadtxt(options.data / f'swc/{self.name}.swc', comments='#')
+        with tempfile.TemporaryDirectory() as folder:
+            skeleton = pathlib.Path(folder) / f'{self.name}.swc'
+            np.savetxt(skeleton, turned(nodes, np.random.default_rng(self.seed), self.copies), '%d %d %.9g %.9g %.9g %.9g %d')
+            run([options.bin / 'samples/swc2vdb', skeleton, path, *self.options])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -379,11 +404,9 @@ class Original:
     box = Dense.box
 
 
-SKELETON = 'a neuron of the Hemibrain, `swc2vdb {}.swc {}`'
-
-
-def skeleton(title, original, name, *options):
-    return Skeleton(title, SKELETON.format(name, ' '.join(options)), original, name, options)
+def skeletons(title, original, name, copies, seed, *options):
+    what = f"{copies} turned copies of a neuron of the Hemibrain, `swc2vdb {name}.swc {' '.join(options)}`"
+    return Skeletons(title, what, original, name, copies, seed, options)
 
 
 VOLUMES = {
@@ -398,10 +421,10 @@ VOLUMES = {
                       13),
     'woodbranch': Dense('Woodbranch', 'cells with thin walls, rings, rays and bark in micro-CT; faint noise nearly everywhere',
                         Statistics((2048, 2048, 2048), 84.89, 3.29, 54), (288, 288, 288), woodbranch, 14),
-    'vdeltaa': skeleton('Hemibrain (vDeltaA)', Statistics((4072, 4372, 4171), 0.30, 0.29, 23), 'hemibrain_754538881',
-                        '--resolution', '400', '--min-radius', '3.2', '--edge', '0.25'),
-    'lln2p': skeleton('Hemibrain (lLN2P)', Statistics((5115, 4774, 6128), 0.34, 0.34, 27), 'hemibrain_722817260',
-                      '--resolution', '400', '--min-radius', '3.9', '--edge', '0.1'),
+    'vdeltaa': skeletons('Hemibrain (vDeltaA)', Statistics((4072, 4372, 4171), 0.30, 0.29, 23), 'hemibrain_754538881',
+                         6, 17, '--resolution', '320', '--min-radius', '1.05', '--edge', '0.1'),
+    'lln2p': skeletons('Hemibrain (lLN2P)', Statistics((5115, 4774, 6128), 0.34, 0.34, 27), 'hemibrain_722817260',
+                       8, 18, '--resolution', '320', '--min-radius', '1.2', '--edge', '0.1'),
     'beechnut': Dense('Beechnut', 'a nut with a shell, a folded kernel and ring artefacts in micro-CT; noise of 3.5 %',
                       Statistics((1024, 1024, 1546), 100.0, 100.0, 55), (256, 256, 386), beechnut, 15),
     'pigheart': Dense('Pigheart', 'a heart in a bath in CT, with muscle, fat, chambers and vessels; noise of 3.5 %',
