@@ -35,8 +35,8 @@ NOTES = f"""\
 Screen occupancy is the share of pixels that are not background. The paper's is a mean over the views of its own camera.
 That of the stand-ins is a mean over {VIEWS} pictures of a full turn, {SIDE} x {SIDE} pixels, with the default camera and
 transfer function of `esvr-render`; as the camera differs, the two cannot be compared closely: the
-aneurysm, which is the original, shows by how much they differ. In the volumes of the Hemibrain, the paper has all
-neurons of a type, at ten times the resolution; the stand-ins have copies of one neuron with thickened branches."""
+aneurysm, which is the original, shows by how much they differ. In the volumes of the Hemibrain, the paper has
+neurons of a type at more than ten times the resolution; the stand-ins have copies of one neuron with thickened branches."""
 
 
 # Fields. Lengths are in parts of the longest side, so that a smaller volume shows the same things.
@@ -422,7 +422,7 @@ VOLUMES = {
     'woodbranch': Dense('Woodbranch', 'cells with thin walls, rings, rays and bark in micro-CT; faint noise nearly everywhere',
                         Statistics((2048, 2048, 2048), 84.89, 3.29, 54), (288, 288, 288), woodbranch, 14),
     'vdeltaa': skeletons('Hemibrain (vDeltaA)', Statistics((4072, 4372, 4171), 0.30, 0.29, 23), 'hemibrain_754538881',
-                         6, 17, '--resolution', '320', '--min-radius', '1.05', '--edge', '0.1'),
+                         6, 17, '--resolution', '320', '--min-radius', '1.1', '--edge', '0.1'),
     'lln2p': skeletons('Hemibrain (lLN2P)', Statistics((5115, 4774, 6128), 0.34, 0.34, 27), 'hemibrain_722817260',
                        8, 18, '--resolution', '320', '--min-radius', '1.2', '--edge', '0.1'),
     'beechnut': Dense('Beechnut', 'a nut with a shell, a folded kernel and ring artefacts in micro-CT; noise of 3.5 %',
