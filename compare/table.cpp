@@ -66,7 +66,7 @@ class TableRun {
 
   void matchedRows() {
     std::set<std::uint64_t> sizes(options_.sizes.begin(), options_.sizes.end());
-    std::set<double> psnrs;
+    std::set<double> psnrs(options_.psnrs.begin(), options_.psnrs.end());
     for (const auto& row : record_.rows) {
       if (row.group != kOurGroup) continue;
       sizes.insert(*row.bytes);
@@ -81,7 +81,7 @@ class TableRun {
       for (const auto& form : psnrForms(options_)) add(maker_.psnrMatched(form, goal));
       for (const auto& command : options_.commands) add(maker_.psnrMatched(command, goal));
     }
-    for (const double psnr : options_.psnrs) {
+    for (const double psnr : options_.activePsnrs) {
       const MatchGoal goal{.psnr = psnr, .active = true, .dropsVoxels = true};
       for (const auto& form : activePsnrForms(options_)) add(maker_.psnrMatched(form, goal));
       for (const auto& command : options_.commands) add(maker_.psnrMatched(command, goal));

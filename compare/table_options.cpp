@@ -35,8 +35,8 @@ cli::ProgramText programText() {
           "that is not larger. For VDB files, voxels near the background are dropped, empty leaves "
           "are removed, and the other voxels are quantised. The search varies the threshold until "
           "the file is at most 2 % smaller than the size, and takes the tolerance of FpN and the "
-          "setting of ZFP with the highest PSNR. For the PSNR of each CAND, it searches for the "
-          "smallest FpN and ZFP files. -v shows the searches, and --report includes them.\n"
+          "setting of ZFP with the highest PSNR. For the PSNR of each CAND and each "
+          "--psnr, it searches for the smallest FpN and ZFP files. -v shows the searches, and --report includes them.\n"
           "\n"
           "--external-command takes any compressor of arrays. COMMAND is run in a shell as\n"
           "  COMMAND encode RAW PACKED NX NY NZ BOUND\n"
@@ -73,6 +73,8 @@ cli::CommandLine makeCommandLine() {
      "use this baseline instead of --rows; the command of a row has its SETTING; may be repeated")
     ("size", value<Words>()->value_name("BYTES")->composing(),
      "also search for the best baselines of this size; may be repeated")
+    ("psnr", value<std::vector<double>>()->value_name("DB")->composing(),
+     "also search for the smallest baselines that reach this PSNR over the box; may be repeated")
     ("psnr-active", value<std::vector<double>>()->value_name("DB")->composing(),
      "also search for the smallest baselines that reach this PSNR over the active voxels, some of "
      "which may drop voxels near the background; may be repeated")
@@ -127,11 +129,17 @@ void readRows(const Arguments& a, TableOptions& options) {
     options.settings.push_back(parseBaseline(text));
 }
 
+std::vector<double> psnrs(const Arguments& a, const std::string& option) {
+  const auto found = a.find<std::vector<double>>(option).value_or(std::vector<double>{});
+  for (const double psnr : found) cli::requireRange(option, psnr, 0.0, kMaxPsnr);
+  return found;
+}
+
 void readSizes(const Arguments& a, TableOptions& options) {
   for (const auto& text : a.find<Words>("size").value_or(Words{}))
     options.sizes.push_back(cli::parseByteSize("size", text));
-  options.psnrs = a.find<std::vector<double>>("psnr-active").value_or(options.psnrs);
-  for (const double psnr : options.psnrs) cli::requireRange("psnr-active", psnr, 0.0, kMaxPsnr);
+  options.psnrs = psnrs(a, "psnr");
+  options.activePsnrs = psnrs(a, "psnr-active");
   for (const auto& text : a.find<Words>("fit").value_or(Words{})) {
     if (text == "default")
       options.fitDefault = true;
@@ -147,11 +155,12 @@ void readCommands(const Arguments& a, TableOptions& options) {
   for (const auto& text : a.find<Words>("external-command").value_or(Words{}))
     options.commands.push_back(parseExternalCommand(text));
   const bool hasAim = !options.candidates.empty() || !options.sizes.empty() ||
-                      !options.psnrs.empty() || !options.fits.empty() || options.fitDefault ||
-                      options.fitPaper;
+                      !options.psnrs.empty() || !options.activePsnrs.empty() ||
+                      !options.fits.empty() || options.fitDefault || options.fitPaper;
   if (!options.commands.empty() && !hasAim)
     throw UsageError(
-        "--external-command needs a size or a PSNR to match: CAND, --size, --psnr-active or --fit");
+        "--external-command needs a size or a PSNR to match: CAND, --size, --psnr, --psnr-active or "
+        "--fit");
 }
 
 /// Reads a text like "viridis" or "viridis:tent".

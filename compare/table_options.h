@@ -25,7 +25,8 @@ struct TableOptions {
   bool lossless = true, quantised = true, matched = true, zfp = true;
   std::vector<BaselineSetting> settings;  ///< baselines of --row, which replace the others
   std::vector<std::uint64_t> sizes;       ///< sizes to match besides the candidates'
-  std::vector<double> psnrs;              ///< PSNRs over the active voxels to match, dB
+  std::vector<double> psnrs;              ///< PSNRs over the box to match, dB
+  std::vector<double> activePsnrs;        ///< PSNRs over the active voxels to match, dB
   std::vector<std::uint64_t> fits;        ///< sizes for which ellipsoids are fitted
   bool fitDefault = false;                ///< whether a fit with the default options is made
   bool fitPaper = false;                  ///< whether a fit by the paper's method is made

@@ -255,6 +255,17 @@ TEST_F(CompareTableCommand, isSearchedForAPsnrOverTheActiveVoxels) {
   }
 }
 
+TEST_F(CompareTableCommand, isSearchedForAPsnrOverTheBox) {
+  const auto report =
+      reportOf({"--rows", "matched", "--psnr", "30", "--external-command", option()});
+  for (const char* name : {"NanoVDB FpN Zip", "Rounding"}) {
+    const json* row = rowOf(report, name, "at 30.00 dB");
+    ASSERT_NE(row, nullptr) << name;
+    ASSERT_TRUE(row->contains("psnr_box")) << row->dump();
+    EXPECT_GE((*row)["psnr_box"].get<double>(), 30.0) << name;
+  }
+}
+
 TEST_F(CompareTableCommand, leavesTheReasonWhereItFails) {
   const auto report =
       reportOf({"--rows", "none", "--size", "1KB", "--external-command",
@@ -458,6 +469,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"DIR/ref.vdb", "--external", "A=DIR/no.raw:1:9x9x9:uint8"}, 3, "no.raw"},
         Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1"}, 3, "out.raw"},
         Refusal{{"DIR/ref.vdb", "--external-command", "A=true"}, 2, "--size"},
+        Refusal{{"DIR/ref.vdb", "--psnr", "inf"}, 2, "--psnr"},
         Refusal{{"DIR/ref.vdb", "--psnr-active", "-1"}, 2, "--psnr-active"},
         Refusal{{"DIR/ref.vdb", "--psnr-active", "nan"}, 2, "--psnr-active"},
         Refusal{{"DIR/ref.vdb", "--size", "1KB", "--external-command", "true"}, 2, "NAME=COMMAND"},

@@ -215,6 +215,7 @@ Table tableTests() {
           {"--max-dense", "CompareTable.leavesRowsThatCannotBeWithTheirReason"},
           {"--max-memory", "CompareTable.refusesWhatTakesMoreMemoryThanAllowed"},
           {"--peak", "CompareOption.tableTakesTheGridTheBoxAndThePeak"},
+          {"--psnr", "CompareTableCommand.isSearchedForAPsnrOverTheBox"},
           {"--psnr-active", "CompareTableCommand.isSearchedForAPsnrOverTheActiveVoxels"},
           {"--report", "CompareTable.writesReportsInEachForm"},
           {"--row", "CompareTable.takesLpipsFromAProgramOfTheUsers"},

@@ -2,17 +2,16 @@
 """Measures our figures of the paper's tables, on stand-ins for the volumes that cannot be had.
 
     measure.py volumes   --bin BUILD --data DATA --volumes VOLUMES --out OUT --machine TEXT --rivals FOLDER
-    measure.py ngp       ...
-    measure.py ablations ...
+    measure.py compressors | ngp | ablations ...
 
 VOLUMES has the stand-ins that paper_volumes.py makes. FOLDER has programs of other systems, named sz3, tthresh,
-sperr3d and instant_ngp. `volumes` measures our files, the paper's method, and all other forms and compressors. `ngp`
-measures Instant-NGP at multiples of the bytes of our files. `ablations` repeats the paper's ablations on two volumes.
+sperr3d and instant_ngp. `volumes` measures our files, the paper's method, and OpenVDB, NanoVDB and ZFP.
+`compressors` measures SZ3, SPERR and TTHRESH, and `ngp` Instant-NGP at multiples of the bytes of our files. `ablations` repeats the paper's ablations on two volumes.
 Each writes a JSON file to docs/paper, which page.py reads. OUT keeps all files and reports; nothing that it holds is
 made again.
 
-Fits and pictures run one after the other. The searches of the other compressors run beside them, on --jobs processes,
-so that the times of these compressors are those of a busy machine.
+Fits and pictures run one after the other. The searches of `volumes` for other files run beside them, on --jobs
+processes, so that the times of their rows are those of a busy machine.
 """
 import argparse
 import concurrent.futures
@@ -43,11 +42,14 @@ SHARPNESS = (5, 50, 500, 5000)
 
 
 def kept(path, make):
-    """The content of a JSON file, which `make` writes if it does not exist."""
-    if not path.exists():
+    """The content of a JSON file, which `make` writes if it does not exist. A report of an interrupted program is made
+    again."""
+    content = json.loads(path.read_text()) if path.exists() else {"interrupted": True}
+    if content.get("interrupted"):
         path.parent.mkdir(parents=True, exist_ok=True)
         make(path)
-    return json.loads(path.read_text())
+        content = json.loads(path.read_text())
+    return content
 
 
 def timed(words):
@@ -104,7 +106,37 @@ class Subject:
     def by_paper(self, name, kept_count, **keys):
         """A fit by the paper's method that keeps this number of ellipsoids."""
         keys = ",".join(f"{key.replace('_', '-')}={value}" for key, value in keys.items())
-        return self.convert(name, ["--paper", keys, "--count", kept_count, "--topology", "threshold"])
+        return self.convert(name, ["--paper", keys, "--count", kept_count, "--topology", "threshold", "--hits"])
+
+
+# Compressors of arrays
+
+def commands(subject):
+    """The options of esvr-compare that add the rows of compressors whose programs are there."""
+    words = []
+    for name, program in (("SZ3", "sz3"), ("SPERR", "sperr3d"), ("TTHRESH", "tthresh")):
+        path = subject.options.rivals / program
+        if path.exists() and (name != "TTHRESH" or subject.voxels <= MOST_FOR_TTHRESH):
+            script = ROOT / "samples/compressors" / program.replace("sperr3d", "sperr")
+            words += ["--external-command", f"{name}={script} {path}"]
+    return words
+
+
+def psnr_of(volume):
+    """Our PSNR over the box."""
+    return next(row["psnr_box"] for row in volume["rows"] if row["group"] == "ESVR")
+
+
+def compress(options, name):
+    subject, ours = Subject(options, name), results(options, "volumes")[name]
+    table = subject.table("compressors", ["--rows", "none", "--size", ours["bytes"], "--psnr", psnr_of(ours), *VIEWS,
+                                          *commands(subject)])
+    print(name, len(table["rows"]), "rows", flush=True)
+    return {"rows": rows_of(table["rows"])}
+
+
+def measure_compressors(options):
+    return {name: compress(options, name) for name in options.only}
 
 
 # Instant-NGP
@@ -157,22 +189,10 @@ def measure_ngp(options):
 
 # One volume
 
-def compressors(subject):
-    """The options of esvr-compare that add the rows of compressors of arrays."""
-    words = []
-    for name, program in (("SZ3", "sz3"), ("SPERR", "sperr3d"), ("TTHRESH", "tthresh")):
-        path = subject.options.rivals / program
-        if path.exists() and (name != "TTHRESH" or subject.voxels <= MOST_FOR_TTHRESH):
-            script = ROOT / "samples/compressors" / program.replace("sperr3d", "sperr")
-            words += ["--external-command", f"{name}={script} {path}"]
-    return words
-
-
 def rivals(subject):
     """All other rows at our size and at our PSNR, with pictures."""
     try:
-        return subject.table("rivals", [subject.ours[0], "--rows", "lossless,matched,zfp", *VIEWS,
-                                        *compressors(subject)])
+        return subject.table("rivals", [subject.ours[0], "--rows", "lossless,matched,zfp", *VIEWS])
     except SystemExit as failure:  # which would end a thread only
         raise RuntimeError(failure) from failure
 
@@ -308,7 +328,7 @@ def results(options, what):
     return json.loads(file_of(options, what).read_text())["volumes"]
 
 
-MEASURE = {"volumes": measure_volumes, "ngp": measure_ngp, "ablations": measure_ablations}
+MEASURE = {"volumes": measure_volumes, "compressors": measure_compressors, "ngp": measure_ngp, "ablations": measure_ablations}
 VOLUMES = ("aneurysm", "breast", "neuron", "bigbrain", "woodbranch", "vdeltaa", "lln2p", "beechnut",
            "pigheart")
 
