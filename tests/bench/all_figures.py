@@ -1,15 +1,17 @@
 #!/usr/bin/env python3
 """Remakes the documents whose figures scripts measure: stability, economy, comparison, resolution and the paper's.
 
+    all_figures.py volumes --bin BUILD --data DATA --out OUT                makes the stand-ins for the paper's volumes
     all_figures.py gpu   --bin BUILD --data DATA --out OUT --machine TEXT   measures what needs a GPU
     all_figures.py cpu   --bin BUILD --data DATA --out OUT --machine TEXT   measures the rest
     all_figures.py pages --bin BUILD --data DATA --out OUT                  writes the documents
     all_figures.py agree OLD NEW     compares the figures of two folders like docs
 
-The first three print the commands that they run; --dry-run prints them only, and --only names documents. Between `gpu`
-and `cpu`, OUT and the folder docs go from one machine to the other. A command that fails does not stop the others,
+The first four print the commands that they run; --dry-run prints them only, and --only names documents. Between the
+parts, OUT and the folder docs go from one machine to the other. A command that fails does not stop the others,
 and the exit code is then 1. `pages` writes the tables of the paper's method to OUT, because their document has text
-around them. DATA/swc has the skeletons of docs/data.md, and --sz3 names the program sz3 for the page of resolutions.
+around them. DATA/swc has the skeletons of docs/data.md. --rivals is a folder with the programs sz3, sperr3d, tthresh and
+instant_ngp (samples/README.md); without it, they have no rows.
 
 `agree` compares the JSON files that stability.py and economy.py keep in docs. Bytes, numbers of ellipsoids and other
 figures that do not depend on time agree within 3 %, PSNR within 0.5 dB, and largest errors within a factor of 3, as the
@@ -23,6 +25,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).parent
+PARTS = ("volumes", "gpu", "cpu", "pages")
 DOCUMENTS = ["stability", "economy", "comparison", "resolution", "paper"]
 SKELETONS = (754538881, 722817260, 1734350788)  # those of docs/data.md
 SHARE, DB, FACTOR = 0.03, 0.5, 3.0
@@ -38,10 +41,19 @@ def commands(arguments):
     swc = ["--swc", *(pathlib.Path(arguments.data) / f"swc/hemibrain_{n}.swc" for n in SKELETONS),
            "--out", out / "resolution"]
     series = [*swc, "--bin", arguments.bin]
-    sz3 = ["--sz3", arguments.sz3] if arguments.sz3 else []
+    rivals = ["--rivals", arguments.rivals] if arguments.rivals else []
+    sz3 = ["--sz3", arguments.rivals / "sz3"] if arguments.rivals else []
+    sperr = ["--sperr", arguments.rivals / "sperr3d"] if arguments.rivals else []
     comparison = [*data, "--out", out / "comparison"]
+    unseen = out / "unseen/section.md"
     bench = ["--bin", arguments.bin, *machine]
+    volumes = out / "volumes"
+    paper = [*data, "--volumes", volumes, "--out", out / "paper", *machine, *rivals]
+    ngp = [("paper", "gpu", ["paper/measure.py", "ngp", *paper])] if arguments.rivals else []
     return [
+        ("paper", "volumes", ["paper_volumes.py", "make", *data, "--out", volumes]),
+        ("paper", "volumes", ["paper_volumes.py", "statistics", *data, "--out", volumes, "--report",
+                              "docs/paper/statistics.json"]),
         ("stability", "gpu", ["stability.py", "measure", *bench, "--device", "cuda"]),
         ("stability", "cpu", ["stability.py", "measure", *bench, "--device", "cpu"]),
         ("stability", "pages", ["stability.py", "page"]),
@@ -51,19 +63,26 @@ def commands(arguments):
         ("comparison", "gpu", ["comparison.py", "fit", *comparison, "--device", "cuda"]),
         ("comparison", "gpu", ["comparison.py", "tables", *comparison, "--device", "cuda"]),
         ("comparison", "cpu", ["comparison.py", "rivals", *comparison]),
-        ("comparison", "pages", ["comparison.py", "page", *comparison, "--page", "docs/comparison.md"]),
+        ("comparison", "cpu", ["unseen.py", *data, "--out", out / "unseen", "--section", unseen, *sz3, *sperr]),
+        ("comparison", "pages", ["comparison.py", "page", *comparison, "--page", "docs/comparison.md", "--unseen",
+                                 unseen]),
         ("resolution", "gpu", ["resolution_series.py", "fit", *series, "--device", "cuda"]),
         ("resolution", "cpu", ["resolution_series.py", "rivals", *series, *sz3]),
         ("resolution", "pages", ["resolution_series.py", "page", *swc]),
         ("paper", "gpu", ["paper_tables.py", "run", *data, "--out", out / "paper", "--jobs", "5"]),
+        ("paper", "gpu", ["paper/measure.py", "volumes", *paper]),
+        ("paper", "gpu", ["paper/measure.py", "ablations", *paper]),
+        *ngp,
+        ("paper", "cpu", ["paper/measure.py", "compressors", *paper, "--device", "cpu"]),
         ("paper", "pages", ["paper_tables.py", "tables", "--out", out / "paper"]),
+        ("paper", "pages", ["paper/page.py"]),
         ("paper", "pages", ["check_paper_page.py"]),
     ]
 
 
 def output_of(arguments, name, words):
     """Where a command's text goes: the tables of documents that are written by hand go to OUT."""
-    is_table = name == "paper" and words[0] != "check_paper_page.py"
+    is_table = name == "paper" and words[0] == "paper_tables.py"
     return arguments.out / f"{name}.md" if is_table and arguments.what == "pages" else None
 
 
@@ -141,13 +160,13 @@ def agree(arguments):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     jobs = parser.add_subparsers(dest="what", required=True)
-    for part in ("gpu", "cpu", "pages"):
+    for part in PARTS:
         job = jobs.add_parser(part)
         job.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
         job.add_argument("--data", type=pathlib.Path, default=pathlib.Path("DATA"))
         job.add_argument("--out", type=pathlib.Path, required=True)
         job.add_argument("--machine", default="a machine that was not described")
-        job.add_argument("--sz3", type=pathlib.Path)
+        job.add_argument("--rivals", type=pathlib.Path)
         job.add_argument("--only", nargs="+", choices=DOCUMENTS, default=DOCUMENTS)
         job.add_argument("--dry-run", action="store_true")
     job = jobs.add_parser("agree")

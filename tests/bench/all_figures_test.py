@@ -36,11 +36,12 @@ class Agree(unittest.TestCase):
 
 class Commands(unittest.TestCase):
     def test_run_scripts_that_exist(self):
-        arguments = types.SimpleNamespace(out=pathlib.Path("OUT"), bin="BUILD", data="DATA", machine="TEXT", sz3=None)
+        arguments = types.SimpleNamespace(out=pathlib.Path("OUT"), bin="BUILD", data="DATA", machine="TEXT",
+                                          rivals=pathlib.Path("RIVALS"))
         names = set()
         for name, part, words in all_figures.commands(arguments):
             self.assertTrue((all_figures.HERE / words[0]).exists(), words[0])
-            self.assertIn(part, ("gpu", "cpu", "pages"))
+            self.assertIn(part, all_figures.PARTS)
             names.add(name)
         self.assertEqual(names, set(all_figures.DOCUMENTS))
 

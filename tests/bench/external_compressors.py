@@ -173,9 +173,15 @@ def figures(values, decoded):
 
 def add_programs(parser):
     """Adds the options that name the compressors' programs."""
-    parser.add_argument('--sz3', action='append', default=[], metavar='VERSION=PROGRAM')
+    parser.add_argument('--sz3', action='append', default=[], metavar='[VERSION=]PROGRAM')
     parser.add_argument('--tthresh', metavar='PROGRAM')
-    parser.add_argument('--sperr', metavar='VERSION=PROGRAM', help='its program sperr3d')
+    parser.add_argument('--sperr', metavar='[VERSION=]PROGRAM', help='its program sperr3d')
+
+
+def named(compressor, word):
+    """The name of a compressor, with its version if the word has one, and its program."""
+    version, _, program = word.rpartition('=')
+    return (f'{compressor}-{version}' if version else compressor), program
 
 
 def compressors(options):
@@ -184,13 +190,13 @@ def compressors(options):
              'xz-lossless': lambda v, p: lossless(Xz, v, p),
              'zstd-lossless': lambda v, p: lossless(Zstd, v, p)}
     for word in options.sz3:
-        version, program = word.split('=', 1)
-        found[f'SZ3-{version}'] = lambda v, p, program=program: sz3(program, v, p)
+        name, program = named('SZ3', word)
+        found[name] = lambda v, p, program=program: sz3(program, v, p)
     if options.tthresh:
         found['TTHRESH'] = lambda v, p: tthresh(options.tthresh, v, p)
     if options.sperr:
-        version, program = options.sperr.split('=', 1)
-        found[f'SPERR-{version}+zstd'] = lambda v, p: sperr(program, v, p)
+        name, program = named('SPERR', options.sperr)
+        found[f'{name}+zstd'] = lambda v, p: sperr(program, v, p)
     return found
 
 

@@ -7,7 +7,7 @@ namespace ngp {
 
 struct TrainOptions {
   std::uint64_t bytes = 0;     ///< largest size of the file
-  std::uint32_t steps = 3000;  ///< of 2^18 voxels each
+  std::uint32_t steps = 8000;  ///< of 2^18 voxels each
 };
 
 /// Fits a model to an array. The largest hash grid whose file is not larger than wanted is taken;
