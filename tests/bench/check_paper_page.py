@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks docs/paper.md against the documents from which it takes our figures.
 
-Each row of its table "Our figures" names a document, or DOCUMENT#HEADING for one of its sections, and the beginning
+Each row of its table "Figures of other documents" names a document, or DOCUMENT#HEADING for one of its sections, and the beginning
 of a row. Some row that begins so must have the figure as one of its cells or words. Exits with 1 and names the rows that do not agree.
 """
 import pathlib
@@ -19,7 +19,7 @@ def cells(line):
 def claims():
     """The rows of the table: what it is, the figure, the place and the beginning of the row."""
     text = (DOCS / 'paper.md').read_text()
-    section = text.split('## Our figures', 1)[1].split('\n## ', 1)[0]
+    section = text.split('## Figures of other documents', 1)[1].split('\n## ', 1)[0]
     rows = [cells(line) for line in section.splitlines() if line.startswith('|')]
     return [(row[0], row[2], row[3], row[4]) for row in rows[2:]]
 
@@ -47,7 +47,7 @@ def main():
     for what, figure, place, beginning in wrong:
         print(f'docs/paper.md: {what}: {place} has no row "{beginning}" with {figure}')
     if not rows:
-        print('docs/paper.md: the table "Our figures" has no row')
+        print('docs/paper.md: the table "Figures of other documents" has no row')
     return 1 if wrong or not rows else 0
 
 

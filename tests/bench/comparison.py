@@ -189,7 +189,9 @@ RATES = """\
 Each cell has the PSNR over the box of ESVR and of the best rival, which is named. `v` marks files for which
 `vdb2esvr --size` chose voxels; the others hold ellipsoids. A rival is any other row of `esvr-compare table`
 (`--rows matched,zfp`) and any external compressor. Cells where a rival is better, or where both are exact and the
-rival is smaller, are bold.
+rival is smaller, are bold. ESVR, OpenVDB and NanoVDB also store which voxels are active, for which compressors of arrays
+have no bytes: in `smoke1` at 1/25 the mask takes 16 % of our file, and `--topology threshold` leaves it out and reaches
+54.18 dB on two CPU cores.
 """
 
 FULL_TABLES = """\
