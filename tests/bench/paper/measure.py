@@ -18,6 +18,7 @@ import concurrent.futures
 import functools
 import json
 import pathlib
+import re
 import shlex
 import sys
 import time
@@ -323,6 +324,12 @@ def file_of(options, what):
     return options.docs / f"paper/{what}.json"
 
 
+def written(machine, volumes):
+    """The text of a file of results, with one row in a line."""
+    content = json.dumps({"machine": machine, "volumes": volumes}, indent=1)
+    return re.sub(r"\{[^{}]*\}", lambda row: re.sub(r"\s+", " ", row.group()), content) + "\n"
+
+
 def results(options, what):
     """The results that were written before, by volume."""
     return json.loads(file_of(options, what).read_text())["volumes"]
@@ -350,7 +357,7 @@ def main():
     path = file_of(options, options.what)
     path.parent.mkdir(parents=True, exist_ok=True)
     before = results(options, options.what) if path.exists() else {}
-    path.write_text(json.dumps({"machine": options.machine, "volumes": {**before, **measured}}, indent=1) + "\n")
+    path.write_text(written(options.machine, {**before, **measured}))
 
 
 if __name__ == "__main__":
