@@ -10,6 +10,7 @@ namespace esvr::report {
 namespace {
 
 constexpr std::size_t kCurveColors = 10;  // curve-1 to curve-10 in page.css
+constexpr double kLetter = 7.4;           // width of a letter of a label, in units of the view box
 constexpr std::size_t kMostMarkers = 40;  // more markers would hide the line
 
 /// The size of a drawing in units of its view box, and how many ticks have room.
@@ -57,7 +58,7 @@ class ChartWriter {
 
   /// Room for the labels of y and its name. Without fonts, the width of a letter is an estimate.
   [[nodiscard]] double leftMargin() const {
-    constexpr double kLetter = 7.4, kName = 26.0;
+    constexpr double kName = 26.0;
     std::size_t letters = 0;
     for (const Tick& tick : axes_.y.ticks(form_.ticksY))
       letters = std::max(letters, labelOf(tick, plot_.textY).size());
@@ -108,11 +109,22 @@ class ChartWriter {
     return lines;
   }
 
-  [[nodiscard]] Html labels() const {
+  /// The labels below the chart, without those that would touch the one before.
+  [[nodiscard]] Html labelsX() const {
     Html all;
-    for (const Tick& tick : axes_.x.ticks(form_.ticksX))
-      all += text(labelOf(tick, plot_.textX), placeX(tick.value),
-                  bottom() + kTextSize + kTickGap / 2, "middle");
+    double end = 0.0;
+    for (const Tick& tick : axes_.x.ticks(form_.ticksX)) {
+      const std::string label = labelOf(tick, plot_.textX);
+      const double x = placeX(tick.value), half = kLetter * double(label.size()) / 2;
+      if (x - half < end) continue;
+      all += text(label, x, bottom() + kTextSize + kTickGap / 2, "middle");
+      end = x + half + kTickGap;
+    }
+    return all;
+  }
+
+  [[nodiscard]] Html labels() const {
+    Html all = labelsX();
     for (const Tick& tick : axes_.y.ticks(form_.ticksY))
       all += text(labelOf(tick, plot_.textY), left_ - kTickGap, placeY(tick.value) + kTextSize / 3,
                   "end");

@@ -62,6 +62,23 @@ TEST(HtmlChart, hasAtLeastThreeTicksOnEachAxisAtEachWidth) {
     }
 }
 
+// A letter of the labels is 7.4 units wide.
+TEST(HtmlChart, hasRoomBetweenItsLabels) {
+  Plot wide = curves();
+  wide.series = {{.name = "a", .points = {{4.5e4, 0.5}, {6.7e6, 0.02}}}};
+  for (const char* name : {"wide", "narrow"}) {
+    const std::string svg = drawing(wide, name);
+    const std::regex label("<text x=\"([0-9.]+)\"[^>]*>([^<]*B)</text>");
+    double end = 0.0;
+    for (std::sregex_iterator it(svg.begin(), svg.end(), label), none; it != none; ++it) {
+      const double x = std::stod((*it)[1]), half = 3.7 * double((*it)[2].length());
+      EXPECT_GE(x - half, end) << name << ", " << (*it)[2];
+      end = x + half;
+    }
+    EXPECT_GT(end, 0.0) << "no label was found";
+  }
+}
+
 TEST(HtmlChart, saysTheValuesOfItsPoints) {
   const std::string svg = drawing(curves(), "wide");
   EXPECT_THAT(svg, HasSubstr("<title>ESVR\n10 KB, 0.5 %\n46.02 dB</title>"));

@@ -24,7 +24,7 @@ constexpr std::uint32_t kBaseResolution = 16;
 constexpr std::uint32_t kDecays = 10;   // of the learning rate, in the last third of the steps
 constexpr double kNetworkShare = 0.25;  // of the parameters, unless the network is the smallest
 constexpr std::uint32_t kSmallestNeurons = 16;
-constexpr std::uint32_t kMostLevels = 16, kFewestLevels = 4;
+constexpr std::uint32_t kFewestLevels = 4, kFewestTableBits = 6;
 
 std::uint32_t longest(const Sides& sides) { return *std::max_element(sides.begin(), sides.end()); }
 
@@ -94,7 +94,7 @@ Shape shapeFor(const Sides& sides, std::uint64_t bytes) {
   std::size_t most = 0;
   for (const std::uint32_t neurons : {64u, 32u, kSmallestNeurons})
     for (std::uint32_t levels = kMostLevels; levels >= kFewestLevels; --levels)
-      for (std::uint32_t bits = 6; bits <= 24; ++bits) {
+      for (std::uint32_t bits = kFewestTableBits; bits <= kMostTableBits; ++bits) {
         const Shape shape{levels, bits, neurons};
         const Counts counts = countsOf(sides, shape);
         const bool fits = kHeaderBytes + counts.all * sizeof(Half) <= bytes;

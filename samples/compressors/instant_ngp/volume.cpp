@@ -32,6 +32,12 @@ void close(std::ofstream& stream, const std::string& path) {
   if (!stream) throw std::runtime_error("cannot write '" + path + "'");
 }
 
+bool isKnown(const Shape& shape) {
+  const bool hasNeurons = shape.neurons == 16 || shape.neurons == 32 || shape.neurons == 64;
+  return hasNeurons && shape.levels >= 1 && shape.levels <= kMostLevels &&
+         shape.tableBits <= kMostTableBits;
+}
+
 }  // namespace
 
 std::size_t voxelsOf(const Sides& sides) { return std::size_t(sides[0]) * sides[1] * sides[2]; }
@@ -72,6 +78,7 @@ Stored readModel(const std::string& path) {
   std::memcpy(words, bytes.data() + sizeof kMagic, sizeof words);
   model.sides = {words[0], words[1], words[2]};
   model.shape = {words[3], words[4], words[5]};
+  if (!isKnown(model.shape)) throw std::runtime_error("'" + path + "' has an unknown model");
   std::memcpy(&model.peak, bytes.data() + sizeof kMagic + sizeof words, sizeof model.peak);
   model.parameters.resize((bytes.size() - kHeaderBytes) / sizeof(std::uint16_t));
   std::memcpy(model.parameters.data(), bytes.data() + kHeaderBytes,

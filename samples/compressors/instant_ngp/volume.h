@@ -20,6 +20,8 @@ using Sides = std::array<std::uint32_t, 3>;
 /// \throws std::runtime_error  the file cannot be written
 void writeVoxels(const std::string& path, const std::vector<float>& voxels);
 
+inline constexpr std::uint32_t kMostLevels = 16, kMostTableBits = 24;
+
 /// What determines a model besides its parameters.
 struct Shape {
   std::uint32_t levels = 16;    ///< of the hash grid; each has 2 features
