@@ -36,7 +36,8 @@ cli::ProgramText programText() {
           "are removed, and the other voxels are quantised. The search varies the threshold until "
           "the file is at most 2 % smaller than the size, and takes the tolerance of FpN and the "
           "setting of ZFP with the highest PSNR. For the PSNR of each CAND and each "
-          "--psnr, it searches for the smallest FpN and ZFP files. -v shows the searches, and --report includes them.\n"
+          "--psnr, it searches for the smallest FpN and ZFP files. -v shows the searches, and "
+          "--report includes them.\n"
           "\n"
           "--external-command takes any compressor of arrays. COMMAND is run in a shell as\n"
           "  COMMAND encode RAW PACKED NX NY NZ BOUND\n"
@@ -159,7 +160,8 @@ void readCommands(const Arguments& a, TableOptions& options) {
                       !options.fits.empty() || options.fitDefault || options.fitPaper;
   if (!options.commands.empty() && !hasAim)
     throw UsageError(
-        "--external-command needs a size or a PSNR to match: CAND, --size, --psnr, --psnr-active or "
+        "--external-command needs a size or a PSNR to match: CAND, --size, --psnr, --psnr-active "
+        "or "
         "--fit");
 }
 

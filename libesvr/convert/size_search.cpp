@@ -106,8 +106,7 @@ class SizeSearch {
     const std::uint64_t besides = bytesBesides(now), padding = paddingOf(now.grid);
     const bool larger = besides > besides_ + padding;
     const bool muchSmaller = besides_ > besides + padding + bytes_ / kRefillDivisor;
-    if ((larger || muchSmaller) && reserve(besides))
-      now = compactFor(attempt, {.bytes = left_});
+    if ((larger || muchSmaller) && reserve(besides)) now = compactFor(attempt, {.bytes = left_});
     return now;
   }
 

@@ -6,7 +6,8 @@
 
 VOLUMES has the stand-ins that paper_volumes.py makes. FOLDER has programs of other systems, named sz3, tthresh,
 sperr3d and instant_ngp. `volumes` measures our files, the paper's method, and OpenVDB, NanoVDB and ZFP.
-`compressors` measures SZ3, SPERR and TTHRESH, and `ngp` Instant-NGP at multiples of the bytes of our files. `ablations` repeats the paper's ablations on two volumes.
+`compressors` measures SZ3, SPERR and TTHRESH, and `ngp` Instant-NGP at multiples of the bytes of our files. `ablations`
+repeats the paper's ablations on two volumes.
 Each writes a JSON file to docs/paper, which page.py reads. OUT keeps all files and reports; nothing that it holds is
 made again.
 
@@ -335,7 +336,8 @@ def results(options, what):
     return json.loads(file_of(options, what).read_text())["volumes"]
 
 
-MEASURE = {"volumes": measure_volumes, "compressors": measure_compressors, "ngp": measure_ngp, "ablations": measure_ablations}
+MEASURE = {"volumes": measure_volumes, "compressors": measure_compressors, "ngp": measure_ngp,
+           "ablations": measure_ablations}
 VOLUMES = ("aneurysm", "breast", "neuron", "bigbrain", "woodbranch", "vdeltaa", "lln2p", "beechnut",
            "pigheart")
 

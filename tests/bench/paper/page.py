@@ -231,7 +231,8 @@ def data_sets(statistics):
         rows.append([TITLES[volume["name"]], volume["what"], *sides,
                      *(f"{old[key]:g} / {new[key]:.{digits}f}" for key, digits in
                        (("nonzero", 2), ("above", 2), ("screen", 0)))])
-    return table(["data set", "stand-in", "resolution", "here", "% not zero", "% above a tenth", "% of the screen"], rows)
+    return table(["data set", "stand-in", "resolution", "here", "% not zero", "% above a tenth",
+                  "% of the screen"], rows)
 
 
 def at_best(f):
@@ -276,15 +277,32 @@ def losses_of_pictures(figures, looks):
     return "\n".join(line for look in looks for line in better_pictures(figures, look)) or "- none"
 
 
+def span(values):
+    """The least and the largest of some seconds, as text."""
+    return f"{min(values):.1f} to {max(values):.1f}"
+
+
+def opening(figures, looks):
+    """The figures of the first sentences."""
+    sperr = [best(f.at_size(), AT_SIZE["SPERR"]) for f in figures]
+    ngp = [best(f.at_size(), AT_SIZE["Instant-NGP"]) for f in figures]
+    lost = [bool(better_pictures([f], look)) for f in figures for look in looks]
+    return {"FINDING": finding(figures), "SECONDS": span([f.volume["seconds"] for f in figures]),
+            "SECONDS_NGP": span([row["encode_s"] for row in ngp if row]),
+            "SECONDS_SPERR": span([row["encode_s"] for row in sperr if row]), "LOST_PICTURES": str(sum(lost)),
+            "ALL_PICTURES": str(len(lost))}
+
+
 def parts_of(parts):
     order = [name for name in TITLES if name in parts["volumes"]]
     figures = [Figures(name, parts) for name in order]
     dense = [f for f in figures if f.name in DENSE]
     looks = list(figures[0].volume["looks"])
-    return {"DATA_SETS": data_sets(parts["statistics"]), "FINDING": finding(figures),
+    return {**opening(figures, looks), "DATA_SETS": data_sets(parts["statistics"]),
             "SIZE_MATCHED": size_matched(figures), "PSNR_MATCHED": psnr_matched(figures),
             "PICTURES": "\n\n".join(f"`--colors {look}`:\n\n{pictures(figures, look)}" for look in looks),
-            "BETTER_PICTURES": losses_of_pictures(figures, looks), "DRAWING": drawing(figures), "DEPTH_PARTS": depth_parts(figures), "FITS": fits(figures),
+            "BETTER_PICTURES": losses_of_pictures(figures, looks), "DRAWING": drawing(figures),
+            "DEPTH_PARTS": depth_parts(figures), "FITS": fits(figures),
             "TOTALS": totals(figures), "LOSSLESS": lossless(figures), "DENSE": margins(dense),
             "ABLATIONS": ablations(parts["ablations"]), "SHARPNESS": sharpness(parts["ablations"])}
 

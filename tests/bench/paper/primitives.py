@@ -22,8 +22,8 @@ import esvr
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 from run_program import run  # noqa: E402
 
-PICTURE = ["--resolution", "700x700", "--mode", "maximum", "--colors", "inferno", "--background", "0,0,0", "--fov", "22", "-q",
-           "-f"]
+PICTURE = ["--resolution", "700x700", "--mode", "maximum", "--colors", "inferno", "--background", "0,0,0", "--fov",
+           "22", "-q", "-f"]
 FAINTEST = 0.02  # of ellipsoids with the lowest figure, so that they differ from the background
 
 
