@@ -57,16 +57,25 @@ bool mayStoreVoxels(const Job& job) {
          !std::holds_alternative<FitGoal>(job.options.goal) && !isLarge(job);
 }
 
+/// Voxels of a size, if there are any.
+std::optional<Conversion> bandAsVoxelsOfSize(const Job& job, const ConvertTo& convertTo) try {
+  return bandAsVoxels(job, convertTo);
+} catch (const UsageError&) {
+  return std::nullopt;
+}
+
 Conversion bandToSize(const Job& job, std::uint64_t bytes, const ConvertTo& convertTo) {
   Conversion made = corrected(job, convertTo(job));
   if (bytesAdded(made.grid) <= bytes) return made;
   if (auto fitted = withRoomForSigns(job, bytes, std::move(made), convertTo))
     return std::move(*fitted);
-  if (mayStoreVoxels(job)) return bandAsVoxels(job, convertTo);
+  const bool mayBeVoxels = mayStoreVoxels(job);
+  if (mayBeVoxels)
+    if (auto voxels = bandAsVoxelsOfSize(job, convertTo)) return std::move(*voxels);
   throw UsageError("grid '" + job.input.descriptor.name +
                    "': ellipsoids and the residual that corrects the signs of the level set do not "
                    "fit into " +
-                   std::to_string(bytes) + " bytes");
+                   std::to_string(bytes) + " bytes" + (mayBeVoxels ? ", and voxels neither" : ""));
 }
 
 /// True if the voxels that were compared with the ellipsoids take fewer bytes than these and their

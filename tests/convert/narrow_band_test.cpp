@@ -5,6 +5,7 @@
 // A level set with a hole, one without a negative value and one whose values exceed its background
 // are converted like other grids.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -118,6 +119,16 @@ INSTANTIATE_TEST_SUITE_P(Shapes, NarrowBand,
                                           testing::Values(Band{}, Band{1.5, 1.5}, Band{3.0, 1.5},
                                                           Band{3.0, 3.0, 0.01},
                                                           Band{3.0, 3.0, 100.0})));
+
+TEST(NarrowBandChoice, SaysWhatDoesNotFitIntoASmallSize) {
+  try {
+    (void)bandOf(levelSetOf(toBall, {}), SizeGoal{650});
+    FAIL() << "650 bytes hold the signs";
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("corrects the signs"),
+                                             testing::HasSubstr("650 bytes, and voxels neither")));
+  }
+}
 
 TEST(NarrowBandChoice, SlowKeepsTheSignsOfWhatIsStored) {
   const SparseVolume volume = levelSetOf(toBall, {});
