@@ -1,9 +1,29 @@
 #!/usr/bin/env python3
-"""Measures volumes with which ESVR was not tuned with these volumes before they were measured; `tests/bench/unseen_volumes.py` makes them. They
+"""Measures volumes with which ESVR was not tuned, for the section "Unseen volumes" of docs/comparison.md.
+
+    unseen.py --bin BUILD --data DATA --out OUT --section SECTION.md --sperr 0.8.5=PROGRAM --sz3 3.3.2=PROGRAM
+
+Makes the volumes of unseen_volumes.py, fits them to the sizes of comparison.py, measures the other rows of
+esvr-compare and the external compressors at these sizes, and writes the section. OUT keeps all results; nothing
+that it holds is made again.
+"""
+import argparse
+import json
+import pathlib
+
+import external_compressors as external
+import rates
+import unseen_volumes
+from volumes import Volume, kept
+
+INTRODUCTION = """\
+## Unseen volumes
+
+ESVR was not tuned with these volumes before they were measured; `tests/bench/unseen_volumes.py` makes them. They
 showed faults of the searches for voxels (`blobs`, `scan`, `torus`), which were mended. All were fitted on two CPU cores
 (`--device cpu`). Sizes below 600 bytes are left out. TTHRESH was not measured. `-` stands for no file: the size is too
 small for the grid. A version without masks of active voxels and without the promise that closed level sets keep their
-signs had files for more sizes and won 43 of the 47 cases; the present one stores more than values.
+signs had files for more sizes, and was better in 43 of the 47 cases; the present one stores more than values.
 
 | volume | what it is | active voxels | half-float Blosc VDB, bytes |
 |---|---|--:|--:|
