@@ -91,6 +91,9 @@ class RangeEncoder {
     }
   }
 
+  /// The number of bytes so far. finish() would now return at most 4 more.
+  [[nodiscard]] std::uint64_t size() const { return bytes_.size() + waiting_ - 1; }
+
   /// Returns the encoded bytes. Zeros at the end are left out, since a decoder reads zeros there.
   [[nodiscard]] std::vector<std::byte> finish() {
     for (int i = 0; i < 5; ++i) shiftLow();

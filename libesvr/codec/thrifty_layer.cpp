@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "codec/brick_order.h"
 #include "codec/frame_coder.h"
@@ -22,21 +24,29 @@ std::vector<double> placesOf(const SparseVolume& volume, const VoxelLayer& layer
   return places;
 }
 
+/// The bytes of all bricks, if a part of them took more than a limit.
+std::optional<std::uint64_t> extrapolated(const codec::CodedPart& part, std::size_t bricks,
+                                          std::uint64_t mostBytes) {
+  if (part.bytes <= mostBytes) return std::nullopt;
+  return std::uint64_t(double(part.bytes) * double(bricks) / double(part.bricks));
+}
+
 }  // namespace
 
-VoxelLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
-                        const ThriftOptions& options) {
-  if (layer.form != VoxelForm::kQuantised) return layer;
+ThriftyLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
+                          const ThriftOptions& options) {
+  if (layer.form != VoxelForm::kQuantised) return {std::move(layer)};
   const auto order = codec::codingOrder(layer.bricks);
   if (options.previous && codec::isPredictable(layer, *options.previous)) {
     const codec::FrameThrift thrift{placesOf(volume, layer), options.bitPrice, options.steadiness,
                                     options.signs};
     codec::chooseFrameCodes(order, codec::PastVoxels(*options.previous, layer), thrift, layer);
-    return layer;
+    return {std::move(layer)};
   }
   const codec::Thrift thrift{placesOf(volume, layer), options.bitPrice, options.signs};
-  codec::chooseCodes(order, codec::chooseModel(layer), thrift, layer);
-  return layer;
+  const codec::CodedPart part =
+      codec::chooseCodes(order, codec::chooseModel(layer), thrift, options.mostBytes, layer);
+  return {std::move(layer), extrapolated(part, order.size(), options.mostBytes)};
 }
 
 }  // namespace esvr

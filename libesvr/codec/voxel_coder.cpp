@@ -240,17 +240,34 @@ void code(Side& side, std::span<const std::size_t> order, const VoxelModel& mode
   for (const std::size_t b : order) coder->brick(side, b);
 }
 
+CodedPart codePart(std::span<const std::size_t> order, const VoxelModel& model,
+                   const Thrift* thrift, std::uint64_t mostBytes, VoxelLayer& layer) {
+  Writer writer;
+  const auto coder = std::make_unique<VoxelCoder<Writer>>(model, layer, thrift);
+  CodedPart part;
+  while (part.bricks < order.size() && part.bytes <= mostBytes) {
+    coder->brick(writer, order[part.bricks++]);
+    part.bytes = writer.coder.size();
+  }
+  return part;
+}
+
 }  // namespace
 
 void codeVoxels(Writer& side, std::span<const std::size_t> order, const VoxelModel& model,
                 VoxelLayer& layer) {
   code(side, order, model, layer);
 }
-void chooseCodes(std::span<const std::size_t> order, const VoxelModel& model, const Thrift& thrift,
-                 VoxelLayer& layer) {
-  Writer writer;
-  const auto coder = std::make_unique<VoxelCoder<Writer>>(model, layer, &thrift);
-  for (const std::size_t b : order) coder->brick(writer, b);
+
+CodedPart chooseCodes(std::span<const std::size_t> order, const VoxelModel& model,
+                      const Thrift& thrift, std::uint64_t mostBytes, VoxelLayer& layer) {
+  return codePart(order, model, &thrift, mostBytes, layer);
+}
+
+CodedPart codeWithin(std::span<const std::size_t> order, const VoxelModel& model,
+                     std::uint64_t mostBytes, const VoxelLayer& layer) {
+  VoxelLayer written = layer;  // a coder without thrift writes the codes that are there
+  return codePart(order, model, nullptr, mostBytes, written);
 }
 
 void codeVoxels(Reader& side, std::span<const std::size_t> order, const VoxelModel& model,

@@ -32,11 +32,22 @@ struct Thrift {
   RoundedSigns signs = RoundedSigns::kMayChange;  ///< kKept: a code keeps its sign
 };
 
+/// What was coded before a limit stopped the coder.
+struct CodedPart {
+  std::uint64_t bytes = 0;
+  std::size_t bricks = 0;
+};
+
 /// Replaces the code of a voxel that is not vacant by a code near it that takes fewer bits, if the
 /// bits saved are worth more than the error added. The layer must have the form kQuantised. Bricks
 /// are visited in the same order as by codeVoxels().
-void chooseCodes(std::span<const std::size_t> order, const VoxelModel& model, const Thrift& thrift,
-                 VoxelLayer& layer);
+/// \param mostBytes  the coder stops after the brick with which it has more bytes than this
+CodedPart chooseCodes(std::span<const std::size_t> order, const VoxelModel& model,
+                      const Thrift& thrift, std::uint64_t mostBytes, VoxelLayer& layer);
+
+/// The same part for the codes that the layer has.
+[[nodiscard]] CodedPart codeWithin(std::span<const std::size_t> order, const VoxelModel& model,
+                                   std::uint64_t mostBytes, const VoxelLayer& layer);
 
 /// Writes the bricks in the given order, and the voxels of a brick in the order of their offsets.
 /// A brick must come after all bricks none of whose coordinates is larger than its own.

@@ -120,12 +120,12 @@ std::vector<BrickMask> differing(const SparseVolume& volume, double bound) {
 
 /// Makes all voxels outside a box inactive.
 void clip(const SparseVolume& volume, const Box& box, std::vector<BrickMask>& masks) {
-  for (std::size_t b = 0; b < masks.size(); ++b) {
+  tbb::parallel_for(std::size_t{0}, masks.size(), [&](std::size_t b) {
     const BrickMask all = masks[b];
     masks[b] = {};
     for (int v = 0; v < kBrickVoxels; ++v)
       if (all.test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v))) masks[b].set(v);
-  }
+  });
 }
 
 /// The simplified mask and those of the volume's active voxels that differ.

@@ -1,7 +1,7 @@
 #include "convert/choice.h"
 
-#include <cmath>
 #include <future>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -21,6 +21,13 @@ namespace {
 Representation representationOf(const Job& job) {
   if (job.options.storage.form == Storage::kFloat32) return Representation::kEllipsoids;
   return job.options.representation;
+}
+
+/// The result of `work`, which makes fits; an empty one if they were cancelled too early for one.
+/// \param seconds  the time that it takes is added to this
+template <class Work>
+auto fitted(double& seconds, const Work& work) {
+  return addSeconds(seconds, [&] { return unlessCancelled(work); });
 }
 
 Candidate record(const VoxelCandidate& voxels) {
@@ -46,10 +53,11 @@ Conversion asConversion(VoxelCandidate voxels, const Candidate& ellipsoids, FitE
   return asConversion(std::move(voxels), choice, end);
 }
 
-/// Records that ellipsoids were taken instead of these voxels.
-void recordRejected(const VoxelCandidate& voxels, const ChoiceRecord& choice, Conversion& taken) {
+/// Records that ellipsoids were taken instead of voxels.
+/// \param plateau  the decision of the voxels
+void recordRejected(const Decision& plateau, const ChoiceRecord& choice, Conversion& taken) {
   taken.choice = choice;
-  taken.decisions.plateau = voxels.plateau;
+  taken.decisions.plateau = plateau;
   taken.decisions.plateau.used = false;
 }
 
@@ -81,13 +89,12 @@ Conversion smallerOf(const Job& job, const PsnrTarget& target, PsnrCandidates ca
   double& seconds = candidates.seconds;
   const double psnr = target.psnr;
   const auto below = std::uint64_t(target.worthwhileShare * double(voxels.bytes));
-  auto [ellipsoids, expected] = addSeconds(
-      seconds, [&] { return unlessCancelled([&] { return candidates.search(below); }); });
+  auto [ellipsoids, expected] = fitted(seconds, [&] { return candidates.search(below); });
   ChoiceRecord choice{record(voxels), {}};
   if (expected > 0) choice.ellipsoids = Candidate{expected, psnr, true, seconds};
   if (ellipsoids) {
     choice.ellipsoids = record(job, *ellipsoids, seconds);
-    recordRejected(voxels, choice, *ellipsoids);
+    recordRejected(voxels.plateau, choice, *ellipsoids);
     if (choice.ellipsoids->psnr >= psnr && choice.ellipsoids->bytes < voxels.bytes)
       return std::move(*ellipsoids);
   }
@@ -113,21 +120,81 @@ Conversion smallerOfExactAnd(const Job& job, double psnr) {
   return asConversion(std::move(exact).take(), other, FitEnd::kPsnrReached);
 }
 
-/// The better of `voxels` and ellipsoids of a size.
-Conversion betterOf(const Job& job, std::uint64_t bytes, VoxelCandidate voxels) {
-  double seconds = 0.0;
-  auto result = addSeconds(seconds, [&] {
-    return unlessCancelled([&] { return searchSize(job, bytes, voxels.psnr); });
-  });
-  ChoiceRecord choice{record(voxels), {}};
-  if (result.expected > 0.0) choice.ellipsoids = Candidate{bytes, result.expected, true, seconds};
-  if (result.conversion) {
-    choice.ellipsoids = record(job, *result.conversion, seconds);
-    recordRejected(voxels, choice, *result.conversion);
-    if (choice.ellipsoids->psnr > voxels.psnr) return std::move(*result.conversion);
-  }
+/// The conversion to voxels of a size to which there is no alternative.
+Conversion voxelsAlone(VoxelCandidate voxels) {
+  const ChoiceRecord choice{record(voxels), {}};
   return asConversion(std::move(voxels), choice, FitEnd::kScheduleDone);
 }
+
+Conversion voxelsToSize(const Job& job, std::uint64_t bytes) {
+  auto voxels = voxelsForSize(job, bytes).found;
+  if (!voxels) throw tooSmall(job, bytes, "has no voxels of that size");
+  return voxelsAlone(std::move(*voxels));
+}
+
+/// Chooses the better of quantised voxels and ellipsoids of a size. A short fit is made first, so
+/// that voxels are searched only if they can be as good as it promises.
+class BetterOfSize {
+ public:
+  BetterOfSize(const Job& job, std::uint64_t bytes) : job_(job), bytes_(bytes) {}
+
+  Conversion run() {
+    const auto search = fitted(seconds_, [&] { return startSizeSearch(job_, bytes_); });
+    if (!search.rest) return cancelled();
+    searchVoxels(search.atLeast);
+    ellipsoids_ = fitted(seconds_, [&] { return search.rest(psnrOfVoxels()); });
+    if (ellipsoids_.conversion) figures_ = record(job_, *ellipsoids_.conversion, seconds_);
+    const bool asPromised = figures_ && *figures_->psnr >= search.atLeast;
+    if (voxels_.tooLarge && !asPromised) searchVoxels(figures_ ? *figures_->psnr : kAnyPsnr);
+    return better();
+  }
+
+ private:
+  static constexpr double kAnyPsnr = -std::numeric_limits<double>::infinity();
+
+  void searchVoxels(double least) {
+    const double before = voxels_.seconds;
+    voxels_ = voxelsForSize(job_, bytes_, least);
+    voxels_.seconds += before;
+  }
+
+  [[nodiscard]] std::optional<double> psnrOfVoxels() const {
+    return voxels_.found ? std::optional(voxels_.found->psnr) : std::nullopt;
+  }
+
+  /// Voxels, since there is no ellipsoid.
+  Conversion cancelled() {
+    searchVoxels(kAnyPsnr);
+    if (!voxels_.found) throw Cancelled();
+    return voxelsAlone(std::move(*voxels_.found));
+  }
+
+  [[nodiscard]] ChoiceRecord choice() const {
+    ChoiceRecord made{voxels_.tooLarge, figures_};
+    if (voxels_.found) made.voxels = record(*voxels_.found);
+    if (made.voxels) made.voxels->seconds = voxels_.seconds;
+    if (!figures_ && ellipsoids_.expected > 0.0)
+      made.ellipsoids = Candidate{bytes_, ellipsoids_.expected, true, seconds_};
+    return made;
+  }
+
+  Conversion better() {
+    const ChoiceRecord record = choice();
+    if (figures_ && (!voxels_.found || *figures_->psnr > voxels_.found->psnr)) {
+      recordRejected(voxels_.plateau, record, *ellipsoids_.conversion);
+      return std::move(*ellipsoids_.conversion);
+    }
+    if (!voxels_.found) throw tooSmall(job_, bytes_, ellipsoids_.needed);
+    return asConversion(std::move(*voxels_.found), record, FitEnd::kScheduleDone);
+  }
+
+  const Job& job_;
+  std::uint64_t bytes_;
+  double seconds_ = 0.0;  ///< of all fits
+  VoxelsOfSize voxels_;
+  SizeResult ellipsoids_;
+  std::optional<Candidate> figures_;  ///< of the ellipsoids' conversion
+};
 
 /// Exact voxels if they keep to a size, otherwise ellipsoids.
 Conversion exactOrEllipsoids(const Job& job, std::uint64_t bytes) {
@@ -166,9 +233,7 @@ PsnrCandidates psnrCandidates(const Job& job, const PsnrTarget& target) {
     if (voxels.bytes < target.smallEnough) notNeeded.cancel();
     return voxels;
   });
-  made.search = addSeconds(made.seconds, [&] {
-    return unlessCancelled([&] { return startPsnrSearch(job, target.psnr, notNeeded); });
-  });
+  made.search = fitted(made.seconds, [&] { return startPsnrSearch(job, target.psnr, notNeeded); });
   made.voxels = coder.get();
   if (!made.search) made.search = [](auto) { return PsnrResult{}; };
   return made;
@@ -195,15 +260,9 @@ Conversion convertToSize(const Job& job, std::uint64_t bytes) {
   const Representation wanted = representationOf(job);
   if (wanted == Representation::kEllipsoids) return ellipsoidsToSize(job, bytes);
   if (wanted == Representation::kAuto && isLarge(job)) return exactOrEllipsoids(job, bytes);
-  auto voxels = voxelsForSize(job, bytes);
-  if (!voxels && wanted == Representation::kVoxels)
-    throw tooSmall(job, bytes, "has no voxels of that size");
-  if (!voxels) return ellipsoidsToSize(job, bytes);
-  if (wanted == Representation::kVoxels || std::isinf(voxels->psnr)) {
-    const ChoiceRecord choice{record(*voxels), {}};
-    return asConversion(std::move(*voxels), choice, FitEnd::kScheduleDone);
-  }
-  return betterOf(job, bytes, std::move(*voxels));
+  if (auto exact = exactVoxelsWithin(job, bytes)) return voxelsAlone(std::move(*exact));
+  return wanted == Representation::kVoxels ? voxelsToSize(job, bytes)
+                                           : BetterOfSize(job, bytes).run();
 }
 
 Conversion unlessExactIsSmaller(const Job& job, const std::function<Conversion()>& fit) {

@@ -13,7 +13,9 @@ namespace esvr::convert {
 /// either exact or not tried, because each trial would take long.
 [[nodiscard]] Conversion convertToPsnr(const Job& job, const PsnrTarget& target);
 
-/// The better of two grids of a size: voxels or ellipsoids, which are compared in the same way.
+/// The better of two grids of a size: exact voxels, or quantised voxels or ellipsoids. A short fit is
+/// made before quantised voxels, because it usually shows that these cannot be better. Voxels of a
+/// large volume are treated as for a PSNR.
 /// \throws UsageError  neither can be that small
 [[nodiscard]] Conversion convertToSize(const Job& job, std::uint64_t bytes);
 

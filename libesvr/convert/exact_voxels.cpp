@@ -28,10 +28,6 @@ double scaledBytes(const SparseVolume& volume, const SparseVolume& sample) {
 
 bool isLarge(const Job& job) { return job.input.source.values.size() > job.limits.maxVoxels; }
 
-std::uint64_t bytesBesideVoxels(const ConvertInput& input) {
-  return bytesAdded(makeStoredVoxels(input.descriptor, input.source, {}));
-}
-
 Candidate estimateExactVoxels(const ConvertInput& input, const SampleSize& size) {
   double seconds = 0.0;
   const std::uint64_t bytes = addSeconds(seconds, [&] {

@@ -11,9 +11,6 @@ namespace esvr::convert {
 /// True for volumes of more than VoxelLimits::maxVoxels.
 [[nodiscard]] bool isLarge(const Job& job);
 
-/// Bytes that a grid of voxels adds to a file besides those of its voxels.
-[[nodiscard]] std::uint64_t bytesBesideVoxels(const ConvertInput& input);
-
 /// Estimates the bytes of a grid of exact voxels from a sample. If the runs have 16 bricks, the
 /// estimates of docs/lab-notes.md, "Estimating the bytes of exact voxels", are 0.94 to 1.08 times
 /// the true bytes of volumes without symmetry. A sample hardly contains mirror images and copies of

@@ -9,6 +9,7 @@ namespace esvr::convert {
 
 /// Bounds are counted in octaves below the range of the values: 1 is half the range.
 inline constexpr double kCoarsest = 1.0, kFinest = 24.0;  // float32 has 24 bits
+inline constexpr double kDbPerOctave = 6.02;              // gain of PSNR by half the bound
 inline constexpr double kNarrowest = 0.002;  // a bound that differs by 0.14 % is not tried
 
 /// Finds the octave at which a figure that grows with it reaches an aim: by a usual slope while all

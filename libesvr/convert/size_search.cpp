@@ -1,6 +1,7 @@
 #include "convert/size_search.h"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "esvr/grid_coding.h"
@@ -28,15 +29,23 @@ std::uint64_t bytesBesides(const CompactResult& compact) {
 
 class SizeSearch {
  public:
-  SizeSearch(const Job& job, std::uint64_t bytes, std::optional<double> above)
-      : options_(job.options), job_{job.input, options_}, bytes_(bytes), above_(above) {}
+  SizeSearch(const Job& job, std::uint64_t bytes)
+      : options_(job.options), job_{job.input, options_}, bytes_(bytes) {
+    draft_ = attempt(job_, double(bytes_) / kBytesPerEllipsoid, FitLength::kShort);
+    draft_ = withBetterSigns(job_.input, std::move(draft_), options_);
+    bothSigns_ = draft_.bothSigns;
+  }
 
-  SizeResult run() {
-    Attempt last = attempt(job_, double(bytes_) / kBytesPerEllipsoid, FitLength::kShort);
-    last = withBetterSigns(job_.input, std::move(last), options_);
-    bothSigns_ = last.bothSigns;
-    const double expected = last.psnr + kShortFitBehind - kUsualLoss;
-    if (above_ && !last.cancelled() && expected + kUncertainty < *above_)
+  SizeSearch(const SizeSearch&) = delete;
+  SizeSearch& operator=(const SizeSearch&) = delete;
+
+  /// The PSNR of the short fit after quantising.
+  [[nodiscard]] double atLeast() const { return draft_.psnr - kUsualLoss; }
+
+  SizeResult run(std::optional<double> above) {
+    const double expected = atLeast() + kShortFitBehind;
+    Attempt last = std::move(draft_);
+    if (above && !last.cancelled() && expected + kUncertainty < *above)
       return {std::nullopt, 0, expected};
     const CompactResult first = compactFor(last, {});
     if (!reserve(bytesBesides(first))) return refused();
@@ -113,14 +122,19 @@ class SizeSearch {
   ConvertOptions options_;
   Job job_;
   std::uint64_t bytes_, besides_ = 0, left_ = 0;
-  std::optional<double> above_;
+  Attempt draft_;  ///< a short fit
   Decision bothSigns_;
 };
 
 }  // namespace
 
 SizeResult searchSize(const Job& job, std::uint64_t bytes, std::optional<double> above) {
-  return SizeSearch(job, bytes, above).run();
+  return SizeSearch(job, bytes).run(above);
+}
+
+StartedSizeSearch startSizeSearch(const Job& job, std::uint64_t bytes) {
+  const auto search = std::make_shared<SizeSearch>(job, bytes);
+  return {search->atLeast(), [search](std::optional<double> above) { return search->run(above); }};
 }
 
 }  // namespace esvr::convert

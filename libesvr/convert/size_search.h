@@ -2,6 +2,7 @@
 /// The search for the best grid of a given size.
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 
 #include "convert/attempt.h"
@@ -23,5 +24,17 @@ struct SizeResult {
 ///               that it would not
 [[nodiscard]] SizeResult searchSize(const Job& job, std::uint64_t bytes,
                                     std::optional<double> above = {});
+
+/// A search whose short fit is done.
+struct StartedSizeSearch {
+  /// PSNR of the short fit, dB, less what quantising usually costs. A full fit mostly exceeds it.
+  double atLeast = 0.0;
+  /// The rest, which may be called once while the job exists.
+  std::function<SizeResult(std::optional<double> above)> rest;
+};
+
+/// Makes the short fit of a search before `above` is known.
+/// \throws Cancelled  the fit was cancelled before it had a result
+[[nodiscard]] StartedSizeSearch startSizeSearch(const Job& job, std::uint64_t bytes);
 
 }  // namespace esvr::convert

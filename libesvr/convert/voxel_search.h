@@ -3,6 +3,7 @@
 /// No fit is made.
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "convert/attempt.h"
@@ -18,6 +19,9 @@ struct VoxelCandidate {
   Decision plateau;         ///< whether the lattice contains the most frequent value
 };
 
+/// Bytes that a grid of voxels adds to a file besides those of its voxels.
+[[nodiscard]] std::uint64_t bytesBesideVoxels(const ConvertInput& input);
+
 /// Exact voxels. Doubles are exact as they were read, rounded to float32.
 [[nodiscard]] VoxelCandidate exactVoxels(const Job& job);
 
@@ -25,8 +29,25 @@ struct VoxelCandidate {
 /// quantised ones do not reach it.
 [[nodiscard]] VoxelCandidate voxelsForPsnr(const Job& job, const PsnrTarget& target);
 
-/// The best voxels found that add at most `bytes` to a file.
-/// \return nothing if even the coarsest voxels are larger
-[[nodiscard]] std::optional<VoxelCandidate> voxelsForSize(const Job& job, std::uint64_t bytes);
+/// Exact voxels that add at most `bytes` to a file.
+/// \return nothing if they are larger, which usually shows before all of them are coded
+[[nodiscard]] std::optional<VoxelCandidate> exactVoxelsWithin(const Job& job, std::uint64_t bytes);
+
+/// What a search for voxels of a size found.
+struct VoxelsOfSize {
+  std::optional<VoxelCandidate> found;  ///< nothing if even the coarsest voxels are larger
+  /// Set if no voxels of the size have the wanted PSNR: the coarsest voxels that have it, with
+  /// estimated bytes. Nothing was found then.
+  std::optional<Candidate> tooLarge;
+  Decision plateau;      ///< as in a candidate
+  double seconds = 0.0;  ///< wall-clock seconds of the whole search
+};
+
+/// The best quantised voxels found that add at most `bytes` to a file.
+/// \param least  PSNR over the box, dB, below which voxels are of no use. The coarsest voxels with
+///               it are tried first. If they are larger, nothing else is tried, because the voxels
+///               of the size are coarser
+[[nodiscard]] VoxelsOfSize voxelsForSize(const Job& job, std::uint64_t bytes,
+                                         double least = -std::numeric_limits<double>::infinity());
 
 }  // namespace esvr::convert

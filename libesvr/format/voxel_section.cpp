@@ -195,6 +195,15 @@ std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   return out.take();
 }
 
+bool takeMore(const VoxelLayer& layer, std::uint64_t bytes) {
+  const auto order = codec::codingOrder(layer.bricks);
+  const auto takesMore = [&](const codec::VoxelModel& model) {
+    return codec::codeWithin(order, model, bytes, layer).bytes > bytes;
+  };
+  const codec::VoxelModel model = codec::chooseModel(layer);
+  return takesMore(model) && (!codec::hasMirror(model) || takesMore(codec::withoutMirrors(model)));
+}
+
 VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,
                      MemoryBudget& budget) {
   ByteReader in(content, where);

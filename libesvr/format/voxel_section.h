@@ -15,6 +15,9 @@ namespace esvr::format {
 
 [[nodiscard]] std::vector<std::byte> putVoxels(const VoxelLayer& layer);
 
+/// True if the section takes more than a number of bytes. Coding stops where that is known.
+[[nodiscard]] bool takeMore(const VoxelLayer& layer, std::uint64_t bytes);
+
 /// \throws BadInput  the content is damaged; the text begins with `where`
 /// \throws MemoryExceeded  there are more bricks than the budget allows
 [[nodiscard]] VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,

@@ -93,7 +93,12 @@ TEST(ChoiceForASize, SlowTakesEllipsoidsOfBlobs) {
   const Conversion conversion = choose(volume, SizeGoal{2000});
   EXPECT_FALSE(conversion.grid.voxels);
   EXPECT_LE(bytesAdded(conversion.grid), 2000u);
-  EXPECT_GT(psnrOver(volume, conversion), *conversion.choice->voxels->psnr);
+  ASSERT_TRUE(conversion.choice && conversion.choice->voxels);
+  EXPECT_TRUE(conversion.choice->voxels->estimated)
+      << "a short fit and the first bricks show that ellipsoids are right";
+  EXPECT_GT(conversion.choice->voxels->bytes, 2000u);
+  EXPECT_GT(conversion.choice->voxels->seconds, 0.0);
+  EXPECT_EQ(*conversion.choice->ellipsoids->psnr, psnrOver(volume, conversion));
 }
 
 TEST(ChoiceForASize, TakesExactVoxelsWhereTheyFit) {
@@ -216,11 +221,37 @@ TEST_F(VoxelSearch, SlowReachesAPsnrAndLittleMore) {
 
 TEST_F(VoxelSearch, FillsASize) {
   for (const std::uint64_t bytes : {4000u, 20000u}) {
-    const auto found = convert::voxelsForSize(job_, bytes);
+    const auto found = convert::voxelsForSize(job_, bytes).found;
     ASSERT_TRUE(found);
     EXPECT_LE(found->bytes, bytes);
     EXPECT_GE(double(found->bytes), 0.98 * double(bytes));
   }
+}
+
+TEST_F(VoxelSearch, FindsNothingOfASizeBelowTheLeastPsnr) {
+  const std::uint64_t bytes = 4000;
+  const auto best = convert::voxelsForSize(job_, bytes).found;
+  ASSERT_TRUE(best);
+  const auto found = convert::voxelsForSize(job_, bytes, best->psnr - 1.0);
+  ASSERT_TRUE(found.found) << "the least PSNR is reached";
+  EXPECT_NEAR(found.found->psnr, best->psnr, 0.3) << "one percent of the size may stay unused";
+  EXPECT_FALSE(found.tooLarge);
+  const auto none = convert::voxelsForSize(job_, bytes, best->psnr + 6.0);
+  EXPECT_FALSE(none.found);
+  ASSERT_TRUE(none.tooLarge);
+  EXPECT_GT(none.tooLarge->bytes, bytes);
+  EXPECT_GE(*none.tooLarge->psnr, best->psnr + 6.0);
+  EXPECT_TRUE(none.tooLarge->estimated);
+}
+
+TEST_F(VoxelSearch, TakesExactVoxelsOfASizeOnlyIfTheyKeepToIt) {
+  const std::uint64_t bytes = convert::exactVoxels(job_).bytes;
+  const auto exact = convert::exactVoxelsWithin(job_, bytes);
+  ASSERT_TRUE(exact);
+  EXPECT_EQ(exact->bytes, bytes);
+  EXPECT_EQ(decodeGrid(exact->grid).values, volume_.values);
+  EXPECT_FALSE(convert::exactVoxelsWithin(job_, bytes - 1));
+  EXPECT_FALSE(convert::exactVoxelsWithin(job_, bytes / 2));
 }
 
 TEST_F(VoxelSearch, FindsExactVoxelsWhereNothingElseReachesAPsnr) {

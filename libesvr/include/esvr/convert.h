@@ -143,7 +143,9 @@ struct Candidate {
   std::uint64_t bytes = 0;  ///< bytesAdded
   /// PSNR over the box, dB; +inf for exact voxels. Nothing for a BoundGoal.
   std::optional<double> psnr{};
-  bool estimated = false;  ///< the figures were extrapolated from a short fit or from a sample
+  /// The figures were extrapolated from a short fit, from a sample, or from the first bricks of
+  /// voxels that are too large.
+  bool estimated = false;
   /// Wall-clock seconds that all trials for this candidate took; nothing if none was made.
   std::optional<double> seconds{};
 };

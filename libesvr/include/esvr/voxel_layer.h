@@ -3,6 +3,7 @@
 /// were chosen instead of ellipsoids (convert.h), or as a residual.
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -83,6 +84,15 @@ struct ThriftOptions {
   double steadiness = 0.0;
   /// With kKept, no code gets another sign (negative or not) than the voxel has in the volume.
   RoundedSigns signs = RoundedSigns::kMayChange;
+  /// Bytes of the codes above which the work stops. It is ignored with `previous`.
+  std::uint64_t mostBytes = std::numeric_limits<std::uint64_t>::max();
+};
+
+struct ThriftyLayer {
+  VoxelLayer layer;
+  /// Set if the codes take more than ThriftOptions::mostBytes: the bytes of all codes, extrapolated
+  /// from those that were chosen. The layer is incomplete then and should not be used.
+  std::optional<std::uint64_t> tooMany{};
 };
 
 /// Makes a layer smaller by rate-distortion optimised quantisation. A voxel gets a code at most
@@ -91,8 +101,8 @@ struct ThriftOptions {
 /// lattice, and errors are correlated with the coder's predictions. Vacant voxels remain vacant.
 /// \param layer  a layer that boundedLayer made from `volume`; other forms than kQuantised are
 ///               returned unchanged
-[[nodiscard]] VoxelLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
-                                      const ThriftOptions& options);
+[[nodiscard]] ThriftyLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
+                                        const ThriftOptions& options);
 
 [[nodiscard]] SparseVolume volumeOf(const VoxelLayer& layer);
 

@@ -1,0 +1,133 @@
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <utility>
+
+#include "convert/octave_search.h"
+#include "convert/voxel_trials.h"
+
+namespace esvr::convert {
+namespace {
+
+/// Where the bound cannot be chosen freely, higher prices than kPrice use up the PSNR that is left.
+constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
+/// Prices of a bit for frames that are predicted: with a steadiness of 0, and what steadiness adds.
+/// Voxels whose bits are not worth their price keep to the prediction, and so to the frame before.
+constexpr double kFramePrice = 0.14, kSteadyPrice = 0.12;
+constexpr double kThriftOctaves = 0.08;  // bound's octaves that make up for the loss by kPrice
+constexpr int kMaxThriftyTrials = 4, kMaxFrameTrials = 10;
+/// Bits of an active voxel of a frame from which on exact voxels are tried, which take 8 at least in
+/// all but constant volumes.
+constexpr double kBitsOfExact = 8.0;
+
+bool isSmaller(const VoxelCandidate& a, const VoxelCandidate& b) { return a.bytes < b.bytes; }
+
+class VoxelPsnrSearch {
+ public:
+  VoxelPsnrSearch(const Job& job, double psnr) : job_(job), trials_(job), psnr_(psnr) {}
+
+  /// \param smallEnough  bytes below which nothing further is tried
+  VoxelCandidate run(std::uint64_t smallEnough) const {
+    if (!trials_.hasRange()) return exactVoxels(job_);
+    auto plain = trials_.coarsestFor(psnr_, psnr_ / kDbPerOctave - 1.0, 0.0, kMaxTrials);
+    if (!plain) return exactVoxels(job_);
+    const double bound = plain->bound;
+    if (job_.options.previous) return predicted(std::move(*plain));
+    VoxelCandidate best;
+    tbb::task_arena arena(trials_.trialsAtOnce());
+    arena.execute([&] {
+      best = exactUnless(std::move(*plain));
+      if (best.bytes >= smallEnough) best = furtherTrials(bound, std::move(best));
+    });
+    if (!best.plateau.tried) best.plateau.seconds = trials_.plateauSeconds();
+    return best;
+  }
+
+ private:
+  [[nodiscard]] VoxelCandidate stored(Trial trial) const {
+    return candidateOf(job_, std::move(trial.layer), trial.psnr);
+  }
+
+  [[nodiscard]] double framePrice() const {
+    return kFramePrice + kSteadyPrice * job_.options.steadiness;
+  }
+
+  /// Thrifty voxels of a frame, or the trial if they do not reach the PSNR. Exact voxels are tried
+  /// only if these take so many bits that exact ones may take fewer.
+  [[nodiscard]] VoxelCandidate predicted(Trial plain) const {
+    const double octave = trials_.octaveOf(plain.bound) + framePrice();
+    auto thrifty = trials_.coarsestFor(psnr_, octave, framePrice(), kMaxFrameTrials);
+    VoxelCandidate best = stored(std::move(thrifty ? *thrifty : plain));
+    const double bits = 8.0 * double(best.bytes) / double(activeVoxelCount(job_.input.source));
+    if (bits < kBitsOfExact) return best;
+    VoxelCandidate exact = exactVoxels(job_);
+    return isSmaller(best, exact) ? std::move(best) : std::move(exact);
+  }
+
+  /// Exact voxels, unless the trial is smaller.
+  [[nodiscard]] VoxelCandidate exactUnless(Trial trial) const {
+    VoxelCandidate exact, rounded;
+    tbb::parallel_invoke([&] { exact = exactVoxels(job_); },
+                         [&] { rounded = stored(std::move(trial)); });
+    return isSmaller(rounded, exact) ? std::move(rounded) : std::move(exact);
+  }
+
+  /// The smallest of `best`, thrifty voxels of about the same bound, and voxels with the plateau.
+  [[nodiscard]] VoxelCandidate furtherTrials(double bound, VoxelCandidate best) const {
+    std::optional<VoxelCandidate> thrifty;
+    PlateauTrial trial{.without{}, .seconds = trials_.plateauSeconds()};
+    tbb::parallel_invoke([&] { thrifty = thriftyNear(bound); },
+                         [&] {
+                           if (!trials_.isPlateau()) return;
+                           trial.with =
+                               addSeconds(trial.seconds, [&] { return withPlateau(bound); });
+                         });
+    if (thrifty && isSmaller(*thrifty, best)) best = std::move(*thrifty);
+    if (!trials_.isPlateau()) return best;
+    trial.without = std::move(best);
+    return *std::move(trial).decide(isSmaller);
+  }
+
+  [[nodiscard]] std::optional<VoxelCandidate> thriftyNear(double bound) const {
+    const double octave = trials_.octaveOf(bound) + kThriftOctaves;
+    auto trial = trials_.coarsestFor(psnr_, octave, kPrice, kMaxThriftyTrials);
+    return trial ? std::optional(stored(std::move(*trial))) : std::nullopt;
+  }
+
+  /// The smallest voxels found whose lattice has the value of the plateau.
+  [[nodiscard]] std::optional<VoxelCandidate> withPlateau(double bound) const {
+    const double levels = trials_.fewestLevels(psnr_, bound);
+    if (levels == 0.0) return std::nullopt;
+    std::array<std::optional<VoxelCandidate>, kPlateauPrices.size()> made;
+    tbb::parallel_for(std::size_t{0}, made.size(), [&](std::size_t k) {
+      Trial trial = trials_.tryBound(trials_.boundOf(levels), kPlateauPrices[k]);
+      if (trial.psnr >= psnr_) made[k] = stored(std::move(trial));
+    });
+    const auto larger = [](const auto& a, const auto& b) {
+      return a && (!b || a->bytes < b->bytes);
+    };
+    return std::move(*std::min_element(made.begin(), made.end(), larger));
+  }
+
+  const Job& job_;
+  VoxelTrials trials_;
+  double psnr_;
+};
+
+}  // namespace
+
+VoxelCandidate exactVoxels(const Job& job) {
+  return timed([&] {
+    return candidateOf(job, exactLayer(job.input.source), std::numeric_limits<double>::infinity());
+  });
+}
+
+VoxelCandidate voxelsForPsnr(const Job& job, const PsnrTarget& target) {
+  return timed([&] { return VoxelPsnrSearch(job, target.psnr).run(target.smallEnough); });
+}
+
+}  // namespace esvr::convert
