@@ -141,11 +141,11 @@ class BetterOfSize {
   Conversion run() {
     const auto search = fitted(seconds_, [&] { return startSizeSearch(job_, bytes_); });
     if (!search.rest) return cancelled();
-    searchVoxels(search.atLeast);
+    const double least = search.expected - kUncertainty;
+    searchVoxels(least);
     ellipsoids_ = fitted(seconds_, [&] { return search.rest(psnrOfVoxels()); });
     if (ellipsoids_.conversion) figures_ = record(job_, *ellipsoids_.conversion, seconds_);
-    const bool asPromised = figures_ && *figures_->psnr >= search.atLeast;
-    if (voxels_.tooLarge && !asPromised) searchVoxels(figures_ ? *figures_->psnr : kAnyPsnr);
+    if (voxels_.tooLarge && !suffices(least)) searchVoxels(figures_ ? *figures_->psnr : kAnyPsnr);
     return better();
   }
 
@@ -160,6 +160,13 @@ class BetterOfSize {
 
   [[nodiscard]] std::optional<double> psnrOfVoxels() const {
     return voxels_.found ? std::optional(voxels_.found->psnr) : std::nullopt;
+  }
+
+  /// True if the ellipsoids have a PSNR, or if they were cancelled, so that nothing should be tried
+  /// after them.
+  [[nodiscard]] bool suffices(double psnr) const {
+    if (!figures_) return false;
+    return *figures_->psnr >= psnr || ellipsoids_.conversion->fit.end == FitEnd::kCancelled;
   }
 
   /// Voxels, since there is no ellipsoid.

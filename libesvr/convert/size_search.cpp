@@ -39,11 +39,10 @@ class SizeSearch {
   SizeSearch(const SizeSearch&) = delete;
   SizeSearch& operator=(const SizeSearch&) = delete;
 
-  /// The PSNR of the short fit after quantising.
-  [[nodiscard]] double atLeast() const { return draft_.psnr - kUsualLoss; }
+  [[nodiscard]] double expected() const { return draft_.psnr + kShortFitBehind - kUsualLoss; }
 
   SizeResult run(std::optional<double> above) {
-    const double expected = atLeast() + kShortFitBehind;
+    const double expected = this->expected();
     Attempt last = std::move(draft_);
     if (above && !last.cancelled() && expected + kUncertainty < *above)
       return {std::nullopt, 0, expected};
@@ -134,7 +133,7 @@ SizeResult searchSize(const Job& job, std::uint64_t bytes, std::optional<double>
 
 StartedSizeSearch startSizeSearch(const Job& job, std::uint64_t bytes) {
   const auto search = std::make_shared<SizeSearch>(job, bytes);
-  return {search->atLeast(), [search](std::optional<double> above) { return search->run(above); }};
+  return {search->expected(), [search](std::optional<double> above) { return search->run(above); }};
 }
 
 }  // namespace esvr::convert

@@ -27,8 +27,7 @@ struct SizeResult {
 
 /// A search whose short fit is done.
 struct StartedSizeSearch {
-  /// PSNR of the short fit, dB, less what quantising usually costs. A full fit mostly exceeds it.
-  double atLeast = 0.0;
+  double expected = 0.0;  ///< PSNR to expect, dB
   /// The rest, which may be called once while the job exists.
   std::function<SizeResult(std::optional<double> above)> rest;
 };
