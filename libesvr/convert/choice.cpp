@@ -23,7 +23,8 @@ Representation representationOf(const Job& job) {
   return job.options.representation;
 }
 
-/// The result of `work`, which makes fits; an empty one if they were cancelled too early for one.
+/// Returns the result of `work`, which makes fits. It is empty if they were cancelled before they had
+/// an ellipsoid.
 /// \param seconds  the time that it takes is added to this
 template <class Work>
 auto fitted(double& seconds, const Work& work) {
@@ -132,8 +133,8 @@ Conversion voxelsToSize(const Job& job, std::uint64_t bytes) {
   return voxelsAlone(std::move(*voxels));
 }
 
-/// Chooses the better of quantised voxels and ellipsoids of a size. A short fit is made first, so
-/// that voxels are searched only if they can be as good as it promises.
+/// Chooses the better of quantised voxels and ellipsoids of a size. A short fit is made first. Voxels
+/// are searched only if they can have the PSNR that this fit lets expect of a full one.
 class BetterOfSize {
  public:
   BetterOfSize(const Job& job, std::uint64_t bytes) : job_(job), bytes_(bytes) {}
@@ -197,10 +198,11 @@ class BetterOfSize {
 
   const Job& job_;
   std::uint64_t bytes_;
-  double seconds_ = 0.0;  ///< of all fits
+  double seconds_ = 0.0;  ///< Wall-clock seconds that all fits took together.
   VoxelsOfSize voxels_;
   SizeResult ellipsoids_;
-  std::optional<Candidate> figures_;  ///< of the ellipsoids' conversion
+  /// The measured bytes and PSNR of ellipsoids_; nothing if no fit was stored.
+  std::optional<Candidate> figures_;
 };
 
 /// Exact voxels if they keep to a size, otherwise ellipsoids.

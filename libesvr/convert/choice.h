@@ -13,9 +13,9 @@ namespace esvr::convert {
 /// either exact or not tried, because each trial would take long.
 [[nodiscard]] Conversion convertToPsnr(const Job& job, const PsnrTarget& target);
 
-/// The better of two grids of a size: exact voxels, or quantised voxels or ellipsoids. A short fit is
-/// made before quantised voxels, because it usually shows that these cannot be better. Voxels of a
-/// large volume are treated as for a PSNR.
+/// The best grid of a size: exact voxels if they keep to it, otherwise the better of quantised voxels
+/// and ellipsoids. A short fit is made before voxels are quantised, because it usually shows that
+/// these cannot be better. Voxels of a large volume are treated as for a PSNR.
 /// \throws UsageError  neither can be that small
 [[nodiscard]] Conversion convertToSize(const Job& job, std::uint64_t bytes);
 

@@ -39,7 +39,10 @@ class SizeSearch {
   SizeSearch(const SizeSearch&) = delete;
   SizeSearch& operator=(const SizeSearch&) = delete;
 
-  [[nodiscard]] double expected() const { return draft_.psnr + kShortFitBehind - kUsualLoss; }
+  /// The PSNR to expect of a full fit. None follows a short fit that was cancelled.
+  [[nodiscard]] double expected() const {
+    return draft_.psnr + (draft_.cancelled() ? 0.0 : kShortFitBehind) - kUsualLoss;
+  }
 
   SizeResult run(std::optional<double> above) {
     const double expected = this->expected();

@@ -7,7 +7,6 @@
 #include <limits>
 #include <utility>
 
-#include "convert/octave_search.h"
 #include "convert/voxel_trials.h"
 
 namespace esvr::convert {
@@ -33,7 +32,7 @@ class VoxelPsnrSearch {
   /// \param smallEnough  bytes below which nothing further is tried
   VoxelCandidate run(std::uint64_t smallEnough) const {
     if (!trials_.hasRange()) return exactVoxels(job_);
-    auto plain = trials_.coarsestFor(psnr_, psnr_ / kDbPerOctave - 1.0, 0.0, kMaxTrials);
+    auto plain = trials_.nearestFor(psnr_);
     if (!plain) return exactVoxels(job_);
     const double bound = plain->bound;
     if (job_.options.previous) return predicted(std::move(*plain));

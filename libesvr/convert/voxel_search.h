@@ -39,14 +39,14 @@ struct VoxelsOfSize {
   /// Set if no voxels of the size have the wanted PSNR: the coarsest voxels that have it, with
   /// estimated bytes. Nothing was found then.
   std::optional<Candidate> tooLarge;
-  Decision plateau;      ///< as in a candidate
+  Decision plateau;      ///< whether the lattice contains the most frequent value
   double seconds = 0.0;  ///< wall-clock seconds of the whole search
 };
 
 /// The best quantised voxels found that add at most `bytes` to a file.
 /// \param least  PSNR over the box, dB, below which voxels are of no use. The coarsest voxels with
-///               it are tried first. If they are larger, nothing else is tried, because the voxels
-///               of the size are coarser
+///               this PSNR are tried first. If they are larger than `bytes`, the search ends: smaller
+///               voxels are coarser, and their PSNR is below `least`
 [[nodiscard]] VoxelsOfSize voxelsForSize(const Job& job, std::uint64_t bytes,
                                          double least = -std::numeric_limits<double>::infinity());
 

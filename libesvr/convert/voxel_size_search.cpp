@@ -28,7 +28,7 @@ struct SizedTrial {
 
 /// The coarsest voxels that reach a PSNR, without and with the plateau, where they were tried.
 struct CoarsestTrials {
-  double psnr = 0.0;  ///< of nearest codes, dB
+  double psnr = 0.0;  ///< PSNR if every voxel has the code nearest to it, dB
   std::optional<SizedTrial> without{}, with{};
 
   /// True if voxels of the size do not reach the PSNR, because they are coarser.
@@ -60,21 +60,27 @@ class VoxelSizeSearch {
  private:
   [[nodiscard]] CoarsestTrials coarsestFor(double psnr) const {
     if (job_.options.previous || !std::isfinite(psnr)) return {};
-    const auto plain = trials_.coarsestFor(psnr, psnr / kDbPerOctave - 1.0, 0.0, kMaxTrials);
+    auto plain = trials_.nearestFor(psnr);
     if (!plain) return {};
-    CoarsestTrials made{.psnr = plain->psnr, .without = tryBound(plain->bound)};
+    const double bound = plain->bound;
+    CoarsestTrials made{.psnr = plain->psnr, .without = tryCodes(bound, std::move(plain->layer))};
     if (!made.areTooLarge() || !trials_.isPlateau()) return made;
-    const double levels = trials_.fewestLevels(psnr, plain->bound);
+    const double levels = trials_.fewestLevels(psnr, bound);
     if (levels > 0.0) made.with = tryBound(trials_.boundOf(levels));
     return made;
   }
 
-  /// Voxels of a bound, which are given up where they are clearly larger than the size.
   [[nodiscard]] SizedTrial tryBound(double bound) const {
+    return tryCodes(bound, trials_.nearestAt(bound));
+  }
+
+  /// Makes the nearest codes within a bound thrifty, and gives them up where they are clearly larger
+  /// than the size.
+  [[nodiscard]] SizedTrial tryCodes(double bound, VoxelLayer nearest) const {
     ThriftOptions thrift = trials_.thriftOf(kPrice);
     const std::uint64_t codes = bytes_ - std::min(bytes_, besides_);
     thrift.mostBytes = std::uint64_t(kCodesBeyondSize * double(codes));
-    auto [layer, tooMany] = thriftyLayer(job_.input.source, trials_.nearestAt(bound), thrift);
+    auto [layer, tooMany] = thriftyLayer(job_.input.source, std::move(nearest), thrift);
     SizedTrial trial{.octave = trials_.octaveOf(bound)};
     if (tooMany) {
       trial.bytes = *tooMany + besides_;
@@ -122,7 +128,8 @@ class VoxelSizeSearch {
 
   const Job& job_;
   VoxelTrials trials_;
-  std::uint64_t bytes_, besides_;  ///< of the grid, and of the grid besides its voxels
+  std::uint64_t bytes_;    ///< The grid may add this many bytes to a file.
+  std::uint64_t besides_;  ///< The grid adds this many of them without its voxels.
 };
 
 }  // namespace

@@ -96,6 +96,10 @@ std::optional<Trial> VoxelTrials::coarsestFor(double psnr, double firstOctave, d
   return best;
 }
 
+std::optional<Trial> VoxelTrials::nearestFor(double psnr) const {
+  return coarsestFor(psnr, psnr / kDbPerOctave - 1.0, 0.0, kMaxTrials);
+}
+
 double VoxelTrials::fewestLevels(double psnr, double bound) const {
   const double from = levelsOf(bound) + 1.0;
   const double to = std::max(std::floor(0.5 * from), std::max(from - kMaxLevels, 1.0));

@@ -92,6 +92,9 @@ class VoxelTrials {
   [[nodiscard]] std::optional<Trial> coarsestFor(double psnr, double firstOctave, double price,
                                                  int maxTrials) const;
 
+  /// The same for the nearest codes.
+  [[nodiscard]] std::optional<Trial> nearestFor(double psnr) const;
+
   /// The smallest number of levels with which a lattice that has the plateau reaches a PSNR, near a
   /// bound that reaches it; 0 if there is none. The PSNR is not monotone in the number of levels,
   /// since there may be other plateaus.
