@@ -200,7 +200,7 @@ FULL_TABLES = """\
 - *encode s* of an ESVR row is the run time of the whole command `vdb2esvr --size` on the device that the row
   names. The other forms are encoded, and all forms are decoded, on the CPU of the same machine; these times are
   medians of three runs. ESVR files were made before the search for voxels was shortened
-  ([lab-notes.md](lab-notes.md#when-voxels-of-a-size-are-worth-coding)), which changes those with voxels by up to 0.05 dB.
+  ([lab-notes.md](lab-notes.md#when-voxels-of-a-size-are-worth-coding)), which changed those with voxels by up to 0.05 dB in six cases.
 - *image PSNR* and *FLIP* compare pictures of four views with pictures of the source. Pictures have 400 x 400
   pixels, the map viridis, linear opacity, and one voxel between samples. *FPS* is the number of pictures per
   second. *VRAM* is the device memory that drawing held. Voxels are drawn from NanoVDB grids; the rows of quantised
