@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <utility>
 
 #include "compare/baseline.h"
@@ -20,62 +21,98 @@ struct Pair {
   std::optional<std::size_t> candidate;
 };
 
-std::optional<std::size_t> counterpart(const GridFile& file, const std::string& uniqueName) {
-  const auto& grids = file.grids();
-  const auto it = std::find_if(grids.begin(), grids.end(), [&](const ListedGrid& grid) {
-    return grid.uniqueName == uniqueName;
-  });
-  if (it == grids.end()) return std::nullopt;
-  return std::size_t(it - grids.begin());
-}
-
-/// Pairs all grids of the reference, and records the grids that only the candidate has.
-std::vector<Pair> pairAll(const CheckOptions& options, const GridFile& reference,
-                          const GridFile& candidate, CheckRecord& record) {
-  std::vector<Pair> pairs;
-  const auto isIgnored = [&](const ListedGrid& grid) {
-    return options.ignored.contains(grid.uniqueName);
-  };
-  for (std::size_t g = 0; g < reference.grids().size(); ++g)
-    if (const ListedGrid& grid = reference.grids()[g]; !isIgnored(grid))
-      pairs.push_back({g, counterpart(candidate, grid.uniqueName)});
-  for (const auto& grid : candidate.grids())
-    if (!isIgnored(grid) && !counterpart(reference, grid.uniqueName)) {
-      record.extra.push_back(grid.uniqueName);
-      record.failures.push_back("grid \"" + grid.uniqueName + "\" is not in the reference");
+/// Grids that --ignore-grids names are left out. Where both files have the same number of grids of a name,
+/// it stands for the grids with this number in both; where the candidate has fewer, for that of the
+/// reference, whose other grids are then paired with those of the candidate.
+class Pairing {
+ public:
+  Pairing(const CheckOptions& options, const GridFile& reference, const GridFile& candidate)
+      : options_(options), reference_(reference), candidate_(candidate) {
+    std::vector<GridTraits> traits;
+    std::vector<std::size_t> places;
+    const auto counts = countsOf(reference), others = countsOf(candidate);
+    for (std::size_t g = 0; g < reference.grids().size(); ++g) {
+      const std::string& name = reference.grids()[g].name;
+      const auto other = others.find(name);
+      const bool isOneOfMany = other != others.end() && other->second != counts.at(name);
+      if (isOneOfMany && isIgnored(reference, g)) continue;
+      traits.push_back(reference.traits()[g]);
+      places.push_back(g);
     }
-  return pairs;
-}
+    of_.resize(reference.grids().size());
+    const auto pairs = pairGrids(traits, candidate.traits());
+    for (std::size_t p = 0; p < pairs.size(); ++p) of_[places[p]] = pairs[p];
+  }
+
+  /// The grid of the candidate that is the same as one of the reference.
+  [[nodiscard]] std::optional<std::size_t> of(std::size_t reference) const {
+    return of_[reference];
+  }
+
+  /// Pairs all grids of the reference, and records the grids that only the candidate has.
+  [[nodiscard]] std::vector<Pair> all(CheckRecord& record) const {
+    std::vector<Pair> pairs;
+    std::vector<bool> isPaired(candidate_.grids().size(), false);
+    for (std::size_t g = 0; g < reference_.grids().size(); ++g) {
+      if (of_[g]) isPaired[*of_[g]] = true;
+      if (!isIgnored(reference_, g)) pairs.push_back({g, of_[g]});
+    }
+    for (std::size_t g = 0; g < isPaired.size(); ++g) {
+      if (isPaired[g] || isIgnored(candidate_, g)) continue;
+      const std::string& name = candidate_.grids()[g].uniqueName;
+      record.extra.push_back(name);
+      record.failures.push_back("grid \"" + name + "\" is not in the reference");
+    }
+    return pairs;
+  }
+
+ private:
+  static std::map<std::string, std::size_t> countsOf(const GridFile& file) {
+    std::map<std::string, std::size_t> counts;
+    for (const ListedGrid& grid : file.grids()) ++counts[grid.name];
+    return counts;
+  }
+
+  [[nodiscard]] bool isIgnored(const GridFile& file, std::size_t grid) const {
+    return std::ranges::any_of(options_.ignored, [&](const std::string& name) {
+      return name == file.grids()[grid].name || file.names().lookUp(name) == NamedGrid{grid};
+    });
+  }
+
+  const CheckOptions& options_;
+  const GridFile &reference_, &candidate_;
+  std::vector<std::optional<std::size_t>> of_;  ///< by the place in the reference
+};
 
 /// Pairs a grid by "NAME" or "NAME=OTHER". If a grid's name contains "=", the whole text is a name.
-Pair pairNamed(const GridFile& reference, const GridFile& candidate, const std::string& wanted) {
-  const std::size_t split = counterpart(reference, wanted) ? std::string::npos : wanted.find('=');
-  const std::string name = wanted.substr(0, split);
-  const std::string other = split == std::string::npos ? wanted : wanted.substr(split + 1);
-  return {reference.find(name), candidate.find(other)};
+Pair pairNamed(const GridFile& reference, const GridFile& candidate, const Pairing& pairing,
+               const std::string& wanted) {
+  const bool isWhole = reference.names().lookUp(wanted).has_value();
+  const std::size_t split = isWhole ? std::string::npos : wanted.find('=');
+  const std::size_t place = reference.find(wanted.substr(0, split));
+  if (split != std::string::npos) return {place, candidate.find(wanted.substr(split + 1))};
+  const auto same = pairing.of(place);
+  return {place, same ? *same : candidate.find(wanted)};
 }
 
 std::vector<Pair> choosePairs(const CheckOptions& options, const GridFile& reference,
                               const GridFile& candidate, CheckRecord& record) {
-  if (options.grids.empty()) return pairAll(options, reference, candidate, record);
+  const Pairing pairing(options, reference, candidate);
+  if (options.grids.empty()) return pairing.all(record);
   std::vector<Pair> pairs;
-  for (const auto& wanted : options.grids) pairs.push_back(pairNamed(reference, candidate, wanted));
+  for (const auto& wanted : options.grids)
+    pairs.push_back(pairNamed(reference, candidate, pairing, wanted));
   return pairs;
-}
-
-std::string joinedNames(const GridFile& file) {
-  std::string list;
-  for (const auto& grid : file.grids())
-    list += (list.empty() ? "\"" : ", \"") + grid.uniqueName + '"';
-  return list.empty() ? "none" : list;
 }
 
 void requirePairs(const std::vector<Pair>& pairs, const GridFile& reference,
                   const GridFile& candidate) {
+  // A file without grids is the first frame of many simulations, and compares like any other.
+  if (reference.grids().empty() || candidate.grids().empty()) return;
   if (pairs.empty()) throw BadInput(reference.path().string() + ": no grid can be compared");
   if (std::none_of(pairs.begin(), pairs.end(), [](const Pair& p) { return p.candidate; }))
-    throw BadInput("no grid of " + reference.path().string() + " (" + joinedNames(reference) +
-                   ") is in " + candidate.path().string() + " (" + joinedNames(candidate) + ")");
+    throw BadInput("no grid of " + reference.path().string() + " (" + reference.names().list() +
+                   ") is in " + candidate.path().string() + " (" + candidate.names().list() + ")");
 }
 
 /// \throws BadInput  nothing could be compared
@@ -155,7 +192,8 @@ class Comparison {
     addTemporal(record.grids.back(), lengths, magnitudeOf(b.components));
     for (std::size_t c = 0; c < kComponents; ++c) {
       const VolumeMetrics& m = metrics.components[c];
-      record.grids.push_back({componentName(name, c), componentName(other, c), m, figuresOf(m),
+      record.grids.push_back({reference_.names().ofComponent(pair.reference, c),
+                              candidate_.names().ofComponent(*pair.candidate, c), m, figuresOf(m),
                               backgroundDifferences(a, b, c)});
       addRange(a.components[c]);
       addTemporal(record.grids.back(), a.components[c], b.components[c]);
@@ -223,6 +261,8 @@ CheckRecord compareFiles(const CheckOptions& options, const FilePair& files,
   CheckRecord record;
   record.candidateBytes = files.candidate.bytes();
   const auto pairs = choosePairs(options, files.reference, files.candidate, record);
+  if (files.reference.grids().empty() && files.candidate.grids().empty())
+    record.same.emplace_back("no grid in either file");
   requirePairs(pairs, files.reference, files.candidate);
   record.fileDifferences = compareMetadata(files.reference.metadata(), files.candidate.metadata(),
                                            std::array<std::string, 1>{kWriterKey});

@@ -63,7 +63,8 @@ std::map<std::string, const MetaItem*> byName(std::span<const MetaItem> items) {
 }
 
 Difference metadataDifference(const std::string& name, const std::string& how) {
-  return {DifferenceKind::kMetadata, "metadata \"" + name + "\": " + how};
+  return {DifferenceKind::kMetadata,
+          "metadata \"" + shownText(name, LineEnds::kReplace) + "\": " + how};
 }
 
 }  // namespace

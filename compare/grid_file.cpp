@@ -5,16 +5,9 @@
 #include "cli/names.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
 
 namespace esvr::compare {
 namespace {
-
-std::vector<std::string> storedNames(const std::vector<ListedGrid>& grids) {
-  std::vector<std::string> names;
-  for (const auto& grid : grids) names.push_back(grid.name);
-  return names;
-}
 
 ListedGrid listedGrid(const StoredGrid& grid) {
   return {.name = grid.descriptor.name,
@@ -70,8 +63,15 @@ void GridFile::listEsvr() {
     grids_.push_back(listedGrid(*esvr_, grid));
     grids_.back().ofEsvr = grid;
   }
-  const auto unique = uniqueNames(storedNames(grids_));
-  for (std::size_t g = 0; g < grids_.size(); ++g) grids_[g].uniqueName = unique[g];
+  traits_ = cli::traitsOf(*esvr_);
+  nameGrids();
+}
+
+void GridFile::nameGrids() {
+  std::vector<std::string> names;
+  for (const auto& grid : grids_) names.push_back(grid.name);
+  names_.emplace(std::move(names));
+  for (std::size_t g = 0; g < grids_.size(); ++g) grids_[g].uniqueName = names_->unique(g);
 }
 
 void GridFile::listVdb() {
@@ -80,18 +80,17 @@ void GridFile::listVdb() {
   metadata_ = std::move(summary.metadata);
   for (const auto& grid : summary.grids) {
     grids_.push_back({.name = grid.name,
-                      .uniqueName = grid.uniqueName,
                       .comparable = grid.isScalar,
                       .empty = grid.activeVoxels == 0,
                       .valueType = grid.valueType,
                       .isVector = grid.isVector});
     whyNoBytes_.push_back(grid.whyNotCarried);
   }
+  traits_ = cli::traitsOf(summary);
+  nameGrids();
 }
 
-std::size_t GridFile::find(const std::string& name) const {
-  return findGrid(storedNames(grids_), name, path_);
-}
+std::size_t GridFile::find(const std::string& name) const { return names_->findWhole(name, path_); }
 
 std::size_t GridFile::firstWithVoxels() const {
   for (std::size_t g = 0; g < grids_.size(); ++g)
@@ -111,7 +110,7 @@ std::optional<CarriedGrid> GridFile::bytesOf(std::size_t g) const {
 VolumeGrid GridFile::read(std::size_t g) const {
   const ReadOptions options{
       .allowEmpty = true, .maxBytes = memory_.maxBytes, .memory = memory_.voxels};
-  if (!esvr_) return readGrid(path_, grids_[g].uniqueName, options);
+  if (!esvr_) return readGrid(path_, g, options);
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readGrid(esvr_->carried[place.index], options);
   VolumeGrid grid;
@@ -123,7 +122,7 @@ VolumeGrid GridFile::read(std::size_t g) const {
 
 VectorGrid GridFile::readVectors(std::size_t g) const {
   const ReadOptions options{.maxBytes = memory_.maxBytes, .memory = memory_.voxels};
-  if (!esvr_) return readVector(path_, grids_[g].uniqueName, options);
+  if (!esvr_) return readVector(path_, g, options);
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readVector(esvr_->carried[place.index], options);
   const StoredVector& vector = esvr_->vectors.at(place.index);

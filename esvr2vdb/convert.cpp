@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "cli/interrupts.h"
+#include "cli/names.h"
 #include "cli/output.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
@@ -50,7 +51,7 @@ const char* whyNot(const GridOfFile& grid, const Options& options) {
 void restrictToNamed(const Options& options, ReadPart& wanted) {
   wanted.grids.emplace();
   const EsvrFile file = readEsvrPart(options.input, wanted).file;
-  for (const auto& [grid, name] : chooseGrids(options.input, file, options.grids)) {
+  for (const auto& [grid, name, place] : chooseGrids(options.input, file, options.grids)) {
     if (grid.isCarried) {
       wanted.carriedBytes = true;
       continue;
@@ -76,11 +77,11 @@ EsvrFile read(const Options& options, const cli::Log& log) {
 
 /// The chosen grids that the output can hold. Says which of them are left out.
 /// \throws UsageError  a grid that it cannot hold is named
-/// \throws BadInput  no grid is left
-std::vector<NamedGrid> writable(const std::vector<NamedGrid>& chosen, const Options& options,
-                                const cli::Log& log) {
-  std::vector<NamedGrid> kept;
-  for (const NamedGrid& grid : chosen) {
+/// \throws BadInput  no grid is left, or the file has none and the output needs one
+std::vector<ListedGrid> writable(const std::vector<ListedGrid>& chosen, const Options& options,
+                                 const cli::Log& log) {
+  std::vector<ListedGrid> kept;
+  for (const ListedGrid& grid : chosen) {
     const char* why = whyNot(grid.grid, options);
     if (!why) {
       kept.push_back(grid);
@@ -93,6 +94,9 @@ std::vector<NamedGrid> writable(const std::vector<NamedGrid>& chosen, const Opti
   }
   if (kept.empty() && !chosen.empty())
     throw BadInput(options.input.string() + ": no grid is left to write");
+  if (kept.empty() && writesNano(options))
+    throw BadInput(options.input.string() +
+                   " has no grid, and a .nvdb file cannot be without one; write a .vdb file");
   return kept;
 }
 
@@ -149,7 +153,8 @@ const GridDescriptor& descriptorOf(const DecodedGrid& grid) {
 
 void tellEmpty(const DecodedGrid& grid, const cli::Log& log) {
   if (activeVoxelsOf(grid) == 0)
-    log.warning("grid \"" + descriptorOf(grid).name + "\" comes back without an active voxel");
+    log.warning("grid \"" + shownName(descriptorOf(grid).name) +
+                "\" comes back without an active voxel");
 }
 
 DecodedGrid decoded(const EsvrFile& file, const GridOfFile& grid, const Options& options,
@@ -159,13 +164,13 @@ DecodedGrid decoded(const EsvrFile& file, const GridOfFile& grid, const Options&
 }
 
 /// The grids that are not carried, in order.
-std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<NamedGrid>& chosen,
+std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
                                    const Options& options, const cli::Log& log) {
   std::vector<DecodedGrid> grids;
   DecodeOptions decode = options.decode;
   decode.maxBytes = options.memory.maxBytes;
   decode.memory = options.memory.voxels;
-  for (const NamedGrid& named : chosen) {
+  for (const ListedGrid& named : chosen) {
     if (named.grid.isCarried) continue;
     grids.push_back(decoded(file, named.grid, options, decode));
     tellEmpty(grids.back(), log);
@@ -176,11 +181,11 @@ std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<Named
 }
 
 /// All chosen grids in order. \param decoded  those that are not carried
-std::vector<GridToWrite> inOrder(const EsvrFile& file, const std::vector<NamedGrid>& chosen,
+std::vector<GridToWrite> inOrder(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
                                  const std::vector<DecodedGrid>& decoded) {
   std::vector<GridToWrite> all;
   auto next = decoded.begin();
-  for (const auto& [grid, name] : chosen)
+  for (const auto& [grid, name, place] : chosen)
     if (grid.isCarried)
       all.emplace_back(&file.carried[grid.index]);
     else
@@ -199,24 +204,22 @@ void tellLostMetadata(const EsvrFile& file, const std::vector<DecodedGrid>& grid
               std::to_string(items) + " items");
 }
 
-/// The names of the chosen grids in the output.
-std::vector<std::string> writtenNames(const EsvrFile& file, const std::vector<NamedGrid>& chosen) {
-  std::vector<std::string> names;
-  for (const auto& [grid, name] : chosen) names.push_back(nameOf(file, grid));
-  return uniqueNames(names);
-}
-
-/// Finds each grid that is not carried in the reference, before anything is written.
-std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<NamedGrid>& chosen,
+/// Finds each grid that is not carried in the reference, before anything is written. The file may lack
+/// grids of the reference that share a name with others.
+std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
                                        const Options& options) {
-  const auto written = writtenNames(file, chosen);
-  std::vector<std::string> referenceNames;
-  for (const auto& grid : inspectVdb(*options.reference).grids) referenceNames.push_back(grid.name);
+  const auto references = cli::traitsOf(inspectVdb(*options.reference));
+  const auto pairs = pairGrids(cli::traitsOf(file), references);
+  std::vector<std::string> names;
+  for (const GridTraits& reference : references) names.push_back(reference.name);
+  const GridNames ofReference(std::move(names));
   std::vector<ComparedGrid> grids;
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    if (chosen[i].grid.isCarried) continue;
-    (void)findGrid(referenceNames, chosen[i].name, *options.reference);
-    grids.push_back({chosen[i].name, written[i], chosen[i].grid.isVector});
+  for (std::size_t written = 0; written < chosen.size(); ++written) {
+    const auto& [grid, name, place] = chosen[written];
+    if (grid.isCarried) continue;
+    const std::size_t reference =
+        pairs[place] ? *pairs[place] : ofReference.findWhole(name, *options.reference);
+    grids.push_back({name, reference, written, grid.isVector});
   }
   return grids;
 }

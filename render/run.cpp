@@ -63,11 +63,15 @@ SceneFile sceneFile(const Options& options, const fs::path& path) {
 }
 
 /// The drawing of --ref. If the input is a VDB file, --values applies to the input alone.
-std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings& settings) {
+/// \param drawn  the grid of the input, which is also drawn of the reference if it has a grid of this name
+std::unique_ptr<Drawing> referenceOf(const Options& options, const std::string& drawn,
+                                     const DrawSettings& settings) {
   if (options.reference.empty()) return nullptr;
   DrawSettings own = settings;
   if (options.input.extension() != ".esvr") own.values.reset();
-  return std::make_unique<Drawing>(readScenes(sceneFile(options, options.reference)), own);
+  SceneFile file = sceneFile(options, options.reference);
+  if (!file.grid) file.preferred = drawn;
+  return std::make_unique<Drawing>(readScenes(file), own);
 }
 
 std::string summary(const fs::path& file, const std::vector<Scene>& scenes, Resolution r,
@@ -287,7 +291,7 @@ void run(const Options& options) {
   auto scenes = readScenes(sceneFile(options, options.input));
   RenderOptions r = renderOptions(options, scenes);
   Drawing drawing(std::move(scenes), settings);
-  const auto reference = referenceOf(options, settings);
+  const auto reference = referenceOf(options, drawing.scenes.front().grid, settings);
   r.cancel = &interrupts.token();
   saveTransfer(options, r.transfer);
   auto report = reportHead(options, settings.device);

@@ -70,6 +70,8 @@ ByteShares::ByteShares(const Options& options, const VdbSummary& input,
                        const std::vector<FittedGrid>& grids, const Twins& twins,
                        const std::vector<CarriedGrid>& carried)
     : left_(sizeOf(options, input)), shares_(grids.size()) {
+  // A file without grids has nothing to divide, and no option makes it smaller.
+  if (input.grids.empty()) left_.reset();
   if (!left_) return;
   *left_ -= bytesOfAll({input, grids, carried}, *left_);
   for (std::size_t g = 0; g < grids.size(); ++g) {

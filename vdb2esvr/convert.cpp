@@ -8,7 +8,6 @@
 #include "cli/stopwatch.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
 #include "esvr/psnr_between.h"
 #include "vdb2esvr/source.h"
 
@@ -23,14 +22,15 @@ void convertByPaper(const Options& options, const VolumeGrid& source, ConvertedG
   grid.paper = std::move(made.record);
 }
 
-/// The same grid of the previous frame; null if there is none.
-const StoredGrid* previousOf(const Options& options, const std::string& uniqueName) {
+/// The same grid of the previous frame, which is the one with its number among those that are stored by
+/// its name; null if there is none.
+const StoredGrid* previousOf(const Options& options, const FittedGrid& fitted) {
   if (!options.previous) return nullptr;
-  std::vector<std::string> names;
-  for (const StoredGrid& grid : options.previous->grids) names.push_back(grid.descriptor.name);
-  names = uniqueNames(names);
-  const auto at = std::ranges::find(names, uniqueName);
-  return at == names.end() ? nullptr : &options.previous->grids[std::size_t(at - names.begin())];
+  const std::string name = fitted.storedName();
+  std::size_t before = 0;
+  for (const StoredGrid& grid : options.previous->grids)
+    if (grid.descriptor.name == name && before++ == fitted.number) return &grid;
+  return nullptr;
 }
 
 /// What a grid is converted to.
@@ -83,9 +83,9 @@ std::optional<SurfaceErrors> surfaceErrors(const VolumeGrid& source, const Volum
 /// A converted grid that has its names only.
 ConvertedGrid named(const FittedGrid& fitted) {
   ConvertedGrid grid;
-  grid.uniqueName = fitted.uniqueName();
+  grid.uniqueName = fitted.uniqueName;
   grid.sourceName = fitted.source.uniqueName;
-  grid.component = fitted.component;
+  grid.id = fitted.id();
   return grid;
 }
 
@@ -106,8 +106,7 @@ ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
   grid.seconds.read = watch.lap();
 
   grid.device = deviceName(fit.device);
-  convert(options, source, {bytes, expected ? expected : previousOf(options, grid.uniqueName)},
-          grid);
+  convert(options, source, {bytes, expected ? expected : previousOf(options, fitted)}, grid);
   grid.seconds.seed = grid.conversion.fit.secondsSeed;
   grid.seconds.optimise = grid.conversion.fit.secondsOptimise;
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
@@ -128,11 +127,12 @@ ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
 
 ConvertedGrid twinOf(const ConvertedGrid& grid, const FittedGrid& fitted, const Twin& twin) {
   ConvertedGrid made = grid;
-  made.uniqueName = fitted.uniqueName();
+  made.uniqueName = fitted.uniqueName;
   made.sourceName = fitted.source.uniqueName;
-  made.component = fitted.component;
+  made.id = fitted.id();
   made.conversion.grid.descriptor = twin.descriptor;
   made.nonFiniteReplaced = twin.nonFiniteReplaced;
+  made.twinOf = grid.id;
   made.sameAs = grid.uniqueName;
   made.seconds = {.read = twin.secondsRead};
   return made;

@@ -45,9 +45,9 @@ std::uint64_t sharedMemoryOf(const Device& device, const Options& options) {
 }
 
 /// The memory that the conversion of a file may take, bytes.
-std::uint64_t memoryOf(const Options& options) {
+std::uint64_t memoryOf(Options options) {
   const VdbSummary file = inspectVdb(options.input);
-  return conversionMemory(file, chooseGrids(options.input, file, options.grids));
+  return conversionMemory(file, chooseFor(options, file));
 }
 
 }  // namespace

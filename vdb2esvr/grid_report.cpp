@@ -184,8 +184,8 @@ Json stabilityOf(const StoredGrid& grid) {
 Json gridJson(const RunRecord& record, std::size_t g) {
   const ConvertedGrid& grid = record.grids[g];
   return {{"name", grid.uniqueName},
-          {"component_of", grid.component ? Json(grid.sourceName) : Json(nullptr)},
-          {"same_as", orNull(grid.sameAs)},
+          {"component_of", grid.id.component ? Json(grid.sourceName) : Json(nullptr)},
+          {"same_as", grid.twinOf ? Json(grid.sameAs) : Json(nullptr)},
           {"shared", sharedOf(grid)},
           {"source", sourceOf(grid)},
           {"ellipsoids", grid.stored().field.ellipsoidCount()},

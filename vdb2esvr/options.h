@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,7 @@ enum class OnCancel { kKeep, kDiscard };
 struct WantedSharing {
   bool isOn = true;
   std::vector<std::string> names;  ///< empty: all grids
+  std::set<std::size_t> places{};  ///< of the named grids in the input (resolveNames)
 };
 
 struct Options {

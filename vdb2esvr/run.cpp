@@ -52,6 +52,8 @@ void tellDevices(const std::vector<Device>& devices, const Options& options, con
 
 void tellNothingFitted(const GridChoice& choice, const cli::Log& log) {
   if (!choice.fitted.empty()) return;
+  if (choice.carried.empty())
+    return log.warning("the file has no grid; the output has its metadata only");
   log.warning("no grid is fitted; the output has carried grids only",
               std::to_string(choice.carried.size()) + " of " +
                   std::to_string(choice.carried.size() + choice.skipped.size()) +
@@ -97,11 +99,11 @@ class FileConversion {
     ByteShares shares(options_, record.input, grids, twins, carried);
     for (std::size_t g = 0; g < grids.size(); ++g) {
       if (cancelled())
-        record.notFitted.push_back(grids[g].uniqueName());
+        record.notFitted.push_back(grids[g].uniqueName);
       else if (const auto twin = twins.find(g); twin != twins.end())
         record.grids.push_back(twinOf(record.grids[twin->second.of], grids[g], twin->second));
       else if (!convert(g, grids[g], shares, record))
-        record.notFitted.push_back(grids[g].uniqueName());
+        record.notFitted.push_back(grids[g].uniqueName);
     }
     collectVectors(record);
     record.interrupted = cancelled();
@@ -126,7 +128,7 @@ class FileConversion {
 
   /// \return false if the run was interrupted before the fit had a result
   bool convert(std::size_t g, const FittedGrid& fitted, ByteShares& shares, RunRecord& record) try {
-    ProgressBar bar(fitted.uniqueName(), options_.progress, options_.verbosity);
+    ProgressBar bar(fitted.uniqueName, options_.progress, options_.verbosity);
     options_.convert.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
     record.grids.push_back(convertToShare(g, fitted, shares));
     return true;
@@ -171,13 +173,10 @@ class FileConversion {
 
 /// Gives the carried grids their places among those that the file holds.
 void placeCarried(const RunRecord& record, std::vector<CarriedGrid>& carried) {
-  const auto& names = record.input.grids;
-  std::size_t source = 0, converted = 0;
+  std::size_t converted = 0;
   for (std::size_t c = 0; c < carried.size(); ++c) {
-    for (; source < carried[c].place; ++source)
-      while (converted < record.grids.size() &&
-             names[source].uniqueName == record.grids[converted].sourceName)
-        ++converted;
+    while (converted < record.grids.size() && record.grids[converted].id.place < carried[c].place)
+      ++converted;
     carried[c].place = std::uint32_t(converted + c);
   }
 }
@@ -277,6 +276,12 @@ bool mayFit(const Options& options) {
          options.convert.representation != Representation::kVoxels;
 }
 
+GridChoice chooseFor(Options& options, const VdbSummary& input) {
+  if (input.grids.empty() && options.sequence) return {};
+  resolveNames(input, options);
+  return chooseGrids(options.input, input, options.grids);
+}
+
 StoreFile writingTo(const Options& options) {
   return [&options](const EsvrFile& file) {
     writeEsvr(options.output, file, {.overwrite = options.overwrite});
@@ -293,8 +298,7 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   auto devices = std::async(std::launch::async, [&] { return devicesFor(given, ranks); });
   record.input = inspectVdb(given.input);
   Options options = given;
-  resolveNames(record.input, options);
-  GridChoice choice = chooseGrids(options.input, record.input, options.grids);
+  GridChoice choice = chooseFor(options, record.input);
   tellNothingFitted(choice, log);
   std::vector<CarriedGrid> carried = readUnchanged(options, choice.carried);
   record.carried = std::move(choice.carried);

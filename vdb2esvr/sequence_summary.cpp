@@ -18,8 +18,8 @@ std::string stateOf(const SequenceRecord& record, const FrameRecord& frame) {
   return "held from " + std::to_string(record.frames[*frame.frame.holds].frame.number);
 }
 
-/// True for a frame that this run converted.
-bool hasFigures(const FrameRecord& frame) { return !frame.grids.empty() || !frame.carried.empty(); }
+/// True for a frame that this run converted, which may have no grid.
+bool hasFigures(const FrameRecord& frame) { return frame.bytesIn > 0; }
 
 /// The smallest value of the fitted grids of a frame as text.
 std::string lowest(const FrameRecord& frame, double FrameGrid::*psnr) {

@@ -5,9 +5,8 @@
 namespace esvr::vdb2esvr {
 
 VolumeGrid readSource(const Options& options, const FittedGrid& grid) {
-  const std::string& name = grid.source.uniqueName;
-  return grid.component ? readComponent(options.input, name, *grid.component, options.read)
-                        : readGrid(options.input, name, options.read);
+  return grid.component ? readComponent(options.input, grid.place, *grid.component, options.read)
+                        : readGrid(options.input, grid.place, options.read);
 }
 
 void findPeaks(const Options& options, std::vector<FittedGrid>& grids) {
@@ -15,8 +14,7 @@ void findPeaks(const Options& options, std::vector<FittedGrid>& grids) {
     if (!grids[g].component) continue;
     grids[g].peak =
         grids[g].component == std::size_t{0}
-            ? peakOfVectors(
-                  readVector(options.input, grids[g].source.uniqueName, options.read).components)
+            ? peakOfVectors(readVector(options.input, grids[g].place, options.read).components)
             : grids[g - 1].peak;
   }
 }

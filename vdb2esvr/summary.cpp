@@ -87,18 +87,18 @@ void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& 
   if (grid.psnrBetween)
     out << cli::printable(grid.uniqueName) << ": the sum between voxels has "
         << cli::decibels(*grid.psnrBetween) << " dB\n";
-  if (!grid.sameAs) {
+  if (!grid.twinOf) {
     printRemark(grid, out);
     return printChoice(grid, out);
   }
-  out << cli::printable(grid.uniqueName) << ": stored once with " << cli::printable(*grid.sameAs)
+  out << cli::printable(grid.uniqueName) << ": stored once with " << cli::printable(grid.sameAs)
       << ", which has the same voxels\n";
 }
 
 /// Says which grids the voxels of others refer to, and what that saved.
 void printShared(const RunRecord& record, std::ostream& out) {
   for (const ConvertedGrid& grid : record.grids)
-    if (grid.shared && !grid.shared->with.empty() && !grid.sameAs)
+    if (grid.shared && !grid.shared->with.empty() && !grid.twinOf)
       out << cli::printable(grid.uniqueName) << ": refers to " << cli::printable(grid.shared->with)
           << ", with " << grid.shared->bytesWith << " bytes rather than "
           << grid.shared->bytesWithout << '\n';
@@ -121,7 +121,7 @@ void printFitted(const Options& options, const RunRecord& record, std::ostream& 
   }
   table.print(out);
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
-    if (!record.grids[g].sameAs) {
+    if (!record.grids[g].twinOf) {
       printTopology(record, g, out);
       printOverlap(options, record.grids[g], out);
     }

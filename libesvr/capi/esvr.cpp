@@ -13,6 +13,7 @@
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "esvr/sparse_volume.h"
 #include "field/voxel_rule.h"
 
@@ -180,7 +181,7 @@ std::vector<Place> placesOf(const double* places, std::size_t count) {
 
 void evaluate(const StoredGrid& grid, std::span<const Place> places, std::span<float> values) {
   if (!followsFromEllipsoids(grid))
-    throw UsageError("grid '" + grid.descriptor.name +
+    throw UsageError("grid '" + shownName(grid.descriptor.name) +
                      "' is not the sum of ellipsoids alone, and can only be decoded to voxels");
   evaluatePlaces(grid.field, places, values);
   const VoxelRule rule = makeVoxelRule(grid.field.background, voxelRule(grid));

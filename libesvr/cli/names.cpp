@@ -48,6 +48,41 @@ std::string activeVoxelsOf(const GridSummary& grid) {
   return grid.isScalar || grid.activeVoxels > 0 ? std::to_string(grid.activeVoxels) : "-";
 }
 
+namespace {
+
+GridTraits traitsOf(const GridSummary& grid) {
+  return {grid.name, grid.valueType, grid.gridClass, grid.activeVoxels, grid.activeBox};
+}
+
+/// The traits of the grid of a .vdb file that is stored so.
+GridTraits traitsOf(const EsvrFile& file, const GridOfFile& grid) {
+  if (grid.isCarried) {
+    const CarriedGrid& carried = file.carried[grid.index];
+    if (carried.bytes.empty()) return {.name = carried.name};  // they were not read
+    return traitsOf(inspectCarried(carried));
+  }
+  const StoredGrid& first = file.grids[grid.isVector ? file.vectors[grid.index].first : grid.index];
+  const bool isDouble = first.descriptor.valueType == ValueType::kDouble;
+  GridTraits traits{nameOf(file, grid), isDouble ? "double" : "float", first.descriptor.gridClass,
+                    first.activeVoxels, first.activeBox};
+  if (grid.isVector) traits.valueType = isDouble ? "vec3d" : "vec3s";
+  return traits;
+}
+
+}  // namespace
+
+std::vector<GridTraits> traitsOf(const VdbSummary& file) {
+  std::vector<GridTraits> traits;
+  for (const GridSummary& grid : file.grids) traits.push_back(traitsOf(grid));
+  return traits;
+}
+
+std::vector<GridTraits> traitsOf(const EsvrFile& file) {
+  std::vector<GridTraits> traits;
+  for (const GridOfFile& grid : gridsInOrder(file)) traits.push_back(traitsOf(file, grid));
+  return traits;
+}
+
 std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid) {
   std::uint64_t bytes = 0;
   for (const auto& section : file.sections)

@@ -2,9 +2,11 @@
 /// Names of the enumerations that files hold.
 
 #include <string>
+#include <vector>
 
 #include "esvr/container.h"
 #include "esvr/grid_descriptor.h"
+#include "esvr/grid_names.h"
 #include "esvr/kernel.h"
 #include "esvr/vdb_io.h"
 
@@ -26,6 +28,10 @@ namespace esvr::cli {
 /// The number of its active voxels; "-" if the grid is of a type that is not counted, and the
 /// writer did not store the number.
 [[nodiscard]] std::string activeVoxelsOf(const GridSummary& grid);
+
+/// What tells the grids of a file apart from others of their names (pairGrids), in the order of the file.
+[[nodiscard]] std::vector<GridTraits> traitsOf(const VdbSummary& file);
+[[nodiscard]] std::vector<GridTraits> traitsOf(const EsvrFile& file);
 
 /// Bytes of the sections of a grid, whether it shares them with other grids or not.
 [[nodiscard]] std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid);

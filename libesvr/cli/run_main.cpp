@@ -21,7 +21,7 @@ int runAndFlush(const std::function<int()>& body) {
 
 int runMain(const std::string& program, const std::function<int()>& body) {
   const auto complain = [&](const std::string& text) {
-    std::cerr << program << ": " << printable(text) << '\n';
+    std::cerr << program << ": " << printableMessage(text) << '\n';
   };
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes then gives an error, not a signal
   try {

@@ -8,6 +8,7 @@
 #include "compact/measure_layers.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "esvr/metrics.h"
 
 namespace esvr {
@@ -54,7 +55,7 @@ bool missedByReader(const StoredGrid& grid, const SparseVolume& source,
 void requireOneKappa(const StoredGrid& grid) {
   for (const auto& chunk : grid.field.chunks)
     if (!chunk.ellipsoids.kappa.empty())
-      throw RuntimeFailure("cannot quantise grid '" + grid.descriptor.name +
+      throw RuntimeFailure("cannot quantise grid '" + shownName(grid.descriptor.name) +
                            "': its ellipsoids have kappas of their own");
 }
 

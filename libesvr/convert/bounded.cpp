@@ -12,6 +12,7 @@
 #include "core/add_seconds.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "esvr/metrics.h"
 #include "esvr/residual.h"
 
@@ -153,7 +154,7 @@ std::optional<double> boundOf(const Goal& goal, const SparseVolume& source) {
 Conversion convertLossless(const Job& job) {
   if (job.input.descriptor.valueType == ValueType::kDouble)
     throw UsageError(
-        "grid '" + job.input.descriptor.name +
+        "grid '" + shownName(job.input.descriptor.name) +
         "' has values of type double, which are read as float32; a lossless file cannot hold them");
   return asVoxels(job, exactLayer(job.input.source));
 }
@@ -170,7 +171,7 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   best.choice.voxels = Candidate{bytesAdded(best.conversion.grid)};
   if (job.options.representation != Representation::kVoxels) tryTimed(job, bound, best);
   if (insists && !best.hasEllipsoids())
-    throw UsageError("grid '" + job.input.descriptor.name +
+    throw UsageError("grid '" + shownName(job.input.descriptor.name) +
                      "' has no ellipsoids with a residual that keep the bound");
   best.record();
   return std::move(best.conversion);

@@ -13,6 +13,7 @@
 #include "convert/unless_cancelled.h"
 #include "core/add_seconds.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 
 namespace esvr::convert {
 namespace {
@@ -63,8 +64,8 @@ void recordRejected(const Decision& plateau, const ChoiceRecord& choice, Convers
 }
 
 UsageError tooSmall(const Job& job, std::uint64_t bytes, const std::string& needs) {
-  return UsageError("grid '" + job.input.descriptor.name + "' " + needs + "; the size allows " +
-                    std::to_string(bytes));
+  return UsageError("grid '" + shownName(job.input.descriptor.name) + "' " + needs +
+                    "; the size allows " + std::to_string(bytes));
 }
 
 UsageError tooSmall(const Job& job, std::uint64_t bytes, std::uint64_t needed) {

@@ -14,6 +14,7 @@
 #include "esvr/error.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "esvr/metrics.h"
 #include "format/mask_section.h"
 
@@ -91,7 +92,7 @@ StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
 void requireBound(const ConvertInput& input, const SparseVolume& decoded, double bound) {
   const double error = largestDifference(input.source, decoded);
   if (error > bound)
-    throw RuntimeFailure("grid '" + input.descriptor.name + "': an error of " +
+    throw RuntimeFailure("grid '" + shownName(input.descriptor.name) + "': an error of " +
                          std::to_string(error) + " exceeds the bound of " + std::to_string(bound));
 }
 
@@ -118,7 +119,8 @@ void requirePossible(const ConvertOptions& options) {
 }
 
 [[noreturn]] void refuseSums(const ConvertInput& input, Coord tooLarge) {
-  throw BadInput("grid '" + input.descriptor.name + "': the value at " + toString(tooLarge) +
+  throw BadInput("grid '" + shownName(input.descriptor.name) + "': the value at " +
+                 toString(tooLarge) +
                  " is too large for a sum of ellipsoids in float32; store voxels, with a PSNR, a "
                  "size, a bound or lossless");
 }
@@ -215,7 +217,7 @@ PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions&
         "a k for each ellipsoid needs float32 storage; compact storage has one edge for all");
   if (isNarrowBand(input.descriptor, input.source))
     throw UsageError(
-        "grid '" + input.descriptor.name +
+        "grid '" + shownName(input.descriptor.name) +
         "' is a level set; the paper's method cannot fit it, because its loss compares windows "
         "that a narrow band does not fill");
   if (const auto tooLarge = convert::tooLargeForSums(input.source)) refuseSums(input, *tooLarge);

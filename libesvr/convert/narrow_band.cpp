@@ -8,6 +8,7 @@
 #include "convert/exact_voxels.h"
 #include "esvr/empty_signs.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "esvr/residual.h"
 #include "esvr/sign_errors.h"
 
@@ -72,7 +73,7 @@ Conversion bandToSize(const Job& job, std::uint64_t bytes, const ConvertTo& conv
   const bool mayBeVoxels = mayStoreVoxels(job);
   if (mayBeVoxels)
     if (auto voxels = bandAsVoxelsOfSize(job, convertTo)) return std::move(*voxels);
-  throw UsageError("grid '" + job.input.descriptor.name +
+  throw UsageError("grid '" + shownName(job.input.descriptor.name) +
                    "': ellipsoids and the residual that corrects the signs of the level set do not "
                    "fit into " +
                    std::to_string(bytes) + " bytes" + (mayBeVoxels ? ", and voxels neither" : ""));
@@ -96,7 +97,7 @@ Conversion convertNarrowBand(const Job& job, const ConvertTo& convertTo) {
 
 void requireSigns(const ConvertInput& input, const SparseVolume& decoded) {
   const SignErrors errors = compareSigns(input.source, decoded);
-  const std::string grid = "grid '" + input.descriptor.name + "': ";
+  const std::string grid = "grid '" + shownName(input.descriptor.name) + "': ";
   if (errors.first)
     throw RuntimeFailure(grid + std::to_string(errors.voxels) +
                          " voxels are on the wrong side of the surface, for example voxel " +

@@ -2,6 +2,7 @@
 
 #include "esvr/container.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "format/byte_source.h"
 #include "format/packed_sections.h"
 
@@ -23,7 +24,7 @@ void noteSkipped(const SectionTable& table, std::vector<std::string>& notes) {
 }
 
 void noteGrid(const StoredGrid& grid, std::vector<std::string>& notes) {
-  const std::string name = "grid '" + grid.descriptor.name + "'";
+  const std::string name = "grid '" + shownName(grid.descriptor.name) + "'";
   if (grid.field.ellipsoidCount() == 0)
     notes.push_back(name +
                     (grid.voxels ? " holds voxels and no ellipsoids" : " has no ellipsoids"));
@@ -32,7 +33,8 @@ void noteGrid(const StoredGrid& grid, std::vector<std::string>& notes) {
 }
 
 void noteCarried(const CarriedGrid& grid, std::vector<std::string>& notes) {
-  notes.push_back("grid '" + grid.name + "' is carried unchanged (" + grid.treeType + ")");
+  notes.push_back("grid '" + shownName(grid.name) + "' is carried unchanged (" +
+                  shownName(grid.treeType) + ")");
 }
 
 /// The file without its carried grids, whose bytes are not decoded.

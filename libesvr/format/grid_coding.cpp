@@ -10,6 +10,7 @@
 #include "esvr/empty_signs.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
+#include "esvr/grid_names.h"
 #include "field/active_region.h"
 #include "format/active_threshold.h"
 #include "format/choose_levels.h"
@@ -356,12 +357,12 @@ SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
   if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
   if (options.threshold && grid.voxels)
-    throw UsageError("grid '" + grid.descriptor.name +
+    throw UsageError("grid '" + shownName(grid.descriptor.name) +
                      "' says itself which voxels are active: it takes no threshold");
   if (options.box && options.box->empty()) throw UsageError("the box of voxels is empty");
   if (options.maxBytes != kNoMemoryLimit)
     requireWithinMemory(estimateDecode(grid, options).bytes(options.memory), options.maxBytes,
-                        "grid '" + grid.descriptor.name + "'");
+                        "grid '" + shownName(grid.descriptor.name) + "'");
   if (!grid.voxels) return evaluated(grid, options);
   SparseVolume volume = volumeOf(*grid.voxels);
   if (options.box) clip(*options.box, ruleOf(grid), volume);

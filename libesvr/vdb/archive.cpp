@@ -3,9 +3,8 @@
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/io.h>
 
-#include <algorithm>
-
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "vdb/metadata.h"
 #include "vdb/transform.h"
 #include "vdb/versions.h"
@@ -39,7 +38,8 @@ DirectoryRow readRow(InputFile& file) {
   const auto blocksAt = file.read<std::int64_t>();
   row.next = file.read<std::int64_t>();
   if (gridAt < std::int64_t(file.position()) || row.next < gridAt)
-    throw BadInput("is damaged: grid \"" + row.entry.name() + "\" has no valid place in the file");
+    throw BadInput("is damaged: grid \"" + shownName(row.entry.name()) +
+                   "\" has no valid place in the file");
   row.entry.gridAt = std::uint64_t(gridAt);
   row.entry.gridBytes = std::uint64_t(row.next - gridAt);
   row.entry.blocksAt = std::uint64_t(blocksAt);
@@ -53,9 +53,9 @@ std::string ArchiveEntry::name() const {
 }
 
 std::string ArchiveEntry::valueType() const {
-  if (!treeType.starts_with(kTreePrefix)) return treeType;
+  if (!treeType.starts_with(kTreePrefix)) return shownName(treeType);
   const auto begin = std::string(kTreePrefix).size();
-  return treeType.substr(begin, treeType.find('_', begin) - begin);
+  return shownName(treeType.substr(begin, treeType.find('_', begin) - begin));
 }
 
 bool beginsAsVdb(InputFile& file) {
@@ -104,6 +104,7 @@ void Archive::readDirectory() {
   if (count < 0) throw BadInput("is damaged: a negative number of grids");
   for (std::int32_t i = 0; i < count; ++i) {
     DirectoryRow row = readRow(file_);
+    if (row.entry.parent.empty()) trees_.emplace(row.entry.storedName, entries_.size());
     entries_.push_back(std::move(row.entry));
     file_.seek(std::uint64_t(row.next));
   }
@@ -121,12 +122,9 @@ GridHead Archive::readHead(const ArchiveEntry& entry) {
 
 const ArchiveEntry& Archive::treeOwner(const ArchiveEntry& entry) const {
   if (entry.parent.empty()) return entry;
-  const auto parent =
-      std::find_if(entries_.begin(), entries_.end(), [&](const ArchiveEntry& candidate) {
-        return candidate.storedName == entry.parent && candidate.parent.empty();
-      });
-  if (parent == entries_.end()) throw BadInput("shares the voxels of a grid that is not there");
-  return *parent;
+  const auto parent = trees_.find(entry.parent);
+  if (parent == trees_.end()) throw BadInput("shares the voxels of a grid that is not there");
+  return entries_[parent->second];
 }
 
 }  // namespace esvr::vdb

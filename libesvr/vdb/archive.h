@@ -5,6 +5,7 @@
 /// grids.
 
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "esvr/carried_grid.h"
@@ -23,8 +24,9 @@ struct ArchiveEntry {
   std::uint64_t gridBytes = 0;
   std::uint64_t blocksAt = 0;  ///< position of the values, as the file says; it is not checked
 
-  [[nodiscard]] std::string name() const;       ///< the name without the number
-  [[nodiscard]] std::string valueType() const;  ///< "float", "vec3s", "ptdataidx32", ...
+  [[nodiscard]] std::string name() const;  ///< the name without the number
+  /// "float", "vec3s", "ptdataidx32", ...; a text that can be shown (shownName)
+  [[nodiscard]] std::string valueType() const;
 };
 
 /// The part of a grid before its tree.
@@ -60,6 +62,8 @@ class Archive {
   std::uint32_t vdbVersion_ = 0;
   std::vector<MetaItem> metadata_;
   std::vector<ArchiveEntry> entries_;
+  std::unordered_map<std::string, std::size_t>
+      trees_;  ///< entries with trees by their stored names
 };
 
 /// True if the file begins as a .vdb file does.

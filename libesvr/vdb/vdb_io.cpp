@@ -36,12 +36,12 @@ VdbSummary OpenVdb::inspectVdb(const std::filesystem::path& path) const {
   });
 }
 
-VolumeGrid OpenVdb::readGrid(const std::filesystem::path& path, const std::string& name,
+VolumeGrid OpenVdb::readGrid(const std::filesystem::path& path, std::size_t place,
                              const ReadOptions& options) const {
   return whileReading(path, [&] {
     InputFile file(path);
-    return formatOf(file) == FileFormat::kOpenVdb ? readOpenVdbGrid(file, name, options)
-                                                  : readNanoVdbGrid(file, name, options);
+    return formatOf(file) == FileFormat::kOpenVdb ? readOpenVdbGrid(file, place, options)
+                                                  : readNanoVdbGrid(file, place, options);
   });
 }
 
@@ -60,15 +60,16 @@ auto readVectors(const std::filesystem::path& path, const Read& read) {
 
 }  // namespace
 
-VolumeGrid OpenVdb::readComponent(const std::filesystem::path& path, const std::string& name,
+VolumeGrid OpenVdb::readComponent(const std::filesystem::path& path, std::size_t place,
                                   std::size_t component, const ReadOptions& options) const {
   return readVectors(
-      path, [&](InputFile& file) { return readOpenVdbComponent(file, name, component, options); });
+      path, [&](InputFile& file) { return readOpenVdbComponent(file, place, component, options); });
 }
 
-VectorGrid OpenVdb::readVector(const std::filesystem::path& path, const std::string& name,
+VectorGrid OpenVdb::readVector(const std::filesystem::path& path, std::size_t place,
                                const ReadOptions& options) const {
-  return readVectors(path, [&](InputFile& file) { return readOpenVdbVector(file, name, options); });
+  return readVectors(path,
+                     [&](InputFile& file) { return readOpenVdbVector(file, place, options); });
 }
 
 std::vector<CarriedGrid> OpenVdb::readCarried(const std::filesystem::path& path,

@@ -9,6 +9,7 @@
 
 #include "esvr/empty_signs.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "vdb/metadata.h"
 #include "vdb/streamed_grid.h"
 #include "vdb/transform.h"
@@ -74,7 +75,7 @@ void refuseBeyondHalf(const std::string& name, double background, const SparseVo
     for (int i = 0; i < kBrickVoxels; ++i)
       if (volume.active[b].test(i)) fits &= fitsHalf(volume.brickValues(b)[i]);
   if (!fits)
-    throw UsageError("grid \"" + name +
+    throw UsageError("grid \"" + shownName(name) +
                      "\" has values beyond 65504, the largest that half precision holds");
 }
 

@@ -69,8 +69,6 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"text", [](const auto& path) { test::writeText(path, "density 1 2 3\n"); },
                 "neither an OpenVDB nor a NanoVDB"},
         BadFile{"truncated", truncated, "in.vdb"},
-        BadFile{"no grid", [](const auto& path) { test::writeInput(path, {}); },
-                "the file has no grid"},
         BadFile{"not finite", [](const auto& path) { test::writeInput(path, {withNonFinite()}); },
                 "2 voxels are NaN, infinite or too large for float; the first is at (1, 2, 3)"}));
 

@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "esvr/sequence_file.h"
 #include "python/src/objects.h"
 
@@ -23,14 +24,22 @@ std::vector<Grid> gridsOf(const File& self) {
   return grids;
 }
 
+/// The names of the grids, separated by commas.
+std::string listed(const File& self) {
+  std::string names;
+  for (const auto& name : namesOfStored(*self.file)) names += (names.empty() ? "" : ", ") + name;
+  return names;
+}
+
 Grid gridNamed(const File& self, const std::string& name) {
-  std::string known;
-  for (std::size_t g = 0; g < self.file->grids.size(); ++g) {
-    const std::string& other = self.file->grids[g].descriptor.name;
-    if (other == name) return gridOf(self, g);
-    known += (known.empty() ? "" : ", ") + other;
+  try {
+    return gridOf(self, findStored(*self.file, name));
+  } catch (const BadInput& error) {
+    const GridNames all(namesInOrder(*self.file));
+    if (all.isAmbiguous(name) || all.lookUp(name))
+      throw py::key_error("the file " + std::string(error.what()));
+    throw py::key_error("there is no grid '" + shownName(name) + "'; there are: " + listed(self));
   }
-  throw py::key_error("there is no grid '" + name + "'; there are: " + known);
 }
 
 std::vector<std::string> carriedNames(const File& self) {
@@ -113,9 +122,7 @@ std::uint64_t writeGridList(const std::filesystem::path& path, const std::vector
 }
 
 std::string fileText(const File& self) {
-  std::string names;
-  for (const auto& grid : self.file->grids)
-    names += (names.empty() ? "" : ", ") + grid.descriptor.name;
+  const std::string names = listed(self);
   return "<esvr.File: " + (names.empty() ? "no grid" : names) + ">";
 }
 
@@ -124,9 +131,17 @@ std::string fileText(const File& self) {
 void addFiles(py::module_& module) {
   py::class_<File>(module, "File", "The content of an .esvr file.")
       .def_property_readonly("grids", &gridsOf, "The grids in their order (list of esvr.Grid).")
+      .def_property_readonly(
+          "names", [](const File& self) { return namesOfStored(*self.file); },
+          "The names by which file[name] finds each of the grids. They are unique, unlike "
+          "Grid.name:\n"
+          "\"density[1]\" is the second grid of a name, \"vel.x\" a component of the vectors "
+          "\"vel\".")
       .def_property_readonly("carried", &carriedNames,
                              "Names of the grids that are kept as the bytes of their .vdb file.")
-      .def("__getitem__", &gridNamed, py::arg("name"), "The first grid of a name.")
+      .def("__getitem__", &gridNamed, py::arg("name"),
+           "The grid of a name, as --grid of the programs finds it. KeyError: there is none, or\n"
+           "several grids have the name; one of File.names tells them apart.")
       .def(
           "save",
           [](const File& file, const std::filesystem::path& path,

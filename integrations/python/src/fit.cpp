@@ -7,6 +7,7 @@
 
 #include "esvr/convert.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "python/src/interruptible.h"
 
 namespace esvr::python {
@@ -107,7 +108,8 @@ Grid fitVolume(const Volume& volume, const ConvertOptions& options, const Progre
   }
   reporter.rethrow();
   if (conversion.fit.end == FitEnd::kPsnrMissed)
-    throw TargetMissed("grid '" + volume.grid->descriptor.name + "': the PSNR is out of reach");
+    throw TargetMissed("grid '" + shownName(volume.grid->descriptor.name) +
+                       "': the PSNR is out of reach");
   return {std::make_shared<const StoredGrid>(std::move(conversion.grid))};
 }
 

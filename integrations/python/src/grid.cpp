@@ -71,7 +71,7 @@ py::array_t<float> evaluate(const Grid& self, const Places& points) {
   const StoredGrid& grid = *self.grid;
   if (!followsFromEllipsoids(grid))
     throw UsageError(
-        "grid '" + grid.descriptor.name +
+        "grid '" + shownName(grid.descriptor.name) +
         "' stores voxels or a residual, so that there is no sum to evaluate; decode it "
         "with to_volume()");
   py::array_t<float> values(points.shape(0));
@@ -93,7 +93,7 @@ std::string kindOf(const StoredGrid& grid) {
 std::string gridText(const Grid& self) {
   const StoredGrid& grid = *self.grid;
   const std::size_t ellipsoids = grid.field.ellipsoidCount();
-  std::string text = "<esvr.Grid '" + grid.descriptor.name + "': ";
+  std::string text = "<esvr.Grid '" + shownName(grid.descriptor.name) + "': ";
   text += grid.voxels ? "voxels" : std::to_string(ellipsoids) + " ellipsoids";
   return text + ", " + std::to_string(grid.activeVoxels) + " active voxels>";
 }

@@ -131,27 +131,28 @@ py::array_t<float> toNumpy(const Volume& self, const std::optional<PlainBox>& pl
   return array;
 }
 
-/// The unique name, which may be empty, of the first grid that a fit can take.
-std::string firstOfNumbers(const std::filesystem::path& path) {
+/// The place of the first grid that a fit can take.
+std::size_t firstOfNumbers(const std::filesystem::path& path) {
   const VdbSummary summary = inspectVdb(path);
   const auto& grids = summary.grids;
   const auto first = std::find_if(grids.begin(), grids.end(),
                                   [](const GridSummary& g) { return g.skipReason.empty(); });
   if (first == grids.end())
     throw BadInput(path.string() + ": no grid of numbers has an active voxel");
-  return first->uniqueName;
+  return std::size_t(first - grids.begin());
 }
 
 Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name) {
   const py::gil_scoped_release release;
-  return {std::make_shared<const VolumeGrid>(readGrid(path, name ? *name : firstOfNumbers(path)))};
+  return {std::make_shared<const VolumeGrid>(name ? readGrid(path, *name)
+                                                  : readGrid(path, firstOfNumbers(path)))};
 }
 
 /// The only grid of a file, which may have no active voxel.
 Volume fromOnlyGrid(const std::filesystem::path& path) {
   const py::gil_scoped_release release;
-  const std::string name = inspectVdb(path).grids.at(0).uniqueName;
-  return {std::make_shared<const VolumeGrid>(readGrid(path, name, {.allowEmpty = true}))};
+  constexpr std::size_t kOnly = 0;
+  return {std::make_shared<const VolumeGrid>(readGrid(path, kOnly, {.allowEmpty = true}))};
 }
 
 void write(const Volume& self, const std::filesystem::path& path, const WriteOptions& options) {
@@ -177,8 +178,12 @@ void addVolume(py::module_& module) {
           "Makes a volume from an array of shape (nx, ny, nz), converted to float32.\n\n"
           "A voxel is active if it differs from the background by more than the threshold.\n"
           "origin is the voxel of array[0, 0, 0], and voxel_size is in world units.")
-      .def_static("from_vdb", &fromVdb, py::arg("path"), py::arg("grid") = py::none(),
-                  "Reads a grid of numbers of a .vdb or .nvdb file; the first one by default.")
+      .def_static(
+          "from_vdb", &fromVdb, py::arg("path"), py::arg("grid") = py::none(),
+          "Reads a grid of numbers of a .vdb or .nvdb file; the first one by default. It is named\n"
+          "as for --grid of the programs: \"density[1]\" is the second grid of a name, \"vel.x\" "
+          "a\n"
+          "component of vectors.")
       .def("to_numpy", &toNumpy, py::arg("box") = py::none(),
            "The voxels of a box ((x0, y0, z0), (x1, y1, z1)), both inclusive, as float32 of shape\n"
            "(nx, ny, nz); by default those of Volume.box.")

@@ -155,6 +155,18 @@ struct GridOfFile {
 /// The names of all grids in the order of the file.
 [[nodiscard]] std::vector<std::string> namesInOrder(const EsvrFile& file);
 
+/// The names by which users find each of EsvrFile::grids: GridNames::unique (grid_names.h), and for
+/// components of vectors GridNames::ofComponent. They are the same as in the .vdb file that the file comes
+/// from, if it has all grids of it.
+[[nodiscard]] std::vector<std::string> namesOfStored(const EsvrFile& file);
+
+/// The index in EsvrFile::grids of the grid of numbers or the component that a user names (GridNames).
+/// \param path  file name for the error's text; empty if the caller adds it
+/// \throws BadInput  there is no such grid, or its name is ambiguous (the text lists grids); the grid is
+///                   carried or has vectors, of which one component is to be named
+[[nodiscard]] std::size_t findStored(const EsvrFile& file, const std::string& wanted,
+                                     const std::filesystem::path& path = {});
+
 struct ContainerWriteOptions {
   bool overwrite = false;
 };

@@ -21,10 +21,9 @@ namespace esvr {
 
 /// Properties of one grid of a file.
 struct GridSummary {
-  std::string name;  ///< stored name; may be empty or shared by several grids
-  /// The name that --grid takes: `name`, with "[i]" (i from 0) if several grids share it.
-  std::string uniqueName;
-  std::string valueType;  ///< OpenVDB's name: "float", "double", "vec3s", "ptdataidx32", ...
+  std::string name;        ///< stored name; may be empty or shared by several grids
+  std::string uniqueName;  ///< the name that --grid takes (GridNames::unique, grid_names.h)
+  std::string valueType;   ///< OpenVDB's name: "float", "double", "vec3s", "ptdataidx32", ...
   bool savedAsHalf = false;
   GridClass gridClass = GridClass::kUnknown;
   std::uint64_t activeVoxels = 0;
@@ -76,27 +75,40 @@ struct VolumeGrid {
 /// rounded to float32. Inactive voxels hold the background and not the file's inactive values. In a
 /// level set they hold the background with the file's sign, which distinguishes inside from
 /// outside.
-/// \param name  "density" (the first grid of that name) or "density[1]" (the second)
-/// \throws BadInput  as for inspectVdb; the grid does not exist (the text lists the grids); its
-///                   type cannot be fitted; it has no active voxel (without allowEmpty); voxels are
-///                   not finite (the text gives the first coordinate and the number)
+/// \param place  index of the grid in VdbSummary::grids
+/// \throws BadInput  as for inspectVdb; the file has no grid at this place; its type cannot be fitted;
+///                   it has no active voxel (without allowEmpty); voxels are not finite (the text
+///                   gives the first coordinate and the number)
 /// \throws MemoryExceeded  the grid needs more than maxBytes
+[[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, std::size_t place,
+                                  const ReadOptions& options = {});
+
+/// The same for a grid that a user has named (GridNames in grid_names.h): "density", "density[1]".
+/// "vel.x" is read as a component of the vectors "vel" if no grid has this very name.
+/// \throws BadInput, MemoryExceeded  as above; no grid has the name, or several have it (the text lists
+///                                   the grids)
 [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                                   const ReadOptions& options = {});
 
 /// Reads a component of a grid of vectors in a .vdb file, as readGrid reads a grid of numbers. The
 /// name of the result is componentName(). The component x has the metadata of the grid; the others
 /// have none, so that a file with all of them holds the metadata once.
-/// \param name       as for readGrid
+/// \param place      as for readGrid
 /// \param component  0, 1 or 2
 /// \throws BadInput  as for readGrid; the grid has not GridSummary::isVector
 /// \throws MemoryExceeded  the component needs more than maxBytes
+[[nodiscard]] VolumeGrid readComponent(const std::filesystem::path& path, std::size_t place,
+                                       std::size_t component, const ReadOptions& options = {});
+/// The same for a grid that a user has named. \throws  as above; as for readGrid by a name
 [[nodiscard]] VolumeGrid readComponent(const std::filesystem::path& path, const std::string& name,
                                        std::size_t component, const ReadOptions& options = {});
 
 /// Reads all components of a grid of vectors.
 /// \throws BadInput  as for readComponent
 /// \throws MemoryExceeded  the components together need more than maxBytes
+[[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, std::size_t place,
+                                    const ReadOptions& options = {});
+/// The same for a grid that a user has named. \throws  as above; as for readGrid by a name
 [[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
                                     const ReadOptions& options = {});
 
