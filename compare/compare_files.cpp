@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "cli/names.h"
 #include "compare/baseline.h"
 #include "compare/limits.h"
 #include "compare/unfitted.h"
@@ -40,7 +41,12 @@ class Pairing {
       places.push_back(g);
     }
     of_.resize(reference.grids().size());
-    const auto pairs = pairGrids(traits, candidate.traits());
+    auto ofCandidate = candidate.traits();
+    cli::addRanges(
+        ofCandidate, [&](std::size_t g) { return rangeOf(reference, places[g]); }, traits);
+    cli::addRanges(
+        traits, [&](std::size_t g) { return rangeOf(candidate, g); }, ofCandidate);
+    const auto pairs = pairGrids(traits, ofCandidate);
     for (std::size_t p = 0; p < pairs.size(); ++p) of_[places[p]] = pairs[p];
   }
 
@@ -71,6 +77,15 @@ class Pairing {
     std::map<std::string, std::size_t> counts;
     for (const ListedGrid& grid : file.grids()) ++counts[grid.name];
     return counts;
+  }
+
+  /// The range of the active values of a grid.
+  static std::optional<std::array<float, 2>> rangeOf(const GridFile& file, std::size_t grid) {
+    const ListedGrid& listed = file.grids()[grid];
+    if (listed.empty || !(listed.comparable || listed.isVector)) return std::nullopt;
+    const ValueRange range = activeRange(listed.isVector ? file.readVectors(grid).components.front()
+                                                         : file.read(grid).volume);
+    return std::array{range.min, range.max};
   }
 
   [[nodiscard]] bool isIgnored(const GridFile& file, std::size_t grid) const {

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -204,22 +205,40 @@ void tellLostMetadata(const EsvrFile& file, const std::vector<DecodedGrid>& grid
               std::to_string(items) + " items");
 }
 
+/// The range of the active values of a grid of the reference.
+std::optional<std::array<float, 2>> rangeIn(const Options& options, const GridSummary& grid,
+                                            std::size_t place) {
+  if (grid.activeVoxels == 0 || !(grid.isScalar || grid.isVector)) return std::nullopt;
+  const ReadOptions read{.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels};
+  const VolumeGrid voxels = grid.isVector ? readComponent(*options.reference, place, 0, read)
+                                          : readGrid(*options.reference, place, read);
+  const ValueRange range = activeRange(voxels.volume);
+  return std::array{range.min, range.max};
+}
+
 /// Finds each grid that is not carried in the reference, before anything is written. The file may lack
 /// grids of the reference that share a name with others.
 std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
                                        const Options& options) {
-  const auto references = cli::traitsOf(inspectVdb(*options.reference));
-  const auto pairs = pairGrids(cli::traitsOf(file), references);
+  const VdbSummary reference = inspectVdb(*options.reference);
+  const auto ofGrids = cli::traitsOf(file);
+  auto references = cli::traitsOf(reference);
+  cli::addRanges(
+      ofGrids, [&](std::size_t g) { return rangeIn(options, reference.grids[g], g); }, references);
+  const auto pairs = pairGrids(ofGrids, references);
   std::vector<std::string> names;
-  for (const GridTraits& reference : references) names.push_back(reference.name);
-  const GridNames ofReference(std::move(names));
+  for (const GridTraits& traits : references) names.push_back(traits.name);
+  const GridNames ofReference(std::move(names)), ofFile(namesInOrder(file));
   std::vector<ComparedGrid> grids;
   for (std::size_t written = 0; written < chosen.size(); ++written) {
     const auto& [grid, name, place] = chosen[written];
     if (grid.isCarried) continue;
-    const std::size_t reference =
+    ComparedGrid compared{.name = name, .written = written, .isVector = grid.isVector};
+    compared.reference =
         pairs[place] ? *pairs[place] : ofReference.findWhole(name, *options.reference);
-    grids.push_back({name, reference, written, grid.isVector});
+    for (std::size_t c = 0; c < kComponents; ++c)
+      compared.components[c] = ofFile.ofComponent(place, c);
+    grids.push_back(std::move(compared));
   }
   return grids;
 }

@@ -65,7 +65,7 @@ void addRows(const ComparedFiles& files, const ComparedGrid& grid, cli::Table& t
   const VectorMetrics metrics = compareVectorGrid(files, grid);
   table.add(row(grid.name, metrics.magnitude));
   for (std::size_t c = 0; c < kComponents; ++c)
-    table.add(row(componentName(grid.name, c), metrics.components[c]));
+    table.add(row(grid.components[c], metrics.components[c]));
 }
 
 }  // namespace

@@ -23,21 +23,21 @@ Json gridsOf(const RunRecord& record) {
   return grids;
 }
 
-Json toJson(const EsvrSummary& file, const ConvertedVector& vector) {
+Json toJson(const RunRecord& record, const ConvertedVector& vector) {
   Json components = Json::array();
   for (std::size_t c = 0; c < kComponents; ++c)
-    components.push_back({{"name", componentName(vector.uniqueName, c)},
+    components.push_back({{"name", record.grids[vector.stored.first + c].uniqueName},
                           {"metrics", metricsJson(vector.metrics.components[c], std::nullopt)}});
   return {{"name", vector.uniqueName},
           {"value_type", vector.valueType},
-          {"bytes", ownBytes(file, vector)},
+          {"bytes", ownBytes(record.output, vector)},
           {"metrics", metricsJson(vector.metrics.magnitude, std::nullopt)},
           {"components", std::move(components)}};
 }
 
 Json vectorsOf(const RunRecord& record) {
   Json vectors = Json::array();
-  for (const auto& vector : record.vectors) vectors.push_back(toJson(record.output, vector));
+  for (const auto& vector : record.vectors) vectors.push_back(toJson(record, vector));
   return vectors;
 }
 

@@ -1,6 +1,10 @@
 #pragma once
 /// Names of the enumerations that files hold.
 
+#include <array>
+#include <functional>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,6 +36,13 @@ namespace esvr::cli {
 /// What tells the grids of a file apart from others of their names (pairGrids), in the order of the file.
 [[nodiscard]] std::vector<GridTraits> traitsOf(const VdbSummary& file);
 [[nodiscard]] std::vector<GridTraits> traitsOf(const EsvrFile& file);
+
+/// Adds the ranges of values that are not known where they are needed, because another file has another
+/// number of grids of a name.
+/// \param rangeOf  reads the range of the grid at a place; nothing if it has none
+void addRanges(std::span<const GridTraits> other,
+               const std::function<std::optional<std::array<float, 2>>(std::size_t)>& rangeOf,
+               std::vector<GridTraits>& traits);
 
 /// Bytes of the sections of a grid, whether it shares them with other grids or not.
 [[nodiscard]] std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid);

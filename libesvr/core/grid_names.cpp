@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <map>
 
 #include "esvr/error.h"
@@ -75,10 +76,23 @@ std::optional<std::size_t> wholeNumber(std::string_view digits) {
 /// Where there are more, grids are paired by their numbers.
 constexpr std::size_t kMostCells = std::size_t{1} << 20;
 
+/// How far ranges of values agree. A lossy conversion changes them by a few percent.
+int agreementOfValues(const GridTraits& a, const GridTraits& b) {
+  if (!a.values || !b.values) return 0;
+  const auto& [low, high] = *a.values;
+  const double scale =
+      std::max({double(high) - low, std::abs(double(low)), std::abs(double(high))});
+  const double difference = std::max(std::abs(double(b.values->front()) - low),
+                                     std::abs(double(b.values->back()) - high));
+  if (difference == 0.0) return 6;
+  return difference <= 0.05 * scale ? 5 : 0;
+}
+
 int agreement(const GridTraits& a, const GridTraits& b) {
   // The type counts most, because a grid of another type is never the same grid.
-  return 8 * int(a.valueType == b.valueType) + int(a.gridClass == b.gridClass) +
-         2 * int(a.activeBox == b.activeBox) + 2 * int(a.activeVoxels == b.activeVoxels);
+  return agreementOfValues(a, b) + 16 * int(a.valueType == b.valueType) +
+         int(a.gridClass == b.gridClass) + 2 * int(a.activeBox == b.activeBox) +
+         2 * int(a.activeVoxels == b.activeVoxels);
 }
 
 /// Pairs grids of one name in order, so that the sum of agreements is largest. The first of equal

@@ -140,6 +140,12 @@ TEST(PairedGrids, AreThoseThatAgreeWhereOthersAreMissing) {
   EXPECT_THAT(pairGrids(all, std::vector{all[1]}),
               ElementsAre(std::nullopt, Optional(0u), std::nullopt));
   EXPECT_THAT(pairGrids(std::vector{all[2]}, all), ElementsAre(Optional(2u)));
+  std::vector<GridTraits> alike(3, traits("d", 1));
+  for (std::size_t g = 0; g < alike.size(); ++g) alike[g].values = {0.0f, float(g + 1)};
+  GridTraits lossy = alike[2];
+  lossy.values = {0.0f, 2.95f};
+  EXPECT_THAT(pairGrids(alike, std::vector{alike[1], lossy}),
+              ElementsAre(std::nullopt, Optional(0u), Optional(1u)));
   EXPECT_THAT(pairGrids(all, std::vector{traits("d", 9)}),
               ElementsAre(Optional(0u), std::nullopt, std::nullopt));
 }

@@ -3,6 +3,7 @@
 /// may share a name or have none, and a name may look like another way to name a grid. All programs and
 /// bindings find grids by the rules of GridNames, so that one name means the same grid everywhere.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -111,6 +112,8 @@ struct GridTraits {
   GridClass gridClass = GridClass::kUnknown;
   std::uint64_t activeVoxels = 0;
   Box activeBox{};
+  /// The smallest and the largest active value (of vectors: of component x), if they are known.
+  std::optional<std::array<float, 2>> values{};
 };
 
 /// Finds the grids of one file in another file that was made from it and may lack some of them. Grids
