@@ -38,10 +38,13 @@ void tell(const CheckOptions& options, const CheckRecord& record) {
     printCheck(record, std::cout);
 }
 
+/// A missed limit or a difference counts more than a grid that cannot be read.
 void throwFailures(const CheckOptions& options, const CheckRecord& record) {
-  if (record.failures.empty()) return;
+  if (record.failures.empty() && record.unreadable.empty()) return;
   std::string text = options.candidate.string() + " fails:";
   for (const auto& failure : record.failures) text += "\n  " + failure;
+  for (const auto& failure : record.unreadable) text += "\n  " + failure;
+  if (record.failures.empty()) throw BadInput(text);
   throw TargetMissed(text);
 }
 

@@ -33,7 +33,8 @@ cli::ProgramText programText() {
           "backgrounds and metadata are listed, and the check fails if --fail-on names them. It "
           "always fails if only one of the files has a grid, if a grid has become one of another "
           "type, or if the bounding boxes of the active voxels of the two grids do not intersect. "
-          "Grids that are not of floats or doubles are compared bit for bit. --ignore-grids "
+          "Grids that are not of floats or doubles, and grids of the same bytes, are compared bit "
+          "for bit. --ignore-grids "
           "excludes a grid from all of this.\n"
           "\n"
           "REF and CAND may both be sequences: a pattern such as smoke.####.vdb, or an .esvr file "
@@ -43,7 +44,8 @@ cli::ProgramText programText() {
           "A baseline holds figures and their tolerances. --update writes the figures of this run "
           "and keeps the tolerances of the file.\n"
           "\n"
-          "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 unusable input, 4 a "
+          "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 unusable input or a grid "
+          "that cannot be compared, 4 a "
           "limit was missed, 5 not enough memory (--max-memory).",
       .examples =
           "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45 --min-iou 0.98\n"

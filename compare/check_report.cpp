@@ -91,7 +91,7 @@ Json toJson(const CheckedGrid& grid) {
   const Coord at = grid.metrics.maxErrorAt;
   json["frame"] = grid.frame ? Json(*grid.frame) : Json(nullptr);
   json["max_error_at"] = {at.x, at.y, at.z};
-  json["peak"] = grid.metrics.peak;
+  json["peak"] = grid.metrics.peak > 0.0 ? Json(grid.metrics.peak) : Json();
   json["differences"] = toJson(grid.differences);
   return json;
 }
@@ -125,6 +125,7 @@ Json checkReport(const CheckOptions& options, const CheckRecord& record) {
           {"same", record.same},
           {"skipped", record.skipped},
           {"failures", record.failures},
+          {"unreadable", record.unreadable},
           {"notes", record.notes}};
 }
 

@@ -68,6 +68,7 @@ void append(FrameNumber number, CheckRecord from, CheckRecord& to) {
   appendLines(frame, from.skipped, to.skipped);
   appendLines(frame, from.extra, to.extra);
   appendLines(frame, from.failures, to.failures);
+  appendLines(frame, from.unreadable, to.unreadable);
   appendLines(frame, from.notes, to.notes);
 }
 

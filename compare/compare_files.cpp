@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
 
 #include "compare/baseline.h"
@@ -80,7 +81,9 @@ void requirePairs(const std::vector<Pair>& pairs, const GridFile& reference,
 
 /// \throws BadInput  nothing could be compared
 void requireResults(const GridFile& reference, const CheckRecord& record) {
-  if (!record.grids.empty() || !record.same.empty() || !record.failures.empty()) return;
+  if (!record.grids.empty() || !record.same.empty() || !record.failures.empty() ||
+      !record.unreadable.empty())
+    return;
   std::string text = reference.path().string() + ": no grid can be compared";
   for (const auto& line : record.skipped) text += "\n  " + line;
   throw BadInput(text);
@@ -111,31 +114,69 @@ class Comparison {
       return;
     }
     const GridPair both{reference_, pair.reference, candidate_, *pair.candidate};
+    const bool areVectors = both.a().isVector && both.b().isVector;
     if (isRetyped(both))
       record.failures.push_back(retypedText(both));
-    else if (both.a().isVector && both.b().isVector && !haveSameBytes(both))
-      compareVectorGrids(pair, listed.uniqueName, record);
-    else if (!listed.comparable || (listed.empty && options_.grids.empty()))
+    else if (!(listed.comparable || areVectors) || listed.empty)
       compareUnfitted(options_, both, record);
+    else if (haveSameBytes(both) && !(temporal_ && hasFigures(both)))
+      addSame(both, record);
     else
-      record.grids.push_back(compare(pair, listed.uniqueName, record));
+      measure(pair, both, record);
   }
-  [[nodiscard]] const std::vector<double>& ranges() const { return ranges_; }
 
  private:
+  /// True if grids of the same bytes get a row of figures. Those that an .esvr file carries are
+  /// listed with the other carried grids.
+  static bool hasFigures(const GridPair& both) {
+    return both.a().comparable && !both.reference.esvr() && !both.candidate.esvr();
+  }
+
+  /// Two grids of the same bytes are equal, whatever their values, and need not be read.
+  void addSame(const GridPair& both, CheckRecord& record) const {
+    if (!hasFigures(both)) {
+      record.same.push_back("grid \"" + both.a().uniqueName + "\": the same bytes (" +
+                            both.a().valueType + ")");
+      return;
+    }
+    CheckedGrid grid{.name = both.a().uniqueName, .candidateName = both.b().uniqueName};
+    VolumeMetrics exact;
+    exact.psnrBox = exact.psnrActive = std::numeric_limits<double>::infinity();
+    if (ssim_) exact.ssim = 1.0;
+    grid.figures = figuresOf(exact);
+    const auto distance = std::size_t(FigureId::kMeshDistance);
+    if (options_.limits[distance]) grid.figures[distance] = 0.0;
+    record.grids.push_back(std::move(grid));
+  }
+
+  /// A grid that cannot be measured, because a value is not finite for example, does not keep the
+  /// others from being compared.
+  void measure(const Pair& pair, const GridPair& both, CheckRecord& record) {
+    const std::string& name = both.a().uniqueName;
+    try {
+      if (both.a().isVector)
+        compareVectorGrids(pair, name, record);
+      else
+        record.grids.push_back(compare(pair, name, record));
+    } catch (const BadInput& why) {
+      record.unreadable.push_back(
+          "grid \"" + name +
+          "\" cannot be compared, and its bytes are not the same: " + why.what());
+    }
+  }
+
   CheckedGrid compare(const Pair& pair, const std::string& name, CheckRecord& record) {
     const VolumeGrid a = reference_.read(pair.reference);
     const VolumeGrid b = candidate_.read(*pair.candidate);
     CheckedGrid grid{.name = name, .candidateName = candidate_.grids()[*pair.candidate].uniqueName};
-    requireRange(a.volume, name);
     requireOverlap(a.volume, b.volume, name, record);
     grid.metrics = compareVolumes(a.volume, b.volume,
                                   {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
     grid.figures = figuresOf(grid.metrics);
     addMeshDistance(grid, a, b);
     grid.differences = compareDescriptors(a.descriptor, b.descriptor);
-    addRange(a.volume);
-    addTemporal(grid, a.volume, b.volume);
+    grid.range = valueRangeOf(a.volume);
+    addTemporal(grid, {a.volume, b.volume, grid.metrics.peak});
     return grid;
   }
 
@@ -144,21 +185,28 @@ class Comparison {
     const VectorGrid a = reference_.readVectors(pair.reference);
     const VectorGrid b = candidate_.readVectors(*pair.candidate);
     const std::string& other = candidate_.grids()[*pair.candidate].uniqueName;
-    const SparseVolume lengths = magnitudeOf(a.components);
-    requireRange(lengths, name);
-    requireOverlap(lengths, magnitudeOf(b.components), name, record);
+    const SparseVolume lengths = magnitudeOf(a.components), others = magnitudeOf(b.components);
+    requireOverlap(lengths, others, name, record);
     const VectorMetrics metrics = compareVectors(
         a.components, b.components, {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
-    record.grids.push_back({name, other, metrics.magnitude, figuresOf(metrics.magnitude),
-                            compareDescriptors(a.descriptor, b.descriptor)});
-    addRange(lengths);
-    addTemporal(record.grids.back(), lengths, magnitudeOf(b.components));
+    const double range = valueRangeOfVectors(a.components), peak = metrics.magnitude.peak;
+    record.grids.push_back({.name = name,
+                            .candidateName = other,
+                            .metrics = metrics.magnitude,
+                            .figures = figuresOf(metrics.magnitude),
+                            .differences = compareDescriptors(a.descriptor, b.descriptor),
+                            .range = range,
+                            .isLengths = true});
+    addTemporal(record.grids.back(), {lengths, others, peak});
     for (std::size_t c = 0; c < kComponents; ++c) {
       const VolumeMetrics& m = metrics.components[c];
-      record.grids.push_back({componentName(name, c), componentName(other, c), m, figuresOf(m),
-                              backgroundDifferences(a, b, c)});
-      addRange(a.components[c]);
-      addTemporal(record.grids.back(), a.components[c], b.components[c]);
+      record.grids.push_back({.name = componentName(name, c),
+                              .candidateName = componentName(other, c),
+                              .metrics = m,
+                              .figures = figuresOf(m),
+                              .differences = backgroundDifferences(a, b, c),
+                              .range = range});
+      addTemporal(record.grids.back(), {a.components[c], b.components[c], peak});
     }
   }
 
@@ -180,14 +228,9 @@ class Comparison {
       grid.figures[figure] = meshDistance(a, b).voxels;
   }
 
-  void addTemporal(CheckedGrid& grid, const SparseVolume& a, const SparseVolume& b) const {
+  void addTemporal(CheckedGrid& grid, const ComparedVolumes& volumes) const {
     if (temporal_)
-      grid.figures[std::size_t(FigureId::kPsnrTemporal)] = temporal_->compare(grid.name, a, b);
-  }
-
-  void addRange(const SparseVolume& reference) {
-    const ValueRange range = activeRange(reference);
-    ranges_.push_back(double(range.max) - double(range.min));
+      grid.figures[std::size_t(FigureId::kPsnrTemporal)] = temporal_->compare(grid.name, volumes);
   }
 
   static void requireOverlap(const SparseVolume& a, const SparseVolume& b, const std::string& name,
@@ -199,21 +242,10 @@ class Comparison {
                                    : "the active voxels lie in boxes that do not meet"));
   }
 
-  /// Checks that the reference has an active voxel and a peak, without which PSNR and SSIM are not
-  /// defined.
-  void requireRange(const SparseVolume& reference, const std::string& name) const {
-    const std::string grid = reference_.path().string() + ": grid \"" + name + "\": ";
-    if (activeVoxelCount(reference) == 0) throw BadInput(grid + "it has no active voxel");
-    const ValueRange range = activeRange(reference);
-    if (!options_.peak && range.min == 0.0f && range.max == 0.0f)
-      throw BadInput(grid + "every active voxel is 0, so PSNR has no peak; set it with --peak");
-  }
-
   const CheckOptions& options_;
   const GridFile &reference_, &candidate_;
   TemporalComparison* temporal_;  ///< null: the files are no frames
   bool ssim_ = false;
-  std::vector<double> ranges_;
 };
 
 }  // namespace
@@ -232,7 +264,7 @@ CheckRecord compareFiles(const CheckOptions& options, const FilePair& files,
     comparison.run(pair, record);
   }
   requireResults(files.reference, record);
-  judgeLimits(options, comparison.ranges(), record);
+  judgeLimits(options, record);
   judgeDifferences(options, record);
   return record;
 }

@@ -84,6 +84,7 @@ void GridFile::listVdb() {
                       .comparable = grid.isScalar,
                       .empty = grid.activeVoxels == 0,
                       .valueType = grid.valueType,
+                      .storedBytes = grid.storedBytes,
                       .isVector = grid.isVector});
     whyNoBytes_.push_back(grid.whyNotCarried);
   }
@@ -99,10 +100,13 @@ std::size_t GridFile::firstWithVoxels() const {
   throw BadInput(path_.string() + ": no grid of type float or double has an active voxel");
 }
 
+bool GridFile::hasBytes(std::size_t g) const {
+  return esvr_ ? grids_[g].ofEsvr.isCarried : whyNoBytes_[g].empty();
+}
+
 std::optional<CarriedGrid> GridFile::bytesOf(std::size_t g) const {
-  const GridOfFile& place = grids_[g].ofEsvr;
-  if (esvr_) return place.isCarried ? std::optional(esvr_->carried[place.index]) : std::nullopt;
-  if (!whyNoBytes_[g].empty()) return std::nullopt;
+  if (!hasBytes(g)) return std::nullopt;
+  if (esvr_) return esvr_->carried[grids_[g].ofEsvr.index];
   auto grids =
       readCarried(path_, {&g, 1}, {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});
   return std::move(grids.front());

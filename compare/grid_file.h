@@ -21,8 +21,9 @@ struct ListedGrid {
   bool comparable = true;    ///< true if the values are floats or doubles
   bool empty = false;        ///< true if there is no active voxel
   std::string valueType;
-  GridOfFile ofEsvr{};    ///< place in the content of an .esvr file
-  bool isVector = false;  ///< true if readVectors can read it
+  std::uint64_t storedBytes = 0;  ///< bytes of the grid in a .vdb file
+  GridOfFile ofEsvr{};            ///< place in the content of an .esvr file
+  bool isVector = false;          ///< true if readVectors can read it
 };
 
 /// An .esvr file is recognised by its extension, a .vdb or .nvdb file by its first bytes.
@@ -46,6 +47,8 @@ class GridFile {
   [[nodiscard]] std::size_t find(const std::string& name) const;
   /// Index of the first comparable grid with an active voxel. \throws BadInput  there is none
   [[nodiscard]] std::size_t firstWithVoxels() const;
+  /// Whether bytesOf() has the bytes of a grid.
+  [[nodiscard]] bool hasBytes(std::size_t grid) const;
   /// A grid as the bytes that OpenVDB wrote; nothing if the file does not have them, because the
   /// grid was fitted or the file is a .nvdb. \throws BadInput, MemoryExceeded  as for readCarried
   [[nodiscard]] std::optional<CarriedGrid> bytesOf(std::size_t grid) const;

@@ -70,7 +70,7 @@ GridStability measureGrid(const StabilityRun& run, const StoredGrid& grid,
                           const std::string& name) {
   GridStability result{.name = name,
                        .ellipsoids = grid.field.ellipsoidCount(),
-                       .peak = cli::largestMagnitude(grid),
+                       .peak = cli::peakOfSource(grid),
                        .corrected = grid.residual.has_value()};
   if (grid.voxels) result.whyNone = "it is stored as voxels";
   if (result.ellipsoids == 0 && result.whyNone.empty()) result.whyNone = "it has no ellipsoids";

@@ -33,6 +33,10 @@ void compareEmpty(const CheckOptions& options, const GridPair& pair, CheckRecord
 }  // namespace
 
 bool haveSameBytes(const GridPair& pair) {
+  if (!pair.reference.hasBytes(pair.ofReference) || !pair.candidate.hasBytes(pair.ofCandidate))
+    return false;
+  const bool areVdb = !pair.reference.esvr() && !pair.candidate.esvr();
+  if (areVdb && pair.a().storedBytes != pair.b().storedBytes) return false;
   const auto a = pair.reference.bytesOf(pair.ofReference);
   const auto b = pair.candidate.bytesOf(pair.ofCandidate);
   return a && b && haveSameBytes(*a, *b);

@@ -43,8 +43,8 @@ VectorMetrics compareVectorGrid(const Options& options, const ComparedGrid& grid
 
 std::vector<std::string> row(const std::string& name, const VolumeMetrics& m) {
   return {name,
-          cli::decibels(m.psnrBox),
           cli::decibels(m.psnrActive),
+          cli::decibels(m.psnrBox),
           cli::shortNumber(m.maxError),
           cli::shortNumber(m.p999Error),
           cli::shortNumber(*m.ssim),
@@ -66,7 +66,7 @@ void addRows(const Options& options, const ComparedGrid& grid, cli::Table& table
 
 void printErrors(const Options& options, const std::vector<ComparedGrid>& grids,
                  std::ostream& out) {
-  cli::Table table({"grid", "PSNR box", "active", "max error", "p99.9 error", "SSIM", "IoU",
+  cli::Table table({"grid", "PSNR active", "PSNR box", "max error", "p99.9 error", "SSIM", "IoU",
                     "mass ref", "mass"});
   for (const auto& grid : grids) addRows(options, grid, table);
   table.print(out);

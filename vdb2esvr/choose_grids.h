@@ -31,7 +31,8 @@ struct FittedGrid {
   GridSummary source;                      ///< the grid of the input
   std::size_t place = 0;                   ///< its index in VdbSummary::grids
   std::optional<std::size_t> component{};  ///< of vectors
-  std::optional<double> peak{};            ///< peak of the PSNR of vectors (findPeaks)
+  std::optional<double> peak{};            ///< peak of the PSNR of vectors (findScales)
+  std::optional<double> range{};  ///< of vectors, to which a bound in % refers (findScales)
 
   /// The unique name of the grid, or componentName() of it.
   [[nodiscard]] std::string uniqueName() const;

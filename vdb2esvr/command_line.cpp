@@ -107,7 +107,7 @@ void addGoalOptions(cli::po::options_description& options) {
      "density=50,temperature=40, or 40,density=50 with 40 for all others")
     ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
     ("max-error", value<std::string>()->value_name("E"),
-     "keep the error of every voxel within E, or within E% of the range of values; NAME=E is the "
+     "keep the error of every voxel within E, or within E% of the range of the active values (of vectors: of the component with the largest range); NAME=E is the "
      "bound of one grid, as with --psnr; if ellipsoids are stored, they have a residual; a sample of "
      "the grid shows whether they may be smaller")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
@@ -178,7 +178,8 @@ void addFileOptions(cli::po::options_description& options) {
      "parts of the file are stored together; off: each grid is stored on its own, as with --size and "
      "--ratio; or the names of the grids that may share, as density,temperature")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
-     "refuse: fail on NaN or infinite voxels; zero: replace them by 0")
+     "refuse: fail on NaN or infinite voxels; zero, background or a number: replace them by 0, by the "
+     "background of the grid or by that number")
     ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
      "keep or discard the best result so far if the run is interrupted (with --resume: discard, "
      "because the finished parts are kept)")

@@ -33,6 +33,14 @@ const StoredGrid* previousOf(const Options& options, const std::string& uniqueNa
   return at == names.end() ? nullptr : &options.previous->grids[std::size_t(at - names.begin())];
 }
 
+/// The goal of a grid. A bound in % of the range of vectors is the same for all components.
+Goal resolvedGoal(const Options& options, const FittedGrid& fitted) {
+  Goal goal = goalOf(options, fitted);
+  if (auto* within = std::get_if<BoundGoal>(&goal); within && within->relative && fitted.range)
+    *within = {within->bound * *fitted.range, false};
+  return goal;
+}
+
 /// What a grid is converted to.
 struct Wish {
   std::optional<std::uint64_t> bytes;  ///< that it may add
@@ -61,7 +69,8 @@ void countHits(const SparseVolume& source, ConvertedGrid& grid) {
 /// The error of the sum between voxels, where it is meant to be drawn.
 std::optional<double> errorBetween(const SparseVolume& source, const StoredGrid& grid,
                                    const CommonFitOptions& fit) {
-  if (grid.field.fitFor == FitFor::kVoxels || grid.field.ellipsoidCount() == 0) return std::nullopt;
+  const bool isDrawn = grid.field.fitFor == FitFor::kDrawing && !grid.farBackground;
+  if (!isDrawn || grid.field.ellipsoidCount() == 0) return std::nullopt;
   const RevoxeliseOptions rule = voxelRule(grid);
   return psnrBetween(
       source, grid.field,
@@ -94,7 +103,7 @@ ConvertedGrid named(const FittedGrid& fitted) {
 ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
                           std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
   Options options = given;
-  options.convert.goal = goalOf(given, fitted);
+  options.convert.goal = resolvedGoal(given, fitted);
   CommonFitOptions& fit = options.convert.fit;
   fit.peak = fitted.peak;
   ConvertedGrid grid = named(fitted);

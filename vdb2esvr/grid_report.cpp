@@ -173,7 +173,7 @@ Json stabilityOf(const StoredGrid& grid) {
   constexpr std::size_t kSamples = 32;
   if (grid.field.ellipsoidCount() == 0) return nullptr;
   const Stability stability = measureStability(grid.field, cli::stabilityOptionsOf(grid, kSamples));
-  Json json{{"correct_digits", correctDigits(stability.largest, cli::largestMagnitude(grid))}};
+  Json json{{"correct_digits", correctDigits(stability.largest, cli::peakOfSource(grid))}};
   json.update(cli::differencesJson(stability));
   json.update(cli::difficultiesJson(stability));
   return json;

@@ -1,5 +1,6 @@
 #include "vdb2esvr/options.h"
 
+#include <cmath>
 #include <limits>
 
 #include "cli/box_option.h"
@@ -173,9 +174,17 @@ void requireRepresentation(const Arguments& a, const Options& options) {
     throw UsageError("--representation voxels cannot be combined with --storage float32");
 }
 
-NonFinite nonFinite(const Arguments& a) {
-  return cli::choose<NonFinite>("nonfinite", a.get<std::string>("nonfinite"),
-                                {{"refuse", NonFinite::kRefuse}, {"zero", NonFinite::kZero}});
+/// \throws UsageError  the text is no word and no finite float
+void readNonFinite(const Arguments& a, ReadOptions& read) {
+  const auto text = a.get<std::string>("nonfinite");
+  if (text == "refuse" || text == "error") return;
+  read.nonFinite = text == "background" ? NonFinite::kBackground : NonFinite::kValue;
+  if (text == "zero" || text == "background") return;
+  const auto value = cli::parseNumber(text);
+  if (!value || !std::isfinite(float(*value)))
+    throw UsageError("--nonfinite must be refuse, zero, background or a number such as -1, not '" +
+                     text + "'");
+  read.nonFiniteValue = float(*value);
 }
 
 ProgressForm progressForm(const Arguments& a) {
@@ -224,7 +233,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.grids.lossless = a.get<bool>("lossless");
   options.convert.representation = representation(a);
   requireRepresentation(a, options);
-  options.read.nonFinite = nonFinite(a);
+  readNonFinite(a, options.read);
   readMemory(a, options);
   options.device = cli::deviceOf(a);
   options.onCancel = onCancel(a);

@@ -58,10 +58,14 @@ void tellNothingFitted(const GridChoice& choice, const cli::Log& log) {
                   " grids are carried unchanged");
 }
 
-void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
+void tellGrid(const Options& options, const ConvertedGrid& grid, const cli::Log& log) {
+  const std::string replacement = options.read.nonFinite == NonFinite::kBackground
+                                      ? "the background"
+                                      : cli::shortNumber(options.read.nonFiniteValue);
   if (grid.nonFiniteReplaced > 0)
-    log.warning("grid \"" + grid.uniqueName + "\": NaN or infinite voxels were replaced by 0",
-                std::to_string(grid.nonFiniteReplaced) + " voxels");
+    log.warning(
+        "grid \"" + grid.uniqueName + "\": NaN or infinite voxels were replaced by " + replacement,
+        std::to_string(grid.nonFiniteReplaced) + " voxels");
   if (const FitResult& fit = grid.conversion.fit; fit.deviceFull)
     log.warning("grid \"" + grid.uniqueName + "\": the memory of the GPU was full",
                 std::to_string(grid.stored().field.ellipsoidCount()) + " ellipsoids instead of " +
@@ -301,11 +305,11 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   record.skipped = std::move(choice.skipped);
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
-  findPeaks(besides(carried, options), choice.fitted);
+  findScales(besides(carried, options), choice.fitted);
   Parts parts(options, selected.front(), cancel, ranks);
   FileConversion(besides(carried, options), selected, cancel, parts, log)
       .run(choice.fitted, carried, record);
-  for (const auto& grid : record.grids) tellGrid(grid, log);
+  for (const auto& grid : record.grids) tellGrid(options, grid, log);
   if (options.job == Job::kPart) {
     if (!ranks) tellPart(options, record, log);
     return record;

@@ -40,8 +40,8 @@ std::vector<std::string> rowOf(const SequenceRecord& record, const FrameRecord& 
           std::to_string(frame.carried.size()),
           std::to_string(ellipsoids),
           std::to_string(frame.bytesOut),
-          lowest(frame, &FrameGrid::psnrBox),
           lowest(frame, &FrameGrid::psnrActive),
+          lowest(frame, &FrameGrid::psnrBox),
           cli::seconds(frame.seconds),
           state};
 }
@@ -111,7 +111,7 @@ void printBytes(const Options& options, const SequenceRecord& record, std::ostre
 }  // namespace
 
 void printSequence(const Options& options, const SequenceRecord& record, std::ostream& out) {
-  cli::Table table({"frame", "fitted", "carried", "ellipsoids", "bytes", "PSNR box", "active",
+  cli::Table table({"frame", "fitted", "carried", "ellipsoids", "bytes", "PSNR active", "PSNR box",
                     "seconds", "state"});
   for (const FrameRecord& frame : record.frames) table.add(rowOf(record, frame));
   table.print(out);

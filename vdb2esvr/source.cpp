@@ -10,14 +10,16 @@ VolumeGrid readSource(const Options& options, const FittedGrid& grid) {
                         : readGrid(options.input, name, options.read);
 }
 
-void findPeaks(const Options& options, std::vector<FittedGrid>& grids) {
+void findScales(const Options& options, std::vector<FittedGrid>& grids) {
   for (std::size_t g = 0; g < grids.size(); ++g) {
     if (!grids[g].component) continue;
-    grids[g].peak =
-        grids[g].component == std::size_t{0}
-            ? peakOfVectors(
-                  readVector(options.input, grids[g].source.uniqueName, options.read).components)
-            : grids[g - 1].peak;
+    if (grids[g].component != std::size_t{0}) {
+      grids[g].peak = grids[g - 1].peak, grids[g].range = grids[g - 1].range;
+      continue;
+    }
+    const VectorGrid vectors = readVector(options.input, grids[g].source.uniqueName, options.read);
+    grids[g].peak = peakOfVectors(vectors.components);
+    grids[g].range = valueRangeOfVectors(vectors.components);
   }
 }
 

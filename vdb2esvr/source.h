@@ -13,8 +13,8 @@ namespace esvr::vdb2esvr {
 /// \throws  as for readGrid and readComponent
 [[nodiscard]] VolumeGrid readSource(const Options& options, const FittedGrid& grid);
 
-/// Sets the peak of all components of vectors to peakOfVectors(), for which the vectors are read.
-/// \throws  as for readVector
-void findPeaks(const Options& options, std::vector<FittedGrid>& grids);
+/// Sets the peak and the range of all components of vectors to peakOfVectors() and
+/// valueRangeOfVectors(), for which the vectors are read. \throws  as for readVector
+void findScales(const Options& options, std::vector<FittedGrid>& grids);
 
 }  // namespace esvr::vdb2esvr

@@ -111,13 +111,14 @@ void printShared(const RunRecord& record, std::ostream& out) {
 
 void printFitted(const Options& options, const RunRecord& record, std::ostream& out) {
   if (record.grids.empty()) return;
-  cli::Table table({"grid", "ellipsoids", "bytes", "PSNR box", "active", "max error", "seconds"});
+  cli::Table table(
+      {"grid", "ellipsoids", "bytes", "PSNR active", "PSNR box", "max error", "seconds"});
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
     const ConvertedGrid& grid = record.grids[g];
     table.add({grid.uniqueName, std::to_string(grid.stored().field.ellipsoidCount()),
-               std::to_string(cli::ownBytes(record.output, g)), cli::decibels(grid.metrics.psnrBox),
-               cli::decibels(grid.metrics.psnrActive), cli::shortNumber(grid.metrics.maxError),
-               cli::seconds(grid.seconds.total())});
+               std::to_string(cli::ownBytes(record.output, g)),
+               cli::decibels(grid.metrics.psnrActive), cli::decibels(grid.metrics.psnrBox),
+               cli::shortNumber(grid.metrics.maxError), cli::seconds(grid.seconds.total())});
   }
   table.print(out);
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
@@ -132,11 +133,11 @@ void printFitted(const Options& options, const RunRecord& record, std::ostream& 
 /// Lists the errors of the vectors. The table of fitted grids has their components.
 void printVectors(const RunRecord& record, std::ostream& out) {
   if (record.vectors.empty()) return;
-  cli::Table table({"vectors", "values", "bytes", "PSNR box", "active", "max error"});
+  cli::Table table({"vectors", "values", "bytes", "PSNR active", "PSNR box", "max error"});
   for (const ConvertedVector& vector : record.vectors) {
     const VolumeMetrics& m = vector.metrics.magnitude;
     table.add({vector.uniqueName, vector.valueType, std::to_string(ownBytes(record.output, vector)),
-               cli::decibels(m.psnrBox), cli::decibels(m.psnrActive),
+               cli::decibels(m.psnrActive), cli::decibels(m.psnrBox),
                cli::shortNumber(m.maxError)});
   }
   table.print(out);

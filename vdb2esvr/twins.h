@@ -24,7 +24,7 @@ struct Twin {
 using Twins = std::map<std::size_t, Twin>;
 
 /// Reads the grids whose numbers and boxes of active voxels are the same, one after the other.
-/// Twins have the same peak of the PSNR and the same goal. It ends early if the run is interrupted.
+/// Twins have the same peak of the PSNR, the same range and the same goal. It ends early if the run is interrupted.
 [[nodiscard]] Twins findTwins(const Options& options, const std::vector<FittedGrid>& grids);
 
 }  // namespace esvr::vdb2esvr

@@ -58,7 +58,7 @@ esvr_grid describe(const StoredGrid& grid) {
     d.has_transform = 1;
     std::copy(affine->begin(), affine->end(), d.transform);
   }
-  d.background = grid.field.background;
+  d.background = float(grid.descriptor.background);
   d.low = grid.valueMin, d.high = grid.valueMax;
   set(d.box, grid.activeBox);
   d.active_voxels = grid.activeVoxels;

@@ -26,9 +26,7 @@ constexpr std::uint64_t kEllipsoidBytesDivisor = 4;
 constexpr double kPromisingRatio = 0.9;
 
 double absoluteBound(const BoundGoal& goal, const SparseVolume& source) {
-  if (!goal.relative) return goal.bound;
-  const ValueRange range = activeRange(source);
-  return goal.bound * (double(range.max) - double(range.min));
+  return goal.relative ? goal.bound * valueRangeOf(source) : goal.bound;
 }
 
 Conversion asVoxels(const Job& job, VoxelLayer layer) {

@@ -1,5 +1,6 @@
 #include "esvr/convert.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -169,6 +170,70 @@ std::vector<BrickMask> expectedMasks(const SparseVolume& source, const StoredGri
   return format::movedMask(maskOf(source), maskOf(before));
 }
 
+/// The mean of the active values, within their range.
+float meanOf(const SparseVolume& volume, const ValueRange& range) {
+  double sum = 0.0, count = 0.0;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    const auto values = volume.brickValues(b);
+    double ofBrick = 0.0;
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (volume.active[b].test(v)) ofBrick += values[std::size_t(v)];
+    sum += ofBrick, count += volume.active[b].count();
+  }
+  return std::clamp(float(sum / count), range.min, range.max);
+}
+
+/// True if all inactive voxels have the background.
+bool isUniformOutside(const SparseVolume& volume) {
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!volume.active[b].test(v) && volume.brickValues(b)[std::size_t(v)] != volume.background)
+        return false;
+  return true;
+}
+
+/// The background to which the values of a volume are stored if its own is far from them: that of
+/// the previous frame if it is among them, or else their mean. Nothing if its own will do.
+std::optional<float> nearBackground(const ConvertInput& input, const ConvertOptions& options) {
+  const SparseVolume& source = input.source;
+  if (std::holds_alternative<LosslessGoal>(options.goal)) return std::nullopt;
+  const ValueRange range = activeRange(source);
+  if (!spanOf(range, source.background).farBackground || !isUniformOutside(source) ||
+      isNarrowBand(input.descriptor, source))
+    return std::nullopt;
+  if (const StoredGrid* previous = options.previous; previous && previous->farBackground) {
+    const float before = previous->field.background;
+    if (range.min <= before && before <= range.max) return before;
+  }
+  return meanOf(source, range);
+}
+
+/// Converts a volume whose background is far from its values relative to a background among them.
+/// The step from one to the other at the border of the active voxels would otherwise take all
+/// ellipsoids, and sums in float32 would lose the differences of the values. The exact mask is stored,
+/// since a voxel with the wrong state would have a wrong value altogether.
+Conversion convertNear(const ConvertInput& given, const ConvertOptions& options, float background) {
+  GridDescriptor descriptor = given.descriptor;
+  descriptor.background = background;
+  SparseVolume source = given.source;
+  setBackground(background, source);
+  ConvertOptions own = options;
+  own.storage.activity = Activity::kExact;
+  StoredGrid before;  // the previous frame, as it is without its far background
+  if (own.previous && own.previous->farBackground && own.previous->field.background == background) {
+    before = *own.previous;
+    before.descriptor.background = background;
+    before.farBackground = false;
+    own.previous = &before;
+  } else {
+    own.previous = nullptr;
+  }
+  Conversion conversion = convertVolume({descriptor, source}, own);
+  conversion.grid.descriptor = given.descriptor;
+  conversion.grid.farBackground = true;
+  return conversion;
+}
+
 }  // namespace
 
 double presetPsnr(Preset preset) {
@@ -185,12 +250,15 @@ double presetPsnr(Preset preset) {
 
 Conversion convertVolume(const ConvertInput& given, const ConvertOptions& options) {
   requirePossible(options);
+  if (const auto background = nearBackground(given, options))
+    return convertNear(given, options, *background);
+  ConvertOptions own = options;
+  if (own.previous && own.previous->farBackground) own.previous = nullptr;
   SimplifiedMasks::MakeExpected expected;
-  if (options.previous) expected = [&] { return expectedMasks(given.source, *options.previous); };
+  if (own.previous) expected = [&] { return expectedMasks(given.source, *own.previous); };
   const SimplifiedMasks masks(given.source, std::move(expected));  // all attempts share them
   const ConvertInput input{given.descriptor, given.source,
                            given.simplified ? given.simplified : &masks};
-  ConvertOptions own = options;
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
   if (own.fit.narrowBand) own.fit.fitFor = FitFor::kVoxels;
   if (own.fit.fitFor == FitFor::kDrawing) own.representation = Representation::kEllipsoids;

@@ -54,9 +54,7 @@ VoxelCandidate candidateOf(const Job& job, VoxelLayer layer, double psnr) {
 
 VoxelTrials::VoxelTrials(const Job& job)
     : job_(job), plateau_(timed([&] { return plateauOf(job.input.source); })) {
-  const ValueRange range = activeRange(job.input.source);
-  const double background = job.input.source.background;
-  range_ = std::max(double(range.max), background) - std::min(double(range.min), background);
+  range_ = spanOf(job.input.source).length();
 }
 
 bool VoxelTrials::isPlateau() const { return plateau_.share >= kPlateauShare; }

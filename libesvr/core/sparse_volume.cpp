@@ -1,10 +1,12 @@
 #include "esvr/sparse_volume.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <stdexcept>
 
 #include "esvr/error.h"
@@ -115,6 +117,34 @@ ValueRange activeRange(const SparseVolume& volume) {
       [&](std::size_t b, ValueRange& r) { addActive(volume.brickValues(b), volume.active[b], r); });
   if (range.min > range.max) throw BadInput("the grid has no active voxel");
   return range;
+}
+
+ValueSpan spanOf(const ValueRange& active, double background) {
+  const double low = active.min, high = active.max;
+  const double gap = std::max({low - background, background - high, 0.0});
+  const bool isNear = low == high ? std::isfinite(background) : gap <= high - low;
+  if (!isNear) return {low, high, true};
+  return {std::min(low, background), std::max(high, background), false};
+}
+
+ValueSpan spanOf(const SparseVolume& volume) {
+  return spanOf(activeRange(volume), volume.background);
+}
+
+double peakOf(const ValueRange& active, double background) {
+  if (active.min == active.max) return active.min == 0.0f ? 1.0 : std::abs(double(active.min));
+  const ValueSpan span = spanOf(active, background);
+  const bool hasBothSigns = span.low < 0.0 && span.high > 0.0;
+  return hasBothSigns ? std::max(-span.low, span.high) : span.length();
+}
+
+void setBackground(float background, SparseVolume& volume) {
+  volume.background = background;
+  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!volume.active[b].test(v)) values[std::size_t(v)] = background;
+  });
 }
 
 void dropInactiveBricks(SparseVolume& volume) {

@@ -27,7 +27,7 @@ void noteGrid(const StoredGrid& grid, std::vector<std::string>& notes) {
   if (grid.field.ellipsoidCount() == 0)
     notes.push_back(name +
                     (grid.voxels ? " holds voxels and no ellipsoids" : " has no ellipsoids"));
-  if (float(grid.descriptor.background) != grid.field.background)
+  if (!grid.farBackground && float(grid.descriptor.background) != grid.field.background)
     notes.push_back(name + " has one background in its descriptor and another in its field");
 }
 

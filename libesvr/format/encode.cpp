@@ -267,6 +267,9 @@ SectionWriter collect(const EsvrFile& file, const Differences& differences,
   // Records come first, so that one read at the beginning of the file is enough to list it.
   SectionWriter out;
   out.setLayout(file.layout);
+  constexpr std::uint16_t kFarBackgrounds = 5;  // the minor version that has them
+  if (std::ranges::any_of(file.grids, &StoredGrid::farBackground))
+    out.requireVersion(kFarBackgrounds);
   if (!inherited.metadata) addFileMetadata(out, file);
   addRecords(out, grids, differences);
   for (std::uint32_t g = 0; g < grids.size(); ++g)

@@ -56,6 +56,9 @@ std::optional<Fault> faultOf(const StoredGrid& grid) {
   if (!validAffine(grid.descriptor.transform)) return fault("the affine map is not finite");
   if (!validKernel(grid.field.kernel))
     return fault("the kernel's kappa is not finite or its epsilon not between 0 and 1");
+  if (grid.farBackground && grid.topology != TopologyKind::kMask &&
+      grid.topology != TopologyKind::kThreshold)
+    return fault("a far background needs a mask or voxels");
   if (!finite(grid.activeThreshold)) return fault("the threshold is not finite");
   if (grid.topology == TopologyKind::kBlocks && !(grid.activeThreshold > 0.0f))
     return fault("the threshold of blocks is not above 0");

@@ -44,7 +44,7 @@ void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options) {
 }
 
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite) {
-  if (tally.count == 0 || nonFinite == NonFinite::kZero) return;
+  if (tally.count == 0 || nonFinite != NonFinite::kRefuse) return;
   throw BadInput(std::to_string(tally.count) + (tally.count == 1 ? " voxel is" : " voxels are") +
                  " NaN, infinite or too large for float; the first is at " + toString(tally.first));
 }

@@ -23,7 +23,13 @@ struct FillRules {
   float background = 0.0f;
   bool levelSet = false;
   NonFinite nonFinite = NonFinite::kRefuse;
+  float nonFiniteValue = 0.0f;
   bool allowEmpty = false;
+
+  /// What a voxel becomes that is not finite and is not refused.
+  [[nodiscard]] float replacement() const {
+    return nonFinite == NonFinite::kBackground ? background : nonFiniteValue;
+  }
 };
 
 /// The background as float. \throws BadInput  it is not finite as float
@@ -34,8 +40,9 @@ void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options);
 
 /// Active voxels that float cannot hold: NaN, infinite values, and doubles out of range.
 struct NonFiniteTally {
+  float replacement = 0.0f;  ///< which they become
   std::uint64_t count = 0;
-  Coord first;  ///< the first one in the order of bricks and of voxels in a brick
+  Coord first{};  ///< the first one in the order of bricks and of voxels in a brick
 
   void add(Coord voxel) {
     if (count++ == 0 || std::pair(brickOf(voxel), voxel) < std::pair(brickOf(first), first))
@@ -68,12 +75,12 @@ std::size_t brickAt(const SparseVolume& volume, Coord corner);
 /// Fills the bricks that a tile covers.
 void fillTile(const TileSource& tile, SparseVolume& volume, NonFiniteTally& tally);
 
-/// An active value as float. A value that float cannot hold is counted and becomes 0.
+/// An active value as float. A value that float cannot hold is counted and replaced.
 inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
   const auto narrow = float(value);
   if (std::isfinite(narrow)) return narrow;
   tally.add(voxel);
-  return 0.0f;
+  return tally.replacement;
 }
 
 /// Fills brick b. access.value(leaf, i) is a leaf's voxel in voxelOffset order, and

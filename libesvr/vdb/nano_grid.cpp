@@ -174,10 +174,10 @@ void readVoxelsAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGr
   grid.descriptor.background = tree.background();
   const FillRules rules{narrowBackground(tree.background()),
                         grid.descriptor.gridClass == GridClass::kLevelSet, options.nonFinite,
-                        options.allowEmpty};
+                        options.nonFiniteValue, options.allowEmpty};
   auto corners = brickCorners(tree, options);
   SparseVolume& volume = grid.volume = layOutBricks(corners, rules, options.memory);
-  NonFiniteTally tally;
+  NonFiniteTally tally{.replacement = rules.replacement()};
   tree.visit(
       [&](Coord corner, const Leaf& leaf) {
         if (Access::mask(leaf).count() == 0) return;

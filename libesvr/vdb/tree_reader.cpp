@@ -185,8 +185,8 @@ TreeVoxels readVoxelsAs(Archive& archive, const LocatedTree& located, const Want
   result.background = reader.background();
   const FillRules rules{narrowBackground(result.background),
                         wanted.gridClass == GridClass::kLevelSet, options.nonFinite,
-                        options.allowEmpty};
-  NonFiniteTally tally;
+                        options.nonFiniteValue, options.allowEmpty};
+  NonFiniteTally tally{.replacement = rules.replacement()};
   result.volume = reader.read(rules, options.memory, tally);
   refuseNonFinite(tally, rules.nonFinite);
   result.nonFiniteReplaced = tally.count;

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "cli/converters.h"
+#include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
 #include "vdb/carried_bytes.h"
 
@@ -92,6 +93,59 @@ TEST_F(EdgeFile, RealFileWithATypeThatOpenVdbCannotReadGivesAllItsGrids) {
   EXPECT_THAT(namesOf(back()), ElementsAre("velocity", "phi_obstacle", "phi_inflow", "phi_out",
                                            "flags", "velocity_previous", "particles",
                                            "phi_particles", "phi", "phi_previous"));
+}
+
+/// Converts a file there and back, with the default goal and given options.
+class FaultFile : public EdgeFile {
+ protected:
+  [[nodiscard]] std::string source(const std::string& name) const { return path("faults/" + name); }
+  void convertThereAndBack(const std::string& name, std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {source(name), folder_ / "out.esvr", "--force"});
+    const auto there = test::vdb2esvr(more);
+    ASSERT_EQ(there.exitCode, 0) << there.err;
+    const auto run = test::esvr2vdb({folder_ / "out.esvr", folder_ / "back.vdb", "--force"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+  }
+  [[nodiscard]] test::ProgramRun check(const std::string& name, const std::string& candidate,
+                                       std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"check", source(name), folder_ / candidate});
+    return test::runProgram(ESVR_COMPARE, more);
+  }
+};
+
+TEST_F(FaultFile, RealFileOfAnOffsetPressureHasTheQualityOfItsRange) {
+  for (const std::vector<std::string>& options :
+       {std::vector<std::string>{}, {"--representation", "ellipsoids", "--count", "300"}}) {
+    convertThereAndBack("pressure_offset.vdb", options);
+    const VolumeGrid a = readGrid(source("pressure_offset.vdb"), "p");
+    const VolumeGrid b = readGrid(folder_ / "back.vdb", "p");
+    EXPECT_LT(peakOf(a.volume), 41.0);
+    const VolumeMetrics m = compareVolumes(a.volume, b.volume);
+    EXPECT_GE(m.psnrActive, options.empty() ? 40.0 : 20.0);
+    EXPECT_GT(m.iou, 0.95);
+    EXPECT_GE(activeRange(b.volume).min, a.volume.background - 1.0f);
+    EXPECT_EQ(b.volume.background, a.volume.background);
+  }
+}
+
+TEST_F(FaultFile, RealFileOfVectorsKeepsAPercentageForTheCheckToo) {
+  convertThereAndBack("vector.vdb", {"--max-error", "1%"});
+  for (const char* candidate : {"out.esvr", "back.vdb"}) {
+    const auto run = check("vector.vdb", candidate, {"--max-error", "1%"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+  }
+}
+
+TEST_F(FaultFile, RealFileWithAGridOfZerosIsComparedWithItself) {
+  const std::string zeros = source("all_zero_flame.vdb");
+  EXPECT_EQ(test::runProgram(ESVR_COMPARE, {"check", zeros, zeros}).exitCode, 0);
+  convertThereAndBack("all_zero_flame.vdb");
+  EXPECT_EQ(check("all_zero_flame.vdb", "back.vdb").exitCode, 0);
+}
+
+TEST_F(FaultFile, RealFileOfARootTileIsComparedByItsBytes) {
+  const std::string tile = source("root_tile.vdb");
+  EXPECT_EQ(test::runProgram(ESVR_COMPARE, {"check", tile, tile}).exitCode, 0);
 }
 
 }  // namespace

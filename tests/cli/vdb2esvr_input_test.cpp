@@ -10,6 +10,7 @@
 
 #include "cli/vdb2esvr_fixture.h"
 #include "esvr/container.h"
+#include "esvr/grid_coding.h"
 #include "support/non_finite.h"
 
 namespace esvr {
@@ -99,6 +100,22 @@ TEST_F(Vdb2Esvr, takesNonFiniteVoxelsAsZeroWhereAskedAndSaysHowMany) {
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.err, HasSubstr("NaN or infinite voxels were replaced by 0 (2 voxels)"));
   EXPECT_TRUE(outIsThere());
+}
+
+TEST_F(Vdb2Esvr, replacesNonFiniteVoxelsByTheBackgroundOrByAValue) {
+  test::writeInput(in(), {withNonFinite()});
+  for (const auto& [option, words] :
+       {std::pair{"background", "replaced by the background (2 voxels)"},
+        std::pair{"0.25", "replaced by 0.25 (2 voxels)"}}) {
+    const auto run = test::vdb2esvr({in(), out(), "--force", "--lossless", "--nonfinite", option});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_THAT(run.err, HasSubstr(words));
+  }
+  const SparseVolume decoded = decodeGrid(readEsvr(out()).grids.front());
+  EXPECT_EQ(valueAt(decoded, {1, 2, 3}), 0.25f);
+  EXPECT_EQ(fitQuickly({"--nonfinite", "error"}).exitCode, 3);
+  for (const char* wrong : {"keep", "nan", "1e99", ""})
+    EXPECT_EQ(fitQuickly({"--nonfinite", wrong}).exitCode, 2) << wrong;
 }
 
 TEST_F(Vdb2Esvr, fitsTheGridsThatAreNamedOnly) {

@@ -138,7 +138,7 @@ TEST_F(Nvdb, WithNonFiniteVoxelsIsRefusedOrMended) {
   save({source});
   EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
               ThrowsMessage<BadInput>(AllOf(HasSubstr("1 voxel is"), HasSubstr("(0, 0, 5)"))));
-  EXPECT_EQ(readGrid(path(), "density", {.nonFinite = NonFinite::kZero}).nonFiniteReplaced, 1u);
+  EXPECT_EQ(readGrid(path(), "density", {.nonFinite = NonFinite::kValue}).nonFiniteReplaced, 1u);
 }
 
 TEST_F(Nvdb, WithAHugeTileIsRefusedBeforeItIsExpanded) {

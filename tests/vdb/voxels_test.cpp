@@ -185,17 +185,28 @@ TEST_F(Voxels, NonFiniteOnesBecomeZeroWhenAsked) {
   auto source = test::smallGrid(0.5f);
   source->tree().setValue({9, 1, 1}, kNan);
   source->tree().addTile(1, {64, 0, 0}, kInf, true);
-  const auto grid = saveAndRead(source, {.nonFinite = NonFinite::kZero});
+  const auto grid = saveAndRead(source, {.nonFinite = NonFinite::kValue});
   EXPECT_EQ(grid.nonFiniteReplaced, 1u + 512u);
   EXPECT_EQ(valueAt(grid.volume, {9, 1, 1}), 0.0f);
   EXPECT_EQ(valueAt(grid.volume, {64, 0, 0}), 0.0f);
   EXPECT_EQ(activeVoxelCount(grid.volume), source->activeVoxelCount());
 }
 
+TEST_F(Voxels, NonFiniteOnesBecomeAValueOrTheBackgroundWhenAsked) {
+  auto source = test::smallGrid(0.5f);
+  source->tree().setValue({9, 1, 1}, kNan);
+  source->tree().addTile(1, {64, 0, 0}, kInf, true);
+  const auto background = saveAndRead(source, {.nonFinite = NonFinite::kBackground});
+  EXPECT_EQ(background.nonFiniteReplaced, 1u + 512u);
+  EXPECT_EQ(valueAt(background.volume, {9, 1, 1}), 0.5f);
+  const auto value = saveAndRead(source, {.nonFinite = NonFinite::kValue, .nonFiniteValue = -2.0f});
+  EXPECT_EQ(valueAt(value.volume, {64, 0, 0}), -2.0f);
+}
+
 TEST_F(Voxels, ABackgroundThatIsNotFiniteIsRefused) {
   const auto source = test::smallGrid(kInf);
   EXPECT_THROW((void)saveAndRead(source), BadInput);
-  EXPECT_THROW((void)saveAndRead(source, {.nonFinite = NonFinite::kZero}), BadInput);
+  EXPECT_THROW((void)saveAndRead(source, {.nonFinite = NonFinite::kValue}), BadInput);
 }
 
 TEST_F(Voxels, DoublesAreNarrowedToTheNearestFloat) {

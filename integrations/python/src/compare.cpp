@@ -51,7 +51,8 @@ void addCompare(py::module_& module) {
       "compare", &compare, py::arg("reference"), py::arg("candidate"), py::kw_only(),
       py::arg("box") = py::none(), py::arg("peak") = py::none(), py::arg("ssim") = false,
       "Compares two volumes or grids; grids are decoded. The box is that of the reference's\n"
-      "active voxels by default, and the peak its largest value.");
+      "active voxels by default, and the peak the range of its values, which is the largest value\n"
+      "of a density (docs/compare.md).");
 }
 
 }  // namespace esvr::python

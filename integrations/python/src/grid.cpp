@@ -157,7 +157,8 @@ void addGrid(py::module_& module) {
       .def_property_readonly(
           "kind", [](const Grid& g) { return kindOf(*g.grid); },
           "\"ellipsoids\", \"ellipsoids with a residual\" or \"voxels\".")
-      .def_property_readonly("background", [](const Grid& g) { return g.grid->field.background; })
+      .def_property_readonly("background",
+                             [](const Grid& g) { return float(g.grid->descriptor.background); })
       .def_property_readonly(
           "active_voxels", [](const Grid& g) { return g.grid->activeVoxels; },
           "Number of active voxels of the source.")

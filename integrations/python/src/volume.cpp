@@ -210,6 +210,16 @@ void addVolume(py::module_& module) {
           "box", [](const Volume& v) { return plainBox(activeBox(v.grid->volume)); },
           "The first and the last active voxel along each axis; None if there is none.")
       .def_property_readonly(
+          "value_range",
+          [](const Volume& v) -> std::optional<std::pair<float, float>> {
+            if (activeVoxelCount(v.grid->volume) == 0) return std::nullopt;
+            const ValueRange range = activeRange(v.grid->volume);
+            return std::pair(range.min, range.max);
+          },
+          "The smallest and the largest active value; None if there is none. Their difference is "
+          "the\n"
+          "range of which --max-error takes a percentage.")
+      .def_property_readonly(
           "transform", [](const Volume& v) { return matrixOf(v.grid->descriptor.transform); },
           "4 x 4 matrix from index to world coordinates, for column vectors; None for a frustum.");
 }

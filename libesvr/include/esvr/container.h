@@ -68,9 +68,13 @@ struct StoredGrid {
   std::vector<Coord> bricks;
   std::vector<BrickMask> mask;      ///< active voxels of each brick, for kMask; else empty
   std::vector<BlockLevels> levels;  ///< levels of each brick, for kBlocks; else empty
-  bool withinRange = true;          ///< decoded values are clamped to the source's range of values
-  Box activeBox;                    ///< active bounding box of the source, index coordinates
-  std::uint64_t activeVoxels = 0;   ///< number of active voxels of the source
+  /// The background of the source is far from its values (spanOf, sparse_volume.h). The background of
+  /// `field` and of `voxels` then is a value among the active ones, to which these are relative, and
+  /// decoded inactive voxels get the background of `descriptor`. Only with kMask or with voxels.
+  bool farBackground = false;
+  bool withinRange = true;         ///< decoded values are clamped to the source's range of values
+  Box activeBox;                   ///< active bounding box of the source, index coordinates
+  std::uint64_t activeVoxels = 0;  ///< number of active voxels of the source
   float valueMin = 0.0f, valueMax = 0.0f;  ///< range of the source's active voxels
   std::vector<CurvePoint> curve;
   /// The quantised ellipsoids of every chunk. The ellipsoids of `field` are exactly their

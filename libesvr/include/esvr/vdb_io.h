@@ -51,12 +51,14 @@ struct VdbSummary {
 ///                   names the file)
 [[nodiscard]] VdbSummary inspectVdb(const std::filesystem::path& path);
 
-/// Treatment of NaN and infinite voxels: they are an error, or they are replaced by 0.
-enum class NonFinite { kRefuse, kZero };
+/// Treatment of active voxels that are NaN, infinite or too large for float: they are an error, or
+/// they get a value or the background of their grid (of a vector: of the component).
+enum class NonFinite { kRefuse, kValue, kBackground };
 
 struct ReadOptions {
   NonFinite nonFinite = NonFinite::kRefuse;
-  bool allowEmpty = false;  ///< a grid without active voxels becomes a volume without bricks
+  float nonFiniteValue = 0.0f;  ///< the value of NonFinite::kValue, which is finite
+  bool allowEmpty = false;      ///< a grid without active voxels becomes a volume without bricks
   /// Limit on the memory of the file's tree and of the bricks that are made from it. Active tiles
   /// become bricks; one tile may become 2^27 bricks.
   std::uint64_t maxBytes = std::uint64_t{16} << 30;
@@ -69,7 +71,7 @@ struct ReadOptions {
 struct VolumeGrid {
   GridDescriptor descriptor;
   SparseVolume volume;
-  std::uint64_t nonFiniteReplaced = 0;  ///< voxels replaced under NonFinite::kZero
+  std::uint64_t nonFiniteReplaced = 0;  ///< voxels replaced as NonFinite says
 };
 
 /// Reads one grid with its active tiles. Active voxels of the volume hold the grid's values,

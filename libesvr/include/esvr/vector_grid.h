@@ -21,7 +21,7 @@ struct VectorGrid {
   GridDescriptor descriptor;  ///< its background is that of component x
   std::array<double, kComponents> background{};
   VectorVolume components;
-  std::uint64_t nonFiniteReplaced = 0;  ///< components replaced under NonFinite::kZero
+  std::uint64_t nonFiniteReplaced = 0;  ///< components replaced as NonFinite says
 };
 
 /// The name of a component: that of the grid with ".x", ".y" or ".z".
