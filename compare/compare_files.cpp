@@ -159,9 +159,7 @@ class Comparison {
       else
         record.grids.push_back(compare(pair, name, record));
     } catch (const BadInput& why) {
-      record.unreadable.push_back(
-          "grid \"" + name +
-          "\" cannot be compared, and its bytes are not the same: " + why.what());
+      record.unreadable.push_back("grid \"" + name + "\" cannot be compared: " + why.what());
     }
   }
 

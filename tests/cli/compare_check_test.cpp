@@ -254,8 +254,7 @@ TEST_F(CompareCheck, comparesGridsThatAreNotFiniteByTheirBytes) {
         {odd(2.0f), {.name = "far", .voxels = softBall({}), .background = nan}, ball()});
   const auto run = check("other.vdb");
   EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err,
-              HasSubstr("grid \"odd\" cannot be compared, and its bytes are not the same"));
+  EXPECT_THAT(run.err, HasSubstr("grid \"odd\" cannot be compared: "));
   EXPECT_THAT(run.out, HasSubstr("density")) << "the others are compared";
   EXPECT_EQ(check("other.vdb", {"--max-bytes", "1"}).exitCode, 4);
 }
