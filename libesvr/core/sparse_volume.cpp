@@ -132,10 +132,11 @@ ValueSpan spanOf(const SparseVolume& volume) {
 }
 
 double peakOf(const ValueRange& active, double background) {
-  if (active.min == active.max) return active.min == 0.0f ? 1.0 : std::abs(double(active.min));
+  const double low = active.min, high = active.max;
+  if (low == high) return low == 0.0 ? 1.0 : std::abs(low);
+  if (low < 0.0 && high > 0.0) return std::max(-low, high);
   const ValueSpan span = spanOf(active, background);
-  const bool hasBothSigns = span.low < 0.0 && span.high > 0.0;
-  return hasBothSigns ? std::max(-span.low, span.high) : span.length();
+  return low >= 0.0 ? high - std::max(span.low, 0.0) : std::min(span.high, 0.0) - low;
 }
 
 void setBackground(float background, SparseVolume& volume) {

@@ -177,7 +177,7 @@ struct PeakCase {
 
 class Peak : public testing::TestWithParam<PeakCase> {};
 
-TEST_P(Peak, IsTheLengthOfTheSpanOrTheMagnitudeOfSignedValues) {
+TEST_P(Peak, IsTheRangeOfOneSignAndTheMagnitudeOfTwo) {
   const PeakCase& c = GetParam();
   EXPECT_DOUBLE_EQ(peakOf(c.active, c.background), c.peak) << c.what;
   EXPECT_EQ(spanOf(c.active, c.background).farBackground, c.isFar) << c.what;

@@ -129,12 +129,13 @@ struct ValueSpan {
 [[nodiscard]] ValueSpan spanOf(const SparseVolume& volume);
 
 /// The peak of the PSNR of a grid, to which its errors are relative. It is
-///  - the length of spanOf(), as in compressors of scientific data, which divide by the range of the
-///    values. For values from 0 up over a background of 0, this is the largest value;
-///  - the largest magnitude, if the span has values of both signs. A velocity from -v to v then has
-///    the peak v, which does not depend on the direction of the axes, and a range that is filled by
-///    one sign only counts as much as one that is filled by both;
-///  - the magnitude of the value, if all active values are equal, or 1 if they are 0.
+///  - for values of one sign, their range, as in compressors of scientific data. It begins at the
+///    background if that lies between 0 and the values and is not far (spanOf). For values from 0 up
+///    this is the largest value;
+///  - for values of both signs, the largest magnitude. A velocity from -v to v then has the peak v,
+///    which does not depend on the direction of the axes, and data of both signs have the quality
+///    that those of one sign have;
+///  - if all active values are equal, their magnitude, or 1 if they are 0.
 /// \param active  range of the active values, as from activeRange
 [[nodiscard]] double peakOf(const ValueRange& active, double background);
 
