@@ -14,7 +14,7 @@ from .jobs import Job, JobFailed
 from .modal import JobOperator
 from .preferences import absolute
 from .properties import remember
-from .source import EXTENSION, Source, SourceError, grouped
+from .source import EXTENSION, Source, SourceError, grouped, text_of_gaps
 
 
 def decode_all(job, requests):
@@ -27,6 +27,13 @@ def decoded_or_failure(job, request):
         return decode(job, request)
     except JobFailed as failure:
         return failure
+
+
+def report_gaps(operator, source, entry):
+    """Blender shows nothing in a missing frame, and its own import ends at the first one."""
+    text = text_of_gaps(source.stem, entry.frames or [])
+    if text:
+        operator.report({"WARNING"}, text)
 
 
 def report_failures(operator, results):
@@ -76,6 +83,7 @@ class ImportESVR(JobOperator, bpy.types.Operator, ImportHelper):
         for request, entry in zip(self._requests, result):
             if not isinstance(entry, JobFailed):
                 add_volume(context, request, entry)
+                report_gaps(self, request.source, entry)
         return report_failures(self, result)
 
     def _paths(self):

@@ -73,6 +73,20 @@ def within(number, frames):
     return frames is None or frames[0] <= number <= frames[1]
 
 
+def gaps_in(frames):
+    """The first and the last of the missing frames between increasing numbers, for each gap."""
+    return [(before + 1, after - 1) for before, after in zip(frames, frames[1:]) if after > before + 1]
+
+
+def text_of_gaps(stem, frames):
+    """What the user should know about missing frames; empty if there is no gap."""
+    gaps = ", ".join(str(first) if first == last else f"{first} to {last}" for first, last in gaps_in(frames))
+    if not gaps:
+        return ""
+    return (f"{stem}: nothing is shown in the missing frames {gaps}. --missing hold of vdb2esvr and esvr2vdb repeats "
+            "the frame before a gap")
+
+
 def in_frames(frames):
     return f" in the frames {frames[0]} to {frames[1]}" if frames else ""
 

@@ -2,7 +2,7 @@
 import os
 
 import pytest
-from esvr_blender.source import Source, SourceError, grouped
+from esvr_blender.source import Source, SourceError, gaps_in, grouped, text_of_gaps
 
 
 def touch(folder, *names):
@@ -67,3 +67,11 @@ def test_numbers_of_different_lengths_have_the_pattern_of_the_shortest(tmp_path)
 
 def test_names_that_would_become_another_pattern_are_no_sequence(tmp_path):
     assert group(tmp_path, "a1#.esvr", "a2#.esvr") == [("a1#.esvr", None), ("a2#.esvr", None)]
+
+
+def test_gaps_between_frames_are_told():
+    assert gaps_in([1, 2, 3]) == [] and gaps_in([]) == [] and gaps_in([7]) == []
+    assert gaps_in([1, 2, 4, 9]) == [(3, 3), (5, 8)]
+    assert text_of_gaps("smoke", [1, 2, 3]) == ""
+    text = text_of_gaps("smoke", [1, 2, 4, 9])
+    assert "smoke" in text and "3, 5 to 8" in text and "--missing hold" in text
