@@ -75,7 +75,7 @@ cli::CommandLine makeCommandLine() {
      "largest size of the file CAND, for example 200KB")
     ("fail-on", value<std::string>()->value_name("KINDS"),
      "differences for which the check fails, separated by commas: name, class, type, "
-     "background, transform, metadata, or all")
+     "background, transform, metadata, inactive (values of inactive voxels), or all")
     ("ssim", bool_switch(), "measure and print the SSIM even without a limit on it")
     ("baseline", value<std::string>()->value_name("FILE.json"),
      "compare with the figures of this file")
@@ -91,15 +91,16 @@ cli::CommandLine makeCommandLine() {
 std::set<DifferenceKind> kindsOf(const std::string& word) {
   using Kind = DifferenceKind;
   if (word == "all")
-    return {Kind::kName,       Kind::kClass,     Kind::kValueType,
-            Kind::kBackground, Kind::kTransform, Kind::kMetadata};
+    return {Kind::kName,      Kind::kClass,    Kind::kValueType, Kind::kBackground,
+            Kind::kTransform, Kind::kMetadata, Kind::kInactive};
   return {cli::choose<Kind>("fail-on", word,
                             {{"name", Kind::kName},
                              {"class", Kind::kClass},
                              {"type", Kind::kValueType},
                              {"background", Kind::kBackground},
                              {"transform", Kind::kTransform},
-                             {"metadata", Kind::kMetadata}})};
+                             {"metadata", Kind::kMetadata},
+                             {"inactive", Kind::kInactive}})};
 }
 
 std::set<DifferenceKind> parseKinds(const std::string& list) {

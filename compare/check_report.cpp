@@ -70,6 +70,8 @@ const char* nameOf(DifferenceKind kind) {
       return "background";
     case DifferenceKind::kTransform:
       return "transform";
+    case DifferenceKind::kInactive:
+      return "inactive";
     case DifferenceKind::kMetadata:
       break;
   }

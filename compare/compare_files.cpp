@@ -134,6 +134,7 @@ class Comparison {
     grid.figures = figuresOf(grid.metrics);
     addMeshDistance(grid, a, b);
     grid.differences = compareDescriptors(a.descriptor, b.descriptor);
+    addDifferences(compareInactive(a.inactive, b.inactive), grid);
     addRange(a.volume);
     addTemporal(grid, a.volume, b.volume);
     return grid;
@@ -151,6 +152,7 @@ class Comparison {
         a.components, b.components, {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
     record.grids.push_back({name, other, metrics.magnitude, figuresOf(metrics.magnitude),
                             compareDescriptors(a.descriptor, b.descriptor)});
+    addDifferences(compareInactive(a.inactive, b.inactive), record.grids.back());
     addRange(lengths);
     addTemporal(record.grids.back(), lengths, magnitudeOf(b.components));
     for (std::size_t c = 0; c < kComponents; ++c) {
@@ -160,6 +162,10 @@ class Comparison {
       addRange(a.components[c]);
       addTemporal(record.grids.back(), a.components[c], b.components[c]);
     }
+  }
+
+  static void addDifferences(const std::vector<Difference>& more, CheckedGrid& grid) {
+    grid.differences.insert(grid.differences.end(), more.begin(), more.end());
   }
 
   /// The difference of the backgrounds of a component. That of x is one of the descriptors.

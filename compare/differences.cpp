@@ -90,6 +90,17 @@ std::vector<Difference> compareMetadata(std::span<const MetaItem> reference,
   return differences;
 }
 
+std::vector<Difference> compareInactive(const InactiveValues& reference,
+                                        const InactiveValues& candidate) {
+  if (reference == candidate) return {};
+  const auto text = [](const InactiveValues& values) {
+    return values.count() == 0 ? "none" : toText(values);
+  };
+  return {{DifferenceKind::kInactive,
+           "inactive values that are not the background: " + text(reference) +
+               ", in the candidate " + text(candidate)}};
+}
+
 std::vector<Difference> compareDescriptors(const GridDescriptor& a, const GridDescriptor& b) {
   Differences differences;
   differences.add(DifferenceKind::kName, "name", '"' + a.name + '"', '"' + b.name + '"');

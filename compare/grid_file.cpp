@@ -10,6 +10,8 @@
 namespace esvr::compare {
 namespace {
 
+constexpr std::uint64_t kVolumes = 2;  // the reference and the candidate
+
 std::vector<std::string> storedNames(const std::vector<ListedGrid>& grids) {
   std::vector<std::string> names;
   for (const auto& grid : grids) names.push_back(grid.name);
@@ -109,8 +111,10 @@ std::optional<CarriedGrid> GridFile::bytesOf(std::size_t g) const {
 }
 
 VolumeGrid GridFile::read(std::size_t g) const {
-  const ReadOptions options{
-      .allowEmpty = true, .maxBytes = memory_.maxBytes, .memory = memory_.voxels};
+  const ReadOptions options{.allowEmpty = true,
+                            .maxBytes = memory_.maxBytes,
+                            .memory = memory_.voxels,
+                            .volumes = kVolumes};
   if (!esvr_) return readGrid(path_, grids_[g].uniqueName, options);
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readGrid(esvr_->carried[place.index], options);
@@ -122,7 +126,8 @@ VolumeGrid GridFile::read(std::size_t g) const {
 }
 
 VectorGrid GridFile::readVectors(std::size_t g) const {
-  const ReadOptions options{.maxBytes = memory_.maxBytes, .memory = memory_.voxels};
+  const ReadOptions options{
+      .maxBytes = memory_.maxBytes, .memory = memory_.voxels, .volumes = kVolumes};
   if (!esvr_) return readVector(path_, grids_[g].uniqueName, options);
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readVector(esvr_->carried[place.index], options);

@@ -44,9 +44,10 @@ WantedPlaces wantedPlaces(const std::filesystem::path& file, const VdbSummary& s
 /// The reason why a grid is not fitted; empty if it is.
 std::string whyCarried(const GridSummary& grid, bool isKept, bool lossless) {
   if (isKept) return "--keep names it";
-  if (!grid.isVector) return grid.skipReason;
-  return lossless && grid.valueType == "vec3d"
-             ? "its vectors are of doubles, which a lossless file cannot hold in another way"
+  if (!grid.skipReason.empty() && !grid.isVector) return grid.skipReason;
+  const bool isDouble = grid.valueType == "double" || grid.valueType == "vec3d";
+  return lossless && isDouble && grid.whyNotCarried.empty()
+             ? "its values are doubles, which a lossless file cannot hold in another way"
              : "";
 }
 

@@ -16,7 +16,7 @@ struct WantedGrids {
   std::vector<std::string> only;  ///< empty: all grids
   std::vector<std::string> keep;  ///< carried unchanged, even if they could be fitted
   std::vector<std::string> skip;  ///< left out
-  bool lossless = false;  ///< whether doubles, which are fitted as float32, are carried in vectors
+  bool lossless = false;          ///< whether doubles, which are fitted as float32, are carried
 };
 
 /// A grid that is not fitted, and the reason.

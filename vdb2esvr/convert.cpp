@@ -91,8 +91,10 @@ ConvertedGrid named(const FittedGrid& fitted) {
 
 }  // namespace
 
-ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
-                          std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
+namespace {
+
+ConvertedGrid readAndConvert(const Options& given, const FittedGrid& fitted,
+                             std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
   Options options = given;
   options.convert.goal = goalOf(given, fitted);
   CommonFitOptions& fit = options.convert.fit;
@@ -103,6 +105,7 @@ ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
   const VolumeGrid source = readSource(options, fitted);
   grid.bricks = source.volume.brickCount();
   grid.nonFiniteReplaced = source.nonFiniteReplaced;
+  grid.inactive = source.inactive;
   grid.seconds.read = watch.lap();
 
   grid.device = deviceName(fit.device);
@@ -126,6 +129,13 @@ ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
   return grid;
 }
 
+}  // namespace
+
+ConvertedGrid convertGrid(const Options& options, const FittedGrid& fitted,
+                          std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
+  return sayingTheWayOut(fitted, [&] { return readAndConvert(options, fitted, bytes, expected); });
+}
+
 ConvertedGrid twinOf(const ConvertedGrid& grid, const FittedGrid& fitted, const Twin& twin) {
   ConvertedGrid made = grid;
   made.uniqueName = fitted.uniqueName();
@@ -133,6 +143,7 @@ ConvertedGrid twinOf(const ConvertedGrid& grid, const FittedGrid& fitted, const 
   made.component = fitted.component;
   made.conversion.grid.descriptor = twin.descriptor;
   made.nonFiniteReplaced = twin.nonFiniteReplaced;
+  made.inactive = twin.inactive;
   made.sameAs = grid.uniqueName;
   made.seconds = {.read = twin.secondsRead};
   return made;

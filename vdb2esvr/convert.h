@@ -45,6 +45,7 @@ struct ConvertedGrid {
   std::optional<double> psnrBetween;     ///< of ellipsoids that were fitted for drawing, dB
   std::size_t bricks = 0;                ///< bricks of the source
   std::uint64_t nonFiniteReplaced = 0;
+  InactiveValues inactive;                  ///< of the source, which the file does not hold
   std::string device;                       ///< name of the device that fitted the grid
   std::optional<double> hits;               ///< averageHits, with --hits
   std::optional<std::uint64_t> voxelPairs;  ///< those of countHits in the source's bricks, --hits

@@ -30,6 +30,15 @@ const char* nameOf(FitEnd end) {
   return "";
 }
 
+/// The inactive values that the file does not hold; null if there is none.
+Json inactiveOf(const InactiveValues& values) {
+  if (values.count() == 0) return nullptr;
+  const bool hasRange = values.count() > values.nonFinite();
+  return {{"count", values.count()},
+          {"value_range", hasRange ? Json{values.min(), values.max()} : Json(nullptr)},
+          {"nonfinite", values.nonFinite()}};
+}
+
 Json sourceOf(const ConvertedGrid& grid) {
   const StoredGrid& stored = grid.stored();
   return {{"class", className(stored.descriptor.gridClass)},
@@ -40,7 +49,8 @@ Json sourceOf(const ConvertedGrid& grid) {
           {"active_box", toJson(stored.activeBox)},
           {"bricks", grid.bricks},
           {"value_range", {stored.valueMin, stored.valueMax}},
-          {"nonfinite_replaced", grid.nonFiniteReplaced}};
+          {"nonfinite_replaced", grid.nonFiniteReplaced},
+          {"inactive_lost", inactiveOf(grid.inactive)}};
 }
 
 Json kernelOf(const Kernel& kernel) {

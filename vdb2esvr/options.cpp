@@ -196,10 +196,12 @@ WantedSharing sharing(const Arguments& a) {
 }
 
 void readMemory(const Arguments& a, Options& options) {
+  constexpr std::uint64_t kVolumes = 3;    // the source, its codes and what they decode to
   constexpr std::uint64_t kFitsShare = 2;  // one of two; the rest is for the volume and its copy
   const cli::HostMemory memory = cli::hostMemoryOf(a);
   options.read.maxBytes = memory.maxBytes;
   options.read.memory = memory.voxels;
+  options.read.volumes = kVolumes;
   options.convert.fit.maxHostBytes = memory.maxBytes / kFitsShare;
 }
 

@@ -295,6 +295,8 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   Options options = given;
   resolveNames(record.input, options);
   GridChoice choice = chooseGrids(options.input, record.input, options.grids);
+  carryInactiveValues(
+      options, [&](std::string text) { log.warning(std::move(text)); }, choice);
   tellNothingFitted(choice, log);
   std::vector<CarriedGrid> carried = readUnchanged(options, choice.carried);
   record.carried = std::move(choice.carried);

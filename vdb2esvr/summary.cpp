@@ -1,10 +1,12 @@
 #include "vdb2esvr/summary.h"
 
+#include <algorithm>
 #include <cmath>
 #include <ostream>
 
 #include "cli/names.h"
 #include "cli/printable.h"
+#include "cli/shell_word.h"
 #include "cli/table.h"
 
 namespace esvr::vdb2esvr {
@@ -76,6 +78,18 @@ void printSurface(const ConvertedGrid& grid, std::ostream& out) {
       << grid.surface->signs.voxels << " voxels change sign\n";
 }
 
+/// Says which values of inactive voxels the file does not hold, and how to keep them.
+void printInactive(const RunRecord& record, const ConvertedGrid& grid, std::ostream& out) {
+  if (grid.inactive.count() == 0) return;
+  out << cli::printable(grid.uniqueName) << ": gives up " << toText(grid.inactive);
+  const auto source =
+      std::ranges::find(record.input.grids, grid.sourceName, &GridSummary::uniqueName);
+  if (source != record.input.grids.end() && source->whyNotCarried.empty())
+    out << "; --lossless or --keep " << cli::printable(cli::shellWord(grid.sourceName))
+        << " keeps them";
+  out << '\n';
+}
+
 /// Says how the data of a grid were made.
 void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& out) {
   const bool forDrawing = options.convert.fit.fitFor == FitFor::kDrawing;
@@ -125,6 +139,7 @@ void printFitted(const Options& options, const RunRecord& record, std::ostream& 
       printTopology(record, g, out);
       printOverlap(options, record.grids[g], out);
     }
+    printInactive(record, record.grids[g], out);
     printNote(options, record.grids[g], out);
   }
 }

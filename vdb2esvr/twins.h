@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "esvr/grid_descriptor.h"
+#include "esvr/inactive_values.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/options.h"
 
@@ -17,6 +18,7 @@ struct Twin {
   std::size_t of = 0;  ///< index of the first grid with these voxels
   GridDescriptor descriptor;
   std::uint64_t nonFiniteReplaced = 0;
+  InactiveValues inactive{};
   double secondsRead = 0.0;
 };
 

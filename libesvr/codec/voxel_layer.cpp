@@ -76,6 +76,25 @@ double roundingError(const SparseVolume& volume, double bound) {
   return (largest + bound) * 0x1p-24;
 }
 
+/// The largest bound on values before they are rounded to halfs, with which the bound usually holds
+/// for the halfs. Where halfs are u apart and the source's value is a half, a value that is d off is
+/// off by a multiple of u after it is rounded, which exceeds the bound unless d is below
+/// (floor(bound / u) + 1/2) u.
+double boundBeforeRounding(const SparseVolume& volume, double bound) {
+  constexpr int kMantissa = 10, kLowest = -14, kHighest = 15;  // of a half: bits, exponents
+  double largest = 0.0;
+  for (const float v : volume.values) largest = std::max(largest, std::abs(double(v)));
+  // A value that is off by the bound may lie beyond the next power of 2, where halfs are farther apart.
+  const int last =
+      largest + bound > 0x1p-14 ? std::min(std::ilogb(largest + bound), kHighest) : kLowest;
+  double before = bound;
+  for (int exponent = kLowest; exponent <= last; ++exponent) {
+    const double apart = std::ldexp(1.0, exponent - kMantissa);
+    before = std::min(before, (std::floor(bound / apart) + 0.5) * apart);
+  }
+  return before;
+}
+
 /// The voxels of a volume, rounded to multiples of two half steps.
 VoxelLayer quantised(const SparseVolume& volume, double halfStep, RoundedSigns signs) {
   VoxelLayer layer;
@@ -181,21 +200,38 @@ VoxelLayer exactLayer(const SparseVolume& volume) {
 }
 
 VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
-                        RoundedSigns signs, const SimplifiedMasks* simplified) {
+                        RoundedSigns signs, const SimplifiedMasks* simplified,
+                        DecodedValues decoded) {
   if (!(std::isfinite(bound) && bound > 0.0))
     throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
+  const bool halfs = decoded == DecodedValues::kHalfs;
   // Multiples of twice the bound are nearly exact on the first lattice. Its values may miss the
   // bound where they are rounded to float32; the second lattice is finer and leaves room for that.
-  // A negative value near 0 that keeps its sign is up to a whole step off.
-  const double halfStep = (signs == RoundedSigns::kKept ? 0.5 : 1.0) * bound * kMargin;
-  for (const double h : {halfStep, halfStep - roundingError(volume, bound)}) {
+  // A negative value near 0 that keeps its sign is up to a whole step off. The half that is nearest
+  // to a code's value is at most twice as far from the source's half as this value, so that the last
+  // lattice keeps the bound where values that lie on two sides of a power of 2 miss it.
+  const double side = (signs == RoundedSigns::kKept ? 0.5 : 1.0) * kMargin;
+  const double halfStep = side * (halfs ? boundBeforeRounding(volume, bound) : bound);
+  std::vector<double> halfSteps{halfStep, halfStep - roundingError(volume, bound)};
+  if (halfs) halfSteps.push_back(0.5 * side * bound);
+  for (const double h : halfSteps) {
     if (!(h > 0.0)) break;
     VoxelLayer layer = quantised(volume, h, signs);
     if (activity != Activity::kExact)
-      activateByValue(volume, halfStep, activity, simplified, layer);
-    if (largestError(volume, layer) <= bound) return layer;
+      activateByValue(volume, side * bound, activity, simplified, layer);
+    SparseVolume made = volumeOf(layer);
+    if (halfs) roundToHalfs(made);
+    if (largestDifference(volume, made) <= bound) return layer;
   }
   return exactLayer(volume);
+}
+
+void roundToHalfs(SparseVolume& volume) {
+  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (volume.active[b].test(v)) values[v] = codec::nearestHalf(values[v]);
+  });
 }
 
 SparseVolume volumeOf(const VoxelLayer& layer) {

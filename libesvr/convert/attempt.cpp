@@ -133,6 +133,11 @@ RoundedSigns voxelSigns(const Job& job) {
   return job.options.fit.narrowBand ? RoundedSigns::kKept : RoundedSigns::kMayChange;
 }
 
+DecodedValues decodedValues(const Job& job) {
+  return job.input.descriptor.valueType == ValueType::kHalf ? DecodedValues::kHalfs
+                                                            : DecodedValues::kFloats;
+}
+
 double psnrOf(const Job& job, const SparseVolume& volume) {
   return psnrOverBox(job.input.source, volume,
                      {.box = job.options.fit.box, .peak = job.options.fit.peak});

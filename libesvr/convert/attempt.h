@@ -49,6 +49,9 @@ struct Job {
 /// How voxels are rounded: with their signs if the grid is a narrow band.
 [[nodiscard]] RoundedSigns voxelSigns(const Job& job);
 
+/// Whether a reader of the grid gets halfs, as for a source that was saved as half.
+[[nodiscard]] DecodedValues decodedValues(const Job& job);
+
 /// The target of a search.
 struct PsnrTarget {
   double psnr = 0.0;  ///< dB over the box

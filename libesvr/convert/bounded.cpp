@@ -154,7 +154,7 @@ Conversion convertLossless(const Job& job) {
   if (job.input.descriptor.valueType == ValueType::kDouble)
     throw UsageError(
         "grid '" + job.input.descriptor.name +
-        "' has values of type double, which are read as float32; a lossless file cannot hold them");
+        "' has values of type double, which are read as float32; a lossless grid cannot hold them");
   return asVoxels(job, exactLayer(job.input.source));
 }
 
@@ -162,8 +162,8 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   const SparseVolume& source = job.input.source;
   const double bound = absoluteBound(goal, source);
   if (bound == 0.0) return asVoxels(job, exactLayer(source));
-  Conversion voxels = asVoxels(
-      job, boundedLayer(source, bound, voxelActivity(job), voxelSigns(job), job.input.simplified));
+  Conversion voxels = asVoxels(job, boundedLayer(source, bound, voxelActivity(job), voxelSigns(job),
+                                                 job.input.simplified, decodedValues(job)));
   const bool insists = job.options.representation == Representation::kEllipsoids;
   if (isNarrowBand(job.input.descriptor, source) && !insists) return voxels;
   Smaller best{std::move(voxels), {}, insists};

@@ -79,7 +79,9 @@ ThriftOptions VoxelTrials::thriftOf(double price) const {
 Trial VoxelTrials::tryBound(double bound, double price) const {
   VoxelLayer layer = nearestAt(bound);
   if (price > 0.0) layer = thriftyLayer(job_.input.source, std::move(layer), thriftOf(price)).layer;
-  const double psnr = psnrOf(job_, volumeOf(layer));
+  SparseVolume made = volumeOf(layer);
+  if (decodedValues(job_) == DecodedValues::kHalfs) roundToHalfs(made);
+  const double psnr = psnrOf(job_, made);
   return {bound, psnr, std::move(layer)};
 }
 

@@ -350,6 +350,12 @@ void clip(const Box& box, const VoxelRule& rule, SparseVolume& volume) {
   dropInactiveBricks(volume);
 }
 
+/// True if the decoded values are halfs, as those of the source. Exact voxels are the source's own.
+bool isRoundedToHalfs(const StoredGrid& grid) {
+  return grid.descriptor.valueType == ValueType::kHalf &&
+         (!grid.voxels || grid.voxels->form == VoxelForm::kQuantised);
+}
+
 }  // namespace
 
 SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
@@ -362,9 +368,9 @@ SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
   if (options.maxBytes != kNoMemoryLimit)
     requireWithinMemory(estimateDecode(grid, options).bytes(options.memory), options.maxBytes,
                         "grid '" + grid.descriptor.name + "'");
-  if (!grid.voxels) return evaluated(grid, options);
-  SparseVolume volume = volumeOf(*grid.voxels);
-  if (options.box) clip(*options.box, ruleOf(grid), volume);
+  SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
+  if (grid.voxels && options.box) clip(*options.box, ruleOf(grid), volume);
+  if (isRoundedToHalfs(grid)) roundToHalfs(volume);
   return volume;
 }
 

@@ -121,6 +121,7 @@ VolumeGrid readTree(ListedArchive& listed, std::size_t i, std::size_t component,
   grid.descriptor.metadata = withoutFileStatistics(listed.heads[i].metadata);
   grid.volume = std::move(voxels.volume);
   grid.nonFiniteReplaced = voxels.nonFiniteReplaced;
+  grid.inactive = voxels.inactive;
   return grid;
 }
 
@@ -160,6 +161,7 @@ VectorGrid readListedVector(ListedArchive& listed, std::size_t i, ReadOptions op
     if (c == 0) vectors.descriptor = std::move(component.descriptor);
     vectors.components[c] = std::move(component.volume);
     vectors.nonFiniteReplaced += component.nonFiniteReplaced;
+    vectors.inactive.add(component.inactive.ofComponent(c));
   }
   return vectors;
 }

@@ -45,6 +45,19 @@ std::unique_ptr<Leaf> makeLeaf(const Voxels& voxels, std::size_t b,
   return leaf;
 }
 
+/// Makes a leaf of the first brick with active voxels if all voxels are in tiles. Blender 3.4
+/// draws nothing of a grid without a leaf, and all of its tiles if there is one.
+template <class Tree>
+void keepALeaf(const SparseVolume& volume, Tree& tree) {
+  if (tree.cbeginLeaf()) return;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    if (volume.active[b].count() == 0) continue;
+    const Coord corner = volume.brickCorner(b);
+    tree.touchLeaf(openvdb::Coord(corner.x, corner.y, corner.z));
+    return;
+  }
+}
+
 /// \tparam Voxels  NumberVoxels or VectorVoxels
 template <class Tree, class Voxels>
 class StreamedGrid : public openvdb::Grid<Tree> {
@@ -52,12 +65,15 @@ class StreamedGrid : public openvdb::Grid<Tree> {
   using Leaf = typename Tree::LeafNodeType;
   using Value = typename Tree::ValueType;
 
-  /// \param constantTiles  bricks whose voxels are all active and equal become tiles
+  /// \param constantTiles  bricks whose voxels are all active and equal become tiles, except one if
+  ///                       there were no leaf otherwise
   StreamedGrid(Voxels voxels, const Value& background, bool constantTiles)
       : openvdb::Grid<Tree>(background), voxels_(std::move(voxels)) {
     openvdb::tree::ValueAccessor<Tree> accessor(this->tree());
     for (std::size_t b = 0; b < voxels_.bricks().brickCount(); ++b) add(b, constantTiles, accessor);
-    if (constantTiles) mergeTiles();
+    if (!constantTiles) return;
+    mergeTiles();
+    keepALeaf(voxels_.bricks(), this->tree());
   }
 
   /// The bytes that the grid takes where it is read again, with its voxels.

@@ -14,12 +14,14 @@ class Surveyor {
     mask.forEachSet([&](std::size_t n) { survey.activeBox.expand(corner + voxelLocal(int(n))); });
   }
 
-  void rootTile(Coord corner, std::uint64_t) { tile(corner, kUpperExtent); }
+  void rootTile(Coord corner, std::uint64_t, bool isActive) {
+    if (isActive) tile(corner, kUpperExtent);
+  }
 
   template <int kLog2>
-  void tiles(const NodeMask<kLog2>& mask, const TileValues& values, std::int32_t extent) {
-    mask.forEachSet(
-        [&](std::size_t n) { tile(cellCorner<kLog2>(values.corner, n, extent), extent); });
+  void tiles(const NodeCells<NodeMask<kLog2>>& cells, std::int32_t extent) {
+    cells.active.forEachSet(
+        [&](std::size_t n) { tile(cellCorner<kLog2>(cells.corner, n, extent), extent); });
   }
 
   TreeSurvey survey;

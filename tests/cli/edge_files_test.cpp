@@ -6,8 +6,13 @@
 
 #include <filesystem>
 
+#include "vdb/scalar_trees.h"
+
+#include <openvdb/io/File.h>
+
 #include "cli/converters.h"
 #include "esvr/vdb_io.h"
+#include "esvr/voxel_layer.h"
 #include "vdb/carried_bytes.h"
 
 namespace esvr {
@@ -80,6 +85,66 @@ TEST_F(EdgeFile, RealFileOfAMillionVectorsIsSmallestUnchanged) {
 TEST_F(EdgeFile, RealFileOfAMillionVectorsIsFittedWhereEllipsoidsAreAskedFor) {
   ASSERT_EQ(fit("vec3_velocity.vdb").exitCode, 0);
   EXPECT_TRUE(back().grids.at(0).isVector);
+}
+
+/// Converts a file of edge/faults or edge/faults2 there and back.
+class FaultFile : public EdgeFile {
+ protected:
+  test::ProgramRun throughTheFile(const std::string& name,
+                                  std::vector<std::string> options = {}) const {
+    options.insert(options.begin(), {path(name), folder_ / "out.esvr", "--force"});
+    const auto run = test::vdb2esvr(options);
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    const auto decode = test::esvr2vdb({folder_ / "out.esvr", folder_ / "back.vdb", "--force"});
+    EXPECT_EQ(decode.exitCode, 0) << decode.err;
+    return run;
+  }
+  [[nodiscard]] VolumeGrid read(const std::string& file) const {
+    return readGrid(file, inspectVdb(file).grids.at(0).uniqueName);
+  }
+  [[nodiscard]] VolumeGrid readBack() const { return read(folder_ / "back.vdb"); }
+};
+
+TEST_F(FaultFile, RealFileOfALevelSetWithAnotherInsideIsKeptByLossless) {
+  const auto run = throughTheFile("faults/levelset_inside_minus2.vdb", {"--lossless"});
+  EXPECT_THAT(run.out, HasSubstr("2109 inactive values (-2"));
+  EXPECT_EQ(readBack().inactive, read(path("faults/levelset_inside_minus2.vdb")).inactive);
+}
+
+TEST_F(FaultFile, RealFileOfTwoInactiveValuesIsKeptByLosslessAndToldOtherwise) {
+  throughTheFile("faults/inactive_values.vdb", {"--lossless"});
+  EXPECT_EQ(readBack().inactive.count(), 2u);
+  EXPECT_THAT(throughTheFile("faults/inactive_values.vdb").out,
+              HasSubstr("gives up 2 inactive values (5, first at"));
+}
+
+TEST_F(FaultFile, RealFileOfHalfsKeepsItsBound) {
+  throughTheFile("faults/half.vdb", {"--max-error", "0.0003"});
+  EXPECT_LE(largestDifference(read(path("faults/half.vdb")).volume, readBack().volume), 0.0003);
+}
+
+TEST_F(FaultFile, RealFileOfTheLargestHalfsComesBack) {
+  throughTheFile("faults2/half_maximum.vdb");
+  EXPECT_LE(activeRange(readBack().volume).max, 65504.0f);
+}
+
+TEST_F(FaultFile, RealFileOfAGiantTileIsRefusedOrCarried) {
+  const auto run =
+      test::vdb2esvr({path("faults/root_tile.vdb"), folder_ / "out.esvr", "--max-memory", "8GB"});
+  EXPECT_EQ(run.exitCode, 5);
+  EXPECT_THAT(run.err, HasSubstr("--keep"));
+  throughTheFile("faults/root_tile.vdb",
+                 {"--keep", inspectVdb(path("faults/root_tile.vdb")).grids.at(0).uniqueName});
+}
+
+TEST_F(FaultFile, RealFileOfConstantLeavesKeepsALeafForBlender) {
+  throughTheFile("faults2/dense_leaves.vdb");
+  openvdb::initialize();
+  openvdb::io::File file(folder_ / "back.vdb");
+  file.open();
+  const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("density"));
+  EXPECT_GE(grid->tree().leafCount(), 1u);
+  EXPECT_EQ(grid->activeVoxelCount(), 8u * kBrickVoxels);
 }
 
 TEST_F(EdgeFile, RealFileOfPointsIsCarried) { expectCarried("points_only.vdb"); }

@@ -96,7 +96,9 @@ struct DecodeOptions {
 [[nodiscard]] WorkEstimate estimateDecode(const StoredGrid& grid,
                                           const DecodeOptions& options = {});
 
-/// The voxels that a stored grid represents.
+/// The voxels that a stored grid represents. If the source was saved as half (ValueType::kHalf), the
+/// active voxels are halfs (roundToHalfs, voxel_layer.h), so that a .vdb file of them has the same
+/// values and keeps the same bound.
 /// \throws UsageError  the threshold is negative or not finite, or the grid stores voxels, which say
 ///                     themselves whether they are active
 /// \throws MemoryExceeded  the estimate is above options.maxBytes; nothing was evaluated

@@ -14,6 +14,7 @@
 #include "esvr/carried_grid.h"
 #include "esvr/coord.h"
 #include "esvr/grid_descriptor.h"
+#include "esvr/inactive_values.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/vector_grid.h"
 
@@ -63,6 +64,10 @@ struct ReadOptions {
   /// Holds the voxels. Those in a file do not count towards maxBytes. Of the tree of a .vdb file,
   /// only the leaf that is being read has its voxels in memory.
   VoxelMemory memory{};
+  /// Number of volumes of this size that the caller will have at the same time, with copies and codes
+  /// that it makes. A grid is refused before it is read if the memory has no room for their masks, or
+  /// the disk none for their voxels in files.
+  std::uint64_t volumes = 1;
 };
 
 /// A grid with its voxels.
@@ -70,17 +75,21 @@ struct VolumeGrid {
   GridDescriptor descriptor;
   SparseVolume volume;
   std::uint64_t nonFiniteReplaced = 0;  ///< voxels replaced under NonFinite::kZero
+  InactiveValues inactive{};            ///< of the file; the volume does not hold them
 };
 
 /// Reads one grid with its active tiles. Active voxels of the volume hold the grid's values,
-/// rounded to float32. Inactive voxels hold the background and not the file's inactive values. In a
-/// level set they hold the background with the file's sign, which distinguishes inside from
-/// outside.
+/// rounded to float32. Inactive voxels hold the background and not the file's inactive values, which
+/// VolumeGrid::inactive counts. In a level set they hold the background with the file's sign, which
+/// distinguishes inside from outside.
 /// \param name  "density" (the first grid of that name) or "density[1]" (the second)
 /// \throws BadInput  as for inspectVdb; the grid does not exist (the text lists the grids); its
 ///                   type cannot be fitted; it has no active voxel (without allowEmpty); voxels are
 ///                   not finite (the text gives the first coordinate and the number)
-/// \throws MemoryExceeded  the grid needs more than maxBytes
+/// \throws CannotConvert  a BadInput of a sound grid: its voxels are not finite (NotFinite) or 2^31
+///                        apart, or its background is not a finite float
+/// \throws MemoryExceeded  the grid needs more than maxBytes, or more than the disk of files has free;
+///                         this is known from the tree, before tiles become bricks
 [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                                   const ReadOptions& options = {});
 
@@ -121,13 +130,17 @@ struct VolumeGrid {
 /// Reads the voxels of a carried grid of vectors. \throws  as for readVector
 [[nodiscard]] VectorGrid readVector(const CarriedGrid& grid, const ReadOptions& options = {});
 
-/// Choice of half floats for a written file; kAuto: half if the source was saved as half.
+/// Choice of half floats for a written file; kAuto: half for ValueType::kHalf, unless a value is
+/// beyond 65504, and for other grids whose metadata say half if half floats hold every value exactly.
+/// The values of decodeGrid() are halfs if those of the source were, so that nothing is rounded here.
 enum class HalfMode { kAuto, kOn, kOff };
 
 struct WriteOptions {
   HalfMode half = HalfMode::kAuto;
-  bool overwrite = false;     ///< replace an existing file
-  bool constantTiles = true;  ///< leaves whose voxels are all active and equal become tiles
+  bool overwrite = false;  ///< replace an existing file
+  /// Leaves whose voxels are all active and equal become tiles. One leaf remains, because Blender
+  /// draws nothing of a grid that has tiles only.
+  bool constantTiles = true;
 };
 
 /// Writes grids to a .vdb (with Blosc and active masks) or .nvdb file. The data go to a temporary

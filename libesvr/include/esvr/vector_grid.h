@@ -8,6 +8,7 @@
 #include <string>
 
 #include "esvr/grid_descriptor.h"
+#include "esvr/inactive_values.h"
 #include "esvr/sparse_volume.h"
 
 namespace esvr {
@@ -22,6 +23,7 @@ struct VectorGrid {
   std::array<double, kComponents> background{};
   VectorVolume components;
   std::uint64_t nonFiniteReplaced = 0;  ///< components replaced under NonFinite::kZero
+  InactiveValues inactive{};            ///< of the components together
 };
 
 /// The name of a component: that of the grid with ".x", ".y" or ".z".
