@@ -105,7 +105,9 @@ void addGoalOptions(cli::po::options_description& options) {
     ("psnr", value<std::string>()->value_name("DB"),
      "write the smallest file that reaches this PSNR over the box; NAME=DB is that of one grid: "
      "density=50,temperature=40, or 40,density=50 with 40 for all others")
-    ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
+    ("lossless", bool_switch(),
+     "store voxels and active mask bit for bit, without ellipsoids; grids that have other inactive "
+     "values than the background are carried unchanged")
     ("max-error", value<std::string>()->value_name("E"),
      "keep the error of every voxel within E, or within E% of the range of values; NAME=E is the "
      "bound of one grid, as with --psnr; if ellipsoids are stored, they have a residual; a sample of "

@@ -1,6 +1,7 @@
 #include "vdb/brick_filler.h"
 
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "esvr/empty_signs.h"
@@ -31,16 +32,37 @@ void refuseEmpty(std::size_t bricks, const FillRules& rules) {
 
 }  // namespace
 
-Box InactiveCounter::boxOf(const TileSource& tile) {
+void InactiveCounter::tile(const TileSource& tile) {
+  if (tile.value == background_) return;
   const std::int32_t last = tile.extent - 1;
-  return {tile.corner, tile.corner + Coord{last, last, last}};
+  InactiveValues values;
+  values.add(tile.value, Box{tile.corner, tile.corner + Coord{last, last, last}});
+  if (isNegated(tile.value))
+    negatedPlaces_.push_back({tile.corner, values});
+  else
+    others_.add(values);
+}
+
+void InactiveCounter::leaf(std::span<const double, kBrickVoxels> values, Coord corner) {
+  InactiveValues negated;
+  for (int i = 0; i < kBrickVoxels; ++i) {
+    const double value = values[std::size_t(i)];
+    if (value == background_) continue;
+    (isNegated(value) ? negated : others_).add(value, corner + voxelLocal(i));
+  }
+  if (negated.count() > 0) negatedPlaces_.push_back({corner, negated});
 }
 
 InactiveValues InactiveCounter::lostIn(const SparseVolume& volume) const {
   InactiveValues lost = others_;
-  const bool isRestored = negated_.count() > 0 && volume.brickCount() > 0 &&
-                          volume.background > 0.0f && EmptySigns(volume).agree();
-  if (!isRestored) lost.add(negated_);
+  if (negated_.count() == 0 && negatedPlaces_.empty()) return lost;
+  std::optional<EmptySigns> signs;
+  if (volume.brickCount() > 0 && volume.background > 0.0f) signs.emplace(volume);
+  const bool isFilled = signs && signs->agree();
+  if (!isFilled) lost.add(negated_);
+  // A place without active voxels lies in one region of the empty space.
+  for (const Place& place : negatedPlaces_)
+    if (!isFilled || !signs->isInside(brickOf(place.corner))) lost.add(place.values);
   return lost;
 }
 

@@ -8,8 +8,10 @@
 /// outside.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -61,26 +63,34 @@ class InactiveCounter {
   InactiveCounter(double background, bool levelSet)
       : background_(background), levelSet_(levelSet) {}
 
+  /// Adds an inactive voxel of a leaf that has active voxels, too.
   void voxel(double value, Coord at) {
-    if (value != background_) listFor(value).add(value, at);
+    if (value != background_) (isNegated(value) ? negated_ : others_).add(value, at);
   }
-  void tile(const TileSource& tile) {
-    if (tile.value != background_) listFor(tile.value).add(tile.value, boxOf(tile));
-  }
+  /// Adds an inactive tile.
+  void tile(const TileSource& tile);
+  /// Adds a leaf without active voxels.
+  /// \param values  in voxelOffset order
+  void leaf(std::span<const double, kBrickVoxels> values, Coord corner);
 
   /// The values that a writer does not restore from the volume: all that are not the background,
-  /// but for the background with a negative sign in a level set whose signs a flood fill restores.
+  /// but for the background with a negative sign in a level set where a flood fill restores it.
   [[nodiscard]] InactiveValues lostIn(const SparseVolume& volume) const;
 
  private:
-  static Box boxOf(const TileSource& tile);
-  InactiveValues& listFor(double value) {
-    return levelSet_ && value == -background_ ? negated_ : others_;
-  }
+  /// Values in a tile or a leaf without active voxels.
+  struct Place {
+    Coord corner;
+    InactiveValues values;
+  };
+
+  [[nodiscard]] bool isNegated(double value) const { return levelSet_ && value == -background_; }
 
   double background_;
   bool levelSet_;
-  InactiveValues others_, negated_;
+  InactiveValues others_;
+  InactiveValues negated_;              ///< in leaves with active voxels
+  std::vector<Place> negatedPlaces_{};  ///< elsewhere
 };
 
 /// What is found while a volume is filled.
@@ -138,8 +148,9 @@ template <class Leaf, class Access>
 void countInactiveLeaf(const Leaf& leaf, const Access& access, const FillRules& rules, Coord corner,
                        FillTallies& tallies) {
   if (!rules.countInactive) return;
-  for (int i = 0; i < kBrickVoxels; ++i)
-    tallies.inactive.voxel(double(access.value(leaf, i)), corner + voxelLocal(i));
+  std::array<double, kBrickVoxels> values{};
+  for (int i = 0; i < kBrickVoxels; ++i) values[std::size_t(i)] = double(access.value(leaf, i));
+  tallies.inactive.leaf(values, corner);
 }
 
 }  // namespace esvr::vdb

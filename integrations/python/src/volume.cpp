@@ -142,9 +142,19 @@ std::string firstOfNumbers(const std::filesystem::path& path) {
   return first->uniqueName;
 }
 
+constexpr const char* kWayOut =
+    "; the program vdb2esvr carries such a grid of a .vdb file unchanged (--keep NAME)";
+
 Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name) {
   const py::gil_scoped_release release;
-  return {std::make_shared<const VolumeGrid>(readGrid(path, name ? *name : firstOfNumbers(path)))};
+  try {
+    return {
+        std::make_shared<const VolumeGrid>(readGrid(path, name ? *name : firstOfNumbers(path)))};
+  } catch (const CannotConvert& error) {
+    throw BadInput(error.what() + std::string(kWayOut));
+  } catch (const MemoryExceeded& error) {
+    throw MemoryExceeded(error.what() + std::string(kWayOut));
+  }
 }
 
 /// The only grid of a file, which may have no active voxel.
@@ -206,6 +216,11 @@ void addVolume(py::module_& module) {
       .def_property_readonly(
           "active_voxels", [](const Volume& v) { return activeVoxelCount(v.grid->volume); },
           "Number of active voxels.")
+      .def_property_readonly(
+          "inactive_values", [](const Volume& v) { return v.grid->inactive.count(); },
+          "Number of inactive voxels of the file, those of tiles included, whose values are not "
+          "the\n"
+          "background. A volume does not hold these values.")
       .def_property_readonly(
           "box", [](const Volume& v) { return plainBox(activeBox(v.grid->volume)); },
           "The first and the last active voxel along each axis; None if there is none.")
