@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "cli/shell_word.h"
 #include "esvr/error.h"
 #include "esvr/grid_names.h"
 
@@ -57,13 +58,16 @@ void addFitted(const GridSummary& grid, std::size_t place, std::vector<FittedGri
 }
 
 void refuseLostGrids(const std::filesystem::path& file, const std::vector<NotFitted>& carried) {
-  std::string text;
-  for (const auto& [grid, place, why] : carried)
-    if (!grid.whyNotCarried.empty())
-      text += "\n  grid \"" + grid.uniqueName + "\" can be neither fitted (" + why +
-              ") nor carried (" + grid.whyNotCarried + ')';
+  std::string text, skips;
+  for (const auto& [grid, place, why] : carried) {
+    if (grid.whyNotCarried.empty()) continue;
+    text += "\n  grid \"" + grid.uniqueName + "\" can be neither fitted (" + why +
+            ") nor carried (" + grid.whyNotCarried + ')';
+    skips += " --skip " + cli::shellWord(grid.uniqueName);
+  }
   if (!text.empty())
-    throw BadInput(file.string() + ": grids would be lost; --skip NAME leaves them out" + text);
+    throw BadInput(file.string() + ": grids would be lost unless they are left out by" + skips +
+                   text);
 }
 
 void refuseNothing(const std::filesystem::path& file, const VdbSummary& summary,

@@ -154,7 +154,8 @@ Conversion convertLossless(const Job& job) {
   if (job.input.descriptor.valueType == ValueType::kDouble)
     throw UsageError(
         "grid '" + job.input.descriptor.name +
-        "' has values of type double, which are read as float32; a lossless grid cannot hold them");
+        "' has values of type double, which are read as float32; a lossless grid cannot hold them; "
+        "choose a bound or a PSNR instead");
   return asVoxels(job, exactLayer(job.input.source));
 }
 

@@ -1,7 +1,6 @@
 #include "esvr/inactive_values.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <sstream>
@@ -9,24 +8,49 @@
 namespace esvr {
 namespace {
 
-/// The mixing function of SplitMix64 (Steele, Lea and Flood 2014).
-std::uint64_t mixed(std::uint64_t n) {
+/// The mixing function of SplitMix64 (Steele, Lea and Flood 2014), made odd, so that no factor of a
+/// product makes it 0.
+constexpr std::uint64_t mixed(std::uint64_t n) {
   n += 0x9e3779b97f4a7c15u;
   n = (n ^ (n >> 30)) * 0xbf58476d1ce4e5b9u;
   n = (n ^ (n >> 27)) * 0x94d049bb133111ebu;
-  return n ^ (n >> 31);
+  return (n ^ (n >> 31)) | 1u;
 }
 
-/// The sum of the hashes of the coordinates of a side of a box. Each of them is odd, so that no
-/// factor of a product makes it 0.
-std::uint64_t hashesAlong(std::int32_t from, std::int32_t to, std::uint64_t axis) {
+/// The hash of a coordinate is the product of a hash of its block of 128 and of one of its place in
+/// the block, so that a tile of 4096 takes 32 steps.
+constexpr int kBlockLog2 = 7;
+constexpr std::int64_t kBlock = std::int64_t{1} << kBlockLog2;
+
+constexpr std::uint64_t hashInBlock(std::int64_t place) {
+  return mixed((std::uint64_t{1} << 48) + std::uint64_t(place));
+}
+constexpr std::uint64_t sumOfBlock() {
   std::uint64_t sum = 0;
-  for (std::int64_t c = from; c <= to; ++c) sum += mixed((axis << 32) | std::uint32_t(c)) | 1u;
+  for (std::int64_t place = 0; place < kBlock; ++place) sum += hashInBlock(place);
+  return sum;
+}
+
+/// The sum of the hashes of the coordinates of a side of a box.
+std::uint64_t hashesAlong(std::int32_t from, std::int32_t to, std::uint64_t axis) {
+  constexpr std::uint64_t kSumOfBlock = sumOfBlock();
+  std::uint64_t sum = 0;
+  for (std::int64_t c = from; c <= to;) {
+    const std::int64_t place = c & (kBlock - 1),
+                       end = std::min(c - place + kBlock, to + std::int64_t{1});
+    std::uint64_t places = kSumOfBlock;
+    if (end - c < kBlock) {
+      places = 0;
+      for (std::int64_t i = 0; i < end - c; ++i) places += hashInBlock(place + i);
+    }
+    sum += mixed((axis << 32) | std::uint32_t(c >> kBlockLog2)) * places;
+    c = end;
+  }
   return sum;
 }
 
 std::uint64_t hashOf(double value) {
-  return mixed(std::bit_cast<std::uint64_t>(value == 0.0 ? 0.0 : value)) | 1u;
+  return mixed(std::bit_cast<std::uint64_t>(value == 0.0 ? 0.0 : value));
 }
 
 std::string shortText(double value) {
@@ -67,7 +91,7 @@ void InactiveValues::add(const InactiveValues& others) {
 
 InactiveValues InactiveValues::ofComponent(std::size_t component) const {
   InactiveValues values = *this;
-  values.digest_ *= mixed(component) | 1u;
+  values.digest_ *= mixed(component);
   return values;
 }
 

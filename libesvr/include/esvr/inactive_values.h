@@ -16,7 +16,7 @@ class InactiveValues {
  public:
   /// Adds the value of a voxel.
   void add(double value, Coord voxel) { add(value, Box{voxel, voxel}); }
-  /// Adds the value of all voxels of a tile. The time follows the side of the tile.
+  /// Adds the value of all voxels of a tile. The time follows the side of the tile in blocks of 128.
   void add(double value, const Box& tile);
   void add(const InactiveValues& others);
   /// The values of a component of vectors, which differ from equal ones of another component.
