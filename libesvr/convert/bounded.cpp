@@ -171,8 +171,10 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   best.choice.voxels = Candidate{bytesAdded(best.conversion.grid)};
   if (job.options.representation != Representation::kVoxels) tryTimed(job, bound, best);
   if (insists && !best.hasEllipsoids())
-    throw UsageError("grid '" + job.input.descriptor.name +
-                     "' has no ellipsoids with a residual that keep the bound");
+    throw UsageError(
+        "grid '" + job.input.descriptor.name +
+        "' has no ellipsoids with a residual that keep the bound; store voxels, or allow "
+        "a larger error");
   best.record();
   return std::move(best.conversion);
 }

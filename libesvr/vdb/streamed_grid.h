@@ -45,16 +45,20 @@ std::unique_ptr<Leaf> makeLeaf(const Voxels& voxels, std::size_t b,
   return leaf;
 }
 
-/// Makes a leaf of the first brick with active voxels if all voxels are in tiles. Blender 3.4
-/// draws nothing of a grid without a leaf, and all of its tiles if there is one.
+/// Makes leaves of bricks with active voxels if all voxels are in tiles. Cycles of Blender 3.4 draws
+/// nothing of a grid without a leaf, and all of its tiles if there is one. It draws the border of a
+/// leaf half a voxel farther out than that of a tile, so that a single leaf among tiles stands out.
+/// All bricks of a small grid therefore remain leaves, and one of a larger grid.
 template <class Tree>
-void keepALeaf(const SparseVolume& volume, Tree& tree) {
+void keepLeaves(const SparseVolume& volume, Tree& tree) {
+  constexpr std::size_t kMostLeaves = 512;  // a constant leaf takes about 200 bytes of a file
   if (tree.cbeginLeaf()) return;
+  const bool keepsAll = volume.brickCount() <= kMostLeaves;
   for (std::size_t b = 0; b < volume.brickCount(); ++b) {
     if (volume.active[b].count() == 0) continue;
     const Coord corner = volume.brickCorner(b);
     tree.touchLeaf(openvdb::Coord(corner.x, corner.y, corner.z));
-    return;
+    if (!keepsAll) return;
   }
 }
 
@@ -65,15 +69,15 @@ class StreamedGrid : public openvdb::Grid<Tree> {
   using Leaf = typename Tree::LeafNodeType;
   using Value = typename Tree::ValueType;
 
-  /// \param constantTiles  bricks whose voxels are all active and equal become tiles, except one if
-  ///                       there were no leaf otherwise
+  /// \param constantTiles  bricks whose voxels are all active and equal become tiles, unless no
+  ///                       leaf would remain (keepLeaves)
   StreamedGrid(Voxels voxels, const Value& background, bool constantTiles)
       : openvdb::Grid<Tree>(background), voxels_(std::move(voxels)) {
     openvdb::tree::ValueAccessor<Tree> accessor(this->tree());
     for (std::size_t b = 0; b < voxels_.bricks().brickCount(); ++b) add(b, constantTiles, accessor);
     if (!constantTiles) return;
     mergeTiles();
-    keepALeaf(voxels_.bricks(), this->tree());
+    keepLeaves(voxels_.bricks(), this->tree());
   }
 
   /// The bytes that the grid takes where it is read again, with its voxels.

@@ -59,7 +59,7 @@ typename openvdb::Grid<Tree>::Ptr makeGrid(const VolumeGrid& source, const Write
     openvdb::tools::signedFloodFill(tree);
   if (options.constantTiles) {
     openvdb::tools::prune(tree);
-    keepALeaf(source.volume, tree);
+    keepLeaves(source.volume, tree);
   }
   return grid;
 }

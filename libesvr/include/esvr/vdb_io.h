@@ -138,8 +138,9 @@ enum class HalfMode { kAuto, kOn, kOff };
 struct WriteOptions {
   HalfMode half = HalfMode::kAuto;
   bool overwrite = false;  ///< replace an existing file
-  /// Leaves whose voxels are all active and equal become tiles. One leaf remains, because Blender
-  /// draws nothing of a grid that has tiles only.
+  /// Leaves whose voxels are all active and equal become tiles. If no leaf would remain, those
+  /// of a small grid all remain, and one of a larger grid, because Blender draws nothing of a grid
+  /// that has tiles only.
   bool constantTiles = true;
 };
 
