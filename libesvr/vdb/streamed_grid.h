@@ -47,7 +47,7 @@ std::unique_ptr<Leaf> makeLeaf(const Voxels& voxels, std::size_t b,
 
 /// Makes leaves of bricks with active voxels if all voxels are in tiles. Cycles of Blender 3.4 draws
 /// nothing of a grid without a leaf, and all of its tiles if there is one. It draws the border of a
-/// leaf half a voxel farther out than that of a tile, so that a single leaf among tiles stands out.
+/// leaf farther out than that of a tile, so that a single leaf among tiles stands out.
 /// All bricks of a small grid therefore remain leaves, and one of a larger grid.
 template <class Tree>
 void keepLeaves(const SparseVolume& volume, Tree& tree) {
