@@ -89,10 +89,6 @@ ConvertedGrid named(const FittedGrid& fitted) {
   return grid;
 }
 
-}  // namespace
-
-namespace {
-
 ConvertedGrid readAndConvert(const Options& given, const FittedGrid& fitted,
                              std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
   Options options = given;
