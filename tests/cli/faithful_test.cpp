@@ -236,7 +236,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"far",
                 {.name = "my grid", .voxels = {{{-kFar, 0, 0}, 1.0f}, {{kFar, 0, 0}, 1.0f}}},
                 "2^31"}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& refused) { return std::string(refused.param.name); });
 
 }  // namespace
 }  // namespace esvr
