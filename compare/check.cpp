@@ -1,11 +1,14 @@
 #include "compare/check.h"
 
+#include <algorithm>
 #include <iostream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "cli/interrupts.h"
 #include "cli/json_file.h"
 #include "cli/output.h"
+#include "cli/sequence.h"
 #include "cli/thread_limit.h"
 #include "compare/baseline.h"
 #include "compare/check_report.h"
@@ -19,15 +22,13 @@ namespace esvr::compare {
 namespace {
 
 void checkFiles(const CheckOptions& options) {
-  std::vector<std::filesystem::path> files;
-  if (options.baseline) files.push_back(*options.baseline);
-  if (!options.report.empty() && options.report != cli::kStandardOutput) {
-    files.emplace_back(options.report);
-    cli::checkOutput(options.report, {".json"}, options.overwrite);
-  }
+  std::vector<std::filesystem::path> inputs, outputs{options.report};
   for (const auto& input : {options.reference, options.candidate})
-    for (const auto& file : files) cli::requireDistinct({input, file});
-  cli::requireDistinct(files);
+    std::ranges::copy(cli::filesOfInput(input.string()), std::back_inserter(inputs));
+  if (options.baseline) (options.update ? outputs : inputs).push_back(*options.baseline);
+  cli::requireSeparate(inputs, outputs);
+  if (!options.report.empty() && options.report != cli::kStandardOutput)
+    cli::checkOutput(options.report, {".json"}, options.overwrite);
   if (options.update) cli::checkOutput(*options.baseline, {".json"}, true);
 }
 

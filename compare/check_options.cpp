@@ -27,7 +27,8 @@ cli::ProgramText programText() {
           "  esvr-compare check REF CAND [--min-psnr DB] [--max-error E] [--max-bytes SIZE] ...\n"
           "  esvr-compare check REF CAND --baseline FILE.json [--update]",
       .notes =
-          "REF and CAND may each be a .vdb, .nvdb or .esvr file. Grids are compared and not the "
+          "REF and CAND may each be a .vdb, .nvdb or .esvr file, - for standard input, or a pipe. "
+          "Grids are compared and not the "
           "bytes of files, because the bytes of a .vdb file differ whenever it is written. Voxels "
           "are compared in index space. Different transforms, names, classes, value types, "
           "backgrounds and metadata are listed, and the check fails if --fail-on names them. It "
@@ -57,6 +58,8 @@ cli::CommandLine makeCommandLine() {
   cli::CommandLine line(programText());
   line.argument("reference", "REF");
   line.argument("candidate", "CAND");
+  line.volumeInputs({"reference", "candidate"});
+  line.textInputs({"baseline"});
   auto& options = line.options();
   options.add_options()(
       "grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
@@ -133,6 +136,7 @@ std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv)
   if (!arguments) return std::nullopt;
   const Arguments& a = *arguments;
   CheckOptions options;
+  options.inputs = a.inputs;
   options.reference = a.get<std::string>("reference");
   options.candidate = a.get<std::string>("candidate");
   options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});

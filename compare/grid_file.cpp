@@ -49,13 +49,14 @@ ListedGrid listedGrid(const EsvrFile& file, const GridOfFile& grid) {
 }  // namespace
 
 GridFile::GridFile(std::filesystem::path path, cli::HostMemory memory)
-    : path_(std::move(path)), memory_(std::move(memory)) {
+    : path_(std::move(path)), watched_({path_}), memory_(std::move(memory)) {
   if (path_.extension() != ".esvr") {
     listVdb();
     return;
   }
   esvr_ = std::make_unique<EsvrFile>(readEsvr(path_, {memory_.maxBytes, memory_.voxels}));
   bytes_ = inspectEsvr(path_).fileBytes;
+  watched_.requireUnchanged();
   listEsvr();
 }
 
@@ -105,13 +106,13 @@ std::optional<CarriedGrid> GridFile::bytesOf(std::size_t g) const {
   if (!whyNoBytes_[g].empty()) return std::nullopt;
   auto grids =
       readCarried(path_, {&g, 1}, {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});
-  return std::move(grids.front());
+  return ofSameFile(std::move(grids.front()));
 }
 
 VolumeGrid GridFile::read(std::size_t g) const {
   const ReadOptions options{
       .allowEmpty = true, .maxBytes = memory_.maxBytes, .memory = memory_.voxels};
-  if (!esvr_) return readGrid(path_, grids_[g].uniqueName, options);
+  if (!esvr_) return ofSameFile(readGrid(path_, grids_[g].uniqueName, options));
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readGrid(esvr_->carried[place.index], options);
   VolumeGrid grid;
@@ -123,7 +124,7 @@ VolumeGrid GridFile::read(std::size_t g) const {
 
 VectorGrid GridFile::readVectors(std::size_t g) const {
   const ReadOptions options{.maxBytes = memory_.maxBytes, .memory = memory_.voxels};
-  if (!esvr_) return readVector(path_, grids_[g].uniqueName, options);
+  if (!esvr_) return ofSameFile(readVector(path_, grids_[g].uniqueName, options));
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readVector(esvr_->carried[place.index], options);
   const StoredVector& vector = esvr_->vectors.at(place.index);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cli/host_memory.h"
+#include "cli/input_files.h"
 #include "esvr/container.h"
 #include "esvr/vdb_io.h"
 
@@ -59,7 +60,15 @@ class GridFile {
   void listEsvr();
   void listVdb();
 
+  /// The list and each grid of a VDB file are read at different times.
+  template <class Value>
+  [[nodiscard]] Value ofSameFile(Value value) const {
+    watched_.requireUnchanged();
+    return value;
+  }
+
   std::filesystem::path path_;
+  cli::WatchedInputs watched_;
   cli::HostMemory memory_;
   std::uint64_t bytes_ = 0;
   std::vector<ListedGrid> grids_;

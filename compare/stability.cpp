@@ -20,8 +20,8 @@ namespace {
 
 void checkFiles(const StabilityRequest& request) {
   if (request.report.empty() || request.report == cli::kStandardOutput) return;
+  cli::requireSeparate(cli::filesOfInput(request.file.string()), {request.report});
   cli::checkOutput(request.report, {".json"}, request.overwrite);
-  cli::requireDistinct({request.file, request.report});
 }
 
 /// The CPU, which users decode on, and the GPU that is asked for or usable.

@@ -24,9 +24,7 @@ using DecodedGrid = std::variant<VolumeGrid, VectorGrid>;
 
 /// Checks everything that can be checked before the work begins.
 void checkFiles(const Options& options) {
-  std::vector<std::filesystem::path> files{options.input, options.output};
-  if (options.reference) files.push_back(*options.reference);
-  cli::requireDistinct(files);
+  cli::requireSeparate(options.inputs.paths, {options.output});
   cli::checkOutput(options.output, {".vdb", ".nvdb"}, options.write.overwrite);
 }
 
@@ -163,7 +161,7 @@ std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<Named
                                    const Options& options, const cli::Log& log) {
   std::vector<DecodedGrid> grids;
   DecodeOptions decode = options.decode;
-  decode.maxBytes = options.memory.maxBytes;
+  decode.maxBytes = options.memory.maxBytes - std::min(options.memory.maxBytes, contentBytes(file));
   decode.memory = options.memory.voxels;
   for (const NamedGrid& named : chosen) {
     if (named.grid.isCarried) continue;
@@ -235,12 +233,18 @@ void convert(const Options& options) {
 
 void convertFile(const Options& options, const CancelToken& cancel, const cli::Log& log,
                  std::ostream& out) {
-  convertContent(options, read(options, log), cancel, log, out);
+  // It may be read twice, for the names of the grids and for the grids.
+  const cli::WatchedInputs watched({options.input});
+  const EsvrFile file = read(options, log);
+  watched.requireUnchanged();
+  convertContent(options, file, cancel, log, out);
 }
 
 void convertContent(const Options& options, const EsvrFile& file, const CancelToken& cancel,
                     const cli::Log& log, std::ostream& out) {
   const auto chosen = writable(chooseGrids(options.input, file, options.grids), options, log);
+  cli::WatchedInputs watched;
+  if (options.reference) watched.add(*options.reference);
   std::vector<ComparedGrid> compared;
   if (options.reference) compared = counterparts(file, chosen, options);
   const auto grids = decodeAll(file, chosen, options, log);
@@ -248,6 +252,7 @@ void convertContent(const Options& options, const EsvrFile& file, const CancelTo
   tellLostMetadata(file, grids, options, log);
   writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);
   if (options.reference) printErrors(options, compared, out);
+  watched.requireUnchanged();  // the errors are those of one file
 }
 
 }  // namespace esvr::esvr2vdb

@@ -78,6 +78,7 @@ class SequenceDecoding {
       : options_(options),
         frames_(frames),
         cancel_(cancel),
+        watched_({options.input}),
         holders_(cli::holdersOf(frames)),
         tasks_(tasksFor(*options.sequence, frames)),
         workers_(cli::taskWorkers(options.threads, tasks_.size())),
@@ -162,10 +163,13 @@ class SequenceDecoding {
     const cli::FrameFolder folder(own.output);
     const cli::Log log = warnings_.logOf(frame, kProgram, own.verbosity);
     std::ostringstream table;
-    if (options_.sequence->input.isWhole())
-      convertContent(own, file.read(frame.number, limitsOf(own)), cancel_, log, table);
-    else
+    if (options_.sequence->input.isWhole()) {
+      const EsvrFile& content = file.read(frame.number, limitsOf(own));
+      watched_.requireUnchanged();
+      convertContent(own, content, cancel_, log, table);
+    } else {
       convertFile(own, cancel_, log, table);
+    }
     done_[i].table = table.str();
   }
 
@@ -198,6 +202,7 @@ class SequenceDecoding {
   const Options& options_;
   const std::vector<cli::Frame>& frames_;
   const CancelToken& cancel_;
+  const cli::WatchedInputs watched_;  ///< the file of all frames, which each task opens; or nothing
   const std::multimap<std::size_t, std::size_t> holders_;
   const std::vector<FrameIndices> tasks_;
   const int workers_;
@@ -214,7 +219,12 @@ void convertSequence(const Options& options) {
   const cli::Interrupts interrupts;
   const cli::Sequence& sequence = *options.sequence;
   const auto frames = cli::planFrames(sequence);
-  cli::checkFrameOutputs(sequence, frames, {{".vdb", ".nvdb"}, options.write.overwrite});
+  std::vector<std::filesystem::path> references;
+  if (options.reference) references = cli::filesOfInput(options.reference->string());
+  cli::checkFrameOutputs(sequence, frames,
+                         {.extensions = {".vdb", ".nvdb"},
+                          .mayExist = options.write.overwrite,
+                          .moreInputs = references});
   SequenceDecoding(options, frames, interrupts.token()).run();
 }
 

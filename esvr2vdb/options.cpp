@@ -28,6 +28,8 @@ cli::ProgramText programText() {
           "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
           "  esvr2vdb --check IN.esvr",
       .notes =
+          "IN and REF.vdb may be - for standard input, or a pipe.\n"
+          "\n"
           "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of the "
           "file and of its grids, and it gets no grids of vectors and no carried grids. --lod, "
           "--max-ellipsoids and --bbox do not write carried grids either, because they cannot be "
@@ -62,6 +64,7 @@ cli::CommandLine commandLine() {
   cli::CommandLine line(programText());
   line.argument("input", "IN.esvr");
   line.optionalArgument("output", "OUT.vdb");
+  line.volumeInputs({"input", "reference"});
   // clang-format off
   line.options().add_options()
     ("list", bool_switch(),
@@ -163,6 +166,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   Options options;
   options.job = jobOf(*arguments);
   options.input = arguments->get<std::string>("input");
+  options.inputs = arguments->inputs;
   options.threads = arguments->threads;
   options.verbosity = arguments->verbosity;
   options.memory = cli::hostMemoryOf(*arguments);

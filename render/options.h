@@ -44,6 +44,7 @@ struct FurtherGrid {
 
 struct Options {
   std::filesystem::path input;
+  cli::InputFiles inputs;
   std::filesystem::path output;     ///< empty: no picture is written
   std::optional<std::string> grid;  ///< default: the first that can be drawn
   Look look;

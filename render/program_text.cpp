@@ -15,7 +15,8 @@ std::string listOf(const std::string& title, const std::vector<std::string>& nam
 }
 
 std::string notes() {
-  return "IN may be an .esvr, a .vdb or an .nvdb file. All are drawn with the same camera, "
+  return "IN may be an .esvr, a .vdb or an .nvdb file, - for standard input, or a pipe. All are "
+         "drawn with the same camera, "
          "samples, transfer function and compositing. Voxels are interpolated trilinearly. The "
          "voxels of an .esvr file are decoded when a ray needs them, and kept for the next "
          "picture. All are decoded before the first picture if the file stores voxels, a residual "

@@ -133,7 +133,9 @@ std::vector<Scene> voxels(const SceneFile& from) {
 }  // namespace
 
 std::vector<Scene> readScenes(const SceneFile& file) {
+  const cli::WatchedInputs watched({file.path});  // grid after grid is read from it
   auto scenes = file.path.extension() == ".esvr" ? encoded(file) : voxels(file);
+  watched.requireUnchanged();
   for (const Scene& scene : scenes)
     if (scene.box.empty())
       throw BadInput(file.path.string() + ", " + scene.grid + ": nothing active to draw");

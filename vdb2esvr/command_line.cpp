@@ -28,6 +28,10 @@ cli::ProgramText programText() {
           "  vdb2esvr IN.####.vdb OUT.####.esvr [--frames 1-100x2] ...\n"
           "  vdb2esvr IN.####.vdb OUT.esvr [--frames 1-100x2] [--gop N] ...",
       .notes =
+          "IN.vdb may be - for standard input, or a pipe such as <(...). Its bytes are copied to a "
+          "file in the folder of --scratch, which has no name. If an input changes while it is "
+          "read, the run fails.\n"
+          "\n"
           "Without -g, all grids are converted. Grids of vectors are fitted by components, unless "
           "they take fewer bytes unchanged. Grids that are not fitted come back bit for bit: those "
           "that are not of floats, doubles or vectors of them (integers, masks, strings, points), "
@@ -196,6 +200,7 @@ void addFileOptions(cli::po::options_description& options) {
 cli::CommandLine commandLine() {
   cli::CommandLine line(programText());
   line.argument("input", "IN.vdb");
+  line.volumeInputs({"input"});
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
   addFrameOptions(line.options());

@@ -212,6 +212,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   Options options;
   options.input = a.get<std::string>("input");
   options.output = a.get<std::string>("output");
+  options.inputs = a.inputs;
   options.grids = {namesIn(a, "grid"), namesIn(a, "keep"), namesIn(a, "skip"), false};
   options.sharing = sharing(a);
   readGridGoals(a, options);

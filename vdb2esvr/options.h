@@ -36,6 +36,7 @@ struct WantedSharing {
 
 struct Options {
   std::filesystem::path input, output;
+  cli::InputFiles inputs;
   /// The frames, if the input is a pattern. The output is a pattern, too, or one file for all
   /// frames.
   std::optional<cli::Sequence> sequence;

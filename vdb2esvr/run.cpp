@@ -32,9 +32,7 @@ namespace esvr::vdb2esvr {
 namespace {
 
 void checkFiles(const Options& options) {
-  std::vector<std::filesystem::path> files{options.input, options.output};
-  if (reportIsFile(options)) files.emplace_back(options.report);
-  cli::requireDistinct(files);
+  cli::requireSeparate(options.inputs.paths, {options.output, options.report});
   const bool mayExist = options.overwrite || options.job == Job::kPart;  // it is not written
   cli::checkOutput(options.output, {".esvr"}, mayExist);
   if (reportIsFile(options)) cli::checkOutput(options.report, {".json"}, options.overwrite);
@@ -290,6 +288,7 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   const cli::Log& log = run.log;
   cli::Stopwatch watch;
   RunRecord record;
+  const cli::WatchedInputs watched({given.input});
   auto devices = std::async(std::launch::async, [&] { return devicesFor(given, ranks); });
   record.input = inspectVdb(given.input);
   Options options = given;
@@ -313,6 +312,7 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   carrySmallerVectors(options, record, carried);
   EsvrFile file = assemble(std::move(carried), record);
   shareGrids(optionsOfFits(options, cancel, selected), choice.fitted, file, record);
+  watched.requireUnchanged();  // the grids were read one after the other
   store(options, file, run.store, record);
   if (file.layout == FileLayout::kCompact) record.bytesSeparate = bytesWithoutSharing(file, record);
   if (!record.interrupted) parts.remove();

@@ -12,6 +12,7 @@
 #include "cli/json_file.h"
 #include "cli/output.h"
 #include "cli/thread_limit.h"
+#include "esvr/sequence_file.h"
 #include "vdb2esvr/convert_groups.h"
 #include "vdb2esvr/frame_conversion.h"
 #include "vdb2esvr/report.h"
@@ -95,7 +96,10 @@ SequenceRecord convertFrames(const Options& options, const CancelToken& cancel) 
   const auto frames = cli::planFrames(sequence);
   const bool isOneFile = sequence.output.isWhole();
   const bool mayExist = options.overwrite || (options.resume && !isOneFile);
-  cli::checkFrameOutputs(sequence, frames, {{".esvr"}, mayExist});
+  std::vector<std::filesystem::path> more{options.report};
+  if (isOneFile) more.push_back(SequenceWriter::partialPath(options.output));
+  cli::checkFrameOutputs(sequence, frames,
+                         {.extensions = {".esvr"}, .mayExist = mayExist, .moreOutputs = more});
   return isOneFile ? convertGroups(options, frames, cancel)
                    : SequenceConversion(options, frames, cancel).run();
 }

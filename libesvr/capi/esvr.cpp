@@ -23,11 +23,11 @@ using capi::require;
 
 static_assert(ESVR_BRICK_SIDE == kBrickSide && ESVR_BRICK_VOXELS == kBrickVoxels);
 
-/// A limit of the caller, of which 0 stands for none. Where addresses have 32 bits, sizes in the
-/// code have, too, so that content stays below them.
+/// A limit of the caller, of which 0 stands for the usual one. Where addresses have 32 bits, sizes in
+/// the code have, too, so that content stays below them.
 std::uint64_t limitOf(std::uint64_t maxMemory) {
   constexpr std::uint64_t kMost = sizeof(std::size_t) < 8 ? std::uint64_t{1} << 31 : kNoMemoryLimit;
-  return maxMemory == 0 ? kMost : std::min(maxMemory, kMost);
+  return std::min(maxMemory == 0 ? usualMemoryLimit() : maxMemory, kMost);
 }
 
 /// Carried grids are checked, but nothing here can read their bytes.

@@ -5,6 +5,7 @@
 
 #include "cli/failure.h"
 #include "cli/printable.h"
+#include "core/publish_file.h"
 #include "esvr/error.h"
 
 namespace esvr::cli {
@@ -23,6 +24,7 @@ int runMain(const std::string& program, const std::function<int()>& body) {
   const auto complain = [&](const std::string& text) {
     std::cerr << program << ": " << printable(text) << '\n';
   };
+  keepStandardDescriptors();
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes then gives an error, not a signal
   try {
     return runAndFlush(body);

@@ -137,7 +137,28 @@ void refuseExisting(const std::vector<Frame>& frames) {
   throw RuntimeFailure(text + "; --force replaces files");
 }
 
+void requireSeparateFrames(const Sequence& sequence, const std::vector<Frame>& frames,
+                           const FrameOutputRules& rules) {
+  std::vector<fs::path> inputs = rules.moreInputs, outputs = rules.moreOutputs;
+  for (const Frame& frame : frames) {
+    if (!frame.missing) inputs.push_back(frame.input);
+    if ((!frame.missing || frame.holds) && !sequence.output.isWhole())
+      outputs.push_back(frame.output);
+  }
+  if (sequence.output.isWhole()) outputs.emplace_back(sequence.output.text());
+  requireSeparate(inputs, outputs);
+}
+
 }  // namespace
+
+std::vector<fs::path> filesOfInput(const std::string& input) {
+  if (isThere(input)) return {input};
+  const auto pattern = FramePattern::in(input);
+  if (!pattern) return {input};
+  std::vector<fs::path> files;
+  for (const FrameNumber frame : pattern->onDisk()) files.push_back(pattern->at(frame));
+  return files;
+}
 
 void addSequenceOptions(po::options_description& options) {
   // clang-format off
@@ -201,7 +222,7 @@ std::multimap<std::size_t, std::size_t> holdersOf(const std::vector<Frame>& fram
 
 void checkFrameOutputs(const Sequence& sequence, const std::vector<Frame>& frames,
                        const FrameOutputRules& rules) {
-  for (const Frame& frame : frames) requireDistinct({frame.input, frame.output});
+  requireSeparateFrames(sequence, frames, rules);
   if (sequence.output.isWhole())
     return checkOutput(sequence.output.text(), rules.extensions, rules.mayExist);
   if (!rules.mayExist) refuseExisting(frames);

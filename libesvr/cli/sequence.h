@@ -77,10 +77,15 @@ struct Frame {
 struct FrameOutputRules {
   std::initializer_list<std::string_view> extensions;  ///< those that an output may have
   bool mayExist = false;                               ///< outputs that exist are no error
+  std::vector<std::filesystem::path> moreInputs{};     ///< other files that the run reads
+  std::vector<std::filesystem::path> moreOutputs{};    ///< other files that it writes: its report
 };
 
+/// The files that an input stands for: the file of that name, or those of all frames of a pattern.
+[[nodiscard]] std::vector<std::filesystem::path> filesOfInput(const std::string& input);
+
 /// Checks before the work begins that the outputs of all frames can be written.
-/// \throws UsageError  the extension is another one; a frame's output is its input
+/// \throws UsageError  the extension is another one; as for requireSeparate, of all files of the run
 /// \throws RuntimeFailure  outputs exist, but may not; the folder is not writable
 void checkFrameOutputs(const Sequence& sequence, const std::vector<Frame>& frames,
                        const FrameOutputRules& rules);

@@ -37,6 +37,15 @@ void rename(const fs::path& file, const fs::path& target, bool overwrite) {
 
 }  // namespace
 
+void keepStandardDescriptors() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(fd, F_GETFD) >= 0 || errno != EBADF) continue;
+    // open() returns the lowest number that is free, which is `fd` unless another thread is faster.
+    const int opened = ::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+    if (opened > STDERR_FILENO) ::close(opened);
+  }
+}
+
 fs::path followLinks(const fs::path& path) {
   std::error_code ignored;  // open() reports a path that cannot be resolved
   const fs::path resolved = fs::weakly_canonical(path, ignored);

@@ -9,6 +9,12 @@
 
 namespace esvr {
 
+/// Opens those of the descriptors 0, 1 and 2 that are closed, so that reading from them and writing to
+/// them fail as before. Otherwise the next file would get such a number, and what the process, or a
+/// library in it, prints would be written into that file. Every file that is written is opened after
+/// this; programs call it before anything else.
+void keepStandardDescriptors();
+
 /// Permissions of a new file; the umask of the process reduces them.
 inline constexpr mode_t kNewFileMode = 0666;
 

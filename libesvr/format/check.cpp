@@ -4,6 +4,7 @@
 #include "esvr/error.h"
 #include "format/byte_source.h"
 #include "format/packed_sections.h"
+#include "format/validity.h"
 
 namespace esvr {
 namespace {
@@ -20,6 +21,12 @@ void noteSkipped(const SectionTable& table, std::vector<std::string>& notes) {
     if (!known(e.id.kind))
       notes.push_back("skipped: section " + describe(e.id) + ", " + std::to_string(e.storedBytes) +
                       " bytes");
+}
+
+/// Readers of voxels need no map, but no VDB file can be made with one that is damaged.
+void requireMap(const StoredGrid& grid, const std::string& file) {
+  if (const auto fault = mapFaultOf(grid.descriptor.transform))
+    throw BadInput(file + ": grid '" + grid.descriptor.name + "': " + fault->text);
 }
 
 void noteGrid(const StoredGrid& grid, std::vector<std::string>& notes) {
@@ -54,7 +61,10 @@ std::vector<std::string> checkEsvr(const std::filesystem::path& path, const Read
   std::vector<std::string> notes;
   noteVersion(table, notes);
   noteSkipped(table, notes);
-  for (const auto& grid : file.grids) noteGrid(grid, notes);
+  for (const auto& grid : file.grids) {
+    requireMap(grid, path.string());
+    noteGrid(grid, notes);
+  }
   for (const auto& grid : file.carried) noteCarried(grid, notes);
   return notes;
 }

@@ -1,10 +1,9 @@
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
+#include "core/read_input.h"
 #include "esvr/error.h"
 #include "esvr/transfer_function.h"
 #include "render/paraview_xml.h"
@@ -13,12 +12,6 @@ namespace esvr {
 namespace {
 
 using nlohmann::json;
-
-std::string contentOf(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw BadInput("cannot read " + path.string());
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 bool isXml(const std::string& text) {
   const auto first = text.find_first_not_of(" \t\r\n");
@@ -167,7 +160,7 @@ std::string paraViewPreset(const TransferFunction& function, const std::string& 
 }
 
 TransferFunction readParaViewPreset(const std::filesystem::path& path, const std::string& name) {
-  const json presets = parsed(contentOf(path), path.string());
+  const json presets = parsed(readText(path), path.string());
   return namedFunction(chosen(presets, name, path.string()), path.string());
 }
 

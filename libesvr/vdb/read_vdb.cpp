@@ -3,6 +3,8 @@
 #include <openvdb/Grid.h>
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 #include "esvr/error.h"
 #include "vdb/archive.h"
@@ -21,9 +23,11 @@ using openvdb::GridBase;
 /// A file and the list of its grids, in the same order.
 struct ListedArchive {
   Archive archive;
-  std::vector<GridHead> heads;
   std::vector<GridSummary> grids;
 };
+
+/// What trees hold, by their owners' positions. A tree that many grids share is surveyed once.
+using Surveys = std::map<std::uint64_t, TreeSurvey>;
 
 /// The class by OpenVDB's name for it, for example "level set"; kUnknown for any other text.
 GridClass gridClassOf(const std::string& text) {
@@ -66,21 +70,25 @@ bool countFromStatistics(const std::vector<MetaItem>& items, GridSummary& grid) 
   return true;
 }
 
-void countFromTree(Archive& archive, const ArchiveEntry& entry, GridSummary& grid) {
+void countFromTree(Archive& archive, const ArchiveEntry& entry, Surveys& surveys,
+                   GridSummary& grid) {
   if (!isScalarFloatTree(entry) && !isVectorTree(entry)) return;
-  const TreeSurvey survey = surveyTree(archive, entry);
-  grid.activeVoxels = survey.activeVoxels;
-  grid.activeBox = survey.activeBox;
+  const std::uint64_t owner = archive.treeOwner(entry).gridAt;
+  auto survey = surveys.find(owner);
+  if (survey == surveys.end()) survey = surveys.emplace(owner, surveyTree(archive, entry)).first;
+  grid.activeVoxels = survey->second.activeVoxels;
+  grid.activeBox = survey->second.activeBox;
 }
 
-GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHead& head) {
+GridSummary summarise(Archive& archive, const ArchiveEntry& entry, Surveys& surveys) {
+  const GridHead head = archive.readHead(entry);
   GridSummary grid;
   grid.name = stringValue(head.metadata, GridBase::META_GRID_NAME);
   grid.valueType = entry.valueType();
   grid.savedAsHalf = entry.savedAsHalf;
   grid.storedBytes = entry.gridBytes;
   grid.gridClass = gridClassOf(stringValue(head.metadata, GridBase::META_GRID_CLASS));
-  if (!countFromStatistics(head.metadata, grid)) countFromTree(archive, entry, grid);
+  if (!countFromStatistics(head.metadata, grid)) countFromTree(archive, entry, surveys, grid);
   grid.isScalar = isScalarFloatTree(entry);
   grid.isVector =
       isVectorTree(entry) && grid.activeVoxels > 0 && grid.gridClass != GridClass::kLevelSet;
@@ -90,15 +98,33 @@ GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHea
 }
 
 ListedArchive listGrids(Archive archive) {
-  ListedArchive listed{std::move(archive), {}, {}};
-  for (const auto& entry : listed.archive.entries()) {
-    inGrid(entry.name(), [&] {
-      listed.heads.push_back(listed.archive.readHead(entry));
-      listed.grids.push_back(summarise(listed.archive, entry, listed.heads.back()));
-    });
-  }
+  ListedArchive listed{std::move(archive), {}};
+  Surveys surveys;
+  for (const auto& entry : listed.archive.entries())
+    inGrid(entry.name(),
+           [&] { listed.grids.push_back(summarise(listed.archive, entry, surveys)); });
   assignUniqueNames(listed.grids);
   return listed;
+}
+
+/// Lists the names of all grids, and all that is to be known about the one that is read. A file with
+/// many grids is read grid by grid, so that trees of other grids are not looked at.
+/// \return the list, and the place of the grid in it
+std::pair<ListedArchive, std::size_t> listForReading(Archive archive, const std::string& name) {
+  ListedArchive listed{std::move(archive), {}};
+  for (const auto& entry : listed.archive.entries())
+    inGrid(entry.name(), [&] {
+      const GridHead head = listed.archive.readHead(entry);
+      listed.grids.emplace_back().name = stringValue(head.metadata, GridBase::META_GRID_NAME);
+    });
+  assignUniqueNames(listed.grids);
+  const std::size_t i = findGrid(listed.grids, name);
+  const ArchiveEntry& entry = listed.archive.entries()[i];
+  const std::string uniqueName = listed.grids[i].uniqueName;
+  Surveys surveys;
+  inGrid(entry.name(), [&] { listed.grids[i] = summarise(listed.archive, entry, surveys); });
+  listed.grids[i].uniqueName = uniqueName;
+  return {std::move(listed), i};
 }
 
 ValueType valueTypeOf(const GridSummary& grid) {
@@ -110,6 +136,7 @@ ValueType valueTypeOf(const GridSummary& grid) {
 VolumeGrid readTree(ListedArchive& listed, std::size_t i, std::size_t component,
                     const ReadOptions& options) {
   const GridSummary& summary = listed.grids[i];
+  GridHead head = listed.archive.readHead(listed.archive.entries()[i]);
   TreeVoxels voxels = readVoxels(listed.archive, listed.archive.entries()[i],
                                  {summary.gridClass, component}, options);
   VolumeGrid grid;
@@ -117,8 +144,8 @@ VolumeGrid readTree(ListedArchive& listed, std::size_t i, std::size_t component,
   grid.descriptor.gridClass = summary.gridClass;
   grid.descriptor.valueType = valueTypeOf(summary);
   grid.descriptor.background = voxels.background;
-  grid.descriptor.transform = listed.heads[i].transform;
-  grid.descriptor.metadata = withoutFileStatistics(listed.heads[i].metadata);
+  grid.descriptor.transform = std::move(head.transform);
+  grid.descriptor.metadata = withoutFileStatistics(std::move(head.metadata));
   grid.volume = std::move(voxels.volume);
   grid.nonFiniteReplaced = voxels.nonFiniteReplaced;
   return grid;
@@ -172,23 +199,23 @@ VdbSummary inspectOpenVdb(InputFile& file) {
 }
 
 VolumeGrid readOpenVdbGrid(InputFile& file, const std::string& name, const ReadOptions& options) {
-  ListedArchive listed = listGrids(Archive(file));
-  const std::size_t i = findGrid(listed.grids, name);
-  return inGrid(listed.grids[i].uniqueName, [&] { return readListedGrid(listed, i, options); });
+  auto [listed, i] = listForReading(Archive(file), name);
+  return inGrid(listed.grids[i].uniqueName,
+                [&, i = i, &listed = listed] { return readListedGrid(listed, i, options); });
 }
 
 VolumeGrid readOpenVdbComponent(InputFile& file, const std::string& name, std::size_t component,
                                 const ReadOptions& options) {
-  ListedArchive listed = listGrids(Archive(file));
-  VolumeGrid grid = readListedComponent(listed, findGrid(listed.grids, name), component, options);
+  auto [listed, i] = listForReading(Archive(file), name);
+  VolumeGrid grid = readListedComponent(listed, i, component, options);
   grid.descriptor.name = componentName(grid.descriptor.name, component);
   if (component > 0) grid.descriptor.metadata.clear();
   return grid;
 }
 
 VectorGrid readOpenVdbVector(InputFile& file, const std::string& name, const ReadOptions& options) {
-  ListedArchive listed = listGrids(Archive(file));
-  return readListedVector(listed, findGrid(listed.grids, name), options);
+  auto [listed, i] = listForReading(Archive(file), name);
+  return readListedVector(listed, i, options);
 }
 
 GridSummary OpenVdb::inspectCarried(const CarriedGrid& grid) const {

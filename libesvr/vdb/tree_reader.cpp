@@ -48,19 +48,14 @@ struct LocatedTree {
   TreeSurvey survey;
 };
 
-ValueLayout layoutOf(const ArchiveEntry& owner, const GridHead& head) {
-  const bool isDouble = owner.valueType() == "double" || owner.valueType() == "vec3d";
-  const std::uint64_t numbers = isVectorTree(owner) ? kComponents : 1;
-  return {numbers * (isDouble ? sizeof(double) : sizeof(float)),
-          numbers * sizeof(openvdb::math::half), owner.savedAsHalf, head.compression};
-}
-
 LocatedTree locateTree(Archive& archive, const ArchiveEntry& entry) {
   const ArchiveEntry& owner = archive.treeOwner(entry);
   if (owner.treeType != entry.treeType)
     throw BadInput("is damaged: it shares the voxels of a grid of another type");
   GridHead head = archive.readHead(owner);
-  const ValueLayout layout = layoutOf(owner, head);
+  const ValueLayout layout =
+      layoutOf({owner.treeType, owner.savedAsHalf, head.compression}).value();
+  const InputFile::Within grid(archive.file(), owner.gridAt + owner.gridBytes);
   const TreeSurvey survey = surveyTree(archive.file(), layout);
   return {owner, std::move(head), layout, survey};
 }

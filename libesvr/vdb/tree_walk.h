@@ -91,6 +91,7 @@ class TreeWalk {
 
   /// Checks the values of a leaf. \throws BadInput  they are truncated or damaged
   void leafValues() {
+    if (layout_.leaves == ValueLayout::Leaves::kFixed) return file_.skip(layout_.leafBytes);
     const auto mask = file_.read<LeafMask>();
     valueBlock(mask);
   }

@@ -323,5 +323,36 @@ TEST(CompareProgram, namesItsCommands) {
   EXPECT_THAT(test::runProgram(ESVR_COMPARE, {"check", "--help"}).out, HasSubstr("--min-psnr"));
 }
 
+TEST_F(CompareCheck, refusesABaselineThatChecksNothing) {
+  ASSERT_EQ(check("ref.vdb", {"--baseline", at("base.json"), "--update"}).exitCode, 0);
+  const auto good = json::parse(test::readText(at("base.json")));
+  const auto expectRefused = [&](const json& baseline, const char* words) {
+    test::writeText(at("bad.json"), baseline.dump());
+    const auto run = check("ref.vdb", {"--baseline", at("bad.json")});
+    EXPECT_EQ(run.exitCode, 3) << baseline;
+    EXPECT_THAT(run.err, AllOf(HasSubstr("bad.json"), HasSubstr(words)));
+  };
+  for (const json& value : {json(5), json(), json(-1), json("density"), json::array()}) {
+    auto bad = good;
+    bad["grids"]["density"] = value;
+    expectRefused(bad, "is no object with figures");
+    bad = good;
+    bad["grids"]["density"]["iou"] = value;
+    expectRefused(bad, "is no object with a value and a tolerance");
+    bad = good;
+    bad["bytes"] = value;
+    expectRefused(bad, "bytes is no object");
+  }
+  auto misspelt = good;
+  misspelt["grids"]["density"]["max_eror"] = good["grids"]["density"]["max_error"];
+  expectRefused(misspelt, "which is no figure");
+  for (const json& tolerance : {json(), json(-1.0), json("1")}) {
+    auto bad = good;
+    bad["grids"]["density"]["max_error"]["tolerance"] = tolerance;
+    expectRefused(bad, "tolerance");
+  }
+  EXPECT_EQ(check("ref.vdb", {"--baseline", at("base.json")}).exitCode, 0);
+}
+
 }  // namespace
 }  // namespace esvr

@@ -43,6 +43,7 @@ struct Part {
   std::optional<PlainBox> box;
   std::optional<std::size_t> ellipsoids;
   std::optional<std::int64_t> frame;
+  ReadLimits limits{};
 
   [[nodiscard]] bool isWhole() const { return !box && !ellipsoids; }
 };
@@ -50,23 +51,25 @@ struct Part {
 EsvrFile readFrame(const std::filesystem::path& path, const Part& part) {
   if (!part.isWhole())
     throw UsageError(path.string() + ": frames of a sequence are read as a whole");
-  return SequenceReader(path).read(*part.frame);
+  return SequenceReader(path, part.limits).read(*part.frame);
 }
 
 EsvrFile readPart(const std::filesystem::path& path, const Part& part) {
   if (part.frame) return readFrame(path, part);
   if (holdsSequence(path))
     throw UsageError(path.string() + ": the file holds a sequence; name a frame (esvr.frames)");
-  if (part.isWhole()) return readEsvr(path);
-  ReadPart wanted{.ellipsoids = part.ellipsoids};
+  if (part.isWhole()) return readEsvr(path, part.limits);
+  ReadPart wanted{.ellipsoids = part.ellipsoids, .limits = part.limits};
   if (part.box) wanted.box = boxOf(*part.box);
   return readEsvrPart(path, wanted).file;
 }
 
 File read(const std::filesystem::path& path, const std::optional<PlainBox>& box,
-          const std::optional<std::size_t>& ellipsoids, const std::optional<std::int64_t>& frame) {
+          const std::optional<std::size_t>& ellipsoids, const std::optional<std::int64_t>& frame,
+          const std::optional<std::uint64_t>& maxMemory) {
   const py::gil_scoped_release release;
-  return {std::make_shared<const EsvrFile>(readPart(path, {box, ellipsoids, frame}))};
+  const ReadLimits limits{.maxBytes = memoryLimit(maxMemory)};
+  return {std::make_shared<const EsvrFile>(readPart(path, {box, ellipsoids, frame, limits}))};
 }
 
 std::vector<std::int64_t> numbersOf(const SequenceReader& reader) {
@@ -83,7 +86,8 @@ std::vector<std::int64_t> framesOf(const std::filesystem::path& path) {
 
 /// A reader that threads of Python may share.
 struct Sequence {
-  explicit Sequence(const std::filesystem::path& path) : reader(path) {}
+  Sequence(const std::filesystem::path& path, std::uint64_t maxBytes)
+      : reader(path, {.maxBytes = maxBytes}) {}
 
   SequenceReader reader;
   std::mutex reads;
@@ -148,11 +152,13 @@ void addFiles(py::module_& module) {
       module, "Sequence",
       "A file that holds a sequence. Reading its frames in their order decodes each\n"
       "of them once; esvr.read(path, frame=...) decodes those before it again.")
-      .def(py::init([](const std::filesystem::path& path) {
+      .def(py::init([](const std::filesystem::path& path,
+                       const std::optional<std::uint64_t>& maxMemory) {
              const py::gil_scoped_release release;
-             return std::make_unique<Sequence>(path);
+             return std::make_unique<Sequence>(path, memoryLimit(maxMemory));
            }),
-           py::arg("path"))
+           py::arg("path"), py::kw_only(), py::arg("max_memory") = py::none(),
+           "max_memory is that of esvr.read.")
       .def_property_readonly(
           "frames", [](const Sequence& s) { return numbersOf(s.reader); },
           "The numbers of the frames, which increase.")
@@ -160,9 +166,13 @@ void addFiles(py::module_& module) {
   module.def(
       "read", &read, py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
       py::arg("ellipsoids") = py::none(), py::arg("frame") = py::none(),
+      py::arg("max_memory") = py::none(),
       "Reads an .esvr file, or a part of it.\n\n"
       "box selects the ellipsoids that reach ((x0, y0, z0), (x1, y1, z1)); ellipsoids is the\n"
-      "number that a level of detail should have at least; frame is one of esvr.frames(path).");
+      "number that a level of detail should have at least; frame is one of esvr.frames(path).\n"
+      "max_memory is a limit on the bytes that the content may take in memory, which may be many\n"
+      "times those of the file (default: half of the memory of the machine); above it, a\n"
+      "MemoryError is raised.");
   module.def("frames", &framesOf, py::arg("path"),
              "The numbers of the frames of a sequence; an empty list for a file of one frame.");
   module.def("write", &writeFile, py::arg("path"), py::arg("file"), py::kw_only(),

@@ -129,8 +129,9 @@ py::object matrixOf(const Transform& transform) {
   return matrix;
 }
 
-Volume decoded(const Grid& grid, const std::optional<PlainBox>& box) {
-  DecodeOptions options;
+Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
+               const std::optional<std::uint64_t>& maxMemory) {
+  DecodeOptions options{.maxBytes = memoryLimit(maxMemory)};
   if (box) options.box = boxOf(*box);
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
   const py::gil_scoped_release release;
@@ -141,8 +142,10 @@ Volume decoded(const Grid& grid, const std::optional<PlainBox>& box) {
 void addGrid(py::module_& module) {
   addEllipsoids(module);
   py::class_<Grid>(module, "Grid", "A grid of an .esvr file: a sum of ellipsoids, or voxels.")
-      .def("to_volume", &decoded, py::arg("box") = py::none(),
-           "Decodes the voxels, or those in a box ((x0, y0, z0), (x1, y1, z1)), both inclusive.")
+      .def("to_volume", &decoded, py::arg("box") = py::none(), py::kw_only(),
+           py::arg("max_memory") = py::none(),
+           "Decodes the voxels, or those in a box ((x0, y0, z0), (x1, y1, z1)), both inclusive.\n"
+           "max_memory is that of esvr.read.")
       .def("evaluate", &evaluate, py::arg("points"),
            "The sum of the ellipsoids at points of shape (n, 3), in index coordinates: float32 of\n"
            "shape (n,). It is accurate between voxels if the grid was fitted for drawing.")

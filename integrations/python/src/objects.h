@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "esvr/container.h"
+#include "esvr/memory_limit.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::python {
@@ -33,6 +34,11 @@ struct Grid {
 };
 
 using Corner = std::array<std::int32_t, 3>;
+/// The limit that a caller gives, or the usual one.
+[[nodiscard]] inline std::uint64_t memoryLimit(const std::optional<std::uint64_t>& given) {
+  return given ? *given : usualMemoryLimit();
+}
+
 /// A box of voxels as Python has it: its first and its last voxel.
 using PlainBox = std::array<Corner, 2>;
 
@@ -64,7 +70,9 @@ std::vector<std::string> saveFile(const File& file, const std::filesystem::path&
 
 /// The voxels of a stored grid, with the GIL released.
 /// \throws UsageError  the box is empty
-[[nodiscard]] Volume decoded(const Grid& grid, const std::optional<PlainBox>& box);
+/// \throws MemoryExceeded  they need more than the limit
+[[nodiscard]] Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
+                             const std::optional<std::uint64_t>& maxMemory = std::nullopt);
 
 // Each adds its functions and classes to the module.
 void addErrors(py::module_& module);

@@ -178,6 +178,10 @@ struct ReadLimits {
   bool carriedBytes = true;  ///< false: the bytes of carried grids are checked, but not kept
 };
 
+/// Bytes of the heap that the content of a file takes: ellipsoids, voxels and carried grids. Voxels in
+/// files do not count.
+[[nodiscard]] std::uint64_t contentBytes(const EsvrFile& file);
+
 /// Reads a whole file. Every size is checked before memory is allocated, every section is checked
 /// against its checksum, and every parameter must be finite.
 /// \throws BadInput  the file is missing, not an .esvr file, of a newer major version, truncated or

@@ -75,7 +75,7 @@ class PartStore {
   /// \return nothing if another process fits the part
   [[nodiscard]] std::optional<Claim> claim(const PartKey& key);
 
-  /// Removes the folder with all results.
+  /// Removes all results, and the folder unless it has files that this class has not made.
   void remove();
 
  private:
