@@ -64,6 +64,10 @@ class FileOfFrames {
     return reader_->read(number);
   }
 
+  /// A frame needed more than its share of the memory. The later frames of its group get all of it,
+  /// too, because each change of the limit decodes the group again from its beginning.
+  bool needsAll = false;
+
  private:
   std::filesystem::path path_;
   std::unique_ptr<SequenceReader> reader_;
@@ -143,12 +147,13 @@ class SequenceDecoding {
   /// Decodes a frame with its share of the memory. A frame that needs more is decoded alone.
   void decode(std::size_t i, FileOfFrames& file) {
     const std::uint64_t share = options_.memory.maxBytes / std::uint64_t(workers_);
-    try {
-      const auto part = gate_.take(share);
-      return decodeWithin(i, share, file);
-    } catch (const MemoryExceeded&) {
-      if (workers_ == 1) throw;
-    }
+    if (!file.needsAll) try {
+        const auto part = gate_.take(share);
+        return decodeWithin(i, share, file);
+      } catch (const MemoryExceeded&) {
+        if (workers_ == 1) throw;
+        file.needsAll = options_.sequence->input.isWhole();
+      }
     const auto all = gate_.takeAll();
     decodeWithin(i, options_.memory.maxBytes, file);
   }

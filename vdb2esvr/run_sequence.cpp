@@ -107,6 +107,8 @@ SequenceRecord convertFrames(const Options& options, const CancelToken& cancel) 
 /// Converts the frames; if nothing can be converted, writes a report of the failure.
 SequenceRecord convertFramesOrReport(const Options& options, const CancelToken& cancel) try {
   return convertFrames(options, cancel);
+} catch (const UsageError&) {
+  throw;  // the report itself may be one of the files that must not be written
 } catch (const Error& error) {
   if (!options.report.empty())
     cli::writeJson({options.report, options.overwrite}, makeFailureReport(options, error));
@@ -129,6 +131,7 @@ int runSequence(const Options& options, const Ranks* ranks) {
         "sequence (--frames)");
   const cli::ThreadLimit threads(options.threads);
   const cli::Interrupts interrupts;
+  cli::requireSeparate(cli::filesOfInput(options.input.string()), {options.report});
   if (reportIsFile(options)) cli::checkOutput(options.report, {".json"}, options.overwrite);
   const SequenceRecord record = convertFramesOrReport(options, interrupts.token());
   tellSequence(options, record);
