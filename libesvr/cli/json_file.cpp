@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "core/atomic_file.h"
+#include "cli/bytes_file.h"
 
 namespace esvr::cli {
 namespace {
@@ -23,9 +23,7 @@ void writeJson(const JsonFile& file, const nlohmann::ordered_json& json) {
     std::cout << text;
     return;
   }
-  AtomicFile output(file.path, file.overwrite);
-  output.write(std::as_bytes(std::span(text)));
-  output.commit();
+  writeBytes(file.path, std::as_bytes(std::span(text)), file.overwrite);
 }
 
 }  // namespace esvr::cli

@@ -1,10 +1,12 @@
 #include "cli/output.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <system_error>
 
 #include "core/atomic_file.h"
+#include "core/publish_file.h"
 #include "esvr/error.h"
 
 namespace esvr::cli {
@@ -27,6 +29,13 @@ std::string alternatives(std::initializer_list<std::string_view> extensions) {
   return text;
 }
 
+/// False for files that are written by way of a name or in several steps.
+bool canBeWrittenDirectly(std::initializer_list<std::string_view> extensions) {
+  constexpr std::array<std::string_view, 5> kNotDirectly{".esvr", ".vdb", ".nvdb", ".mp4", ".webm"};
+  return std::find_first_of(extensions.begin(), extensions.end(), kNotDirectly.begin(),
+                            kNotDirectly.end()) == extensions.end();
+}
+
 }  // namespace
 
 void requireExtension(const fs::path& path, std::initializer_list<std::string_view> extensions) {
@@ -38,6 +47,7 @@ void requireExtension(const fs::path& path, std::initializer_list<std::string_vi
 
 void checkOutput(const fs::path& path, std::initializer_list<std::string_view> extensions,
                  bool overwrite) {
+  if (isWrittenDirectly(path) && canBeWrittenDirectly(extensions)) return;  // any name will do
   requireExtension(path, extensions);
   std::error_code unreadable;  // AtomicFile reports the reason
   if (!overwrite && fs::exists(path, unreadable))

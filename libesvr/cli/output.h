@@ -12,7 +12,8 @@ namespace esvr::cli {
 void requireExtension(const std::filesystem::path& path,
                       std::initializer_list<std::string_view> extensions);
 
-/// Checks before the work begins that a file can be written.
+/// Checks before the work begins that a file can be written. Reports and pictures may go to a
+/// device or a pipe of any name.
 /// \throws UsageError  the extension is another one
 /// \throws RuntimeFailure  the file exists (without `overwrite`) or is not writable
 void checkOutput(const std::filesystem::path& path,

@@ -43,6 +43,12 @@ fs::path followLinks(const fs::path& path) {
   return resolved.empty() ? path : resolved;
 }
 
+bool isWrittenDirectly(const fs::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) return false;
+  return S_ISCHR(status.st_mode) || S_ISFIFO(status.st_mode) || S_ISSOCK(status.st_mode);
+}
+
 bool checkTarget(const fs::path& target, bool overwrite) {
   struct stat status {};
   if (::lstat(target.c_str(), &status) != 0) return false;

@@ -15,6 +15,10 @@ inline constexpr mode_t kNewFileMode = 0666;
 /// The file that a path leads to, so that a symbolic link is not replaced.
 [[nodiscard]] std::filesystem::path followLinks(const std::filesystem::path& path);
 
+/// Whether a path leads to something that is written directly, because it cannot be replaced by a file: a
+/// device, a pipe or a socket, such as /dev/null, /dev/stdout or the >(...) of a shell.
+[[nodiscard]] bool isWrittenDirectly(const std::filesystem::path& path);
+
 /// Refuses a target that exists (without `overwrite`) or is not a regular file.
 /// \return whether it exists
 /// \throws RuntimeFailure
