@@ -222,6 +222,16 @@ void writeReport(const Options& options, const nlohmann::ordered_json& report) {
   if (!options.report.empty()) cli::writeJson({options.report, options.overwrite}, report);
 }
 
+/// Warns that a transform is not applied.
+void reportTransform(const Options& options, const std::vector<Scene>& scenes) {
+  if (voxelShape(scenes.front().transform.affine)) return;
+  cli::Log(kProgram, options.verbosity)
+      .warning(
+          options.input.string() + ", " + scenes.front().grid +
+          ": its transform is a frustum or has no inverse, and is not applied; voxels are drawn "
+          "as cubes");
+}
+
 void drawFrames(const Options& options, RenderOptions r, Drawing& drawing, Frames& frames) {
   const Vec3 pivot = pivotOf(options, drawing.scenes);  // of a turntable
   const Camera first = r.camera;
@@ -258,6 +268,7 @@ void drawSequence(const Options& options, const DrawSettings& settings, const Ca
   limits.carriedBytes = false;
   SequenceReader reader(options.input, limits);
   const auto all = scenesOfAll(options, file, reader);
+  reportTransform(options, all);
   RenderOptions r = renderOptions(options, all);
   r.cancel = &cancel;
   saveTransfer(options, r.transfer);
@@ -285,6 +296,7 @@ void run(const Options& options) {
                               options.shading.has_value(), options.memory};
   if (options.frames) return drawSequence(options, settings, interrupts.token());
   auto scenes = readScenes(sceneFile(options, options.input));
+  reportTransform(options, scenes);
   RenderOptions r = renderOptions(options, scenes);
   Drawing drawing(std::move(scenes), settings);
   const auto reference = referenceOf(options, settings);

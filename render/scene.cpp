@@ -103,6 +103,23 @@ std::optional<std::vector<Scene>> scenesBy(const EsvrFile& frame, const SceneFil
   return scenes.front().box.empty() ? std::nullopt : std::optional(std::move(scenes));
 }
 
+/// Whether a grid of ellipsoids has so much empty space between its voxels that the table of its blocks
+/// of 64^3 voxels, by which rays find bricks (render/brick_table.h), would be too large. Such a grid is
+/// decoded at once, and its bricks are found by a search.
+bool liesFarApart(const Scene& scene) {
+  constexpr double kMostBlocks = double(1 << 26);  // 256 MB
+  constexpr double kBlockSide = 64.0;
+  const auto* const field = std::get_if<Field>(&scene.content);
+  if (field == nullptr || !scene.encoded || fittedBetween(*field) == Between::kSum) return false;
+  const auto blocks = [](std::int32_t low, std::int32_t high) {
+    return (double(high) - double(low)) / kBlockSide + 2.0;
+  };
+  const Box& box = scene.box;
+  return blocks(box.min.x, box.max.x) * blocks(box.min.y, box.max.y) *
+             blocks(box.min.z, box.max.z) >
+         kMostBlocks;
+}
+
 std::string firstDrawable(const std::filesystem::path& path) {
   for (const auto& grid : inspectVdb(path).grids)
     if (grid.skipReason.empty() && grid.activeVoxels > 0) return grid.uniqueName;
@@ -185,8 +202,19 @@ DrawnGrid SceneRenderer::drawnGrid(const Scene& scene, const cli::HostMemory& me
 
 void SceneRenderer::drawAlone(const Scene& scene, const DrawSettings& s) {
   const bool isNano = !s.shaded && (s.device.kind == DeviceKind::kCuda || s.values);
-  const auto* const voxels = std::get_if<VolumeGrid>(&scene.content);
+  const auto* voxels = std::get_if<VolumeGrid>(&scene.content);
+  if (!voxels && liesFarApart(scene)) {
+    const StoredGrid& stored = *scene.encoded;
+    farApart_ = VolumeGrid{
+        stored.descriptor,
+        decodeGrid(stored, {.maxBytes = s.memory.maxBytes, .memory = s.memory.voxels}), 0};
+    voxels = &*farApart_;
+  }
   if (voxels && isNano) return sampleNano(*voxels, s);
+  if (farApart_) {
+    renderer_ = makeVolumeRenderer(farApart_->volume, s.device, s.limits);
+    return;
+  }
   const DrawnGrid grid = drawnGrid(scene, s.memory);
   if (const auto* const drawn = std::get_if<DrawnField>(&grid))
     renderer_ = makeFieldRenderer(*drawn->field, s.device, s.limits, drawn->voxels);

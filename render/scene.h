@@ -83,6 +83,7 @@ class SceneRenderer {
   void sampleNano(const VolumeGrid& grid, const DrawSettings& settings);
 
   std::deque<SparseVolume> decoded_;
+  std::optional<VolumeGrid> farApart_;
   NanoVolume nano_;
   std::unique_ptr<Renderer> renderer_;
 };

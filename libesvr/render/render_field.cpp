@@ -31,6 +31,7 @@ void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
   const Lists lists = ellipsoidsOfTiles(scene.ellipsoids, firstRow, tiles);
   tbb::parallel_for(0, tiles, [&](int t) {
     if (lists[t].empty()) return;
+    checkCancelled(scene.options);
     SumTile tile(scene, {t * kTileSide, firstRow});
     tile.draw(lists[t]);
     tile.copyTo(picture);
@@ -38,10 +39,10 @@ void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
 }
 
 Image renderSum(const Field& field, const RenderOptions& options, const RevoxeliseOptions& voxels) {
-  Picture picture(options);
+  const auto box = supportBox(field);
+  Picture picture(options, box.value_or(kNoPlaces));
   refuseShading(options);
-  if (const auto box = supportBox(field))
-    checkRayLength(binsWithin(*box, picture.view, options.step));
+  if (box) checkRayLength(binsWithin(*box, picture.view, options.step));
   const auto ellipsoids = visibleEllipsoids(field, picture.view, options.resolution);
   const auto origins = chunkOrigins(field);
   const TileScene scene{options,
