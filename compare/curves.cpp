@@ -84,6 +84,7 @@ void curves(const CurvesOptions& options) {
   TableRecord record = files.record();
   const TableScene scene = files.scene();
   CurvesRun(scene, record, log).run();
+  const Completion completion;  // finished rows are written after an interruption, too
   writeCurves(options.prefix, {options.table.reference, record, options.table.commandLine},
               options.overwrite);
   for (const auto& file : curveFiles(options.prefix, options.table.images.views > 0))

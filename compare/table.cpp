@@ -121,6 +121,7 @@ void table(const TableOptions& options) {
     log.warning("this build has no ZFP; the table has no rows for it");
   const TableScene scene = files.scene();
   TableRun(scene, record, log).run();
+  const Completion completion;  // finished rows are written after an interruption, too
   tell(options, record);
   requireAllRows(record);
 }

@@ -57,8 +57,9 @@ cli::ProgramText programText() {
           "The program prints a table on stdout. Its PSNR and largest error are measured on the "
           "voxels that are decoded from the written file.\n"
           "\n"
-          "Ctrl-C ends the fit, and the exit code is 1. --on-cancel chooses whether the best "
-          "result so far is written. A second Ctrl-C ends the program at once. OUT.esvr is never "
+          "Ctrl-C and SIGTERM end the run within two seconds, and the exit code is 1. --on-cancel "
+          "chooses whether the best result so far is written; a message says so if completing it "
+          "takes longer. A second Ctrl-C ends the program at once. OUT.esvr is never "
           "incomplete. With --resume, the same command continues a run that was interrupted.\n"
           "\n"
           "If OUT has a pattern, each frame of a sequence is converted as a file of its own, which "
@@ -87,7 +88,7 @@ cli::ProgramText programText() {
           "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report fit.json\n"
           "  vdb2esvr frame.vdb frame.esvr --skip velocity       # all grids but one\n"
           "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            # every voxel within the bound\n"
-          "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4 --resume\n"
+          "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4GB --resume\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255\n"
           "  vdb2esvr 'smoke.####.vdb' 'smoke.####.esvr' --frames 1-100 --missing hold\n"
           "  vdb2esvr 'smoke.####.vdb' smoke.esvr                # all frames in one file"};
@@ -156,8 +157,9 @@ void addFitOptions(cli::po::options_description& options) {
   cli::addDevice(options, {}, "; cuda:0,1 or cuda:all fit the chunks of a volume on several GPUs");
   // clang-format off
   options.add_options()
-    ("max-vram", value<double>()->value_name("GB"),
-     "GPU memory to use (default: all free memory); a volume that does not fit is fitted in chunks")
+    ("max-vram", value<std::string>()->value_name("BYTES"),
+     "GPU memory to use, for example 4GB or 64MB; a number below 1000000 without a unit is one of GB "
+     "(default: all free memory); a volume that does not fit is fitted in chunks")
     ("chunk-voxels", value<std::int64_t>()->value_name("N"),
      "fit the volume in chunks of about N active voxels (default: one chunk if it fits)");
   // clang-format on

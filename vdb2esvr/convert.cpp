@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cli/stopwatch.h"
+#include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "esvr/grid_names.h"
@@ -89,6 +90,35 @@ ConvertedGrid named(const FittedGrid& fitted) {
   return grid;
 }
 
+/// The errors that a summary needs.
+VolumeGrid measureValues(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
+  const CommonFitOptions& fit = options.convert.fit;
+  VolumeGrid decoded{.descriptor = source.descriptor,
+                     .volume = decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)})};
+  grid.metrics = compareVolumes(source.volume, decoded.volume, {.box = fit.box, .peak = fit.peak});
+  return decoded;
+}
+
+void measureAll(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
+  const VolumeGrid decoded = measureValues(options, source, grid);
+  grid.surface = surfaceErrors(source, decoded);
+  if (source.descriptor.gridClass == GridClass::kLevelSet)
+    grid.whyNoNarrowBand = whyNoNarrowBand(source.descriptor, source.volume);
+  grid.psnrBetween = errorBetween(source.volume, grid.stored(), options.convert.fit);
+  if (options.countHits) countHits(source.volume, grid);
+}
+
+/// Measures a conversion. If that is cancelled, the values only.
+void measure(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
+  try {
+    CancelScope::check();
+    return measureAll(options, source, grid);
+  } catch (const Cancelled&) {
+  }
+  const BestSoFar completion;
+  (void)measureValues(options, source, grid);
+}
+
 }  // namespace
 
 ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
@@ -113,16 +143,8 @@ ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
   if (options.job == Job::kPart) return grid;
 
-  const VolumeGrid decoded{
-      .descriptor = source.descriptor,
-      .volume = decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)})};
-  grid.metrics = compareVolumes(source.volume, decoded.volume, {.box = fit.box, .peak = fit.peak});
-  grid.surface = surfaceErrors(source, decoded);
-  if (source.descriptor.gridClass == GridClass::kLevelSet)
-    grid.whyNoNarrowBand = whyNoNarrowBand(source.descriptor, source.volume);
-  grid.psnrBetween = errorBetween(source.volume, grid.stored(), fit);
+  measure(options, source, grid);
   grid.seconds.measure = watch.lap();
-  if (options.countHits) countHits(source.volume, grid);
   return grid;
 }
 

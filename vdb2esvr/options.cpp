@@ -25,9 +25,8 @@ using cli::requireRange;
 constexpr std::int64_t kMaxIterations = 10'000'000;
 constexpr double kLongestRun = 1e9;  // seconds
 constexpr double kLargestRatio = 1e9;
-constexpr double kMaxLoss = 20.0;                  // dB
-constexpr double kMinVram = 1e-3, kMaxVram = 1e6;  // GB
-constexpr float kLargestKappa = 1e4f;              // kernel.h
+constexpr double kMaxLoss = 20.0;      // dB
+constexpr float kLargestKappa = 1e4f;  // kernel.h
 
 /// An option's number, which must be within [low, high], converted to another type.
 template <class To, class From>
@@ -57,8 +56,8 @@ FitOptions fitOptions(const Arguments& a) {
   fit.voxelShare = *bounded<double>(a, "voxel-share", 0.0, 1.0);
   if (!a.values["voxel-share"].defaulted() && fit.fitFor != FitFor::kDrawing)
     throw UsageError("--voxel-share needs --fit-for drawing");
-  if (const auto gigabytes = bounded<double>(a, "max-vram", kMinVram, kMaxVram))
-    fit.maxDeviceBytes = std::size_t(*gigabytes * 1e9);
+  if (const auto memory = a.find<std::string>("max-vram"))
+    fit.maxDeviceBytes = std::size_t(cli::parseDeviceMemory("max-vram", *memory));
   fit.chunkVoxels = bounded<std::uint64_t>(a, "chunk-voxels", std::int64_t{1},
                                            std::numeric_limits<std::int64_t>::max());
   fit.kappa = bounded<float>(a, "kappa", -kLargestKappa, kLargestKappa);

@@ -109,6 +109,9 @@ class FileConversion {
       throw RuntimeFailure("interrupted; " + whatIsLeft());
   }
 
+  /// The device of fits, which is another one if the first has failed.
+  [[nodiscard]] const Device& device() const { return options_.convert.fit.device; }
+
  private:
   [[nodiscard]] bool cancelled() const { return options_.convert.fit.cancel->cancelled(); }
 
@@ -119,9 +122,17 @@ class FileConversion {
            ", and the same command continues";
   }
 
-  void runOn(const std::vector<Device>& devices) {
-    options_.convert.fit.device = devices.front();
-    options_.convert.fit.parts = parts_.runOn(devices);
+  void runOn(std::vector<Device> devices) {
+    devices_ = std::move(devices);
+    options_.convert.fit.device = devices_.front();
+    options_.convert.fit.parts =
+        parts_.runOn(devices_, [this](const Device& device, const std::string& why) {
+          tellLost(device, why, "the other devices go on");
+        });
+  }
+
+  void tellLost(const Device& device, const std::string& why, const std::string& next) const {
+    log_.warning(deviceName(device) + " is not used any more: " + why + "; " + next);
   }
 
   /// \return false if the run was interrupted before the fit had a result
@@ -148,25 +159,38 @@ class FileConversion {
     return grid;
   }
 
-  /// Converts a grid. If the GPU that "auto" selected fails, for example because its memory is too
-  /// small, the CPU converts this grid and all later ones.
+  /// Converts a grid. If a device fails, for example because its memory is full, the next one of
+  /// several, or the CPU in place of the GPU that "auto" selected, converts this grid and all later ones.
   ConvertedGrid convertWhereItFits(const FittedGrid& fitted, std::optional<std::uint64_t> bytes) {
-    const bool onGpu = options_.convert.fit.device.kind == DeviceKind::kCuda;
-    if (options_.device != kAuto || !onGpu || parts_.haveRanks())
-      return convertGrid(options_, fitted, bytes);
-    try {
-      return convertGrid(options_, fitted, bytes);
-    } catch (const DeviceError& error) {
-      log_.warning(std::string(error.what()) + "; continuing on the CPU");
-      runOn({Device{}});
-      return convertGrid(options_, fitted, bytes);
+    for (;;) {
+      try {
+        return convertGrid(options_, fitted, bytes);
+      } catch (const DeviceError& error) {
+        if (!replaceDevice(error)) throw;
+      }
     }
+  }
+
+  /// \return false if there is no device to go on with
+  bool replaceDevice(const DeviceError& error) {
+    const Device failed = device();
+    if (parts_.haveRanks() || failed.kind == DeviceKind::kCpu) return false;
+    std::vector<Device> left = devices_;
+    std::erase(left, failed);
+    const bool toCpu = left.empty() && options_.device == kAuto;
+    if (toCpu) left = {Device{}};
+    if (left.empty()) return false;
+    tellLost(failed, error.what(),
+             toCpu ? "continuing on the CPU" : "continuing on " + deviceName(left.front()));
+    runOn(std::move(left));
+    return true;
   }
 
   Options options_;
   Parts& parts_;
   const cli::Log& log_;
-  std::future<void> started_;  ///< the device starts while the first grid is read; may be empty
+  std::vector<Device> devices_;  ///< those that have not failed
+  std::future<void> started_;    ///< the device starts while the first grid is read; may be empty
 };
 
 /// Gives the carried grids their places among those that the file holds.
@@ -193,12 +217,20 @@ EsvrFile assemble(std::vector<CarriedGrid> carried, const RunRecord& record) {
   return file;
 }
 
+/// The file, after vectors that are smaller unchanged were carried. An interrupted run tries none.
+EsvrFile carriedAndConverted(const Options& options, std::vector<CarriedGrid> carried,
+                             RunRecord& record) {
+  const Completion completion;
+  if (!record.interrupted) carrySmallerVectors(options, record, carried);
+  return assemble(std::move(carried), record);
+}
+
 void store(const Options& options, const EsvrFile& file, const StoreFile& store,
            RunRecord& record) {
   cli::Stopwatch watch;
   record.output = store(file);
   record.secondsWrite = watch.lap();
-  measureVectors(options, file, record);
+  if (!record.interrupted) measureVectors(options, file, record);
 }
 
 void tellResult(const Options& options, const RunRecord& record) {
@@ -263,10 +295,9 @@ Options besides(const std::vector<CarriedGrid>& carried, Options options) {
 }
 
 /// The options of conversions after the fits.
-Options optionsOfFits(Options options, const CancelToken& cancel,
-                      const std::vector<Device>& devices) {
+Options optionsOfFits(Options options, const CancelToken& cancel, const Device& device) {
   options.convert.fit.cancel = &cancel;
-  options.convert.fit.device = devices.front();
+  options.convert.fit.device = device;
   return options;
 }
 
@@ -290,6 +321,7 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   const cli::Log& log = run.log;
   cli::Stopwatch watch;
   RunRecord record;
+  const CancelScope scope(&cancel);
   auto devices = std::async(std::launch::async, [&] { return devicesFor(given, ranks); });
   record.input = inspectVdb(given.input);
   Options options = given;
@@ -303,16 +335,16 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   tellDevices(selected, options, log);
   findPeaks(besides(carried, options), choice.fitted);
   Parts parts(options, selected.front(), cancel, ranks);
-  FileConversion(besides(carried, options), selected, cancel, parts, log)
-      .run(choice.fitted, carried, record);
+  FileConversion conversion(besides(carried, options), selected, cancel, parts, log);
+  conversion.run(choice.fitted, carried, record);
   for (const auto& grid : record.grids) tellGrid(grid, log);
   if (options.job == Job::kPart) {
     if (!ranks) tellPart(options, record, log);
     return record;
   }
-  carrySmallerVectors(options, record, carried);
-  EsvrFile file = assemble(std::move(carried), record);
-  shareGrids(optionsOfFits(options, cancel, selected), choice.fitted, file, record);
+  EsvrFile file = carriedAndConverted(options, std::move(carried), record);
+  shareGrids(optionsOfFits(options, cancel, conversion.device()), choice.fitted, file, record);
+  const Completion completion;
   store(options, file, run.store, record);
   if (file.layout == FileLayout::kCompact) record.bytesSeparate = bytesWithoutSharing(file, record);
   if (!record.interrupted) parts.remove();
@@ -347,11 +379,25 @@ Options optionsOf(const Options& options, const Ranks* ranks) {
   return own;
 }
 
+/// MPI kills the ranks about two seconds after Ctrl-C.
+void tellWhatSurvives(const Options& options, const cli::Log& log) {
+  if (keepsParts(options))
+    log.info("if MPI ends this run early, its finished parts stay in " +
+             partsFolder(options).string() + ", and the same command continues");
+  else
+    log.info(
+        "if MPI ends this run early, it writes the best result so far if that takes less than two "
+        "seconds; --resume keeps the finished parts");
+}
+
 int runAs(const Options& options, Ranks* ranks) {
   const cli::Log log(kProgram, options.verbosity);
   const cli::ThreadLimit threads(options.threads);
-  const cli::Interrupts interrupts;
+  cli::Interrupts interrupts(ranks ? cli::FurtherSignals::kAreIgnored
+                                   : cli::FurtherSignals::kEndAtOnce);
+  if (options.onCancel == OnCancel::kDiscard) interrupts.discardResults();
   checkFiles(options);
+  if (ranks) tellWhatSurvives(options, log);
   const RunRecord record = convertOrReport(options, ranks, interrupts, log);
   if (options.job == Job::kPart) return 0;
   tellResult(options, record);

@@ -124,7 +124,8 @@ int runSequence(const Options& options, const Ranks* ranks) {
         "the ranks of MPI fit the chunks of one volume; give each process some frames of the "
         "sequence (--frames)");
   const cli::ThreadLimit threads(options.threads);
-  const cli::Interrupts interrupts;
+  cli::Interrupts interrupts;
+  if (options.onCancel == OnCancel::kDiscard) interrupts.discardResults();
   if (reportIsFile(options)) cli::checkOutput(options.report, {".json"}, options.overwrite);
   const SequenceRecord record = convertFramesOrReport(options, interrupts.token());
   tellSequence(options, record);

@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "cli/stopwatch.h"
+#include "esvr/error.h"
 #include "esvr/voxel_reference.h"
 
 namespace esvr::vdb2esvr {
@@ -28,7 +29,7 @@ class Sharing {
 
   void run() {
     for (std::size_t g = 0; g < record_.grids.size() && !isCancelled(); ++g)
-      if (mayShare(g)) share(g);
+      if (mayShare(g)) shareUnlessCancelled(g);
   }
 
  private:
@@ -52,6 +53,17 @@ class Sharing {
       if (mayShare(other) && file_.grids[other].descriptor.transform == transform)
         candidates.push_back(other);
     return candidates;
+  }
+
+  /// A grid whose sharing is cancelled stands alone.
+  void shareUnlessCancelled(std::size_t g) {
+    try {
+      CancelScope::check();
+      share(g);
+    } catch (const Cancelled&) {
+      file_.grids[g] = converted(g).stored();
+      converted(g).shared.reset();
+    }
   }
 
   void share(std::size_t g) {

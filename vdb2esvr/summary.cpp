@@ -134,7 +134,8 @@ void printVectors(const RunRecord& record, std::ostream& out) {
   if (record.vectors.empty()) return;
   cli::Table table({"vectors", "values", "bytes", "PSNR box", "active", "max error"});
   for (const ConvertedVector& vector : record.vectors) {
-    const VolumeMetrics& m = vector.metrics.magnitude;
+    if (!vector.metrics) continue;  // the run was interrupted
+    const VolumeMetrics& m = vector.metrics->magnitude;
     table.add({vector.uniqueName, vector.valueType, std::to_string(ownBytes(record.output, vector)),
                cli::decibels(m.psnrBox), cli::decibels(m.psnrActive),
                cli::shortNumber(m.maxError)});

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "core/atomic_file.h"
+#include "esvr/progress.h"
 
 namespace esvr::cli {
 namespace {
@@ -23,6 +24,7 @@ void writeJson(const JsonFile& file, const nlohmann::ordered_json& json) {
     std::cout << text;
     return;
   }
+  const Completion completion;  // a report tells of an interrupted run, too
   AtomicFile output(file.path, file.overwrite);
   output.write(std::as_bytes(std::span(text)));
   output.commit();

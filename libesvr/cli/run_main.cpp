@@ -26,6 +26,9 @@ int runMain(const std::string& program, const std::function<int()>& body) {
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes then gives an error, not a signal
   try {
     return runAndFlush(body);
+  } catch (const Cancelled& error) {
+    complain("interrupted; nothing was written");
+    return error.exitCode();
   } catch (const MemoryExceeded& error) {
     complain(error.what());
     std::cerr << "The option --max-memory allows more.\n";

@@ -1,9 +1,5 @@
 #include "esvr/voxel_layer.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -12,6 +8,7 @@
 #include <unordered_set>
 
 #include "codec/voxel_values.h"
+#include "core/parallel.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -59,7 +56,7 @@ void fill(const SparseVolume& volume, RoundedSigns signs, VoxelLayer& layer) {
   layer.active = volume.active;
   layer.vacant.resize(volume.brickCount());
   layer.codes = VoxelArray<std::int32_t>(volume.values.size(), memoryOf(volume));
-  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
     const auto values = volume.brickValues(b);
     for (int v = 0; v < kBrickVoxels; ++v) {
       if (!volume.active[b].test(v) && sameBits(values[v], volume.background))
@@ -110,7 +107,7 @@ void dropVacant(VoxelLayer& layer) {
 /// The voxels that differ from the background by more than a bound.
 std::vector<BrickMask> differing(const SparseVolume& volume, double bound) {
   std::vector<BrickMask> masks(volume.brickCount());
-  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
     const auto values = volume.brickValues(b);
     for (int v = 0; v < kBrickVoxels; ++v)
       if (std::abs(double(values[v]) - volume.background) > bound) masks[b].set(v);
@@ -120,7 +117,7 @@ std::vector<BrickMask> differing(const SparseVolume& volume, double bound) {
 
 /// Makes all voxels outside a box inactive.
 void clip(const SparseVolume& volume, const Box& box, std::vector<BrickMask>& masks) {
-  tbb::parallel_for(std::size_t{0}, masks.size(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, masks.size(), [&](std::size_t b) {
     const BrickMask all = masks[b];
     masks[b] = {};
     for (int v = 0; v < kBrickVoxels; ++v)
@@ -143,7 +140,7 @@ std::vector<BrickMask> withDiffering(const SparseVolume& volume, std::span<const
 void activate(const SparseVolume& volume, const std::vector<BrickMask>& active,
               const std::vector<BrickMask>& differing, VoxelLayer& layer) {
   const std::int32_t background = codec::codeOfValue(layer, volume.background);
-  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
     layer.active[b] = active[b];
     layer.vacant[b] = {};
     for (int v = 0; v < kBrickVoxels; ++v) {
@@ -205,7 +202,7 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
   volume.bricks = layer.bricks;
   volume.active = layer.active;
   volume.values = VoxelArray<float>(layer.codes.size(), layer.codes.get_allocator());
-  tbb::parallel_for(std::size_t{0}, layer.bricks.size(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, layer.bricks.size(), [&](std::size_t b) {
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
       const std::size_t i = b * kBrickVoxels + v;
       volume.values[i] = layer.vacant[b].test(int(v)) ? layer.background
@@ -240,7 +237,7 @@ double largestOver(const SparseVolume& a, std::size_t i, const SparseVolume& b) 
 double largestOver(const SparseVolume& a, const SparseVolume& b) {
   using BrickRange = tbb::blocked_range<std::size_t>;
   const auto largest = [](double x, double y) { return std::max(x, y); };
-  return tbb::parallel_reduce(
+  return parallelReduce(
       BrickRange(0, a.brickCount()), 0.0,
       [&](const BrickRange& bricks, double found) {
         for (std::size_t i = bricks.begin(); i != bricks.end(); ++i)

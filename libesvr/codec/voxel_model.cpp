@@ -1,7 +1,5 @@
 #include "codec/voxel_model.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <span>
@@ -10,6 +8,7 @@
 
 #include "core/axes.h"
 #include "core/brick_index.h"
+#include "core/parallel.h"
 
 namespace esvr::codec {
 namespace {
@@ -70,8 +69,8 @@ class MirrorSearch {
     if (samples_.empty() || extent > kMaxExtent) return VoxelModel::kNoMirror;
     const std::int32_t first = extent / 2;
     std::vector<std::size_t> counts(static_cast<std::size_t>(extent));
-    tbb::parallel_for(std::size_t{0}, counts.size(),
-                      [&](std::size_t n) { counts[n] = alike(axis, first + std::int32_t(n)); });
+    parallelFor(std::size_t{0}, counts.size(),
+                [&](std::size_t n) { counts[n] = alike(axis, first + std::int32_t(n)); });
     const auto most = std::max_element(counts.begin(), counts.end());
     if (double(*most) <= kAlike * double(samples_.size())) return VoxelModel::kNoMirror;
     return first + std::int32_t(most - counts.begin());

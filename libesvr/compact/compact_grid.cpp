@@ -136,9 +136,35 @@ CompactResult corrected(CompactResult best, const StoredGrid& grid, const Sparse
 
 }  // namespace
 
+namespace {
+
+CompactResult compactQuickly(const StoredGrid& grid, const SparseVolume& source,
+                             const CompactOptions& options) {
+  CompactResult result{grid, {}, 0.0, 0};
+  if (grid.field.ellipsoidCount() == 0) return result;
+  TrialMaker maker(withOneThreshold(grid), {.source = source,
+                                            .box = options.box.value_or(activeBox(source)),
+                                            .device = options.device,
+                                            .peak = options.peak,
+                                            .quick = true});
+  Trial chosen = options.bytes ? firstStepsFor(maker, *options.bytes)
+                               : firstStepsWithin(maker, allowedError(maker, options));
+  result.loss =
+      maker.error() > 0.0 ? 10.0 * std::log10(maker.measure(chosen) / maker.error()) : 0.0;
+  result.grid.layerErrors.clear();
+  result.grid.field = std::move(chosen.field);
+  result.grid.quantised = std::move(chosen.quantised);
+  result.steps = chosen.steps;
+  result.bytes = chosen.bytes;
+  return result;
+}
+
+}  // namespace
+
 CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                           const CompactOptions& options) {
   requireOneKappa(grid);
+  if (options.quick) return compactQuickly(grid, source, options);
   CompactResult result = compactOnce(grid, source, options);
   if (!options.psnr || hasOneThreshold(result.grid)) return result;
   return corrected(std::move(result), grid, source, options);

@@ -124,8 +124,7 @@ bool isPromising(const Job& job, double bound, std::uint64_t bytes, Smaller& bes
   return false;
 }
 
-/// Takes ellipsoids if they are smaller than the voxels or an option insists on them. A cancelled
-/// fit counts as one that found none, unless the option leaves no voxels to take instead.
+/// Takes ellipsoids if they are smaller than the voxels or an option insists on them.
 void tryEllipsoids(const Job& job, double bound, Smaller& best) {
   const std::uint64_t beside = bytesBesideVoxels(job.input);
   const std::uint64_t bytes = (best.choice.voxels->bytes - beside) / kEllipsoidBytesDivisor;
@@ -133,13 +132,19 @@ void tryEllipsoids(const Job& job, double bound, Smaller& best) {
     if (!best.insists && !isPromising(job, bound, bytes, best)) return std::nullopt;
     return withEllipsoids(job, bound, beside + bytes);
   };
-  auto found = best.insists ? fitted() : unlessCancelled(fitted);
-  if (found) best.take(std::move(*found));
+  if (auto found = fitted()) best.take(std::move(*found));
 }
 
+/// A cancellation counts as finding none, unless an option leaves no voxels to take instead.
 void tryTimed(const Job& job, double bound, Smaller& best) {
   best.residual.tried = true;
-  best.residual.seconds = secondsOf([&] { tryEllipsoids(job, bound, best); });
+  best.residual.seconds = secondsOf([&] {
+    const auto tried = [&] {
+      tryEllipsoids(job, bound, best);
+      return true;
+    };
+    (void)(best.insists ? tried() : unlessCancelled(tried));
+  });
 }
 
 }  // namespace
@@ -167,7 +172,11 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   const bool insists = job.options.representation == Representation::kEllipsoids;
   if (isNarrowBand(job.input.descriptor, source) && !insists) return voxels;
   Smaller best{std::move(voxels), {}, insists};
-  best.choice.voxels = Candidate{bytesAdded(best.conversion.grid)};
+  const auto bytes =
+      unlessCancelled([&] { return std::optional(bytesAdded(best.conversion.grid)); });
+  if (!bytes && insists) throw Cancelled();
+  if (!bytes) return std::move(best.conversion);
+  best.choice.voxels = Candidate{*bytes};
   if (job.options.representation != Representation::kVoxels) tryTimed(job, bound, best);
   if (insists && !best.hasEllipsoids())
     throw UsageError("grid '" + job.input.descriptor.name +

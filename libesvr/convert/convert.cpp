@@ -11,6 +11,7 @@
 #include "convert/narrow_band.h"
 #include "convert/preset.h"
 #include "convert/summable.h"
+#include "convert/unless_cancelled.h"
 #include "esvr/error.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
@@ -25,23 +26,16 @@ using convert::Job;
 /// Stores a fit in the form that the options determine.
 Conversion stored(const Job& job, FitResult fit, const CommonFitOptions& options) {
   const StorageOptions& storage = job.options.storage;
-  const ActivityOptions activity = convert::activityOf(job);
-  StoredGrid grid =
-      makeStoredGrid(job.input.descriptor, job.input.source, std::move(fit.field), activity);
+  StoredGrid grid = convert::storedGridOf(job, fit);
   grid.curve = withoutTimes(fit.curve);
-  Conversion conversion;
   if (storage.form == Storage::kFloat32) {
+    Conversion conversion;
     conversion.fit = std::move(fit);
     conversion.grid = std::move(grid);
     return conversion;
   }
-  CompactResult compact = compactGrid(grid, job.input.source,
-                                      {.loss = storage.loss,
-                                       .psnr = options.psnr,
-                                       .box = options.box,
-                                       .peak = options.peak,
-                                       .device = convert::rateControlDevice(fit, options.device),
-                                       .activity = activity});
+  CompactResult compact =
+      convert::compacted(job, grid, fit, {.loss = storage.loss, .psnr = options.psnr});
   return convert::conversionOf(std::move(fit), std::move(compact));
 }
 
@@ -75,7 +69,8 @@ class Converter {
   Job job_;
 };
 
-/// Encodes and decodes a grid, so that the caller gets the same grid as a reader of the file.
+/// Encodes and decodes a grid, so that the caller gets the same grid as a reader of the file. A
+/// cancelled conversion keeps the grid that is there.
 /// \param previous  the grid of the previous frame; null: the grid stands alone
 StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
                             const VoxelMemory& memory) {
@@ -83,8 +78,12 @@ StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
   file.grids.push_back(std::move(grid));
   if (previous) before.grids.push_back(*previous);
   const EsvrFile* const frame = previous ? &before : nullptr;
-  const auto bytes = encodeFrame(file, frame);
-  return std::move(decodeFrame(bytes, "the stored grid", {.memory = memory}, frame).grids.front());
+  auto read = convert::unlessCancelled([&] {
+    const auto bytes = encodeFrame(file, frame);
+    return std::optional(
+        std::move(decodeFrame(bytes, "the stored grid", {.memory = memory}, frame).grids.front()));
+  });
+  return read ? std::move(*read) : std::move(file.grids.front());
 }
 
 /// Checks the decoded grid against the bound.
@@ -100,6 +99,7 @@ void requirePromises(const Job& job, const StoredGrid& grid) {
   const SparseVolume& source = job.input.source;
   const auto bound = convert::boundOf(job.options.goal, source);
   if (!bound && !job.options.fit.narrowBand) return;
+  const BestSoFar completion;  // no grid is returned that was not checked
   const SparseVolume decoded = decodeGrid(grid, {.memory = memoryOf(source)});
   if (bound) requireBound(job.input, decoded, *bound);
   if (job.options.fit.narrowBand) convert::requireSigns(job.input, decoded);
@@ -185,12 +185,15 @@ double presetPsnr(Preset preset) {
 
 Conversion convertVolume(const ConvertInput& given, const ConvertOptions& options) {
   requirePossible(options);
+  const CancelScope scope(CancelScope::orToken(options.fit.cancel));
+  CancelScope::check();
   SimplifiedMasks::MakeExpected expected;
   if (options.previous) expected = [&] { return expectedMasks(given.source, *options.previous); };
   const SimplifiedMasks masks(given.source, std::move(expected));  // all attempts share them
   const ConvertInput input{given.descriptor, given.source,
                            given.simplified ? given.simplified : &masks};
   ConvertOptions own = options;
+  own.fit.cancel = CancelScope::token();
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
   if (own.fit.narrowBand) own.fit.fitFor = FitFor::kVoxels;
   if (own.fit.fitFor == FitFor::kDrawing) own.representation = Representation::kEllipsoids;
@@ -201,7 +204,9 @@ Conversion convertVolume(const ConvertInput& given, const ConvertOptions& option
   };
   Conversion conversion = own.fit.narrowBand ? convert::convertNarrowBand({input, own}, convertTo)
                                              : convertTo({input, own});
-  conversion.smallerExactBytes = smallerExactBytes({input, own}, conversion.grid);
+  conversion.smallerExactBytes = convert::unlessCancelled([&] {
+    return smallerExactBytes({input, own}, conversion.grid);
+  });
   conversion.grid =
       throughTheFormat(std::move(conversion.grid), own.previous, memoryOf(input.source));
   requirePromises({input, own}, conversion.grid);
@@ -219,8 +224,10 @@ PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions&
         "' is a level set; the paper's method cannot fit it, because its loss compares windows "
         "that a narrow band does not fill");
   if (const auto tooLarge = convert::tooLargeForSums(input.source)) refuseSums(input, *tooLarge);
+  const CancelScope scope(CancelScope::orToken(options.cancel));
   PaperFitResult made = fitByPaper(input.source, options);
   ConvertOptions own;
+  static_cast<CommonFitOptions&>(own.fit) = options;
   own.storage = storage;
   Conversion conversion = stored({input, own}, std::move(made.fit), options);
   conversion.grid = throughTheFormat(std::move(conversion.grid), nullptr, memoryOf(input.source));

@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "convert/exact_voxels.h"
+#include "convert/unless_cancelled.h"
 #include "esvr/empty_signs.h"
 #include "esvr/error.h"
 #include "esvr/residual.h"
@@ -20,8 +21,14 @@ constexpr int kMaxFitsForSize = 4;
 constexpr double kRoomFactor = 1.2;
 
 Conversion corrected(const Job& job, Conversion conversion) {
-  if (!conversion.grid.voxels && !conversion.grid.residual)
-    conversion.grid = withSigns(std::move(conversion.grid), job.input.source);
+  if (conversion.grid.voxels || conversion.grid.residual) return conversion;
+  auto grid =
+      unlessCancelled([&] { return std::optional(withSigns(conversion.grid, job.input.source)); });
+  if (!grid) {  // without these signs, the ellipsoids of a band are of no use
+    const BestSoFar completion;
+    grid = withSigns(std::move(conversion.grid), job.input.source);
+  }
+  conversion.grid = std::move(*grid);
   return conversion;
 }
 
@@ -66,7 +73,7 @@ std::optional<Conversion> bandAsVoxelsOfSize(const Job& job, const ConvertTo& co
 
 Conversion bandToSize(const Job& job, std::uint64_t bytes, const ConvertTo& convertTo) {
   Conversion made = corrected(job, convertTo(job));
-  if (bytesAdded(made.grid) <= bytes) return made;
+  if (bytesOfEllipsoids(made.grid) <= bytes) return made;
   if (auto fitted = withRoomForSigns(job, bytes, std::move(made), convertTo))
     return std::move(*fitted);
   const bool mayBeVoxels = mayStoreVoxels(job);
@@ -91,7 +98,11 @@ Conversion convertNarrowBand(const Job& job, const ConvertTo& convertTo) {
   if (const auto* size = std::get_if<SizeGoal>(&job.options.goal))
     return bandToSize(job, size->bytes, convertTo);
   Conversion made = corrected(job, convertTo(job));
-  return voxelsAreSmaller(job, made) ? bandAsVoxels(job, convertTo) : std::move(made);
+  auto smaller = unlessCancelled([&]() -> std::optional<Conversion> {
+    if (isCancelled(job) || !voxelsAreSmaller(job, made)) return std::nullopt;
+    return bandAsVoxels(job, convertTo);
+  });
+  return smaller ? std::move(*smaller) : std::move(made);
 }
 
 void requireSigns(const ConvertInput& input, const SparseVolume& decoded) {

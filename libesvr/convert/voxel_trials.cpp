@@ -1,6 +1,5 @@
 #include "convert/voxel_trials.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 #include <tbb/task_arena.h>
 
@@ -10,6 +9,8 @@
 #include <vector>
 
 #include "convert/octave_search.h"
+#include "convert/unless_cancelled.h"
+#include "core/parallel.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 
@@ -88,9 +89,12 @@ std::optional<Trial> VoxelTrials::coarsestFor(double psnr, double firstOctave, d
   OctaveSearch search(psnr + 0.3 * kPsnrTolerance, kDbPerOctave, firstOctave);
   std::optional<Trial> best;
   for (int n = 0; n < maxTrials && !search.ended(); ++n) {
-    Trial now = tryBound(boundAt(search.next()), price);
-    search.learn(now.psnr);
-    if (now.psnr >= psnr && (!best || now.bound > best->bound)) best = std::move(now);
+    auto now = unlessCancelled(
+        [&]() -> std::optional<Trial> { return tryBound(boundAt(search.next()), price); });
+    if (!now && best) break;
+    if (!now) throw Cancelled();
+    search.learn(now->psnr);
+    if (now->psnr >= psnr && (!best || now->bound > best->bound)) best = std::move(*now);
     if (best && best->psnr < psnr + kPsnrTolerance) break;
   }
   return best;
@@ -108,7 +112,10 @@ double VoxelTrials::fewestLevels(double psnr, double bound) const {
     reaches[n] = tryBound(boundOf(to + double(n)), 0.0).psnr >= psnr;
   };
   tbb::task_arena arena(trialsAtOnce());
-  arena.execute([&] { tbb::parallel_for(std::size_t{0}, reaches.size(), tryLevels); });
+  arena.execute([&, token = CancelScope::token()] {
+    const CancelScope scope(token);
+    parallelFor(std::size_t{0}, reaches.size(), tryLevels);
+  });
   const auto first = std::find(reaches.begin(), reaches.end(), true);
   return first == reaches.end() ? 0.0 : to + double(first - reaches.begin());
 }

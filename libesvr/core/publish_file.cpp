@@ -4,12 +4,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <string>
 #include <system_error>
 
 #include "esvr/error.h"
+#include "esvr/progress.h"
 
 namespace esvr {
 namespace {
@@ -62,8 +64,11 @@ void failAt(const char* what, const fs::path& path, int error) {
 }
 
 void writeAll(int fd, std::span<const std::byte> bytes, const fs::path& path) {
+  constexpr std::size_t kPiece = std::size_t{1}
+                                 << 24;  // a slow disk takes a tenth of a second for it
   while (!bytes.empty()) {
-    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
+    CancelScope::check();
+    const ssize_t n = ::write(fd, bytes.data(), std::min(bytes.size(), kPiece));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) failAt("cannot write ", path, errno);
     bytes = bytes.subspan(std::size_t(n));

@@ -1,12 +1,10 @@
 #include "esvr/sparse_volume.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <bit>
 #include <stdexcept>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -54,7 +52,7 @@ void addActive(const BrickMask& mask, Coord corner, Box& box) {
 template <class Result, class Add>
 Result overBricks(const SparseVolume& volume, const Result& none, Add add) {
   using BrickRange = tbb::blocked_range<std::size_t>;
-  return tbb::parallel_reduce(
+  return parallelReduce(
       BrickRange(0, volume.brickCount()), none,
       [&](const BrickRange& bricks, Result result) {
         for (std::size_t b = bricks.begin(); b != bricks.end(); ++b) add(b, result);

@@ -129,6 +129,7 @@ std::optional<std::vector<std::byte>> PartStore::find(const PartKey& key) const 
 
 void PartStore::put(const PartKey& key, std::span<const std::byte> result) {
   const ResultHead head{.bytes = result.size(), .hash = XXH3_64bits(result.data(), result.size())};
+  const Completion completion;  // a part that is complete is kept
   AtomicFile file(fileOf(key, kResult), true);
   file.write(std::as_bytes(std::span(&head, 1)));
   file.write(result);

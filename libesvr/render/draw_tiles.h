@@ -2,10 +2,10 @@
 /// Draws the tiles of a picture in parallel on the CPU.
 
 #include <tbb/blocked_range2d.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 
+#include "core/parallel.h"
 #include "render/picture.h"
 #include "render/tile_ranges.h"
 
@@ -29,7 +29,7 @@ void drawTiles(const RenderOptions& options, const TileRanges& ranges, Picture& 
         picture.set(column, row, colorOf(column, row, samples));
   };
   using Tiles = tbb::blocked_range2d<int>;
-  tbb::parallel_for(Tiles(0, ranges.rows(), 0, ranges.columns()), [&](const Tiles& tiles) {
+  parallelFor(Tiles(0, ranges.rows(), 0, ranges.columns()), [&](const Tiles& tiles) {
     checkCancelled(options);
     for (int row = tiles.rows().begin(); row != tiles.rows().end(); ++row)
       for (int column = tiles.cols().begin(); column != tiles.cols().end(); ++column)

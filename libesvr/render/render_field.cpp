@@ -1,5 +1,5 @@
-#include <tbb/parallel_for.h>
 
+#include "core/parallel.h"
 #include "esvr/render.h"
 #include "render/picture.h"
 #include "render/render_cells.h"
@@ -29,7 +29,7 @@ Lists ellipsoidsOfTiles(const VisibleEllipsoids& ellipsoids, int firstRow, int t
 void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
   const int tiles = tilesAlong(scene.options.resolution.width);
   const Lists lists = ellipsoidsOfTiles(scene.ellipsoids, firstRow, tiles);
-  tbb::parallel_for(0, tiles, [&](int t) {
+  parallelFor(0, tiles, [&](int t) {
     if (lists[t].empty()) return;
     SumTile tile(scene, {t * kTileSide, firstRow});
     tile.draw(lists[t]);
@@ -50,7 +50,7 @@ Image renderSum(const Field& field, const RenderOptions& options, const Revoxeli
                         origins,
                         sampleRule(options, picture.table.view(), field.background),
                         makeVoxelRule(field.background, voxels)};
-  tbb::parallel_for(0, tilesAlong(options.resolution.height), [&](int row) {
+  parallelFor(0, tilesAlong(options.resolution.height), [&](int row) {
     checkCancelled(options);
     drawRow(scene, row * kTileSide, picture);
   });

@@ -1,8 +1,7 @@
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <stdexcept>
 
+#include "core/parallel.h"
 #include "esvr/renderer.h"
 #include "render/nano_box.h"
 #include "render/nano_march.h"
@@ -16,7 +15,7 @@ void drawAs(const NanoVolume& volume, const RenderOptions& o, Picture& picture) 
   const auto& grid = *reinterpret_cast<const nanovdb::NanoGrid<Build>*>(volume.data.get());
   const MarchScene scene{picture.view, sampledBox(volume), o.step, clipOf(o),
                          sampleRule(o, picture.table.view(), volume.background)};
-  tbb::parallel_for(tbb::blocked_range<int>(0, o.resolution.height), [&](const auto& rows) {
+  parallelFor(tbb::blocked_range<int>(0, o.resolution.height), [&](const auto& rows) {
     for (int row = rows.begin(); row != rows.end(); ++row) {
       checkCancelled(o);
       for (int column = 0; column < o.resolution.width; ++column)

@@ -1,10 +1,9 @@
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "core/parallel.h"
 #include "render/level_tables.h"
 #include "render/render_levels.h"
 #include "render/scene_depth.h"
@@ -147,7 +146,7 @@ Image renderLevels(VolumeLevels& levels, const RenderOptions& options) {
   Picture picture(options);
   if (levels[0].bricks.empty()) return picture.take();
   const VolumePicture pixel(levels, options, picture);
-  tbb::parallel_for(tbb::blocked_range<int>(0, options.resolution.height), [&](const auto& rows) {
+  parallelFor(tbb::blocked_range<int>(0, options.resolution.height), [&](const auto& rows) {
     for (int row = rows.begin(); row != rows.end(); ++row) {
       checkCancelled(options);
       for (int column = 0; column < options.resolution.width; ++column)

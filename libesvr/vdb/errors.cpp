@@ -13,6 +13,8 @@ namespace {
 void rethrowCommon(const std::string& where) {
   try {
     throw;
+  } catch (const Cancelled&) {
+    throw;
   } catch (const BadInput& e) {
     throw BadInput(where + e.what());
   } catch (const UsageError& e) {

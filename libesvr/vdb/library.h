@@ -68,7 +68,8 @@ class Library {
 /// \throws RuntimeFailure  the module is to be loaded, and cannot be
 [[nodiscard]] const Library& library();
 
-/// The file name of the module, and the C function in it that returns the `const Library*`.
+/// The file name of the module, and the C function in it that returns the `const Library*`. It takes the
+/// program's CancelSlot, so that the loops of the module are cancelled like those of the program.
 inline constexpr const char* kModule = "esvr_vdb.so";
 inline constexpr const char* kModuleFunction = "esvrVdbLibrary";
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/parallel.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/vector_grid.h"
 
@@ -56,7 +57,10 @@ class StreamedGrid : public openvdb::Grid<Tree> {
   StreamedGrid(Voxels voxels, const Value& background, bool constantTiles)
       : openvdb::Grid<Tree>(background), voxels_(std::move(voxels)) {
     openvdb::tree::ValueAccessor<Tree> accessor(this->tree());
-    for (std::size_t b = 0; b < voxels_.bricks().brickCount(); ++b) add(b, constantTiles, accessor);
+    for (std::size_t b = 0; b < voxels_.bricks().brickCount(); ++b) {
+      throwIfCancelled();
+      add(b, constantTiles, accessor);
+    }
     if (constantTiles) mergeTiles();
   }
 
@@ -67,6 +71,7 @@ class StreamedGrid : public openvdb::Grid<Tree> {
 
   void writeBuffers(std::ostream& stream) const override {
     for (auto leaf = this->tree().cbeginLeaf(); leaf; ++leaf) {
+      throwIfCancelled();
       const Coord corner{leaf->origin().x(), leaf->origin().y(), leaf->origin().z()};
       const auto b =
           findBrick(voxels_.bricks(), brickOf(corner) - brickOf(voxels_.bricks().origin));

@@ -8,6 +8,7 @@
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/io.h>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "vdb/brick_filler.h"
 #include "vdb/tree_walk.h"
@@ -151,8 +152,14 @@ class VoxelReader {
     SparseVolume volume = layOutBricks(topology_.bricks, rules, memory);
     topology_.bricks = {};
     file_.seek(file_.position());  // OpenVDB reads on from there
-    for (const Coord corner : topology_.leaves) readLeaf(corner, rules, volume, tally);
-    for (const TileSource& tile : topology_.activeTiles) fillTile(tile, volume, tally);
+    for (const Coord corner : topology_.leaves) {
+      throwIfCancelled();
+      readLeaf(corner, rules, volume, tally);
+    }
+    for (const TileSource& tile : topology_.activeTiles) {
+      throwIfCancelled();
+      fillTile(tile, volume, tally);
+    }
     return volume;
   }
 

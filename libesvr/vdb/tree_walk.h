@@ -13,6 +13,7 @@
 #include <set>
 #include <string>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/sparse_volume.h"
 #include "vdb/input_file.h"
@@ -124,6 +125,7 @@ class TreeWalk {
   }
 
   void lowerNode(Coord corner) {
+    throwIfCancelled();
     const auto children = nodeHead<LowerMask, kLowerLog2>(corner, kBrickSide);
     children.forEachSet(
         [&](std::size_t n) { leaf(cellCorner<kLowerLog2>(corner, n, kBrickSide)); });

@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "esvr/metrics.h"
+#include "python/src/interruptible.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
@@ -22,8 +23,7 @@ VolumeMetrics compare(const Side& reference, const Side& candidate,
   const Volume a = voxelsOf(reference), b = voxelsOf(candidate);
   CompareOptions options{.peak = peak, .ssim = ssim};
   if (box) options.box = boxOf(*box);
-  const py::gil_scoped_release release;
-  return compareVolumes(a.grid->volume, b.grid->volume, options);
+  return interruptible([&] { return compareVolumes(a.grid->volume, b.grid->volume, options); });
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "esvr/error.h"
 #include "esvr/sequence_file.h"
+#include "python/src/interruptible.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
@@ -65,8 +66,9 @@ EsvrFile readPart(const std::filesystem::path& path, const Part& part) {
 
 File read(const std::filesystem::path& path, const std::optional<PlainBox>& box,
           const std::optional<std::size_t>& ellipsoids, const std::optional<std::int64_t>& frame) {
-  const py::gil_scoped_release release;
-  return {std::make_shared<const EsvrFile>(readPart(path, {box, ellipsoids, frame}))};
+  return interruptible([&] {
+    return File{std::make_shared<const EsvrFile>(readPart(path, {box, ellipsoids, frame}))};
+  });
 }
 
 std::vector<std::int64_t> numbersOf(const SequenceReader& reader) {
@@ -76,9 +78,10 @@ std::vector<std::int64_t> numbersOf(const SequenceReader& reader) {
 }
 
 std::vector<std::int64_t> framesOf(const std::filesystem::path& path) {
-  const py::gil_scoped_release release;
-  if (!holdsSequence(path)) return {};
-  return numbersOf(SequenceReader(path));
+  return interruptible([&]() -> std::vector<std::int64_t> {
+    if (!holdsSequence(path)) return {};
+    return numbersOf(SequenceReader(path));
+  });
 }
 
 /// A reader that threads of Python may share.
@@ -90,26 +93,27 @@ struct Sequence {
 };
 
 File readOfSequence(Sequence& self, std::int64_t frame) {
-  const py::gil_scoped_release release;
-  const std::lock_guard lock(self.reads);
-  return {std::make_shared<const EsvrFile>(self.reader.read(frame))};
+  return interruptible([&] {
+    const std::lock_guard lock(self.reads);
+    return File{std::make_shared<const EsvrFile>(self.reader.read(frame))};
+  });
 }
 
 std::uint64_t writeFile(const std::filesystem::path& path, const File& file, bool overwrite) {
-  const py::gil_scoped_release release;
-  return writeEsvr(path, *file.file, {.overwrite = overwrite});
+  return interruptible([&] { return writeEsvr(path, *file.file, {.overwrite = overwrite}); });
 }
 
 std::uint64_t writeGridList(const std::filesystem::path& path, const std::vector<Grid>& grids,
                             bool overwrite) {
-  const py::gil_scoped_release release;
-  EsvrFile file;
-  for (const Grid& grid : grids) {
-    file.grids.push_back(*grid.grid);
-    // The other grid may not be there. It only made the voxels smaller.
-    file.grids.back().reference.reset();
-  }
-  return writeEsvr(path, file, {.overwrite = overwrite});
+  return interruptible([&] {
+    EsvrFile file;
+    for (const Grid& grid : grids) {
+      file.grids.push_back(*grid.grid);
+      // The other grid may not be there. It only made the voxels smaller.
+      file.grids.back().reference.reset();
+    }
+    return writeEsvr(path, file, {.overwrite = overwrite});
+  });
 }
 
 std::string fileText(const File& self) {
@@ -132,8 +136,9 @@ void addFiles(py::module_& module) {
           [](const File& file, const std::filesystem::path& path,
              const std::optional<PlainBox>& box, const std::optional<std::size_t>& layers,
              const std::optional<std::size_t>& maxEllipsoids, bool overwrite) {
-            const py::gil_scoped_release release;
-            return saveFile(file, path, {box, layers, maxEllipsoids}, overwrite);
+            return interruptible([&] {
+              return saveFile(file, path, {box, layers, maxEllipsoids}, overwrite);
+            });
           },
           py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
           py::arg("layers") = py::none(), py::arg("max_ellipsoids") = py::none(),

@@ -96,8 +96,10 @@ Grid fitVolume(const Volume& volume, const ConvertOptions& options, const Progre
   Reporter reporter(progress, token);
   ConvertOptions reporting = options;
   if (progress) reporting.fit.progress = std::ref(reporter);
-  auto running = std::async(std::launch::async,
-                            [&] { return convertWith(volume, std::move(reporting), token); });
+  auto running = std::async(std::launch::async, [&] {
+    const CancelScope scope(&token);
+    return convertWith(volume, std::move(reporting), token);
+  });
   Conversion conversion;
   try {
     conversion = waitFor(running, token);

@@ -78,10 +78,11 @@ py::array_t<float> evaluate(const Grid& self, const Places& points) {
   const std::span places(reinterpret_cast<const Place*>(points.data()),
                          std::size_t(points.shape(0)));
   const std::span out(values.mutable_data(), places.size());
-  const py::gil_scoped_release release;
-  evaluatePlaces(grid.field, places, out);
-  if (const auto range = voxelRule(grid).range)
-    for (float& value : out) value = std::clamp(value, range->min, range->max);
+  interruptible([&] {
+    evaluatePlaces(grid.field, places, out);
+    if (const auto range = voxelRule(grid).range)
+      for (float& value : out) value = std::clamp(value, range->min, range->max);
+  });
   return values;
 }
 
@@ -133,9 +134,10 @@ Volume decoded(const Grid& grid, const std::optional<PlainBox>& box) {
   DecodeOptions options;
   if (box) options.box = boxOf(*box);
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
-  const py::gil_scoped_release release;
-  return {std::make_shared<const VolumeGrid>(
-      VolumeGrid{grid.grid->descriptor, decodeGrid(*grid.grid, options)})};
+  return interruptible([&] {
+    return Volume{std::make_shared<const VolumeGrid>(
+        VolumeGrid{grid.grid->descriptor, decodeGrid(*grid.grid, options)})};
+  });
 }
 
 void addGrid(py::module_& module) {

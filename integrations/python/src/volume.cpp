@@ -9,6 +9,7 @@
 
 #include "esvr/error.h"
 #include "esvr/grid_names.h"
+#include "python/src/interruptible.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
@@ -143,21 +144,25 @@ std::string firstOfNumbers(const std::filesystem::path& path) {
 }
 
 Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name) {
-  const py::gil_scoped_release release;
-  return {std::make_shared<const VolumeGrid>(readGrid(path, name ? *name : firstOfNumbers(path)))};
+  return interruptible([&] {
+    return Volume{
+        std::make_shared<const VolumeGrid>(readGrid(path, name ? *name : firstOfNumbers(path)))};
+  });
 }
 
 /// The only grid of a file, which may have no active voxel.
 Volume fromOnlyGrid(const std::filesystem::path& path) {
-  const py::gil_scoped_release release;
-  const std::string name = inspectVdb(path).grids.at(0).uniqueName;
-  return {std::make_shared<const VolumeGrid>(readGrid(path, name, {.allowEmpty = true}))};
+  return interruptible([&] {
+    const std::string name = inspectVdb(path).grids.at(0).uniqueName;
+    return Volume{std::make_shared<const VolumeGrid>(readGrid(path, name, {.allowEmpty = true}))};
+  });
 }
 
 void write(const Volume& self, const std::filesystem::path& path, const WriteOptions& options) {
-  const py::gil_scoped_release release;
-  const GridToWrite grid = self.grid.get();
-  writeGrids(path, {}, std::span(&grid, 1), options);
+  interruptible([&] {
+    const GridToWrite grid = self.grid.get();
+    writeGrids(path, {}, std::span(&grid, 1), options);
+  });
 }
 
 }  // namespace

@@ -98,6 +98,8 @@ struct StoredPartsOptions {
   PartShare share{};
   bool mergeOnly = false;  ///< parts are not fitted; all must be there
   const CancelToken* cancel = nullptr;
+  LostDevice
+      onLost{};  ///< is told when a device fails and the others do its parts; it may be empty
 };
 
 /// Takes the results of parts from a store, and fits those that are not there.
