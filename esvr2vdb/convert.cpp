@@ -228,7 +228,7 @@ ReadLimits limitsOf(const Options& options) {
 }
 
 void convert(const Options& options) {
-  const cli::Interrupts interrupts;  // Ctrl-C lets a file that is being written be completed
+  const cli::Interrupts interrupts;
   checkFiles(options);
   convertFile(options, interrupts.token(), cli::Log(kProgram, options.verbosity), std::cout);
 }

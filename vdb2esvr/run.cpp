@@ -151,8 +151,11 @@ class FileConversion {
   ConvertedGrid convertToShare(std::size_t g, const FittedGrid& fitted, ByteShares& shares) {
     std::optional<std::uint64_t> bytes = shares.of(g);
     ConvertedGrid grid = convertWhereItFits(fitted, bytes);
-    while (const std::uint64_t excess = shares.take(g, grid.stored())) {
-      if (cancelled()) break;
+    const auto excessOf = [&]() -> std::uint64_t {
+      const BestSoFar completion;
+      return cancelled() ? 0 : shares.take(g, grid.stored());  // no grid follows an interrupted one
+    };
+    while (const std::uint64_t excess = excessOf()) {
       bytes = *bytes - std::min(*bytes, excess);
       grid = convertWhereItFits(fitted, bytes);
     }
@@ -379,15 +382,16 @@ Options optionsOf(const Options& options, const Ranks* ranks) {
   return own;
 }
 
-/// MPI kills the ranks about two seconds after Ctrl-C.
+/// Open MPI kills the ranks a second after it has told them to end.
 void tellWhatSurvives(const Options& options, const cli::Log& log) {
   if (keepsParts(options))
-    log.info("if MPI ends this run early, its finished parts stay in " +
-             partsFolder(options).string() + ", and the same command continues");
-  else
-    log.info(
-        "if MPI ends this run early, it writes the best result so far if that takes less than two "
-        "seconds; --resume keeps the finished parts");
+    return log.info("if MPI ends this run early, its finished parts stay in " +
+                    partsFolder(options).string() + ", and the same command continues");
+  log.info(
+      "if MPI ends this run early, the best result so far is written if that takes less than the "
+      "second that Open MPI leaves (OMPI_MCA_odls_base_sigkill_timeout=10 leaves 10); --resume "
+      "keeps "
+      "the finished parts in any case");
 }
 
 int runAs(const Options& options, Ranks* ranks) {
@@ -399,7 +403,10 @@ int runAs(const Options& options, Ranks* ranks) {
   checkFiles(options);
   if (ranks) tellWhatSurvives(options, log);
   const RunRecord record = convertOrReport(options, ranks, interrupts, log);
-  if (options.job == Job::kPart) return 0;
+  if (options.job == Job::kPart) {
+    if (ranks && record.interrupted) throw RuntimeFailure("interrupted");  // as rank 0 does
+    return 0;
+  }
   tellResult(options, record);
   throwWhatIsAmiss(options, record);
   return 0;

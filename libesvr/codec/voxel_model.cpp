@@ -35,6 +35,7 @@ std::vector<std::int32_t> commonCodes(const VoxelLayer& layer) {
   std::unordered_map<std::int32_t, std::size_t> counts;
   std::size_t voxels = 0;
   for (std::size_t i = 0; i < layer.codes.size(); ++i) {
+    if (i % kBrickVoxels == 0) throwIfCancelled();
     if (vacantAt(layer, i)) continue;
     ++counts[layer.codes[i]];
     ++voxels;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "compact/residual_layer.h"
+#include "core/parallel.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "field/active_region.h"
@@ -122,6 +123,7 @@ std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& sour
   const std::vector<float> emptyBrick(kBrickVoxels, source.background);
   std::vector<BrickCodes> bricks;
   for (std::size_t b = 0; b < corners.size(); ++b) {
+    throwIfCancelled();
     const auto at = findBrick(source, brickOf(corners[b]) - brickOf(source.origin));
     BrickCodes brick{corners[b], {}};
     const BrickMask region = regionIn(rule, corners[b]).within;

@@ -28,6 +28,7 @@ class RanksTest : public test::FolderTest {
     for (const char* name : {"OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM",
                              "OMPI_MCA_rmaps_base_oversubscribe"})
       ::setenv(name, "1", 1);
+    ::setenv("OMPI_MCA_odls_base_sigkill_timeout", "10", 1);  // the machine may be busy
     test::writeInput(at("in.vdb"), {{.voxels = test::cloud(8)}});
   }
   [[nodiscard]] std::vector<std::string> conversion(const std::string& name,

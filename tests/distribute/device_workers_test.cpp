@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <barrier>
 #include <string>
 #include <vector>
@@ -50,12 +51,18 @@ class PartsForOthers : public test::FakeParts {
  public:
   PartsForOthers(std::size_t count, const Device& full) : FakeParts(count), full_(full) {}
   [[nodiscard]] PartOutput fit(std::size_t part, const Device& device) const override {
-    if (device == full_) throw DeviceError("it is full");
+    if (device == full_) {
+      hasFailed_ = true;
+      hasFailed_.notify_all();
+      throw DeviceError("it is full");
+    }
+    hasFailed_.wait(false);  // the others do not do all parts before it begins
     return FakeParts::fit(part, device);
   }
 
  private:
   Device full_;
+  mutable std::atomic<bool> hasFailed_{false};
 };
 
 const Device kFirst{DeviceKind::kCuda, 0}, kSecond{DeviceKind::kCuda, 1};
