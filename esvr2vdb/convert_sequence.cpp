@@ -158,8 +158,7 @@ class SequenceDecoding {
     own.memory.maxBytes = maxBytes;
     own.input = frame.input, own.output = frame.output;
     if (own.reference)
-      own.reference = cli::FramePattern::in(own.reference->string())->at(frame.number);
-    const cli::FrameFolder folder(own.output);
+      own.reference = cli::FramePattern::ofInput(own.reference->string())->toRead(frame.number);
     const cli::Log log = warnings_.logOf(frame, kProgram, own.verbosity);
     std::ostringstream table;
     if (options_.sequence->input.isWhole())
@@ -213,7 +212,7 @@ class SequenceDecoding {
 void convertSequence(const Options& options) {
   const cli::Interrupts interrupts;
   const cli::Sequence& sequence = *options.sequence;
-  const auto frames = cli::planFrames(sequence);
+  const auto frames = cli::planFrames(sequence, cli::Log(kProgram, options.verbosity));
   cli::checkFrameOutputs(sequence, frames, {{".vdb", ".nvdb"}, options.write.overwrite});
   SequenceDecoding(options, frames, interrupts.token()).run();
 }

@@ -239,6 +239,8 @@ PartOfFile readForList(const Options& options) {
 }  // namespace
 
 void list(const Options& options) {
+  if (const auto pattern = cli::FramePattern::ofInput(options.input.string()))
+    return listFrames(options, *pattern);
   const auto extension = options.input.extension();
   if (extension == ".vdb" || extension == ".nvdb") return listVdb(options);
   if (holdsSequence(options.input)) return listSequence(options);

@@ -63,7 +63,6 @@ class SequenceConversion {
   void convert(FrameRecord& record, int worker) {
     if (keep(record)) return;
     const Options own = conversion_.optionsOf(record.frame, worker);
-    const cli::FrameFolder folder(own.output);
     conversion_.convert(own, record, writingTo(own));
   }
 
@@ -92,7 +91,7 @@ class SequenceConversion {
 
 SequenceRecord convertFrames(const Options& options, const CancelToken& cancel) {
   const cli::Sequence& sequence = *options.sequence;
-  const auto frames = cli::planFrames(sequence);
+  const auto frames = cli::planFrames(sequence, cli::Log(kProgram, options.verbosity));
   const bool isOneFile = sequence.output.isWhole();
   const bool mayExist = options.overwrite || (options.resume && !isOneFile);
   cli::checkFrameOutputs(sequence, frames, {{".esvr"}, mayExist});

@@ -14,6 +14,7 @@
 #include "cli/command_line.h"
 #include "cli/frame_pattern.h"
 #include "cli/frame_range.h"
+#include "cli/log.h"
 
 namespace esvr::cli {
 
@@ -57,6 +58,10 @@ void addSequenceOptions(po::options_description& options);
 /// \throws BadInput  as for framesInFile
 [[nodiscard]] std::optional<Sequence> readSequence(const Arguments& arguments, WholeFiles allowed);
 
+/// The frames of a pattern.
+/// \throws BadInput  there are none; the text names what looks like frames
+[[nodiscard]] FrameListing framesOnDisk(const FramePattern& input);
+
 /// A frame of a sequence.
 struct Frame {
   FrameNumber number = 0;
@@ -66,10 +71,10 @@ struct Frame {
 };
 
 /// The frames of a sequence in the order in which they are named, or by increasing numbers if the
-/// output is one file.
+/// output is one file. A warning says which names look like frames and are none.
 /// \throws BadInput  no frame exists; or frames are missing, and MissingFrame::kError is wanted, or
 ///                   there is no frame to hold. The text names them
-[[nodiscard]] std::vector<Frame> planFrames(const Sequence& sequence);
+[[nodiscard]] std::vector<Frame> planFrames(const Sequence& sequence, const Log& log);
 
 /// The frames that hold a frame, by the index of that frame.
 [[nodiscard]] std::multimap<std::size_t, std::size_t> holdersOf(const std::vector<Frame>& frames);

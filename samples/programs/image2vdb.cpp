@@ -205,6 +205,7 @@ int run(int argc, char** argv) {
   if (files.outOfOrder)
     log.warning(
         "the slices are in the order given, which is not that of the numbers in their names");
+  if (!files.hint.empty()) log.warning(files.hint);
   const cli::ThreadLimit threads(arguments->threads);
   const cli::Interrupts interrupts;
   samples::ImageVolume made = volumeOf(

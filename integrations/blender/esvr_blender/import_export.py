@@ -37,6 +37,13 @@ def report_failures(operator, results):
     return len(failures) < len(results)
 
 
+def report_left_out(operator, request):
+    """Warns of files that look like frames of the source and are none."""
+    hint = request.source.hint(request.settings.frames)
+    if hint:
+        operator.report({"WARNING"}, hint)
+
+
 class ImportESVR(JobOperator, bpy.types.Operator, ImportHelper):
     """Import .esvr files as volumes"""
     bl_idname = "import_volume.esvr"
@@ -76,6 +83,7 @@ class ImportESVR(JobOperator, bpy.types.Operator, ImportHelper):
         for request, entry in zip(self._requests, result):
             if not isinstance(entry, JobFailed):
                 add_volume(context, request, entry)
+                report_left_out(self, request)
         return report_failures(self, result)
 
     def _paths(self):
@@ -123,6 +131,8 @@ class ReloadESVR(JobOperator, bpy.types.Operator):
                 self.report({"ERROR"}, f"{volume.name}: {error}")
         if not requests:
             return {"FINISHED"}
+        for request in requests.values():
+            report_left_out(self, request)
         self._changed = list(requests)  # names, because a volume may be removed in the meantime
         return self.run(context, Job(lambda job: decode_all(job, requests.values())))
 

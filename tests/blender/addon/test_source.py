@@ -25,6 +25,16 @@ def test_a_pattern_has_the_files_of_its_very_names(tmp_path):
     assert source.stem == "s"
 
 
+def test_files_that_look_like_frames_are_named(tmp_path):
+    touch(tmp_path, "s.0007.esvr", "s.0010.esvr", "s.0010.txt", "t.1.esvr", "s.a.esvr")
+    source = Source(str(tmp_path / "s.####.esvr"))
+    assert source.hint() == ""
+    touch(tmp_path, "s.9.esvr", "s.-003.esvr", "s.0008.50.esvr")
+    assert "s.-003.esvr and 2 more" in source.hint()
+    assert "s.9.esvr looked" in source.hint((9, 10)) and source.hint((10, 20)) == ""
+    assert Source(str(tmp_path / "s.9.esvr")).hint() == ""
+
+
 @pytest.mark.parametrize("pattern, name", [("s#.esvr", "s0003.esvr"), ("s@.esvr", "s3.esvr"), ("s@@.esvr", "s03.esvr"),
                                            ("s##.esvr", "s03.esvr")])
 def test_patterns_mean_what_they_mean_to_the_programs(tmp_path, pattern, name):
