@@ -16,6 +16,7 @@
 #include "esvr/image_metrics.h"
 #include "esvr/memory_limit.h"
 #include "esvr/sequence_file.h"
+#include "esvr/vdb_io.h"
 #include "render/bench.h"
 #include "render/exr_file.h"
 #include "render/output_files.h"
@@ -238,13 +239,53 @@ void saveTransfer(const Options& options, const TransferFunction& transfer) {
   cli::writeBytes(options.saveTransfer, std::as_bytes(std::span(text)), options.overwrite);
 }
 
+/// The frames of the input: in one file, or a file each.
+class InputFrames {
+ public:
+  explicit InputFrames(const Options& options)
+      : options_(options), file_(sceneFile(options, options.input)) {
+    if (options.pattern) return;
+    ReadLimits limits{options.memory.maxBytes, options.memory.voxels};
+    limits.carriedBytes = false;
+    reader_.emplace(options.input, limits);
+  }
+
+  /// The grids of a frame; nothing if it has nothing active to draw.
+  std::optional<std::vector<Scene>> scenes(cli::FrameNumber frame) {
+    if (reader_) return scenesOf(reader_->read(frame), file_);
+    return place(frame) ? readFrame(file_) : std::nullopt;
+  }
+  /// The same without their content.
+  std::optional<std::vector<Scene>> outlines(cli::FrameNumber frame) {
+    if (reader_) return outlinesOf(reader_->read(frame), file_);
+    return place(frame) ? readFrameOutlines(file_) : std::nullopt;
+  }
+
+ private:
+  /// Sets the file of a frame. Unless the options name a grid, all frames of .vdb files draw the
+  /// grid of one name, which is the first that can be drawn in any of them.
+  /// \return false if the frame does not have this grid
+  bool place(cli::FrameNumber frame) {
+    file_.path = options_.pattern->toRead(frame);
+    if (options_.grid || file_.path.extension() == ".esvr") return true;
+    if (!file_.grid) file_.grid = firstDrawable(file_.path);
+    if (!file_.grid) return false;
+    return std::ranges::any_of(inspectVdb(file_.path).grids, [&](const GridSummary& grid) {
+      return grid.uniqueName == *file_.grid;
+    });
+  }
+
+  const Options& options_;
+  SceneFile file_;
+  std::optional<SequenceReader> reader_;
+};
+
 /// Scenes that enclose those of all frames, so that camera and transfer functions do not change from
 /// frame to frame.
-std::vector<Scene> scenesOfAll(const Options& options, const SceneFile& file,
-                               SequenceReader& reader) {
+std::vector<Scene> scenesOfAll(const Options& options, InputFrames& input) {
   std::optional<std::vector<Scene>> all;
   for (const cli::FrameNumber frame : *options.frames) {
-    auto scenes = outlinesOf(reader.read(frame), file);
+    auto scenes = input.outlines(frame);
     if (scenes && all) enclose(*scenes, *all);
     if (!all) all = std::move(scenes);
   }
@@ -253,18 +294,18 @@ std::vector<Scene> scenesOfAll(const Options& options, const SceneFile& file,
 }
 
 void drawSequence(const Options& options, const DrawSettings& settings, const CancelToken& cancel) {
-  const SceneFile file = sceneFile(options, options.input);
-  ReadLimits limits{options.memory.maxBytes, options.memory.voxels};
-  limits.carriedBytes = false;
-  SequenceReader reader(options.input, limits);
-  const auto all = scenesOfAll(options, file, reader);
+  if (!options.frameHint.empty())
+    cli::Log(kProgram, options.verbosity)
+        .warning(options.input.string() + ": " + options.frameHint);
+  InputFrames input(options);
+  const auto all = scenesOfAll(options, input);
   RenderOptions r = renderOptions(options, all);
   r.cancel = &cancel;
   saveTransfer(options, r.transfer);
   Frames frames(options, all, nullptr, cancel);
   for (const cli::FrameNumber frame : *options.frames) {
     const PictureFiles files = filesOfFrame(options, frame);
-    auto scenes = scenesOf(reader.read(frame), file);
+    auto scenes = input.scenes(frame);
     if (!scenes) {
       frames.drawNothing(r, files);
       continue;

@@ -103,29 +103,35 @@ std::optional<std::vector<Scene>> scenesBy(const EsvrFile& frame, const SceneFil
   return scenes.front().box.empty() ? std::nullopt : std::optional(std::move(scenes));
 }
 
-std::string firstDrawable(const std::filesystem::path& path) {
-  for (const auto& grid : inspectVdb(path).grids)
-    if (grid.skipReason.empty() && grid.activeVoxels > 0) return grid.uniqueName;
+/// \throws BadInput  no grid can be drawn
+std::string requiredDrawable(const std::filesystem::path& path) {
+  if (auto name = firstDrawable(path)) return std::move(*name);
   throw BadInput(path.string() + ": no grid that can be drawn");
 }
 
-Scene voxels(const SceneFile& from, const std::string& name) {
-  VolumeGrid grid =
-      readGrid(from.path, name, {.maxBytes = from.memory.maxBytes, .memory = from.memory.voxels});
+/// A grid of a .vdb or .nvdb file, which may have no active voxel.
+Scene voxelsOrNone(const SceneFile& from, const std::string& name, bool allowEmpty) {
+  ReadOptions options{.maxBytes = from.memory.maxBytes, .memory = from.memory.voxels};
+  options.allowEmpty = allowEmpty;
+  VolumeGrid grid = readGrid(from.path, name, options);
   Scene scene;
   scene.grid = grid.descriptor.name;
   scene.unit = unitOf(grid.descriptor);
   scene.transform = grid.descriptor.transform;
   scene.box = activeBox(grid.volume);
-  scene.data = activeRange(grid.volume);
+  if (!scene.box.empty()) scene.data = activeRange(grid.volume);
   scene.background = grid.volume.background;
   scene.isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet;
   scene.content = std::move(grid);
   return scene;
 }
 
+Scene voxels(const SceneFile& from, const std::string& name) {
+  return voxelsOrNone(from, name, false);
+}
+
 std::vector<Scene> voxels(const SceneFile& from) {
-  std::vector<Scene> scenes{voxels(from, from.grid ? *from.grid : firstDrawable(from.path))};
+  std::vector<Scene> scenes{voxels(from, from.grid ? *from.grid : requiredDrawable(from.path))};
   for (const std::string& name : from.with) scenes.push_back(voxels(from, name));
   return scenes;
 }
@@ -153,6 +159,44 @@ std::optional<std::vector<Scene>> outlinesOf(const EsvrFile& frame, const SceneF
     scene.content = std::move(field);
     return scene;
   });
+}
+
+std::optional<std::string> firstDrawable(const std::filesystem::path& path) {
+  for (const auto& grid : inspectVdb(path).grids)
+    if (grid.skipReason.empty() && grid.activeVoxels > 0) return grid.uniqueName;
+  return std::nullopt;
+}
+
+namespace {
+
+EsvrFile readFrameFile(const SceneFile& file) {
+  ReadLimits limits{file.memory.maxBytes, file.memory.voxels};
+  limits.carriedBytes = false;
+  return readEsvr(file.path, limits);
+}
+
+std::optional<std::vector<Scene>> voxelsOfFrame(const SceneFile& file) {
+  const auto first = file.grid ? file.grid : firstDrawable(file.path);
+  if (!first || inspectVdb(file.path).grids.empty()) return std::nullopt;
+  std::vector<Scene> scenes{voxelsOrNone(file, *first, true)};
+  for (const std::string& name : file.with) scenes.push_back(voxelsOrNone(file, name, true));
+  requireOneTransform(scenes, file.path);
+  return scenes.front().box.empty() ? std::nullopt : std::optional(std::move(scenes));
+}
+
+}  // namespace
+
+std::optional<std::vector<Scene>> readFrame(const SceneFile& file) {
+  return file.path.extension() == ".esvr" ? scenesOf(readFrameFile(file), file)
+                                          : voxelsOfFrame(file);
+}
+
+std::optional<std::vector<Scene>> readFrameOutlines(const SceneFile& file) {
+  if (file.path.extension() == ".esvr") return outlinesOf(readFrameFile(file), file);
+  auto scenes = voxelsOfFrame(file);
+  if (scenes)
+    for (Scene& scene : *scenes) scene.content = VolumeGrid{};
+  return scenes;
 }
 
 void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes) {

@@ -49,7 +49,16 @@ struct SceneFile {
 [[nodiscard]] std::optional<std::vector<Scene>> scenesOf(const EsvrFile& frame,
                                                          const SceneFile& file);
 
-/// The same without the voxels that the grids may store, which is enough for a camera and transfer
+/// The grids of a frame that is a file of its own, otherwise as scenesOf.
+[[nodiscard]] std::optional<std::vector<Scene>> readFrame(const SceneFile& file);
+
+/// The same without voxels and ellipsoids, as outlinesOf.
+[[nodiscard]] std::optional<std::vector<Scene>> readFrameOutlines(const SceneFile& file);
+
+/// The name of the first grid of a .vdb or .nvdb file that can be drawn; nothing if there is none.
+[[nodiscard]] std::optional<std::string> firstDrawable(const std::filesystem::path& path);
+
+/// The same as scenesOf without the voxels that the grids may store, which is enough for a camera and transfer
 /// functions.
 [[nodiscard]] std::optional<std::vector<Scene>> outlinesOf(const EsvrFile& frame,
                                                            const SceneFile& file);

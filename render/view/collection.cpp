@@ -92,6 +92,10 @@ const auto& at(const List& list, std::size_t index, const std::string& what) {
 }  // namespace
 
 ShownFile showFile(const fs::path& path, const cli::HostMemory& memory) {
+  if (cli::FramePattern::ofInput(path.string()))
+    throw BadInput(path.string() +
+                   " is a pattern for files of one frame each; esvr-view shows sequences that are "
+                   "in one file, which vdb2esvr writes if its output has no pattern");
   ShownFile file{path, 0, {}, {}};
   const render::SceneFile from{path, {}, {}, memory};
   if (cli::framesInFile(path))
