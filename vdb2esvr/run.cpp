@@ -313,8 +313,10 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   carrySmallerVectors(options, record, carried);
   EsvrFile file = assemble(std::move(carried), record);
   shareGrids(optionsOfFits(options, cancel, selected), choice.fitted, file, record);
+  const bool isShared = file.layout == FileLayout::kCompact;
+  if (!file.carried.empty()) file.layout = FileLayout::kCompact;  // each has two small sections
   store(options, file, run.store, record);
-  if (file.layout == FileLayout::kCompact) record.bytesSeparate = bytesWithoutSharing(file, record);
+  if (isShared) record.bytesSeparate = bytesWithoutSharing(file, record);
   if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();
   return record;

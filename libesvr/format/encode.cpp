@@ -255,7 +255,7 @@ void addRecords(SectionWriter& out, const std::vector<SortedGrid>& grids,
 /// Checks a file and collects its sections.
 /// \param differences  for each grid: its difference from the previous frame, which replaces it
 SectionWriter collect(const EsvrFile& file, const Differences& differences,
-                      const Inherited& inherited) {
+                      const Inherited& inherited, FileLayout layout) {
   (void)gridsInOrder(file);  // refuses places that are impossible
   checkVectors(file);
   std::vector<SortedGrid> grids;
@@ -266,7 +266,7 @@ SectionWriter collect(const EsvrFile& file, const Differences& differences,
 
   // Records come first, so that one read at the beginning of the file is enough to list it.
   SectionWriter out;
-  out.setLayout(file.layout);
+  out.setLayout(layout);
   if (!inherited.metadata) addFileMetadata(out, file);
   addRecords(out, grids, differences);
   for (std::uint32_t g = 0; g < grids.size(); ++g)
@@ -289,8 +289,8 @@ SectionWriter collect(const EsvrFile& file, const Differences& differences,
 
 namespace format {
 
-SectionWriter sectionsOf(const EsvrFile& file) {
-  return collect(file, Differences(file.grids.size()), {});
+SectionWriter sectionsOf(const EsvrFile& file, FileLayout layout) {
+  return collect(file, Differences(file.grids.size()), {}, layout);
 }
 
 std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
@@ -322,7 +322,7 @@ std::optional<FrameSections> collectDifferences(const EsvrFile& frame, const Esv
   }
   if (!any) return std::nullopt;
   const Inherited inherited = inheritedFrom(previous, frame);
-  return FrameSections{collect(frame, differences, inherited), inherited};
+  return FrameSections{collect(frame, differences, inherited, frame.layout), inherited};
 }
 
 std::uint64_t frameBytesOf(const std::optional<FrameSections>& frame) {
@@ -348,12 +348,15 @@ std::optional<FrameSections> differencesOf(const EsvrFile& frame, const EsvrFile
 
 }  // namespace format
 
-std::vector<std::byte> encodeEsvr(const EsvrFile& file) { return sectionsOf(file).assemble(); }
+std::vector<std::byte> encodeEsvr(const EsvrFile& file) {
+  return sectionsOf(file, file.layout).assemble();
+}
 
 std::uint64_t writeEsvr(const std::filesystem::path& path, const EsvrFile& file,
                         const ContainerWriteOptions& options) {
   AtomicFile out(path, options.overwrite);  // refuses an existing file before anything is encoded
-  const std::uint64_t bytes = sectionsOf(file).writeTo([&](auto piece) { out.write(piece); });
+  const std::uint64_t bytes =
+      sectionsOf(file, file.layout).writeTo([&](auto piece) { out.write(piece); });
   out.commit();
   return bytes;
 }
@@ -364,7 +367,7 @@ std::uint64_t bytesBesideGrids(const std::vector<MetaItem>& metadata) {
 
 std::uint64_t bytesAdded(const StoredGrid& grid) {
   const EsvrFile file{{}, {grid}};
-  return sectionsOf(file).bytesUnshared();
+  return sectionsOf(file, FileLayout::kPlain).bytesUnshared();
 }
 
 std::uint64_t bytesAdded(const EsvrFile& file, std::size_t grid) {

@@ -11,7 +11,7 @@ namespace esvr::format {
 
 /// The sections of a file, which must outlive them.
 /// \throws RuntimeFailure  as for encodeEsvr
-[[nodiscard]] SectionWriter sectionsOf(const EsvrFile& file);
+[[nodiscard]] SectionWriter sectionsOf(const EsvrFile& file, FileLayout layout);
 
 /// The sections of a frame that refers to the previous one.
 struct FrameSections {

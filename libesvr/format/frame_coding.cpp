@@ -11,7 +11,8 @@ std::vector<std::byte> encodeFrame(const EsvrFile& frame, const EsvrFile* previo
   if (previous)
     if (auto differences = format::differencesOf(frame, *previous))
       return differences->sections.assembleFrame(differences->inherited);
-  return encodeEsvr(frame);
+  // A sequence has many small frames, so that each saves rows of its table where it can.
+  return format::sectionsOf(frame, FileLayout::kCompact).assemble();
 }
 
 EsvrFile decodeFrame(std::span<const std::byte> bytes, const std::string& nameForErrors,
