@@ -20,6 +20,7 @@ namespace py = pybind11;
 /// esvr.Volume: voxels and the other properties of their grid. It does not change after it was made.
 struct Volume {
   std::shared_ptr<const VolumeGrid> grid;
+  std::uint64_t roundedValues = 0;  ///< active voxels whose number was rounded to a float
 };
 
 /// esvr.File: the content of an .esvr file.
